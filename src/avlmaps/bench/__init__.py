@@ -1,0 +1,1 @@
+"""Measuring quality: the tables behind `avlmaps bench`."""

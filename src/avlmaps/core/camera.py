@@ -1,0 +1,86 @@
+"""Pinhole cameras: OpenCV axes (x right, y down, z forward), the centre of pixel (u, v) at (u + 0.5, v + 0.5)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+
+@dataclass(frozen=True, slots=True)
+class Pinhole:
+    """A pinhole camera without distortion.
+
+    Attributes:
+        fx: focal length along the columns, pixels.
+        fy: focal length along the rows, pixels.
+        cx: column of the principal point, pixels (the image's middle is ``width / 2``).
+        cy: row of the principal point, pixels.
+        width: columns of the image.
+        height: rows of the image.
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+
+    def __post_init__(self) -> None:
+        numbers = (self.fx, self.fy, self.cx, self.cy)
+        if not np.isfinite(numbers).all() or self.fx <= 0 or self.fy <= 0:
+            raise ValueError(f"a camera needs finite numbers and positive focal lengths, not {numbers}")
+        if self.width < 1 or self.height < 1:
+            raise ValueError(f"a camera needs at least one pixel, not {self.width}x{self.height}")
+
+    @property
+    def matrix(self) -> Float[np.ndarray, "3 3"]:
+        """The 3x3 calibration matrix K."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    def resized(self, width: int, height: int) -> "Pinhole":
+        """Return the camera of the same picture sampled at another size."""
+        sx, sy = width / self.width, height / self.height
+        return Pinhole(self.fx * sx, self.fy * sy, self.cx * sx, self.cy * sy, width, height)
+
+    def project(self, points_camera: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 2"]:
+        """Return image coordinates (u, v) in pixels of points in front of the camera (z > 0), in metres."""
+        z = points_camera[..., 2]
+        u = self.fx * points_camera[..., 0] / z + self.cx
+        v = self.fy * points_camera[..., 1] / z + self.cy
+        return np.stack([u, v], axis=-1)
+
+    def rays(self) -> Float[np.ndarray, "h w 3"]:
+        """Return for each pixel's centre the camera-frame direction with z = 1."""
+        x = (np.arange(self.width) + 0.5 - self.cx) / self.fx
+        y = (np.arange(self.height) + 0.5 - self.cy) / self.fy
+        grid = np.ones((self.height, self.width, 3))
+        grid[..., 0], grid[..., 1] = x[None, :], y[:, None]
+        return grid
+
+    def backproject(self, depth_m: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w 3"]:
+        """Return camera-frame points, in metres, of a z-depth image; depth 0 gives the origin."""
+        if depth_m.shape != (self.height, self.width):
+            raise ValueError(f"depth has shape {depth_m.shape}; this camera has {(self.height, self.width)}")
+        return self.rays() * depth_m[..., None]
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """The colour and the depth camera of a robot, and how they sit to one another.
+
+    Attributes:
+        rgb: camera of the colour pictures.
+        depth: camera of the depth pictures. The pose of a frame is that of this camera.
+        rgb_from_depth: 4x4; the identity where depth was registered to colour.
+    """
+
+    rgb: Pinhole
+    depth: Pinhole
+    rgb_from_depth: Float[np.ndarray, "4 4"] = field(default_factory=lambda: np.eye(4))
+
+    @property
+    def registered(self) -> bool:
+        """Whether a depth pixel and the colour pixel at the same place of the picture see the same thing."""
+        same_view = self.rgb == self.depth.resized(self.rgb.width, self.rgb.height)
+        return same_view and np.array_equal(self.rgb_from_depth, np.eye(4))

@@ -1,0 +1,30 @@
+"""The one family of errors that a user can meet.
+
+Every error is one sentence: what failed, with which numbers or names, and what to do next. The command line
+prints it without a traceback and exits 1. Mistakes of a programmer (wrong shapes, wrong types) stay
+``ValueError`` and ``TypeError``.
+"""
+
+
+class AvlmapsError(Exception):
+    """Base of every error that a user can cause and mend."""
+
+
+class RecordingError(AvlmapsError):
+    """A recording cannot be read: a missing frame, a truncated file, a pose that is no pose."""
+
+
+class AudioError(AvlmapsError):
+    """A sound or an audio track cannot be read or used."""
+
+
+class MapError(AvlmapsError):
+    """A map cannot be built, opened or merged: another schema, another profile, a damaged file."""
+
+
+class BackendError(AvlmapsError):
+    """A model backend is unknown, not installed or does not fit what it is asked to do."""
+
+
+class QueryError(AvlmapsError):
+    """A question cannot be asked of this map: an empty phrase, an unreadable picture, a missing modality."""

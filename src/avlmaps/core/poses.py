@@ -1,0 +1,123 @@
+"""Rigid transforms as 4x4 float64 matrices, named ``to_from`` (``world_from_camera`` maps camera to world).
+
+Quaternions are x y z w. Batches are leading axes.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.errors import RecordingError
+
+# A rotation read from a file may be this far from orthonormal (largest entry of RᵀR − I) and still be
+# taken for a rotation written with too few digits; real data (7-Scenes) is off by 2e-4.
+MAX_ROTATION_FAULT = 0.05
+
+
+def orthonormalized(
+    world_from_camera: Float[np.ndarray, "4 4"], name: str, max_fault: float = MAX_ROTATION_FAULT
+) -> Float[np.ndarray, "4 4"]:
+    """Return the pose with its rotation replaced by the nearest one (in the Frobenius norm).
+
+    Args:
+        world_from_camera: 4x4 pose as read from a file.
+        name: what the pose belongs to, for the error's sentence (such as ``frame 000012``).
+        max_fault: largest entry of RᵀR − I that still counts as rounding.
+
+    Raises:
+        RecordingError: the pose holds NaN or infinity, is no rigid transform, mirrors, or is off by more.
+    """
+    if world_from_camera.shape != (4, 4):
+        raise RecordingError(f"The pose of {name} has shape {world_from_camera.shape}; it must be 4x4.")
+    if not np.isfinite(world_from_camera).all():
+        raise RecordingError(f"The pose of {name} holds NaN or infinity; remove that frame or mend its pose.")
+    rotation = world_from_camera[:3, :3]
+    fault = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
+    bottom_is_right = np.allclose(world_from_camera[3], (0.0, 0.0, 0.0, 1.0), atol=1e-6)
+    if fault > max_fault or np.linalg.det(rotation) < 0.0 or not bottom_is_right:
+        raise RecordingError(
+            f"The pose of {name} is not a rigid transform (its rotation is off orthonormal by {fault:.3g}, determinant "
+            f"{np.linalg.det(rotation):.3g}; at most {max_fault} passes for rounding); mend it or leave the frame out."
+        )
+    u, _, vt = np.linalg.svd(rotation)
+    pose = np.eye(4)
+    pose[:3, :3] = u @ vt
+    pose[:3, 3] = world_from_camera[:3, 3]
+    return pose
+
+
+def inverse(b_from_a: Float[np.ndarray, "*batch 4 4"]) -> Float[np.ndarray, "*batch 4 4"]:
+    """Return ``a_from_b`` of a rigid ``b_from_a``, exactly (no general inverse)."""
+    a_from_b = np.zeros_like(b_from_a)
+    transposed = np.swapaxes(b_from_a[..., :3, :3], -1, -2)
+    a_from_b[..., :3, :3] = transposed
+    a_from_b[..., :3, 3] = -np.einsum("...ij,...j->...i", transposed, b_from_a[..., :3, 3])
+    a_from_b[..., 3, 3] = 1.0
+    return a_from_b
+
+
+def apply(b_from_a: Float[np.ndarray, "4 4"], points_a: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+    """Map points from frame a to frame b."""
+    return points_a @ b_from_a[:3, :3].T + b_from_a[:3, 3]
+
+
+def from_quaternion(
+    translation: Float[np.ndarray, "*n 3"], quaternion_xyzw: Float[np.ndarray, "*n 4"]
+) -> Float[np.ndarray, "*n 4 4"]:
+    """Build poses from translations (metres) and quaternions x y z w (any positive norm).
+
+    Raises:
+        ValueError: a quaternion has norm zero.
+    """
+    norm = np.linalg.norm(quaternion_xyzw, axis=-1, keepdims=True)
+    if np.any(norm == 0.0):
+        raise ValueError("a quaternion has norm 0")
+    x, y, z, w = np.moveaxis(quaternion_xyzw / norm, -1, 0)
+    pose = np.zeros((*translation.shape[:-1], 4, 4))
+    pose[..., 0, 0], pose[..., 0, 1], pose[..., 0, 2] = (
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - z * w),
+        2 * (x * z + y * w),
+    )
+    pose[..., 1, 0], pose[..., 1, 1], pose[..., 1, 2] = (
+        2 * (x * y + z * w),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - x * w),
+    )
+    pose[..., 2, 0], pose[..., 2, 1], pose[..., 2, 2] = (
+        2 * (x * z - y * w),
+        2 * (y * z + x * w),
+        1 - 2 * (x * x + y * y),
+    )
+    pose[..., :3, 3] = translation
+    pose[..., 3, 3] = 1.0
+    return pose
+
+
+def to_quaternion(b_from_a: Float[np.ndarray, "*n 4 4"]) -> Float[np.ndarray, "*n 4"]:
+    """Return unit quaternions x y z w with w >= 0."""
+    from scipy.spatial.transform import Rotation
+
+    flat = Rotation.from_matrix(b_from_a[..., :3, :3].reshape(-1, 3, 3)).as_quat(canonical=True)
+    return flat.reshape(*b_from_a.shape[:-2], 4)
+
+
+def rotation_to_level(up_in_world: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """Return the smallest rotation that takes the up direction to +z; the identity where up is +z already.
+
+    The level frame shares the world's origin. Horizontal distances and top-down pictures live there.
+    """
+    up = up_in_world / np.linalg.norm(up_in_world)
+    cosine = float(up[2])
+    if cosine > 1.0 - 1e-12:
+        return np.eye(3)
+    if cosine < -1.0 + 1e-12:
+        return np.diag([1.0, -1.0, -1.0])
+    axis = np.cross(up, (0.0, 0.0, 1.0))
+    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    return np.eye(3) + cross + cross @ cross / (1.0 + cosine)
+
+
+def rotation_angle_rad(a: Float[np.ndarray, "*n 4 4"], b: Float[np.ndarray, "*n 4 4"]) -> Float[np.ndarray, "*n"]:
+    """Return the angle between the rotations of two poses, in [0, π]."""
+    trace = np.einsum("...ij,...ij->...", a[..., :3, :3], b[..., :3, :3])
+    return np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))

@@ -1,0 +1,49 @@
+"""Progress on standard error: a bar with a rate on a terminal, a line now and then elsewhere."""
+
+import sys
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
+
+T = TypeVar("T")
+_quiet = False
+
+
+def silence(quiet: bool = True) -> None:
+    """Turn progress off (or on again) for this process."""
+    global _quiet
+    _quiet = quiet
+
+
+def progress(
+    items: Iterable[T], label: str, *, total: int | None = None, done: int = 0, unit: str = "frame"
+) -> Iterator[T]:
+    """Yield the items and show how far and how fast it goes.
+
+    Args:
+        items: what to go through.
+        label: a verb such as ``fusing``.
+        total: how many there will be in all, where ``len`` cannot tell.
+        done: how many were done before (a resumed run).
+        unit: what one item is.
+    """
+    from tqdm import tqdm
+
+    on_terminal = sys.stderr.isatty()
+    yield from tqdm(
+        items,
+        desc=label,
+        total=total,
+        initial=done,
+        unit=f" {unit}s",
+        file=sys.stderr,
+        disable=_quiet,
+        mininterval=0.2 if on_terminal else 10.0,
+        dynamic_ncols=on_terminal,
+        ascii=not on_terminal,
+    )
+
+
+def say(message: str) -> None:
+    """Print one line on standard error, unless progress is silenced."""
+    if not _quiet:
+        sys.stderr.write(message + "\n")

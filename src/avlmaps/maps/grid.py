@@ -1,0 +1,29 @@
+"""The voxel grid: the only place where metres become voxels."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+
+@dataclass(frozen=True, slots=True)
+class GridSpec:
+    """An unbounded grid of cubes; voxel i covers [i·s, (i+1)·s) along each axis of the world, i of any sign.
+
+    Attributes:
+        voxel_size_m: the edge of a cube.
+    """
+
+    voxel_size_m: float = 0.05
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.voxel_size_m) and 0.001 <= self.voxel_size_m <= 10.0):
+            raise ValueError(f"voxel_size_m is {self.voxel_size_m}; it must be between 0.001 and 10")
+
+    def index_of(self, points_world: Float[np.ndarray, "*n 3"]) -> Int[np.ndarray, "*n 3"]:
+        """Return the voxel of each point (floor, so that the origin is no wider than the rest)."""
+        return np.floor(points_world / self.voxel_size_m).astype(np.int32)
+
+    def centre_of(self, index: Int[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+        """Return the middle of each voxel, metres."""
+        return (index + 0.5) * self.voxel_size_m

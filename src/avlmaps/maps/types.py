@@ -1,0 +1,90 @@
+"""What a map holds, in memory or memory-mapped: voxels, keyframes, heard sounds; all in the recording's world."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float16, Float32, Float64, Int32, Int64, UInt8
+
+
+@dataclass(frozen=True, slots=True)
+class Voxels:
+    """Occupied voxels, sorted by index (x, then y, then z).
+
+    Attributes:
+        index: which voxel.
+        feature: mean feature, unit length; zero where no pixel with a feature fell.
+        weight: sum of the fusion weights of the pixels with a feature.
+        rgb: mean colour.
+        last_seen_s: when a pixel last fell into it.
+        hits: how many pixels fell into it.
+    """
+
+    index: Int32[np.ndarray, "n 3"]
+    feature: Float16[np.ndarray, "n d"]
+    weight: Float32[np.ndarray, " n"]
+    rgb: UInt8[np.ndarray, "n 3"]
+    last_seen_s: Float64[np.ndarray, " n"]
+    hits: Int64[np.ndarray, " n"]
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+
+@dataclass(frozen=True, slots=True)
+class Keyframes:
+    """Chosen frames, in the order of time. Ragged arrays: keyframe k has rows ``offsets[k]:offsets[k + 1]``.
+
+    Attributes:
+        stamp_s: when.
+        world_from_camera: pose of the depth camera.
+        centre: middle of what the camera saw, metres, world.
+        view: area feature (k, 0 columns where the profile has no view encoder).
+        place: place descriptor.
+        offsets: (k + 1,) into the rows of the local features.
+        xy: keypoints, pixels of the colour picture.
+        descriptors: local descriptors, unit length, halved to float16.
+        points_world: the keypoints' 3D points, NaN where there was no depth.
+        thumbnail_offsets: (k + 1,) into ``thumbnails``.
+        thumbnails: JPEG files one after the other.
+    """
+
+    stamp_s: Float64[np.ndarray, " k"]
+    world_from_camera: Float64[np.ndarray, "k 4 4"]
+    centre: Float32[np.ndarray, "k 3"]
+    view: Float32[np.ndarray, "k dv"]
+    place: Float32[np.ndarray, "k dp"]
+    offsets: Int64[np.ndarray, " k1"]
+    xy: Float32[np.ndarray, "m 2"]
+    descriptors: Float16[np.ndarray, "m dl"]
+    points_world: Float32[np.ndarray, "m 3"]
+    thumbnail_offsets: Int64[np.ndarray, " k1"]
+    thumbnails: UInt8[np.ndarray, " bytes"]
+
+    def __len__(self) -> int:
+        return len(self.stamp_s)
+
+
+@dataclass(frozen=True, slots=True)
+class HeardSounds:
+    """Sounds in the order of their onset. Ragged: sound i has rows ``track_offsets[i]:track_offsets[i + 1]`` and so on.
+
+    Attributes:
+        onset_s: start, the recording's time.
+        offset_s: end.
+        track_offsets: (n + 1,) into ``track``.
+        track: where the robot was while it heard the sound, metres, world; at least one place for each sound.
+        feature_offsets: (n + 1,) into ``feature``.
+        feature: unit vectors, one a window.
+        clips: file names below the map's folder, FLAC.
+    """
+
+    onset_s: Float64[np.ndarray, " n"]
+    offset_s: Float64[np.ndarray, " n"]
+    track_offsets: Int64[np.ndarray, " n1"]
+    track: Float32[np.ndarray, "t 3"]
+    feature_offsets: Int64[np.ndarray, " n1"]
+    feature: Float32[np.ndarray, "w d"]
+    clips: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.onset_s)

@@ -1,0 +1,1 @@
+"""Encoders and matchers: what turns pictures, sounds and words into features."""

@@ -1,0 +1,119 @@
+"""Profiles: which backend serves which module. A map keeps the name of its profile and every model's card."""
+
+from dataclasses import dataclass
+from typing import cast
+
+from avlmaps.core.errors import BackendError
+from avlmaps.core.registry import Kind, load
+from avlmaps.perception.protocols import (
+    LocalEncoder,
+    Matcher,
+    ModelCard,
+    PixelEncoder,
+    PlaceEncoder,
+    SoundEncoder,
+    ViewEncoder,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """A name for a set of backends; ``""`` where a profile has none for a module yet.
+
+    Attributes:
+        name: the word on the command line.
+        pixels: features of objects.
+        views: features of areas.
+        sounds: features of sounds.
+        local: keypoints.
+        place: retrieval of places.
+        matcher: matching of keypoints.
+        about: one sentence for ``avlmaps profiles``.
+    """
+
+    name: str
+    pixels: str = ""
+    views: str = ""
+    sounds: str = ""
+    local: str = ""
+    place: str = ""
+    matcher: str = ""
+    about: str = ""
+
+    def backend_name(self, kind: Kind) -> str:
+        """Return the name of the backend for a module, ``""`` for none."""
+        return cast(str, getattr(self, kind.value))
+
+    def _require(self, kind: Kind) -> object:
+        name = self.backend_name(kind)
+        if not name:
+            raise BackendError(
+                f"The profile {self.name!r} has no {kind} backend; choose another profile (avlmaps profiles)."
+            )
+        return load(kind, name)
+
+    def pixel_encoder(self) -> PixelEncoder:
+        """Return the pixel encoder, or raise ``BackendError``."""
+        return cast(PixelEncoder, self._require(Kind.PIXELS))
+
+    def view_encoder(self) -> ViewEncoder:
+        """Return the view encoder, or raise ``BackendError``."""
+        return cast(ViewEncoder, self._require(Kind.VIEWS))
+
+    def sound_encoder(self) -> SoundEncoder:
+        """Return the sound encoder, or raise ``BackendError``."""
+        return cast(SoundEncoder, self._require(Kind.SOUNDS))
+
+    def local_encoder(self) -> LocalEncoder:
+        """Return the keypoint encoder, or raise ``BackendError``."""
+        return cast(LocalEncoder, self._require(Kind.LOCAL))
+
+    def place_encoder(self) -> PlaceEncoder:
+        """Return the place encoder, or raise ``BackendError``."""
+        return cast(PlaceEncoder, self._require(Kind.PLACE))
+
+    def keypoint_matcher(self) -> Matcher:
+        """Return the matcher, or raise ``BackendError``."""
+        return cast(Matcher, self._require(Kind.MATCHER))
+
+    def cards(self) -> dict[Kind, ModelCard]:
+        """Return the card of every model in the profile."""
+        kinds = [kind for kind in Kind if kind is not Kind.WORDS and self.backend_name(kind)]
+        return {kind: cast(ModelCard, self._require(kind).card) for kind in kinds}  # pyright: ignore[reportAttributeAccessIssue]
+
+
+_PROFILES: dict[str, Profile] = {}
+
+
+def register_profile(profile: Profile) -> None:
+    """Make a profile known by its name."""
+    _PROFILES[profile.name] = profile
+
+
+def profiles() -> list[Profile]:
+    """Return every known profile."""
+    return list(_PROFILES.values())
+
+
+def profile(name: str) -> Profile:
+    """Return the profile of that name.
+
+    Raises:
+        BackendError: there is none.
+    """
+    if name not in _PROFILES:
+        raise BackendError(f"There is no profile called {name!r}; known are: {', '.join(_PROFILES)}.")
+    return _PROFILES[name]
+
+
+register_profile(
+    Profile(
+        name="embedded",
+        pixels="colours",
+        sounds="embedded",
+        local="rootsift",
+        place="vlad",
+        matcher="mutual-ratio",
+        about="small models shipped with the package: no download, no GPU",
+    )
+)

@@ -1,0 +1,191 @@
+"""What a backend must be able to do. Arrays are numpy at every boundary; features have unit length.
+
+One conformance suite (``avlmaps.perception.conformance``) holds for every backend of a protocol, ours or others'.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float, Float32, Int, UInt8
+
+from avlmaps.recordings.audio import Sound
+from avlmaps.recordings.types import Frame
+
+
+@dataclass(frozen=True, slots=True)
+class ModelCard:
+    """Which model made the features; it is written into the map.
+
+    Attributes:
+        id: the model's name and version, such as ``avlmaps/words-1``.
+        dim: length of a feature.
+        licence: SPDX name of the weights' licence.
+        checksum: hex SHA-256 of the weights (or of the code's own constants); queries need the same.
+        prompts: the templates that a word is put into before it is encoded, ``{}`` standing for the word.
+        note: what a user must know of its limits, one sentence.
+    """
+
+    id: str
+    dim: int
+    licence: str
+    checksum: str
+    prompts: tuple[str, ...] = ("{}",)
+    note: str = ""
+
+
+@runtime_checkable
+class WordEncoder(Protocol):
+    """Turns phrases into vectors."""
+
+    card: ModelCard
+
+    def encode(self, phrases: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase; the same phrase gives the same vector, in whatever company."""
+        ...
+
+
+@runtime_checkable
+class PixelEncoder(Protocol):
+    """Gives every region of a picture a feature that words can be compared with."""
+
+    card: ModelCard
+
+    @property
+    def vocabulary(self) -> tuple[str, ...]:
+        """Names that compete with an asked word for a voxel (the paper's class list), without ``other``."""
+        ...
+
+    def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
+        """Return features on a grid that covers the colour picture evenly, each of unit length or all zero.
+
+        Zero says that the encoder has nothing to say of that pixel; it then adds no feature to the map.
+        """
+        ...
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each word; all zero for a word of which this encoder understands nothing."""
+        ...
+
+    def understood(self, word: str) -> str:
+        """Return the part of the phrase that this encoder can act on (``red`` of ``red cabinet``), or ``""``."""
+        ...
+
+
+@runtime_checkable
+class ViewEncoder(Protocol):
+    """Gives a whole picture one feature that the name of an area can be compared with."""
+
+    card: ModelCard
+
+    def encode(self, frames: Sequence[Frame]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each frame."""
+        ...
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase."""
+        ...
+
+
+@runtime_checkable
+class SoundEncoder(Protocol):
+    """Gives a sound features that words and other sounds can be compared with."""
+
+    card: ModelCard
+
+    @property
+    def vocabulary(self) -> tuple[str, ...]:
+        """The kinds of sound that it knows; empty for an open vocabulary."""
+        ...
+
+    def encode(self, sound: Sound) -> Float32[np.ndarray, "windows d"]:
+        """Return a unit vector for each window of a sound; long sounds have many, any sound at least one.
+
+        Raises:
+            AudioError: the sound has no samples, or holds NaN.
+        """
+        ...
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase."""
+        ...
+
+    def score_words(
+        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], words: Sequence[str]
+    ) -> Float32[np.ndarray, "sounds words"]:
+        """Return how likely each sound is what each phrase names, calibrated: in [0, 1], at least 0.5 is 'yes'."""
+        ...
+
+    def score_sounds(
+        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
+    ) -> Float32[np.ndarray, " sounds"]:
+        """Return how likely each sound is of the same kind as the asked one, calibrated: in [0, 1], 0.5 is 'yes'."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class LocalFeatures:
+    """Keypoints of one picture.
+
+    Attributes:
+        xy: image coordinates in pixels, sub-pixel, the centre of the first pixel at (0.5, 0.5).
+        descriptors: one row a keypoint, unit length.
+        scale: size of each keypoint, pixels.
+    """
+
+    xy: Float32[np.ndarray, "n 2"]
+    descriptors: Float32[np.ndarray, "n d"]
+    scale: Float32[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0, np.float32))
+
+
+@runtime_checkable
+class LocalEncoder(Protocol):
+    """Finds keypoints and describes them."""
+
+    card: ModelCard
+
+    def encode(self, rgb: UInt8[np.ndarray, "h w 3"]) -> LocalFeatures:
+        """Return the picture's keypoints; none for a blank picture."""
+        ...
+
+
+@runtime_checkable
+class PlaceEncoder(Protocol):
+    """Gives a whole picture one descriptor, to find the keyframes that saw the same place."""
+
+    card: ModelCard
+
+    def fit(self, local: Sequence[LocalFeatures], rng: np.random.Generator) -> dict[str, np.ndarray]:
+        """Learn what it needs (VLAD: the visual words) from the map's own keyframes; arrays to be kept in the map."""
+        ...
+
+    def encode(
+        self, rgb: UInt8[np.ndarray, "h w 3"], local: LocalFeatures, state: dict[str, np.ndarray]
+    ) -> Float32[np.ndarray, " d"]:
+        """Return a unit vector (zero where the picture has no keypoints)."""
+        ...
+
+
+@runtime_checkable
+class Matcher(Protocol):
+    """Finds which keypoints of two pictures show the same point."""
+
+    card: ModelCard
+
+    def match(self, a: LocalFeatures, b: LocalFeatures) -> Int[np.ndarray, "m 2"]:
+        """Return rows (index in a, index in b); each index at most once."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where a picture was taken.
+
+    Attributes:
+        world_from_camera: 4x4.
+        inliers: number of points that agree with it.
+    """
+
+    world_from_camera: Float[np.ndarray, "4 4"]
+    inliers: int

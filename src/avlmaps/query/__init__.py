@@ -1,0 +1,1 @@
+"""Questions: heatmaps for the four modalities, their product, and the goals in it."""

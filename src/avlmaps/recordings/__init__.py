@@ -1,0 +1,1 @@
+"""Recordings: frames with poses and an audio track, in our format and in others'."""

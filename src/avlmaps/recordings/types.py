@@ -1,0 +1,112 @@
+"""What a recording is: frames with poses, an audio track, and how to get at them without reading it whole."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from avlmaps.core.camera import Rig
+from avlmaps.recordings.audio import AudioTrack
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One moment of the camera.
+
+    Attributes:
+        index: position in the recording, from 0.
+        name: what the recording calls it (``000012``); error sentences use it.
+        stamp_s: seconds from the recording's start.
+        rgb: colour picture.
+        depth_m: z-depth in metres; 0 where there is none (never NaN).
+        world_from_camera: 4x4 pose of the depth camera.
+        rig: the two cameras.
+    """
+
+    index: int
+    name: str
+    stamp_s: float
+    rgb: UInt8[np.ndarray, "h w 3"]
+    depth_m: Float[np.ndarray, "hd wd"]
+    world_from_camera: Float[np.ndarray, "4 4"]
+    rig: Rig
+
+    def __post_init__(self) -> None:
+        rgb_size, depth_size = (
+            (self.rig.rgb.height, self.rig.rgb.width),
+            (self.rig.depth.height, self.rig.depth.width),
+        )
+        if self.rgb.shape != (*rgb_size, 3) or self.rgb.dtype != np.uint8:
+            raise ValueError(f"rgb is {self.rgb.dtype} of {self.rgb.shape}; the rig says uint8 of {(*rgb_size, 3)}")
+        if self.depth_m.shape != depth_size or self.depth_m.dtype != np.float32:
+            raise ValueError(
+                f"depth is {self.depth_m.dtype} of {self.depth_m.shape}; the rig says float32 of {depth_size}"
+            )
+        if self.world_from_camera.shape != (4, 4):
+            raise ValueError(f"world_from_camera has shape {self.world_from_camera.shape}; it must be (4, 4)")
+
+    @property
+    def valid(self) -> Bool[np.ndarray, "hd wd"]:
+        """Where there is a depth."""
+        return self.depth_m > 0.0
+
+
+class Recording(ABC):
+    """Frames in the order of time, with poses, and perhaps an audio track. Readers subclass it.
+
+    Opening one reads the poses and the list of names, never a picture; ``frame(i)`` reads one frame. Frames
+    without a usable pose are not among them and are told in ``notices``.
+
+    Attributes:
+        path: the folder or file.
+        format: the format's name on the command line, such as ``7scenes``.
+        rig: the cameras (of every frame).
+        stamps_s: (n,) float64, strictly rising, seconds from the start of the recording.
+        world_from_camera: (n, 4, 4) float64, orthonormal. The world's z axis need not be up: see ``up_in_world``.
+        up_in_world: unit vector, or None where the recording does not know which way is up.
+        audio: the sound track on the frames' clock, or None.
+        notices: one sentence for each thing worth knowing (gaps, clock jumps, frames left out).
+    """
+
+    path: Path
+    format: str
+    rig: Rig
+    stamps_s: Float[np.ndarray, " n"]
+    world_from_camera: Float[np.ndarray, "n 4 4"]
+    up_in_world: Float[np.ndarray, "3"] | None
+    audio: AudioTrack | None
+    notices: tuple[str, ...]
+
+    @abstractmethod
+    def frame(self, index: int) -> Frame:
+        """Read one frame.
+
+        Raises:
+            RecordingError: its pictures are missing, truncated or of another size; the sentence names the file.
+        """
+
+    @cached_property
+    @abstractmethod
+    def fingerprint(self) -> str:
+        """A hex SHA-256 that changes when the recording does.
+
+        It covers poses, intrinsics and every file's name and size, but not the pictures' bytes, so that a
+        recording of a million frames has one in seconds.
+        """
+
+    def __len__(self) -> int:
+        return len(self.stamps_s)
+
+    def frames(self, start: int = 0, stop: int | None = None, step: int = 1) -> Iterator[Frame]:
+        """Read frames one at a time."""
+        for index in range(start, len(self) if stop is None else min(stop, len(self)), step):
+            yield self.frame(index)
+
+    @property
+    def duration_s(self) -> float:
+        """From the first frame to the last; 0 for fewer than two."""
+        return float(self.stamps_s[-1] - self.stamps_s[0]) if len(self) > 1 else 0.0

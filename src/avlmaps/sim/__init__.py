@@ -1,0 +1,1 @@
+"""A world to record in: it reaches a map only through a recording."""
