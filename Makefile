@@ -1,0 +1,46 @@
+# Each target sets up what it needs in .venv and touches nothing outside this folder.
+PYTHON ?= python3
+VENV := .venv
+RUN := $(VENV)/bin
+READY := $(VENV)/.ready
+# Small matrices run many times slower on several BLAS threads when a machine is shared.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+export MKL_NUM_THREADS ?= 1
+
+.PHONY: help demo test lint format bench train lock clean
+
+help:  ## Show what can be made.
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+
+$(READY): requirements/lock.txt pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "avlmaps needs Python 3.11 or newer; say which with: make PYTHON=python3.12 ...")'
+	$(PYTHON) -m venv $(VENV)
+	$(RUN)/python -m pip install --quiet --require-hashes -r requirements/lock.txt
+	$(RUN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	touch $@
+
+demo: $(READY)  ## Walk a room, hear it, map it, ask it; pictures land in demo_out/.
+	$(RUN)/avlmaps demo --out demo_out
+
+test: $(READY)  ## Run every test (offline, two cores, no GPU).
+	$(RUN)/python -m pytest -n 2 --dist loadfile
+
+lint: $(READY)  ## Check style, types and the order of imports.
+	$(RUN)/ruff check .
+	$(RUN)/ruff format --check .
+	$(RUN)/basedpyright
+	$(RUN)/lint-imports
+
+format: $(READY)  ## Put the code in order.
+	$(RUN)/ruff check --fix .
+	$(RUN)/ruff format .
+
+bench: $(READY)  ## Measure speed and quality; writes docs/benchmarks.md.
+	$(RUN)/python benchmarks/report.py --out docs/benchmarks.md
+
+lock: $(READY)  ## Pin every dependency again (needs uv).
+	uv pip compile --universal --generate-hashes --group dev pyproject.toml --output-file requirements/lock.txt --quiet
+
+clean:  ## Remove the virtual environment and what the targets made.
+	rm -rf $(VENV) demo_out bench_out
