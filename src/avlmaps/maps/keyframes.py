@@ -1,0 +1,263 @@
+"""Keyframes: which frames stand for the walk, and what the map keeps of them."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Float32, Int, Int64, UInt8
+
+from avlmaps.core.poses import rotation_angle_rad
+from avlmaps.core.progress import progress
+from avlmaps.maps.lifting import lifted, middle_of_view
+from avlmaps.maps.types import Keyframes
+from avlmaps.perception.profiles import Profile
+from avlmaps.perception.protocols import LocalFeatures
+from avlmaps.recordings.types import Frame, Recording
+
+LEARN_FROM_KEYFRAMES = 64
+_BLOCK = 256
+
+
+@dataclass(frozen=True, slots=True)
+class KeyframeSettings:
+    """When a frame becomes a keyframe."""
+
+    translation_m: float = 0.1
+    """The camera moved so far since the last keyframe."""
+
+    rotation_deg: float = 7.0
+    """Or turned so far."""
+
+    max_gap_s: float = 5.0
+    """Or so much time went by; a robot that stands still looks again now and then."""
+
+    thumbnail_width_px: int = 320
+    """Width of the small pictures that the map keeps."""
+
+    max_depth_m: float = 6.0
+    """Keypoints farther away get no 3D point: the depth of most sensors is poor out there."""
+
+    def __post_init__(self) -> None:
+        for name in ("translation_m", "rotation_deg", "max_gap_s", "thumbnail_width_px", "max_depth_m"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be positive")
+
+
+def select_keyframes(recording: Recording, settings: KeyframeSettings = KeyframeSettings()) -> Int[np.ndarray, " k"]:
+    """Choose keyframes by motion: see ``keyframes_by_motion``. Reads no picture."""
+    return keyframes_by_motion(recording.stamps_s, recording.world_from_camera, settings)
+
+
+def keyframes_by_motion(
+    stamps_s: Float[np.ndarray, " n"],
+    world_from_camera: Float[np.ndarray, "n 4 4"],
+    settings: KeyframeSettings = KeyframeSettings(),
+) -> Int[np.ndarray, " k"]:
+    """Return rising frame numbers: the first, the last, and enough between them to cover the walk.
+
+    Every frame lies within the settings' distance, angle and time of the last keyframe before it. Where the camera
+    goes beyond them, the frame in the second half of the way that moved least becomes the keyframe, because a
+    camera that moves less blurs less.
+
+    Args:
+        stamps_s: seconds, rising.
+        world_from_camera: poses.
+        settings: the limits.
+    """
+    count = len(stamps_s)
+    if count == 0:
+        return np.zeros(0, np.int64)
+    speed = _apparent_motion(stamps_s, world_from_camera)
+    chosen = [0]
+    while chosen[-1] < count - 1:
+        last = chosen[-1]
+        beyond = _first_beyond(last, stamps_s, world_from_camera, settings)
+        if beyond is None:
+            chosen.append(count - 1)
+            break
+        start = max(last + 1, (last + beyond + 1) // 2)
+        chosen.append(start + int(np.argmin(speed[start : beyond + 1])))
+    return np.array(chosen, np.int64)
+
+
+def _first_beyond(
+    last: int,
+    stamps_s: Float[np.ndarray, " n"],
+    world_from_camera: Float[np.ndarray, "n 4 4"],
+    settings: KeyframeSettings,
+) -> int | None:
+    """Return the first frame after ``last`` that breaks a limit; looks ahead block by block."""
+    for start in range(last + 1, len(stamps_s), _BLOCK):
+        poses = world_from_camera[start : start + _BLOCK]
+        moved_m = np.linalg.norm(poses[:, :3, 3] - world_from_camera[last, :3, 3], axis=1)
+        turned_rad = rotation_angle_rad(poses, np.broadcast_to(world_from_camera[last], poses.shape))
+        beyond = (moved_m > settings.translation_m) | (turned_rad > np.deg2rad(settings.rotation_deg))
+        beyond |= stamps_s[start : start + _BLOCK] - stamps_s[last] > settings.max_gap_s
+        if beyond.any():
+            return start + int(np.argmax(beyond))
+    return None
+
+
+def _apparent_motion(
+    stamps_s: Float[np.ndarray, " n"], world_from_camera: Float[np.ndarray, "n 4 4"]
+) -> Float[np.ndarray, " n"]:
+    """Return about how fast the picture moves, rad/s: turning, and going past things that are 2 m away."""
+    speed = np.zeros(len(stamps_s))
+    if len(stamps_s) > 1:
+        turned_rad = rotation_angle_rad(world_from_camera[1:], world_from_camera[:-1])
+        moved_m = np.linalg.norm(np.diff(world_from_camera[:, :3, 3], axis=0), axis=1)
+        between = (turned_rad + moved_m / 2.0) / np.maximum(np.diff(stamps_s), 1e-9)
+        speed[:-1] += between
+        speed[1:] += between
+        speed[1:-1] /= 2.0
+    return speed
+
+
+def perceive_keyframes(
+    recording: Recording,
+    indices: Sequence[int] | Int[np.ndarray, " k"],
+    profile: Profile,
+    rng: np.random.Generator,
+    progress: Callable[..., Iterable[int]] = progress,
+    settings: KeyframeSettings = KeyframeSettings(),
+) -> tuple[Keyframes, dict[str, np.ndarray]]:
+    """Look at the chosen frames: local, place and view features, 3D points, thumbnails.
+
+    Args:
+        recording: where the frames are; read one at a time.
+        indices: which frames, rising.
+        profile: whose encoders to use.
+        rng: for what the place encoder learns.
+        progress: shows how far it is; called as ``avlmaps.core.progress.progress`` is.
+        settings: how far keypoints get a 3D point, size of thumbnails.
+
+    Returns:
+        The keyframes, and the arrays that the place encoder learned; the map must keep them.
+    """
+    place_state, known = learn_places(recording, indices, profile, rng)
+    seen = [
+        see_keyframe(recording.frame(int(index)), profile, place_state, settings, known.get(int(index)))
+        for index in progress(indices, "seeing", total=len(indices), unit="keyframe")
+    ]
+    return assembled(seen), place_state
+
+
+def learn_places(
+    recording: Recording,
+    indices: Sequence[int] | Int[np.ndarray, " k"],
+    profile: Profile,
+    rng: np.random.Generator,
+) -> tuple[dict[str, np.ndarray], dict[int, LocalFeatures]]:
+    """Let the place encoder learn from keyframes spread over the walk.
+
+    Returns:
+        What it learned, and the local features of those frames by their number, to save doing them twice.
+    """
+    if not profile.local or not profile.place:
+        return {}, {}
+    encoder = profile.local_encoder()
+    spread = np.unique(np.linspace(0, len(indices) - 1, min(len(indices), LEARN_FROM_KEYFRAMES)).round().astype(int))
+    local = {int(indices[i]): encoder.encode(recording.frame(int(indices[i])).rgb) for i in spread}
+    return profile.place_encoder().fit(list(local.values()), rng), local
+
+
+@dataclass(frozen=True, slots=True)
+class SeenKeyframe:
+    """All that the map keeps of one keyframe.
+
+    Attributes:
+        stamp_s: when.
+        world_from_camera: pose of the depth camera.
+        centre: middle of what was seen, metres, world.
+        view: area feature; empty where the profile has no view encoder.
+        place: place descriptor; empty where the profile has no place encoder.
+        local: keypoints of the colour picture.
+        points_world: their 3D points, metres, NaN where there is no trustworthy depth.
+        thumbnail: a JPEG file.
+    """
+
+    stamp_s: float
+    world_from_camera: Float[np.ndarray, "4 4"]
+    centre: Float32[np.ndarray, "3"]
+    view: Float32[np.ndarray, " dv"]
+    place: Float32[np.ndarray, " dp"]
+    local: LocalFeatures
+    points_world: Float32[np.ndarray, "n 3"]
+    thumbnail: bytes
+
+
+def see_keyframe(
+    frame: Frame,
+    profile: Profile,
+    place_state: dict[str, np.ndarray],
+    settings: KeyframeSettings = KeyframeSettings(),
+    local: LocalFeatures | None = None,
+) -> SeenKeyframe:
+    """Run a profile's encoders on one frame.
+
+    Args:
+        frame: the frame.
+        profile: whose encoders; a module that the profile leaves empty gives empty features.
+        place_state: what the place encoder learned.
+        settings: how far keypoints get a 3D point, size of thumbnails.
+        local: the frame's keypoints where they are known already.
+    """
+    if local is None:
+        local = profile.local_encoder().encode(frame.rgb) if profile.local else _no_features()
+    place = np.zeros(0, np.float32)
+    if profile.local and profile.place:
+        place = profile.place_encoder().encode(frame.rgb, local, place_state)
+    return SeenKeyframe(
+        stamp_s=frame.stamp_s,
+        world_from_camera=frame.world_from_camera,
+        centre=middle_of_view(frame),
+        view=profile.view_encoder().encode([frame])[0] if profile.views else np.zeros(0, np.float32),
+        place=place,
+        local=local,
+        points_world=lifted(local.xy, frame, settings.max_depth_m),
+        thumbnail=_thumbnail(frame.rgb, settings.thumbnail_width_px),
+    )
+
+
+def assembled(seen: Sequence[SeenKeyframe]) -> Keyframes:
+    """Put keyframes, in the order of time, into the map's arrays."""
+    return Keyframes(
+        stamp_s=np.array([one.stamp_s for one in seen], np.float64),
+        world_from_camera=_stacked([one.world_from_camera for one in seen], (4, 4), np.float64),
+        centre=_stacked([one.centre for one in seen], (3,), np.float32),
+        view=_stacked([one.view for one in seen], (0,), np.float32),
+        place=_stacked([one.place for one in seen], (0,), np.float32),
+        offsets=_offsets([len(one.local.xy) for one in seen]),
+        xy=_joined([one.local.xy for one in seen], (2,), np.float32),
+        descriptors=_joined([one.local.descriptors for one in seen], (0,), np.float16),
+        points_world=_joined([one.points_world for one in seen], (3,), np.float32),
+        thumbnail_offsets=_offsets([len(one.thumbnail) for one in seen]),
+        thumbnails=np.frombuffer(b"".join(one.thumbnail for one in seen), np.uint8),
+    )
+
+
+def _stacked(rows: Sequence[np.ndarray], shape: tuple[int, ...], dtype: type) -> np.ndarray:
+    return np.stack(rows).astype(dtype) if len(rows) else np.zeros((0, *shape), dtype)
+
+
+def _joined(pieces: Sequence[np.ndarray], shape: tuple[int, ...], dtype: type) -> np.ndarray:
+    return np.concatenate(pieces).astype(dtype) if len(pieces) else np.zeros((0, *shape), dtype)
+
+
+def _offsets(lengths: Sequence[int]) -> Int64[np.ndarray, " k1"]:
+    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+
+
+def _no_features() -> LocalFeatures:
+    return LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, 0), np.float32))
+
+
+def _thumbnail(rgb: UInt8[np.ndarray, "h w 3"], width_px: int) -> bytes:
+    """Return a JPEG file at most ``width_px`` wide."""
+    import cv2
+
+    if rgb.shape[1] > width_px:
+        size = (width_px, max(1, round(rgb.shape[0] * width_px / rgb.shape[1])))
+        rgb = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)
+    _, encoded = cv2.imencode(".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 80])
+    return encoded.tobytes()

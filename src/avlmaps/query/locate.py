@@ -1,0 +1,198 @@
+"""Where was this picture taken: the 6-DoF pose of a photo in the map, or an honest "not located"."""
+
+import time
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Float, Float32, Int, UInt8
+
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import QueryError
+from avlmaps.maps.types import Keyframes
+from avlmaps.perception.pose import PoseSettings, estimate_pose
+from avlmaps.perception.profiles import Profile
+from avlmaps.perception.protocols import LocalFeatures
+
+_SAME_ASPECT = 0.01
+
+
+class LocatableMap(Protocol):
+    """What ``locate`` needs of a stored map."""
+
+    @property
+    def keyframes(self) -> Keyframes:
+        """Its keyframes."""
+        ...
+
+    @property
+    def place_state(self) -> dict[str, np.ndarray]:
+        """What the place encoder learned."""
+        ...
+
+    @property
+    def profile(self) -> Profile:
+        """Whose encoders made the keyframes."""
+        ...
+
+    @property
+    def rig(self) -> Rig:
+        """The recording's cameras."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class LocateSettings:
+    """How a picture is located, and when it counts as located."""
+
+    references: int = 6
+    """How many keyframes that look alike are matched."""
+
+    min_inliers: int = 20
+    """A pose needs so many keypoints that agree with it (each counted once)."""
+
+    min_inlier_ratio: float = 0.15
+    """And so large a part of the matched keypoints."""
+
+    min_spread: float = 0.05
+    """And they must cover so large a part of the picture: the product of the spreads (two standard deviations) along
+    the two axes, as a part of width times height; a single poster or logo is no place."""
+
+    pose: PoseSettings = field(default_factory=PoseSettings)
+    """Tolerances of the pose."""
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """The answer.
+
+    Attributes:
+        world_from_camera: pose of the camera that took the picture, None for "not located".
+        inliers: keypoints that agree with the best pose, also where they are too few.
+        reference_stamp_s: when the keyframe was taken that most of them were seen in; None without any.
+        score: how sure it is, in [0, 1]; at least 0.5 exactly where a pose is given.
+        elapsed_ms: how long it took.
+    """
+
+    world_from_camera: Float[np.ndarray, "4 4"] | None
+    inliers: int
+    reference_stamp_s: float | None
+    score: float
+    elapsed_ms: float
+
+
+def locate(
+    stored: LocatableMap,
+    rgb: UInt8[np.ndarray, "h w 3"],
+    camera: Pinhole | None,
+    rng: np.random.Generator,
+    settings: LocateSettings = LocateSettings(),
+) -> Located:
+    """Find where a picture was taken.
+
+    Args:
+        stored: the map.
+        rgb: the picture.
+        camera: the camera that took it; None says that it was the map's own colour camera.
+        rng: seeds the sampling of the pose.
+        settings: effort and thresholds.
+
+    Raises:
+        QueryError: no camera was given and the picture has not the shape of the map's own.
+    """
+    start_s = time.perf_counter()
+    camera = _camera_of(rgb, camera, stored.rig.rgb)
+    local = stored.profile.local_encoder().encode(rgb)
+    place = stored.profile.place_encoder().encode(rgb, local, stored.place_state)
+    found = locate_features(stored, local, place, camera, rng, settings)
+    return replace(found, elapsed_ms=1e3 * (time.perf_counter() - start_s))
+
+
+def locate_features(
+    stored: LocatableMap,
+    local: LocalFeatures,
+    place: Float32[np.ndarray, " d"],
+    camera: Pinhole,
+    rng: np.random.Generator,
+    settings: LocateSettings = LocateSettings(),
+) -> Located:
+    """Find where a picture was taken that has been through the encoders already; ``elapsed_ms`` stays 0."""
+    references = alike(stored.keyframes, place, settings.references)
+    pairs = _matched_points(stored, local, references)
+    estimate = estimate_pose(local.xy[pairs.keypoint], pairs.points_world, camera, rng, settings.pose)
+    if estimate is None:
+        return Located(None, 0, None, 0.0, 0.0)
+    pose, agrees = estimate
+    keypoints = np.unique(pairs.keypoint[agrees])
+    ratio = len(keypoints) / len(np.unique(pairs.keypoint))
+    spread = _spread(local.xy[keypoints], camera)
+    score = min(
+        _confidence(len(keypoints), settings.min_inliers),
+        _confidence(ratio, settings.min_inlier_ratio),
+        _confidence(spread, settings.min_spread),
+    )
+    return Located(
+        world_from_camera=pose.world_from_camera if score >= 0.5 else None,
+        inliers=len(keypoints),
+        reference_stamp_s=float(stored.keyframes.stamp_s[np.bincount(pairs.keyframe[agrees]).argmax()]),
+        score=score,
+        elapsed_ms=0.0,
+    )
+
+
+def alike(keyframes: Keyframes, place: Float32[np.ndarray, " d"], count: int) -> Int[np.ndarray, " k"]:
+    """Return the keyframes whose place descriptors are the most like the given one, best first."""
+    likeness = keyframes.place @ place
+    best = np.argpartition(-likeness, min(count, len(likeness)) - 1)[:count] if len(likeness) else np.zeros(0, int)
+    return best[np.lexsort((best, -likeness[best]))]
+
+
+@dataclass(frozen=True, slots=True)
+class _Pairs:
+    """Keypoints of the picture and the map's 3D points that they match; a keypoint may match in several keyframes."""
+
+    keypoint: Int[np.ndarray, " n"]
+    keyframe: Int[np.ndarray, " n"]
+    points_world: Float32[np.ndarray, "n 3"]
+
+
+def _matched_points(stored: LocatableMap, local: LocalFeatures, references: Int[np.ndarray, " k"]) -> _Pairs:
+    keyframes, matcher = stored.keyframes, stored.profile.keypoint_matcher()
+    keypoint, keyframe, points = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros((0, 3), np.float32)]
+    for reference in references:
+        rows = slice(keyframes.offsets[reference], keyframes.offsets[reference + 1])
+        other = LocalFeatures(keyframes.xy[rows], keyframes.descriptors[rows].astype(np.float32))
+        match = matcher.match(local, other)
+        points_world = keyframes.points_world[rows][match[:, 1]]
+        has_point = np.isfinite(points_world[:, 0])
+        keypoint.append(match[has_point, 0])
+        keyframe.append(np.full(int(has_point.sum()), reference))
+        points.append(points_world[has_point])
+    return _Pairs(np.concatenate(keypoint), np.concatenate(keyframe), np.concatenate(points))
+
+
+def _camera_of(rgb: UInt8[np.ndarray, "h w 3"], camera: Pinhole | None, own: Pinhole) -> Pinhole:
+    height, width = rgb.shape[:2]
+    if camera is None:
+        if abs(width * own.height - height * own.width) > _SAME_ASPECT * width * own.height:
+            raise QueryError(
+                f"The picture is {width}x{height} and the map's own camera {own.width}x{own.height}, so another camera "
+                "took it; say which: --intrinsics fx,fy,cx,cy."
+            )
+        return own.resized(width, height)
+    if (camera.width, camera.height) != (width, height):
+        raise ValueError(f"the camera is {camera.width}x{camera.height} and the picture {width}x{height}")
+    return camera
+
+
+def _spread(xy: Float[np.ndarray, "n 2"], camera: Pinhole) -> float:
+    """Return two standard deviations along x times the same along y, as a part of the picture."""
+    if len(xy) < 2:
+        return 0.0
+    deviation = 2.0 * xy.std(axis=0)
+    return float(deviation[0] * deviation[1] / (camera.width * camera.height))
+
+
+def _confidence(value: float, threshold: float) -> float:
+    """Return a number in [0, 1) that rises with the value and is 0.5 at the threshold."""
+    return value / (value + threshold)
