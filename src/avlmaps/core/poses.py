@@ -3,6 +3,8 @@
 Quaternions are x y z w. Batches are leading axes.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 
@@ -45,6 +47,26 @@ def orthonormalized(
     return pose
 
 
+def orthonormalized_all(
+    world_from_camera: Float[np.ndarray, "n 4 4"], names: Sequence[str], max_fault: float = MAX_ROTATION_FAULT
+) -> Float[np.ndarray, "n 4 4"]:
+    """Do what ``orthonormalized`` does for many poses at once; the first pose that is none is named in the error."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        rotation = world_from_camera[:, :3, :3]
+        fault = np.abs(np.swapaxes(rotation, 1, 2) @ rotation - np.eye(3)).max(axis=(1, 2), initial=0.0)
+        wild = ~(fault <= max_fault) | ~np.isfinite(world_from_camera).all(axis=(1, 2))
+        wild |= np.abs(world_from_camera[:, 3] - (0.0, 0.0, 0.0, 1.0)).max(axis=1, initial=0.0) > 1e-6
+        determinant = np.linalg.det(np.where(wild[:, None, None], np.eye(3), rotation))
+    wild |= determinant < 0.0
+    for index in np.flatnonzero(wild):
+        orthonormalized(world_from_camera[index], names[index], max_fault)
+    u, _, vt = np.linalg.svd(rotation)
+    pose = world_from_camera.copy()
+    pose[:, :3, :3] = u @ vt
+    pose[:, 3] = (0.0, 0.0, 0.0, 1.0)
+    return pose
+
+
 def inverse(b_from_a: Float[np.ndarray, "*batch 4 4"]) -> Float[np.ndarray, "*batch 4 4"]:
     """Return ``a_from_b`` of a rigid ``b_from_a``, exactly (no general inverse)."""
     a_from_b = np.zeros_like(b_from_a)
@@ -71,7 +93,8 @@ def from_quaternion(
     norm = np.linalg.norm(quaternion_xyzw, axis=-1, keepdims=True)
     if np.any(norm == 0.0):
         raise ValueError("a quaternion has norm 0")
-    x, y, z, w = np.moveaxis(quaternion_xyzw / norm, -1, 0)
+    unit = quaternion_xyzw / norm
+    x, y, z, w = unit[..., 0], unit[..., 1], unit[..., 2], unit[..., 3]
     pose = np.zeros((*translation.shape[:-1], 4, 4))
     pose[..., 0, 0], pose[..., 0, 1], pose[..., 0, 2] = (
         1 - 2 * (y * y + z * z),

@@ -1,0 +1,143 @@
+"""Reading the few ROS messages that a recording needs: images, depth, camera calibration, poses.
+
+Works on messages as `rosbags` deserialises them, of ROS 1 and ROS 2 alike.
+"""
+
+import struct
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Float32, UInt8
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.poses import from_quaternion
+
+_COLOUR_ENCODINGS = {
+    "rgb8": (3, (0, 1, 2)),
+    "bgr8": (3, (2, 1, 0)),
+    "rgba8": (4, (0, 1, 2)),
+    "bgra8": (4, (2, 1, 0)),
+    "8UC3": (3, (2, 1, 0)),
+    "mono8": (1, (0, 0, 0)),
+    "8UC1": (1, (0, 0, 0)),
+}
+
+
+def header_stamp_s(rawdata: bytes, is_ros2: bool) -> float:
+    """Return the header's stamp without deserialising the message (whose first field must be a header)."""
+    if is_ros2:  # CDR: four bytes of encapsulation, then sec, nanosec; the second byte tells the byte order
+        order = "<" if rawdata[1] & 1 else ">"
+        seconds, nanoseconds = struct.unpack_from(order + "iI", rawdata, 4)
+    else:  # seq, secs, nsecs
+        _, seconds, nanoseconds = struct.unpack_from("<III", rawdata, 0)
+    return seconds + nanoseconds * 1e-9
+
+
+def colour_of(message: Any, name: str) -> UInt8[np.ndarray, "h w 3"]:
+    """Return the colour picture of an Image or a CompressedImage.
+
+    Raises:
+        RecordingError: its encoding is not one of a colour picture, or its bytes are cut short.
+    """
+    if "CompressedImage" in message.__msgtype__:
+        return _decoded(message.data, name, colour=True)[..., ::-1]
+    if message.encoding not in _COLOUR_ENCODINGS:
+        known = ", ".join(_COLOUR_ENCODINGS)
+        raise RecordingError(f"The picture {name} has encoding {message.encoding!r}; colour is read from: {known}.")
+    channels, order = _COLOUR_ENCODINGS[message.encoding]
+    pixels = _rows(message, np.dtype(np.uint8), channels, name)
+    return np.ascontiguousarray(pixels[..., list(order)])
+
+
+def depth_of(message: Any, name: str) -> Float32[np.ndarray, "h w"]:
+    """Return z-depth in metres, 0 where there is none, of an Image or a `compressedDepth` CompressedImage.
+
+    Raises:
+        RecordingError: its encoding is not one of a depth picture, or its bytes are cut short.
+    """
+    if "CompressedImage" in message.__msgtype__:
+        return _decompressed_depth(message, name)
+    order = ">" if message.is_bigendian else "<"
+    if message.encoding in ("16UC1", "mono16"):
+        return _rows(message, np.dtype(order + "u2"), 1, name)[..., 0].astype(np.float32) / np.float32(1000.0)
+    if message.encoding == "32FC1":
+        depth_m = _rows(message, np.dtype(order + "f4"), 1, name)[..., 0].astype(np.float32)
+        return np.where(np.isfinite(depth_m) & (depth_m > 0), depth_m, np.float32(0.0))
+    raise RecordingError(
+        f"The depth {name} has encoding {message.encoding!r}; depth is read from: 16UC1, mono16, 32FC1."
+    )
+
+
+def _rows(message: Any, dtype: np.dtype, channels: int, name: str) -> np.ndarray:
+    height, width, step = int(message.height), int(message.width), int(message.step)
+    needed = width * channels * dtype.itemsize
+    content = np.asarray(message.data, np.uint8)
+    if step < needed or len(content) < height * step:
+        raise RecordingError(
+            f"The picture {name} is {width}x{height} {message.encoding} but has {len(content)} bytes in rows of {step};"
+            f" at least {height * needed} in rows of {needed} are needed."
+        )
+    lines = np.ascontiguousarray(content[: height * step].reshape(height, step)[:, :needed])
+    return lines.view(dtype).reshape(height, width, channels)
+
+
+def _decoded(content: Any, name: str, colour: bool) -> np.ndarray:
+    import cv2
+
+    flag = cv2.IMREAD_COLOR if colour else cv2.IMREAD_UNCHANGED
+    raw = np.asarray(content, np.uint8)
+    picture = cv2.imdecode(raw, flag) if len(raw) else None
+    if picture is None:
+        raise RecordingError(
+            f"The compressed picture {name} ({len(raw)} bytes) cannot be decoded; it is cut short or damaged."
+        )
+    return picture
+
+
+def _decompressed_depth(message: Any, name: str) -> Float32[np.ndarray, "h w"]:
+    """Undo `compressed_depth_image_transport`: a 12-byte header, then PNG; 32FC1 travels as quantised inverse depth."""
+    if "rvl" in message.format.lower():
+        raise RecordingError(
+            f"The depth {name} is RVL-compressed; republish it as PNG compressedDepth or as raw images."
+        )
+    raw = np.asarray(message.data, np.uint8)
+    picture = _decoded(raw[12:] if "compressedDepth" in message.format else raw, name, colour=False)
+    if not message.format.startswith("32FC1"):
+        return picture.astype(np.float32) / np.float32(1000.0)
+    _, a, b = struct.unpack_from("<iff", raw.tobytes(), 0)
+    inverse = picture.astype(np.float32)
+    valid = inverse > 0
+    return np.where(valid, a / np.where(valid, inverse - b, 1.0), 0.0).astype(np.float32)
+
+
+def camera_of(info: Any, name: str) -> tuple[Pinhole, bool]:
+    """Return the camera of a CameraInfo, and whether it has distortion that a pinhole leaves out.
+
+    ROS counts pixel centres as whole numbers; ours lie at +0.5.
+
+    Raises:
+        RecordingError: the calibration is empty.
+    """
+    k = np.asarray(getattr(info, "k", None) if hasattr(info, "k") else info.K, np.float64)
+    d = np.asarray(getattr(info, "d", None) if hasattr(info, "d") else info.D, np.float64)
+    if not (k.shape == (9,) and k[0] > 0 and k[4] > 0 and info.width > 0 and info.height > 0):
+        raise RecordingError(
+            f"The camera calibration {name} is empty (K = {k.tolist()}); name a calibrated camera's topics."
+        )
+    camera = Pinhole(k[0], k[4], k[2] + 0.5, k[5] + 0.5, int(info.width), int(info.height))
+    return camera, bool(np.abs(d).max(initial=0.0) > 1e-9)
+
+
+def pose_of(message: Any) -> Float[np.ndarray, "4 4"]:
+    """Return parent_from_child of a stamped pose, odometry or transform; all NaN if it is none."""
+    while hasattr(message, "pose"):
+        message = message.pose
+    message = getattr(message, "transform", message)
+    translation = getattr(message, "position", None) or message.translation
+    rotation = getattr(message, "orientation", None) or message.rotation
+    xyz = np.array([translation.x, translation.y, translation.z], np.float64)
+    xyzw = np.array([rotation.x, rotation.y, rotation.z, rotation.w], np.float64)
+    if not (np.isfinite(xyz).all() and np.isfinite(xyzw).all() and np.linalg.norm(xyzw) > 1e-6):
+        return np.full((4, 4), np.nan)
+    return from_quaternion(xyz, xyzw)

@@ -1,0 +1,85 @@
+"""Frames out of an mp4, mkv or other video, by number, without decoding it from the start each time."""
+
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64, UInt8
+
+from avlmaps.core.errors import RecordingError
+
+
+class VideoFrames:
+    """The pictures of a video's first video stream. Opening reads the stamps (demuxing only), no picture.
+
+    Attributes:
+        path: the file.
+        width: columns.
+        height: rows.
+        stamps_s: (n,) seconds from the video's start, in the order they are shown.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._lock = threading.Lock()
+        self._container = self._open()
+        stream = self._stream()
+        self.width, self.height = stream.codec_context.width, stream.codec_context.height
+        self._pts = self._read_stamps()
+        base = float(stream.time_base)
+        self.stamps_s: Float64[np.ndarray, " n"] = (self._pts - self._pts[0]) * base
+        self._next = -1  # the frame that the decoder gives next; -1 after a seek
+        self._decoder: Any = None
+
+    def __len__(self) -> int:
+        return len(self.stamps_s)
+
+    def picture(self, index: int) -> UInt8[np.ndarray, "h w 3"]:
+        """Decode one frame; going on in order is fast, a jump costs a seek to the key frame before it.
+
+        Raises:
+            RecordingError: the frame cannot be decoded.
+        """
+        from av.error import FFmpegError
+
+        with self._lock:
+            try:
+                if index != self._next:
+                    self._seek(index)
+                for frame in self._decoder:
+                    if frame.pts is not None and frame.pts >= self._pts[index]:
+                        self._next = index + 1
+                        return frame.to_ndarray(format="rgb24")
+            except FFmpegError as error:
+                raise RecordingError(
+                    f"Frame {index} of {self.path} cannot be decoded ({error}); is it damaged?"
+                ) from error
+        raise RecordingError(f"{self.path} ends before frame {index} of {len(self)}; the file is cut short.")
+
+    def _open(self) -> Any:
+        import av
+        from av.error import FFmpegError
+
+        if not self.path.is_file():
+            raise RecordingError(f"There is no video {self.path}.")
+        try:
+            container = av.open(str(self.path))
+        except FFmpegError as error:
+            raise RecordingError(f"{self.path} cannot be read as a video ({error}); is it cut short?") from error
+        if not container.streams.video:
+            raise RecordingError(f"{self.path} has no video stream.")
+        return container
+
+    def _stream(self) -> Any:
+        return self._container.streams.video[0]
+
+    def _read_stamps(self) -> np.ndarray:
+        stamps = [packet.pts for packet in self._container.demux(self._stream()) if packet.pts is not None]
+        if not stamps:
+            raise RecordingError(f"{self.path} has a video stream without a single frame.")
+        return np.unique(np.array(stamps, np.int64))
+
+    def _seek(self, index: int) -> None:
+        self._container.seek(int(self._pts[index]), stream=self._stream(), backward=True)
+        self._decoder = self._container.decode(self._stream())

@@ -1,0 +1,222 @@
+"""Bags of both ROSes and MCAP open in place: topics by type, poses by /tf or odometry, sound, and plain sentences."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.poses import from_quaternion, inverse
+from avlmaps.recordings.ros_messages import depth_of
+from avlmaps.recordings.rosbag import RosTopics, open_rosbag
+
+WIDTH, HEIGHT, RATE_HZ = 32, 24, 8000
+BODY_FROM_CAMERA = np.array([[0.0, 0, 1, 0.1], [-1, 0, 0, 0.0], [0, -1, 0, 0.9], [0, 0, 0, 1]])
+START_S = 1000.0
+
+
+class BagMaker:
+    """Writes one second of a robot that drives along x, in any of the three containers."""
+
+    def __init__(self, kind: str, folder: Path) -> None:
+        self.kind, self.is2 = kind, kind != "ros1"
+        self.store = get_typestore(Stores.ROS2_HUMBLE if self.is2 else Stores.ROS1_NOETIC)
+        audio = {
+            **get_types_from_msg("uint8[] data", "audio_common_msgs/msg/AudioData"),
+            **get_types_from_msg(
+                "uint8 channels\nuint32 sample_rate\nstring sample_format\nuint32 bitrate\nstring coding_format",
+                "audio_common_msgs/msg/AudioInfo",
+            ),
+        }
+        if not self.is2:  # ROS 1's store leaves tf2 out
+            audio |= get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage")
+        self.store.register(audio)
+        self.path = folder / ("walk.bag" if kind == "ros1" else "walk")
+        if self.is2:
+            plugin = StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
+            self.writer = Writer2(self.path, version=9, storage_plugin=plugin)
+        else:
+            self.writer = Writer1(self.path)
+        self.connections: dict[str, object] = {}
+
+    def t(self, name: str, *arguments):
+        return self.store.types[name](*arguments)
+
+    def header(self, stamp_s: float, frame: str):
+        stamp = self.t("builtin_interfaces/msg/Time", int(stamp_s), round(stamp_s % 1 * 1e9))
+        sequence = () if self.is2 else (0,)
+        return self.t("std_msgs/msg/Header", *sequence, stamp, frame)
+
+    def write(self, topic: str, message, stamp_s: float) -> None:
+        kind = message.__msgtype__
+        if topic not in self.connections:
+            self.connections[topic] = self.writer.add_connection(topic, kind, typestore=self.store)
+        raw = self.store.serialize_cdr(message, kind) if self.is2 else self.store.serialize_ros1(message, kind)
+        self.writer.write(self.connections[topic], round(stamp_s * 1e9) + 2_000_000, raw)
+
+    def image(self, topic: str, stamp_s: float, pixels: np.ndarray, encoding: str, frame: str) -> None:
+        flat = np.ascontiguousarray(pixels).view(np.uint8).reshape(-1)
+        step = pixels.shape[1] * pixels.itemsize * (pixels.shape[2] if pixels.ndim == 3 else 1)
+        head = self.header(stamp_s, frame)
+        self.write(topic, self.t("sensor_msgs/msg/Image", head, HEIGHT, WIDTH, encoding, 0, step, flat), stamp_s)
+
+    def camera_info(self, topic: str, stamp_s: float) -> None:
+        k = np.array([30.0, 0, 15.5, 0, 30.0, 11.5, 0, 0, 1])
+        roi = self.t("sensor_msgs/msg/RegionOfInterest", 0, 0, 0, 0, False)
+        head = self.header(stamp_s, "camera_optical")
+        d, r, p = np.zeros(5), np.eye(3).reshape(-1), np.zeros(12)
+        info = self.t("sensor_msgs/msg/CameraInfo", head, HEIGHT, WIDTH, "plumb_bob", d, k, r, p, 0, 0, roi)
+        self.write(topic, info, stamp_s)
+
+    def pose(self, world_from_body: np.ndarray):
+        x, y, z = world_from_body[:3, 3]
+        from avlmaps.core.poses import to_quaternion
+
+        q = to_quaternion(world_from_body)
+        return (x, y, z), self.t("geometry_msgs/msg/Quaternion", *q)
+
+    def tf(self, topic: str, stamp_s: float, parent: str, child: str, parent_from_child: np.ndarray) -> None:
+        xyz, rotation = self.pose(parent_from_child)
+        transform = self.t("geometry_msgs/msg/Transform", self.t("geometry_msgs/msg/Vector3", *xyz), rotation)
+        stamped = self.t("geometry_msgs/msg/TransformStamped", self.header(stamp_s, parent), child, transform)
+        self.write(topic, self.t("tf2_msgs/msg/TFMessage", [stamped]), stamp_s)
+
+    def odometry(self, stamp_s: float, parent: str, child: str, parent_from_child: np.ndarray) -> None:
+        xyz, rotation = self.pose(parent_from_child)
+        pose = self.t("geometry_msgs/msg/Pose", self.t("geometry_msgs/msg/Point", *xyz), rotation)
+        with_covariance = self.t("geometry_msgs/msg/PoseWithCovariance", pose, np.zeros(36))
+        zero = self.t("geometry_msgs/msg/Vector3", 0.0, 0.0, 0.0)
+        twist = self.t(
+            "geometry_msgs/msg/TwistWithCovariance", self.t("geometry_msgs/msg/Twist", zero, zero), np.zeros(36)
+        )
+        head = self.header(stamp_s, parent)
+        self.write("/odom", self.t("nav_msgs/msg/Odometry", head, child, with_covariance, twist), stamp_s)
+
+
+def world_from_body(stamp_s: float) -> np.ndarray:
+    pose = np.eye(4)
+    pose[0, 3] = stamp_s - START_S
+    return pose
+
+
+def write_bag(folder: Path, kind: str, poses: str = "tf", sound: bool = False, depth: bool = True) -> Path:
+    maker = BagMaker(kind, folder)
+    with maker.writer:
+        if poses != "odometry without mount":
+            maker.tf("/tf_static", START_S, "base_link", "camera_optical", BODY_FROM_CAMERA)
+        for i in range(11):  # poses at 10 Hz, images at 5 Hz in between
+            stamp_s = START_S + i * 0.1
+            if poses == "tf":
+                maker.tf("/tf", stamp_s, "map", "base_link", world_from_body(stamp_s))
+            elif poses.startswith("odometry"):
+                maker.odometry(stamp_s, "odom", "base_link", world_from_body(stamp_s))
+        for i in range(5):
+            stamp_s = START_S + 0.05 + i * 0.2
+            rgb = np.full((HEIGHT, WIDTH, 3), (10 * i, 100, 200), np.uint8)
+            millimetres = np.full((HEIGHT, WIDTH), 1000 + i, np.uint16)
+            maker.camera_info("/camera/color/camera_info", stamp_s)
+            maker.camera_info("/camera/depth/camera_info", stamp_s)
+            maker.image("/camera/color/image_raw", stamp_s + 0.004, rgb, "rgb8", "camera_optical")
+            if depth:
+                maker.image("/camera/depth/image_raw", stamp_s, millimetres, "16UC1", "camera_optical")
+        if sound:
+            info = maker.t("audio_common_msgs/msg/AudioInfo", 1, RATE_HZ, "S16LE", 0, "wave")
+            maker.write("/audio/audio_info", info, START_S)
+            tone = (8000 * np.sin(np.arange(RATE_HZ) * 0.3)).astype("<i2").view(np.uint8)
+            for piece in range(10):
+                part = tone[piece * len(tone) // 10 : (piece + 1) * len(tone) // 10]
+                maker.write("/audio/audio", maker.t("audio_common_msgs/msg/AudioData", part), START_S + piece * 0.1)
+    return maker.path
+
+
+@pytest.mark.parametrize("kind", ["ros1", "ros2", "mcap"])
+@pytest.mark.parametrize("poses", ["tf", "odometry"])
+def test_a_bag_opens_with_interpolated_poses_of_the_camera(tmp_path: Path, kind: str, poses: str) -> None:
+    recording = open_rosbag(write_bag(tmp_path, kind, poses))
+    assert len(recording) == 5
+    assert recording.stamps_s == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8])
+    expected = np.stack([world_from_body(START_S + 0.05 + s) @ BODY_FROM_CAMERA for s in recording.stamps_s])
+    assert recording.world_from_camera == pytest.approx(expected, abs=1e-9)
+    frame = recording.frame(3)
+    assert frame.rgb[0, 0].tolist() == [30, 100, 200]
+    assert frame.depth_m[5, 5] == pytest.approx(1.003)
+    assert (recording.rig.rgb.fx, recording.rig.rgb.cx) == (30.0, 16.0)
+    assert recording.up_in_world == pytest.approx((0.0, 0.0, 1.0))
+
+
+def test_a_single_mcap_file_opens_like_its_folder(tmp_path: Path) -> None:
+    folder = write_bag(tmp_path, "mcap")
+    assert len(open_rosbag(next(folder.glob("*.mcap")))) == 5
+
+
+def test_the_sound_of_a_bag_is_on_the_clock_of_its_frames(tmp_path: Path) -> None:
+    recording = open_rosbag(write_bag(tmp_path, "ros2", sound=True))
+    assert recording.audio is not None
+    assert recording.audio.rate_hz == RATE_HZ
+    assert recording.audio.duration_s == pytest.approx(1.0)
+    assert recording.audio.start_s == pytest.approx(-0.05, abs=0.005)
+
+
+def test_a_second_thread_reads_the_same_frames(tmp_path: Path) -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    recording = open_rosbag(write_bag(tmp_path, "ros2"))
+    here = [recording.frame(i).depth_m[0, 0] for i in range(5)]
+    with ThreadPoolExecutor(1) as pool:
+        assert list(pool.map(lambda i: recording.frame(i).depth_m[0, 0], range(5))) == here
+
+
+def test_a_bag_without_depth_says_what_it_has(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"has no topic of depth images \(image topics: /camera/color/image_raw\)"):
+        open_rosbag(write_bag(tmp_path, "ros2", depth=False))
+
+
+def test_a_bag_without_poses_says_what_to_record(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="has no poses: no /tf that moves 'camera_optical', no odometry"):
+        open_rosbag(write_bag(tmp_path, "ros2", poses="none"))
+
+
+def test_odometry_of_a_body_without_a_mounted_camera_asks_for_tf_static(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="no static transform from there to the camera 'camera_optical'"):
+        open_rosbag(write_bag(tmp_path, "ros1", poses="odometry without mount"))
+
+
+def test_a_topic_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="has no image topic '/left/image'"):
+        open_rosbag(write_bag(tmp_path, "ros2"), RosTopics(rgb="/left/image"))
+
+
+def test_a_truncated_bag_says_how_to_mend_it(tmp_path: Path) -> None:
+    path = write_bag(tmp_path, "ros1")
+    path.write_bytes(path.read_bytes()[:3000])
+    with pytest.raises(RecordingError, match="cannot be read as a ROS bag"):
+        open_rosbag(path)
+
+
+def test_compressed_depth_is_undone() -> None:
+    millimetres = np.arange(12, dtype=np.uint16).reshape(3, 4) * 500
+    png = cv2.imencode(".png", millimetres)[1].tobytes()
+    message = SimpleNamespace(
+        __msgtype__="sensor_msgs/msg/CompressedImage",
+        format="16UC1; compressedDepth png",
+        data=np.frombuffer(b"\0" * 12 + png, np.uint8),
+    )
+    assert depth_of(message, "x") == pytest.approx(millimetres / 1000.0)
+
+
+def test_a_static_chain_is_inverted_where_the_tree_asks() -> None:
+    from avlmaps.recordings.ros_transforms import TransformTree
+
+    tree = TransformTree()
+    base_from_a = from_quaternion(np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 0.6, 0.8]))
+    base_from_b = from_quaternion(np.array([-1.0, 0.5, 0.0]), np.array([0.6, 0.0, 0.0, 0.8]))
+    tree.add("base", "a", base_from_a, 0.0, static=True)
+    tree.add("base", "b", base_from_b, 0.0, static=True)
+    assert tree.fixed("a", "b") == pytest.approx(inverse(base_from_a) @ base_from_b)
+    assert tree.fixed("a", "elsewhere") is None
