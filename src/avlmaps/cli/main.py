@@ -1,0 +1,72 @@
+"""Reading the command line, running a verb, and turning errors into one sentence and an exit status."""
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import tyro
+
+from avlmaps.cli.bench import Bench
+from avlmaps.cli.output import UsageError
+from avlmaps.cli.verbs import AddSounds, Build, Demo, Info, Locate, Profiles, Query, TeachSound
+from avlmaps.core.errors import AvlmapsError
+
+_DESCRIPTION = """Audio-Visual-Language Maps: what a robot saw and heard, as one 3D map that can be asked.
+
+Every verb takes --json (one JSON object on standard output) and --help. Progress goes to standard error.
+Exit status: 0 done, 1 a known error (one sentence says which), 2 a wrong command line."""
+
+Command = (
+    Annotated[Demo, tyro.conf.subcommand("demo")]
+    | Annotated[AddSounds, tyro.conf.subcommand("add-sounds")]
+    | Annotated[Build, tyro.conf.subcommand("build")]
+    | Annotated[Info, tyro.conf.subcommand("info")]
+    | Annotated[Query, tyro.conf.subcommand("query")]
+    | Annotated[Locate, tyro.conf.subcommand("locate")]
+    | Annotated[TeachSound, tyro.conf.subcommand("teach-sound")]
+    | Annotated[Profiles, tyro.conf.subcommand("profiles")]
+    | Annotated[Bench, tyro.conf.subcommand("bench")]
+)
+_CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit.
+
+    Args:
+        arguments: the words after ``avlmaps``; those of this process if None.
+    """
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    if words == ["--version"]:
+        from avlmaps import __version__
+
+        sys.stdout.write(f"avlmaps {__version__}\n")
+        sys.exit(0)
+    # One BLAS thread: small matrices, ours among them, run many times slower on several when a machine is busy.
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(variable, "1")
+    verb = tyro.cli(Command, prog="avlmaps", description=_DESCRIPTION, args=words, config=_CONFIG)
+    sys.exit(_run(verb))
+
+
+def _run(verb: Command) -> int:
+    try:
+        verb.run()
+    except UsageError as error:
+        return _complain(error, 2)
+    except AvlmapsError as error:
+        return _complain(error, 1)
+    except BrokenPipeError:  # the reader of our output has gone (`avlmaps info MAP | head`): nothing to tell
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        return _complain(error, 1)
+    except KeyboardInterrupt:
+        return _complain("stopped; the same command goes on where this one ended, where it can", 130)
+    return 0
+
+
+def _complain(what: object, status: int) -> int:
+    sys.stderr.write(f"avlmaps: {what}\n")
+    return status

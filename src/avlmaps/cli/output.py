@@ -1,0 +1,41 @@
+"""What a verb prints: one JSON object, or lines for a person."""
+
+import json
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+
+class UsageError(Exception):
+    """The words of a command do not fit together; exit status 2."""
+
+
+def emit(answer: Mapping[str, Any], lines: Iterable[str], as_json: bool) -> None:
+    """Print the answer as one JSON object, or as lines."""
+    if as_json:
+        sys.stdout.write(json.dumps(answer, allow_nan=False, ensure_ascii=False) + "\n")
+    else:
+        for line in lines:
+            sys.stdout.write(line + "\n")
+
+
+def table_lines(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
+    """Lay out rows under columns, padded with spaces."""
+    cells = [[str(column) for column in columns], *[[str(cell) for cell in row] for row in rows]]
+    widths = [max(len(row[i]) for row in cells) for i in range(len(columns))]
+    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in cells]
+
+
+def place(position: Sequence[float]) -> str:
+    """Write a position as people read it."""
+    return "(" + ", ".join(f"{value:.2f}" for value in position) + ") m"
+
+
+def size_of(count: int) -> str:
+    """Write a number of bytes as people read it."""
+    size = float(count)
+    for unit in ("B", "kB", "MB"):
+        if size < 1000:
+            return f"{size:.0f} {unit}" if unit == "B" else f"{size:.1f} {unit}"
+        size /= 1000
+    return f"{size:.1f} GB"

@@ -1,0 +1,294 @@
+"""The verbs. Each field's docstring is its help; heavy imports happen when a verb runs."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from tyro.conf import Positional
+
+from avlmaps.cli.output import UsageError, emit, place, size_of, table_lines
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verb:
+    """What every verb takes."""
+
+    json: bool = False
+    """Print one JSON object on standard output, and nothing else there."""
+
+    def run(self) -> None:
+        """Do it."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Demo(Verb):
+    """Walk a room, hear it, map it, ask it: the whole system in one command, with pictures and a report."""
+
+    out: Path = Path("demo_out")
+    """Folder for the recording, the map, the pictures and report.html."""
+    seed: int = 0
+    """Another seed places the sounds elsewhere."""
+
+    def run(self) -> None:
+        """Run the demonstration."""
+        from avlmaps.demo import run_demo
+
+        report = run_demo(self.out, seed=self.seed)
+        emit(report.to_json(), report.lines(), self.json)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AddSounds(Verb):
+    """Put recorded sounds into the track of a recording; events.csv tells where and when.
+
+    Without options: as many sounds as the walk has room for, no two of them heard within 2 m of one another, as
+    the paper did. The same seed gives the same track. Example:
+
+    avlmaps add-sounds REC --clips sounds/ --category "dog bark" sneezing --out REC2
+    """
+
+    recording: Positional[Path]
+    """A recording in any format that `avlmaps build` reads."""
+    clips: Path
+    """Folder of sound files: one subfolder a category, or an index.csv with the columns path and category."""
+    out: Path
+    """Where the new recording goes (our folder format)."""
+    category: tuple[str, ...] = ()
+    """Only clips of these categories. Default: all of them."""
+    seed: int = 0
+    """Which clips go where."""
+    interval_s: float = 1.0
+    """Least silence between two sounds, seconds."""
+    min_distance_m: float = 2.0
+    """Least distance between the places where two sounds are heard, metres; 0 allows any."""
+    loudness_db: float = -20.0
+    """Loudness of each sound, dB relative to full scale."""
+    background: str | None = None
+    """Background noise: white, pink, room, or a sound file."""
+    snr_db: float | None = None
+    """How much louder the sounds are than the background, dB."""
+    format: str = "auto"
+    """Format of the recording."""
+
+    def run(self) -> None:
+        """Write the new recording."""
+        from avlmaps.recordings.add_sounds import add_sounds
+        from avlmaps.recordings.open import open_recording
+
+        events = add_sounds(
+            open_recording(self.recording, format=self.format),
+            self.clips,
+            self.out,
+            categories=self.category or None,
+            seed=self.seed,
+            interval_s=self.interval_s,
+            min_distance_m=self.min_distance_m,
+            loudness_db=self.loudness_db,
+            background=self.background,
+            snr_db=self.snr_db,
+        )
+        rows = [(f"{e.onset_s:.2f}", f"{e.offset_s:.2f}", e.category, place(e.position)) for e in events]
+        answer = {"recording": str(self.out), "sounds": len(events), "events": [e.to_json() for e in events]}
+        emit(
+            answer,
+            [*table_lines(("onset_s", "offset_s", "category", "heard at"), rows), f"wrote {self.out}"],
+            self.json,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Build(Verb):
+    """Build a map from a recording. A build that was stopped goes on where it ended, with the same map as result.
+
+    Example: avlmaps build REC --out kitchen.avlmap
+    """
+
+    recording: Positional[Path]
+    """A recording: our folder, 7-Scenes/3DMatch, AVLMaps/VLMaps, TUM RGB-D, Replica, ScanNet, a ROS bag, MCAP, a video."""
+    out: Path
+    """The map's folder, by custom NAME.avlmap."""
+    profile: str = "embedded"
+    """Which models perceive (see `avlmaps profiles`)."""
+    voxel_size_m: float = 0.05
+    """Edge of a voxel, metres."""
+    format: str = "auto"
+    """Format of the recording, where it cannot be told from its files."""
+    audio: Path | None = None
+    """A sound file to use in place of the recording's own track."""
+    frame_step: int = 1
+    """Fuse every n-th frame."""
+    max_depth_m: float | None = None
+    """Ignore depth beyond this, metres."""
+    resume: bool = False
+    """Go on with a stopped build. This is what happens anyway; with the flag, having nothing to go on with is an error."""
+    overwrite: bool = False
+    """Replace a finished map at --out that was built from something else."""
+    seed: int = 0
+    """Seed of what is drawn at random (visual words, RANSAC)."""
+
+    def run(self) -> None:
+        """Build the map."""
+        from avlmaps.cli.running import build
+
+        answer = build(self)
+        emit(answer, info_lines(answer), self.json)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Info(Verb):
+    """Tell what is in a recording or a map, and every fault that is found in it."""
+
+    path: Positional[Path]
+    """A recording or a map."""
+    format: str = "auto"
+    """Format of the recording, where it cannot be told from its files."""
+    verify: bool = False
+    """Also check every file of a map against its checksum."""
+    plot: Path | None = None
+    """Draw the map from above, with the walk and the sounds, into this picture."""
+
+    def run(self) -> None:
+        """Describe it."""
+        from avlmaps.cli.running import describe_path
+
+        answer = describe_path(self.path, self.format, verify=self.verify, plot=self.plot)
+        emit(answer, info_lines(answer), self.json)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Query(Verb):
+    """Ask a map, in a sentence or part by part; the parts are fused into one heatmap.
+
+    Examples:
+    avlmaps query MAP "the red cabinet near the sound of a dog barking"
+    avlmaps query MAP --object "red cabinet" --sound-clip bark.ogg --plot heat.png
+    """
+
+    map: Positional[Path]
+    """The map."""
+    sentence: Positional[str] = ""
+    """What is asked, in words; or leave it out and name the parts."""
+    object: str | None = None
+    """The object."""
+    sound: str | None = None
+    """The sound, in words."""
+    sound_clip: Path | None = None
+    """The sound, as a recording of one like it."""
+    area: str | None = None
+    """The area: a room, a part of the building."""
+    image: Path | None = None
+    """A photo taken there."""
+    intrinsics: str | None = None
+    """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: the map's own colour camera."""
+    primary: Literal["object", "sound", "image", "area"] | None = None
+    """Which part is the goal itself; the others say where it is. Default: the first of object, image, sound, area."""
+    top: int = 3
+    """How many goals to tell."""
+    plot: Path | None = None
+    """Draw the heat of each part and of the whole, with the goals numbered, into this picture."""
+
+    def run(self) -> None:
+        """Ask."""
+        from avlmaps.cli.running import ask
+
+        answer = ask(self)
+        emit(answer, query_lines(answer), self.json)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Locate(Verb):
+    """Tell where a photo was taken: the 6-DoF pose of its camera in the map, or that it was not taken there."""
+
+    map: Positional[Path]
+    """The map."""
+    image: Positional[Path]
+    """The photo."""
+    intrinsics: str | None = None
+    """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: the map's own colour camera."""
+
+    def run(self) -> None:
+        """Locate the photo."""
+        from avlmaps.cli.running import locate_photo
+
+        answer = locate_photo(self.map, self.image, self.intrinsics)
+        emit(answer, locate_lines(answer), self.json)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TeachSound(Verb):
+    """Teach a new kind of sound from a few clips of it; it is kept in your own profile folder.
+
+    Example: avlmaps teach-sound "our doorbell" bell1.wav bell2.wav bell3.wav
+    """
+
+    name: Positional[str]
+    """What you will call it in a query."""
+    clips: Positional[tuple[Path, ...]] = ()
+    """Sound files, three or more for preference."""
+    forget: bool = False
+    """Forget the sound of this name."""
+
+    def run(self) -> None:
+        """Teach or forget."""
+        from avlmaps.cli.running import teach
+
+        if bool(self.clips) == self.forget:
+            raise UsageError("teach-sound takes clips to learn from, or --forget, and not both.")
+        answer = teach(self.name, self.clips)
+        emit(answer, [f"{key}: {value}" for key, value in answer.items()], self.json)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Profiles(Verb):
+    """List the profiles and their backends: which are here, which are missing and how to get them."""
+
+    def run(self) -> None:
+        """List them."""
+        from avlmaps.cli.running import list_profiles
+
+        answer = list_profiles()
+        lines: list[str] = []
+        for entry in answer["profiles"]:
+            lines += [f"{entry['name']}: {entry['about']}"]
+            cells = [(b["module"], b["name"], b["state"], b["model"], b["note"]) for b in entry["backends"]]
+            lines += ["  " + line for line in table_lines(("module", "backend", "state", "model", "note"), cells)]
+        emit(answer, lines, self.json)
+
+
+def info_lines(answer: dict[str, Any]) -> list[str]:
+    """Lay out what `build` and `info` tell."""
+    lines: list[str] = []
+    for key, value in answer.items():
+        if key == "sounds":
+            lines.append(f"sounds: {len(value)}")
+            lines += [f"  {s['onset_s']:8.2f} - {s['offset_s']:.2f} s at {place(s['position'])}" for s in value]
+        elif isinstance(value, list) and value and isinstance(value[0], str):
+            lines += [f"{key}:", *[f"  {line}" for line in value]]
+        elif key == "bytes":
+            lines.append(f"size: {size_of(value)}")
+        elif value not in (None, [], {}):
+            lines.append(f"{key.replace('_', ' ')}: {value}")
+    return lines
+
+
+def query_lines(answer: dict[str, Any]) -> list[str]:
+    """Lay out what `query` tells."""
+    asked = ", ".join(f"{part['modality']} {part['query']!r} ({part['role']})" for part in answer["parts"])
+    lines = [f"asked: {asked}"]
+    lines += [f"note: {part['note']}" for part in answer["parts"] if part.get("note")]
+    rows = [
+        (i, place(goal["position"]), f"{goal['score']:.2f}", " x ".join(f"{side:.2f}" for side in goal["size"]))
+        for i, goal in enumerate(answer["goals"], start=1)
+    ]
+    lines.append("found" if answer["found"] else "not found here" + (": the best guesses are" if rows else ""))
+    return lines + (table_lines(("", "place", "score", "size in m"), rows) if rows else [])
+
+
+def locate_lines(answer: dict[str, Any]) -> list[str]:
+    """Lay out what `locate` tells."""
+    pose = answer["world_from_camera"]
+    if pose is None:
+        return [f"not located: {answer['inliers']} points agree, too few to tell a place"]
+    rows = ["  " + " ".join(f"{value:9.4f}" for value in row) for row in pose]
+    return [f"located, {answer['inliers']} points agree; world_from_camera:", *rows]
