@@ -1,11 +1,13 @@
 """The audio track: float32 mono in [-1, 1], read in pieces, whatever the container."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
+
+from avlmaps.core.errors import AudioError
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +36,10 @@ class Sound:
 
 @dataclass(frozen=True, slots=True)
 class AudioTrack:
-    """An audio file, or the audio stream of a video, placed on a recording's clock. To be written by the audio work.
+    """An audio file, or the audio stream of a video, placed on a recording's clock.
+
+    WAV, FLAC and OGG are read by libsndfile, everything else (mp4, mkv, m4a, mp3) by FFmpeg; several channels
+    become one, their mean. Nothing is read before it is asked for, so a track may be hours long.
 
     Attributes:
         path: the file.
@@ -48,10 +53,129 @@ class AudioTrack:
     duration_s: float
     start_s: float = 0.0
 
+    @classmethod
+    def open(cls, path: Path | str, start_s: float = 0.0) -> "AudioTrack":
+        """Find out what an audio file holds, without reading it whole.
+
+        Args:
+            path: a sound file, or a video with sound.
+            start_s: the recording's time at which its first sample sounds.
+
+        Raises:
+            AudioError: there is no such file, it cannot be read, has no audio stream or no samples, or is truncated.
+        """
+        from avlmaps.recordings import containers
+
+        path = Path(path)
+        rate_hz, count = containers.examine(path)
+        return cls(path, rate_hz, count / rate_hz, start_s)
+
+    @property
+    def end_s(self) -> float:
+        """The recording's time at which the track ends."""
+        return self.start_s + self.duration_s
+
     def read(self, onset_s: float = 0.0, offset_s: float | None = None) -> Sound:
-        """Read a piece, in the recording's time."""
-        raise NotImplementedError
+        """Read a piece, with silence for what lies outside the track.
+
+        Args:
+            onset_s: where the piece begins, the recording's time.
+            offset_s: where it ends; the track's end if None.
+
+        Raises:
+            AudioError: the file cannot be read any more, or holds samples that are no finite numbers.
+            ValueError: the piece ends before it begins.
+        """
+        from avlmaps.recordings import containers
+
+        begin = round((onset_s - self.start_s) * self.rate_hz)
+        count = round(self.duration_s * self.rate_hz)
+        end = count if offset_s is None else round((offset_s - self.start_s) * self.rate_hz)
+        if offset_s is not None and end < begin:
+            raise ValueError(f"the piece from {onset_s} s to {offset_s} s ends before it begins")
+        samples = np.zeros(max(end - begin, 0), np.float32)
+        inside_begin, inside_end = max(begin, 0), min(end, count)
+        if inside_begin < inside_end:
+            at = inside_begin - begin
+            piece = containers.read_piece(self.path, inside_begin, inside_end, self.rate_hz)
+            samples[at : at + len(piece)] = _checked(piece, self.path, self.rate_hz, inside_begin)
+        return Sound(samples, self.rate_hz)
 
     def blocks(self, seconds: float = 10.0) -> Iterator[Sound]:
-        """Go through the whole track in pieces."""
-        raise NotImplementedError
+        """Go through the whole track in pieces of one length (the last may be shorter), one in memory at a time.
+
+        Raises:
+            AudioError: the file breaks off, or holds samples that are no finite numbers.
+        """
+        from avlmaps.recordings import containers
+
+        size = max(1, round(seconds * self.rate_hz))
+        count, at = round(self.duration_s * self.rate_hz), 0
+        for block in _regrouped(containers.stream(self.path, count, self.rate_hz), size):
+            yield Sound(_checked(block, self.path, self.rate_hz, at), self.rate_hz)
+            at += len(block)
+        if at < count:
+            raise containers.truncated(self.path, at / self.rate_hz, count / self.rate_hz)
+
+
+def write_flac(path: Path, sound: Sound | Iterable[Sound]) -> None:
+    """Write a sound, or the blocks of a long one, as 16-bit FLAC; a kill leaves the old file or the new one.
+
+    Args:
+        path: the file; its folder must exist.
+        sound: what to write; blocks must share one rate. Samples beyond [-1, 1] are clipped.
+
+    Raises:
+        AudioError: there is not one block.
+    """
+    import soundfile
+
+    from avlmaps.core.files import replaced_atomically
+
+    blocks = iter([sound] if isinstance(sound, Sound) else sound)
+    first = next(blocks, None)
+    if first is None:
+        raise AudioError(f"There is no sound to write to {path}; give at least one block.")
+    with (
+        replaced_atomically(path) as stream,
+        soundfile.SoundFile(stream, "w", first.rate_hz, 1, "PCM_16", format="FLAC") as file,
+    ):
+        block: Sound | None = first
+        while block is not None:
+            if block.rate_hz != first.rate_hz:
+                raise ValueError(f"a block has {block.rate_hz} samples a second, the first had {first.rate_hz}")
+            for at in range(0, len(block.samples), block.rate_hz):
+                file.write(np.clip(block.samples[at : at + block.rate_hz], -1.0, 1.0))
+            block = next(blocks, None)
+
+
+def _checked(samples: Float[np.ndarray, " n"], path: Path, rate_hz: int, at: int) -> Float[np.ndarray, " n"]:
+    """Return the samples within [-1, 1], or say which are no numbers or come from another scale."""
+    finite = np.isfinite(samples)
+    if not finite.all():
+        where_s = (at + int(np.argmin(finite))) / rate_hz
+        raise AudioError(
+            f"{path} holds samples that are no finite numbers, the first at {where_s:.3f} s; convert it again from its "
+            "source."
+        )
+    peak = float(np.abs(samples).max(initial=0.0))
+    if peak > 16.0:
+        raise AudioError(f"{path} holds samples as large as {peak:.0f}; floating-point sound must lie in [-1, 1].")
+    return np.clip(samples, -1.0, 1.0) if peak > 1.0 else samples
+
+
+def _regrouped(pieces: Iterable[Float[np.ndarray, " _"]], size: int) -> Iterator[Float[np.ndarray, " _"]]:
+    """Cut a stream of pieces of any length into blocks of one size; the last may be shorter."""
+    waiting: list[np.ndarray] = []
+    length = 0
+    for piece in pieces:
+        waiting.append(piece)
+        length += len(piece)
+        if length >= size:
+            joined = np.concatenate(waiting)
+            whole = length // size * size
+            for at in range(0, whole, size):
+                yield joined[at : at + size]
+            waiting, length = [joined[whole:]], length - whole
+    if length:
+        yield np.concatenate(waiting)

@@ -1,0 +1,229 @@
+"""Getting mono samples out of sound files and videos: libsndfile for the plain formats, FFmpeg for the rest."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float32
+
+from avlmaps.core.errors import AudioError
+
+if TYPE_CHECKING:
+    import soundfile
+    from av.audio.frame import AudioFrame
+
+_PLAIN = {".wav", ".w64", ".flac", ".ogg", ".oga", ".opus", ".aif", ".aiff", ".caf"}
+_PIECE_SAMPLES = 1 << 16
+_PREROLL_S = 1.0  # a decoder that starts in the middle needs a while until its output is right
+_RESYNC_S = 0.05  # stamps are rounded (to 1 ms in mkv); only a larger jump is a gap
+_SLACK_S = 0.5  # containers round their durations, encoders drop or pad a few hundred samples
+
+
+def truncated(path: Path, found_s: float, promised_s: float) -> AudioError:
+    """Return the error for a file that ends before it should."""
+    return AudioError(
+        f"{path} is truncated: it should last {promised_s:.2f} s and breaks off at {found_s:.2f} s; copy or convert it "
+        "again."
+    )
+
+
+def examine(path: Path) -> tuple[int, int]:
+    """Return samples a second and the number of samples.
+
+    Raises:
+        AudioError: there is no such file, it cannot be read, has no audio stream or no samples, or is truncated.
+    """
+    if not path.is_file():
+        what = "is a folder, not a sound file" if path.is_dir() else "does not exist"
+        raise AudioError(f"{path} {what}; give a wav, flac, ogg, mp3, m4a, mp4 or mkv file.")
+    rate_hz, count = _examine_plain(path) if _is_plain(path) else _examine_video(path)
+    if count < 1:
+        raise AudioError(f"{path} has an audio stream without a single sample; record or convert it again.")
+    return rate_hz, count
+
+
+def read_piece(path: Path, begin: int, end: int, rate_hz: int) -> Float32[np.ndarray, " n"]:
+    """Return the mono samples ``begin:end``; fewer where the file ends before."""
+    if not _is_plain(path):
+        pieces = list(_placed(path, begin, end, rate_hz))
+        return np.concatenate(pieces) if pieces else np.zeros(0, np.float32)
+    with _opened_plain(path) as file:
+        try:
+            file.seek(begin)
+            return _mono(file.read(end - begin, dtype="float32", always_2d=True))
+        except RuntimeError as error:
+            raise _unreadable(path, error) from None
+
+
+def stream(path: Path, count: int, rate_hz: int) -> Iterator[Float32[np.ndarray, " _"]]:
+    """Go through the first ``count`` mono samples in pieces of any length; fewer where the file ends before."""
+    if not _is_plain(path):
+        yield from _placed(path, 0, count, rate_hz)
+        return
+    with _opened_plain(path) as file:
+        while count > 0:
+            try:
+                piece = file.read(min(_PIECE_SAMPLES, count), dtype="float32", always_2d=True)
+            except RuntimeError as error:
+                raise _unreadable(path, error) from None
+            if not len(piece):
+                return
+            count -= len(piece)
+            yield _mono(piece)
+
+
+def _is_plain(path: Path) -> bool:
+    return path.suffix.lower() in _PLAIN
+
+
+def _mono(samples: Float32[np.ndarray, "n channels"]) -> Float32[np.ndarray, " n"]:
+    return samples[:, 0].copy() if samples.shape[1] == 1 else samples.mean(axis=1, dtype=np.float32)
+
+
+def _unreadable(path: Path, error: Exception) -> AudioError:
+    reason = str(error).strip().rstrip(".") or type(error).__name__
+    return AudioError(f"{path} cannot be read as sound ({reason}); convert it again, to FLAC for preference.")
+
+
+def _opened_plain(path: Path) -> "soundfile.SoundFile":
+    import soundfile
+
+    try:
+        return soundfile.SoundFile(str(path))
+    except (RuntimeError, OSError) as error:
+        if path.is_file() and path.stat().st_size == 0:
+            raise AudioError(f"{path} is empty (0 bytes); record or copy it again.") from None
+        reason = getattr(error, "error_string", None) or error
+        raise _unreadable(path, RuntimeError(str(reason))) from None
+
+
+def _examine_plain(path: Path) -> tuple[int, int]:
+    with _opened_plain(path) as file:
+        rate_hz, count = int(file.samplerate), int(file.frames)
+        promised = _promised_wav_samples(path, file.channels)
+        if promised is not None and count < promised:
+            raise truncated(path, count / rate_hz, promised / rate_hz)
+        if file.format == "FLAC" and count:
+            last = _last_flac_sample(file, count)
+            if last < count:
+                raise truncated(path, last / rate_hz, count / rate_hz)
+    return rate_hz, count
+
+
+def _promised_wav_samples(path: Path, channels: int) -> int | None:
+    """Return how many samples a WAV file's header promises, which libsndfile quietly cuts to what is there."""
+    with path.open("rb") as stream_:
+        if stream_.read(4) != b"RIFF" or stream_.seek(8) != 8 or stream_.read(4) != b"WAVE":
+            return None
+        frame_bytes = 0
+        while len(head := stream_.read(8)) == 8:
+            size = int.from_bytes(head[4:], "little")
+            if head[:4] == b"fmt ":
+                fmt = stream_.read(min(size, 16))
+                frame_bytes = int.from_bytes(fmt[12:14], "little")
+                stream_.seek(size - len(fmt) + size % 2, 1)
+            elif head[:4] == b"data":
+                unknown = size >= 0xFFFFFFFF - 0xFFFF or size == 0  # written to a pipe: the length was never filled in
+                return None if unknown or not frame_bytes or not channels else size // frame_bytes
+            else:
+                stream_.seek(size + size % 2, 1)
+    return None
+
+
+def _last_flac_sample(file: "soundfile.SoundFile", count: int) -> int:
+    """Return how many samples can be reached, found by halving (a truncated FLAC still tells its full length)."""
+
+    def reachable(index: int) -> bool:
+        try:
+            file.seek(index)
+            return len(file.read(1, dtype="float32")) == 1
+        except RuntimeError:
+            return False
+
+    if reachable(count - 1):
+        return count
+    low, high = 0, count - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if reachable(middle) else (low, middle)
+    return low
+
+
+def _examine_video(path: Path) -> tuple[int, int]:
+    import av
+    from av.error import FFmpegError
+
+    try:
+        with av.open(str(path)) as container:
+            if not container.streams.audio:
+                raise AudioError(f"{path} has no audio stream; give the sound as a file of its own (--audio).")
+            audio = container.streams.audio[0]
+            rate_hz = int(audio.codec_context.sample_rate)
+            zero_s = (container.start_time or 0) / av.time_base
+            if container.streams.video and audio.duration is not None and audio.time_base is not None:
+                end_s = float((audio.duration + (audio.start_time or 0)) * audio.time_base) - zero_s
+            elif container.streams.video and container.duration is not None:
+                end_s = container.duration / av.time_base
+            else:  # sound alone: going through the packets costs little, and an mp3 knows its length no other way
+                end_s = _end_of_packets(container, audio) - zero_s
+    except FFmpegError as error:
+        raise _unreadable(path, error) from None
+    if next(_decoded(path, 0.0), None) is None:
+        end_s = 0.0
+    return rate_hz, round(end_s * rate_hz)
+
+
+def _end_of_packets(container: Any, audio: Any) -> float:
+    end = 0
+    for packet in container.demux(audio):
+        if packet.pts is not None:
+            end = max(end, packet.pts + (packet.duration or 0))
+    return float(end * audio.time_base)
+
+
+def _decoded(path: Path, from_s: float) -> Iterator[tuple[float, Float32[np.ndarray, " _"]]]:
+    """Yield (time of the first sample since the container's start, mono samples) from a while before ``from_s`` on."""
+    import av
+    from av.error import FFmpegError
+
+    try:
+        with av.open(str(path)) as container:
+            audio = container.streams.audio[0]
+            zero_s = (container.start_time or 0) / av.time_base
+            if from_s > _PREROLL_S and audio.time_base is not None:
+                target = int((from_s - _PREROLL_S + zero_s) / audio.time_base)
+                container.seek(target, stream=audio, backward=True)
+            resampler = av.AudioResampler(format="fltp")
+            for frame in container.decode(audio):
+                for plain in resampler.resample(frame):
+                    if plain.pts is not None and plain.time_base is not None:
+                        yield float(plain.pts * plain.time_base) - zero_s, _frame_samples(plain)
+    except FFmpegError as error:
+        raise _unreadable(path, error) from None
+
+
+def _frame_samples(frame: "AudioFrame") -> Float32[np.ndarray, " _"]:
+    return frame.to_ndarray().mean(axis=0, dtype=np.float32)
+
+
+def _placed(path: Path, begin: int, end: int, rate_hz: int) -> Iterator[Float32[np.ndarray, " _"]]:
+    """Yield the samples ``begin:end`` without holes: gaps between the container's stamps are filled with silence."""
+    at, started = begin, False
+    for time_s, samples in _decoded(path, begin / rate_hz):
+        index = round(time_s * rate_hz)
+        if started and abs(index - at) < _RESYNC_S * rate_hz:
+            index = at
+        while at < min(index, end):
+            gap = np.zeros(min(min(index, end) - at, _PIECE_SAMPLES), np.float32)
+            at += len(gap)
+            yield gap
+        fresh = samples[at - index : end - index] if index < end else samples[:0]
+        if len(fresh):
+            started = True
+            at += len(fresh)
+            yield fresh
+        if at >= end:
+            return
+    if end - at <= _SLACK_S * rate_hz:
+        yield np.zeros(end - at, np.float32)
