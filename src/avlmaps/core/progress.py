@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -12,6 +13,17 @@ def silence(quiet: bool = True) -> None:
     """Turn progress off (or on again) for this process."""
     global _quiet
     _quiet = quiet
+
+
+@contextmanager
+def silenced(quiet: bool = True) -> Iterator[None]:
+    """Keep progress off for a while, and put it back as it was; with ``quiet=False`` change nothing."""
+    before = _quiet
+    silence(before or quiet)
+    try:
+        yield
+    finally:
+        silence(before)
 
 
 def progress(

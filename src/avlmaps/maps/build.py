@@ -1,0 +1,59 @@
+"""From a recording to a map. ``build_map`` is the whole of it; each stage keeps what it finished."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from avlmaps.core.progress import silenced
+from avlmaps.maps.lock import locked
+from avlmaps.maps.parts import build_part, merge_parts
+from avlmaps.maps.plan import claim, make_plan
+from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.stages import commit, find_up, fuse, hear_sounds, keep_keyframes, merge
+from avlmaps.maps.stored import StoredMap, describe, open_stored
+from avlmaps.perception.profiles import profile as profile_of
+from avlmaps.recordings.types import Recording
+
+__all__ = ["BuildSettings", "build_map", "build_part", "describe", "merge_parts", "open_stored"]
+
+
+def build_map(
+    recording: Recording,
+    path: Path | str,
+    profile: str = "embedded",
+    settings: BuildSettings = BuildSettings(),
+    *,
+    parts: Sequence[Path | str] = (),
+    resume: bool = True,
+    overwrite: bool = False,
+    progress: bool = True,
+) -> StoredMap:
+    """Build a map of a recording, or finish one that was begun.
+
+    A build that is killed at any instant goes on from its last finished part when it is started again, and ends with
+    the same map, bit by bit. A finished map in the folder stays whole and readable until the new one replaces it.
+
+    Args:
+        recording: from ``open_recording``.
+        path: the map's folder, by custom ``NAME.avlmap``.
+        profile: which models perceive.
+        settings: all that can be chosen.
+        parts: folders of ``build_part`` from other machines; their frames are not fused again.
+        resume: go on with what a stopped build had finished; otherwise begin anew.
+        overwrite: replace a finished map there that came from another recording, or with other settings.
+        progress: show how far it is on standard error.
+
+    Raises:
+        MapError: the folder is something else, holds another map, is in use or cannot be written.
+        RecordingError: too many frames cannot be read, or none has depth.
+        BackendError: the profile is not known, or a package for it is missing.
+    """
+    plan = make_plan(recording, Path(path), profile_of(profile), settings)
+    with silenced(not progress), locked(plan.path):
+        if claim(plan, resume, overwrite) is None:
+            up = find_up(plan)
+            fused = fuse(plan, parts)
+            pictures = keep_keyframes(plan, fused)
+            heard = hear_sounds(plan)
+            voxels = merge(plan, fused)  # late, because it fills the memory
+            commit(plan, up, fused, pictures, heard, voxels)
+    return open_stored(plan.path)

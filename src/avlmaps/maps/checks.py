@@ -1,0 +1,76 @@
+"""Holding arrays that were read from a disk against what ``maps.types`` declares of them."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+
+from avlmaps.core.errors import MapError
+from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
+
+T = TypeVar("T")
+
+# Ragged arrays: the field of offsets and the field whose rows it divides.
+_RAGGED: dict[type, tuple[tuple[str, str], ...]] = {
+    Keyframes: (("offsets", "xy"), ("thumbnail_offsets", "thumbnails")),
+    HeardSounds: (("track_offsets", "track"), ("feature_offsets", "feature")),
+}
+_MEND = "build the map again with --overwrite"
+
+
+def array_fields(kind: type) -> list[str]:
+    """Return the names of a dataclass's fields that hold arrays."""
+    return [field.name for field in dataclasses.fields(kind) if hasattr(field.type, "dim_str")]
+
+
+def assembled(kind: type[T], values: Mapping[str, Any], where: str) -> T:
+    """Return the dataclass of these fields, each array of the type and shape that its annotation tells.
+
+    Args:
+        kind: ``Voxels``, ``Keyframes``, ``HeardSounds`` or another dataclass with jaxtyping annotations.
+        values: its fields.
+        where: the file or folder that the error names.
+
+    Raises:
+        MapError: a field is missing, has another type or shape, sizes disagree, or ragged offsets do not fit.
+    """
+    sizes: dict[str, int] = {}
+    for field in dataclasses.fields(kind):  # pyright: ignore[reportArgumentType]
+        if field.name not in values:
+            raise MapError(f"{where} is damaged: it has no {field.name}; {_MEND}.")
+        if hasattr(field.type, "dim_str"):
+            _check_array(f"{where}, {field.name}", values[field.name], field.type, sizes)
+    whole = kind(**values)
+    for offsets, rows in _RAGGED.get(kind, ()):
+        _check_offsets(f"{where}, {offsets}", getattr(whole, offsets), len(getattr(whole, rows)), len(whole))  # pyright: ignore[reportArgumentType]
+    return whole
+
+
+def _check_array(where: str, array: np.ndarray, declared: Any, sizes: dict[str, int]) -> None:
+    """Compare an array with a jaxtyping annotation; ``sizes`` keeps what each letter stands for."""
+    dims = declared.dim_str.split()
+    if array.dtype.name not in declared.dtypes or array.ndim != len(dims):
+        raise MapError(
+            f"{where} is {array.dtype} of {array.shape}; a map has {' or '.join(declared.dtypes)} of ({', '.join(dims)}) "
+            f"there; {_MEND}."
+        )
+    for dim, size in zip(dims, array.shape, strict=True):
+        wanted = int(dim) if dim.isdigit() else sizes.setdefault(dim, size)
+        if size != wanted:
+            raise MapError(f"{where} has shape {array.shape}; {dim} is {wanted} in the rest of the map; {_MEND}.")
+
+
+def _check_offsets(where: str, offsets: np.ndarray, rows: int, count: int) -> None:
+    fits = len(offsets) == count + 1 and offsets[0] == 0 and offsets[-1] == rows and bool((np.diff(offsets) >= 0).all())
+    if not fits:
+        raise MapError(f"{where} do not divide {rows} rows among {count}; {_MEND}.")
+
+
+def check_order(voxels: Voxels, where: str) -> None:
+    """Raise ``MapError`` unless the voxels are sorted by index and none comes twice."""
+    index = np.asarray(voxels.index)
+    step = np.diff(index.astype(np.int64), axis=0)
+    first = np.take_along_axis(step, (step != 0).argmax(axis=1)[:, None], axis=1)
+    if len(step) and (first <= 0).any():
+        raise MapError(f"{where} are not sorted by index, or one comes twice; {_MEND}.")

@@ -1,0 +1,250 @@
+"""``map.json``: what is written about a map beside its arrays, and how it is read with suspicion."""
+
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import MapError
+from avlmaps.core.files import write_bytes_atomically
+from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.shards import FileInfo, writing_into
+from avlmaps.perception.protocols import ModelCard
+
+SCHEMA_VERSION = 1
+MANIFEST = "map.json"
+
+Vector = tuple[float, float, float]
+
+
+class _Struct(msgspec.Struct, frozen=True, kw_only=True):
+    """Common options."""
+
+
+class ModelInfo(_Struct):
+    """A model that made features of this map: its card, and the backend's name in the profile.
+
+    ``normalisation`` is that of the stored features; there is one as yet.
+    """
+
+    backend: str
+    id: str
+    dim: int
+    licence: str
+    checksum: str
+    prompts: tuple[str, ...]
+    note: str = ""
+    normalisation: str = "unit length"
+
+    @classmethod
+    def of(cls, backend: str, card: ModelCard) -> "ModelInfo":
+        """Return the entry for a backend."""
+        return cls(
+            backend=backend,
+            id=card.id,
+            dim=card.dim,
+            licence=card.licence,
+            checksum=card.checksum,
+            prompts=tuple(card.prompts),
+            note=card.note,
+        )
+
+
+class CameraInfo(_Struct):
+    """Intrinsics in pixels, conventions as in ``core.camera``."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+
+    @classmethod
+    def of(cls, camera: Pinhole) -> "CameraInfo":
+        """Return the entry for a camera."""
+        return cls(
+            fx=float(camera.fx),
+            fy=float(camera.fy),
+            cx=float(camera.cx),
+            cy=float(camera.cy),
+            width=int(camera.width),
+            height=int(camera.height),
+        )
+
+    def camera(self) -> Pinhole:
+        """Return the camera."""
+        return Pinhole(self.fx, self.fy, self.cx, self.cy, self.width, self.height)
+
+
+class RigInfo(_Struct):
+    """The recording's two cameras; ``rgb_from_depth`` row by row."""
+
+    rgb: CameraInfo
+    depth: CameraInfo
+    rgb_from_depth: tuple[tuple[float, float, float, float], ...]
+
+    @classmethod
+    def of(cls, rig: Rig) -> "RigInfo":
+        """Return the entry for a rig."""
+        rows = tuple(tuple(float(value) for value in row) for row in rig.rgb_from_depth)
+        return cls(rgb=CameraInfo.of(rig.rgb), depth=CameraInfo.of(rig.depth), rgb_from_depth=rows)  # pyright: ignore[reportArgumentType]
+
+    def rig(self) -> Rig:
+        """Return the rig."""
+        return Rig(self.rgb.camera(), self.depth.camera(), np.array(self.rgb_from_depth, np.float64).reshape(4, 4))
+
+
+class RecordingInfo(_Struct):
+    """Which recording the map was built from. The folder's name only: where it lay is nobody's business."""
+
+    name: str
+    format: str
+    fingerprint: str
+    frames: int
+    duration_s: float
+    notices: tuple[str, ...] = ()
+
+
+class UpInfo(_Struct):
+    """Which way is up in the recording's world, and how that is known.
+
+    Attributes:
+        direction: unit vector.
+        known_from: the recording said so, or it was found from the planes in view.
+        support: for a found one the share of the surface that agrees, in [0, 1]; 1 for a known one.
+    """
+
+    direction: Vector
+    known_from: Literal["recording", "planes"]
+    support: float = 1.0
+
+    def vector(self) -> Float[np.ndarray, "3"]:
+        """Return the direction as an array."""
+        return np.array(self.direction, np.float64)
+
+
+class BadFrame(_Struct):
+    """A frame that could not be read and was left out, with the sentence that told why."""
+
+    index: int
+    why: str
+
+
+class Counts(_Struct):
+    """How much there is of everything.
+
+    Attributes:
+        frames: fused frames.
+        keyframes: kept pictures.
+        voxels: occupied voxels.
+        sounds: heard sounds.
+    """
+
+    frames: int
+    keyframes: int
+    voxels: int
+    sounds: int
+
+
+class Box(_Struct):
+    """The smallest box along the world's axes that holds every occupied voxel, metres."""
+
+    low: Vector
+    high: Vector
+
+
+class Timings(_Struct):
+    """When the map was finished (ISO 8601, UTC) and the seconds of work in each stage, over all runs that it took."""
+
+    finished: str
+    elapsed_s: float
+    stages_s: dict[str, float]
+
+
+class MapInfo(_Struct):
+    """The whole of ``map.json``.
+
+    Attributes:
+        format: says that this is a map.
+        schema_version: of the folder's layout.
+        avlmaps_version: which release built it.
+        build_key: hash of everything that went in (recording, settings, models); another build has another one.
+        voxel_size_m: the grid.
+        up: which way is up.
+        rig: the recording's cameras.
+        profile: which models perceived.
+        models: their cards, by module.
+        settings: resolved, defaults included.
+        seed: of everything that was drawn at random.
+        recording: what was recorded.
+        counts: how much there is.
+        bounding_box_m: where the voxels are.
+        bad_frames: frames that were left out because they could not be read.
+        notices: a sentence for each thing worth knowing.
+        files: every file, by what it holds (``voxels/feature``); nothing else in the folder is part of the map.
+        bytes: size of all files.
+        timings: when it was built and how long it took; the only part that differs when a build is repeated.
+    """
+
+    format: Literal["avlmap"] = "avlmap"
+    schema_version: int = SCHEMA_VERSION
+    avlmaps_version: str
+    build_key: str
+    voxel_size_m: float
+    up: UpInfo
+    rig: RigInfo
+    profile: str
+    models: dict[str, ModelInfo]
+    settings: BuildSettings
+    seed: int
+    recording: RecordingInfo
+    counts: Counts
+    bounding_box_m: Box
+    bad_frames: tuple[BadFrame, ...] = ()
+    notices: tuple[str, ...] = ()
+    files: dict[str, FileInfo] = {}
+    bytes: int = 0
+    timings: Timings
+
+
+class _Ident(msgspec.Struct):
+    format: str = ""
+    schema_version: int = 0
+
+
+def write_manifest(folder: Path, info: MapInfo) -> None:
+    """Write ``map.json``; with it the folder becomes this map, and not before."""
+    content = msgspec.json.format(msgspec.json.encode(info), indent=2)
+    with writing_into(folder):
+        write_bytes_atomically(folder / MANIFEST, content + b"\n")
+
+
+def parse_manifest(content: bytes, path: Path) -> MapInfo:
+    """Return what ``map.json`` says.
+
+    Args:
+        content: of the file.
+        path: the file, for the errors.
+
+    Raises:
+        MapError: it is not JSON, not UTF-8, of no map, of another schema version, or lacks something.
+    """
+    try:
+        ident = msgspec.json.decode(content, type=_Ident)
+    except (msgspec.DecodeError, UnicodeDecodeError) as fault:
+        raise MapError(f"{path} is damaged: it is not JSON in UTF-8 ({fault}); restore it from a copy.") from fault
+    if ident.format != "avlmap":
+        raise MapError(f"{path} belongs to no map of avlmaps; give the folder that `avlmaps build` wrote.")
+    if ident.schema_version != SCHEMA_VERSION:
+        how = "upgrade avlmaps" if ident.schema_version > SCHEMA_VERSION else "build the map again with --overwrite"
+        raise MapError(
+            f"{path} has schema version {ident.schema_version}, this avlmaps reads version {SCHEMA_VERSION}; {how}."
+        )
+    try:
+        return msgspec.json.decode(content, type=MapInfo)
+    except (msgspec.DecodeError, ValueError, MapError) as fault:
+        raise MapError(f"{path} is damaged: {fault}; restore it from a copy.") from fault

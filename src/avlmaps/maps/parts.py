@@ -1,0 +1,288 @@
+"""Parts of a map: sums over some frames, kept on disk, that add up to the whole in any order.
+
+A stopped build goes on from the parts that it had finished, and machines that share the work bring theirs:
+``build_part`` on each of them, then ``build_map(..., parts=[...])`` on one.
+"""
+
+import dataclasses
+from collections.abc import Generator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from time import perf_counter
+
+import msgspec
+import numpy as np
+from jaxtyping import Float32
+
+from avlmaps.core.errors import MapError, RecordingError
+from avlmaps.core.progress import progress
+from avlmaps.maps.ahead import run_ahead
+from avlmaps.maps.checkpoints import Checkpoint, find_checkpoint, key_of, load_checkpoint, save_checkpoint
+from avlmaps.maps.fusion import VoxelAccumulator, VoxelSums
+from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.manifest import BadFrame
+from avlmaps.maps.settings import BuildSettings
+from avlmaps.perception.profiles import Profile, profile
+from avlmaps.perception.protocols import PixelEncoder
+from avlmaps.recordings.types import Frame, Recording
+
+BUILD_VERSION = 1  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
+
+Span = tuple[int, int, int]
+
+
+class PartInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """What is known of a part beside its sums.
+
+    Attributes:
+        recording: the recording's name, for people.
+        spans: the frames that it covers: (first, last + 1, step) of each stretch, rising.
+        fused: how many frames were fused.
+        bad_frames: those that could not be read.
+        elapsed_s: seconds of work.
+    """
+
+    recording: str
+    spans: tuple[Span, ...]
+    fused: int
+    bad_frames: tuple[BadFrame, ...]
+    elapsed_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A finished part, its sums memory-mapped.
+
+    Attributes:
+        folder: where it lies.
+        info: which frames it covers.
+        sums: sums over them.
+    """
+
+    folder: Path
+    info: PartInfo
+    sums: VoxelSums
+
+
+def pixel_encoder_of(used: Profile) -> PixelEncoder | None:
+    """Return the profile's pixel encoder, None where it has none (the map is then one of surfaces and colours)."""
+    return used.pixel_encoder() if used.pixels else None
+
+
+def fusion_key(recording: Recording, settings: BuildSettings, used: Profile) -> str:
+    """Return the hash of all that the sums of a frame depend on; parts are only ever added to parts of the same key."""
+    encoder = pixel_encoder_of(used)
+    card = None if encoder is None else encoder.card
+    return key_of("fusion", BUILD_VERSION, recording.fingerprint, settings.voxel_size_m, settings.fusion, card)
+
+
+def plan_spans(frames: int, settings: BuildSettings, covered: Sequence[Span] = ()) -> list[Span]:
+    """Return the stretches to fuse one after the other, each of ``frames.per_part`` frames or fewer.
+
+    Args:
+        frames: of the recording.
+        settings: step, and frames of a part.
+        covered: stretches that are fused already.
+    """
+    wanted = np.zeros(frames, bool)
+    wanted[:: settings.frames.step] = True
+    for start, stop, step in covered:
+        wanted[start:stop:step] = False
+    spans: list[Span] = []
+    stride = settings.frames.per_part * settings.frames.step
+    for start in range(0, frames, stride):
+        left = np.flatnonzero(wanted[start : start + stride])
+        for run in np.split(left, np.flatnonzero(np.diff(left) > settings.frames.step) + 1):
+            if len(run):
+                first, last = start + int(run[0]), start + int(run[-1])
+                spans.append((first, last + 1, settings.frames.step))
+    return spans
+
+
+def build_part(
+    recording: Recording,
+    start: int,
+    stop: int,
+    out: Path | str,
+    profile_name: str = "embedded",
+    settings: BuildSettings = BuildSettings(),
+) -> Part:
+    """Fuse the frames ``start`` to ``stop - 1`` and keep their sums in a folder, as one machine's part of a map.
+
+    Args:
+        recording: what all machines read.
+        start: first frame, from 0.
+        stop: one past the last frame.
+        out: the part's folder; a part that is there already, of the same frames and settings, is returned.
+        profile_name: which models perceive.
+        settings: the same on all machines.
+
+    Raises:
+        MapError: there are no such frames, or too many of them cannot be read.
+    """
+    out, used = Path(out), profile(profile_name)
+    if not 0 <= start < stop <= len(recording):
+        raise MapError(f"There are no frames {start} to {stop}; {recording.path} has frames 0 to {len(recording)}.")
+    key, span = fusion_key(recording, settings, used), (start, stop, settings.frames.step)
+    if out.exists() and any(out.iterdir()):
+        part = load_part(out, key)
+        if part.info.spans != (span,):
+            raise MapError(f"{out} holds a part of other frames; give another folder, or remove it first.")
+        return part
+    fuse_spans(recording, [(span, out)], used, settings)
+    return load_part(out, key)
+
+
+def merge_parts(folders: Sequence[Path | str], out: Path | str) -> Part:
+    """Add parts up to one part, in the order of their frames, whatever the order they are given in.
+
+    Args:
+        folders: of ``build_part`` or of this, all of one recording and the same settings.
+        out: the folder of the sum.
+
+    Raises:
+        MapError: a part is damaged or made otherwise than the first, or two cover the same frame.
+    """
+    key = _key_in(Path(folders[0]))
+    parts = sorted((load_part(Path(folder), key) for folder in folders), key=lambda part: part.info.spans)
+    check_disjoint(parts)
+    info = PartInfo(
+        recording=parts[0].info.recording,
+        spans=tuple(sorted(span for part in parts for span in part.info.spans)),
+        fused=sum(part.info.fused for part in parts),
+        bad_frames=tuple(bad for part in parts for bad in part.info.bad_frames),
+        elapsed_s=sum(part.info.elapsed_s for part in parts),
+    )
+    # The grid only turns metres into voxels, and merging meets none.
+    save_checkpoint(Path(out), key, info, _arrays(add_up(parts, GridSpec()).sums()))
+    return load_part(Path(out), key)
+
+
+def add_up(parts: Sequence[Part], grid: GridSpec) -> VoxelAccumulator:
+    """Add the sums of parts, in the order given; in memory is only the total."""
+    total = VoxelAccumulator(grid, parts[0].sums.feature_sum.shape[1])
+    for part in parts:
+        total.merge(part.sums)
+    return total
+
+
+def load_part(folder: Path, key: str | None = None, *, verify: bool = True) -> Part:
+    """Read a part back; see ``load_checkpoint`` for the arguments and errors."""
+    return _part(load_checkpoint(folder, PartInfo, key, verify=verify))
+
+
+def find_part(folder: Path, key: str, span: Span) -> Part | None:
+    """Return the finished part of this stretch, None where there is none; what is left of a broken one is removed."""
+    found = find_checkpoint(folder, PartInfo, key)
+    return None if found is None or found.facts.spans != (span,) else _part(found)
+
+
+def _part(found: Checkpoint[PartInfo]) -> Part:
+    return Part(found.folder, found.facts, VoxelSums(**found.arrays))
+
+
+def check_disjoint(parts: Sequence[Part]) -> None:
+    """Raise ``MapError`` if two parts cover the same frame: it would count twice."""
+    owner: dict[int, Path] = {}
+    for part in parts:
+        for span in part.info.spans:
+            for frame in range(*span):
+                if frame in owner:
+                    raise MapError(f"{owner[frame]} and {part.folder} both cover frame {frame}; leave one of them out.")
+                owner[frame] = part.folder
+
+
+class Tolerance:
+    """Counts the frames that cannot be read, and says when there are too many."""
+
+    def __init__(self, recording: Recording, settings: BuildSettings, known: Sequence[BadFrame] = ()) -> None:
+        """Begin with those that are known from finished parts."""
+        self._total = len(range(0, len(recording), settings.frames.step))
+        self._allowed = int(settings.frames.max_bad_share * self._total) if settings.frames.on_bad == "skip" else 0
+        self._met = len(known)
+
+    def meet(self, bad: BadFrame) -> None:
+        """Take note of one more; raise ``RecordingError`` when there are more than allowed."""
+        self._met += 1
+        if self._met <= self._allowed:
+            return
+        if self._allowed == 0:
+            raise RecordingError(bad.why)
+        raise RecordingError(
+            f"{self._met} of {self._total} frames cannot be read, more than the {self._allowed} that may be left out; mend "
+            f"the recording or allow more (frames.max_bad_share). The last: {bad.why}"
+        )
+
+
+def fuse_spans(
+    recording: Recording,
+    jobs: Sequence[tuple[Span, Path]],
+    used: Profile,
+    settings: BuildSettings,
+    known_bad: Sequence[BadFrame] = (),
+    done: int = 0,
+) -> None:
+    """Fuse stretches of frames, each into a part of its own; perception runs ahead of fusion in its own thread.
+
+    Args:
+        recording: where the frames are.
+        jobs: each stretch, and the folder of its part.
+        used: whose pixel encoder perceives.
+        settings: of the build.
+        known_bad: frames of other parts that could not be read.
+        done: frames of other parts, for the progress bar.
+
+    Raises:
+        RecordingError: too many frames cannot be read.
+        MapError: a part cannot be written.
+    """
+    key, encoder = fusion_key(recording, settings, used), pixel_encoder_of(used)
+    tolerance = Tolerance(recording, settings, known_bad)
+    every = [index for span, _ in jobs for index in range(*span)]
+    with closing(run_ahead(_perceived(recording, every, encoder))) as ahead:
+        seen = progress(ahead, "fusing", total=done + len(every), done=done)
+        for span, folder in jobs:
+            begin = perf_counter()
+            total = VoxelAccumulator(GridSpec(settings.voxel_size_m), 0 if encoder is None else encoder.card.dim)
+            bad: list[BadFrame] = []
+            for frame, features in islice(seen, len(range(*span))):
+                if isinstance(frame, BadFrame):
+                    bad.append(frame)
+                    tolerance.meet(frame)
+                else:
+                    total.add(frame, features)
+            info = PartInfo(
+                recording=recording.path.name,
+                spans=(span,),
+                fused=len(range(*span)) - len(bad),
+                bad_frames=tuple(bad),
+                elapsed_s=perf_counter() - begin,
+            )
+            save_checkpoint(folder, key, info, _arrays(total.sums()))
+
+
+def _perceived(
+    recording: Recording, frames: Sequence[int], encoder: PixelEncoder | None
+) -> Generator[tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]]:
+    for index in frames:
+        try:
+            frame = recording.frame(index)
+        except RecordingError as fault:
+            yield BadFrame(index=index, why=without_place(str(fault), recording)), None
+            continue
+        yield frame, None if encoder is None else encoder.encode(frame)
+
+
+def without_place(sentence: str, recording: Recording) -> str:
+    """Return a sentence about a recording without the folders that it lies in: a map may travel."""
+    return sentence.replace(str(recording.path), recording.path.name)
+
+
+def _arrays(sums: VoxelSums) -> dict[str, np.ndarray]:
+    return {field.name: getattr(sums, field.name) for field in dataclasses.fields(sums)}
+
+
+def _key_in(folder: Path) -> str:
+    return load_checkpoint(folder, PartInfo).key

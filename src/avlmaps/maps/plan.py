@@ -1,0 +1,114 @@
+"""What a build is going to do, and where it keeps what it has finished."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from avlmaps.core.errors import MapError
+from avlmaps.core.progress import say
+from avlmaps.maps.checkpoints import key_of
+from avlmaps.maps.manifest import MANIFEST, MapInfo, ModelInfo, parse_manifest
+from avlmaps.maps.parts import BUILD_VERSION, fusion_key
+from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.store import is_map_or_free, sweep
+from avlmaps.maps.stored import PARTS
+from avlmaps.perception.profiles import Profile
+from avlmaps.recordings.types import Recording
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A build's ingredients.
+
+    Attributes:
+        recording: what to map.
+        path: the map's folder.
+        used: which models perceive.
+        settings: all that can be chosen.
+        models: the models' cards, by module.
+        key: hash of all ingredients; two builds with one key make one map.
+        fusion_key: hash of those that the sums over frames depend on.
+    """
+
+    recording: Recording
+    path: Path
+    used: Profile
+    settings: BuildSettings
+    models: dict[str, ModelInfo]
+    key: str
+    fusion_key: str
+
+    def folder(self, stage: str, key: str) -> Path:
+        """Return where a stage keeps what it finished, one folder for each key."""
+        return self.path / PARTS / f"{stage}-{key[:12]}"
+
+    def rng(self, stage: int) -> np.random.Generator:
+        """Return a stage's own source of randomness, the same in every run, whatever the other stages drew."""
+        return np.random.default_rng([self.settings.seed, stage])
+
+
+def make_plan(recording: Recording, path: Path, used: Profile, settings: BuildSettings) -> Plan:
+    """Gather the ingredients and refuse what cannot be built.
+
+    Raises:
+        MapError: the recording has no frames, or the path is not a place for a map.
+        BackendError: a model is missing.
+    """
+    if len(recording) == 0:
+        raise MapError(f"{recording.path} has no frames with a pose; there is nothing to build a map from.")
+    if not is_map_or_free(path):
+        raise MapError(f"{path} is there already and is no map; give another --out, nothing in it was touched.")
+    models = {kind.value: ModelInfo.of(used.backend_name(kind), card) for kind, card in used.cards().items()}
+    key = key_of("map", BUILD_VERSION, recording.fingerprint, audio_key(recording), used.name, models, settings)
+    return Plan(recording, path, used, settings, models, key, fusion_key(recording, settings, used))
+
+
+def audio_key(recording: Recording) -> list[str | float] | None:
+    """Return what tells one sound track from another: a recording can be given another one."""
+    track = recording.audio
+    if track is None:
+        return None
+    size = track.path.stat().st_size if track.path.is_file() else 0
+    return [track.path.name, size, track.rate_hz, track.duration_s, track.start_s]
+
+
+def claim(plan: Plan, resume: bool, overwrite: bool) -> MapInfo | None:
+    """Make sure that the folder may be built into; return the map that is there if it is this very one.
+
+    Args:
+        plan: of the build.
+        resume: keep what a stopped build had finished.
+        overwrite: whether a finished map may be replaced.
+
+    Raises:
+        MapError: there is a finished map from something else, or a damaged one, and ``overwrite`` is not set.
+    """
+    manifest = plan.path / MANIFEST
+    if manifest.is_file() and not overwrite:
+        there = parse_manifest(manifest.read_bytes(), manifest)
+        if there.build_key != plan.key:
+            raise MapError(
+                f"{plan.path} is a finished map already, of {there.recording.name} {_difference(plan, there)}; give "
+                "another --out, or replace it with --overwrite."
+            )
+        say(f"{plan.path} is finished already, from the same recording with the same settings; nothing to do.")
+        sweep(plan.path, there)
+        return there
+    if not resume:
+        shutil.rmtree(plan.path / PARTS, ignore_errors=True)
+    return None
+
+
+def _difference(plan: Plan, there: MapInfo) -> str:
+    """Say in words what the finished map was built with that this build is not."""
+    if there.recording.fingerprint != plan.recording.fingerprint:
+        return "(another recording, or it has changed)"
+    if there.profile != plan.used.name:
+        return f"with the profile {there.profile}"
+    if there.settings != plan.settings:
+        return "with other settings"
+    if there.models != plan.models:
+        return "with other models"
+    return "with another sound track or an older avlmaps"

@@ -1,0 +1,71 @@
+"""Everything about a build that can be chosen, nested by stage. A field's docstring is its help on the command line."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from avlmaps.core.errors import MapError
+
+
+@dataclass(frozen=True, slots=True)
+class FrameSettings:
+    """Which frames are fused, and how many at a time."""
+
+    step: int = 1
+    """Fuse every n-th frame."""
+    per_part: int = 200
+    """So many frames are fused, then kept: what a stopped build goes on from. Fewer lose less, more are quicker."""
+    on_bad: Literal["skip", "stop"] = "skip"
+    """What to do with a frame that cannot be read: leave it out and tell it in the map, or stop."""
+    max_bad_share: float = 0.05
+    """Stop all the same when more than this share of the frames cannot be read."""
+
+    def __post_init__(self) -> None:
+        _require(self.step >= 1, f"frames.step is {self.step}", "1 or more")
+        _require(self.per_part >= 1, f"frames.per_part is {self.per_part}", "1 or more")
+        _require(0.0 <= self.max_bad_share <= 1.0, f"max_bad_share is {self.max_bad_share}", "between 0 and 1")
+
+
+@dataclass(frozen=True, slots=True)
+class GravitySettings:
+    """Finding which way is up, where the recording does not say."""
+
+    frames: int = 60
+    """Look at so many frames, spread evenly."""
+
+    def __post_init__(self) -> None:
+        _require(self.frames >= 1, f"gravity.frames is {self.frames}", "1 or more")
+
+
+@dataclass(frozen=True, slots=True)
+class FusionSettings:
+    """From frames to voxels."""
+
+    min_depth_m: float = 0.1
+    """Ignore depth nearer than this, metres."""
+    max_depth_m: float = 10.0
+    """Ignore depth beyond this, metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class BuildSettings:
+    """Everything about a build that can be chosen; the resolved settings are written into the map."""
+
+    voxel_size_m: float = 0.05
+    """Edge of a voxel, metres."""
+    frames: FrameSettings = field(default_factory=FrameSettings)
+    """Which frames are fused, and how many at a time."""
+    fusion: FusionSettings = field(default_factory=FusionSettings)
+    """From frames to voxels."""
+    gravity: GravitySettings = field(default_factory=GravitySettings)
+    """Finding which way is up."""
+    seed: int = 0
+    """Seed of what is drawn at random (visual words, RANSAC)."""
+
+    def __post_init__(self) -> None:
+        _require(0.001 <= self.voxel_size_m <= 10.0, f"The voxel size is {self.voxel_size_m} m", "between 0.001 and 10")
+        _require(self.seed >= 0, f"seed is {self.seed}", "0 or more")
+
+
+def _require(holds: bool, fault: str, wanted: str) -> None:
+    if not holds:
+        raise MapError(f"{fault}; choose {wanted}.")

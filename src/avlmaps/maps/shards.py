@@ -1,0 +1,152 @@
+"""Immutable array files, named by their content: what maps, parts and checkpoints are made of.
+
+A file is written under a temporary name, synced and renamed to ``<name>-<sha256>.npy``. A name therefore never stands
+for two contents, an old manifest's files are never touched by a new build, and the same build gives the same names.
+"""
+
+import hashlib
+import io
+import itertools
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+from typing import BinaryIO
+
+import msgspec
+import numpy as np
+
+from avlmaps.core.errors import MapError
+from avlmaps.core.files import sha256_of_file, sync_folder
+
+SMALL_BYTES = 1 << 20  # files up to this size are read whole and always compared with their checksum
+_CHUNK_BYTES = 1 << 24
+_MEND = "restore it from a copy, or build the map again with --overwrite"
+
+
+class FileInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """One file of a manifest.
+
+    Attributes:
+        path: below the manifest's folder, with ``/``.
+        bytes: its size.
+        sha256: hex checksum of the whole file.
+        dtype: numpy's name of the elements' type, little-endian (``<f2``); ``""`` for a file that is no array.
+        shape: of the array.
+    """
+
+    path: str
+    bytes: int
+    sha256: str
+    dtype: str = ""
+    shape: tuple[int, ...] = ()
+
+
+@contextmanager
+def writing_into(folder: Path) -> Iterator[None]:
+    """Turn a full disk, a missing permission and their like into one sentence."""
+    try:
+        yield
+    except OSError as fault:
+        raise MapError(
+            f"Cannot write {fault.filename or folder}: {fault.strerror or fault}; make room or choose another folder, "
+            "then run the same build again: what was finished is kept."
+        ) from fault
+
+
+def write_array(folder: Path, name: str, array: np.ndarray) -> FileInfo:
+    """Write an array as ``<folder>/<name>-<checksum>.npy`` and return its entry for the manifest.
+
+    Args:
+        folder: the manifest's folder.
+        name: such as ``voxels/feature``; its folder is made.
+        array: any numeric array, memory-mapped or not; it is never copied whole unless it is not contiguous.
+    """
+    array = np.ascontiguousarray(array, array.dtype.newbyteorder("<")).reshape(array.shape)
+    if array.dtype.hasobject:
+        raise ValueError(f"{name} holds Python objects; only numbers can be kept")
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, np.lib.format.header_data_from_array_1_0(array))
+    flat = array.reshape(-1).view(np.uint8)
+    body = (flat[start : start + _CHUNK_BYTES].data for start in range(0, flat.size, _CHUNK_BYTES))
+    path, size, checksum = _write(folder, name, ".npy", itertools.chain([header.getvalue()], body))
+    return FileInfo(path=path, bytes=size, sha256=checksum, dtype=array.dtype.str, shape=array.shape)
+
+
+def write_copy(folder: Path, name: str, source: Path) -> FileInfo:
+    """Copy a file to ``<folder>/<name>-<checksum><its suffix>`` and return its entry for the manifest."""
+    with source.open("rb") as stream:
+        path, size, checksum = _write(folder, name, source.suffix, iter(lambda: stream.read(_CHUNK_BYTES), b""))
+    return FileInfo(path=path, bytes=size, sha256=checksum)
+
+
+def _write(folder: Path, name: str, suffix: str, chunks: Iterable[bytes | memoryview]) -> tuple[str, int, str]:
+    stem = folder / name
+    with writing_into(folder):
+        stem.parent.mkdir(parents=True, exist_ok=True)
+        partial = stem.with_name(f".{stem.name}.{os.getpid()}.partial")
+        try:
+            with partial.open("wb") as stream:
+                size, checksum = _hashed(stream, chunks)
+            final = stem.with_name(f"{stem.name}-{checksum[:16]}{suffix}")
+            partial.replace(final)
+            sync_folder(stem.parent)
+        finally:
+            partial.unlink(missing_ok=True)
+    return final.relative_to(folder).as_posix(), size, checksum
+
+
+def _hashed(stream: BinaryIO, chunks: Iterable[bytes | memoryview]) -> tuple[int, str]:
+    digest, size = hashlib.sha256(), 0
+    for chunk in chunks:
+        digest.update(chunk)
+        size += stream.write(chunk)
+    stream.flush()
+    os.fsync(stream.fileno())
+    return size, digest.hexdigest()
+
+
+def read_array(folder: Path, info: FileInfo, *, verify: bool = False) -> np.ndarray:
+    """Return an array of a manifest: small ones read and compared with their checksum, large ones memory-mapped.
+
+    Args:
+        folder: the manifest's folder.
+        info: the manifest's entry.
+        verify: compare large files with their checksums, too.
+
+    Raises:
+        MapError: the file is missing, truncated, changed, or not the array that the manifest tells of.
+    """
+    path = checked_path(folder, info, verify=verify)
+    try:
+        array = np.load(path, mmap_mode=None if info.bytes <= SMALL_BYTES else "r", allow_pickle=False)
+    except (ValueError, OSError, EOFError) as fault:
+        raise MapError(f"{path} is damaged: it is not an array that numpy can read ({fault}); {_MEND}.") from fault
+    if array.dtype.str != np.dtype(info.dtype).str or array.shape != info.shape:
+        raise MapError(
+            f"{path} is damaged: it holds {array.dtype} of {array.shape}, the map says {np.dtype(info.dtype)} of "
+            f"{info.shape}; {_MEND}."
+        )
+    if not array.flags.c_contiguous:
+        raise MapError(f"{path} is damaged: its elements are not in the order that avlmaps writes; {_MEND}.")
+    return array
+
+
+def checked_path(folder: Path, info: FileInfo, *, verify: bool = False) -> Path:
+    """Return where a file is, its size checked, and its checksum if it is small or ``verify`` is set.
+
+    Raises:
+        MapError: it is missing, has another size or content, or its name leads out of the folder.
+    """
+    parts = PurePosixPath(info.path).parts
+    if not parts or ".." in parts or "\\" in info.path or ":" in info.path or info.path.startswith("/"):
+        raise MapError(f"{folder} names a file outside itself ({info.path}); do not use a map from that source.")
+    path = folder.joinpath(*parts)
+    if not path.is_file():
+        raise MapError(f"{path} is missing from the map; {_MEND}.")
+    size = path.stat().st_size
+    if size != info.bytes:
+        raise MapError(f"{path} is damaged: it has {size} bytes, {info.bytes} were written; {_MEND}.")
+    if (verify or size <= SMALL_BYTES) and sha256_of_file(path) != info.sha256:
+        raise MapError(f"{path} is damaged: its checksum is not the one that was written; {_MEND}.")
+    return path

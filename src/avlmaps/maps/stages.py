@@ -1,0 +1,276 @@
+"""The stages of a build, each of them from what the earlier ones found to something that is kept."""
+
+import shutil
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from time import perf_counter
+
+import msgspec
+import numpy as np
+from jaxtyping import Int
+
+from avlmaps import __version__
+from avlmaps.core.errors import MapError, RecordingError
+from avlmaps.core.registry import Kind
+from avlmaps.maps.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
+from avlmaps.maps.checks import array_fields, assembled
+from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.manifest import Box, Counts, MapInfo, RecordingInfo, RigInfo, Timings, UpInfo
+from avlmaps.maps.parts import (
+    BUILD_VERSION,
+    Part,
+    PartInfo,
+    add_up,
+    check_disjoint,
+    find_part,
+    fuse_spans,
+    load_part,
+    plan_spans,
+    without_place,
+)
+from avlmaps.maps.plan import Plan, audio_key
+from avlmaps.maps.store import MapContent, write_map
+from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
+from avlmaps.recordings.subset import Subset
+from avlmaps.recordings.types import Frame, Recording
+
+# Numbers of the stages that draw at random; a stage keeps its number for ever.
+_GRAVITY, _KEYFRAMES = 1, 2
+# Below this share of agreeing surface the direction that was found is told as a guess.
+_GUESS = 0.1
+
+
+class _UpFacts(msgspec.Struct):
+    up: UpInfo
+    elapsed_s: float
+
+
+class _Facts(msgspec.Struct):
+    elapsed_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class KeptKeyframes:
+    """Outcome of the keyframe stage: the pictures, what the place encoder learned, and the seconds it took."""
+
+    keyframes: Keyframes
+    place_state: dict[str, np.ndarray]
+    elapsed_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class KeptSounds:
+    """Outcome of the sound stage: what was heard, where the clips lie, and the seconds it took."""
+
+    sounds: HeardSounds
+    clips_folder: Path
+    elapsed_s: float
+
+
+def find_up(plan: Plan) -> tuple[UpInfo, float]:
+    """Return which way is up, from the recording or from the planes in view, and the seconds that it took."""
+    from avlmaps.maps.gravity import find_up as up_of_planes
+
+    known = plan.recording.up_in_world
+    if known is not None:
+        return _up_info(known, known_from_recording=True), 0.0
+    key = key_of("up", BUILD_VERSION, plan.recording.fingerprint, plan.settings.gravity, plan.settings.seed)
+    folder = plan.folder("up", key)
+    found = find_checkpoint(folder, _UpFacts, key)
+    if found is None:
+        begin = perf_counter()
+        up = up_of_planes(_spread(plan.recording, plan.settings.gravity.frames), plan.rng(_GRAVITY))
+        info = _up_info(up.direction, known_from_recording=False, support=float(up.support))
+        save_checkpoint(folder, key, _UpFacts(info, perf_counter() - begin), {})
+        found = load_checkpoint(folder, _UpFacts, key)
+    return found.facts.up, found.facts.elapsed_s
+
+
+def _up_info(direction: np.ndarray, *, known_from_recording: bool, support: float = 1.0) -> UpInfo:
+    x, y, z = (float(value) for value in direction / np.linalg.norm(direction))
+    return UpInfo(direction=(x, y, z), known_from="recording" if known_from_recording else "planes", support=support)
+
+
+def _spread(recording: Recording, count: int) -> Iterator[Frame]:
+    """Read frames evenly spread over the recording, passing over those that cannot be read, unless none can."""
+    indices = np.unique(np.linspace(0, len(recording) - 1, count).round().astype(int))
+    read, last_fault = 0, None
+    for index in indices:
+        try:
+            yield recording.frame(int(index))
+            read += 1
+        except RecordingError as fault:
+            last_fault = fault
+    if read == 0 and last_fault is not None:
+        raise last_fault
+
+
+def fuse(plan: Plan, given: Sequence[Path | str]) -> list[Part]:
+    """Fuse all frames that no part covers yet; return the parts that make up the map, in a fixed order."""
+    brought = [load_part(Path(folder), plan.fusion_key) for folder in given]
+    covered = [span for part in brought for span in part.info.spans]
+    home = plan.folder("fusion", plan.fusion_key)
+    spans = {home / f"{span[0]:08d}-{span[1]:08d}": span for span in plan_spans(len(plan.recording), plan.settings, covered)}
+    finished = {folder: find_part(folder, plan.fusion_key, span) for folder, span in spans.items()}
+    jobs = [(spans[folder], folder) for folder, part in finished.items() if part is None]
+    had = [*brought, *(part for part in finished.values() if part is not None)]
+    bad = [frame for part in had for frame in part.info.bad_frames]
+    done = sum(part.info.fused + len(part.info.bad_frames) for part in had)
+    fuse_spans(plan.recording, jobs, plan.used, plan.settings, bad, done)
+    own = [part or load_part(folder, plan.fusion_key, verify=False) for folder, part in finished.items()]
+    parts = sorted([*brought, *own], key=lambda part: part.info.spans)
+    check_disjoint(parts)
+    return parts
+
+
+def merge(plan: Plan, parts: Sequence[Part]) -> tuple[Voxels, float]:
+    """Add the parts up to the voxels of the map; return them and the seconds that it took."""
+    begin = perf_counter()
+    voxels = add_up(parts, GridSpec(plan.settings.voxel_size_m)).voxels()
+    if len(voxels) == 0:
+        raise MapError(
+            f"No pixel of {plan.recording.path} has a depth between {plan.settings.fusion.min_depth_m} and "
+            f"{plan.settings.fusion.max_depth_m} m, so that the map would be empty; check the depth scale of the recording."
+        )
+    return voxels, perf_counter() - begin
+
+
+def keep_keyframes(plan: Plan, parts: Sequence[Part]) -> KeptKeyframes:
+    """Choose keyframes among the frames that were fused, and look at them."""
+    from avlmaps.maps.keyframes import perceive_keyframes, select_keyframes
+
+    indices = _fused_frames(parts)
+    cards = [plan.models.get(kind.value) for kind in (Kind.LOCAL, Kind.PLACE, Kind.VIEWS)]
+    settings = plan.settings.keyframes
+    ingredients = (plan.recording.fingerprint, settings, plan.settings.seed, cards, indices.tolist())
+    key = key_of("keyframes", BUILD_VERSION, ingredients)
+    folder = plan.folder("keyframes", key)
+    found = find_checkpoint(folder, _Facts, key)
+    if found is None:
+        begin = perf_counter()
+        good = Subset(plan.recording, indices)
+        chosen = select_keyframes(good, settings)
+        keyframes, state = perceive_keyframes(good, chosen, plan.used, plan.rng(_KEYFRAMES), settings=settings)
+        arrays = {f"keyframes/{name}": getattr(keyframes, name) for name in array_fields(Keyframes)}
+        arrays |= {f"state/{name}": array for name, array in state.items()}
+        save_checkpoint(folder, key, _Facts(perf_counter() - begin), arrays)
+        found = load_checkpoint(folder, _Facts, key)
+    keyframes = assembled(Keyframes, _below("keyframes/", found.arrays), str(folder))
+    return KeptKeyframes(keyframes, _below("state/", found.arrays), found.facts.elapsed_s)
+
+
+def _fused_frames(parts: Sequence[Part]) -> Int[np.ndarray, " n"]:
+    covered = [np.arange(*span) for part in parts for span in part.info.spans]
+    bad = [frame.index for part in parts for frame in part.info.bad_frames]
+    return np.setdiff1d(np.concatenate(covered), np.array(bad, np.int64))
+
+
+def _below(prefix: str, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+
+
+def hear_sounds(plan: Plan) -> KeptSounds:
+    """Find the sounds in the track; none where there is no track, or no model for them."""
+    from avlmaps.maps.sounds import hear
+
+    if plan.recording.audio is None or not plan.used.sounds:
+        return KeptSounds(_silence(plan), plan.path, 0.0)
+    settings, model = plan.settings.hearing, plan.models[Kind.SOUNDS.value]
+    key = key_of("sounds", BUILD_VERSION, plan.recording.fingerprint, audio_key(plan.recording), settings, model)
+    folder = plan.folder("sounds", key)
+    found = find_checkpoint(folder, _Facts, key)
+    if found is None:
+        begin = perf_counter()
+        scratch = folder.with_name("clips.unfinished")
+        shutil.rmtree(scratch, ignore_errors=True)
+        scratch.mkdir(parents=True)
+        heard = hear(plan.recording, plan.used.sound_encoder(), settings, scratch)
+        arrays = {name: getattr(heard, name) for name in array_fields(HeardSounds)}
+        clips = {f"clips/{number:06d}": scratch / Path(clip).name for number, clip in enumerate(heard.clips)}
+        save_checkpoint(folder, key, _Facts(perf_counter() - begin), arrays, clips)
+        shutil.rmtree(scratch)
+        found = load_checkpoint(folder, _Facts, key)
+    names = tuple(path.name for path in found.files.values())
+    sounds = assembled(HeardSounds, {**found.arrays, "clips": names}, str(folder))
+    return KeptSounds(sounds, folder / "clips", found.facts.elapsed_s)
+
+
+def _silence(plan: Plan) -> HeardSounds:
+    model = plan.models.get(Kind.SOUNDS.value)
+    return HeardSounds(
+        onset_s=np.zeros(0),
+        offset_s=np.zeros(0),
+        track_offsets=np.zeros(1, np.int64),
+        track=np.zeros((0, 3), np.float32),
+        feature_offsets=np.zeros(1, np.int64),
+        feature=np.zeros((0, model.dim if model else 0), np.float32),
+        clips=(),
+    )
+
+
+def commit(
+    plan: Plan,
+    up: tuple[UpInfo, float],
+    parts: Sequence[Part],
+    pictures: KeptKeyframes,
+    heard: KeptSounds,
+    merged: tuple[Voxels, float],
+) -> MapInfo:
+    """Write the map and, last of all, its manifest; then the parts go."""
+    voxels, merge_s = merged
+    content = MapContent(voxels, pictures.keyframes, pictures.place_state, heard.sounds, heard.clips_folder)
+    stages_s = {
+        "up": up[1],
+        "fusion": sum(part.info.elapsed_s for part in parts),
+        "keyframes": pictures.elapsed_s,
+        "sounds": heard.elapsed_s,
+        "merging": merge_s,
+    }
+    bad = tuple(sorted((frame for part in parts for frame in part.info.bad_frames), key=lambda frame: frame.index))
+    fused = sum(part.info.fused for part in parts)
+    recording, settings = plan.recording, plan.settings
+    info = MapInfo(
+        avlmaps_version=__version__,
+        build_key=plan.key,
+        voxel_size_m=settings.voxel_size_m,
+        up=up[0],
+        rig=RigInfo.of(recording.rig),
+        profile=plan.used.name,
+        models=plan.models,
+        settings=settings,
+        seed=settings.seed,
+        recording=RecordingInfo(
+            name=recording.path.name,
+            format=recording.format,
+            fingerprint=recording.fingerprint,
+            frames=len(recording),
+            duration_s=recording.duration_s,
+            notices=tuple(without_place(notice, recording) for notice in recording.notices),
+        ),
+        counts=Counts(frames=fused, keyframes=len(pictures.keyframes), voxels=len(voxels), sounds=len(heard.sounds)),
+        bounding_box_m=_box(voxels, settings.voxel_size_m),
+        bad_frames=bad,
+        notices=tuple(_notices(plan, up[0], len(bad))),
+        timings=Timings(
+            finished=datetime.now(UTC).isoformat(timespec="seconds"),
+            elapsed_s=sum(stages_s.values()),
+            stages_s=stages_s,
+        ),
+    )
+    return write_map(plan.path, content, info)
+
+
+def _box(voxels: Voxels, voxel_size_m: float) -> Box:
+    low, high = voxels.index.min(axis=0) * voxel_size_m, (voxels.index.max(axis=0) + 1) * voxel_size_m
+    return Box(low=tuple(map(float, low)), high=tuple(map(float, high)))  # pyright: ignore[reportArgumentType]
+
+
+def _notices(plan: Plan, up: UpInfo, bad: int) -> Iterator[str]:
+    if up.known_from == "planes" and up.support < _GUESS:
+        yield f"Which way is up is a guess: only {up.support:.0%} of the surface in view agrees with it."
+    if bad:
+        yield f"{bad} frames could not be read and were left out; see bad_frames in map.json."
+    if plan.recording.audio is None:
+        yield "The recording has no sound track, so that the map holds no sounds."
