@@ -1,0 +1,167 @@
+"""Folders of sound clips, and the audible part of a clip at a chosen loudness."""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32
+
+from avlmaps.core.errors import AudioError
+from avlmaps.recordings.audio import AudioTrack, Sound
+from avlmaps.recordings.resample import resampled
+
+SUFFIXES = {".wav", ".flac", ".ogg", ".oga", ".opus", ".mp3", ".m4a"}
+AUDIBLE_DB = -40.0  # below a clip's loudest 10 ms; what is quieter at its ends is cut off
+_ACTIVE_DB = -30.0  # below the loudest 10 ms; pauses inside a clip do not count for its loudness
+_FRAME_S = 0.01
+_EDGE_S = 0.005  # fade at both ends: a cut must not click
+_SILENT = 1e-5  # less than one step of 16-bit sound
+_PEAK = 0.89  # -1 dB: no clip is made so loud that it would be cut off
+
+
+@dataclass(frozen=True, slots=True)
+class Clip:
+    """A sound file of a known category.
+
+    Attributes:
+        path: the file.
+        category: what it is, in words (``dog bark``).
+        name: its path below the folder of clips, with slashes.
+    """
+
+    path: Path
+    category: str
+    name: str
+
+
+def find_clips(folder: Path, categories: Sequence[str] | None = None) -> tuple[Clip, ...]:
+    """List the clips of a folder, sorted by category and name.
+
+    Categories come from an ``index.csv`` with the columns path and category, if there is one; else from the names
+    of the subfolders (underscores stand for spaces); else all files are of one category, named as the folder.
+
+    Args:
+        folder: where the clips are.
+        categories: only these, in any case and with spaces or underscores; all if None.
+
+    Raises:
+        AudioError: no such folder, no clips, an index without those columns, or an unknown category.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise AudioError(f"There is no folder of clips at {folder}; give one with a subfolder for each category.")
+    index = folder / "index.csv"
+    clips = _indexed(index) if index.is_file() else _in_subfolders(folder)
+    if not clips:
+        raise AudioError(
+            f"{folder} holds no sound files; give a folder with a subfolder for each category, or with an index.csv "
+            "that has the columns path and category."
+        )
+    if categories:
+        known = {clip.category for clip in clips}
+        wanted = {_plain(category) for category in categories}
+        if missing := sorted(wanted - known):
+            raise AudioError(
+                f"{folder} has no clips of {', '.join(map(repr, missing))}; it has {', '.join(sorted(known))}."
+            )
+        clips = [clip for clip in clips if clip.category in wanted]
+    return tuple(sorted(clips, key=lambda clip: (clip.category, clip.name)))
+
+
+def audible(sound: Sound, name: str = "the sound") -> Sound:
+    """Return the sound from where it can first be heard to where it can last be heard.
+
+    Heard is what is less than 40 dB below the loudest 10 ms; digital silence, which collections pad short clips
+    with, and inaudible ends are cut off.
+
+    Raises:
+        AudioError: there is nothing to hear.
+    """
+    level = _levels(sound)
+    if level.max(initial=0.0) < _SILENT**2:
+        raise AudioError(f"{name[0].upper()}{name[1:]} is silent from end to end; take another clip.")
+    heard = np.flatnonzero(level >= level.max() * 10.0 ** (AUDIBLE_DB / 10.0))
+    size = _frame_samples(sound)
+    return Sound(sound.samples[heard[0] * size : (heard[-1] + 1) * size], sound.rate_hz)
+
+
+def loudness_db(sound: Sound) -> float:
+    """Return the loudness in dB relative to full scale: the RMS of all 10 ms frames within 30 dB of the loudest."""
+    level = _levels(sound)
+    if not level.max(initial=0.0) > 0.0:
+        return -np.inf
+    return float(10.0 * np.log10(level[level >= level.max() * 10.0 ** (_ACTIVE_DB / 10.0)].mean()))
+
+
+def prepared(clip: Clip, rate_hz: int, wanted_db: float, longest_s: float | None = None) -> tuple[Sound, float]:
+    """Read a clip, cut it to its audible part, and bring it to a rate and a loudness.
+
+    Args:
+        clip: the clip.
+        rate_hz: wanted samples a second.
+        wanted_db: wanted loudness, dB relative to full scale; a clip whose peak would pass -1 dB gets less.
+        longest_s: cut what is longer, with a fade.
+
+    Returns:
+        The sound, and the gain in dB that it got.
+
+    Raises:
+        AudioError: the clip cannot be read or is silent.
+    """
+    sound = audible(resampled(AudioTrack.open(clip.path).read(), rate_hz), str(clip.path))
+    if longest_s is not None and sound.duration_s > longest_s:
+        sound = Sound(sound.samples[: round(longest_s * rate_hz)], rate_hz)
+    gain = 10.0 ** ((wanted_db - loudness_db(sound)) / 20.0)
+    gain = min(gain, _PEAK / float(np.abs(sound.samples).max()))
+    return Sound((sound.samples * gain * _edges(sound)).astype(np.float32), rate_hz), float(20.0 * np.log10(gain))
+
+
+def _frame_samples(sound: Sound) -> int:
+    return max(1, round(_FRAME_S * sound.rate_hz))
+
+
+def _levels(sound: Sound) -> Float32[np.ndarray, " frames"]:
+    """Return the mean power of every 10 ms, without the constant part; the last frame may be shorter."""
+    if len(sound.samples) == 0:
+        return np.zeros(0, np.float32)
+    starts = np.arange(0, len(sound.samples), _frame_samples(sound))
+    power = np.add.reduceat((sound.samples - sound.samples.mean()) ** 2, starts)
+    return (power / np.diff(np.append(starts, len(sound.samples)))).astype(np.float32)
+
+
+def _edges(sound: Sound) -> Float32[np.ndarray, " n"]:
+    fade = min(round(_EDGE_S * sound.rate_hz), len(sound.samples) // 2)
+    gain = np.ones(len(sound.samples), np.float32)
+    if fade:
+        ramp = (np.arange(fade, dtype=np.float32) + 0.5) / fade
+        gain[:fade], gain[-fade:] = ramp, ramp[::-1]
+    return gain
+
+
+def _plain(category: str) -> str:
+    return " ".join(category.replace("_", " ").lower().split())
+
+
+def _indexed(index: Path) -> list[Clip]:
+    with index.open(newline="", encoding="utf-8") as stream:
+        reader = csv.DictReader(stream)
+        missing = {"path", "category"} - set(reader.fieldnames or ())
+        if missing:
+            raise AudioError(f"{index} lacks the column {' and '.join(sorted(missing))}; add it, or remove the file.")
+        rows = [(row["path"], _plain(row["category"] or "")) for row in reader if row["path"]]
+    clips = [Clip(index.parent / path, category, path) for path, category in rows]
+    if absent := [clip.name for clip in clips if not clip.path.is_file()]:
+        raise AudioError(f"{index} lists {len(absent)} files that do not exist, the first {absent[0]}; mend the index.")
+    return clips
+
+
+def _in_subfolders(folder: Path) -> list[Clip]:
+    found: list[Clip] = []
+    for path in folder.rglob("*"):
+        if path.suffix.lower() in SUFFIXES and path.is_file():
+            below = path.relative_to(folder)
+            category = below.parts[0] if len(below.parts) > 1 else folder.resolve().name
+            found.append(Clip(path, _plain(category), below.as_posix()))
+    return found
