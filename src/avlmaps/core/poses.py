@@ -58,7 +58,7 @@ def orthonormalized_all(
         wild |= np.abs(world_from_camera[:, 3] - (0.0, 0.0, 0.0, 1.0)).max(axis=1, initial=0.0) > 1e-6
         determinant = np.linalg.det(np.where(wild[:, None, None], np.eye(3), rotation))
     wild |= determinant < 0.0
-    for index in np.flatnonzero(wild):
+    for index in np.flatnonzero(wild).tolist():
         orthonormalized(world_from_camera[index], names[index], max_fault)
     u, _, vt = np.linalg.svd(rotation)
     pose = world_from_camera.copy()

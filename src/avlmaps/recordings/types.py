@@ -98,6 +98,23 @@ class Recording(ABC):
         recording of a million frames has one in seconds.
         """
 
+    def name(self, index: int) -> str:
+        """Return what the recording calls a frame, without reading it."""
+        return f"{index:06d}"
+
+    def colour_file(self, index: int) -> Path | None:
+        """Return the JPEG or PNG file of a frame's colour picture, where it is one, so that a copy need not encode."""
+        return None
+
+    def depth_file(self, index: int) -> Path | None:
+        """Return the 16-bit PNG file of a frame's depth (0 and 65535 say none), where it is one."""
+        return None
+
+    @property
+    def depth_units_per_m(self) -> float:
+        """How many units of such a file make a metre."""
+        return 1000.0
+
     def __len__(self) -> int:
         return len(self.stamps_s)
 

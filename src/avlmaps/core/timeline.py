@@ -1,0 +1,200 @@
+"""Clocks: putting streams of different rates on one time line.
+
+Stamps are float64 seconds. Nothing here crashes on a bad clock: stamps that run backwards are sorted or cut and
+told in a sentence.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from avlmaps.core import poses
+
+# Messages of one stream may arrive a little out of order; a step back by more is a clock that was set anew.
+MAX_DISORDER_S = 1.0
+# A pause is worth telling when it lasts this long and this many times the usual interval.
+MIN_GAP_S = 1.0
+MIN_GAP_INTERVALS = 5.0
+# A pose may be held this long past the ends of its stream: a frame of a 30 Hz camera may stick out by one interval.
+EDGE_TOLERANCE_S = 0.04
+
+
+@dataclass(frozen=True, slots=True)
+class InOrder:
+    """A stream's samples in the order of time.
+
+    Attributes:
+        index: rows of the stream that were kept; their stamps rise strictly.
+        notices: one sentence for each thing that was done to get there.
+    """
+
+    index: Int[np.ndarray, " k"]
+    notices: tuple[str, ...] = ()
+
+
+def in_order(stamps_s: Float[np.ndarray, " n"], what: str) -> InOrder:
+    """Put a stream in the order of time, whatever its clock did.
+
+    Stamps that are no number are left out. Where the clock steps back by at most ``MAX_DISORDER_S`` the samples
+    are sorted; where it steps back further it was set anew, and only the longest stretch before, between or after
+    such jumps is kept, since one time line cannot hold two of them. Of equal stamps the first is kept.
+
+    Args:
+        stamps_s: the stream's stamps in the order of the file.
+        what: what the samples are, in the plural, for the sentences (``poses of groundtruth.txt``).
+    """
+    notices: list[str] = []
+    index = np.flatnonzero(np.isfinite(stamps_s))
+    if len(index) < len(stamps_s):
+        notices.append(f"{len(stamps_s) - len(index)} {what} have a stamp that is no number and are left out.")
+    back_s = -np.diff(stamps_s[index])
+    jumps = np.flatnonzero(back_s > MAX_DISORDER_S)
+    if len(jumps):
+        edges = np.concatenate([[0], jumps + 1, [len(index)]])
+        longest = int(np.argmax(np.diff(edges)))
+        kept = index[edges[longest] : edges[longest + 1]]
+        notices.append(
+            f"The clock of the {what} jumps back {len(jumps)} time(s), by up to {back_s.max():.3g} s; the longest "
+            f"stretch, {len(kept)} of {len(index)}, is used."
+        )
+        index = kept
+    elif np.any(back_s > 0.0):
+        notices.append(f"The stamps of the {what} run backwards {int((back_s > 0).sum())} time(s); they were sorted.")
+    index = index[np.argsort(stamps_s[index], kind="stable")]
+    new = np.diff(stamps_s[index], prepend=-np.inf) > 0.0
+    if not new.all():
+        notices.append(f"{int((~new).sum())} {what} repeat the stamp of the one before and are left out.")
+    return InOrder(index[new], tuple(notices))
+
+
+def gap_notices(stamps_s: Float[np.ndarray, " n"], what: str, show: int = 3) -> tuple[str, ...]:
+    """Return a sentence about the pauses in a stream of rising stamps, or nothing."""
+    if len(stamps_s) < 3:
+        return ()
+    interval_s = np.diff(stamps_s)
+    gaps = np.flatnonzero(interval_s > max(MIN_GAP_S, MIN_GAP_INTERVALS * float(np.median(interval_s))))
+    if len(gaps) == 0:
+        return ()
+    longest = gaps[np.argsort(-interval_s[gaps], kind="stable")[:show]]
+    told = ", ".join(f"{interval_s[g]:.3g} s after {stamps_s[g] - stamps_s[0]:.2f} s" for g in sorted(longest))
+    more = f" and {len(gaps) - show} more" if len(gaps) > show else ""
+    return (f"There are no {what} for {told}{more}.",)
+
+
+def associate(
+    a_s: Float[np.ndarray, " n"], b_s: Float[np.ndarray, " m"], tolerance_s: float
+) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+    """Pair the samples of two streams that are each other's nearest in time and at most ``tolerance_s`` apart.
+
+    Args:
+        a_s: rising stamps of the one.
+        b_s: rising stamps of the other.
+        tolerance_s: largest difference of a pair, seconds.
+
+    Returns:
+        Rows of a and rows of b, both rising; each row is in at most one pair.
+    """
+    if len(a_s) == 0 or len(b_s) == 0:
+        none = np.zeros(0, np.int64)
+        return none, none
+    b_of_a, a_of_b = _nearest(a_s, b_s), _nearest(b_s, a_s)
+    a = np.arange(len(a_s))
+    paired = (a_of_b[b_of_a] == a) & (np.abs(a_s - b_s[b_of_a]) <= tolerance_s)
+    return a[paired], b_of_a[paired]
+
+
+def _nearest(asked_s: Float[np.ndarray, " n"], stamps_s: Float[np.ndarray, " m"]) -> Int[np.ndarray, " n"]:
+    right = np.clip(np.searchsorted(stamps_s, asked_s), 0, len(stamps_s) - 1)
+    left = np.maximum(right - 1, 0)
+    return np.where(asked_s - stamps_s[left] <= stamps_s[right] - asked_s, left, right)
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """Where a body was, known at some stamps and interpolated between them.
+
+    Attributes:
+        stamps_s: (n,), strictly rising, at least one.
+        world_from_body: (n, 4, 4), orthonormal.
+    """
+
+    stamps_s: Float[np.ndarray, " n"]
+    world_from_body: Float[np.ndarray, "n 4 4"]
+
+    def __post_init__(self) -> None:
+        n = len(self.stamps_s)
+        if n == 0 or self.world_from_body.shape != (n, 4, 4):
+            raise ValueError(f"{n} stamps do not fit poses of {self.world_from_body.shape}; both need n >= 1")
+        if not np.all(np.diff(self.stamps_s) > 0.0):
+            raise ValueError("the stamps of a trajectory must rise strictly")
+
+    def covers(
+        self, stamps_s: Float[np.ndarray, " k"], edge_s: float = EDGE_TOLERANCE_S, max_gap_s: float | None = None
+    ) -> Bool[np.ndarray, " k"]:
+        """Say for each stamp whether a pose can be told there.
+
+        Args:
+            stamps_s: when.
+            edge_s: how far outside the trajectory a stamp may lie.
+            max_gap_s: longest pause between two poses that is still bridged; by default one second or five times
+                the usual interval, whichever is longer.
+        """
+        first, last = self.stamps_s[0], self.stamps_s[-1]
+        inside = (stamps_s >= first - edge_s) & (stamps_s <= last + edge_s)
+        if len(self.stamps_s) < 2:
+            return inside
+        interval_s = np.diff(self.stamps_s)
+        if max_gap_s is None:
+            max_gap_s = max(MIN_GAP_S, MIN_GAP_INTERVALS * float(np.median(interval_s)))
+        left, _, share = self._between(stamps_s)
+        at_a_pose = (share == 0.0) | (share == 1.0)
+        return inside & (at_a_pose | (interval_s[np.minimum(left, len(interval_s) - 1)] <= max_gap_s))
+
+    def at(self, stamps_s: Float[np.ndarray, " k"], edge_s: float = EDGE_TOLERANCE_S) -> Float[np.ndarray, "k 4 4"]:
+        """Return the pose at each stamp: positions on the straight line, rotations on the shortest arc (slerp).
+
+        At a known stamp the known pose is returned exactly. Past an end, by at most ``edge_s``, the end is held.
+
+        Raises:
+            ValueError: a stamp lies further outside; ask ``covers`` first.
+        """
+        outside_s = np.maximum(self.stamps_s[0] - stamps_s, stamps_s - self.stamps_s[-1])
+        if np.any(~(outside_s <= edge_s)):
+            raise ValueError(
+                f"a stamp lies {np.max(outside_s):.3g} s outside the trajectory; at most {edge_s} s passes"
+            )
+        left, right, share = self._between(stamps_s)
+        asked = self.world_from_body[np.where(share == 1.0, right, left)]
+        inner = np.flatnonzero((share > 0.0) & (share < 1.0))
+        if len(inner):
+            a, b, t = self.world_from_body[left[inner]], self.world_from_body[right[inner]], share[inner][:, None]
+            rotation = slerp(poses.to_quaternion(a), poses.to_quaternion(b), share[inner])
+            asked[inner] = poses.from_quaternion((1.0 - t) * a[:, :3, 3] + t * b[:, :3, 3], rotation)
+        return asked
+
+    def _between(
+        self, stamps_s: Float[np.ndarray, " k"]
+    ) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+        """Return the poses before and after each stamp, and how far (0 to 1) the stamp is from the one to the other."""
+        last = len(self.stamps_s) - 1
+        left = np.clip(np.searchsorted(self.stamps_s, stamps_s, side="right") - 1, 0, last)
+        right = np.minimum(left + 1, last)
+        length_s = np.where(right > left, self.stamps_s[right] - self.stamps_s[left], 1.0)
+        return left, right, np.clip((stamps_s - self.stamps_s[left]) / length_s, 0.0, 1.0) * (right > left)
+
+
+def slerp(
+    a_xyzw: Float[np.ndarray, "k 4"], b_xyzw: Float[np.ndarray, "k 4"], share: Float[np.ndarray, " k"]
+) -> Float[np.ndarray, "k 4"]:
+    """Return unit quaternions on the shorter arc from a (share 0) to b (share 1), at constant speed."""
+    cosine = np.einsum("ij,ij->i", a_xyzw, b_xyzw)
+    b = np.where(cosine[:, None] < 0.0, -b_xyzw, b_xyzw)
+    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
+    sine = np.sin(angle)
+    near = sine < 1e-6  # so near that the chord is the arc
+    safe = np.where(near, 1.0, sine)
+    weight_a = np.where(near, 1.0 - share, np.sin((1.0 - share) * angle) / safe)
+    weight_b = np.where(near, share, np.sin(share * angle) / safe)
+    blend = weight_a[:, None] * a_xyzw + weight_b[:, None] * b
+    return blend / np.linalg.norm(blend, axis=1, keepdims=True)

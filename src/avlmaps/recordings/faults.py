@@ -1,0 +1,40 @@
+"""What can be wrong with a recording, and who is told: opening stops at the first, the validator lists them all."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from avlmaps.core.errors import RecordingError
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One thing wrong with a recording.
+
+    Attributes:
+        sentence: what, where and what to do; it names the file and the line.
+        file: the file, where there is one.
+        line: the line in it, counted from 1.
+        fatal: whether the recording cannot be opened because of it.
+    """
+
+    sentence: str
+    file: Path | None = None
+    line: int | None = None
+    fatal: bool = True
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+Report = Callable[[Fault], None]
+
+
+def stop_at_first(fault: Fault) -> None:
+    """Refuse to go on where a fault is fatal; pass over any other.
+
+    Raises:
+        RecordingError: the fault is fatal.
+    """
+    if fault.fatal:
+        raise RecordingError(fault.sentence)

@@ -1,0 +1,231 @@
+"""A recording whose pictures are files: what the readers of folders have in common."""
+
+import hashlib
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core import poses, timeline
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.recordings import images
+from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.faults import Fault, Report
+from avlmaps.recordings.types import Frame, Recording
+
+_SHOWN = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Shots:
+    """Frames as a reader found them, before the unusable ones are sorted out. All have the same length.
+
+    Attributes:
+        names: what the recording calls each frame.
+        colour: each colour file, below the recording's folder.
+        depth: each depth file, below the recording's folder; empty where the recording has no depth at all.
+        stamps_s: when, on any clock.
+        world_from_camera: (n, 4, 4); NaN or infinity where tracking was lost.
+    """
+
+    names: Sequence[str]
+    colour: Sequence[str]
+    depth: Sequence[str]
+    stamps_s: Float[np.ndarray, " n"]
+    world_from_camera: Float[np.ndarray, "n 4 4"]
+
+    def take(self, index: np.ndarray) -> "Shots":
+        """Return some of the shots."""
+        if len(index) == len(self.names) and np.array_equal(index, np.arange(len(index))):
+            return self
+        rows: list[int] = index.tolist()
+        return Shots(
+            [self.names[i] for i in rows],
+            [self.colour[i] for i in rows],
+            [self.depth[i] for i in rows] if len(self.depth) else [],
+            self.stamps_s[index],
+            self.world_from_camera[index],
+        )
+
+
+def settle(
+    path: Path, shots: Shots, report: Report, pose_file: Callable[[int], Path] | None
+) -> tuple[Shots, tuple[str, ...]]:
+    """Leave out what cannot be used, put the rest in the order of time and make the rotations orthonormal.
+
+    Args:
+        path: the recording, for the sentences.
+        shots: as found.
+        report: is told of poses that are none; lost tracking (NaN, infinity) is a notice, not a fault to stop at.
+        pose_file: the file that holds the pose of shot i; None where the reader checked the poses itself.
+
+    Returns:
+        The usable shots, and a sentence for each thing that was done.
+    """
+    notices: list[str] = []
+    tracked = np.isfinite(shots.world_from_camera).all(axis=(1, 2))
+    if not tracked.all():
+        lost = np.flatnonzero(~tracked).tolist()
+        names = [shots.names[i] for i in lost]
+        notices.append(f"{len(lost)} frame(s) without a pose (lost tracking) are left out: {_some(names)}.")
+        for i, name in zip(lost, names, strict=True):
+            if pose_file is not None:
+                sentence = f"{pose_file(i)}: the pose of frame {name} is NaN or infinite; the frame is left out."
+                report(Fault(sentence, pose_file(i), fatal=False))
+    kept = np.flatnonzero(tracked)
+    shots = shots.take(kept)
+    if pose_file is not None:
+        shots = _orthonormal(shots, report, [pose_file(int(i)) for i in kept])
+    order = timeline.in_order(shots.stamps_s, "frames")
+    shots = shots.take(order.index)
+    if len(shots.names) == 0:
+        report(Fault(f"{path} has no frame with a usable pose, so there is nothing to map.", path))
+    return shots, (*notices, *order.notices, *timeline.gap_notices(shots.stamps_s, "frames"))
+
+
+def _orthonormal(shots: Shots, report: Report, pose_files: Sequence[Path]) -> Shots:
+    """Make the rotations orthonormal at once; where one is none, report that one and go on with the others."""
+    labels = [f"frame {name}" for name in shots.names]
+    try:
+        mended = poses.orthonormalized_all(shots.world_from_camera, labels)
+    except RecordingError:
+        good, kept = [], []
+        for i, label in enumerate(labels):
+            try:
+                good.append(poses.orthonormalized(shots.world_from_camera[i], f"{label} ({pose_files[i]})"))
+                kept.append(i)
+            except RecordingError as error:
+                report(Fault(str(error), pose_files[i]))
+        shots = shots.take(np.array(kept, np.int64))
+        mended = np.array(good).reshape(-1, 4, 4)
+    return Shots(shots.names, shots.colour, shots.depth, shots.stamps_s, mended)
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names[:_SHOWN]) + (" ..." if len(names) > _SHOWN else "")
+
+
+@dataclass(eq=False)
+class FileRecording(Recording):
+    """Frames whose pictures are files, read when asked for.
+
+    Attributes:
+        path: the folder.
+        format: the format's name on the command line.
+        rig: the cameras.
+        shots: the usable frames in the order of time; their stamps count from the recording's start.
+        depth_units: units of a depth PNG in a metre.
+        up_in_world: unit vector, or None where it is not known.
+        audio: the sound track on the frames' clock, or None.
+        notices: one sentence for each thing worth knowing.
+    """
+
+    path: Path
+    format: str
+    rig: Rig
+    shots: Shots
+    depth_units: float = 1000.0
+    up_in_world: Float[np.ndarray, "3"] | None = None
+    audio: AudioTrack | None = None
+    notices: tuple[str, ...] = ()
+    stamps_s: Float[np.ndarray, " n"] = field(init=False)
+    world_from_camera: Float[np.ndarray, "n 4 4"] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.stamps_s = self.shots.stamps_s
+        self.world_from_camera = self.shots.world_from_camera
+
+    def frame(self, index: int) -> Frame:
+        """Read one frame; see ``Recording.frame``."""
+        if not 0 <= index < len(self):
+            raise IndexError(f"there is no frame {index}; the recording has {len(self)}")
+        depth_camera = self.rig.depth
+        if len(self.shots.depth):
+            depth_m = images.read_depth(self.path / self.shots.depth[index], depth_camera, self.depth_units)
+        else:
+            depth_m = np.zeros((depth_camera.height, depth_camera.width), np.float32)
+        return Frame(
+            index=index,
+            name=self.name(index),
+            stamp_s=float(self.stamps_s[index]),
+            rgb=images.read_colour(self.path / self.shots.colour[index], self.rig.rgb),
+            depth_m=depth_m,
+            world_from_camera=self.world_from_camera[index],
+            rig=self.rig,
+        )
+
+    def name(self, index: int) -> str:
+        """Return what the recording calls a frame."""
+        return self.shots.names[index]
+
+    def colour_file(self, index: int) -> Path | None:
+        """Return the frame's colour file."""
+        return self.path / self.shots.colour[index]
+
+    def depth_file(self, index: int) -> Path | None:
+        """Return the frame's depth file where it is a PNG."""
+        if len(self.shots.depth) == 0 or not self.shots.depth[index].endswith(".png"):
+            return None
+        return self.path / self.shots.depth[index]
+
+    @property
+    def depth_units_per_m(self) -> float:
+        """Units of the depth files in a metre."""
+        return self.depth_units
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """A hex SHA-256 over poses, stamps, cameras, and every file's name and size; see ``Recording.fingerprint``."""
+        digest = hashlib.sha256(f"{self.format} {_numbers(self.rig)} {self.depth_units}".encode())
+        up = np.zeros(3) if self.up_in_world is None else self.up_in_world
+        for numbers in (up, self.stamps_s, self.world_from_camera):
+            # Rounded, so that another machine's last bit makes no other recording; + 0.0 turns -0.0 into 0.0.
+            digest.update(np.ascontiguousarray(np.round(numbers, 9) + 0.0, "<f8").tobytes())
+        for name in (*self.shots.colour, *self.shots.depth):
+            digest.update(f"{name}\0{_size(self.path / name)}\n".encode())
+        if self.audio is not None:
+            digest.update(f"{self.audio.path.name}\0{_size(self.audio.path)}\0{self.audio.start_s}".encode())
+        return digest.hexdigest()
+
+
+def _numbers(rig: Rig) -> list[float]:
+    def camera(c: Pinhole) -> list[float]:
+        return [c.fx, c.fy, c.cx, c.cy, float(c.width), float(c.height)]
+
+    return [*camera(rig.rgb), *camera(rig.depth), *map(float, rig.rgb_from_depth.ravel())]
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:
+        return -1
+
+
+def list_names(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
+    """Return the names of a folder's files with one of the suffixes, in the order of their numbers, then of letters.
+
+    Raises:
+        RecordingError: the folder is missing or cannot be listed.
+    """
+    try:
+        with os.scandir(folder) as entries:
+            names = [entry.name for entry in entries if entry.name.lower().endswith(suffixes)]
+    except OSError as error:
+        raise RecordingError(f"{folder} cannot be listed ({error.strerror or error}); check the folder.") from None
+    return sorted((name for name in names if not name.startswith(".")), key=_by_number)
+
+
+def _by_number(name: str) -> tuple[int, str]:
+    stem = name.split(".", 1)[0]
+    return (int(stem) if stem.isascii() and stem.isdigit() else -1, name)
+
+
+def find_audio(folder: Path) -> Path | None:
+    """Return the folder's ``audio.flac``, ``audio.wav`` or ``audio.ogg``, the first that is there."""
+    return next((p for p in (folder / f"audio.{kind}" for kind in ("flac", "wav", "ogg")) if p.is_file()), None)

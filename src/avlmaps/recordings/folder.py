@@ -1,0 +1,186 @@
+"""Reading our own folder format; `layout.py` tells what is in it, `writer.py` writes it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from avlmaps.core import poses, timeline
+from avlmaps.core.errors import RecordingError
+from avlmaps.recordings import layout
+from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.file_recording import FileRecording, Shots, find_audio, list_names, settle
+from avlmaps.recordings.layout import Description
+from avlmaps.recordings.tables import read_table, text_lines
+
+# Stamps beyond this are a date (seconds since 1970), not seconds from the start of a recording.
+_DATE_S = 1e8
+# A quaternion whose length is further from one than this was not written as a rotation.
+_MAX_QUATERNION_FAULT = 0.05
+
+
+def open_folder(path: Path, report: Report = stop_at_first) -> FileRecording:
+    """Open a recording in our own format.
+
+    Args:
+        path: the folder.
+        report: is told of every fault; by default the first fatal one ends the opening.
+
+    Raises:
+        RecordingError: the recording is unfinished or damaged so that it cannot be used.
+    """
+    if not (path / layout.DESCRIPTION).exists() and (path / layout.UNFINISHED).exists():
+        sentence = f"{path} was never finished: whatever wrote it stopped before its end; record it again."
+        report(Fault(sentence, path / layout.UNFINISHED))
+    description = layout.read_description(path, report)
+    if description is None:
+        raise RecordingError(f"{path / layout.DESCRIPTION} cannot be used, so the recording cannot be opened.")
+    known = _read_poses(path, report)
+    found = _find_pictures(path, description, known, report)
+    shots, notices, start_s = _pose_pictures(found, known, description)
+    shots, more = settle(path, shots, report, pose_file=None)
+    audio = find_audio(path)
+    audio_start_s = description.audio_start_s - (start_s if description.audio_start_s > _DATE_S else 0.0)
+    up = description.up_in_world
+    return FileRecording(
+        path=path,
+        format="folder",
+        rig=description.rig(),
+        shots=shots,
+        depth_units=description.depth_units_per_m,
+        up_in_world=None if up is None else np.array(up) / np.linalg.norm(up),
+        audio=AudioTrack.open(audio, start_s=audio_start_s) if audio else None,
+        notices=(*notices, *more),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Poses:
+    """Rows of poses.csv, as they stand there: ``usable`` ones have a finite pose and a rotation."""
+
+    stamps_s: Float[np.ndarray, " n"]
+    world_from_camera: Float[np.ndarray, "n 4 4"]
+    usable: Bool[np.ndarray, " n"]
+
+
+@dataclass(frozen=True, slots=True)
+class _Pictures:
+    """The pictures' files and, where it is known, when each was taken."""
+
+    names: list[str]
+    colour: list[str]
+    depth: list[str]
+    stamps_s: Float[np.ndarray, " n"] | None
+
+
+def _read_poses(folder: Path, report: Report) -> _Poses:
+    path = folder / layout.POSES
+    table = read_table(path, (8,), report, header=True)
+    stamps_s, translation, quaternion = table.values[:, 0], table.values[:, 1:4], table.values[:, 4:8]
+    length = np.linalg.norm(quaternion, axis=1)
+    finite = np.isfinite(table.values).all(axis=1)
+    rigid = np.abs(length - 1.0) <= _MAX_QUATERNION_FAULT
+    for row in np.flatnonzero(~finite):
+        line = int(table.lines[row])
+        report(Fault(f"{path}, line {line}: the pose is NaN or infinite; it is not used.", path, line, fatal=False))
+    for row in np.flatnonzero(finite & ~rigid):
+        line = int(table.lines[row])
+        sentence = (
+            f"{path}, line {line}: the quaternion has length {length[row]:.3g}, so this is no rotation; "
+            "write qx qy qz qw of length 1, or leave the line out."
+        )
+        report(Fault(sentence, path, line))
+    for row in np.flatnonzero(np.diff(stamps_s) <= 0.0) + 1:
+        line = int(table.lines[row])
+        sentence = (
+            f"{path}, line {line}: stamp {stamps_s[row]:.6f} s is not after that of the line before "
+            f"({stamps_s[row - 1]:.6f} s); frames are sorted, or cut where the clock was set anew."
+        )
+        report(Fault(sentence, path, line, fatal=False))
+    usable = finite & rigid
+    quaternion = np.where(usable[:, None], quaternion, (0.0, 0.0, 0.0, 1.0))
+    pose = poses.from_quaternion(translation, quaternion)
+    pose[~usable] = np.nan
+    if len(stamps_s) == 0:
+        report(Fault(f"{path} holds no pose, so there is nothing to map.", path))
+    return _Poses(stamps_s, pose, usable)
+
+
+def _find_pictures(folder: Path, description: Description, known: _Poses, report: Report) -> _Pictures:
+    """Find the pictures and their stamps: by frames.csv, else row by row with poses.csv, else by the rate."""
+    found = {name.rsplit(".", 1)[0]: name for name in list_names(folder / "rgb", layout.COLOUR_SUFFIXES)}
+    path = folder / layout.FRAMES
+    if path.exists():
+        rows = list(_listed(path, report))
+        names = [name for name, _ in rows]
+        stamps_s: Float[np.ndarray, " n"] | None = np.array([stamp for _, stamp in rows], np.float64)
+    else:
+        names = list(found)
+        stamps_s = _stamps_without_list(folder, names, description, known, report)
+    colour = [f"rgb/{found.get(name, name + '.png')}" for name in names]
+    if description.frames is not None and description.frames != len(names):
+        where = path.name if path.exists() else "rgb/"
+        sentence = f"{folder / layout.DESCRIPTION} tells of {description.frames} frames, but {where} has {len(names)}."
+        report(Fault(sentence, folder / layout.DESCRIPTION, fatal=False))
+    return _Pictures(names, colour, [f"depth/{name}.png" for name in names], stamps_s)
+
+
+def _listed(path: Path, report: Report) -> Iterator[tuple[str, float]]:
+    for number, text in text_lines(path, report):
+        if text == layout.FRAMES_HEADER:
+            continue
+        name, _, stamp = text.rpartition(",")
+        try:
+            if not name or "/" in name or "\\" in name:
+                raise ValueError(name)
+            yield name, float(stamp)
+        except ValueError:
+            report(Fault(f"{path}, line {number}: {text[:40]!r} is not name,stamp_s; mend the line.", path, number))
+
+
+def _stamps_without_list(
+    folder: Path, names: list[str], description: Description, known: _Poses, report: Report
+) -> Float[np.ndarray, " n"] | None:
+    if len(names) == len(known.stamps_s):
+        return None
+    if description.rgb_rate_hz and all(name.isascii() and name.isdigit() for name in names):
+        return np.array([int(name) for name in names], np.float64) / description.rgb_rate_hz
+    sentence = (
+        f"{folder} has {len(names)} pictures in rgb/ and {len(known.stamps_s)} lines in {layout.POSES}; add "
+        f"{layout.FRAMES} ({layout.FRAMES_HEADER}), or rgb_rate_hz in {layout.DESCRIPTION} and numbers as names."
+    )
+    report(Fault(sentence, folder / layout.POSES))
+    return np.arange(len(names), dtype=np.float64)
+
+
+def _pose_pictures(found: _Pictures, known: _Poses, description: Description) -> tuple[Shots, tuple[str, ...], float]:
+    """Give every picture a pose: its own row's, or one interpolated at its stamp (NaN where none can be told)."""
+    notices: list[str] = []
+    stamps_s = known.stamps_s if found.stamps_s is None else found.stamps_s
+    own_row = len(stamps_s) == len(known.stamps_s) and np.array_equal(stamps_s, known.stamps_s, equal_nan=True)
+    if own_row:
+        world_from_camera = known.world_from_camera
+    else:
+        world_from_camera = np.full((len(stamps_s), 4, 4), np.nan)
+        usable = np.flatnonzero(known.usable)
+        if len(usable) < len(known.usable):
+            notices.append(f"{len(known.usable) - len(usable)} pose(s) of {layout.POSES} are NaN and not used.")
+        order = timeline.in_order(known.stamps_s[usable], f"poses of {layout.POSES}")
+        notices += order.notices
+        rows = usable[order.index]
+        if len(rows):
+            trajectory = timeline.Trajectory(known.stamps_s[rows], known.world_from_camera[rows])
+            covered = trajectory.covers(stamps_s)
+            world_from_camera[covered] = trajectory.at(stamps_s[covered])
+            if not covered.all():
+                notices.append(
+                    f"{int((~covered).sum())} frame(s) lie outside the poses of {layout.POSES} or in a gap of them."
+                )
+    start_s = 0.0
+    if len(stamps_s) and np.nanmin(stamps_s) > _DATE_S:
+        start_s = float(np.nanmin(stamps_s))
+        notices.append(f"The stamps are dates; time 0 is the first frame's, {start_s:.6f} s since 1970.")
+    return Shots(found.names, found.colour, found.depth, stamps_s - start_s, world_from_camera), tuple(notices), start_s

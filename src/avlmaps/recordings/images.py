@@ -1,0 +1,205 @@
+"""Reading pictures of a recording: colour (JPEG, PNG) and depth (16-bit PNG, NPY), never half a file."""
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32, UInt8
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.core.errors import RecordingError
+
+_PNG = b"\x89PNG\r\n\x1a\n"
+_JPEG = b"\xff\xd8"
+# A JPEG's frame headers carry its size; of the codes C0 to CF these three mean something else.
+_JPEG_SIZE_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_HEADER_BYTES = 1 << 18
+DEPTH_SATURATED = 65535
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return a file's content.
+
+    Raises:
+        RecordingError: it is missing or cannot be read.
+    """
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise RecordingError(f"{path} is missing; restore it, or leave that frame out of the recording.") from None
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None
+
+
+def check_whole(path: Path, content: bytes) -> None:
+    """Refuse a JPEG or PNG that is cut off or damaged; decoders would return a half-grey picture without a word.
+
+    Raises:
+        RecordingError: the file is truncated, damaged, empty or neither PNG nor JPEG.
+    """
+    if content.startswith(_PNG):
+        fault = _png_fault(content)
+    elif content.startswith(_JPEG):
+        # Within the scan 0xFF is always followed by 0x00, so the end marker is found only where the picture ends.
+        fault = "" if content.rfind(b"\xff\xd9") > content.rfind(b"\xff\xda") else "truncated"
+    else:
+        fault = "neither PNG nor JPEG" if content else "empty"
+    if fault:
+        raise RecordingError(f"{path} is {fault} ({len(content)} bytes); copy it again or leave that frame out.")
+
+
+def _png_fault(content: bytes) -> str:
+    at = len(_PNG)
+    view = memoryview(content)
+    while at + 12 <= len(content):
+        (length,) = struct.unpack_from(">I", content, at)
+        end = at + 12 + length
+        if end > len(content):
+            return "truncated"
+        if zlib.crc32(view[at + 4 : end - 4]) != struct.unpack_from(">I", content, end - 4)[0]:
+            return f"damaged at byte {at}"
+        if view[at + 4 : at + 8] == b"IEND":
+            return ""
+        at = end
+    return "truncated"
+
+
+def picture_size(path: Path, content: bytes | None = None) -> tuple[int, int]:
+    """Return (width, height) of a JPEG, PNG or NPY file from its header alone.
+
+    Raises:
+        RecordingError: the file is missing or has no such header.
+    """
+    if content is None:
+        content = _head(path)
+    if content.startswith(_PNG) and len(content) >= 24:
+        return struct.unpack_from(">II", content, 16)
+    if content.startswith(_JPEG) and (size := _jpeg_size(content)):
+        return size
+    if path.suffix == ".npy":
+        shape = _load_npy(path, mmap=True).shape
+        if len(shape) >= 2:
+            return shape[1], shape[0]
+    raise RecordingError(f"{path} is no PNG, JPEG or NPY picture (or is cut off); copy it again.")
+
+
+def _head(path: Path) -> bytes:
+    try:
+        with path.open("rb") as stream:
+            return stream.read(_HEADER_BYTES)
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None
+
+
+def _jpeg_size(content: bytes) -> tuple[int, int] | None:
+    at = 2
+    while at + 9 <= len(content):
+        if content[at] != 0xFF:
+            return None
+        marker = content[at + 1]
+        if marker in _JPEG_SIZE_MARKERS:
+            height, width = struct.unpack_from(">HH", content, at + 5)
+            return width, height
+        at += 1 if marker == 0xFF else 2 + struct.unpack_from(">H", content, at + 2)[0]
+    return None
+
+
+def read_colour(path: Path, camera: Pinhole) -> UInt8[np.ndarray, "h w 3"]:
+    """Read a colour picture as RGB, as the sensor delivered it (no turning by EXIF).
+
+    Raises:
+        RecordingError: the file is missing, truncated, no picture or not of the camera's size.
+    """
+    import cv2
+
+    content = read_bytes(path)
+    check_whole(path, content)
+    bgr = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    if bgr is None:
+        raise RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
+    _check_size(path, bgr.shape, camera)
+    return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+
+
+def read_depth(path: Path, camera: Pinhole, units_per_m: float) -> Float32[np.ndarray, "h w"]:
+    """Read z-depth in metres; 0 where there is none.
+
+    A PNG holds 16-bit whole numbers, of which 0 and 65535 say that nothing was measured; an NPY holds metres, of
+    which NaN, infinity and what is not positive say so.
+
+    Args:
+        path: a 16-bit PNG or an NPY file.
+        camera: the depth camera.
+        units_per_m: the PNG's units in a metre.
+
+    Raises:
+        RecordingError: the file is missing, truncated, of another kind or not of the camera's size.
+    """
+    if path.suffix == ".npy":
+        return _npy_depth(path, camera)
+    raw = decode_depth_png(path, read_bytes(path))
+    _check_size(path, raw.shape, camera)
+    depth_m = raw.astype(np.float32)
+    depth_m[raw == DEPTH_SATURATED] = 0.0
+    depth_m /= np.float32(units_per_m)
+    return depth_m
+
+
+def decode_depth_png(path: Path, content: bytes) -> np.ndarray:
+    """Return the whole numbers of a depth PNG as uint16."""
+    import cv2
+
+    check_whole(path, content)
+    raw = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+    if raw is None:
+        raise RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
+    if raw.dtype != np.uint16 or raw.ndim != 2:
+        kind = f"{raw.dtype.itemsize * 8}-bit with {raw.shape[2] if raw.ndim == 3 else 1} channel(s)"
+        raise RecordingError(f"{path} is {kind}; depth must be a 16-bit PNG with one channel.")
+    return raw
+
+
+def _npy_depth(path: Path, camera: Pinhole) -> Float32[np.ndarray, "h w"]:
+    raw = _load_npy(path)
+    if raw.ndim == 3 and raw.shape[2] == 1:
+        raw = raw[..., 0]
+    if raw.ndim != 2 or raw.dtype.kind not in "fiu":
+        raise RecordingError(f"{path} holds {raw.dtype} of {raw.shape}; depth must be numbers of (height, width).")
+    _check_size(path, raw.shape, camera)
+    depth_m = raw.astype(np.float32)
+    depth_m[~(np.isfinite(depth_m) & (depth_m > 0.0))] = 0.0
+    return depth_m
+
+
+def _load_npy(path: Path, mmap: bool = False) -> np.ndarray:
+    if not path.is_file():
+        read_bytes(path)
+    try:
+        return np.load(path, mmap_mode="r" if mmap else None, allow_pickle=False)
+    except (ValueError, OSError, EOFError) as error:
+        reason = str(error).splitlines()[0] if str(error) else "it is empty"
+        raise RecordingError(f"{path} is no whole NPY file ({reason}); copy it again.") from None
+
+
+def _check_size(path: Path, shape: tuple[int, ...], camera: Pinhole) -> None:
+    if shape[:2] != (camera.height, camera.width):
+        raise RecordingError(
+            f"{path} is {shape[1]}x{shape[0]}, but the recording's camera is {camera.width}x{camera.height}; "
+            "every picture of a recording must have one size."
+        )
+
+
+def check_picture(path: Path, camera: Pinhole) -> None:
+    """Check a picture's wholeness and size without decoding it.
+
+    Raises:
+        RecordingError: as reading it would, as far as that can be told from the outside.
+    """
+    if path.suffix == ".npy":
+        width, height = picture_size(path)
+    else:
+        content = read_bytes(path)
+        check_whole(path, content)
+        width, height = picture_size(path, content)
+    _check_size(path, (height, width), camera)

@@ -1,0 +1,171 @@
+"""What `recording.json` of our own folder format holds, and the names of the files beside it.
+
+recording.json    this file's Description; written last, so that a folder without it is unfinished
+rgb/              colour pictures, PNG or JPEG
+depth/            16-bit PNG of the same names; 0 and 65535 say that nothing was measured
+poses.csv         stamp_s,tx,ty,tz,qx,qy,qz,qw: poses of the depth camera, at any rate
+frames.csv        name,stamp_s: when each picture was taken. It may be left out where poses.csv has one row for
+                  each picture (in the order of the names), or where rgb_rate_hz is given and names are numbers
+audio.flac        or .wav, .ogg: the sound track
+events.csv, semantic/, objects.json   truth, which mapping never reads
+"""
+
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.faults import Fault, Report
+
+SCHEMA_VERSION = 1
+DESCRIPTION = "recording.json"
+UNFINISHED = "UNFINISHED"
+POSES = "poses.csv"
+FRAMES = "frames.csv"
+POSES_HEADER = "stamp_s,tx,ty,tz,qx,qy,qz,qw"
+FRAMES_HEADER = "name,stamp_s"
+COLOUR_SUFFIXES = (".png", ".jpg", ".jpeg")
+
+
+class CameraNumbers(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """A pinhole camera in pixels; the centre of the first pixel is at (0.5, 0.5)."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+
+    def camera(self) -> Pinhole:
+        """Return it as the camera that the package works with."""
+        return Pinhole(self.fx, self.fy, self.cx, self.cy, self.width, self.height)
+
+    @staticmethod
+    def of(camera: Pinhole) -> "CameraNumbers":
+        """Return the numbers of a camera."""
+        fx, fy, cx, cy = (float(number) for number in (camera.fx, camera.fy, camera.cx, camera.cy))
+        return CameraNumbers(fx, fy, cx, cy, int(camera.width), int(camera.height))
+
+
+class Intrinsics(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
+    """The cameras: ``depth`` is the same as ``rgb`` where it is left out (depth registered to colour)."""
+
+    rgb: CameraNumbers
+    depth: CameraNumbers | None = None
+    rgb_from_depth: list[list[float]] | None = None
+
+
+class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """The content of ``recording.json``.
+
+    Attributes:
+        schema_version: of this format.
+        intrinsics: the cameras.
+        depth_units_per_m: units of the depth pictures in a metre; 1000 says millimetres.
+        rgb_rate_hz: pictures a second.
+        pose_rate_hz: poses a second.
+        world_from_camera: which way the camera's axes point; ``opencv`` says x right, y down, z forward.
+        up_in_world: unit vector against gravity, or null where it is not known.
+        audio_start_s: the recording's time at which the sound track begins.
+        frames: how many pictures there are, as a check.
+        origin: what made the recording.
+    """
+
+    schema_version: int
+    intrinsics: Intrinsics
+    depth_units_per_m: float = 1000.0
+    rgb_rate_hz: float | None = None
+    pose_rate_hz: float | None = None
+    world_from_camera: Literal["opencv"] = "opencv"
+    up_in_world: tuple[float, float, float] | None = None
+    audio_start_s: float = 0.0
+    frames: int | None = None
+    origin: str = ""
+
+    def rig(self) -> Rig:
+        """Return the cameras.
+
+        Raises:
+            ValueError: a number is not possible (a focal length of 0, a matrix that is not 4x4).
+        """
+        rgb = self.intrinsics.rgb.camera()
+        depth = self.intrinsics.depth.camera() if self.intrinsics.depth else rgb
+        if self.intrinsics.rgb_from_depth is None:
+            return Rig(rgb, depth)
+        rgb_from_depth = np.array(self.intrinsics.rgb_from_depth, np.float64)
+        if rgb_from_depth.shape != (4, 4):
+            raise ValueError(f"rgb_from_depth has shape {rgb_from_depth.shape}; it must be 4x4")
+        return Rig(rgb, depth, rgb_from_depth)
+
+
+class _Version(msgspec.Struct):
+    schema_version: int
+
+
+def read_description(folder: Path, report: Report) -> Description | None:
+    """Read ``recording.json``; report what is wrong with it and return None where it cannot be used."""
+    path = folder / DESCRIPTION
+    try:
+        description = decode_json(path, Description)
+    except RecordingError as error:
+        report(Fault(str(error), path))
+        return None
+    fault = _impossible(description)
+    if fault:
+        report(Fault(f"{path}: {fault}; mend the file.", path))
+        return None
+    return description
+
+
+def decode_json(path: Path, kind: type[Description]) -> Description:
+    """Decode a versioned JSON file.
+
+    Raises:
+        RecordingError: it is missing, not UTF-8, not JSON, of another version, or a field has the wrong type.
+    """
+    try:
+        content = path.read_bytes()
+        content.decode("utf-8")
+        version = msgspec.json.decode(content, type=_Version).schema_version
+        if version != SCHEMA_VERSION:
+            raise RecordingError(
+                f"{path} has schema version {version}; this avlmaps reads version {SCHEMA_VERSION}: "
+                f"{'update avlmaps' if version > SCHEMA_VERSION else 'write the recording again'}."
+            )
+        return msgspec.json.decode(content, type=kind)
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise RecordingError(f"{path}, line {line}: this is not UTF-8 text; save the file as UTF-8.") from None
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None
+    except msgspec.ValidationError as error:
+        message, _, where = str(error).partition(" - at ")
+        at = f" at {where.strip('`').removeprefix('$.')}" if where else ""
+        raise RecordingError(f"{path}{at}: {_lower(message)}; mend the file.") from None
+    except msgspec.DecodeError as error:
+        raise RecordingError(f"{path} is not JSON ({_lower(str(error))}); mend the file.") from None
+
+
+def _lower(message: str) -> str:
+    return message[:1].lower() + message[1:]
+
+
+def _impossible(description: Description) -> str:
+    """Return what in a well-formed description cannot be, or an empty string."""
+    try:
+        description.rig()
+    except ValueError as error:
+        return str(error)
+    if not description.depth_units_per_m > 0.0:
+        return f"depth_units_per_m is {description.depth_units_per_m}; it must be positive"
+    if description.rgb_rate_hz is not None and not description.rgb_rate_hz > 0.0:
+        return f"rgb_rate_hz is {description.rgb_rate_hz}; it must be positive"
+    if description.up_in_world is not None and not 0.99 < float(np.linalg.norm(description.up_in_world)) < 1.01:
+        return (
+            f"up_in_world is {list(description.up_in_world)}; it must be a unit vector, or null where up is not known"
+        )
+    return ""

@@ -1,0 +1,117 @@
+"""Reading the small text files of recordings: numbers in lines, poses, lists; every fault with its line."""
+
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.faults import Fault, Report
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Numbers of a text file.
+
+    Attributes:
+        values: one row a line.
+        lines: each row's line in the file, from 1.
+    """
+
+    values: Float[np.ndarray, "n c"]
+    lines: Int[np.ndarray, " n"]
+
+
+def text_lines(path: Path, report: Report) -> Iterator[tuple[int, str]]:
+    """Yield (number, text) of each line that is neither empty nor a comment (``#``).
+
+    Lines that are not UTF-8 are reported and passed over.
+    """
+    try:
+        stream = path.open("rb")
+    except FileNotFoundError:
+        report(Fault(f"{path} is missing; the recording needs it.", path))
+        return
+    except OSError as error:
+        report(Fault(f"{path} cannot be read ({error.strerror or error}); check the file.", path))
+        return
+    with stream:
+        for number, raw in enumerate(stream, start=1):
+            try:
+                text = raw.decode("utf-8-sig" if number == 1 else "utf-8").strip()
+            except UnicodeDecodeError:
+                report(Fault(f"{path}, line {number}: this is not UTF-8 text; save the file as UTF-8.", path, number))
+                continue
+            if text and not text.startswith("#"):
+                yield number, text
+
+
+def read_table(path: Path, columns: tuple[int, ...], report: Report, header: bool = False) -> Table:
+    """Read lines of numbers, split at commas or white space.
+
+    Args:
+        path: the file.
+        columns: how many numbers a line may have; the first line decides which of them.
+        report: is told of every line that is not as it should be.
+        header: whether the first line may name the columns instead.
+    """
+    values, lines, width = array("d"), array("q"), 0
+    for number, text in text_lines(path, report):
+        fields = text.replace(",", " ").split()
+        try:
+            row = [_number(field) for field in fields]
+        except ValueError:
+            if header and not lines and not _any_number(fields):
+                continue
+            report(Fault(f"{path}, line {number}: {text[:40]!r} is not all numbers; mend the line.", path, number))
+            continue
+        if len(row) not in columns or (width and len(row) != width):
+            wanted = width or " or ".join(map(str, columns))
+            sentence = f"{path}, line {number}: there are {len(row)} numbers where {wanted} belong; mend the line."
+            report(Fault(sentence, path, number))
+            continue
+        width = len(row)
+        values.extend(row)
+        lines.append(number)
+    table = np.frombuffer(values, np.float64) if len(values) else np.zeros(0)
+    return Table(table.reshape(-1, width or columns[0]), np.array(lines, np.int64))
+
+
+def _number(field: str) -> float:
+    """Parse a number; what Windows printed for NaN and infinity (``-1.#IND``) is NaN."""
+    return float("nan") if ".#" in field else float(field)
+
+
+def _any_number(fields: list[str]) -> bool:
+    for field in fields:
+        try:
+            _number(field)
+        except ValueError:
+            continue
+        return True
+    return False
+
+
+def read_matrix(path: Path, rows: int, columns: int) -> Float[np.ndarray, "rows columns"]:
+    """Read one matrix written row by row, in whatever lines.
+
+    Raises:
+        RecordingError: the file is missing, is not text, or holds another count of numbers.
+    """
+    try:
+        fields = path.read_bytes().decode("utf-8-sig").replace(",", " ").split()
+        numbers = [_number(field) for field in fields]
+    except FileNotFoundError:
+        raise RecordingError(f"{path} is missing; the recording needs it.") from None
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None
+    except UnicodeDecodeError:
+        raise RecordingError(f"{path} is not UTF-8 text; save the file as UTF-8.") from None
+    except ValueError as error:
+        raise RecordingError(f"{path} does not hold numbers only ({error}); mend the file.") from None
+    if len(numbers) != rows * columns:
+        raise RecordingError(f"{path} holds {len(numbers)} numbers where {rows}x{columns} belong; mend the file.")
+    return np.array(numbers).reshape(rows, columns)

@@ -1,0 +1,139 @@
+"""Naming every fault of a recording, each in one sentence with its file and line."""
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from avlmaps.core.errors import AvlmapsError, RecordingError
+from avlmaps.core.progress import progress
+from avlmaps.recordings import images
+from avlmaps.recordings.faults import Fault, Report
+from avlmaps.recordings.file_recording import FileRecording
+from avlmaps.recordings.open import find_format
+from avlmaps.recordings.tables import text_lines
+from avlmaps.recordings.types import Recording
+
+# The last frame may be taken a little after the sound track's end: encoders cut to whole blocks.
+_MAX_AUDIO_LACK_S = 0.5
+
+
+def validate(path: Path | str, format: str = "auto", max_decoded: int | None = None) -> list[Fault]:
+    """Return every fault of a recording; an empty list says that there is none.
+
+    Texts, poses, stamps and the sound track are checked wholly, and so are the outsides of all pictures (there,
+    whole, of the right size). Pictures are decoded as well, to find depth that is zero everywhere.
+
+    Args:
+        path: a recording of any format.
+        format: as for ``open_recording``.
+        max_decoded: how many frames to decode, spread evenly; all of them if None.
+    """
+    path = Path(path)
+    faults: list[Fault] = []
+    try:
+        recording = find_format(path, format).open(path, faults.append)
+    except AvlmapsError as error:
+        if not any(str(error) == fault.sentence for fault in faults):
+            faults.append(Fault(str(error)))
+        if path.is_dir():
+            _check_truth(path, faults.append)
+        return _without_twins(faults)
+    _check_audio(recording, faults.append)
+    _check_pictures(recording, max_decoded, faults.append)
+    if path.is_dir():
+        _check_truth(path, faults.append)
+    return _without_twins(faults)
+
+
+def _without_twins(faults: list[Fault]) -> list[Fault]:
+    return list({fault.sentence: fault for fault in faults}.values())
+
+
+def _check_audio(recording: Recording, report: Report) -> None:
+    if recording.audio is None or len(recording) == 0:
+        return
+    lack_s = float(recording.stamps_s[-1]) - recording.audio.end_s
+    if lack_s > _MAX_AUDIO_LACK_S:
+        sentence = (
+            f"{recording.audio.path} ends at {recording.audio.end_s:.2f} s, but the frames go on to "
+            f"{recording.stamps_s[-1]:.2f} s; what was to be heard in the last {lack_s:.2f} s is missing."
+        )
+        report(Fault(sentence, recording.audio.path, fatal=False))
+    try:
+        for _ in recording.audio.blocks(60.0):
+            pass
+    except AvlmapsError as error:
+        report(Fault(str(error), recording.audio.path, fatal=False))
+
+
+def _check_pictures(recording: Recording, max_decoded: int | None, report: Report) -> None:
+    count = len(recording)
+    some = count if max_decoded is None else min(max_decoded, count)
+    decoded = set(np.linspace(0, count - 1, some).round().astype(int).tolist())
+    for index in progress(range(count), "checking", total=count):
+        if index in decoded or not isinstance(recording, FileRecording):
+            _check_frame(recording, index, report)
+        else:
+            _check_files(recording, index, report)
+
+
+def _check_files(recording: FileRecording, index: int, report: Report) -> None:
+    pictures = [(recording.colour_file(index), recording.rig.rgb)]
+    if len(recording.shots.depth):
+        pictures.append((recording.path / recording.shots.depth[index], recording.rig.depth))
+    for file, camera in pictures:
+        if file is None:
+            continue
+        try:
+            images.check_picture(file, camera)
+        except RecordingError as error:
+            report(Fault(str(error), file, fatal=False))
+
+
+def _check_frame(recording: Recording, index: int, report: Report) -> None:
+    """Decode a frame; where that fails, look at its files one by one, so that both are told of."""
+    try:
+        depth_m = recording.frame(index).depth_m
+    except RecordingError as error:
+        if isinstance(recording, FileRecording):
+            before = _Counting(report)
+            _check_files(recording, index, before)
+            if before.count:
+                return
+        report(Fault(str(error), recording.colour_file(index), fatal=False))
+        return
+    if not (depth_m > 0.0).any() and not (isinstance(recording, FileRecording) and not len(recording.shots.depth)):
+        file = recording.depth_file(index)
+        where = file or f"{recording.path}, frame {recording.name(index)}"
+        report(Fault(f"{where}: the depth is zero everywhere, so this frame adds nothing to a map.", file, fatal=False))
+
+
+class _Counting:
+    """Passes faults on and counts them."""
+
+    def __init__(self, report: Report) -> None:
+        self._report = report
+        self.count = 0
+
+    def __call__(self, fault: Fault) -> None:
+        self.count += 1
+        self._report(fault)
+
+
+def _check_truth(folder: Path, report: Report) -> None:
+    """Check the files of truth, which mapping never reads, so that nobody finds out when an evaluation fails."""
+
+    def unhurried(fault: Fault) -> None:
+        report(Fault(fault.sentence, fault.file, fault.line, fatal=False))
+
+    events = folder / "events.csv"
+    if events.is_file():
+        for _ in text_lines(events, unhurried):
+            pass
+    objects = folder / "objects.json"
+    if objects.is_file():
+        try:
+            msgspec.json.decode(objects.read_bytes())
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            unhurried(Fault(f"{objects} is not JSON in UTF-8 ({error}); mend the file.", objects))
