@@ -116,8 +116,8 @@ _THINGS = (
 )
 
 _WAYPOINTS = (
-        """Return the poses of the camera along the walk: ahead and a little down, with glances aside.
-    (4.4, 3.2), (4.4, 1.6),
+    (1.0, 1.4), (2.5, 1.4), (4.4, 1.4), (7.0, 1.5), (7.3, 3.2), (6.2, 4.0), (4.6, 5.4), (2.2, 5.8),
+    (1.3, 5.0), (3.4, 4.8), (4.4, 3.2), (4.4, 1.6),
 )  # fmt: skip
 
 

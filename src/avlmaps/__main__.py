@@ -1,0 +1,5 @@
+"""`python -m avlmaps` is the same as `avlmaps`."""
+
+from avlmaps.cli import main
+
+main()

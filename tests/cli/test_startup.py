@@ -1,0 +1,47 @@
+"""The package and the command line start quickly and load nothing heavy."""
+
+import subprocess
+import sys
+from time import perf_counter
+
+import pytest
+
+HEAVY = ("numpy", "scipy", "cv2", "numba", "onnxruntime", "matplotlib", "soundfile", "av", "rosbags", "torch", "transformers")
+
+
+def loaded_by(code: str) -> set[str]:
+    script = f"import sys\n{code}\nprint(' '.join(sorted({{name.partition('.')[0] for name in sys.modules}})))"
+    out = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+    return set(out.splitlines()[-1].split())
+
+
+@pytest.mark.parametrize("code", ["import avlmaps", "import avlmaps.cli.main"])
+def test_importing_loads_no_heavy_library(code: str) -> None:
+    assert loaded_by(code) & set(HEAVY) == set()
+
+
+@pytest.mark.parametrize("verb", ["", "build", "query"])
+def test_help_loads_no_heavy_library(verb: str) -> None:
+    code = (
+        "import io, contextlib\nfrom avlmaps.cli import main\n"
+        f"with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit): main({[verb, '--help'][not verb:]})"
+    )
+    assert loaded_by(code) & set(HEAVY) == set()
+
+
+def test_help_comes_within_half_a_second() -> None:
+    def seconds() -> float:
+        begin = perf_counter()
+        subprocess.run([sys.executable, "-m", "avlmaps", "--help"], capture_output=True, check=True)
+        return perf_counter() - begin
+
+    assert min(seconds() for _ in range(5)) < 0.5
+
+
+def test_every_public_name_can_be_had() -> None:
+    import avlmaps
+
+    for name in avlmaps.__all__:
+        assert getattr(avlmaps, name) is not None
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        avlmaps.nothing  # noqa: B018
