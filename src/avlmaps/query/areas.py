@@ -1,0 +1,98 @@
+"""Where a kind of area is: keyframes whose view is closer to its name than to those of other areas."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Float32, Int
+
+from avlmaps.maps.types import Keyframes
+from avlmaps.perception.protocols import ViewEncoder
+from avlmaps.query.heatmap import HeatSettings, NearAnchors, normalised
+from avlmaps.query.level import Space
+from avlmaps.query.question import Part
+
+# What a place may be, if it is not what was asked for.
+AREA_NAMES = (
+    "kitchen", "living room", "bedroom", "bathroom", "dining room", "office", "corridor", "staircase", "entrance hall",
+    "laundry room", "storage room", "garage", "balcony", "garden", "gym", "library", "meeting room", "workshop",
+    "laboratory", "classroom", "waiting area", "shop", "lounge", "children's room",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class AreaSettings:
+    """From views to heat."""
+
+    anchor: Literal["camera", "centre"] = "camera"
+    """Where a keyframe's heat falls from: the camera (the paper), or the middle of what the camera saw."""
+    score: Literal["posterior", "min-max"] = "posterior"
+    """``posterior`` asks how likely the name is among all area names; ``min-max`` stretches the cosines (the paper)."""
+    temperature: float = 0.05
+    """Of the posterior: a cosine higher by this makes a name e times as likely. To be calibrated for an encoder."""
+    same_word_cosine: float = 0.95
+    """Another name at least this close to the asked one names the same and does not compete with it."""
+    link_m: float = 1.0
+    """Keyframes closer than this to a better one belong to its area."""
+
+
+def area_scores(
+    view: Float32[np.ndarray, "k d"], encoder: ViewEncoder, name: str, settings: AreaSettings
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+    """Return for each keyframe the posterior of the name among all area names, and its score in [0, 1].
+
+    They are the same unless the settings ask for the paper's stretched cosines.
+    """
+    others = [area for area in AREA_NAMES if area != name]
+    words = np.asarray(encoder.encode_words([name, *others]), np.float64)
+    competes = np.r_[True, words[1:] @ words[0] < settings.same_word_cosine]
+    cosine = np.asarray(view, np.float64) @ words[competes].T
+    logits = cosine / settings.temperature
+    weight = np.exp(logits - logits.max(axis=1, keepdims=True, initial=-np.inf))
+    posterior = weight[:, 0] / weight.sum(axis=1)
+    return posterior, posterior if settings.score == "posterior" else normalised(cosine[:, 0])
+
+
+def modes(points: Float[np.ndarray, "a 2"], score: Float[np.ndarray, " a"], link_m: float) -> Int[np.ndarray, " a"]:
+    """Group anchors round the local maxima of their score: each follows its best neighbour uphill (quick shift).
+
+    Args:
+        points: horizontal, metres.
+        score: one for each.
+        link_m: how far a neighbour may be.
+
+    Returns:
+        The number of the group of each anchor, the best group first.
+    """
+    from scipy.spatial import KDTree
+
+    order = np.argsort(-score, kind="stable")
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    group = np.empty(len(order), np.int64)
+    count = 0
+    near = KDTree(points).query_ball_point(points, link_m) if len(points) else []
+    for row in order:
+        uphill = [other for other in near[row] if rank[other] < rank[row]]
+        if uphill:
+            group[row] = group[min(uphill, key=lambda other: rank[other])]
+        else:
+            group[row] = count
+            count += 1
+    return group
+
+
+def area_factor(
+    space: Space, keyframes: Keyframes, encoder: ViewEncoder, part: Part, settings: AreaSettings, heat: HeatSettings
+) -> NearAnchors:
+    """Return the heat of an area: one anchor a keyframe."""
+    posterior, scores = area_scores(np.asarray(keyframes.view), encoder, part.query, settings)
+    places = keyframes.world_from_camera[:, :3, 3] if settings.anchor == "camera" else keyframes.centre
+    anchors = np.asarray(places, np.float64).reshape(-1, 3)
+    best = float(posterior.max(initial=0.0))
+    note = "" if best >= 0.5 else f"no view is like {part.query!r}; the best score is {best:.2f}, below 0.50"
+    if not len(keyframes):
+        note = "the map holds no keyframes"
+    group = modes(space.level(anchors)[:, :2], scores, settings.link_m)
+    falloff = heat.falloff_per_m(part.role)
+    return NearAnchors(space, part, falloff, anchors, scores, group, best >= 0.5, part.query, note)

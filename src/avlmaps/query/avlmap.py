@@ -1,0 +1,208 @@
+"""The map as a user meets it: four ways to ask, each a heatmap, and whole questions."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import UInt8
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.core.registry import Kind
+from avlmaps.query.areas import AreaSettings, area_factor
+from avlmaps.query.heatmap import Heatmap, HeatSettings, fused
+from avlmaps.query.images import image_factor, read_picture, require_fitting
+from avlmaps.query.level import Space
+from avlmaps.query.objects import ObjectSettings, Rivals, object_factor
+from avlmaps.query.question import Answer, Modality, Part, PartAnswer, Question, Role
+from avlmaps.query.sounds import SoundSettings, read_clip, require_audible, sound_factor, sound_features
+from avlmaps.recordings.audio import Sound
+
+if TYPE_CHECKING:
+    from avlmaps.maps.stored import StoredMap
+    from avlmaps.query.locate import Located
+
+
+@dataclass(frozen=True, slots=True)
+class QuerySettings:
+    """Everything about a query that can be chosen."""
+
+    heat: HeatSettings = field(default_factory=HeatSettings)
+    """How fast heat falls."""
+    objects: ObjectSettings = field(default_factory=ObjectSettings)
+    """From a word to instances."""
+    sounds: SoundSettings = field(default_factory=SoundSettings)
+    """From a sound's scores to heat."""
+    areas: AreaSettings = field(default_factory=AreaSettings)
+    """From views to heat."""
+    seed: int = 0
+    """Seed of what is drawn at random when a picture is located."""
+
+
+class AVLMap:
+    """A map that can be asked. Heatmaps of one map multiply: ``m.object("chair", primary=True) * m.sound("dog")``.
+
+    The first query by word of an object scores all voxels against the vocabulary and keeps that for later ones.
+
+    Attributes:
+        stored: the map as it lies on the disk.
+        settings: how to query.
+    """
+
+    def __init__(self, stored: "StoredMap", settings: QuerySettings | None = None) -> None:
+        self.stored = stored
+        self.settings = settings or QuerySettings()
+        self._rivals: tuple[tuple[str, ...], Rivals] | None = None
+
+    @classmethod
+    def open(cls, path: str | Path, settings: QuerySettings | None = None) -> "AVLMap":
+        """Open a map's folder; the features stay on the disk until they are asked.
+
+        Raises:
+            MapError: it is no map, damaged, or of another schema or profile.
+        """
+        from avlmaps.maps.stored import open_stored
+
+        return cls(open_stored(Path(path)), settings)
+
+    @cached_property
+    def space(self) -> Space:
+        """The voxels' places, shared by all heatmaps of this map."""
+        return Space(self.stored.grid, self.stored.voxels.index, self.stored.up_in_world, self.stored)
+
+    def object(self, word: str, primary: bool = False, vocabulary: Sequence[str] | None = None) -> Heatmap:
+        """Return the heat of an object.
+
+        Args:
+            word: what it is called.
+            primary: whether it is what is sought (reaches 0.5 m) rather than a mark near it (5 m).
+            vocabulary: what the word competes with, instead of the encoder's own list.
+
+        Raises:
+            QueryError: the word is empty, or the pixel encoder understands nothing of it.
+            BackendError: the map's profile has no pixel encoder.
+        """
+        part = Part(Modality.OBJECT, word, _role(primary))
+        encoder = self.stored.profile.pixel_encoder()
+        self.stored.require_model(Kind.PIXELS)
+        feature = self.stored.voxels.feature
+        names = tuple(encoder.vocabulary if vocabulary is None else vocabulary)
+        if self._rivals is None or self._rivals[0] != names:
+            self._rivals = names, Rivals.of(feature, encoder, names)
+        settings = self.settings
+        return Heatmap.of(
+            object_factor(self.space, feature, encoder, self._rivals[1], part, settings.objects, settings.heat)
+        )
+
+    def sound(self, text: str, primary: bool = False) -> Heatmap:
+        """Return the heat of where a sound of that name was heard.
+
+        Raises:
+            QueryError: the text is empty.
+        """
+        part = Part(Modality.SOUND, text, _role(primary))
+        heard = self.stored.sounds
+        scores = np.zeros(0)
+        if len(heard):
+            self.stored.require_model(Kind.SOUNDS)
+            scores = self.stored.profile.sound_encoder().score_words(sound_features(heard), [text])[:, 0]
+        return Heatmap.of(
+            sound_factor(self.space, heard, scores, part, self.settings.sounds, self.settings.heat)
+        )  # fmt: skip
+
+    def sound_clip(self, clip: str | Path | Sound, primary: bool = False) -> Heatmap:
+        """Return the heat of where sounds of the same kind as a clip were heard.
+
+        Raises:
+            QueryError: the clip is missing, unreadable or silent.
+        """
+        name = "a clip" if isinstance(clip, Sound) else str(clip)
+        part = Part(Modality.SOUND, name, _role(primary), is_file=True)
+        sound = require_audible(clip, name) if isinstance(clip, Sound) else read_clip(Path(clip))
+        heard = self.stored.sounds
+        scores = np.zeros(0)
+        if len(heard):
+            self.stored.require_model(Kind.SOUNDS)
+            encoder = self.stored.profile.sound_encoder()
+            scores = encoder.score_sounds(sound_features(heard), encoder.encode(sound))
+        return Heatmap.of(
+            sound_factor(self.space, heard, scores, part, self.settings.sounds, self.settings.heat)
+        )  # fmt: skip
+
+    def area(self, word: str, primary: bool = False) -> Heatmap:
+        """Return the heat of an area, such as a kitchen.
+
+        Raises:
+            QueryError: the word is empty.
+            BackendError: the map's profile has no view encoder.
+        """
+        part = Part(Modality.AREA, word, _role(primary))
+        encoder = self.stored.profile.view_encoder()
+        self.stored.require_model(Kind.VIEWS)
+        settings = self.settings
+        return Heatmap.of(area_factor(self.space, self.stored.keyframes, encoder, part, settings.areas, settings.heat))
+
+    def image(
+        self,
+        picture: str | Path | UInt8[np.ndarray, "h w 3"],
+        intrinsics: Pinhole | None = None,
+        primary: bool = False,
+    ) -> Heatmap:
+        """Return the heat of where a picture was taken; zero everywhere where that could not be told.
+
+        Args:
+            picture: a file, or RGB uint8.
+            intrinsics: of the camera that took it; by default the map's own.
+            primary: whether that place is what is sought.
+
+        Raises:
+            QueryError: the picture is missing, no picture, or does not fit the camera.
+        """
+        is_array = isinstance(picture, np.ndarray)
+        part = Part(Modality.IMAGE, "a picture" if is_array else str(picture), _role(primary), is_file=True)
+        rgb = picture if is_array else read_picture(Path(picture))
+        located = self.locate(rgb, intrinsics)
+        return Heatmap.of(image_factor(self.space, located, part, self.settings.heat))
+
+    def locate(self, rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None = None) -> "Located":
+        """Return the pose of the camera that took a picture, or that it could not be told."""
+        from avlmaps.query.locate import locate
+
+        require_fitting(rgb, intrinsics)
+        return locate(self.stored, rgb, intrinsics, np.random.default_rng(self.settings.seed))
+
+    def heat(self, part: Part, intrinsics: Pinhole | None = None) -> Heatmap:
+        """Return the heat of one part of a question."""
+        primary = part.role is Role.PRIMARY
+        if part.modality is Modality.OBJECT:
+            return self.object(part.query, primary)
+        if part.modality is Modality.AREA:
+            return self.area(part.query, primary)
+        if part.modality is Modality.IMAGE:
+            return self.image(part.query, intrinsics, primary)
+        return self.sound_clip(part.query, primary) if part.is_file else self.sound(part.query, primary)
+
+    def ask(self, question: Question, top: int = 3, intrinsics: Pinhole | None = None) -> Answer:
+        """Answer a question with places.
+
+        Args:
+            question: what is sought, and near what.
+            top: at most so many goals.
+            intrinsics: of the camera that took the question's pictures; by default the map's own.
+        """
+        begin = time.perf_counter()
+        heat = fused([self.heat(part, intrinsics) for part in question.parts])
+        goals, found = heat.goals(top), heat.found
+        elapsed_ms = 1e3 * (time.perf_counter() - begin)
+        parts = [
+            PartAnswer(part, float(factor.values.max(initial=0.0)), factor.found, factor.understood, factor.note)
+            for part, factor in zip(question.parts, heat.factors, strict=True)
+        ]
+        return Answer(tuple(goals), found, tuple(parts), elapsed_ms, heat)
+
+
+def _role(primary: bool) -> Role:
+    return Role.PRIMARY if primary else Role.CONTEXT

@@ -1,0 +1,126 @@
+"""From heat to places: distinct things rather than single voxels, ranked.
+
+The lead factor is the primary one. Its instances divide the heated voxels among themselves: each voxel belongs
+to the instance that its lead heat comes from. A goal is the highest place of the product in an instance's share.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from avlmaps.query.heatmap import Factor, Heatmap, NearThings
+from avlmaps.query.question import Goal, Role
+
+# Where everything asked for is in the map, but nowhere together by at least this much heat, the whole is not found.
+LEAST_TOGETHER = 0.1
+# Two sounds heard at one place are one place to go to.
+SEPARATION_M = 1.0
+# Heat that differs by less is a plateau, whose middle is taken.
+_SAME = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class _Shares:
+    """Heated voxels and anchors, each with the instance whose share it lies in.
+
+    Attributes:
+        points: metres, world; voxels first.
+        voxels: how many of them are voxels.
+        heat: the product there.
+        instance: whose share.
+        peak: (instances,) highest heat in each share.
+    """
+
+    points: Float[np.ndarray, "m 3"]
+    voxels: int
+    heat: Float[np.ndarray, " m"]
+    instance: Int[np.ndarray, " m"]
+    peak: Float[np.ndarray, " i"]
+
+
+def lead_of(heat: Heatmap) -> Factor:
+    """Return the factor whose instances are the goals: the primary one, else the first object, else the first."""
+    factors = heat.factors
+    primary = next((f for f in factors if f.part.role is Role.PRIMARY), None)
+    return primary or next((f for f in factors if isinstance(f, NearThings)), factors[0])
+
+
+def _shares(heat: Heatmap, lead: Factor) -> _Shares:
+    if isinstance(lead, NearThings) and len(heat.factors) == 1:
+        rows = np.flatnonzero(lead.mask)
+        instance = lead.instance
+    else:
+        rows = np.flatnonzero(heat.values > 0.0) if len(lead.anchors) else np.zeros(0, np.int64)
+        instance = lead.instance[lead.anchor_of(rows)] if len(rows) else np.zeros(0, np.int64)
+    points, values = heat.space.centres[rows], heat.values[rows].astype(np.float64)
+    if lead.flat:
+        at_anchors = np.ones(len(lead.anchors))
+        for factor in heat.factors:
+            at_anchors *= factor.at(lead.anchors)
+        points = np.concatenate([points, lead.anchors])
+        values, instance = np.append(values, at_anchors), np.append(instance, lead.instance)
+    peak = np.zeros(len(lead.confidence))
+    np.maximum.at(peak, instance, values)
+    return _Shares(points, len(rows), values, instance, peak)
+
+
+def is_found(heat: Heatmap) -> bool:
+    """Tell whether all that was asked for is in the map and comes together around a likely instance of the lead."""
+    if not all(factor.found for factor in heat.factors):
+        return False
+    if len(heat.factors) == 1:
+        return True
+    lead = lead_of(heat)
+    likely = np.asarray(lead.confidence) >= 0.5
+    return bool((_shares(heat, lead).peak[likely] >= LEAST_TOGETHER).any())
+
+
+def find_goals(heat: Heatmap, top: int) -> list[Goal]:
+    """Return up to ``top`` goals, best first, by heat times the confidence of the lead's instance."""
+    lead = lead_of(heat)
+    shares = _shares(heat, lead)
+    score = shares.peak * lead.confidence
+    goals: list[Goal] = []
+    taken: list[np.ndarray] = []
+    for instance in np.argsort(-score, kind="stable"):
+        if len(goals) >= top or score[instance] <= 0.0:
+            break
+        position = _position(heat, lead, shares, int(instance))
+        ground = heat.space.level(position)[:2]
+        if lead.flat and any(np.hypot(*(ground - other)) < SEPARATION_M for other in taken):
+            continue
+        taken.append(ground)
+        goals.append(_goal(heat, lead, int(instance), position, float(score[instance])))
+    return goals
+
+
+def _position(heat: Heatmap, lead: Factor, shares: _Shares, instance: int) -> Float[np.ndarray, "3"]:
+    """Return the highest place of a share; the middle one of a plateau, and an anchor rather than a voxel."""
+    rows = np.flatnonzero((shares.instance == instance) & (shares.heat >= shares.peak[instance] - _SAME))
+    at_anchors = rows[rows >= shares.voxels]
+    plateau = shares.points[at_anchors if len(at_anchors) else rows]
+    middle = plateau[np.argmin(np.linalg.norm(plateau - plateau.mean(axis=0), axis=1))]
+    if len(at_anchors) or not all(factor.flat for factor in heat.factors):
+        return middle
+    # A column: every height is as hot, so the place is put where the anchor was.
+    anchors = heat.space.level(lead.anchors[lead.instance == instance])
+    place = heat.space.level(middle)
+    place[2] = anchors[np.argmin(np.linalg.norm(anchors[:, :2] - place[:2], axis=1)), 2]
+    return heat.space.world(place)
+
+
+def _goal(heat: Heatmap, lead: Factor, instance: int, position: Float[np.ndarray, "3"], score: float) -> Goal:
+    extent = np.ptp(heat.space.level(lead.anchors[lead.instance == instance]), axis=0)
+    size = extent if lead.flat else extent + heat.space.grid.voxel_size_m
+    parts: dict[str, float] = {}
+    for factor in heat.factors:
+        name = str(factor.part.modality)
+        again = sum(key.split("_")[0] == name for key in parts)
+        parts[f"{name}_{again + 1}" if again else name] = float(factor.at(position[None])[0])
+    return Goal(_triple(position), min(max(score, 0.0), 1.0), _triple(size), parts)
+
+
+def _triple(vector: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in vector)
+    return x, y, z

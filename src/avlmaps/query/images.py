@@ -1,0 +1,62 @@
+"""Where a picture was taken: heat around the camera that ``locate`` finds."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import UInt8
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.core.errors import QueryError
+from avlmaps.query.heatmap import HeatSettings, NearAnchors
+from avlmaps.query.level import Space
+from avlmaps.query.question import Part
+
+if TYPE_CHECKING:
+    from avlmaps.query.locate import Located
+
+
+def read_picture(path: Path) -> UInt8[np.ndarray, "h w 3"]:
+    """Read a picture as RGB.
+
+    Raises:
+        QueryError: it is missing or no picture.
+    """
+    import cv2
+
+    if not path.is_file():
+        raise QueryError(f"The picture {path} is not there; check the name.")
+    encoded = np.frombuffer(path.read_bytes(), np.uint8)
+    # The pose is that of the picture as its pixels lie, so a camera's turn flag must not rotate it.
+    picture = cv2.imdecode(encoded, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION) if len(encoded) else None
+    if picture is None:
+        raise QueryError(f"The picture {path} cannot be read as an image; use a PNG or a JPEG.")
+    return cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
+
+
+def require_fitting(rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None) -> None:
+    """Raise ``QueryError`` where a picture is not of the size that its intrinsics are for."""
+    height, width = rgb.shape[:2]
+    if intrinsics is not None and (intrinsics.width, intrinsics.height) != (width, height):
+        raise QueryError(
+            f"The picture has {width}x{height} pixels, its intrinsics are for "
+            f"{intrinsics.width}x{intrinsics.height}; give those of the picture as it is."
+        )
+
+
+def image_factor(space: Space, located: "Located", part: Part, heat: HeatSettings) -> NearAnchors:
+    """Return the heat of a picture: one anchor of score 1 at the camera, none where it was not located."""
+    pose = located.world_from_camera
+    anchors = np.zeros((0, 3)) if pose is None else np.asarray(pose, np.float64)[None, :3, 3]
+    note = "" if pose is not None else f"the picture could not be located ({located.inliers} points agree)"
+    return NearAnchors(
+        space,
+        part,
+        heat.falloff_per_m(part.role),
+        anchors,
+        np.ones(len(anchors)),
+        np.zeros(len(anchors), np.int64),
+        pose is not None,
+        part.query,
+        note,
+    )

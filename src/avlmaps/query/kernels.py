@@ -1,0 +1,329 @@
+"""The compiled inner loops of queries. Each has a brute-force twin in the tests.
+
+Loops over voxels take a range, so that threads can share them (they release the interpreter's lock); that
+compiles in a fraction of the time of numba's own parallel mode.
+"""
+
+import itertools
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float32, UInt16
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+
+# More threads than this gain little: the loops are bound by memory.
+_MAX_THREADS = 4
+
+
+@cache
+def _pool() -> tuple[ThreadPoolExecutor, int]:
+    """Return the threads that all queries share, and how many they are."""
+    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    threads = max(1, min(_MAX_THREADS, allowed))
+    return ThreadPoolExecutor(threads, thread_name_prefix="avlmaps-query"), threads
+
+
+def share(work: Callable[[int, int], Any], count: int, least: int = 1) -> None:
+    """Call ``work(start, stop)`` for ranges that cover ``range(count)``, on every core when it is worth it.
+
+    Args:
+        work: a function that releases the interpreter's lock for most of its time.
+        count: how many items there are.
+        least: fewer items than this are not worth a thread.
+    """
+    pool, threads = _pool()
+    parts = max(1, min(threads, count // max(least, 1)))
+    edges = [count * k // parts for k in range(parts + 1)]
+    if parts == 1:
+        work(0, count)
+        return
+    for future in [pool.submit(work, a, b) for a, b in itertools.pairwise(edges)]:
+        future.result()
+
+
+@intrinsic
+def _half_to_float(typing_context, bits):
+    """Widen the bits of a float16; numba on a CPU has no float16 of its own, the processor's instruction has."""
+
+    def generate(context, builder, signature, arguments):
+        half = builder.bitcast(arguments[0], ir.HalfType())
+        return builder.fpext(half, ir.FloatType())
+
+    return types.float32(types.uint16), generate
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def half_dot(bits, word, out, start, stop):
+    """Write the dot product of each float16 row (given as uint16 bits) with a float32 word."""
+    for i in range(start, stop):
+        total = np.float32(0.0)
+        for k in range(word.shape[0]):
+            total += _half_to_float(bits[i, k]) * word[k]  # pyright: ignore[reportCallIssue]
+        out[i] = total
+
+
+@njit(cache=True, nogil=True)
+def widen(bits, out):
+    """Copy float16 rows (given as uint16 bits) to float32."""
+    for i in range(bits.shape[0]):
+        for k in range(bits.shape[1]):
+            out[i, k] = _half_to_float(bits[i, k])  # pyright: ignore[reportCallIssue]
+
+
+@njit(cache=True, nogil=True)
+def best_two(scores, best, best_word, second, second_word, offset):
+    """Write the two highest scores of each row and whose they are, to rows from ``offset``."""
+    for i in range(scores.shape[0]):
+        a, b = np.float32(-np.inf), np.float32(-np.inf)
+        at_a, at_b = -1, -1
+        for k in range(scores.shape[1]):
+            s = scores[i, k]
+            if s > a:
+                b, at_b = a, at_a
+                a, at_a = s, k
+            elif s > b:
+                b, at_b = s, k
+        best[offset + i], best_word[offset + i] = a, at_a
+        second[offset + i], second_word[offset + i] = b, at_b
+
+
+@njit(cache=True, nogil=True)
+def margins(score, best, best_word, second, second_word, silent, least, out, unsure, start, stop):
+    """Write score minus the best rival's, where words that are ``silent`` (by number) do not compete.
+
+    ``unsure`` is set where both kept rivals are silent and a third may be the best one.
+    """
+    for i in range(start, stop):
+        rival = np.float32(least)
+        unsure[i] = False
+        if best_word[i] >= 0:
+            if not silent[best_word[i]]:
+                rival = max(rival, best[i])
+            elif second_word[i] >= 0:
+                if silent[second_word[i]]:
+                    unsure[i] = True
+                else:
+                    rival = max(rival, second[i])
+        out[i] = score[i] - rival
+
+
+@njit(cache=True, nogil=True)
+def undominated(horizontal, score, falloff_per_m):
+    """Mark the cones that stick out somewhere; rows must come in falling score.
+
+    Cone j lies under cone i everywhere if s_j <= s_i − ε·d(i, j). That relation carries over, so it is enough
+    to compare with the cones kept so far.
+    """
+    keep = np.zeros(len(score), np.bool_)
+    kept = np.empty(len(score), np.int64)
+    count = 0
+    for j in range(len(score)):
+        if score[j] <= 0.0:
+            break
+        hidden = False
+        for k in range(count):
+            i = kept[k]
+            dx, dy = horizontal[j, 0] - horizontal[i, 0], horizontal[j, 1] - horizontal[i, 1]
+            if score[j] <= score[i] - falloff_per_m * np.sqrt(dx * dx + dy * dy):
+                hidden = True
+                break
+        if not hidden:
+            keep[j] = True
+            kept[count] = j
+            count += 1
+    return keep
+
+
+@njit(cache=True, nogil=True)
+def _circle(points, first, last):
+    """Return centre and radius of a circle round the bounding box of some points."""
+    low_x = high_x = points[first, 0]
+    low_y = high_y = points[first, 1]
+    for i in range(first + 1, last):
+        low_x, high_x = min(low_x, points[i, 0]), max(high_x, points[i, 0])
+        low_y, high_y = min(low_y, points[i, 1]), max(high_y, points[i, 1])
+    radius = 0.5 * np.sqrt((high_x - low_x) ** 2 + (high_y - low_y) ** 2)
+    return 0.5 * (low_x + high_x), 0.5 * (low_y + high_y), radius
+
+
+@njit(cache=True, nogil=True)
+def _cones_near(x, y, slack, anchors, score, falloff_per_m, near):
+    """Write which cones can be the highest somewhere within a circle, and return how many.
+
+    ``slack`` is the falloff times the circle's radius: a cone's heat in it lies that much round its middle's. A
+    cone whose best in the circle stays below another's worst is not highest anywhere in it.
+    """
+    worst = 0.0
+    for a in range(len(score)):
+        if score[a] - slack > worst:
+            d = np.sqrt((anchors[a, 0] - x) ** 2 + (anchors[a, 1] - y) ** 2)
+            worst = max(worst, score[a] - falloff_per_m * d - slack)
+    count = 0
+    for a in range(len(score)):
+        if score[a] + slack >= worst:
+            d = np.sqrt((anchors[a, 0] - x) ** 2 + (anchors[a, 1] - y) ** 2)
+            if score[a] - falloff_per_m * d + slack >= worst:
+                near[count] = a
+                count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def cone_heat(points, starts, anchors, score, falloff_per_m, out, winner, first_block, last_block):
+    """Write max over anchors of s − ε·d, floored at 0, for horizontal points in blocks, and who won (−1: none)."""
+    near = np.empty(len(score), np.int64)
+    for b in range(first_block, last_block):
+        x, y, radius = _circle(points, starts[b], starts[b + 1])
+        slack = falloff_per_m * (radius + 1e-9)
+        count = _cones_near(x, y, slack, anchors, score, falloff_per_m, near)
+        for i in range(starts[b], starts[b + 1]):
+            best, who = 0.0, -1
+            for k in range(count):
+                a = near[k]
+                d = np.sqrt((anchors[a, 0] - points[i, 0]) ** 2 + (anchors[a, 1] - points[i, 1]) ** 2)
+                heat = score[a] - falloff_per_m * d
+                if heat > best:
+                    best, who = heat, a
+            out[i] = best
+            winner[i] = who
+
+
+@njit(cache=True, nogil=True)
+def _box_gap(low_a, high_a, low_b, high_b):
+    """Return the smallest and the largest squared distance between points of two boxes, in voxels."""
+    least, most = 0, 0
+    for k in range(3):
+        gap = max(low_b[k] - high_a[k], low_a[k] - high_b[k], 0)
+        span = max(high_b[k] - low_a[k], high_a[k] - low_b[k])
+        least += gap * gap
+        most += span * span
+    return least, most
+
+
+@njit(cache=True, nogil=True)
+def _nearest_in(x, y, z, xs, ys, zs, best):
+    """Return the smaller of ``best`` and the squared distance to the nearest of some voxels."""
+    for k in range(len(xs)):
+        dx, dy, dz = xs[k] - x, ys[k] - y, zs[k] - z
+        best = min(best, dx * dx + dy * dy + dz * dz)
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _things_near(box_low, box_high, low, high, limit, near, gaps):
+    """Write which blocks of things can hold the nearest to some voxel of a box, nearest block first.
+
+    Those are the blocks whose least distance from the box is within the smallest of all largest distances.
+    """
+    bound, count = np.int64(limit), 0
+    for t in range(len(gaps)):
+        gaps[t], most = _box_gap(box_low, box_high, low[t], high[t])
+        bound = min(bound, most)
+    for t in range(len(gaps)):
+        if gaps[t] <= bound:
+            k = count
+            while k > 0 and gaps[near[k - 1]] > gaps[t]:
+                near[k] = near[k - 1]
+                k -= 1
+            near[k] = t
+            count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def nearest_squared(voxels, starts, low, high, things, thing_starts, thing_low, thing_high, limit, out, first, last):
+    """Write each voxel's squared distance, in voxels, to the nearest thing, or ``limit`` where that is farther.
+
+    Voxels and things come in blocks: places ``starts[b]:starts[b + 1]`` of (3, n) int32 indices (one row an axis,
+    so that the inner loop is vectorised), in boxes from ``low`` to ``high`` (b, 3) int64. ``first`` and ``last``
+    are the blocks of voxels to do.
+    """
+    near = np.empty(len(thing_low), np.int64)
+    gaps = np.empty(len(thing_low), np.int64)
+    for b in range(first, last):
+        count = _things_near(low[b], high[b], thing_low, thing_high, limit, near, gaps)
+        for i in range(starts[b], starts[b + 1]):
+            x, y, z = voxels[0, i], voxels[1, i], voxels[2, i]
+            best = limit
+            for k in range(count):
+                t = near[k]
+                gap_x = max(thing_low[t, 0] - x, x - thing_high[t, 0], 0)
+                gap_y = max(thing_low[t, 1] - y, y - thing_high[t, 1], 0)
+                gap_z = max(thing_low[t, 2] - z, z - thing_high[t, 2], 0)
+                if gap_x * gap_x + gap_y * gap_y + gap_z * gap_z < best:
+                    a, c = thing_starts[t], thing_starts[t + 1]
+                    best = _nearest_in(x, y, z, things[0, a:c], things[1, a:c], things[2, a:c], best)
+            out[i] = best
+
+
+@njit(cache=True)
+def _root(parent, i):
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@njit(cache=True)
+def linked(index, reach):
+    """Label voxels so that those within ``reach`` along every axis share a label (reach 1: the 26 neighbours).
+
+    Args:
+        index: (n, 3) int64, sorted by x, then y, then z, without repeats.
+        reach: in voxels.
+
+    Returns:
+        (n,) int64, labels 0, 1, ... in the order of their first voxel.
+    """
+    n = len(index)
+    parent = np.arange(n)
+    for dx in range(reach + 1):
+        for dy in range(-reach, reach + 1):
+            if dx == 0 and dy < 0:
+                continue
+            j = 0
+            for i in range(n):
+                x, y, z = index[i, 0] + dx, index[i, 1] + dy, index[i, 2] - reach
+                # Both walk in the same order, so the first neighbour never lies behind the last one's.
+                while j < n and (
+                    index[j, 0] < x
+                    or (index[j, 0] == x and (index[j, 1] < y or (index[j, 1] == y and index[j, 2] < z)))
+                ):
+                    j += 1
+                k = j
+                while k < n and index[k, 0] == x and index[k, 1] == y and index[k, 2] <= z + 2 * reach:
+                    a, c = _root(parent, i), _root(parent, k)
+                    parent[max(a, c)] = min(a, c)
+                    k += 1
+    labels = np.empty(n, np.int64)
+    count = 0
+    for i in range(n):
+        root = _root(parent, i)
+        if root == i:
+            labels[i] = count
+            count += 1
+        else:
+            labels[i] = labels[root]
+    return labels
+
+
+def feature_scores(
+    feature: Float32[np.ndarray, "n d"] | UInt16[np.ndarray, "n d"], word: Float32[np.ndarray, " d"]
+) -> Float32[np.ndarray, " n"]:
+    """Return the dot product of every float16 feature with one word, as fast as memory gives them.
+
+    Args:
+        feature: float16, memory-mapped or not, rows contiguous.
+        word: float32.
+    """
+    out = np.empty(len(feature), np.float32)
+    bits = np.asarray(feature, np.float16).view(np.uint16)
+    column = np.ascontiguousarray(word, np.float32)
+    share(lambda a, b: half_dot(bits, column, out, a, b), len(out), least=20_000)
+    return out

@@ -1,0 +1,203 @@
+"""Which voxels are the object that a word asks for, and which of them belong together.
+
+As the paper does, the asked word competes with a vocabulary and with "other" for every voxel, and wins where it
+is the closest. The margin by which it wins is kept: instances are ranked and absence is told by it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float16, Float32, Int
+
+from avlmaps.core.errors import QueryError
+from avlmaps.perception.protocols import PixelEncoder
+from avlmaps.query.heatmap import HeatSettings, NearThings
+from avlmaps.query.level import Space
+from avlmaps.query.question import Part
+
+_CHUNK = 16_384
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectSettings:
+    """From a word to instances."""
+
+    same_word_cosine: float = 0.95
+    """A vocabulary word at least this close to the asked one names the same thing and does not compete with it."""
+    least_score: float = 0.5
+    """For an encoder that has no feature for "other": a voxel must score at least this."""
+    margin_yes: float = 0.1
+    """An instance that wins its voxels by this much on average is as likely right as wrong."""
+    area_yes_m2: float = 0.01
+    """Surface below which an instance is probably noise; a mug shows about 0.02 m²."""
+    link_m: float = 0.1
+    """Voxels of an object no farther apart than this along every axis belong to one instance."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rivals:
+    """The two words of a vocabulary closest to each voxel, worked out once a map and vocabulary.
+
+    With two kept, a query is one pass over the features even when the asked word is in the vocabulary itself.
+
+    Attributes:
+        words: the vocabulary and, if the encoder has a feature for it, ``other`` as the last.
+        word_feature: unit vectors.
+        has_other: whether ``other`` is among them.
+        best: highest score; −inf where there is no word at all.
+        best_word: whose that is, −1 for nobody.
+        second: next highest score.
+        second_word: whose that is.
+    """
+
+    words: tuple[str, ...]
+    word_feature: Float32[np.ndarray, "v d"]
+    has_other: bool
+    best: Float32[np.ndarray, " n"]
+    best_word: Int[np.ndarray, " n"]
+    second: Float32[np.ndarray, " n"]
+    second_word: Int[np.ndarray, " n"]
+
+    @classmethod
+    def of(cls, feature: Float16[np.ndarray, "n d"], encoder: PixelEncoder, vocabulary: Sequence[str]) -> "Rivals":
+        """Score every voxel against a vocabulary; words of which the encoder understands nothing are left out."""
+        names = [*dict.fromkeys(word for word in vocabulary if word != "other"), "other"]
+        encoded = np.asarray(encoder.encode_words(names), np.float32)
+        known = np.any(encoded != 0.0, axis=1)
+        words = tuple(word for word, is_known in zip(names, known, strict=True) if is_known)
+        return cls(words, encoded[known], bool(known[-1]), *_two_closest(feature, encoded[known]))
+
+    def silent_for(self, encoder: PixelEncoder, asked: str, asked_feature: Float32[np.ndarray, " d"], cosine: float):
+        """Return which words do not compete because they name what is asked for; ``other`` always competes."""
+        meaning = encoder.understood(asked)
+        close = self.word_feature @ asked_feature >= cosine
+        same = [encoder.understood(word) == meaning for word in self.words]
+        silent = close | np.array(same, bool)
+        if self.has_other:
+            silent[-1] = False
+        return silent
+
+
+def _two_closest(feature: Float16[np.ndarray, "n d"], words: Float32[np.ndarray, "v d"]):
+    from avlmaps.query.kernels import best_two, share, widen
+
+    n = len(feature)
+    best, second = np.full(n, -np.inf, np.float32), np.full(n, -np.inf, np.float32)
+    best_word, second_word = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
+    columns = np.ascontiguousarray(words.T)
+
+    def work(start: int, stop: int) -> None:
+        wide = np.empty((min(_CHUNK, max(stop - start, 1)), feature.shape[1]), np.float32)
+        for a in range(start, stop, _CHUNK):
+            rows = np.ascontiguousarray(feature[a : min(a + _CHUNK, stop)], np.float16)
+            widen(rows.view(np.uint16), wide)
+            best_two(wide[: len(rows)] @ columns, best, best_word, second, second_word, a)
+
+    if len(words):
+        share(work, n, least=_CHUNK)
+    return best, best_word, second, second_word
+
+
+def object_margins(
+    feature: Float16[np.ndarray, "n d"],
+    rivals: Rivals,
+    asked: Float32[np.ndarray, " d"],
+    silent: Bool[np.ndarray, " v"],
+    least_score: float,
+) -> Float32[np.ndarray, " n"]:
+    """Return by how much the asked word beats its best rival at each voxel; positive where the voxel is the object.
+
+    Args:
+        feature: of the voxels, zero where there is none.
+        rivals: what competes.
+        asked: unit vector.
+        silent: which of the rivals' words do not compete.
+        least_score: what the word must beat besides where ``other`` has no feature.
+    """
+    from avlmaps.query.kernels import feature_scores, margins, share
+
+    score = feature_scores(feature, asked)
+    floor = np.float32(-np.inf if rivals.has_other else least_score)
+    out, unsure = np.empty(len(score), np.float32), np.empty(len(score), np.bool_)
+    mute = np.append(silent, True)
+    share(
+        lambda a, b: margins(
+            score, rivals.best, rivals.best_word, rivals.second, rivals.second_word, mute, floor, out, unsure, a, b
+        ),
+        len(score),
+        least=50_000,
+    )
+    rows = np.flatnonzero(unsure)
+    if len(rows) and not silent.all():
+        others = rivals.word_feature[~silent].T
+        for a in range(0, len(rows), _CHUNK):
+            some = rows[a : a + _CHUNK]
+            best = (np.asarray(feature[some], np.float32) @ others).max(axis=1)
+            out[some] = score[some] - np.maximum(best, floor)
+    return out
+
+
+def instances_of(space: Space, mask: Bool[np.ndarray, " n"], link_m: float) -> Int[np.ndarray, " a"]:
+    """Return for each voxel of the mask the number of the instance that it belongs to."""
+    from avlmaps.query.kernels import linked
+
+    reach = max(1, round(link_m / space.grid.voxel_size_m))
+    return linked(np.ascontiguousarray(space.index[mask], np.int64), reach)
+
+
+def instance_confidence(
+    margin: Float32[np.ndarray, " a"], instance: Int[np.ndarray, " a"], voxel_size_m: float, settings: ObjectSettings
+) -> Float32[np.ndarray, " i"]:
+    """Return in [0, 1] how sure it is that each instance is the object: m / (m + m_yes) · (1 − exp(−area / area_yes)).
+
+    m is the mean margin of its voxels, the area is a voxel's face for each of them.
+    """
+    count = np.bincount(instance)
+    mean_margin = np.bincount(instance, weights=margin) / np.maximum(count, 1)
+    clear = mean_margin / (mean_margin + settings.margin_yes)
+    large = 1.0 - np.exp(-count * voxel_size_m**2 / settings.area_yes_m2)
+    return (clear * large).astype(np.float32)
+
+
+def object_factor(
+    space: Space,
+    feature: Float16[np.ndarray, "n d"],
+    encoder: PixelEncoder,
+    rivals: Rivals,
+    part: Part,
+    settings: ObjectSettings,
+    heat: HeatSettings,
+) -> NearThings:
+    """Return the heat of the object that a word asks for.
+
+    Raises:
+        QueryError: the encoder understands nothing of the word.
+    """
+    asked = np.asarray(encoder.encode_words([part.query]), np.float32)[0]
+    understood = encoder.understood(part.query)
+    if not asked.any():
+        known = ", ".join(encoder.vocabulary[:20]) or "nothing that it could list"
+        raise QueryError(
+            f"The pixel encoder {encoder.card.id} understands nothing of {part.query!r}; it knows: {known}."
+            + (f" ({encoder.card.note})" if encoder.card.note else "")
+        )
+    silent = rivals.silent_for(encoder, part.query, asked, settings.same_word_cosine)
+    margin = object_margins(feature, rivals, asked, silent, settings.least_score)
+    mask = margin > 0.0
+    instance = instances_of(space, mask, settings.link_m)
+    confidence = instance_confidence(margin[mask], instance, space.grid.voxel_size_m, settings)
+    best = float(confidence.max(initial=0.0))
+    note = "" if best >= 0.5 else _absence(part.query, len(mask), int(mask.sum()), best)
+    if understood and understood != part.query.strip().lower():
+        note = f"understood only {understood!r} of {part.query!r}" + ("; " + note if note else "")
+    falloff = heat.falloff_per_m(part.role)
+    return NearThings(space, part, falloff, mask, instance, confidence, best >= 0.5, understood, note)
+
+
+def _absence(word: str, voxels: int, won: int, best: float) -> str:
+    if not voxels:
+        return "the map holds no voxels"
+    if not won:
+        return f"no voxel is closer to {word!r} than to other things"
+    return f"the best of the {won} voxels closest to {word!r} make an instance of confidence {best:.2f}, below 0.50"
