@@ -1,44 +1,237 @@
-"""From the words of a command to calls of the library, and back to plain values."""
+"""From the words of a command to calls of the library, and back to plain values. Heavy imports stay inside."""
 
-import sys
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from avlmaps.cli.output import UsageError
-from avlmaps.core.camera import Pinhole
-from avlmaps.core.errors import BackendError, QueryError
+from avlmaps.core.errors import MapError
 from avlmaps.core.progress import say
-from avlmaps.core.registry import Kind, backends
 
 if TYPE_CHECKING:
     from avlmaps.cli.verbs import Build, Query
+    from avlmaps.core.camera import Pinhole
+    from avlmaps.query.question import Part
+    from avlmaps.recordings.types import Recording
+
+MAP_MANIFEST = "map.json"
+# `info` opens so many pictures of a recording, spread evenly; `info --verify` opens them all.
+DECODED_BY_INFO = 100
 
 
 def build(verb: "Build") -> dict[str, Any]:
     """Build a map and describe it."""
     from avlmaps.maps.build import build_map, describe
-    from avlmaps.maps.settings import BuildSettings
+    from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings
+    from avlmaps.maps.stored import has_unfinished_build
     from avlmaps.recordings.open import open_recording
 
     begin = perf_counter()
+    if verb.resume and not has_unfinished_build(verb.out):
+        raise MapError(f"{verb.out} holds no unfinished build to resume; leave --resume out to start one.")
     recording = open_recording(verb.recording, format=verb.format, audio=verb.audio)
     for notice in recording.notices:
         say(f"note: {notice}")
-    stored = build_map(recording, verb.out, profile=verb.profile, settings=BuildSettings())
+    settings = BuildSettings(
+        voxel_size_m=verb.voxel_size_m,
+        frames=FrameSettings(step=verb.frame_step),
+        fusion=FusionSettings(max_depth_m=verb.max_depth_m),
+        seed=verb.seed,
+    )
+    stored = build_map(recording, verb.out, profile=verb.profile, settings=settings, overwrite=verb.overwrite)
     return {**describe(stored), "elapsed_s": round(perf_counter() - begin, 3)}
 
 
-def camera_of(intrinsics: str | None, rgb: np.ndarray) -> Pinhole | None:
+def describe_path(path: Path, format: str, verify: bool, plot: Path | None) -> dict[str, Any]:
+    """Describe a map or a recording."""
+    if (path / MAP_MANIFEST).exists() or path.suffix == ".avlmap":
+        return _describe_map(path, verify, plot)
+    if plot is not None:
+        raise UsageError(f"--plot draws a map, and {path} is a recording; build one first.")
+    from avlmaps.recordings.open import open_recording
+    from avlmaps.recordings.validate import validate
+
+    faults = [str(fault) for fault in validate(path, format, None if verify else DECODED_BY_INFO)]
+    if faults:
+        say(f"{len(faults)} fault(s) found")
+    try:
+        recording = open_recording(path, format=format)
+    except Exception:
+        for fault in faults:
+            say(f"fault: {fault}")
+        raise
+    return {**_describe_recording(recording), "faults": faults}
+
+
+def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]:
+    from avlmaps.maps.stored import describe, open_stored
+
+    stored = open_stored(path, verify=verify)
+    if plot is not None:
+        from avlmaps.query.plots import plot_map
+
+        plot_map(stored, plot)
+    return describe(stored)
+
+
+def _describe_recording(recording: "Recording") -> dict[str, Any]:
+    rig, audio = recording.rig, recording.audio
+    up = recording.up_in_world
+    return {
+        "path": str(recording.path),
+        "format": recording.format,
+        "frames": len(recording),
+        "duration_s": round(recording.duration_s, 3),
+        "rgb": f"{rig.rgb.width}x{rig.rgb.height}",
+        "depth": f"{rig.depth.width}x{rig.depth.height}",
+        "intrinsics": {
+            name: {"fx": camera.fx, "fy": camera.fy, "cx": camera.cx, "cy": camera.cy}
+            for name, camera in (("rgb", rig.rgb), ("depth", rig.depth))
+        },
+        "up_in_world": None if up is None else [float(value) for value in up],
+        "audio": None
+        if audio is None
+        else {
+            "file": audio.path.name,
+            "rate_hz": audio.rate_hz,
+            "duration_s": audio.duration_s,
+            "start_s": audio.start_s,
+        },
+        "notices": list(recording.notices),
+        "fingerprint": recording.fingerprint,
+    }
+
+
+def ask(verb: "Query") -> dict[str, Any]:
+    """Ask a map a question in a sentence or in parts."""
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.question import Modality, Question
+
+    parts = _parts(verb)
+    if bool(verb.sentence.strip()) == bool(parts):
+        raise UsageError(
+            "query takes a sentence, or parts (--object, --sound, --sound-clip, --area, --image), and not both: "
+            'avlmaps query MAP "the red cabinet near the sound of a dog"'
+        )
+    if verb.top < 1:
+        raise UsageError(f"--top is {verb.top}; it must be 1 or more.")
+    if parts:
+        question = Question.of(parts, Modality(verb.primary) if verb.primary else None)
+    else:
+        from avlmaps.language.sentence import parse_sentence
+
+        question = parse_sentence(verb.sentence)
+        if verb.primary:
+            question = Question.of(question.parts, Modality(verb.primary))
+    camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
+    answer = AVLMap.open(verb.map).ask(question, top=verb.top, intrinsics=camera)
+    if verb.plot is not None and answer.heat is not None:
+        answer.heat.plot(verb.plot)
+    return answer.to_json()
+
+
+def _parts(verb: "Query") -> list["Part"]:
+    from avlmaps.query.question import Modality, Part
+
+    named = (
+        (Modality.OBJECT, verb.object, False),
+        (Modality.IMAGE, verb.image, True),
+        (Modality.SOUND, verb.sound, False),
+        (Modality.SOUND, verb.sound_clip, True),
+        (Modality.AREA, verb.area, False),
+    )
+    return [Part(modality, str(query), is_file=is_file) for modality, query, is_file in named if query is not None]
+
+
+def _first_image(parts: "tuple[Part, ...]") -> Path | None:
+    from avlmaps.query.question import Modality
+
+    return next((Path(part.query) for part in parts if part.modality is Modality.IMAGE), None)
+
+
+def _camera_for(picture: Path | None, intrinsics: str | None) -> "Pinhole | None":
     """Read ``fx,fy,cx,cy`` for a picture; None stays None."""
     if intrinsics is None:
         return None
+    if picture is None:
+        raise UsageError("--intrinsics belongs to a photo (--image); there is none.")
+    from avlmaps.core.camera import Pinhole
+    from avlmaps.query.images import read_picture
+
+    height, width = read_picture(picture).shape[:2]
     try:
         fx, fy, cx, cy = (float(word) for word in intrinsics.split(","))
-        return Pinhole(fx, fy, cx, cy, width=rgb.shape[1], height=rgb.shape[0])
-    except ValueError as error:
+        return Pinhole(fx, fy, cx, cy, width=width, height=height)
+    except ValueError:
         raise UsageError(
-            f"--intrinsics takes fx,fy,cx,cy in pixels, such as 525,525,320,240; not {intrinsics!r} ({error})."
+            f"--intrinsics takes fx,fy,cx,cy in pixels, such as 525,525,320,240; not {intrinsics!r}."
         ) from None
+
+
+def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[str, Any]:
+    """Locate a photo."""
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.images import read_picture
+
+    found = AVLMap.open(map_path).locate(read_picture(picture), _camera_for(picture, intrinsics))
+    pose = found.world_from_camera
+    return {
+        "world_from_camera": None if pose is None else [[float(value) for value in row] for row in pose],
+        "inliers": int(found.inliers),
+        "reference": found.reference_stamp_s,
+        "score": found.score,
+        "elapsed_ms": found.elapsed_ms,
+    }
+
+
+def teach(name: str, clips: tuple[Path, ...]) -> dict[str, Any]:
+    """Teach a kind of sound from clips, or forget it where there are none."""
+    from avlmaps.perception.taught import forget_sound, taught_sounds, teach_sound
+
+    if clips:
+        teach_sound(name, list(clips))
+    else:
+        forget_sound(name)
+    return {"name": name, "clips": len(clips), "taught": list(taught_sounds())}
+
+
+def list_profiles() -> dict[str, Any]:
+    """Tell every profile's backends, and every other backend that is known."""
+    from avlmaps.core.registry import Backend, Kind, backends, load
+    from avlmaps.perception.profiles import profiles
+
+    known = {(backend.kind, backend.name): backend for backend in backends()}
+
+    def state(kind: Kind, name: str) -> dict[str, Any]:
+        backend: Backend | None = known.get((kind, name))
+        entry = {"module": str(kind), "name": name or "-", "state": "none yet", "model": "", "licence": "", "note": ""}
+        if backend is None:
+            return entry
+        if backend.missing:
+            how = (
+                f"pip install 'avlmaps[{backend.extra}]'"
+                if backend.extra
+                else f"pip install {' '.join(backend.missing)}"
+            )
+            return {**entry, "state": "missing", "note": how}
+        card = load(kind, name).card
+        return {
+            **entry,
+            "state": "ready",
+            "model": card.id,
+            "dim": card.dim,
+            "licence": card.licence,
+            "note": card.note,
+        }
+
+    listed = [
+        {
+            "name": profile.name,
+            "about": profile.about,
+            "backends": [state(kind, profile.backend_name(kind)) for kind in Kind if kind is not Kind.WORDS],
+        }
+        for profile in profiles()
+    ]
+    in_profiles = {(b["module"], b["name"]) for entry in listed for b in entry["backends"]}
+    others = [state(b.kind, b.name) for b in known.values() if (str(b.kind), b.name) not in in_profiles]
+    return {"profiles": listed, "other_backends": others}

@@ -105,7 +105,7 @@ class Build(Verb):
     """
 
     recording: Positional[Path]
-    """A recording: our folder, 7-Scenes/3DMatch, AVLMaps/VLMaps, TUM RGB-D, Replica, ScanNet, a ROS bag, MCAP, a video."""
+    """Our folder, 7-Scenes/3DMatch, AVLMaps/VLMaps, TUM RGB-D, Replica, ScanNet, a ROS 1 or 2 bag, MCAP."""
     out: Path
     """The map's folder, by custom NAME.avlmap."""
     profile: str = "embedded"
@@ -118,10 +118,10 @@ class Build(Verb):
     """A sound file to use in place of the recording's own track."""
     frame_step: int = 1
     """Fuse every n-th frame."""
-    max_depth_m: float | None = None
+    max_depth_m: float = 10.0
     """Ignore depth beyond this, metres."""
     resume: bool = False
-    """Go on with a stopped build. This is what happens anyway; with the flag, having nothing to go on with is an error."""
+    """Insist on going on with a stopped build. It is gone on with anyway; with this, there must be one."""
     overwrite: bool = False
     """Replace a finished map at --out that was built from something else."""
     seed: int = 0
@@ -144,7 +144,7 @@ class Info(Verb):
     format: str = "auto"
     """Format of the recording, where it cannot be told from its files."""
     verify: bool = False
-    """Also check every file of a map against its checksum."""
+    """Check every file of a map against its checksum, or every picture of a recording."""
     plot: Path | None = None
     """Draw the map from above, with the walk and the sounds, into this picture."""
 

@@ -53,6 +53,11 @@ class Backend:
         """Packages that it needs and that are not installed."""
         return tuple(package for package in self.needs if find_spec(package) is None)
 
+    @property
+    def how_to_get(self) -> str:
+        """The command that installs what is missing."""
+        return f"pip install 'avlmaps[{self.extra}]'" if self.extra else f"pip install {' '.join(self.missing)}"
+
 
 _EMBEDDED = "avlmaps.perception.embedded"
 _BUILT_IN = (
@@ -100,7 +105,7 @@ def _load(kind: Kind, name: str) -> Any:
         )
     backend = known[name]
     if backend.missing:
-        how = f"pip install 'avlmaps[{backend.extra}]'" if backend.extra else f"pip install {' '.join(backend.missing)}"
-        raise BackendError(f"The {kind} backend {name!r} needs {', '.join(backend.missing)}; get it with: {how}")
+        missing = ", ".join(backend.missing)
+        raise BackendError(f"The {kind} backend {name!r} needs {missing}; get it with: {backend.how_to_get}")
     module, _, attribute = backend.target.partition(":")
     return getattr(importlib.import_module(module), attribute)()
