@@ -1,0 +1,395 @@
+"""The compiled inner loops of fusion. One frame takes two steps.
+
+`trace` walks the depth picture row by row, finds the voxel of every pixel and adds up, for each voxel that the
+frame touches, colour and hits, and for each *pair* of a voxel and a cell of the feature map the weight. A frame
+of 300 thousand pixels has some 3,400 voxels and 33 thousand pairs, so that features are read once for a pair
+instead of once for a pixel. `flush` then adds the pairs to the map, voxel by voxel, each sum formed in the
+first-level cache before its row is touched: reading and writing rows of 2 KB is what limits fusion.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from avlmaps.maps.voxel_kernels import OPTIONS, find_or_insert
+
+# A voxel within one frame is named by one integer: three offsets from the camera's voxel, 21 bits each.
+OFFSET_BITS = 21
+REACH_VOXELS = 1 << (OFFSET_BITS - 1)
+# Remembers which pair was used last for a (voxel, cell). A miss costs a second pair and no error.
+RECENT_PAIRS = 1 << 13
+# The hash table of the frame's voxels begins with this many slots and doubles when it is half full.
+FIRST_SLOTS = 1 << 11
+# Columns of what a frame adds to each voxel.
+RED, GREEN, BLUE, RGB_WEIGHT, HITS = range(5)
+SUM_COLUMNS = 8  # one cache line
+
+# exp(-e) = table[n] · exp(-r) with n = floor(64 e) and r in [0, 1/64); five terms are right to 2e-14, and four
+# times faster than a call of exp, because the loop is vectorised.
+STEPS = 64
+GREATEST_EXPONENT = 30.0 * np.log(10.0)
+_EXPONENTIALS = np.exp(-np.arange(STEPS * (int(GREATEST_EXPONENT) + 1) + 1) / STEPS)
+
+_REASSOCIATING = {**OPTIONS, "fastmath": {"contract", "nsz", "reassoc"}}
+
+
+class Scratch(NamedTuple):
+    """What the kernels keep between their steps, for pictures of one size; only the touched part costs memory.
+
+    Of each pixel of a row: ``key`` (of its voxel), ``weight``, ``picture`` (its colour pixel), ``cell`` (its cell of
+    the feature map), the latter two linear indices, -1 outside. Of the frame's voxels: a hash table (``slot_key``,
+    ``slot_voxel``), ``voxel_key``, ``voxel_sum`` (what the frame adds), ``voxel_row`` (where in the map),
+    ``voxel_start`` (where in ``pair_order`` their pairs begin). Of each pair: ``pair_voxel``, ``pair_cell``,
+    ``pair_weight``; ``recent`` remembers the pairs used last. Of one voxel: ``live_cell``, ``live_weight``.
+    """
+
+    key: np.ndarray
+    weight: np.ndarray
+    picture: np.ndarray
+    cell: np.ndarray
+    slot_key: np.ndarray
+    slot_voxel: np.ndarray
+    voxel_key: np.ndarray
+    voxel_sum: np.ndarray
+    voxel_row: np.ndarray
+    voxel_start: np.ndarray
+    pair_voxel: np.ndarray
+    pair_cell: np.ndarray
+    pair_weight: np.ndarray
+    pair_order: np.ndarray
+    recent: np.ndarray
+    live_cell: np.ndarray
+    live_weight: np.ndarray
+
+
+def make_scratch(height: int, width: int) -> Scratch:
+    """Allocate the scratch for depth pictures of one size: no frame has more voxels or pairs than pixels."""
+    pixels = height * width
+    slots = max(FIRST_SLOTS, 1 << (2 * pixels + 1).bit_length())
+    return Scratch(
+        key=np.empty(width, np.int64),
+        weight=np.empty(width, np.float64),
+        picture=np.empty(width, np.int32),
+        cell=np.empty(width, np.int32),
+        slot_key=np.empty(slots, np.int64),
+        slot_voxel=np.empty(slots, np.int32),
+        voxel_key=np.empty(pixels, np.int64),
+        voxel_sum=np.empty((pixels, SUM_COLUMNS), np.float64),
+        voxel_row=np.empty(pixels, np.int32),
+        voxel_start=np.empty(pixels + 1, np.int64),
+        pair_voxel=np.empty(pixels, np.int32),
+        pair_cell=np.empty(pixels, np.int32),
+        pair_weight=np.empty(pixels, np.float64),
+        pair_order=np.empty(pixels, np.int32),
+        recent=np.empty(RECENT_PAIRS, np.int32),
+        live_cell=np.empty(pixels + 4, np.int64),
+        live_weight=np.empty(pixels + 4, np.float32),
+    )
+
+
+@njit(**OPTIONS)
+def _measure_row(depth, x, y, pose, limits, key, weight):
+    """Find the voxel (as an offset key, -1 without depth) and the weight of every pixel of a row."""
+    rotation, translation, origin = pose
+    voxel_size, nearest, farthest, falloff = limits
+    half = np.int64(REACH_VOXELS)
+    bx = rotation[0, 1] * y + rotation[0, 2]
+    by = rotation[1, 1] * y + rotation[1, 2]
+    bz = rotation[2, 1] * y + rotation[2, 2]
+    for u in range(depth.shape[0]):
+        z = np.float64(depth[u])
+        valid = (z >= nearest) & (z <= farthest)
+        z = z if valid else 0.0
+        px = translation[0] + z * (rotation[0, 0] * x[u] + bx)
+        py = translation[1] + z * (rotation[1, 0] * x[u] + by)
+        pz = translation[2] + z * (rotation[2, 0] * x[u] + bz)
+        i = np.int64(np.floor(px / voxel_size)) - origin[0]
+        j = np.int64(np.floor(py / voxel_size)) - origin[1]
+        k = np.int64(np.floor(pz / voxel_size)) - origin[2]
+        packed = ((i + half) << (2 * OFFSET_BITS)) | ((j + half) << OFFSET_BITS) | (k + half)
+        key[u] = packed if valid else -1
+        exponent = min(z * z * (x[u] * x[u] + y * y + 1.0) * falloff, GREATEST_EXPONENT)
+        step = np.int32(exponent * STEPS)
+        r = exponent - step * (1.0 / STEPS)
+        series = 1.0 - r * (1.0 - r * (1 / 2 - r * (1 / 6 - r * (1 / 24 - r * (1 / 120)))))
+        weight[u] = _EXPONENTIALS[np.uint32(step)] * series
+
+
+@njit(**OPTIONS)
+def _project_row(depth, x, y, projection, picture, cell):
+    """Find the colour pixel and the feature cell (linear, -1 outside) of every pixel of a row, by projection."""
+    _, rgb_from_depth, (fx, fy, cx, cy), (height, width), (cell_rows, cell_columns) = projection
+    rows_ratio, columns_ratio = cell_rows / height, cell_columns / width
+    ax = rgb_from_depth[0, 1] * y + rgb_from_depth[0, 2]
+    ay = rgb_from_depth[1, 1] * y + rgb_from_depth[1, 2]
+    az = rgb_from_depth[2, 1] * y + rgb_from_depth[2, 2]
+    for u in range(depth.shape[0]):
+        z = np.float64(depth[u])
+        px = z * (rgb_from_depth[0, 0] * x[u] + ax) + rgb_from_depth[0, 3]
+        py = z * (rgb_from_depth[1, 0] * x[u] + ay) + rgb_from_depth[1, 3]
+        pz = z * (rgb_from_depth[2, 0] * x[u] + az) + rgb_from_depth[2, 3]
+        column, row = fx * px / pz + cx, fy * py / pz + cy
+        inside = (pz > 0.0) & (column >= 0.0) & (column < width) & (row >= 0.0) & (row < height)
+        column, row = (column, row) if inside else (0.0, 0.0)
+        picture[u] = np.int32(row) * np.int32(width) + np.int32(column) if inside else -1
+        linear = np.int32(row * rows_ratio) * np.int32(cell_columns) + np.int32(column * columns_ratio)
+        cell[u] = linear if inside and cell_columns > 0 else -1
+
+
+@njit(**OPTIONS)
+def _combine_row(of_column, of_row, out):
+    """Write the linear index of a row of pixels from tables of their column and row, -1 outside."""
+    for u in range(of_column.shape[0]):
+        out[u] = of_column[u] + of_row if (of_column[u] >= 0) & (of_row >= 0) else -1
+
+
+@njit(**OPTIONS)
+def _find_slot(slot_key, mask, key):
+    """Return the slot that holds the key, or the free one where it belongs."""
+    slot = ((key * np.int64(-7046029254386353131)) >> 40) & mask
+    while slot_key[slot] != key and slot_key[slot] != -1:
+        slot = (slot + 1) & mask
+    return slot
+
+
+@njit(**OPTIONS)
+def _enter_voxel(slot, key, scratch, voxels, mask):
+    """Number a voxel that the frame had not met, and double the table when it is half full; return its mask."""
+    scratch.slot_key[slot] = key
+    scratch.slot_voxel[slot] = voxels
+    scratch.voxel_key[voxels] = key
+    for column in range(SUM_COLUMNS):
+        scratch.voxel_sum[voxels, column] = 0.0
+    if 2 * (voxels + 1) <= mask:
+        return mask
+    mask = 2 * mask + 1
+    for slot in range(mask + 1):
+        scratch.slot_key[slot] = -1
+    for voxel in range(voxels + 1):
+        slot = _find_slot(scratch.slot_key, mask, scratch.voxel_key[voxel])
+        scratch.slot_key[slot] = scratch.voxel_key[voxel]
+        scratch.slot_voxel[slot] = voxel
+    return mask
+
+
+@njit(**OPTIONS)
+def _add_pair(voxel, cell, amount, scratch, pairs):
+    """Add weight to the pair (voxel, cell) if it was met lately, else begin a new one; return the count of pairs."""
+    slot = (np.int64(cell) * 5 + np.int64(voxel) * 1237) & (RECENT_PAIRS - 1)
+    pair = scratch.recent[slot]
+    if pair >= 0 and scratch.pair_voxel[pair] == voxel and scratch.pair_cell[pair] == cell:
+        scratch.pair_weight[pair] += amount
+        return pairs
+    scratch.recent[slot] = pairs
+    scratch.pair_voxel[pairs] = voxel
+    scratch.pair_cell[pairs] = cell
+    scratch.pair_weight[pairs] = amount
+    return pairs + 1
+
+
+@njit(**OPTIONS)
+def _add_run(u, scratch, rgb, voxel_sum):
+    """Add the pixels from ``u`` on that share voxel and cell to the voxel; return where they end and their weight."""
+    key, cell = scratch.key[u], scratch.cell[u]
+    start = u
+    total = red = green = blue = seen = 0.0
+    while u < scratch.key.shape[0] and scratch.key[u] == key and scratch.cell[u] == cell:
+        weight = scratch.weight[u]
+        total += weight
+        pixel = scratch.picture[u]
+        if pixel >= 0:
+            seen += weight
+            red += weight * rgb[pixel, 0]
+            green += weight * rgb[pixel, 1]
+            blue += weight * rgb[pixel, 2]
+        u += 1
+    voxel_sum[RED] += red
+    voxel_sum[GREEN] += green
+    voxel_sum[BLUE] += blue
+    voxel_sum[RGB_WEIGHT] += seen
+    voxel_sum[HITS] += u - start
+    return u, total
+
+
+@njit(**OPTIONS)
+def trace(depth, rays, pose, limits, rgb, tables, projection, scratch):
+    """Measure one frame: its voxels, with what they get of colour and hits, and its pairs of voxel and cell.
+
+    Args:
+        depth: (h, w) float32, metres.
+        rays: (x (w,), y (h,)), camera-frame direction of each column and row at z = 1.
+        pose: (rotation (3, 3), translation (3,), origin (3,) int64: the camera's voxel).
+        limits: (voxel size, least and greatest depth in metres, 1 / (2 variance)).
+        rgb: (H * W, 3) uint8.
+        tables: see `pixel_lookup.PixelLookup`.
+        projection: likewise.
+        scratch: receives the voxels and the pairs.
+
+    Returns:
+        Counts of points, of voxels and of pairs.
+    """
+    mask = np.int64(FIRST_SLOTS - 1)
+    scratch.slot_key[:FIRST_SLOTS] = -1
+    scratch.recent[:] = -1
+    points = voxels = pairs = np.int64(0)
+    for v in range(depth.shape[0]):
+        _measure_row(depth[v], rays[0], rays[1][v], pose, limits, scratch.key, scratch.weight)
+        if projection[0]:
+            _project_row(depth[v], rays[0], rays[1][v], projection, scratch.picture, scratch.cell)
+        else:
+            _combine_row(tables[0], tables[1][v], scratch.picture)
+            _combine_row(tables[2], tables[3][v], scratch.cell)
+        u = np.int64(0)
+        while u < depth.shape[1]:
+            key, cell = scratch.key[u], scratch.cell[u]
+            if key < 0:
+                u += 1
+                continue
+            slot = _find_slot(scratch.slot_key, mask, key)
+            if scratch.slot_key[slot] == key:
+                voxel = np.int64(scratch.slot_voxel[slot])
+            else:
+                voxel = voxels
+                mask = _enter_voxel(slot, key, scratch, voxels, mask)
+                voxels += 1
+            end, weight = _add_run(u, scratch, rgb, scratch.voxel_sum[voxel])
+            points += end - u
+            u = end
+            if cell >= 0:
+                pairs = _add_pair(voxel, cell, weight, scratch, pairs)
+    return points, voxels, pairs
+
+
+@njit(**OPTIONS)
+def commit(voxels, scratch, origin, stamp_s, slots, geometry, count):
+    """Add colour and hits of a traced frame to the map, and find the map's row of each of the frame's voxels.
+
+    Args:
+        voxels: count of the frame's voxels.
+        scratch: as `trace` left it; receives the rows.
+        origin: (3,) the camera's voxel.
+        stamp_s: when the frame was taken.
+        slots: hash table of the map, with room.
+        geometry: (index, rgb_sum, rgb_weight, hits, last_seen_s) of the map, added to.
+        count: voxels of the map so far.
+
+    Returns:
+        Count of voxels now.
+    """
+    index, rgb_sum, rgb_weight, hits, last_seen_s = geometry
+    lowest = (1 << OFFSET_BITS) - 1
+    for voxel in range(voxels):
+        key = scratch.voxel_key[voxel]
+        i = np.int32((key >> (2 * OFFSET_BITS)) - REACH_VOXELS + origin[0])
+        j = np.int32(((key >> OFFSET_BITS) & lowest) - REACH_VOXELS + origin[1])
+        k = np.int32((key & lowest) - REACH_VOXELS + origin[2])
+        row = find_or_insert(i, j, k, slots, index, count)
+        last_seen_s[row] = stamp_s if row == count else max(last_seen_s[row], stamp_s)
+        if row == count:
+            count += 1
+        scratch.voxel_row[voxel] = row
+        rgb_sum[row, 0] += scratch.voxel_sum[voxel, RED]
+        rgb_sum[row, 1] += scratch.voxel_sum[voxel, GREEN]
+        rgb_sum[row, 2] += scratch.voxel_sum[voxel, BLUE]
+        rgb_weight[row] += scratch.voxel_sum[voxel, RGB_WEIGHT]
+        hits[row] += np.int64(scratch.voxel_sum[voxel, HITS])
+    return count
+
+
+@njit(**OPTIONS)
+def _group_pairs(voxels, pairs, scratch):
+    """Counting sort: the pairs of voxel v are ``pair_order[voxel_start[v] : voxel_start[v + 1]]``, as they were met."""
+    start = scratch.voxel_start
+    for voxel in range(voxels + 1):
+        start[voxel] = 0
+    for pair in range(pairs):
+        start[scratch.pair_voxel[pair] + 1] += 1
+    for voxel in range(voxels):
+        start[voxel + 1] += start[voxel]
+    for pair in range(pairs):
+        voxel = scratch.pair_voxel[pair]
+        scratch.pair_order[start[voxel]] = pair
+        start[voxel] += 1
+    for voxel in range(voxels, 0, -1):
+        start[voxel] = start[voxel - 1]
+    start[0] = 0
+
+
+@njit(**OPTIONS)
+def _gather_pairs(voxel, scratch, features):
+    """Collect the voxel's pairs whose feature is not all zero, and pad to fours; return their count and weight."""
+    count = 0
+    amount = 0.0
+    for n in range(scratch.voxel_start[voxel], scratch.voxel_start[voxel + 1]):
+        pair = scratch.pair_order[n]
+        cell = scratch.pair_cell[pair]
+        column = 0
+        while column < features.shape[1] and features[cell, column] == 0.0:
+            column += 1
+        if column < features.shape[1]:
+            scratch.live_cell[count] = cell
+            scratch.live_weight[count] = scratch.pair_weight[pair]
+            amount += scratch.pair_weight[pair]
+            count += 1
+    while count % 4 != 0:
+        scratch.live_cell[count] = scratch.live_cell[count - 1]
+        scratch.live_weight[count] = 0.0
+        count += 1
+    return count, amount
+
+
+@njit(**OPTIONS)
+def _sum_features(count, cells, weights, features, total):
+    """Set ``total`` to the weighted sum of the cells' features; the count is a multiple of four."""
+    for column in range(total.shape[0]):
+        total[column] = 0.0
+    for n in range(0, count, 4):
+        a, b, c, d = cells[n], cells[n + 1], cells[n + 2], cells[n + 3]
+        wa, wb, wc, wd = weights[n], weights[n + 1], weights[n + 2], weights[n + 3]
+        for column in range(total.shape[0]):
+            ab = wa * features[a, column] + wb * features[b, column]
+            total[column] += ab + wc * features[c, column] + wd * features[d, column]
+
+
+@njit(**_REASSOCIATING)
+def _add_if_finite(row, total, feature_sum):
+    """Add the total to a row of the map, unless it holds NaN or infinity; return whether it was added."""
+    size = np.float32(0.0)
+    for column in range(total.shape[0]):
+        size += abs(total[column])
+    if not size < np.inf:
+        return False
+    for column in range(total.shape[0]):
+        feature_sum[row, column] += total[column]
+    return True
+
+
+@njit(**OPTIONS)
+def flush(voxels, pairs, scratch, features, feature_sum, weight):
+    """Add the features of a traced and committed frame to the map.
+
+    Args:
+        voxels: count of the frame's voxels.
+        pairs: count of its pairs.
+        scratch: as `commit` left it.
+        features: (cells, d) float32; a feature that is all zero adds neither itself nor weight.
+        feature_sum: (rows, d) float32, added to.
+        weight: (rows,) float64, added to.
+
+    Returns:
+        How many voxels were passed over because their features are not finite.
+    """
+    _group_pairs(voxels, pairs, scratch)
+    total = np.empty(features.shape[1], np.float32)
+    faults = 0
+    for voxel in range(voxels):
+        count, amount = _gather_pairs(voxel, scratch, features)
+        if count > 0:
+            _sum_features(count, scratch.live_cell, scratch.live_weight, features, total)
+            row = scratch.voxel_row[voxel]
+            if _add_if_finite(row, total, feature_sum):
+                weight[row] += amount
+            else:
+                faults += 1
+    return faults

@@ -1,0 +1,85 @@
+"""The compiled loops over a table of voxels: finding rows by index, adding rows, finishing features."""
+
+import numpy as np
+from numba import njit
+
+OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}}
+
+
+@njit(**OPTIONS)
+def _hash(i, j, k):
+    mixed = np.int64(i) * np.int64(73856093) ^ np.int64(j) * np.int64(19349669) ^ np.int64(k) * np.int64(83492791)
+    mixed = mixed * np.int64(-7046029254386353131)
+    return mixed ^ (mixed >> 29)
+
+
+@njit(**OPTIONS)
+def find_or_insert(i, j, k, table, index, count):
+    """Return the row of a voxel, entering it as row ``count`` where it is new; the table must have room."""
+    mask = table.shape[0] - 1
+    slot = _hash(i, j, k) & mask
+    while table[slot] >= 0:
+        row = table[slot]
+        if index[row, 0] == i and index[row, 1] == j and index[row, 2] == k:
+            return row
+        slot = (slot + 1) & mask
+    table[slot] = count
+    index[count, 0] = i
+    index[count, 1] = j
+    index[count, 2] = k
+    return np.int32(count)
+
+
+@njit(**OPTIONS)
+def rehash(table, index, count):
+    """Enter the first ``count`` voxels into an empty (all -1) table."""
+    mask = table.shape[0] - 1
+    for row in range(count):
+        slot = _hash(index[row, 0], index[row, 1], index[row, 2]) & mask
+        while table[slot] >= 0:
+            slot = (slot + 1) & mask
+        table[slot] = row
+
+
+@njit(**OPTIONS)
+def add_rows(part, table, sums, feature_sum, weight, count):
+    """Add voxels of another map to this one; the table and the sums must have room for all of them.
+
+    Args:
+        part: (index, rgb_sum, rgb_weight, hits, last_seen_s, feature_sum, weight) of the other's voxels.
+        table: hash table of rows.
+        sums: (index, rgb_sum, rgb_weight, hits, last_seen_s), added to.
+        feature_sum: (rows, d), added to.
+        weight: (rows,), added to.
+        count: voxels of this map so far.
+
+    Returns:
+        Count of voxels now.
+    """
+    index, rgb_sum, rgb_weight, hits, last_seen_s = sums
+    part_index, part_rgb, part_rgb_weight, part_hits, part_last_seen, part_feature, part_weight = part
+    for n in range(part_index.shape[0]):
+        row = find_or_insert(part_index[n, 0], part_index[n, 1], part_index[n, 2], table, index, count)
+        last_seen_s[row] = part_last_seen[n] if row == count else max(last_seen_s[row], part_last_seen[n])
+        if row == count:
+            count += 1
+        for colour in range(3):
+            rgb_sum[row, colour] += part_rgb[n, colour]
+        rgb_weight[row] += part_rgb_weight[n]
+        hits[row] += part_hits[n]
+        weight[row] += part_weight[n]
+        for column in range(feature_sum.shape[1]):
+            feature_sum[row, column] += part_feature[n, column]
+    return count
+
+
+@njit(**OPTIONS)
+def unit_rows(feature_sum, rows, out):
+    """Write the rows of ``feature_sum`` scaled to length 1 (a zero row stays zero) into ``out`` (len(rows), d)."""
+    for n in range(rows.shape[0]):
+        square = 0.0
+        for column in range(out.shape[1]):
+            square += np.float64(feature_sum[rows[n], column]) ** 2
+        scale = 1.0 / np.sqrt(square) if square > 0.0 else 0.0
+        for column in range(out.shape[1]):
+            out[n, column] = feature_sum[rows[n], column] * scale
