@@ -82,7 +82,7 @@ def backends() -> list[Backend]:
     found = dict(_registered)
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         kind, _, name = entry.name.partition(":")
-        if kind in Kind and name:
+        if kind in set(Kind) and name:
             found.setdefault((Kind(kind), name), Backend(Kind(kind), name, entry.value))
     return sorted(found.values(), key=lambda b: (b.kind, b.name))
 
