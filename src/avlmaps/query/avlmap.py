@@ -121,7 +121,7 @@ class AVLMap:
         """
         name = "a clip" if isinstance(clip, Sound) else str(clip)
         part = Part(Modality.SOUND, name, _role(primary), is_file=True)
-        sound = require_audible(clip, name) if isinstance(clip, Sound) else read_clip(Path(clip))
+        sound = require_audible(clip, name) if isinstance(clip, Sound) else read_clip(Path(clip).expanduser())
         heard = self.stored.sounds
         scores = np.zeros(0)
         if len(heard):
@@ -163,7 +163,7 @@ class AVLMap:
         """
         is_array = isinstance(picture, np.ndarray)
         part = Part(Modality.IMAGE, "a picture" if is_array else str(picture), _role(primary), is_file=True)
-        rgb = picture if is_array else read_picture(Path(picture))
+        rgb = picture if is_array else read_picture(Path(picture).expanduser())
         located = self.locate(rgb, intrinsics)
         return Heatmap.of(image_factor(self.space, located, part, self.settings.heat))
 

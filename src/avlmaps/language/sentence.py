@@ -1,0 +1,95 @@
+"""From a sentence to a question: what is sought, and what it is near or in.
+
+Small on purpose: one thing and its surroundings. Commands of several steps and spatial relations are another matter.
+"""
+
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from avlmaps.core.errors import QueryError
+from avlmaps.query.question import Modality, Part, Question
+
+# A phrase that ends in one of these is an area; "kitchen table" ends in a thing.
+AREA_WORDS = frozenset({
+    "kitchen", "kitchenette", "bathroom", "bedroom", "washroom", "restroom", "toilet", "office", "corridor",
+    "hallway", "hall", "foyer", "lobby", "entrance", "lounge", "garage", "garden", "patio", "terrace", "balcony",
+    "gym", "library", "pantry", "basement", "cellar", "attic", "staircase", "stairwell", "workshop", "lab",
+    "laboratory", "classroom", "nursery", "studio", "canteen", "cafeteria", "restaurant", "shop", "room", "area",
+    "zone",
+})  # fmt: skip
+_EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
+
+
+def parse_sentence(sentence: str) -> Question:
+    """Return the question that a sentence asks; its first part is sought, the others say where it is.
+
+    Raises:
+        QueryError: the sentence is empty or is of no form that is understood; it names the place.
+    """
+    from lark.exceptions import UnexpectedEOF, UnexpectedInput, UnexpectedToken
+
+    if not sentence.strip(" \t\r\n.,?!"):
+        raise QueryError(f"The sentence is empty; say what is sought, such as: {_EXAMPLE}.")
+    try:
+        tree = _parser().parse(sentence)
+    except UnexpectedInput as fault:
+        at_end = isinstance(fault, UnexpectedEOF) or (isinstance(fault, UnexpectedToken) and fault.token.type == "$END")
+        raise QueryError(_not_understood(sentence, None if at_end else fault.pos_in_stream or 0)) from fault
+    return Question.of(_parts(tree))
+
+
+@cache
+def _parser() -> Any:
+    from lark import Lark
+
+    grammar = files("avlmaps.language").joinpath("sentence.lark").read_text(encoding="utf-8")
+    return Lark(grammar, parser="lalr", lexer="contextual", maybe_placeholders=False)
+
+
+def _not_understood(sentence: str, at: int | None) -> str:
+    if at is None:
+        return f"The sentence {sentence!r} ends too early; say it like: {_EXAMPLE}."
+    word, before = sentence[at:].split(maxsplit=1)[0], sentence[:at].strip()
+    where = f"after {before!r}" if before else "at the start"
+    return f"{word!r} is not understood {where} of the sentence; say it like: {_EXAMPLE}."
+
+
+def _parts(tree: Any) -> list[Part]:
+    """Return the parts of a parsed sentence in their order."""
+    parts: list[Part] = []
+    for node in tree.children:
+        if isinstance(node, str):
+            continue
+        parts += _parts(node) if node.data in ("near", "within", "more") else [_part(node)]
+    return parts
+
+
+def _part(node: Any) -> Part:
+    """Return the part that one sound, picture or thing of the sentence stands for."""
+    inner = [child for child in node.children if not isinstance(child, str)]
+    if node.data == "heard" or (node.data == "sound" and inner and inner[0].data in ("sound", "clip", "sound_verb")):
+        return _part(inner[0])
+    if node.data == "clip":
+        return Part(Modality.SOUND, _file(node, "CLIP_FILE"), is_file=True)
+    if node.data == "picture":
+        return Part(Modality.IMAGE, _file(node, "IMAGE_FILE"), is_file=True)
+    words = _words(inner[0])
+    if node.data == "sound_verb":
+        verb = next(str(token) for token in node.children if getattr(token, "type", "") == "SOUND_VERB")
+        return Part(Modality.SOUND, f"{' '.join(words)} {verb.lower()}")
+    if node.data == "sound":
+        return Part(Modality.SOUND, " ".join(words))
+    is_area = words[-1].lower() in AREA_WORDS
+    return Part(Modality.AREA if is_area else Modality.OBJECT, " ".join(words))
+
+
+def _words(phrase: Any) -> list[str]:
+    words: list[str] = []
+    for child in phrase.children:
+        words += [str(child)] if isinstance(child, str) else _words(child)
+    return words
+
+
+def _file(node: Any, kind: str) -> str:
+    return next(str(token) for token in node.children if getattr(token, "type", "") == kind).strip("\"'")
