@@ -1,0 +1,87 @@
+"""From features to probabilities: which kind a sound is, whether it is known at all, and what a phrase asks for.
+
+The constants were fitted on recordings that the networks had not heard (``training/sounds``), so that 0.5 is the
+point where a yes is as often right as wrong.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+Array = Float[np.ndarray, "..."]
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """The fitted constants.
+
+    Attributes:
+        temperature: of the softmax over kinds of a window's cosines.
+        known: weights (bias, highest cosine, lead over the runner-up) of the log-odds that a window is of a known kind.
+        phrase_temperature: of the softmax over kinds of a phrase's cosines.
+        phrase: (bias, highest cosine) of the log-odds that a phrase names a known kind.
+        word: (bias, log-odds of the matched posterior) of the log-odds that a sound is what a phrase names.
+        pair: (bias, cosine, agreement of posteriors) of the log-odds that two sounds are of one kind.
+        taught: (middle between strangers and its own, slope) for taught kinds, in units of the gap between them.
+    """
+
+    temperature: float
+    known: tuple[float, float, float]
+    phrase_temperature: float
+    phrase: tuple[float, float]
+    word: tuple[float, float]
+    pair: tuple[float, float, float]
+    taught: tuple[float, float]
+
+
+def sigmoid(x: Array) -> Array:
+    """Return 1 / (1 + exp(-x)) without overflow."""
+    return 0.5 * (1.0 + np.tanh(0.5 * np.asarray(x, np.float64)))
+
+
+def log_odds(p: Array) -> Array:
+    """Return log(p / (1 - p)), bounded to ±13.8."""
+    p = np.clip(np.asarray(p, np.float64), 1e-6, 1.0 - 1e-6)
+    return np.log(p / (1.0 - p))
+
+
+def softmax(x: Array) -> Array:
+    """Return the softmax over the last axis."""
+    e = np.exp(x - x.max(axis=-1, keepdims=True))
+    return e / e.sum(axis=-1, keepdims=True)
+
+
+def kinds_of_windows(
+    cosines: Float[np.ndarray, "windows kinds"], c: Calibration
+) -> tuple[Float[np.ndarray, "windows kinds"], Float[np.ndarray, " windows"]]:
+    """Return each window's posterior over the known kinds, and how likely it is of any of them."""
+    posterior = softmax(np.asarray(cosines, np.float64) / c.temperature)
+    best = np.sort(cosines, axis=1)[:, -2:].astype(np.float64)
+    bias, highest, lead = c.known
+    return posterior, sigmoid(bias + highest * best[:, 1] + lead * (best[:, 1] - best[:, 0]))
+
+
+def kinds_of_phrases(
+    cosines: Float[np.ndarray, "phrases kinds"], c: Calibration
+) -> tuple[Float[np.ndarray, "phrases kinds"], Float[np.ndarray, " phrases"]]:
+    """Return what share of each phrase means which kind, and how likely it names a known kind at all."""
+    bias, highest = c.phrase
+    return (
+        softmax(np.asarray(cosines, np.float64) / c.phrase_temperature),
+        sigmoid(bias + highest * cosines.max(axis=1).astype(np.float64)),
+    )
+
+
+def matched(
+    sound: Float[np.ndarray, " kinds"], phrase: Float[np.ndarray, " kinds"], named: float, c: Calibration
+) -> float:
+    """Return how likely a sound is what a phrase names, from both distributions over kinds."""
+    bias, slope = c.word
+    return float(sigmoid(bias + slope * log_odds(np.asarray(named * (sound * phrase).sum()))))
+
+
+def same_kind(cosine: Array, agreement: Array, c: Calibration) -> Array:
+    """Return how likely two sounds are of one kind."""
+    bias, by_cosine, by_agreement = c.pair
+    return sigmoid(bias + by_cosine * cosine + by_agreement * agreement)

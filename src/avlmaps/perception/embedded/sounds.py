@@ -1,0 +1,231 @@
+"""The embedded sound encoder: a small network into the space of the embedded words, and what it makes of questions.
+
+It knows a closed set of kinds (``vocabulary``) and what the user taught it; what it does not know it refuses, by a
+low score. Kinds of origin ``recorded`` were learnt from recordings, ``synthesised`` ones from sounds made by rule:
+they carry less well to recordings. ``training/sounds`` makes the weights.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, cast
+
+import msgspec
+import numpy as np
+from jaxtyping import Float, Float32
+
+from avlmaps.core.errors import BackendError
+from avlmaps.core.registry import Kind, load
+from avlmaps.perception.embedded import logmel
+from avlmaps.perception.embedded.sound_calibration import (
+    Calibration,
+    kinds_of_phrases,
+    kinds_of_windows,
+    matched,
+    same_kind,
+    sigmoid,
+)
+from avlmaps.perception.protocols import ModelCard, WordEncoder
+from avlmaps.perception.taught import TaughtSound, sounds_folder, taught_sounds
+from avlmaps.recordings.audio import Sound
+from avlmaps.recordings.resample import resampled
+
+_BATCH = 16
+_NARROWEST_GAP = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class KnownKind:
+    """A kind of sound that the network learnt.
+
+    Attributes:
+        name: what answers call it.
+        called: phrases that a question is compared with.
+        origin: ``recorded`` or ``synthesised``: what its examples were.
+        clips: how many examples.
+    """
+
+    name: str
+    called: tuple[str, ...]
+    origin: str
+    clips: int
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What is made of one sound.
+
+    Attributes:
+        kinds: how likely the sound holds each kind, the known ones and then the taught ones; they need not sum to one,
+            since a long sound may hold several and an unknown one none.
+        known: how likely it is of any of them.
+    """
+
+    kinds: Float[np.ndarray, " kinds"]
+    known: float
+
+
+class EmbeddedSounds:
+    """Our own sound encoder (``SoundEncoder``): onnxruntime on one thread, no download.
+
+    Args:
+        words: the word encoder whose space the features live in; the embedded one if None.
+        folder: the profile folder with the taught sounds; the user's own if None.
+    """
+
+    def __init__(self, words: WordEncoder | None = None, folder: Path | None = None) -> None:
+        weights = files("avlmaps.perception.embedded") / "weights"
+        network, notes = (weights / "sounds.onnx").read_bytes(), (weights / "sounds.json").read_bytes()
+        self._network = network
+        self._folder = folder
+        about = json.loads(notes)
+        self._words: WordEncoder = cast(WordEncoder, load(Kind.WORDS, "embedded")) if words is None else words
+        self.kinds = tuple(KnownKind(k["name"], tuple(k["called"]), k["origin"], k["clips"]) for k in about["kinds"])
+        self.calibration = msgspec.convert(about["calibration"], Calibration)
+        self.card = ModelCard(
+            id=about["id"],
+            dim=about["dim"],
+            licence="MIT",
+            checksum=sha256(network + notes).hexdigest(),
+            prompts=tuple(about["templates"]),
+            note=about["note"],
+        )
+
+    @property
+    def vocabulary(self) -> tuple[str, ...]:
+        """The kinds of sound that it knows, those that the user taught last."""
+        return tuple(kind.name for kind in self.kinds) + tuple(taught.name for taught in self.taught)
+
+    @property
+    def taught(self) -> tuple[TaughtSound, ...]:
+        """The user's own sounds, read anew so that one taught a moment ago is known; without those of other weights."""
+        own = taught_sounds(self._folder) if sounds_folder(self._folder).is_dir() else []
+        return tuple(taught for taught in own if taught.checksum == self.card.checksum)
+
+    def encode(self, sound: Sound) -> Float32[np.ndarray, "windows d"]:
+        """Return a unit vector for each window of 5.2 s, one every 2.6 s.
+
+        Raises:
+            AudioError: the sound has no samples, or some that are no finite numbers.
+        """
+        logmel.check_audible(sound.samples)
+        mels = logmel.normalised(logmel.mel_power(resampled(sound, logmel.RATE_HZ).samples))
+        windows = logmel.windows(mels)
+        parts = [
+            cast(np.ndarray, self._session.run(None, {"heard": logmel.heard(windows[at : at + _BATCH])})[0])
+            for at in range(0, len(windows), _BATCH)
+        ]
+        features = np.concatenate(parts).astype(np.float32)
+        return features / np.linalg.norm(features, axis=1, keepdims=True)
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase."""
+        return self._words.encode(words)
+
+    def score_words(
+        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], words: Sequence[str]
+    ) -> Float32[np.ndarray, "sounds words"]:
+        """Return how likely each sound is what each phrase names.
+
+        A phrase is first compared with the names of the known kinds, and its sound with their vectors; the two
+        meet over the kinds. So a paraphrase works as well as the name it stands for, and a phrase that names
+        nothing known, or a sound of no known kind, gets a low score.
+        """
+        if not sounds or not words:
+            return np.zeros((len(sounds), len(words)), np.float32)
+        taught = self.taught
+        shares, named = self._meant(words, taught)
+        heard = [self._hear(features, taught) for features in sounds]
+        scores = [
+            [matched(h.kinds, share, float(name), self.calibration) for share, name in zip(shares, named, strict=True)]
+            for h in heard
+        ]
+        return np.array(scores, np.float32).reshape(len(sounds), len(words))
+
+    def score_sounds(
+        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
+    ) -> Float32[np.ndarray, " sounds"]:
+        """Return how likely each sound is of the same kind as the asked one.
+
+        Two things speak for it: that some windows of both are alike, and that both are taken for the same kind.
+        """
+        taught = self.taught
+        ours = _direction(self._hear(asked, taught).kinds)
+        cosines = np.array([float((features @ asked.T).max()) for features in sounds])
+        agreement = np.array([float(_direction(self._hear(features, taught).kinds) @ ours) for features in sounds])
+        return np.asarray(same_kind(cosines, agreement, self.calibration), np.float32).reshape(len(sounds))
+
+    def describe(self, features: Float32[np.ndarray, "windows d"]) -> Heard:
+        """Return what is made of a sound, for lists of what a map holds."""
+        return self._hear(features, self.taught)
+
+    @cached_property
+    def _session(self) -> Any:
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.log_severity_level = 3
+        return onnxruntime.InferenceSession(self._network, options, providers=["CPUExecutionProvider"])
+
+    @cached_property
+    def _prototypes(self) -> Float32[np.ndarray, "kinds d"]:
+        """What the network aims at for each kind: the mean over the templates of what it is called first."""
+        firsts = [kind.called[0] for kind in self.kinds]
+        total = np.sum(
+            [self._words.encode([prompt.format(word) for word in firsts]) for prompt in self.card.prompts], axis=0
+        )
+        if total.shape[1] != self.card.dim:
+            raise BackendError(
+                f"The sound encoder {self.card.id} needs words of {self.card.dim} numbers, the word encoder "
+                f"{self._words.card.id} gives {total.shape[1]}; use the two of one release."
+            )
+        return (total / np.linalg.norm(total, axis=1, keepdims=True)).astype(np.float32)
+
+    @cached_property
+    def _called(self) -> tuple[Float32[np.ndarray, "names d"], np.ndarray]:
+        """The vectors of everything that the known kinds are called, and where each kind's begin."""
+        vectors = self._words.encode([name for kind in self.kinds for name in kind.called])
+        starts = np.cumsum([0] + [len(kind.called) for kind in self.kinds[:-1]])
+        return vectors, starts
+
+    def _meant(self, words: Sequence[str], taught: Sequence[TaughtSound]) -> tuple[np.ndarray, np.ndarray]:
+        """Return for each phrase its share in each kind, and how likely it names one."""
+        asked = self._words.encode(words)
+        vectors, starts = self._called
+        cosines = np.maximum.reduceat(asked @ vectors.T, starts, axis=1)
+        if taught:
+            cosines = np.hstack([cosines, asked @ self._words.encode([t.name for t in taught]).T])
+        return kinds_of_phrases(cosines, self.calibration)
+
+    def _hear(self, features: Float32[np.ndarray, "windows d"], taught: Sequence[TaughtSound]) -> Heard:
+        """Return the kinds in a sound: for each the most likely window."""
+        posterior, known = kinds_of_windows(features @ self._prototypes.T, self.calibration)
+        likely = posterior * known[:, None]
+        if taught:
+            own = np.stack([self._taught_likely(features, t) for t in taught], axis=1)
+            # what the user taught goes before what the network believes of a sound it was not made for
+            likely = np.hstack([likely * (1.0 - own.max(axis=1, keepdims=True)), own])
+            known = np.maximum(known, own.max(axis=1))
+        return Heard(likely.max(axis=0), float(known.max()))
+
+    def _taught_likely(self, features: Float32[np.ndarray, "windows d"], taught: TaughtSound) -> np.ndarray:
+        """Return how likely each window is of a taught kind.
+
+        The scale runs from how alike the taught clips are to the nearest known kind, to how alike they are to each
+        other.
+        """
+        stranger = float((taught.features @ self._prototypes.T).max(axis=1).mean())
+        gap = max(taught.own_cosine - stranger, _NARROWEST_GAP)
+        middle, slope = self.calibration.taught
+        cosine = (features @ taught.features.T).max(axis=1)
+        return sigmoid(slope * ((cosine - taught.own_cosine) / gap + 1.0 - middle))
+
+
+def _direction(kinds: Float[np.ndarray, " kinds"]) -> Float[np.ndarray, " kinds"]:
+    """Return square roots of the probabilities, so that the product of two is their Bhattacharyya coefficient."""
+    return np.sqrt(kinds)

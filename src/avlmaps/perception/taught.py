@@ -1,0 +1,196 @@
+"""Sounds that a person taught: a name and the features of a few clips, kept in their own folder.
+
+One folder each, ``sounds/<slug>/`` with ``sound.json`` and ``features.npy``; nothing is ever unpickled.
+"""
+
+import json
+import re
+import shutil
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32
+
+from avlmaps.core.errors import AudioError, BackendError
+from avlmaps.core.files import replaced_atomically, write_bytes_atomically
+from avlmaps.perception.protocols import SoundEncoder
+from avlmaps.perception.user_folder import user_folder
+from avlmaps.recordings.audio import AudioTrack, Sound
+
+SCHEMA = 1
+SILENT_PEAK = 1e-4  # three steps of 16-bit sound
+LONGEST_CLIP_S = 600.0
+
+
+@dataclass(frozen=True, slots=True)
+class TaughtSound:
+    """A kind of sound learnt from examples.
+
+    Attributes:
+        name: what it is called.
+        features: the unit features of its clips' windows.
+        own_cosine: how alike its own clips are (mean cosine of each to the nearest other), 0.9 where there is but one.
+        clips: the names of the clips.
+        model: the id of the encoder that made the features.
+        checksum: of that encoder's weights; another encoder cannot use them.
+    """
+
+    name: str
+    features: Float32[np.ndarray, "windows d"]
+    own_cosine: float
+    clips: tuple[str, ...]
+    model: str
+    checksum: str
+
+
+def sounds_folder(folder: Path | None = None) -> Path:
+    """Return where taught sounds are kept."""
+    return (user_folder() if folder is None else Path(folder)) / "sounds"
+
+
+def teach_sound(
+    name: str, clips: Sequence[Path | str | Sound], folder: Path | None = None, encoder: SoundEncoder | None = None
+) -> TaughtSound:
+    """Learn a new kind of sound from a few clips, and keep it; a sound of the same name is replaced.
+
+    Args:
+        name: what it shall be called, as one would ask for it: "our kettle's whistle".
+        clips: files or sounds, one at least; three to five different ones serve well.
+        folder: a profile folder other than the user's own.
+        encoder: the encoder to learn with; the embedded one if None.
+
+    Raises:
+        AudioError: a clip cannot be read, is silent or much too long, or there is none.
+        BackendError: the name is empty.
+    """
+    name = " ".join(name.split())
+    if not name:
+        raise BackendError("A taught sound needs a name; give one, as you would ask for it.")
+    if not clips:
+        raise AudioError(f"No clips were given to learn {name!r} from; give at least one sound file.")
+    encoder = _embedded() if encoder is None else encoder
+    sounds = [_audible(clip) for clip in clips]
+    of_clips = [encoder.encode(sound) for _, sound in sounds]
+    taught = TaughtSound(
+        name=name,
+        features=np.concatenate(of_clips).astype(np.float32),
+        own_cosine=_own_cosine(of_clips),
+        clips=tuple(label for label, _ in sounds),
+        model=encoder.card.id,
+        checksum=encoder.card.checksum,
+    )
+    _keep(taught, sounds_folder(folder))
+    return taught
+
+
+def taught_sounds(folder: Path | None = None) -> list[TaughtSound]:
+    """Return every sound that was taught, by name.
+
+    Raises:
+        BackendError: the notes of one are damaged; the sentence names the file.
+    """
+    root = sounds_folder(folder)
+    found = [_read(notes) for notes in sorted(root.glob("*/sound.json"))] if root.is_dir() else []
+    return sorted(found, key=lambda taught: taught.name.casefold())
+
+
+def forget_sound(name: str, folder: Path | None = None) -> None:
+    """Forget a taught sound.
+
+    Raises:
+        BackendError: none of that name was taught.
+    """
+    place = sounds_folder(folder) / _slug(name)
+    if not (place / "sound.json").is_file():
+        known = ", ".join(taught.name for taught in taught_sounds(folder)) or "none"
+        raise BackendError(f"No sound called {name!r} was taught; taught are: {known}.")
+    (place / "sound.json").unlink()  # first: a folder without notes is no sound, whatever else is left of it
+    shutil.rmtree(place)
+
+
+def _embedded() -> SoundEncoder:
+    from avlmaps.core.registry import Kind, load
+
+    return load(Kind.SOUNDS, "embedded")
+
+
+def _slug(name: str) -> str:
+    """Return a folder's name for any name: letters and digits, and a short hash so that no two names meet."""
+    folded = " ".join(name.split()).casefold()
+    plain = unicodedata.normalize("NFKD", folded).encode("ascii", "ignore").decode()
+    return f"{re.sub('[^a-z0-9]+', '-', plain).strip('-')[:40] or 'sound'}-{sha256(folded.encode()).hexdigest()[:8]}"
+
+
+def _audible(clip: Path | str | Sound) -> tuple[str, Sound]:
+    if isinstance(clip, Sound):
+        label, sound = "the clip", clip
+    else:
+        label = Path(clip).name
+        track = AudioTrack.open(Path(clip))
+        if track.duration_s > LONGEST_CLIP_S:
+            raise AudioError(
+                f"{clip} is {track.duration_s:.0f} s long; cut out a piece of at most {LONGEST_CLIP_S:.0f} s "
+                "that holds the sound."
+            )
+        sound = track.read()
+    peak = float(np.abs(sound.samples).max(initial=0.0))
+    if peak < SILENT_PEAK:  # NaN goes on to the encoder, which refuses it
+        raise AudioError(
+            f"There is nothing to hear in {label} (peak {peak:.6f} of 1); give a clip that holds the sound."
+        )
+    return label, sound
+
+
+def _own_cosine(of_clips: Sequence[Float32[np.ndarray, "windows d"]]) -> float:
+    if len(of_clips) < 2:
+        return 0.9
+    nearest = []
+    for i, features in enumerate(of_clips):
+        rest = np.concatenate([other for j, other in enumerate(of_clips) if j != i])
+        nearest.append(float((features @ rest.T).max()))
+    return float(np.clip(np.mean(nearest), 0.5, 0.98))
+
+
+def _keep(taught: TaughtSound, root: Path) -> None:
+    place = root / _slug(taught.name)
+    place.mkdir(parents=True, exist_ok=True)
+    (place / "sound.json").unlink(missing_ok=True)
+    with replaced_atomically(place / "features.npy") as stream:
+        np.save(stream, taught.features, allow_pickle=False)
+    notes = {
+        "schema": SCHEMA,
+        "name": taught.name,
+        "own_cosine": taught.own_cosine,
+        "clips": list(taught.clips),
+        "model": taught.model,
+        "checksum": taught.checksum,
+    }
+    write_bytes_atomically(place / "sound.json", json.dumps(notes, indent=1, ensure_ascii=False).encode())
+
+
+def _read(notes_file: Path) -> TaughtSound:
+    try:
+        notes = json.loads(notes_file.read_text(encoding="utf-8"))
+        if notes["schema"] != SCHEMA:
+            raise BackendError(
+                f"{notes_file} has schema {notes['schema']}, this version reads {SCHEMA}; teach the sound again."
+            )
+        features = np.load(notes_file.with_name("features.npy"), allow_pickle=False)
+        if features.ndim != 2 or features.dtype != np.float32 or not np.isfinite(features).all():
+            raise ValueError(f"features are {features.dtype} of {features.shape}")
+        return TaughtSound(
+            str(notes["name"]),
+            features,
+            float(notes["own_cosine"]),
+            tuple(notes["clips"]),
+            notes["model"],
+            notes["checksum"],
+        )
+    except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+        raise BackendError(
+            f"The taught sound in {notes_file.parent} is damaged ({error}); delete it and teach it again."
+        ) from error

@@ -1,0 +1,23 @@
+"""Where a person's own things are kept: the sounds they taught."""
+
+import os
+import sys
+from pathlib import Path
+
+
+def user_folder() -> Path:
+    """Return the folder of this person's own profile; it need not exist yet.
+
+    ``AVLMAPS_HOME`` where it is set; else ``%APPDATA%`` on Windows, ``~/Library/Application Support`` on macOS and
+    ``$XDG_DATA_HOME`` (``~/.local/share``) elsewhere, and ``avlmaps`` in it.
+    """
+    own = os.environ.get("AVLMAPS_HOME")
+    if own:
+        return Path(own).expanduser()
+    if sys.platform == "win32":
+        base = Path(os.environ.get("APPDATA") or Path.home() / "AppData" / "Roaming")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Application Support"
+    else:
+        base = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share")
+    return base / "avlmaps"

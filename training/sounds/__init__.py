@@ -1,0 +1,1 @@
+"""How the embedded sound encoder was made; see README.md."""

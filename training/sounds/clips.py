@@ -1,0 +1,95 @@
+"""The training clips: recorded ones with their licences and folds, and synthetic ones, as mel power."""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import gcd
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float32
+from training.sounds.kinds import RECORDED, SYNTHESISED
+from training.sounds.synthesis import MAKERS
+
+from avlmaps.core.progress import progress
+from avlmaps.perception.embedded import logmel
+
+SHIPPABLE = ("CC0", "CC-BY ")  # the start of a licence with which a clip may teach weights that ship
+
+
+@dataclass(frozen=True, slots=True)
+class Clip:
+    """One row of the index.
+
+    Attributes:
+        path: relative to the folder of sounds.
+        kind: its category.
+        fold: 2 to 5, or 0 for the clips that are only tested on.
+        licence: name, author and source, separated by bars.
+    """
+
+    path: str
+    kind: str
+    fold: int
+    licence: str
+
+    @property
+    def may_ship(self) -> bool:
+        """Whether weights that ship may learn from it: CC0 or CC-BY, with an author to name."""
+        return (self.licence + " ").startswith(SHIPPABLE)
+
+
+def read_index(sounds_folder: Path) -> list[Clip]:
+    """Read ``index.csv``."""
+    with (sounds_folder / "index.csv").open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    return [Clip(r["path"], r["category"], int(r["fold"] or 0), r["licence"]) for r in rows]
+
+
+def read_samples(path: Path) -> Float32[np.ndarray, " n"]:
+    """Read a file as mono at the encoder's rate."""
+    import soundfile
+    from scipy.signal import resample_poly
+
+    samples, rate_hz = soundfile.read(path, dtype="float32", always_2d=True)
+    common = gcd(rate_hz, logmel.RATE_HZ)
+    return resample_poly(samples.mean(axis=1), logmel.RATE_HZ // common, rate_hz // common).astype(np.float32)
+
+
+def mels_of(samples: Float32[np.ndarray, " n"]) -> Float32[np.ndarray, "frames bands"]:
+    """Return the first window of normalised mel power."""
+    return logmel.windows(logmel.normalised(logmel.mel_power(samples.astype(np.float32))))[0]
+
+
+def recorded_mels(sounds_folder: Path, clips: Sequence[Clip]) -> Float32[np.ndarray, "n frames bands"]:
+    """Read clips of at most one window as mel power."""
+    return np.stack(
+        [mels_of(read_samples(sounds_folder / clip.path)) for clip in progress(clips, "reading", unit="clip")]
+    )
+
+
+def synthetic_mels(each: int, seed: int, cache: Path) -> tuple[Float32[np.ndarray, "n frames bands"], np.ndarray]:
+    """Make ``each`` sounds of every synthesised kind.
+
+    Returns:
+        mel power, and for each sound the index of its kind in ``SYNTHESISED``.
+    """
+    missing = set(SYNTHESISED) ^ set(MAKERS)
+    if missing:
+        raise ValueError(f"kinds and makers differ: {sorted(missing)}")
+    file = cache / f"synthetic-{each}-{seed}.npy"
+    kinds = np.repeat(np.arange(len(SYNTHESISED)), each)
+    if not file.exists():
+        mels = []
+        for k, name in enumerate(progress(list(SYNTHESISED), "synthesising", unit="kind")):
+            rngs = [np.random.default_rng([seed, k, i]) for i in range(each)]
+            mels += [mels_of(MAKERS[name](rng).astype(np.float32)).astype(np.float16) for rng in rngs]
+        cache.mkdir(parents=True, exist_ok=True)
+        np.save(file, np.stack(mels))
+    # half precision ends at 6e-8, far under the floor
+    return np.load(file).astype(np.float32), kinds
+
+
+def recorded_kind(clip: Clip) -> int:
+    """Return the index of a clip's kind among the recorded ones."""
+    return list(RECORDED).index(clip.kind)

@@ -1,0 +1,189 @@
+"""Fit one network to clips and words."""
+
+import copy
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+import torch.nn.functional as functional
+from torch import Tensor
+from training.sounds.augmentation import Augmentation, augmented, heard
+from training.sounds.kinds import CALLED, RECORDED, TEMPLATES
+from training.sounds.network import SoundNet
+
+from avlmaps.core.progress import say
+from avlmaps.perception.embedded import logmel
+
+EncodeWords = Callable[[Sequence[str]], np.ndarray]
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How one network is fitted.
+
+    Attributes:
+        steps: batches.
+        recorded: recorded clips in a batch.
+        synthetic: synthetic clips in a batch.
+        temperature: of the softmax over kinds.
+        smoothing: share of the target that is spread over all kinds.
+        rate: highest learning rate; it rises for a tenth of the steps and then falls.
+        decay: weight decay.
+        averaging: half-life-like constant of the moving average of weights, which is what is kept.
+        seed: of everything.
+    """
+
+    steps: int = 900
+    recorded: int = 32
+    synthetic: int = 16
+    temperature: float = 0.07
+    smoothing: float = 0.1
+    rate: float = 2e-3
+    decay: float = 2e-2
+    averaging: float = 0.995
+    seed: int = 0
+    augmentation: Augmentation = field(default_factory=Augmentation)
+
+
+@dataclass(frozen=True, slots=True)
+class Examples:
+    """What is learnt from: mel power (n, frames, bands) and the index of each one's kind in ``NAMES``."""
+
+    recorded: np.ndarray
+    recorded_kinds: np.ndarray
+    synthetic: np.ndarray
+    synthetic_kinds: np.ndarray
+
+
+def targets(encode_words: EncodeWords) -> Tensor:
+    """Return unit vectors (templates, kinds, dim) of what every kind is called first, in every template."""
+    return torch.from_numpy(np.stack([encode_words([t.format(name) for name in CALLED]) for t in TEMPLATES])).float()
+
+
+def steady_noise(count: int, generator: torch.Generator) -> Tensor:
+    """Return mel power of noise of random colour, from falling by 30 dB over the bands to rising by 10."""
+    power = 0.5 + 0.5 * torch.empty(count, logmel.WINDOW_FRAMES, logmel.BANDS).exponential_(generator=generator)
+    tilt_db = 40.0 * torch.rand(count, 1, 1, generator=generator) - 30.0
+    return power * 10.0 ** (tilt_db * torch.linspace(0.0, 1.0, logmel.BANDS) / 10.0)
+
+
+class _Batches:
+    """Draws batches: recorded clips evenly over kinds, synthetic ones at random."""
+
+    def __init__(self, examples: Examples, settings: Settings) -> None:
+        self._rng = np.random.default_rng(settings.seed)
+        self._examples, self._settings = examples, settings
+        kinds = np.unique(examples.recorded_kinds)
+        self._of_kind = [np.flatnonzero(examples.recorded_kinds == kind) for kind in kinds]
+
+    def draw(self) -> tuple[Tensor, Tensor]:
+        e, rng = self._examples, self._rng
+        kinds = rng.integers(len(self._of_kind), size=self._settings.recorded)
+        rows = np.array([rng.choice(self._of_kind[kind]) for kind in kinds])
+        made = rng.integers(len(e.synthetic), size=self._settings.synthetic)
+        power = np.concatenate([e.recorded[rows], e.synthetic[made]])
+        return torch.from_numpy(power), torch.from_numpy(
+            np.concatenate([e.recorded_kinds[rows], e.synthetic_kinds[made]])
+        )
+
+
+def fit(examples: Examples, words: Tensor, settings: Settings, label: str = "") -> SoundNet:
+    """Return the averaged network.
+
+    Args:
+        examples: training clips.
+        words: targets (templates, kinds, dim).
+        settings: how.
+        label: for the lines of progress.
+    """
+    torch.manual_seed(settings.seed)
+    generator = torch.Generator().manual_seed(settings.seed)
+    batches = _Batches(examples, settings)
+    net = SoundNet(dim=words.shape[2]).to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+    average = copy.deepcopy(net).eval()
+    optimiser = torch.optim.AdamW(net.parameters(), lr=settings.rate, weight_decay=settings.decay)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, settings.rate, settings.steps, pct_start=0.1)
+    total = 0.0
+    for step in range(settings.steps):
+        power, kinds = batches.draw()
+        noise = steady_noise(len(power), generator)
+        x = augmented(power, noise, settings.augmentation, generator).to(memory_format=torch.channels_last)
+        with torch.autocast("cpu", torch.bfloat16):
+            y = net(x)
+        template = words[int(torch.randint(len(words), (1,), generator=generator))]
+        logits = y.float() @ template.T / settings.temperature
+        loss = functional.cross_entropy(logits, kinds, label_smoothing=settings.smoothing)
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        schedule.step()
+        _blend(average, net, min(settings.averaging, (1 + step) / (10 + step)))
+        total += float(loss)
+        if (step + 1) % 100 == 0:
+            say(f"{label} step {step + 1}/{settings.steps} loss {total / 100:.3f}")
+            total = 0.0
+    return average
+
+
+@torch.no_grad()
+def _blend(average: SoundNet, net: SoundNet, keep: float) -> None:
+    for old, new in zip(average.state_dict().values(), net.state_dict().values(), strict=True):
+        if old.is_floating_point():
+            old.lerp_(new, 1.0 - keep)
+        else:
+            old.copy_(new)
+
+
+@torch.no_grad()
+def encode(net: SoundNet, mels: np.ndarray) -> np.ndarray:
+    """Return unit vectors for windows of mel power (n, frames, bands)."""
+    net.eval()
+    parts = [net(heard(torch.from_numpy(mels[i : i + 32]))).numpy() for i in range(0, len(mels), 32)]
+    return np.concatenate(parts)
+
+
+@torch.no_grad()
+def pooled(net: SoundNet, x: Tensor) -> Tensor:
+    """Return what the last layer sees."""
+    return net.pooled(x)
+
+
+def fit_head(net: SoundNet, examples: Examples, words: Tensor, settings: Settings, batches: int = 150) -> SoundNet:
+    """Fit the last layer anew to other words; the rest stays.
+
+    The word encoder may be improved without hearing everything again: what the layers under the last one tell
+    apart does not depend on where the words lie.
+    """
+    generator = torch.Generator().manual_seed(settings.seed + 1)
+    source = _Batches(examples, settings)
+    seen, kinds_seen = [], []
+    for _ in range(batches):
+        power, kinds = source.draw()
+        noise = steady_noise(len(power), generator)
+        seen.append(pooled(net, augmented(power, noise, settings.augmentation, generator)))
+        kinds_seen.append(kinds)
+    features, kinds = torch.cat(seen), torch.cat(kinds_seen)
+    head = torch.nn.Linear(net.head.in_features, words.shape[2])
+    optimiser = torch.optim.AdamW(head.parameters(), lr=5e-3, weight_decay=settings.decay)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, 1500)
+    for _ in range(1500):
+        rows = torch.randint(len(features), (256,), generator=generator)
+        dropped = functional.dropout(features[rows], net.dropout.p)
+        y = functional.normalize(head(dropped), dim=1)
+        template = words[int(torch.randint(len(words), (1,), generator=generator))]
+        loss = functional.cross_entropy(
+            y @ template.T / settings.temperature, kinds[rows], label_smoothing=settings.smoothing
+        )
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        schedule.step()
+    fitted = copy.deepcopy(net)
+    fitted.head = head
+    return fitted.eval()
+
+
+def recorded_index(kind: str) -> int:
+    """Return a recorded kind's index in ``NAMES``."""
+    return list(RECORDED).index(kind)
