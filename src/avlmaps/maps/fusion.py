@@ -6,14 +6,13 @@ for Robot Navigation, section III-A). It is a true mean, so that the order of fr
 parts of a recording add up to the map of the whole.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Float16, Float32
 
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import BackendError, RecordingError
 from avlmaps.maps import fusion_kernels as kernels
+from avlmaps.maps.fusion_settings import FusionSettings
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.pixel_lookup import PixelLookup, look_up
 from avlmaps.maps.types import Voxels
@@ -23,30 +22,6 @@ from avlmaps.recordings.types import Frame
 FARTHEST_VOXEL = (1 << 31) - 2 * kernels.REACH_VOXELS  # indices are int32
 
 __all__ = ["FusionSettings", "VoxelAccumulator", "VoxelSums"]
-
-
-@dataclass(frozen=True, slots=True)
-class FusionSettings:
-    """How pixels become voxels.
-
-    Attributes:
-        min_depth_m: nearer pixels are left out.
-        max_depth_m: farther pixels are left out.
-        weight_variance_m2: the 0.6 of the weight exp(−d² / (2·0.6)).
-    """
-
-    min_depth_m: float = 0.1
-    max_depth_m: float = 10.0
-    weight_variance_m2: float = 0.6
-
-    def __post_init__(self) -> None:
-        if not (0.0 < self.min_depth_m < self.max_depth_m < np.inf):
-            raise ValueError(
-                f"depths from {self.min_depth_m} to {self.max_depth_m} m are no range; "
-                "it must begin above 0 and end at a finite, greater depth"
-            )
-        if not 0.0 < self.weight_variance_m2 < np.inf:
-            raise ValueError(f"weight_variance_m2 is {self.weight_variance_m2}; it must be positive and finite")
 
 
 class VoxelAccumulator:

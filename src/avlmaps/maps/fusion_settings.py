@@ -1,0 +1,28 @@
+"""What of fusion can be chosen; apart from the kernels, so that the command line's help need not load a compiler."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from avlmaps.core.errors import MapError
+
+
+@dataclass(frozen=True, slots=True)
+class FusionSettings:
+    """How pixels become voxels."""
+
+    min_depth_m: float = 0.1
+    """Leave out pixels that are nearer."""
+    max_depth_m: float = 10.0
+    """Leave out pixels that are farther."""
+    weight_variance_m2: float = 0.6
+    """The 0.6 of the weight exp(−d² / (2·0.6)), d the distance from the camera in metres."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.min_depth_m < self.max_depth_m < np.inf:
+            raise MapError(
+                f"Depths from {self.min_depth_m} to {self.max_depth_m} m are no range; "
+                "let it begin above 0 and end at a finite, greater depth."
+            )
+        if not 0.0 < self.weight_variance_m2 < np.inf:
+            raise MapError(f"The weight's variance is {self.weight_variance_m2}; it must be positive and finite.")

@@ -1,0 +1,111 @@
+"""Finding which way is up from what a depth camera saw, for recordings that do not say.
+
+Floors, table tops and ceilings share one normal. A direction that many surfaces share is found by RANSAC over
+surface normals; which of a room's three directions is up is told by the camera, which people and robots hold nearly
+level: its x axis is horizontal, however far it looks down, and its -y axis points upwards.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.types import Frame
+
+STEP_PIXELS = 6  # of a picture 640 wide: normals are measured over twice this distance
+MAX_DEPTH_M = 4.0  # beyond, a depth camera's noise tilts normals
+MAX_JUMP = 0.05  # of the depth: a greater step between neighbours is an edge, not a surface
+NORMALS_PER_FRAME = 800
+CANDIDATES = 600
+NEAR_RAD = np.deg2rad(8.0)
+REFINED_RAD = np.deg2rad(4.0)
+FEWEST_NORMALS = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Up:
+    """Which way is up.
+
+    Attributes:
+        direction: unit vector in the world.
+        support: share of the measured surface normals within 8 degrees of up or of down, in [0, 1]; below 0.1
+            there is hardly a level surface in view and the direction is a guess.
+    """
+
+    direction: Float[np.ndarray, "3"]
+    support: float
+
+
+def find_up(frames: Iterable[Frame], rng: np.random.Generator) -> Up:
+    """Find the direction that level surfaces share.
+
+    Args:
+        frames: spread over the recording, some ten or more; one after the other is held in memory.
+        rng: draws the normals.
+
+    Raises:
+        RecordingError: too little surface within 4 m to tell.
+    """
+    normals, rotations, count = [], [], 0
+    for frame in frames:
+        rotation = np.asarray(frame.world_from_camera[:3, :3], np.float64)
+        found = surface_normals(frame, rng)
+        normals.append(found @ rotation.T)
+        rotations.append(rotation)
+        count += 1
+    normal = np.concatenate(normals) if normals else np.zeros((0, 3))
+    if len(normal) < FEWEST_NORMALS:
+        raise RecordingError(
+            f"Which way is up cannot be told: {count} frames show {len(normal)} places with a smooth surface within "
+            f"{MAX_DEPTH_M} m, and {FEWEST_NORMALS} are needed; write the recording's up direction into it."
+        )
+    direction = _refined(_most_shared(normal, np.stack(rotations), rng), normal)
+    return Up(direction, float(np.mean(np.abs(normal @ direction) > np.cos(NEAR_RAD))))
+
+
+def surface_normals(frame: Frame, rng: np.random.Generator) -> Float[np.ndarray, "n 3"]:
+    """Return unit normals of smooth surfaces in the camera's frame, facing the camera; at most 800, drawn evenly."""
+    step = max(1, round(STEP_PIXELS * frame.rig.depth.width / 640))
+    depth = frame.depth_m.astype(np.float64)
+    points = frame.rig.depth.backproject(np.where(np.isfinite(depth) & (depth < MAX_DEPTH_M), depth, 0.0))
+    grid = points[::step, ::step]
+    z = grid[..., 2]
+    centre, left, right, above, below = z[1:-1, 1:-1], z[1:-1, :-2], z[1:-1, 2:], z[:-2, 1:-1], z[2:, 1:-1]
+    smooth = centre > 0.0
+    for neighbour in (left, right, above, below):
+        smooth &= (neighbour > 0.0) & (np.abs(neighbour - centre) < MAX_JUMP * centre)
+    across = grid[1:-1, 2:] - grid[1:-1, :-2]
+    down = grid[2:, 1:-1] - grid[:-2, 1:-1]
+    normal = np.cross(down[smooth], across[smooth])
+    length = np.linalg.norm(normal, axis=1)
+    normal = normal[length > 0.0] / length[length > 0.0, None]
+    if len(normal) > NORMALS_PER_FRAME:
+        normal = normal[rng.choice(len(normal), NORMALS_PER_FRAME, replace=False)]
+    return normal
+
+
+def _most_shared(
+    normals: Float[np.ndarray, "n 3"], rotations: Float[np.ndarray, "k 3 3"], rng: np.random.Generator
+) -> Float[np.ndarray, "3"]:
+    """Return the candidate that most normals share, weighed by how well the cameras agree that it is up."""
+    candidates = normals[rng.integers(len(normals), size=CANDIDATES)]
+    camera_x, camera_up = rotations[:, :, 0], -rotations[:, :, 1]
+    candidates = np.where((candidates @ camera_up.mean(axis=0) < 0.0)[:, None], -candidates, candidates)
+    votes = normals[rng.permutation(len(normals))[:10_000]]
+    support = np.mean(np.abs(candidates @ votes.T) > np.cos(NEAR_RAD), axis=1)
+    upright = np.clip(candidates @ camera_up.T, 0.0, 1.0).mean(axis=1)
+    level = np.sqrt(np.clip(1.0 - np.square(candidates @ camera_x.T), 0.0, 1.0)).mean(axis=1)
+    return candidates[np.argmax(support * upright * level**4)]
+
+
+def _refined(direction: Float[np.ndarray, "3"], normals: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3"]:
+    """Return the main direction of the normals near it, taken anew with a narrowing cone."""
+    for cone_rad in (NEAR_RAD, NEAR_RAD, REFINED_RAD, REFINED_RAD, REFINED_RAD):
+        near = normals[np.abs(normals @ direction) > np.cos(cone_rad)]
+        if len(near) < 3:
+            break
+        main = np.linalg.svd(near.T @ near)[0][:, 0]
+        direction = main if main @ direction > 0.0 else -main
+    return direction / np.linalg.norm(direction)

@@ -1,0 +1,182 @@
+"""Where a robot can stand: a top-down grid of free, occupied and unknown cells, in the level frame.
+
+The level frame shares the world's origin and has z up (`avlmaps.core.poses.rotation_to_level`). What was never seen
+is unknown, which is not free; and every voxel counts, the first as well as the last.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from jaxtyping import Bool, Float, Float64, Int, UInt8
+
+from avlmaps.core.errors import MapError
+from avlmaps.core.poses import rotation_to_level
+from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.types import Voxels
+
+STRONG_PEAK = 0.3  # of what the most crowded height has over the median: the lowest one with so much is the floor
+MOST_CELLS = 100_000_000
+
+
+class CellState(IntEnum):
+    """What is known of a cell; the number is what the grid holds."""
+
+    UNKNOWN = 0
+    FREE = 1
+    OCCUPIED = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """The robot's body, as far as obstacles matter to it."""
+
+    radius_m: float = 0.2
+    """Radius of the circle that it stands on."""
+    height_m: float = 1.5
+    """Height over the floor that it needs free."""
+    step_m: float = 0.1
+    """What is lower than this is floor to it: it can drive over, and depth is no more exact."""
+    min_hits: int = 3
+    """Voxels with fewer pixels count for nothing: a depth camera's lone speckles."""
+
+    def __post_init__(self) -> None:
+        if not (self.radius_m >= 0.0 and 0.0 < self.step_m < self.height_m):
+            raise MapError(
+                f"A body of radius {self.radius_m} m that steps over {self.step_m} m and is {self.height_m} m high is "
+                "none; the radius must not be negative, and the step between 0 and the height."
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacles:
+    """A top-down grid; cell (i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · cell_size_m`` of the level x and y.
+
+    Attributes:
+        level_from_world: rotation into the level frame.
+        origin_m: level x and y of the corner of cell (0, 0).
+        cell_size_m: edge of a cell.
+        floor_m: level z of the floor.
+        states: `CellState` of each cell.
+    """
+
+    level_from_world: Float64[np.ndarray, "3 3"]
+    origin_m: Float64[np.ndarray, "2"]
+    cell_size_m: float
+    floor_m: float
+    states: UInt8[np.ndarray, "nx ny"]
+
+    def cell_of(self, points_world: Float[np.ndarray, "*n 3"]) -> Int[np.ndarray, "*n 2"]:
+        """Return the cell above or below which each point of the world lies; it may be outside of the grid."""
+        level_xy = points_world @ self.level_from_world[:2].T
+        return np.floor((level_xy - self.origin_m) / self.cell_size_m).astype(np.int64)
+
+    def centre_of(self, cells: Int[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 3"]:
+        """Return the point of the world on the floor in the middle of each cell."""
+        level_xy = self.origin_m + (np.asarray(cells) + 0.5) * self.cell_size_m
+        floor = np.full((*level_xy.shape[:-1], 1), self.floor_m)
+        return np.concatenate([level_xy, floor], axis=-1) @ self.level_from_world
+
+    def state_at(self, points_world: Float[np.ndarray, "*n 3"]) -> UInt8[np.ndarray, "*n"]:
+        """Return the state at each point of the world; unknown outside of the grid."""
+        cells = self.cell_of(points_world)
+        inside = np.all((cells >= 0) & (cells < self.states.shape), axis=-1)
+        i, j = np.moveaxis(np.where(inside[..., None], cells, 0), -1, 0)
+        return np.where(inside, self.states[i, j], CellState.UNKNOWN).astype(np.uint8)
+
+    def standable(self, radius_m: float) -> Bool[np.ndarray, "nx ny"]:
+        """Return the free cells on whose middle a body fits: nothing occupied within its radius.
+
+        Unknown cells within the radius are let pass, since floors are never seen without holes.
+        """
+        from scipy.ndimage import distance_transform_edt
+
+        occupied = self.states == CellState.OCCUPIED
+        free = self.states == CellState.FREE
+        if not occupied.any():
+            return free
+        distance_m = distance_transform_edt(~occupied, sampling=self.cell_size_m)
+        return free & (np.asarray(distance_m) - 0.5 * self.cell_size_m >= radius_m)
+
+
+def find_obstacles(
+    voxels: Voxels,
+    grid: GridSpec,
+    up_in_world: Float[np.ndarray, "3"],
+    body: Body | None = None,
+    cell_size_m: float | None = None,
+) -> Obstacles:
+    """Draw the grid of a map.
+
+    A cell is occupied where a voxel stands between the body's step and its height over the floor, free where the
+    floor was seen and nothing stands, and unknown elsewhere.
+
+    Args:
+        voxels: the map's.
+        grid: their size.
+        up_in_world: which way is up.
+        body: of the robot that is to move there.
+        cell_size_m: edge of a cell; that of a voxel by default, and not smaller (the floor would have holes).
+
+    Raises:
+        MapError: the map has no voxel with enough hits, or would need too large a grid.
+    """
+    body = body or Body()
+    cell_size_m = grid.voxel_size_m if cell_size_m is None else cell_size_m
+    if cell_size_m < grid.voxel_size_m:
+        raise MapError(
+            f"Cells of {cell_size_m} m are smaller than the map's voxels of {grid.voxel_size_m} m; ask for larger ones."
+        )
+    index = np.asarray(voxels.index)[np.asarray(voxels.hits) >= body.min_hits]
+    if len(index) == 0:
+        raise MapError(
+            f"None of the map's {len(voxels)} voxels was hit {body.min_hits} times, so that no floor can be found; "
+            "lower min_hits or map more frames."
+        )
+    level_from_world = rotation_to_level(up_in_world)
+    level = grid.centre_of(index) @ level_from_world.T
+    floor_m = floor_height(level[:, 2], grid.voxel_size_m)
+    cell = _cells(level, level_from_world, grid.voxel_size_m, cell_size_m)
+    low = cell.min(axis=(0, 1))
+    return Obstacles(
+        level_from_world, low * cell_size_m, cell_size_m, floor_m, _states(cell - low, level[:, 2] - floor_m, body)
+    )
+
+
+def _cells(
+    level: Float[np.ndarray, "n 3"], level_from_world: Float[np.ndarray, "3 3"], voxel_size_m: float, cell_size_m: float
+) -> Int[np.ndarray, "8 n 2"]:
+    """Return the cells of eight points in each voxel: one that is turned reaches beyond the cell of its middle."""
+    offsets = (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5) * (0.5 * voxel_size_m) @ level_from_world.T
+    return np.floor((level[None, :, :2] + offsets[:, None, :2]) / cell_size_m).astype(np.int64)
+
+
+def _states(
+    cell: Int[np.ndarray, "8 n 2"], height_m: Float[np.ndarray, " n"], body: Body
+) -> UInt8[np.ndarray, "nx ny"]:
+    """Return the grid's states from the cells and the height over the floor of each voxel."""
+    size = cell.max(axis=(0, 1)) + 1
+    if size.prod() > MOST_CELLS:
+        raise MapError(
+            f"A grid of {size[0]} x {size[1]} cells is too large; ask for larger cells, or fuse with a smaller depth."
+        )
+    states = np.full(size, CellState.UNKNOWN, np.uint8)
+    floor = np.abs(height_m) < body.step_m
+    in_the_way = (height_m >= body.step_m) & (height_m <= body.height_m)
+    for state, these in ((CellState.FREE, floor), (CellState.OCCUPIED, in_the_way)):
+        states[cell[:, these, 0], cell[:, these, 1]] = state
+    return states
+
+
+def floor_height(height_m: Float[np.ndarray, " n"], voxel_size_m: float) -> float:
+    """Return the height of the floor: the lowest one at which, among voxels, strikingly many lie."""
+    base = float(height_m.min())
+    layer = np.floor((height_m - base) / voxel_size_m).astype(np.int64)
+    count = np.bincount(layer)
+    pairs = count + np.append(count[1:], 0)  # a plane between two layers is split among them
+    excess = pairs - np.median(pairs)  # over the walls, which are there at every height
+    lowest = int(np.argmax(excess >= STRONG_PEAK * excess.max()))
+    while lowest + 1 < len(pairs) and pairs[lowest + 1] > pairs[lowest]:
+        lowest += 1
+    on_floor = height_m[(layer == lowest) | (layer == lowest + 1)]
+    return float(np.median(on_floor))
