@@ -7,7 +7,7 @@ from avlmaps.core.progress import silenced
 from avlmaps.maps.lock import locked
 from avlmaps.maps.parts import build_part, merge_parts
 from avlmaps.maps.plan import claim, make_plan
-from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.stages import commit, find_up, fuse, hear_sounds, keep_keyframes, merge
 from avlmaps.maps.stored import StoredMap, describe, open_stored
 from avlmaps.perception.profiles import profile as profile_of
@@ -20,7 +20,7 @@ def build_map(
     recording: Recording,
     path: Path | str,
     profile: str = "embedded",
-    settings: BuildSettings = BuildSettings(),
+    settings: BuildSettings = DEFAULTS,
     *,
     parts: Sequence[Path | str] = (),
     resume: bool = True,

@@ -52,8 +52,8 @@ def _check_array(where: str, array: np.ndarray, declared: Any, sizes: dict[str, 
     dims = declared.dim_str.split()
     if array.dtype.name not in declared.dtypes or array.ndim != len(dims):
         raise MapError(
-            f"{where} is {array.dtype} of {array.shape}; a map has {' or '.join(declared.dtypes)} of ({', '.join(dims)}) "
-            f"there; {_MEND}."
+            f"{where} is {array.dtype} of {array.shape}; a map has {' or '.join(declared.dtypes)} of "
+            f"({', '.join(dims)}) there; {_MEND}."
         )
     for dim, size in zip(dims, array.shape, strict=True):
         wanted = int(dim) if dim.isdigit() else sizes.setdefault(dim, size)

@@ -2,6 +2,7 @@
 
 import os
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,6 +26,16 @@ else:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
+def _grab_patiently(descriptor: int) -> None:
+    """Try a few times: `is_locked` of another process holds the lock for an instant."""
+    for _ in range(3):
+        try:
+            return _grab(descriptor)
+        except OSError:
+            time.sleep(0.02)
+    return _grab(descriptor)
+
+
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
     """Hold the folder's lock; the folder is made if it is not there.
@@ -37,12 +48,12 @@ def locked(folder: Path) -> Iterator[None]:
         descriptor = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
     try:
         try:
-            _grab(descriptor)
+            _grab_patiently(descriptor)
         except OSError as fault:
             holder = os.pread(descriptor, 32, 0).decode("ascii", "replace").strip() if hasattr(os, "pread") else ""
             raise MapError(
-                f"{folder} is being built by another process{f' ({holder})' if holder else ''} at this moment; wait for "
-                "it, or build into another folder."
+                f"{folder} is being built by another process{f' ({holder})' if holder else ''} at this moment; wait "
+                "for it, or build into another folder."
             ) from fault
         os.ftruncate(descriptor, 0)
         os.write(descriptor, f"{os.getpid()}\n".encode())

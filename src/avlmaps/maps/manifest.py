@@ -20,11 +20,7 @@ MANIFEST = "map.json"
 Vector = tuple[float, float, float]
 
 
-class _Struct(msgspec.Struct, frozen=True, kw_only=True):
-    """Common options."""
-
-
-class ModelInfo(_Struct):
+class ModelInfo(msgspec.Struct, frozen=True, kw_only=True):
     """A model that made features of this map: its card, and the backend's name in the profile.
 
     ``normalisation`` is that of the stored features; there is one as yet.
@@ -53,7 +49,7 @@ class ModelInfo(_Struct):
         )
 
 
-class CameraInfo(_Struct):
+class CameraInfo(msgspec.Struct, frozen=True, kw_only=True):
     """Intrinsics in pixels, conventions as in ``core.camera``."""
 
     fx: float
@@ -80,7 +76,7 @@ class CameraInfo(_Struct):
         return Pinhole(self.fx, self.fy, self.cx, self.cy, self.width, self.height)
 
 
-class RigInfo(_Struct):
+class RigInfo(msgspec.Struct, frozen=True, kw_only=True):
     """The recording's two cameras; ``rgb_from_depth`` row by row."""
 
     rgb: CameraInfo
@@ -98,7 +94,7 @@ class RigInfo(_Struct):
         return Rig(self.rgb.camera(), self.depth.camera(), np.array(self.rgb_from_depth, np.float64).reshape(4, 4))
 
 
-class RecordingInfo(_Struct):
+class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
     """Which recording the map was built from. The folder's name only: where it lay is nobody's business."""
 
     name: str
@@ -109,7 +105,7 @@ class RecordingInfo(_Struct):
     notices: tuple[str, ...] = ()
 
 
-class UpInfo(_Struct):
+class UpInfo(msgspec.Struct, frozen=True, kw_only=True):
     """Which way is up in the recording's world, and how that is known.
 
     Attributes:
@@ -127,14 +123,14 @@ class UpInfo(_Struct):
         return np.array(self.direction, np.float64)
 
 
-class BadFrame(_Struct):
+class BadFrame(msgspec.Struct, frozen=True, kw_only=True):
     """A frame that could not be read and was left out, with the sentence that told why."""
 
     index: int
     why: str
 
 
-class Counts(_Struct):
+class Counts(msgspec.Struct, frozen=True, kw_only=True):
     """How much there is of everything.
 
     Attributes:
@@ -150,14 +146,14 @@ class Counts(_Struct):
     sounds: int
 
 
-class Box(_Struct):
+class Box(msgspec.Struct, frozen=True, kw_only=True):
     """The smallest box along the world's axes that holds every occupied voxel, metres."""
 
     low: Vector
     high: Vector
 
 
-class Timings(_Struct):
+class Timings(msgspec.Struct, frozen=True, kw_only=True):
     """When the map was finished (ISO 8601, UTC) and the seconds of work in each stage, over all runs that it took."""
 
     finished: str
@@ -165,7 +161,7 @@ class Timings(_Struct):
     stages_s: dict[str, float]
 
 
-class MapInfo(_Struct):
+class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
     """The whole of ``map.json``.
 
     Attributes:
@@ -247,4 +243,4 @@ def parse_manifest(content: bytes, path: Path) -> MapInfo:
     try:
         return msgspec.json.decode(content, type=MapInfo)
     except (msgspec.DecodeError, ValueError, MapError) as fault:
-        raise MapError(f"{path} is damaged: {fault}; restore it from a copy.") from fault
+        raise MapError(f"{path} is damaged: {str(fault).rstrip('.')}; restore it from a copy.") from fault

@@ -23,7 +23,7 @@ from avlmaps.maps.checkpoints import Checkpoint, find_checkpoint, key_of, load_c
 from avlmaps.maps.fusion import VoxelAccumulator, VoxelSums
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.manifest import BadFrame
-from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.perception.profiles import Profile, profile
 from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.recordings.types import Frame, Recording
@@ -107,7 +107,7 @@ def build_part(
     stop: int,
     out: Path | str,
     profile_name: str = "embedded",
-    settings: BuildSettings = BuildSettings(),
+    settings: BuildSettings = DEFAULTS,
 ) -> Part:
     """Fuse the frames ``start`` to ``stop - 1`` and keep their sums in a folder, as one machine's part of a map.
 
@@ -211,8 +211,8 @@ class Tolerance:
         if self._allowed == 0:
             raise RecordingError(bad.why)
         raise RecordingError(
-            f"{self._met} of {self._total} frames cannot be read, more than the {self._allowed} that may be left out; mend "
-            f"the recording or allow more (frames.max_bad_share). The last: {bad.why}"
+            f"{self._met} of {self._total} frames cannot be read, more than the {self._allowed} that may be left out; "
+            f"mend the recording or allow more (frames.max_bad_share). The last: {bad.why}"
         )
 
 
@@ -238,6 +238,8 @@ def fuse_spans(
         RecordingError: too many frames cannot be read.
         MapError: a part cannot be written.
     """
+    if not jobs:
+        return
     key, encoder = fusion_key(recording, settings, used), pixel_encoder_of(used)
     tolerance = Tolerance(recording, settings, known_bad)
     every = [index for span, _ in jobs for index in range(*span)]
@@ -245,7 +247,8 @@ def fuse_spans(
         seen = progress(ahead, "fusing", total=done + len(every), done=done)
         for span, folder in jobs:
             begin = perf_counter()
-            total = VoxelAccumulator(GridSpec(settings.voxel_size_m), 0 if encoder is None else encoder.card.dim)
+            dim = 0 if encoder is None else encoder.card.dim
+            total = VoxelAccumulator(GridSpec(settings.voxel_size_m), dim, settings.fusion)
             bad: list[BadFrame] = []
             for frame, features in islice(seen, len(range(*span))):
                 if isinstance(frame, BadFrame):
@@ -261,6 +264,8 @@ def fuse_spans(
                 elapsed_s=perf_counter() - begin,
             )
             save_checkpoint(folder, key, info, _arrays(total.sums()))
+        for _ in seen:  # nothing is left; this completes the bar
+            pass
 
 
 def _perceived(

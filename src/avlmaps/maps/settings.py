@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from avlmaps.core.errors import MapError
+from avlmaps.maps.fusion_settings import FusionSettings
+from avlmaps.maps.keyframes import KeyframeSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,16 +39,6 @@ class GravitySettings:
 
 
 @dataclass(frozen=True, slots=True)
-class FusionSettings:
-    """From frames to voxels."""
-
-    min_depth_m: float = 0.1
-    """Ignore depth nearer than this, metres."""
-    max_depth_m: float = 10.0
-    """Ignore depth beyond this, metres."""
-
-
-@dataclass(frozen=True, slots=True)
 class BuildSettings:
     """Everything about a build that can be chosen; the resolved settings are written into the map."""
 
@@ -58,6 +50,8 @@ class BuildSettings:
     """From frames to voxels."""
     gravity: GravitySettings = field(default_factory=GravitySettings)
     """Finding which way is up."""
+    keyframes: KeyframeSettings = field(default_factory=KeyframeSettings)
+    """Which frames stand for the walk."""
     seed: int = 0
     """Seed of what is drawn at random (visual words, RANSAC)."""
 
@@ -69,3 +63,6 @@ class BuildSettings:
 def _require(holds: bool, fault: str, wanted: str) -> None:
     if not holds:
         raise MapError(f"{fault}; choose {wanted}.")
+
+
+DEFAULTS = BuildSettings()

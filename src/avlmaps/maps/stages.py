@@ -21,7 +21,6 @@ from avlmaps.maps.manifest import Box, Counts, MapInfo, RecordingInfo, RigInfo, 
 from avlmaps.maps.parts import (
     BUILD_VERSION,
     Part,
-    PartInfo,
     add_up,
     check_disjoint,
     find_part,
@@ -71,8 +70,6 @@ class KeptSounds:
 
 def find_up(plan: Plan) -> tuple[UpInfo, float]:
     """Return which way is up, from the recording or from the planes in view, and the seconds that it took."""
-    from avlmaps.maps.gravity import find_up as up_of_planes
-
     known = plan.recording.up_in_world
     if known is not None:
         return _up_info(known, known_from_recording=True), 0.0
@@ -80,6 +77,8 @@ def find_up(plan: Plan) -> tuple[UpInfo, float]:
     folder = plan.folder("up", key)
     found = find_checkpoint(folder, _UpFacts, key)
     if found is None:
+        from avlmaps.maps.gravity import find_up as up_of_planes
+
         begin = perf_counter()
         up = up_of_planes(_spread(plan.recording, plan.settings.gravity.frames), plan.rng(_GRAVITY))
         info = _up_info(up.direction, known_from_recording=False, support=float(up.support))
@@ -112,7 +111,9 @@ def fuse(plan: Plan, given: Sequence[Path | str]) -> list[Part]:
     brought = [load_part(Path(folder), plan.fusion_key) for folder in given]
     covered = [span for part in brought for span in part.info.spans]
     home = plan.folder("fusion", plan.fusion_key)
-    spans = {home / f"{span[0]:08d}-{span[1]:08d}": span for span in plan_spans(len(plan.recording), plan.settings, covered)}
+    spans = {
+        home / f"{span[0]:08d}-{span[1]:08d}": span for span in plan_spans(len(plan.recording), plan.settings, covered)
+    }
     finished = {folder: find_part(folder, plan.fusion_key, span) for folder, span in spans.items()}
     jobs = [(spans[folder], folder) for folder, part in finished.items() if part is None]
     had = [*brought, *(part for part in finished.values() if part is not None)]
@@ -132,7 +133,7 @@ def merge(plan: Plan, parts: Sequence[Part]) -> tuple[Voxels, float]:
     if len(voxels) == 0:
         raise MapError(
             f"No pixel of {plan.recording.path} has a depth between {plan.settings.fusion.min_depth_m} and "
-            f"{plan.settings.fusion.max_depth_m} m, so that the map would be empty; check the depth scale of the recording."
+            f"{plan.settings.fusion.max_depth_m} m, so that the map would be empty; check the recording's depth scale."
         )
     return voxels, perf_counter() - begin
 
@@ -173,8 +174,6 @@ def _below(prefix: str, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def hear_sounds(plan: Plan) -> KeptSounds:
     """Find the sounds in the track; none where there is no track, or no model for them."""
-    from avlmaps.maps.sounds import hear
-
     if plan.recording.audio is None or not plan.used.sounds:
         return KeptSounds(_silence(plan), plan.path, 0.0)
     settings, model = plan.settings.hearing, plan.models[Kind.SOUNDS.value]
@@ -182,6 +181,8 @@ def hear_sounds(plan: Plan) -> KeptSounds:
     folder = plan.folder("sounds", key)
     found = find_checkpoint(folder, _Facts, key)
     if found is None:
+        from avlmaps.maps.sounds import hear
+
         begin = perf_counter()
         scratch = folder.with_name("clips.unfinished")
         shutil.rmtree(scratch, ignore_errors=True)
@@ -263,14 +264,15 @@ def commit(
 
 
 def _box(voxels: Voxels, voxel_size_m: float) -> Box:
-    low, high = voxels.index.min(axis=0) * voxel_size_m, (voxels.index.max(axis=0) + 1) * voxel_size_m
-    return Box(low=tuple(map(float, low)), high=tuple(map(float, high)))  # pyright: ignore[reportArgumentType]
+    corners = np.stack([voxels.index.min(axis=0), voxels.index.max(axis=0) + 1]) * voxel_size_m
+    low, high = (tuple(round(float(value), 6) for value in corner) for corner in corners)
+    return Box(low=low, high=high)  # pyright: ignore[reportArgumentType]
 
 
 def _notices(plan: Plan, up: UpInfo, bad: int) -> Iterator[str]:
     if up.known_from == "planes" and up.support < _GUESS:
         yield f"Which way is up is a guess: only {up.support:.0%} of the surface in view agrees with it."
     if bad:
-        yield f"{bad} frames could not be read and were left out; see bad_frames in map.json."
+        yield f"{bad} of {len(plan.recording)} frames could not be read and were left out (bad_frames in map.json)."
     if plan.recording.audio is None:
         yield "The recording has no sound track, so that the map holds no sounds."

@@ -5,6 +5,7 @@ Until ``map.json`` is replaced, in one step, the folder is the old map (or none)
 
 import shutil
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -85,7 +86,8 @@ def sweep(path: Path, info: MapInfo) -> None:
     for section in SECTIONS:
         for old in (path / section).iterdir():
             if old not in kept and old.is_file():
-                old.unlink(missing_ok=True)
+                with suppress(OSError):
+                    old.unlink()
     shutil.rmtree(path / PARTS, ignore_errors=True)
 
 

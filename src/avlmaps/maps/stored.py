@@ -63,12 +63,15 @@ class StoredMap:
         """
         made_by = self.info.models.get(kind.value)
         if made_by is None:
-            raise MapError(f"{self.path} was built without a model for {kind.value}; build it with a profile that has one.")
+            raise MapError(
+                f"{self.path} was built without a model for {kind.value}; build it with a profile that has one."
+            )
         card = self.profile.cards()[kind]
         if (card.id, card.dim, card.checksum) != (made_by.id, made_by.dim, made_by.checksum):
             raise MapError(
-                f"{self.path} was built with {made_by.id} (checksum {made_by.checksum[:8]}), this avlmaps has {card.id} "
-                f"({card.checksum[:8]}) for {kind.value}; build it again, or use avlmaps {self.info.avlmaps_version}."
+                f"{self.path} was built with {made_by.id} (checksum {made_by.checksum[:8]}), this avlmaps has "
+                f"{card.id} ({card.checksum[:8]}) for {kind.value}; build it again, or use avlmaps "
+                f"{self.info.avlmaps_version}."
             )
 
 
@@ -120,8 +123,8 @@ def _manifest_content(path: Path) -> bytes:
         raise MapError(f"{path} is being built at this moment; wait until the build has finished.")
     if has_unfinished_build(path):
         raise MapError(
-            f"{path} is a half-built map (its build was stopped); run the same `avlmaps build` again with --resume, and "
-            "it goes on from there."
+            f"{path} is a half-built map (its build was stopped); run the same `avlmaps build` again with --resume, "
+            "and it goes on from there."
         )
     if path.is_dir():
         raise MapError(f"{path} is a folder without a map in it (no {MANIFEST}); make one with `avlmaps build`.")

@@ -1,0 +1,107 @@
+"""A small walk past a coloured wall, and models that cost nothing, for tests of the store and the build."""
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.registry import Backend, Kind, register
+from avlmaps.maps.keyframes import KeyframeSettings
+from avlmaps.maps.settings import BuildSettings, FrameSettings
+from avlmaps.perception.profiles import Profile, register_profile
+from avlmaps.perception.protocols import LocalFeatures, ModelCard
+from avlmaps.recordings.types import Frame, Recording
+
+RIG = Rig(Pinhole(20.0, 20.0, 16.0, 12.0, 32, 24), Pinhole(20.0, 20.0, 16.0, 12.0, 32, 24))
+SETTINGS = BuildSettings(
+    frames=FrameSettings(per_part=4, max_bad_share=0.2), keyframes=KeyframeSettings(translation_m=0.35)
+)
+
+
+class Walk(Recording):
+    """Sideways past a wall whose colours are random squares; the same seed gives the same walk."""
+
+    def __init__(self, frames: int = 22, *, seed: int = 0, bad: tuple[int, ...] = (), name: str = "walk") -> None:
+        self.path = Path("/nowhere/of/mine") / name
+        self.format = "fake"
+        self.rig = RIG
+        self.stamps_s = np.arange(frames) * 0.1
+        self.world_from_camera = np.tile(np.eye(4), (frames, 1, 1))
+        self.world_from_camera[:, :3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # looks along +y, up is +z
+        self.world_from_camera[:, 0, 3] = 0.1 * np.arange(frames)
+        self.up_in_world = np.array([0.0, 0.0, 1.0])
+        self.audio = None
+        self.notices = (f"{self.path} is made up.",)
+        self.seed, self.bad = seed, bad
+
+    def frame(self, index: int) -> Frame:
+        if index in self.bad:
+            raise RecordingError(f"{self.path}/{index:06d}.png is truncated; leave that frame out.")
+        rng = np.random.default_rng([self.seed, index])
+        rgb = np.kron(rng.integers(0, 256, (6, 8, 3)), np.ones((4, 4, 1))).astype(np.uint8)
+        depth = (2.0 + rng.uniform(0.0, 0.5, (24, 32))).astype(np.float32)
+        depth[rng.uniform(size=depth.shape) < 0.1] = 0.0
+        return Frame(
+            index, self.name(index), float(self.stamps_s[index]), rgb, depth, self.world_from_camera[index], RIG
+        )
+
+    @cached_property
+    def fingerprint(self) -> str:
+        return hashlib.sha256(f"{self.path.name} {len(self)} {self.seed}".encode()).hexdigest()
+
+
+def _card(name: str, dim: int) -> ModelCard:
+    return ModelCard(f"fake/{name}", dim, "CC0-1.0", hashlib.sha256(name.encode()).hexdigest(), ("a {}",), "a fake")
+
+
+@dataclass
+class Pixels:
+    card = _card("pixels", 4)
+    vocabulary = ("red", "green")
+
+    def encode(self, frame: Frame) -> np.ndarray:
+        cells = np.concatenate([frame.rgb[::4, ::4] / 255.0, np.full((6, 8, 1), 0.1)], axis=2)
+        return (cells / np.linalg.norm(cells, axis=2, keepdims=True)).astype(np.float32)
+
+
+@dataclass
+class Corners:
+    card = _card("corners", 3)
+
+    def encode(self, rgb: np.ndarray) -> LocalFeatures:
+        xy = np.array([[2.0, 2.0], [10.0, 6.0], [30.0, 20.0]], np.float32)
+        descriptors = rgb[[2, 6, 20], [2, 10, 30]] + np.float32(1.0)
+        return LocalFeatures(xy, (descriptors / np.linalg.norm(descriptors, axis=1, keepdims=True)).astype(np.float32))
+
+
+@dataclass
+class Places:
+    card = _card("places", 3)
+
+    def fit(self, local: list[LocalFeatures], rng: np.random.Generator) -> dict[str, np.ndarray]:
+        return {"centres": rng.normal(size=(2, 3)).astype(np.float32)}
+
+    def encode(self, rgb: np.ndarray, local: LocalFeatures, state: dict[str, np.ndarray]) -> np.ndarray:
+        whole = local.descriptors.sum(axis=0) + state["centres"][0]
+        return (whole / np.linalg.norm(whole)).astype(np.float32)
+
+
+@dataclass
+class Ears:
+    card = _card("ears", 2)
+    vocabulary = ()
+
+    def encode(self, sound: object) -> np.ndarray:
+        return np.array([[0.6, 0.8]], np.float32)
+
+
+def register_fakes() -> str:
+    """Make the profile ``fake`` known; return its name."""
+    for kind, maker in ((Kind.PIXELS, Pixels), (Kind.LOCAL, Corners), (Kind.PLACE, Places), (Kind.SOUNDS, Ears)):
+        register(Backend(kind, "fake", f"{__name__}:{maker.__name__}"))
+    register_profile(Profile("fake", pixels="fake", local="fake", place="fake", sounds="fake"))
+    return "fake"

@@ -1,0 +1,355 @@
+"""The build: eight stages, parts that add up, frames that cannot be read, and folders that are not to be touched."""
+
+import json
+import shutil
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from build_fakes import SETTINGS, Walk, register_fakes
+from hypothesis import given
+from hypothesis import strategies as st
+
+from avlmaps.core.errors import MapError, RecordingError
+from avlmaps.maps.ahead import run_ahead
+from avlmaps.maps.build import build_map, build_part, describe, merge_parts
+from avlmaps.maps.parts import load_part, plan_spans
+from avlmaps.maps.settings import BuildSettings, FrameSettings
+from avlmaps.maps.stored import StoredMap, open_stored, verify_stored
+from avlmaps.recordings.subset import Subset
+
+PROFILE = register_fakes()
+
+
+def build(walk: Walk, path: Path, settings: BuildSettings = SETTINGS, **options: object) -> StoredMap:
+    return build_map(walk, path, PROFILE, settings, progress=False, **options)  # pyright: ignore[reportArgumentType]
+
+
+def content_of(path: Path) -> dict[str, bytes]:
+    """Return every file of a map, and map.json without its timings."""
+    files = {
+        str(file.relative_to(path)): file.read_bytes()
+        for file in path.rglob("*")
+        if file.is_file() and file.name != ".lock"
+    }
+    manifest = json.loads(files.pop("map.json"))
+    manifest.pop("timings")
+    return {**files, "map.json": json.dumps(manifest, sort_keys=True).encode()}
+
+
+def test_a_build_leaves_the_files_of_its_manifest_and_nothing_else(tmp_path: Path) -> None:
+    stored = build(Walk(10), tmp_path / "a.avlmap")
+    listed = {file.path for file in stored.info.files.values()}
+    assert set(content_of(stored.path)) == listed | {"map.json"}
+    assert not (stored.path / "parts").exists()
+
+
+def test_the_same_build_gives_the_same_files_bit_by_bit(tmp_path: Path) -> None:
+    one, other = (build(Walk(10), tmp_path / name) for name in ("a.avlmap", "b.avlmap"))
+    assert content_of(one.path) == content_of(other.path)
+
+
+def test_a_part_boundary_changes_nothing_but_rounding(tmp_path: Path) -> None:
+    parted = build(Walk(10), tmp_path / "a").voxels
+    whole = build(Walk(10), tmp_path / "b", replace(SETTINGS, frames=FrameSettings(per_part=100))).voxels
+    assert np.array_equal(parted.index, whole.index) and np.array_equal(parted.hits, whole.hits)
+    np.testing.assert_allclose(parted.weight, whole.weight, rtol=1e-6)
+    np.testing.assert_allclose(parted.feature.astype(float), whole.feature.astype(float), atol=2e-3)
+
+
+def test_a_finished_map_is_not_built_again(tmp_path: Path) -> None:
+    first = build(Walk(6), tmp_path / "a")
+    second = build(Walk(6), tmp_path / "a")
+    assert first.info == second.info
+
+
+@pytest.mark.parametrize(
+    ("walk", "settings", "why"),
+    [
+        (Walk(6, seed=1), SETTINGS, "of walk (another recording, or it has changed)"),
+        (Walk(6), replace(SETTINGS, voxel_size_m=0.1), "of walk with other settings"),
+    ],
+)
+def test_a_finished_map_of_something_else_is_kept(
+    tmp_path: Path, walk: Walk, settings: BuildSettings, why: str
+) -> None:
+    before = build(Walk(6), tmp_path / "a")
+    files = content_of(before.path)
+    with pytest.raises(MapError) as fault:
+        build(walk, before.path, settings)
+    assert str(fault.value) == (
+        f"{before.path} is a finished map already, {why}; give another --out, or replace it with --overwrite."
+    )
+    assert content_of(before.path) == files
+    after = build(walk, before.path, settings, overwrite=True)
+    assert after.info.build_key != before.info.build_key
+    assert set(content_of(after.path)) == {file.path for file in after.info.files.values()} | {"map.json"}
+
+
+def test_a_damaged_map_can_be_overwritten(tmp_path: Path) -> None:
+    path = build(Walk(6), tmp_path / "a").path
+    (path / "map.json").write_bytes(b"\xff")
+    with pytest.raises(MapError, match="is not JSON in UTF-8"):
+        build(Walk(6), path)
+    assert verify_stored(build(Walk(6), path, overwrite=True).path).info.counts.frames == 6
+
+
+def test_an_opened_map_stays_readable_when_it_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("avlmaps.maps.shards.SMALL_BYTES", 0)
+    before = build(Walk(6), tmp_path / "a")
+    assert isinstance(before.voxels.feature, np.memmap)
+    expected = build(Walk(6), tmp_path / "b").voxels.feature
+    build(Walk(6, seed=1), tmp_path / "a", overwrite=True)
+    assert np.array_equal(before.voxels.feature, expected)
+
+
+@pytest.mark.parametrize(
+    "make", [lambda path: path.write_text("mine"), lambda path: path.mkdir() or (path / "mine").mkdir()]
+)
+def test_what_is_no_map_is_not_touched(tmp_path: Path, make) -> None:
+    path = tmp_path / "thesis"
+    make(path)
+    with pytest.raises(MapError) as fault:
+        build(Walk(4), path, overwrite=True)
+    assert str(fault.value) == f"{path} is there already and is no map; give another --out, nothing in it was touched."
+    assert not (path / ".lock").exists()
+
+
+def test_an_empty_folder_will_do(tmp_path: Path) -> None:
+    assert build(Walk(4), tmp_path).info.counts.frames == 4
+
+
+def test_a_recording_without_frames_makes_no_folder(tmp_path: Path) -> None:
+    with pytest.raises(MapError) as fault:
+        build(Walk(0), tmp_path / "a")
+    assert str(fault.value) == "/nowhere/of/mine/walk has no frames with a pose; there is nothing to build a map from."
+    assert not (tmp_path / "a").exists()
+
+
+def test_a_walk_without_depth_says_what_to_check(tmp_path: Path) -> None:
+    far = replace(SETTINGS, fusion=replace(SETTINGS.fusion, max_depth_m=0.5))
+    with pytest.raises(MapError) as fault:
+        build(Walk(4), tmp_path / "a", far)
+    assert str(fault.value) == (
+        "No pixel of /nowhere/of/mine/walk has a depth between 0.1 and 0.5 m, so that the map would be empty; check "
+        "the recording's depth scale."
+    )
+
+
+def test_frames_that_cannot_be_read_are_left_out_and_told(tmp_path: Path) -> None:
+    stored = build(Walk(20, bad=(3, 17)), tmp_path / "a")
+    assert stored.info.counts.frames == 18
+    assert [(bad.index, bad.why) for bad in stored.info.bad_frames] == [
+        (3, "walk/000003.png is truncated; leave that frame out."),
+        (17, "walk/000017.png is truncated; leave that frame out."),
+    ]
+    assert "2 of 20 frames could not be read and were left out (bad_frames in map.json)." in stored.info.notices
+    good = [i for i in range(20) if i not in (3, 17)]
+    alone = build(Subset(Walk(20), good), tmp_path / "b")  # pyright: ignore[reportArgumentType]
+    assert np.array_equal(stored.voxels.hits, alone.voxels.hits)
+    assert np.array_equal(stored.keyframes.stamp_s, alone.keyframes.stamp_s)
+
+
+def test_too_many_bad_frames_stop_the_build_and_the_count_survives_a_resume(tmp_path: Path) -> None:
+    said = (
+        "5 of 20 frames cannot be read, more than the 4 that may be left out; mend the recording or allow more "
+        "(frames.max_bad_share). The last: walk/000014.png is truncated; leave that frame out."
+    )
+    for _ in range(2):
+        with pytest.raises(RecordingError) as fault:
+            build(Walk(20, bad=(1, 2, 3, 9, 14, 15)), tmp_path / "a")
+        assert str(fault.value) == said
+    lenient = replace(SETTINGS, frames=replace(SETTINGS.frames, max_bad_share=0.5))
+    assert build(Walk(20, bad=(1, 2, 3, 9, 14, 15)), tmp_path / "a", lenient).info.counts.frames == 14
+
+
+def test_the_first_bad_frame_stops_a_strict_build_with_its_own_sentence(tmp_path: Path) -> None:
+    strict = replace(SETTINGS, frames=replace(SETTINGS.frames, on_bad="stop"))
+    with pytest.raises(RecordingError) as fault:
+        build(Walk(20, bad=(7,)), tmp_path / "a", strict)
+    assert str(fault.value) == "walk/000007.png is truncated; leave that frame out."
+
+
+def test_a_stopped_build_reads_no_finished_frame_again(tmp_path: Path) -> None:
+    walk, read = Walk(20), []
+    walk.frame = lambda index: (
+        read.append(index) or (_ for _ in ()).throw(KeyboardInterrupt) if index == 14 else Walk.frame(walk, index)
+    )
+    with pytest.raises(KeyboardInterrupt):
+        build(walk, tmp_path / "a")
+    walk.frame = lambda index: read.append(index) or Walk.frame(walk, index)
+    read.clear()
+    build(walk, tmp_path / "a")
+    assert read[:8] == [12, 13, 14, 15, 16, 17, 18, 19]
+
+
+def stop_after_four_parts(path: Path) -> None:
+    """Leave a half-built map of 20 frames."""
+    with pytest.raises(RecordingError):
+        build(Walk(20, bad=(16,)), path, replace(SETTINGS, frames=replace(SETTINGS.frames, on_bad="stop")))
+
+
+def test_without_resume_all_is_done_anew(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    stop_after_four_parts(path)
+    assert len(list((path / "parts").glob("fusion-*/*/done.json"))) == 4
+    walk, read = Walk(20), []
+    walk.frame = lambda index: read.append(index) or Walk.frame(walk, index)
+    build(walk, path, resume=False)
+    assert read[:20] == list(range(20))
+
+
+def test_a_damaged_part_is_made_again(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    stop_after_four_parts(path)
+    victim = sorted((path / "parts").rglob("weight-*.npy"))[0]
+    victim.write_bytes(victim.read_bytes()[:-1] + b"\x55")
+    build(Walk(20), path)
+    build(Walk(20), tmp_path / "b")
+    assert content_of(path) == content_of(tmp_path / "b")
+
+
+def test_parts_of_other_settings_are_passed_over(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    stop_after_four_parts(path)
+    coarse = replace(SETTINGS, voxel_size_m=0.2)
+    assert content_of(build(Walk(20), path, coarse).path) == content_of(build(Walk(20), tmp_path / "b", coarse).path)
+
+
+@given(st.integers(0, 60), st.integers(1, 5), st.integers(1, 9), st.sets(st.integers(0, 59)))
+def test_spans_cover_every_wanted_frame_once(frames: int, step: int, per_part: int, covered: set[int]) -> None:
+    settings = BuildSettings(frames=FrameSettings(step=step, per_part=per_part))
+    spans = plan_spans(frames, settings, [(i, i + 1, 1) for i in covered if i < frames])
+    listed = [index for span in spans for index in range(*span)]
+    assert listed == [index for index in range(0, frames, step) if index not in covered]
+    assert all(len(range(*span)) <= per_part for span in spans)
+
+
+def test_parts_of_several_machines_make_the_whole(tmp_path: Path) -> None:
+    walk = Walk(20, bad=(5,))
+    folders = [tmp_path / name for name in ("late", "early", "middle")]
+    for folder, (start, stop) in zip(folders, [(13, 20), (0, 4), (4, 13)], strict=True):
+        build_part(walk, start, stop, folder, PROFILE, SETTINGS)
+    given = build(walk, tmp_path / "given", parts=folders)
+    some = build(walk, tmp_path / "some", parts=folders[1:])
+    merged = merge_parts(folders, tmp_path / "sum")
+    summed = build(walk, tmp_path / "summed", parts=[merged.folder])
+    alone = build(walk, tmp_path / "alone")
+    for shared in (given, some, summed):
+        assert np.array_equal(shared.voxels.hits, alone.voxels.hits)
+        np.testing.assert_allclose(shared.voxels.weight, alone.voxels.weight, rtol=1e-6)
+        assert shared.info.bad_frames == alone.info.bad_frames and shared.info.counts == alone.info.counts
+        assert np.array_equal(shared.keyframes.place, alone.keyframes.place)
+
+
+def test_parts_add_up_in_any_order_to_the_same_bits(tmp_path: Path) -> None:
+    for start in (0, 4, 8):
+        build_part(Walk(12), start, start + 4, tmp_path / f"p{start}", PROFILE, SETTINGS)
+    one = merge_parts([tmp_path / "p0", tmp_path / "p4", tmp_path / "p8"], tmp_path / "one")
+    other = merge_parts([tmp_path / "p8", tmp_path / "p0", tmp_path / "p4"], tmp_path / "other")
+    assert one.sums.feature_sum.tobytes() == other.sums.feature_sum.tobytes()
+    assert one.info.spans == ((0, 4, 1), (4, 8, 1), (8, 12, 1)) and one.info.fused == 12
+
+
+def test_a_part_is_built_once(tmp_path: Path) -> None:
+    first = build_part(Walk(12), 0, 4, tmp_path / "p", PROFILE, SETTINGS)
+    assert build_part(Walk(12), 0, 4, tmp_path / "p", PROFILE, SETTINGS).info == first.info
+    with pytest.raises(MapError) as fault:
+        build_part(Walk(12), 0, 5, tmp_path / "p", PROFILE, SETTINGS)
+    assert str(fault.value) == f"{tmp_path}/p holds a part of other frames; give another folder, or remove it first."
+
+
+def test_parts_that_do_not_belong_together_are_refused(tmp_path: Path) -> None:
+    build_part(Walk(12), 0, 4, tmp_path / "a", PROFILE, SETTINGS)
+    build_part(Walk(12, seed=1), 4, 8, tmp_path / "b", PROFILE, SETTINGS)
+    build_part(Walk(12), 3, 8, tmp_path / "c", PROFILE, SETTINGS)
+    with pytest.raises(MapError) as fault:
+        merge_parts([tmp_path / "a", tmp_path / "b"], tmp_path / "sum")
+    assert str(fault.value) == (
+        f"{tmp_path}/b was made from another recording, with other settings or with other models."
+    )
+    with pytest.raises(MapError) as fault:
+        merge_parts([tmp_path / "a", tmp_path / "c"], tmp_path / "sum")
+    assert str(fault.value) == f"{tmp_path}/a and {tmp_path}/c both cover frame 3; leave one of them out."
+    with pytest.raises(MapError) as fault:
+        load_part(tmp_path / "none")
+    assert str(fault.value) == f"{tmp_path}/none holds no finished part of a map (no readable done.json)."
+    with pytest.raises(MapError) as fault:
+        build_part(Walk(12), 4, 13, tmp_path / "d", PROFILE, SETTINGS)
+    assert str(fault.value) == "There are no frames 4 to 13; /nowhere/of/mine/walk has frames 0 to 12."
+
+
+def test_the_frame_step_is_kept(tmp_path: Path) -> None:
+    settings = replace(SETTINGS, frames=replace(SETTINGS.frames, step=3))
+    stored = build(Walk(20), tmp_path / "a", settings)
+    assert stored.info.counts.frames == 7
+    assert np.array_equal(np.unique(stored.voxels.last_seen_s), np.arange(0, 20, 3) * 0.1)
+
+
+def test_what_is_told_of_a_map_is_plain_json(tmp_path: Path) -> None:
+    stored = build(Walk(10), tmp_path / "a.avlmap")
+    told = json.loads(json.dumps(describe(stored), allow_nan=False))
+    assert told["frames"] == 10 and told["keyframes"] == len(stored.keyframes) and told["sounds"] == []
+    assert told["voxels"] == len(stored.voxels) and told["profile"] == "fake"
+    assert told["bytes"] == sum((stored.path / file.path).stat().st_size for file in stored.info.files.values())
+    low, high = told["bounding_box_m"]
+    centres = stored.grid.centre_of(stored.voxels.index)
+    np.testing.assert_allclose(centres.min(axis=0) - 0.025, low, atol=1e-6)
+    np.testing.assert_allclose(centres.max(axis=0) + 0.025, high, atol=1e-6)
+
+
+@given(st.integers(1, 30), st.integers(1, 5))
+def test_running_ahead_keeps_the_order(count: int, depth: int) -> None:
+    assert list(run_ahead(range(count), depth)) == list(range(count))
+
+
+def test_a_fault_of_the_producer_comes_out_in_its_place() -> None:
+    def items() -> Iterator[int]:
+        yield 1
+        raise RecordingError("the second is broken")
+
+    ahead = run_ahead(items())
+    assert next(ahead) == 1
+    with pytest.raises(RecordingError, match="the second is broken"):
+        next(ahead)
+
+
+def test_the_producer_stops_soon_after_the_consumer() -> None:
+    made = []
+
+    def items() -> Iterator[int]:
+        for number in range(1000):
+            made.append(number)
+            yield number
+
+    ahead = run_ahead(items(), depth=2)
+    next(ahead)
+    time.sleep(0.02)
+    ahead.close()
+    assert len(made) <= 5
+
+
+def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    path = tmp_path / "file" / "a.avlmap"
+    with pytest.raises(MapError) as fault:
+        build(Walk(4), path)
+    assert str(fault.value).startswith(f"Cannot write {path}: Not a directory; make room or choose another folder")
+
+
+def test_a_subset_is_a_recording() -> None:
+    walk = Walk(10)
+    half = Subset(walk, range(0, 10, 2))
+    assert len(half) == 5 and half.frame(2).stamp_s == walk.stamps_s[4] and half.frame(2).index == 2
+    assert half.name(2) == "000004" and half.fingerprint != Subset(walk, [0, 1]).fingerprint
+    with pytest.raises(ValueError, match="rise strictly"):
+        Subset(walk, [3, 3])
+
+
+def test_maps_can_be_moved_and_copied(tmp_path: Path) -> None:
+    path = build(Walk(6), tmp_path / "a").path
+    moved = Path(shutil.move(path, tmp_path / "elsewhere"))
+    assert open_stored(moved, verify=True).info.counts.frames == 6

@@ -1,0 +1,372 @@
+"""The map's folder: what is written comes back, and what is not a whole map is refused in one sentence."""
+
+import errno
+import json
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from build_fakes import RIG, SETTINGS, Walk, register_fakes
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from avlmaps.core.errors import MapError
+from avlmaps.core.registry import Kind
+from avlmaps.maps.build import build_map
+from avlmaps.maps.checks import array_fields, assembled, check_order
+from avlmaps.maps.lock import is_locked, locked
+from avlmaps.maps.shards import SMALL_BYTES, read_array, write_array
+from avlmaps.maps.stored import has_unfinished_build, open_stored, verify_stored
+from avlmaps.maps.types import HeardSounds, Voxels
+
+PROFILE = register_fakes()
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("maps") / "walk.avlmap"
+    build_map(Walk(12), path, PROFILE, SETTINGS, progress=False)
+    return path
+
+
+@pytest.fixture
+def copied(built: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(built, tmp_path / "walk.avlmap"))
+
+
+def refused(path: Path, *, verify: bool = False) -> str:
+    with pytest.raises(MapError) as fault:
+        open_stored(path, verify=verify)
+    return str(fault.value)
+
+
+def edit(path: Path, change: Callable[[dict], object]) -> None:
+    content = json.loads((path / "map.json").read_text())
+    change(content)
+    (path / "map.json").write_text(json.dumps(content))
+
+
+def file_of(path: Path, name: str) -> Path:
+    return path / json.loads((path / "map.json").read_text())["files"][name]["path"]
+
+
+ARRAYS = hnp.arrays(
+    st.sampled_from([np.float16, np.float32, np.float64, np.int32, np.int64, np.uint8]),
+    hnp.array_shapes(min_dims=1, max_dims=3, min_side=0, max_side=6),
+)
+
+
+@given(ARRAYS)
+def test_arrays_come_back_bit_by_bit(tmp_path_factory: pytest.TempPathFactory, array: np.ndarray) -> None:
+    folder = tmp_path_factory.mktemp("shards")
+    back = read_array(folder, write_array(folder, "some/thing", array), verify=True)
+    assert back.dtype == array.dtype and back.shape == array.shape and back.tobytes() == array.tobytes()
+
+
+def test_the_name_of_a_file_follows_from_its_content(tmp_path: Path) -> None:
+    one, same, other = (write_array(tmp_path, "a", np.array([n])) for n in (1, 1, 2))
+    assert one == same and one.path != other.path
+    assert sorted(file.name for file in tmp_path.iterdir()) == sorted([one.path, other.path])
+
+
+def test_strided_and_big_endian_arrays_are_written_in_our_order(tmp_path: Path) -> None:
+    array = np.arange(24, dtype=">i4").reshape(4, 6)[::2, ::-3]
+    back = read_array(tmp_path, write_array(tmp_path, "a", array))
+    assert back.dtype.str == "<i4" and np.array_equal(back, array)
+
+
+def test_large_arrays_are_memory_mapped_and_small_ones_are_not(tmp_path: Path) -> None:
+    large = write_array(tmp_path, "large", np.zeros(SMALL_BYTES, np.uint8))
+    small = write_array(tmp_path, "small", np.zeros(10, np.uint8))
+    assert isinstance(read_array(tmp_path, large), np.memmap)
+    assert not isinstance(read_array(tmp_path, small), np.memmap)
+
+
+def test_objects_cannot_be_kept(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="holds Python objects"):
+        write_array(tmp_path, "a", np.array([{}], object))
+
+
+def test_a_full_disk_is_one_sentence_and_leaves_no_rubbish(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(MapError) as fault:
+        write_array(tmp_path, "a", np.zeros(3))
+    assert str(fault.value) == (
+        f"Cannot write {tmp_path}: No space left on device; make room or choose another folder, then run the same "
+        "build again: what was finished is kept."
+    )
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_map_comes_back_with_all_that_it_is_of(built: Path) -> None:
+    stored = verify_stored(built)
+    assert len(stored.voxels) == stored.info.counts.voxels > 100
+    assert stored.voxels.feature.shape == (len(stored.voxels), 4)
+    assert stored.place_state["centres"].shape == (2, 3)
+    assert (stored.rig.rgb, stored.rig.depth) == (RIG.rgb, RIG.depth) and stored.rig.registered
+    assert stored.up_in_world.tolist() == [0.0, 0.0, 1.0]
+    assert stored.profile.name == PROFILE and stored.grid.voxel_size_m == 0.05
+    assert stored.info.models["place"].checksum and stored.info.models["place"].prompts == ("a {}",)
+    assert stored.info.settings == SETTINGS
+    for kind in (Kind.PIXELS, Kind.SOUNDS, Kind.LOCAL, Kind.PLACE):
+        stored.require_model(kind)
+
+
+def test_a_map_says_nothing_of_where_its_recording_lay(built: Path) -> None:
+    assert "/nowhere/of/mine" not in (built / "map.json").read_text()
+
+
+def test_nothing_there(tmp_path: Path) -> None:
+    path = tmp_path / "none.avlmap"
+    assert refused(path) == f"{path} is not there, or is not a map's folder; make one with `avlmaps build`."
+
+
+def test_a_file_in_place_of_a_folder(tmp_path: Path) -> None:
+    path = tmp_path / "file.avlmap"
+    path.write_text("hello")
+    assert refused(path) == f"{path} is not there, or is not a map's folder; make one with `avlmaps build`."
+
+
+def test_a_folder_without_a_map(tmp_path: Path) -> None:
+    assert (
+        refused(tmp_path) == f"{tmp_path} is a folder without a map in it (no map.json); make one with `avlmaps build`."
+    )
+
+
+def test_a_half_built_map(tmp_path: Path) -> None:
+    (tmp_path / "parts" / "fusion-1234").mkdir(parents=True)
+    assert has_unfinished_build(tmp_path)
+    assert refused(tmp_path) == (
+        f"{tmp_path} is a half-built map (its build was stopped); run the same `avlmaps build` again with --resume, "
+        "and it goes on from there."
+    )
+
+
+def test_a_map_that_is_being_built(tmp_path: Path) -> None:
+    with locked(tmp_path):
+        assert is_locked(tmp_path)
+        assert refused(tmp_path) == f"{tmp_path} is being built at this moment; wait until the build has finished."
+    assert not is_locked(tmp_path)
+
+
+def test_two_builds_into_one_folder_are_refused(tmp_path: Path) -> None:
+    with locked(tmp_path), pytest.raises(MapError) as fault:
+        build_map(Walk(4), tmp_path, PROFILE, SETTINGS, progress=False)
+    assert str(fault.value) == (
+        f"{tmp_path} is being built by another process ({os.getpid()}) at this moment; wait for it, or build into "
+        "another folder."
+    )
+
+
+@pytest.mark.parametrize(("version", "how"), [(2, "upgrade avlmaps"), (0, "build the map again with --overwrite")])
+def test_another_schema_version(copied: Path, version: int, how: str) -> None:
+    edit(copied, lambda content: content.update(schema_version=version, voxel_size_m="one day this may be a word"))
+    said = f"{copied}/map.json has schema version {version}, this avlmaps reads version 1; {how}."
+    assert refused(copied) == said
+
+
+def test_another_profile(copied: Path) -> None:
+    edit(copied, lambda content: content.update(profile="hearsay"))
+    said = refused(copied)
+    assert said.startswith(
+        f"{copied}/map.json is of a profile that is not known here. There is no profile called 'hearsay'"
+    )
+
+
+def test_another_model(copied: Path) -> None:
+    edit(copied, lambda content: content["models"]["sounds"].update(checksum="0123456789", id="fake/ears-0"))
+    stored = open_stored(copied)
+    with pytest.raises(MapError) as fault:
+        stored.require_model(Kind.SOUNDS)
+    assert str(fault.value).startswith(
+        f"{copied} was built with fake/ears-0 (checksum 01234567), this avlmaps has fake/ears"
+    )
+    with pytest.raises(MapError, match="was built without a model for views"):
+        stored.require_model(Kind.VIEWS)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "is damaged: it is not JSON in UTF-8"),
+        (b"{", "is damaged: it is not JSON in UTF-8"),
+        (b'{"format": "\xff\xfe"}', "is damaged: it is not JSON in UTF-8"),
+        (b"[1, 2]", "is damaged: it is not JSON in UTF-8"),
+        (b"{}", "belongs to no map of avlmaps"),
+        (b'{"format": "avlmap", "schema_version": 1}', "is damaged: Object missing required field `avlmaps_version`"),
+    ],
+)
+def test_a_map_json_that_is_none(copied: Path, content: bytes, said: str) -> None:
+    (copied / "map.json").write_bytes(content)
+    assert refused(copied).startswith(f"{copied}/map.json {said}")
+
+
+MEND = "restore it from a copy, or build the map again with --overwrite."
+
+
+def test_a_missing_file(copied: Path) -> None:
+    file = file_of(copied, "voxels/rgb")
+    file.unlink()
+    assert refused(copied) == f"{file} is missing from the map; {MEND}"
+
+
+def test_a_truncated_file(copied: Path) -> None:
+    file = file_of(copied, "voxels/feature")
+    size = file.stat().st_size
+    os.truncate(file, size - 7)
+    assert refused(copied) == f"{file} is damaged: it has {size - 7} bytes, {size} were written; {MEND}"
+
+
+def test_a_flipped_bit_in_a_small_file_is_always_seen(copied: Path) -> None:
+    file = file_of(copied, "keyframes/place")
+    flip(file)
+    assert refused(copied) == f"{file} is damaged: its checksum is not the one that was written; {MEND}"
+
+
+def test_a_flipped_bit_in_a_large_file_is_seen_when_asked(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("avlmaps.maps.shards.SMALL_BYTES", 0)
+    file = file_of(copied, "voxels/feature")
+    flip(file)
+    open_stored(copied)
+    assert refused(copied, verify=True) == f"{file} is damaged: its checksum is not the one that was written; {MEND}"
+
+
+def flip(file: Path) -> None:
+    content = bytearray(file.read_bytes())
+    content[-1] ^= 1
+    file.write_bytes(content)
+
+
+def replace(path: Path, name: str, array: np.ndarray, *, as_told: bool = False) -> None:
+    """Put another array in a map, with a manifest that agrees (or tells the old type and shape)."""
+    written = write_array(path, name, array)
+
+    def change(content: dict) -> None:
+        entry = content["files"][name]
+        entry.update(path=written.path, bytes=written.bytes, sha256=written.sha256)
+        if not as_told:
+            entry.update(dtype=written.dtype, shape=written.shape)
+
+    edit(path, change)
+
+
+def test_a_file_that_is_not_what_the_manifest_tells(copied: Path) -> None:
+    replace(copied, "keyframes/stamp_s", np.zeros(5, np.float32), as_told=True)
+    file, count = file_of(copied, "keyframes/stamp_s"), open_count(copied)
+    assert refused(copied) == f"{file} is damaged: it holds float32 of (5,), the map says float64 of ({count},); {MEND}"
+
+
+def open_count(path: Path) -> int:
+    return json.loads((path / "map.json").read_text())["counts"]["keyframes"]
+
+
+def test_an_array_of_another_type_than_maps_have(copied: Path) -> None:
+    replace(copied, "voxels/rgb", np.zeros((3, 3), np.float32))
+    assert refused(copied) == (
+        f"{copied}/voxels, rgb is float32 of (3, 3); a map has uint8 of (n, 3) there; build the map again with "
+        "--overwrite."
+    )
+
+
+def test_arrays_of_different_lengths(copied: Path) -> None:
+    replace(copied, "voxels/rgb", np.zeros((3, 3), np.uint8))
+    assert refused(copied).startswith(f"{copied}/voxels, rgb has shape (3, 3); n is ")
+
+
+def test_a_pickle_is_never_opened(copied: Path) -> None:
+    file = file_of(copied, "keyframes/stamp_s")
+    np.save(file, np.array([print], object), allow_pickle=True)
+
+    def change(content: dict) -> None:
+        import hashlib
+
+        entry = content["files"]["keyframes/stamp_s"]
+        entry.update(bytes=file.stat().st_size, sha256=hashlib.sha256(file.read_bytes()).hexdigest())
+
+    edit(copied, change)
+    assert f"{file} is damaged: it is not an array that numpy can read" in refused(copied)
+
+
+@pytest.mark.parametrize("name", ["../secret.npy", "/etc/passwd", "voxels/../../x.npy", "C:/x.npy", "..\\x.npy", ""])
+def test_a_name_that_leads_out_of_the_folder(copied: Path, name: str) -> None:
+    edit(copied, lambda content: content["files"]["voxels/rgb"].update(path=name))
+    assert refused(copied) == f"{copied} names a file outside itself ({name}); do not use a map from that source."
+
+
+def test_offsets_that_do_not_divide_their_rows(copied: Path) -> None:
+    offsets = np.load(file_of(copied, "keyframes/offsets"))
+    offsets[1] = offsets[-1] + 1
+    replace(copied, "keyframes/offsets", offsets)
+    assert f"{copied}/keyframes, offsets do not divide" in refused(copied)
+
+
+def test_counts_that_are_not_those_of_the_arrays(copied: Path) -> None:
+    edit(copied, lambda content: content["counts"].update(keyframes=10_000))
+    assert refused(copied).startswith(f"{copied}/map.json is damaged: its counts are not those of the arrays")
+
+
+def test_a_missing_array(copied: Path) -> None:
+    edit(copied, lambda content: content["files"].pop("voxels/hits"))
+    assert refused(copied) == f"{copied}/voxels is damaged: it has no hits; build the map again with --overwrite."
+
+
+def test_a_camera_that_is_none(copied: Path) -> None:
+    edit(copied, lambda content: content["rig"]["depth"].update(fx=-1.0))
+    assert refused(copied).startswith(f"{copied}/map.json is damaged: a camera needs finite numbers and positive focal")
+
+
+def test_settings_that_cannot_be(copied: Path) -> None:
+    edit(copied, lambda content: content["settings"]["frames"].update(step=0))
+    assert (
+        refused(copied) == f"{copied}/map.json is damaged: frames.step is 0; choose 1 or more; restore it from a copy."
+    )
+
+
+@given(hnp.arrays(np.int32, st.tuples(st.integers(0, 8), st.just(3)), elements=st.integers(-2, 2)))
+def test_the_order_of_voxels_is_told_exactly(index: np.ndarray) -> None:
+    rows = [tuple(row) for row in index.tolist()]
+    n = len(rows)
+    voxels = Voxels(index, *(np.zeros(0),) * 5)  # pyright: ignore[reportArgumentType]
+    if rows == sorted(set(rows)):
+        check_order(voxels, "here")
+    else:
+        with pytest.raises(MapError, match="not sorted"):
+            check_order(voxels, "here")
+    assert n == len(index)
+
+
+def test_a_map_replaced_while_it_is_opened_is_opened_anew(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Between reading map.json and the files, another build's commit removes the old files."""
+    from avlmaps.maps import stored
+
+    opened, calls = stored._opened, []
+
+    def slow(path: Path, info: object, verify: bool) -> object:
+        if not calls:
+            calls.append(build_map(Walk(12, seed=5), path, PROFILE, SETTINGS, progress=False, overwrite=True))
+        return opened(path, info, verify)  # pyright: ignore[reportArgumentType]
+
+    monkeypatch.setattr(stored, "_opened", slow)
+    monkeypatch.setattr("avlmaps.maps.build.open_stored", lambda path: None)
+    assert open_stored(copied).info.recording.fingerprint == Walk(12, seed=5).fingerprint
+
+
+def test_sounds_without_any_are_whole() -> None:
+    empty = {
+        "onset_s": np.zeros(0),
+        "offset_s": np.zeros(0),
+        "track_offsets": np.zeros(1, np.int64),
+        "track": np.zeros((0, 3), np.float32),
+        "feature_offsets": np.zeros(1, np.int64),
+        "feature": np.zeros((0, 7), np.float32),
+        "clips": (),
+    }
+    assert len(assembled(HeardSounds, empty, "here")) == 0
+    assert array_fields(HeardSounds) == [name for name in empty if name != "clips"]
