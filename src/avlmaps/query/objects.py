@@ -72,7 +72,7 @@ class Rivals:
         """Return which words do not compete because they name what is asked for; ``other`` always competes."""
         meaning = encoder.understood(asked)
         close = self.word_feature @ asked_feature >= cosine
-        same = [encoder.understood(word) == meaning for word in self.words]
+        same = [bool(meaning) and encoder.understood(word) == meaning for word in self.words]
         silent = close | np.array(same, bool)
         if self.has_other:
             silent[-1] = False

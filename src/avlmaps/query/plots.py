@@ -1,0 +1,212 @@
+"""Pictures: the map from above, the heat over it, the path walked, the sounds, the goals numbered."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float, Float32
+
+from avlmaps.core.errors import QueryError
+from avlmaps.query.heatmap import Factor, Heatmap, NearAnchors
+from avlmaps.query.level import Space
+from avlmaps.query.question import Goal, Modality
+from avlmaps.query.topdown import TopDown, walked
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from avlmaps.maps.stored import StoredMap
+
+_PAPER = "#f6f5f1"
+_INK = "#26292e"
+_PATH = "#2f6fb0"
+_SOUND = "#0b7a75"
+_COLOURMAP = "inferno"
+_PANEL_M = 4.6
+_DPI = 130
+
+
+def plot_heat(heat: Heatmap, path: Path, goals: Sequence[Goal]) -> Path:
+    """Write a picture of a heatmap: a panel for each factor, and one for their product.
+
+    Args:
+        heat: the heat.
+        path: PNG, JPEG, SVG or PDF, by its suffix.
+        goals: numbered in the last panel, best first.
+
+    Raises:
+        QueryError: the picture cannot be written there.
+    """
+    view = TopDown.of(heat.space)
+    panels = len(heat.factors) + (len(heat.factors) > 1)
+    figure, axes = _panels(view, panels)
+    for factor, ax in zip(heat.factors, axes, strict=False):
+        _draw_ground(ax, view, heat.space)
+        _draw_heat(ax, view, factor.values)
+        _draw_anchors(ax, factor)
+        note = "" if factor.found else " · not found"
+        ax.set_title(f"{_asked(factor)} ({factor.part.role}){note}", fontsize=10, color=_INK, loc="left")
+    if panels > 1:
+        _draw_ground(axes[-1], view, heat.space)
+        _draw_heat(axes[-1], view, heat.values)
+        title = f"all together · peak {heat.peak:.2f}" + ("" if heat.found else " · not found")
+        axes[-1].set_title(title, fontsize=10, color=_INK, loc="left", fontweight="bold")
+    _draw_goals(axes[-1], heat.space, goals)
+    _finish(figure, axes, with_heat=True)
+    return _save(figure, path)
+
+
+def plot_map(stored: "StoredMap", path: Path | str) -> Path:
+    """Write a picture of a map from above, with the path walked and the sounds heard.
+
+    Raises:
+        QueryError: the picture cannot be written there.
+    """
+    space = Space(stored.grid, stored.voxels.index, stored.up_in_world, stored)
+    view = TopDown.of(space)
+    figure, axes = _panels(view, 1)
+    _draw_ground(axes[0], view, space)
+    sounds = stored.sounds
+    for k in range(len(sounds)):
+        track = space.level(sounds.track[sounds.track_offsets[k] : sounds.track_offsets[k + 1]])
+        axes[0].plot(*track[:, :2].T, color=_SOUND, linewidth=5, alpha=0.45, solid_capstyle="round")
+        _mark(axes[0], track.mean(axis=0), f"{sounds.onset_s[k]:.0f} s", _SOUND)
+    if len(sounds):
+        axes[0].plot([], [], color=_SOUND, linewidth=5, alpha=0.45, label="where a sound was heard, and when")
+    title = f"{Path(stored.path).name}: {len(space):,} voxels, {len(sounds)} sounds"
+    axes[0].set_title(title, fontsize=10, color=_INK, loc="left", fontweight="bold")
+    _finish(figure, axes, with_heat=False)
+    return _save(figure, Path(path))
+
+
+def _panels(view: TopDown, count: int) -> "tuple[Figure, list[Axes]]":
+    """Return a figure with panels side by side, as large as the map's shape asks for."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    left, right, bottom, top = view.extent
+    aspect = float(np.clip((right - left) / max(top - bottom, 1e-6), 0.4, 2.5))
+    width = _PANEL_M * (1.35 if count == 1 else 1.0) * max(aspect, 0.8) / max(1.0, aspect / 1.6)
+    columns = 2 if count == 4 else min(count, 3)
+    rows = -(-count // columns)
+    figure = Figure(figsize=(width * columns + 0.9, (width / aspect + 1.0) * rows), dpi=_DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.set_facecolor("white")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for spare in axes[count:]:
+        spare.set_visible(False)
+    return figure, list(axes[:count])
+
+
+def _draw_ground(ax: "Axes", view: TopDown, space: Space) -> None:
+    """Draw the map's colours, a little washed out so that heat stands out, and the path walked."""
+    ground = np.where(view.seen[..., None], 0.72 * view.rgb / 255.0 + 0.28, _rgb(_PAPER))
+    ax.imshow(ground, origin="lower", extent=view.extent, interpolation="nearest")
+    ax.set_aspect("equal")
+    ax.set_facecolor(_PAPER)
+    ax.autoscale(False)
+    ax.set_xlabel("x (m)", fontsize=8, color=_INK)
+    ax.set_ylabel("y (m)", fontsize=8, color=_INK)
+    ax.tick_params(labelsize=7, colors=_INK, length=2)
+    for spine in ax.spines.values():
+        spine.set_color("#c9c7c0")
+    walk = walked(space)
+    if len(walk) > 1:
+        ax.plot(*walk[:, :2].T, color="white", linewidth=2.6, alpha=0.8)
+        ax.plot(*walk[:, :2].T, color=_PATH, linewidth=1.2, label="path of the camera")
+
+
+def _draw_heat(ax: "Axes", view: TopDown, values: Float32[np.ndarray, " n"]) -> None:
+    """Lay the heat over the ground. Its colour is absolute; it is the more opaque the nearer it is to the peak."""
+    from matplotlib import colormaps
+
+    heat = view.heat(values)
+    opacity = 0.85 * (heat / max(float(heat.max(initial=0.0)), 1e-9)) ** 0.8
+    colours = colormaps[_COLOURMAP](0.15 + 0.8 * heat)
+    colours[..., 3] = opacity
+    ax.imshow(colours, origin="lower", extent=view.extent, interpolation="nearest")
+
+
+def _draw_anchors(ax: "Axes", factor: Factor) -> None:
+    """Mark where the heat of a sound, an area or an image falls from."""
+    if not isinstance(factor, NearAnchors) or not len(factor.anchors):
+        return
+    anchors = factor.space.level(factor.anchors)
+    likely = np.asarray(factor.scores) >= 0.5
+    if factor.part.modality is Modality.IMAGE:
+        ax.plot(*anchors[0, :2], marker="^", color=_SOUND, markeredgecolor="white", markersize=11, linestyle="none")
+        return
+    what = "heard here" if factor.part.modality is Modality.SOUND else "seen from here"
+    if likely.any():
+        style = {"linestyle": "none", "marker": "o", "markersize": 4, "markeredgecolor": "white"}
+        ax.plot(*anchors[likely, :2].T, color=_SOUND, label=what, **style)
+
+
+def _draw_goals(ax: "Axes", space: Space, goals: Sequence[Goal]) -> None:
+    """Number the goals, and write their scores into the legend."""
+    for number, goal in enumerate(goals, 1):
+        x, y, z = space.level(np.array(goal.position))
+        _mark(ax, np.array([x, y, z]), str(number), _INK)
+        ax.plot([], [], " ", label=f"{number}: score {goal.score:.2f}, z = {z:.2f} m")
+
+
+def _mark(ax: "Axes", point_level: Float[np.ndarray, "3"], text: str, colour: str) -> None:
+    box = {"boxstyle": "circle,pad=0.25" if len(text) < 3 else "round,pad=0.25", "facecolor": colour}
+    ax.annotate(
+        text,
+        xy=(float(point_level[0]), float(point_level[1])),
+        xytext=(9, 9),
+        textcoords="offset points",
+        fontsize=8,
+        color="white",
+        fontweight="bold",
+        ha="center",
+        va="center",
+        bbox={**box, "edgecolor": "white", "linewidth": 1.0},
+        arrowprops={"arrowstyle": "-", "color": "white", "linewidth": 1.2, "shrinkA": 0, "shrinkB": 0},
+        zorder=6,
+    )
+    ax.plot(*point_level[:2], marker="o", markersize=5, color=colour, markeredgecolor="white", zorder=7)
+
+
+def _finish(figure: "Figure", axes: "Sequence[Axes]", with_heat: bool) -> None:
+    """Add the legends and the scale of heat."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap
+
+    for ax in axes:
+        if ax.get_legend_handles_labels()[1]:
+            ax.legend(
+                fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.11), ncols=2, frameon=False, labelcolor=_INK
+            )
+    if with_heat:
+        shown = ListedColormap(colormaps[_COLOURMAP](0.15 + 0.8 * np.linspace(0.0, 1.0, 256)))
+        bar = figure.colorbar(ScalarMappable(cmap=shown), ax=list(axes), shrink=0.7, pad=0.015, fraction=0.04)
+        bar.set_label("heat", fontsize=8, color=_INK)
+        bar.ax.tick_params(labelsize=7, colors=_INK)
+        bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
+
+
+def _asked(factor: Factor) -> str:
+    query = Path(factor.part.query).name if factor.part.is_file else factor.part.query
+    return f"{factor.part.modality}: {query}"
+
+
+def _rgb(colour: str) -> Float[np.ndarray, "3"]:
+    from matplotlib.colors import to_rgb
+
+    return np.array(to_rgb(colour))
+
+
+def _save(figure: "Figure", path: Path) -> Path:
+    if path.suffix.lower().lstrip(".") not in figure.canvas.get_supported_filetypes():
+        raise QueryError(f"A picture cannot be written as {path.name!r}; give it the suffix .png, .jpg, .svg or .pdf.")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path)
+    except OSError as fault:
+        raise QueryError(f"The picture {path} cannot be written ({fault.strerror}); choose another place.") from fault
+    return path
