@@ -16,7 +16,7 @@ import numpy as np
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import write_bytes_atomically
-from avlmaps.maps.shards import FileInfo, checked_path, read_array, write_array, write_copy, writing_into
+from avlmaps.maps.shards import FileInfo, checked_path, read_array, sync_names, write_array, write_copy, writing_into
 
 DONE = "done.json"
 
@@ -74,6 +74,7 @@ def save_checkpoint(
     done = _Done(key=key, facts=msgspec.Raw(msgspec.json.encode(facts)), files=written)
     with writing_into(folder):
         folder.mkdir(parents=True, exist_ok=True)
+        sync_names(folder, written.values())
         write_bytes_atomically(folder / DONE, msgspec.json.encode(done))
 
 

@@ -110,13 +110,24 @@ class UpInfo(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         direction: unit vector.
-        known_from: the recording said so, or it was found from the planes in view.
-        support: for a found one the share of the surface that agrees, in [0, 1]; 1 for a known one.
+        known_from: the recording's word, the planes in view, or (a guess) how the camera was held.
+        support: for planes the share of the surface that agrees, in [0, 1]; 1 for a known one, 0 for a guess.
     """
 
     direction: Vector
-    known_from: Literal["recording", "planes"]
-    support: float = 1.0
+    known_from: Literal["recording", "planes", "camera"]
+    support: float
+
+    @classmethod
+    def of(
+        cls,
+        direction: Float[np.ndarray, "3"],
+        known_from: Literal["recording", "planes", "camera"],
+        support: float,
+    ) -> "UpInfo":
+        """Return the entry for a direction of any length but zero."""
+        x, y, z = (float(value) for value in direction / np.linalg.norm(direction))
+        return cls(direction=(x, y, z), known_from=known_from, support=support)
 
     def vector(self) -> Float[np.ndarray, "3"]:
         """Return the direction as an array."""

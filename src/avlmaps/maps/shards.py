@@ -90,10 +90,16 @@ def _write(folder: Path, name: str, suffix: str, chunks: Iterable[bytes | memory
                 size, checksum = _hashed(stream, chunks)
             final = stem.with_name(f"{stem.name}-{checksum[:16]}{suffix}")
             partial.replace(final)
-            sync_folder(stem.parent)
         finally:
             partial.unlink(missing_ok=True)
     return final.relative_to(folder).as_posix(), size, checksum
+
+
+def sync_names(folder: Path, files: Iterable[FileInfo]) -> None:
+    """Put the names of written files on the disk; to be called before the manifest that tells of them is written."""
+    for parent in sorted({(folder / file.path).parent for file in files}):
+        sync_folder(parent)
+        sync_folder(parent.parent)
 
 
 def _hashed(stream: BinaryIO, chunks: Iterable[bytes | memoryview]) -> tuple[int, str]:

@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -70,40 +71,33 @@ class KeptSounds:
 
 def find_up(plan: Plan) -> tuple[UpInfo, float]:
     """Return which way is up, from the recording or from the planes in view, and the seconds that it took."""
-    known = plan.recording.up_in_world
-    if known is not None:
-        return _up_info(known, known_from_recording=True), 0.0
+    if plan.recording.up_in_world is not None:
+        return UpInfo.of(plan.recording.up_in_world, "recording", 1.0), 0.0
     key = key_of("up", BUILD_VERSION, plan.recording.fingerprint, plan.settings.gravity, plan.settings.seed)
     folder = plan.folder("up", key)
     found = find_checkpoint(folder, _UpFacts, key)
     if found is None:
-        from avlmaps.maps.gravity import find_up as up_of_planes
-
         begin = perf_counter()
-        up = up_of_planes(_spread(plan.recording, plan.settings.gravity.frames), plan.rng(_GRAVITY))
-        info = _up_info(up.direction, known_from_recording=False, support=float(up.support))
-        save_checkpoint(folder, key, _UpFacts(info, perf_counter() - begin), {})
+        save_checkpoint(folder, key, _UpFacts(_look_for_up(plan), perf_counter() - begin), {})
         found = load_checkpoint(folder, _UpFacts, key)
     return found.facts.up, found.facts.elapsed_s
 
 
-def _up_info(direction: np.ndarray, *, known_from_recording: bool, support: float = 1.0) -> UpInfo:
-    x, y, z = (float(value) for value in direction / np.linalg.norm(direction))
-    return UpInfo(direction=(x, y, z), known_from="recording" if known_from_recording else "planes", support=support)
+def _look_for_up(plan: Plan) -> UpInfo:
+    from avlmaps.maps.gravity import find_up as up_of_planes
+
+    try:
+        up = up_of_planes(_spread(plan.recording, plan.settings.gravity.frames), plan.rng(_GRAVITY))
+    except RecordingError:  # too little smooth surface: people and robots hold cameras upright, more or less
+        return UpInfo.of(-plan.recording.world_from_camera[:, :3, 1].mean(axis=0), "camera", 0.0)
+    return UpInfo.of(up.direction, "planes", float(up.support))
 
 
 def _spread(recording: Recording, count: int) -> Iterator[Frame]:
-    """Read frames evenly spread over the recording, passing over those that cannot be read, unless none can."""
-    indices = np.unique(np.linspace(0, len(recording) - 1, count).round().astype(int))
-    read, last_fault = 0, None
-    for index in indices:
-        try:
+    """Read frames evenly spread over the recording; what cannot be read is told when it comes to fusing."""
+    for index in np.unique(np.linspace(0, len(recording) - 1, count).round().astype(int)):
+        with suppress(RecordingError):
             yield recording.frame(int(index))
-            read += 1
-        except RecordingError as fault:
-            last_fault = fault
-    if read == 0 and last_fault is not None:
-        raise last_fault
 
 
 def fuse(plan: Plan, given: Sequence[Path | str]) -> list[Part]:
@@ -270,7 +264,9 @@ def _box(voxels: Voxels, voxel_size_m: float) -> Box:
 
 
 def _notices(plan: Plan, up: UpInfo, bad: int) -> Iterator[str]:
-    if up.known_from == "planes" and up.support < _GUESS:
+    if up.known_from == "camera":
+        yield "Which way is up is a guess from how the camera was held: too little smooth surface is in view."
+    elif up.support < _GUESS:
         yield f"Which way is up is a guess: only {up.support:.0%} of the surface in view agrees with it."
     if bad:
         yield f"{bad} of {len(plan.recording)} frames could not be read and were left out (bad_frames in map.json)."

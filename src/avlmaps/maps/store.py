@@ -15,7 +15,7 @@ import numpy as np
 from avlmaps.maps.checks import array_fields
 from avlmaps.maps.lock import LOCK
 from avlmaps.maps.manifest import MANIFEST, MapInfo, write_manifest
-from avlmaps.maps.shards import FileInfo, write_array, write_copy
+from avlmaps.maps.shards import FileInfo, sync_names, write_array, write_copy
 from avlmaps.maps.stored import CLIPS, PARTS, STATE
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 
@@ -58,6 +58,7 @@ def write_map(path: Path, content: MapContent, info: MapInfo) -> MapInfo:
     files = dict(_write_files(path, content))
     size = sum(file.bytes for file in files.values())
     whole = msgspec.structs.replace(info, files=dict(sorted(files.items())), bytes=size)
+    sync_names(path, files.values())
     write_manifest(path, whole)
     sweep(path, whole)
     return whole
