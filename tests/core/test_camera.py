@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from avlmaps.core.camera import Pinhole, Rig
 from hypothesis import given
 from hypothesis import strategies as st
+
+from avlmaps.core.camera import Pinhole, Rig
 
 cameras = st.builds(
     Pinhole,

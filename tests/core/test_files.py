@@ -4,6 +4,7 @@ import hashlib
 from pathlib import Path
 
 import pytest
+
 from avlmaps.core.files import replaced_atomically, sha256_of_file, sync_folder, write_bytes_atomically
 
 

@@ -4,11 +4,12 @@ import re
 
 import numpy as np
 import pytest
-from avlmaps.core import poses
-from avlmaps.core.errors import RecordingError
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+
+from avlmaps.core import poses
+from avlmaps.core.errors import RecordingError
 
 
 @st.composite

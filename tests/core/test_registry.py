@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import pytest
+
 from avlmaps.core import registry
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind

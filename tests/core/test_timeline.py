@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from avlmaps.core import poses, timeline
-from avlmaps.core.timeline import Trajectory, associate, gap_notices, in_order
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+
+from avlmaps.core import poses, timeline
+from avlmaps.core.timeline import Trajectory, associate, gap_notices, in_order
 
 
 @st.composite
@@ -50,7 +51,7 @@ def test_slerp_of_a_quarter_turn_is_an_eighth_in_the_middle():
 def test_past_its_ends_a_trajectory_is_held_a_little_and_then_refused():
     trajectory = Trajectory(np.array([1.0, 1.1]), np.stack([np.eye(4), np.eye(4)]))
     assert np.array_equal(trajectory.at(np.array([0.97, 1.13])), np.stack([np.eye(4), np.eye(4)]))
-    with pytest.raises(ValueError, match="0.2 s outside the trajectory; at most 0.04 s passes"):
+    with pytest.raises(ValueError, match=r"0\.2 s outside the trajectory; at most 0.04 s passes"):
         trajectory.at(np.array([1.3]))
     assert trajectory.covers(np.array([0.9, 1.05, 1.3])).tolist() == [False, True, False]
 

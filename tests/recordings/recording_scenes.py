@@ -1,10 +1,12 @@
 """A small scene that the tests of the readers write in each format: five pictures of 64x48, of which all is known."""
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
+
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 
@@ -61,10 +63,9 @@ def write_folder(path: Path, count: int = 5, rate_hz: float = 10.0) -> Path:
     """Our own format as a stranger would write it by hand: recording.json, rgb/, depth/, poses.csv and no more."""
     c = CAMERA
     path.mkdir(parents=True)
-    (path / "recording.json").write_text(
-        '{"schema_version": 1, "intrinsics": {"rgb": {"fx": %g, "fy": %g, "cx": %g, "cy": %g, "width": %d, '
-        '"height": %d}}, "up_in_world": [0, 0, 1]}' % (c.fx, c.fy, c.cx, c.cy, c.width, c.height)
-    )
+    intrinsics = {"rgb": {"fx": c.fx, "fy": c.fy, "cx": c.cx, "cy": c.cy, "width": c.width, "height": c.height}}
+    described = {"schema_version": 1, "intrinsics": intrinsics, "up_in_world": [0, 0, 1]}
+    (path / "recording.json").write_text(json.dumps(described))
     lines = ["stamp_s,tx,ty,tz,qx,qy,qz,qw"]
     for index, taken in enumerate(shots(count)):
         save_rgb(path / "rgb" / f"{index:06d}.png", taken.rgb)

@@ -3,12 +3,12 @@
 import hashlib
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 
 from avlmaps.core import poses, timeline
 from avlmaps.core.camera import Pinhole, Rig
@@ -17,6 +17,7 @@ from avlmaps.recordings import images
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report
 from avlmaps.recordings.types import Frame, Recording
+from avlmaps.recordings.video import VideoFrames
 
 _SHOWN = 3
 
@@ -27,10 +28,11 @@ class Shots:
 
     Attributes:
         names: what the recording calls each frame.
-        colour: each colour file, below the recording's folder.
+        colour: each colour file, below the recording's folder; empty where colour is a video.
         depth: each depth file, below the recording's folder; empty where the recording has no depth at all.
         stamps_s: when, on any clock.
         world_from_camera: (n, 4, 4); NaN or infinity where tracking was lost.
+        video_frames: which frame of the video each is; empty where colour is files.
     """
 
     names: Sequence[str]
@@ -38,6 +40,7 @@ class Shots:
     depth: Sequence[str]
     stamps_s: Float[np.ndarray, " n"]
     world_from_camera: Float[np.ndarray, "n 4 4"]
+    video_frames: Sequence[int] = ()
 
     def take(self, index: np.ndarray) -> "Shots":
         """Return some of the shots."""
@@ -46,10 +49,11 @@ class Shots:
         rows: list[int] = index.tolist()
         return Shots(
             [self.names[i] for i in rows],
-            [self.colour[i] for i in rows],
+            [self.colour[i] for i in rows] if len(self.colour) else [],
             [self.depth[i] for i in rows] if len(self.depth) else [],
             self.stamps_s[index],
             self.world_from_camera[index],
+            [self.video_frames[i] for i in rows] if len(self.video_frames) else (),
         )
 
 
@@ -103,7 +107,7 @@ def _orthonormal(shots: Shots, report: Report, pose_files: Sequence[Path]) -> Sh
                 report(Fault(str(error), pose_files[i]))
         shots = shots.take(np.array(kept, np.int64))
         mended = np.array(good).reshape(-1, 4, 4)
-    return Shots(shots.names, shots.colour, shots.depth, shots.stamps_s, mended)
+    return replace(shots, world_from_camera=mended)
 
 
 def _some(names: Sequence[str]) -> str:
@@ -123,6 +127,7 @@ class FileRecording(Recording):
         up_in_world: unit vector, or None where it is not known.
         audio: the sound track on the frames' clock, or None.
         notices: one sentence for each thing worth knowing.
+        video: the colour pictures, where they are one video.
     """
 
     path: Path
@@ -133,6 +138,7 @@ class FileRecording(Recording):
     up_in_world: Float[np.ndarray, "3"] | None = None
     audio: AudioTrack | None = None
     notices: tuple[str, ...] = ()
+    video: VideoFrames | None = None
     stamps_s: Float[np.ndarray, " n"] = field(init=False)
     world_from_camera: Float[np.ndarray, "n 4 4"] = field(init=False)
 
@@ -153,18 +159,25 @@ class FileRecording(Recording):
             index=index,
             name=self.name(index),
             stamp_s=float(self.stamps_s[index]),
-            rgb=images.read_colour(self.path / self.shots.colour[index], self.rig.rgb),
+            rgb=self._colour(index),
             depth_m=depth_m,
             world_from_camera=self.world_from_camera[index],
             rig=self.rig,
         )
+
+    def _colour(self, index: int) -> UInt8[np.ndarray, "h w 3"]:
+        if self.video is not None:
+            return self.video.picture(self.shots.video_frames[index])
+        return images.read_colour(self.path / self.shots.colour[index], self.rig.rgb)
 
     def name(self, index: int) -> str:
         """Return what the recording calls a frame."""
         return self.shots.names[index]
 
     def colour_file(self, index: int) -> Path | None:
-        """Return the frame's colour file."""
+        """Return the frame's colour file, where it has one of its own."""
+        if self.video is not None:
+            return None
         return self.path / self.shots.colour[index]
 
     def depth_file(self, index: int) -> Path | None:
@@ -186,7 +199,8 @@ class FileRecording(Recording):
         for numbers in (up, self.stamps_s, self.world_from_camera):
             # Rounded, so that another machine's last bit makes no other recording; + 0.0 turns -0.0 into 0.0.
             digest.update(np.ascontiguousarray(np.round(numbers, 9) + 0.0, "<f8").tobytes())
-        for name in (*self.shots.colour, *self.shots.depth):
+        video = [self.video.path.name] if self.video is not None else []
+        for name in (*video, *self.shots.colour, *self.shots.depth):
             digest.update(f"{name}\0{_size(self.path / name)}\n".encode())
         if self.audio is not None:
             digest.update(f"{self.audio.path.name}\0{_size(self.audio.path)}\0{self.audio.start_s}".encode())

@@ -1,20 +1,22 @@
 """Reading our own folder format; `layout.py` tells what is in it, `writer.py` writes it."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from avlmaps.core import poses, timeline
-from avlmaps.core.errors import RecordingError
+from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.file_recording import FileRecording, Shots, find_audio, list_names, settle
 from avlmaps.recordings.layout import Description
 from avlmaps.recordings.tables import read_table, text_lines
+from avlmaps.recordings.video import VideoFrames
 
 # Stamps beyond this are a date (seconds since 1970), not seconds from the start of a recording.
 _DATE_S = 1e8
@@ -39,10 +41,12 @@ def open_folder(path: Path, report: Report = stop_at_first) -> FileRecording:
     if description is None:
         raise RecordingError(f"{path / layout.DESCRIPTION} cannot be used, so the recording cannot be opened.")
     known = _read_poses(path, report)
-    found = _find_pictures(path, description, known, report)
-    shots, notices, start_s = _pose_pictures(found, known, description)
+    video = _find_video(path, description)
+    found = _find_pictures(path, description, known, video, report)
+    shots, notices, start_s = _pose_pictures(found, known)
+    if video is not None:
+        shots = replace(shots, colour=[], video_frames=range(len(shots.names)))
     shots, more = settle(path, shots, report, pose_file=None)
-    audio = find_audio(path)
     audio_start_s = description.audio_start_s - (start_s if description.audio_start_s > _DATE_S else 0.0)
     up = description.up_in_world
     return FileRecording(
@@ -52,9 +56,21 @@ def open_folder(path: Path, report: Report = stop_at_first) -> FileRecording:
         shots=shots,
         depth_units=description.depth_units_per_m,
         up_in_world=None if up is None else np.array(up) / np.linalg.norm(up),
-        audio=AudioTrack.open(audio, start_s=audio_start_s) if audio else None,
+        audio=_open_audio(path, audio_start_s, video),
         notices=(*notices, *more),
+        video=video,
     )
+
+
+def _open_audio(path: Path, start_s: float, video: VideoFrames | None) -> AudioTrack | None:
+    """Open the sound track: a file of its own, else the video's (most have none, which is no fault)."""
+    file = find_audio(path)
+    if file is not None:
+        return AudioTrack.open(file, start_s=start_s)
+    if video is not None:
+        with suppress(AudioError):
+            return AudioTrack.open(video.path, start_s=start_s)
+    return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,9 +125,32 @@ def _read_poses(folder: Path, report: Report) -> _Poses:
     return _Poses(stamps_s, pose, usable)
 
 
-def _find_pictures(folder: Path, description: Description, known: _Poses, report: Report) -> _Pictures:
+def _find_video(folder: Path, description: Description) -> VideoFrames | None:
+    """Open ``rgb.mp4`` (or another container) where there is no ``rgb/``."""
+    files = [folder / f"rgb{suffix}" for suffix in layout.VIDEO_SUFFIXES]
+    file = next((f for f in files if f.is_file()), None)
+    if file is None or (folder / "rgb").is_dir():
+        return None
+    video, camera = VideoFrames(file), description.intrinsics.rgb
+    if (video.width, video.height) != (camera.width, camera.height):
+        raise RecordingError(
+            f"{file} is {video.width}x{video.height}, but {layout.DESCRIPTION} says {camera.width}x{camera.height}; "
+            "give the intrinsics of the video's own size."
+        )
+    return video
+
+
+def _find_pictures(
+    folder: Path, description: Description, known: _Poses, video: VideoFrames | None, report: Report
+) -> _Pictures:
     """Find the pictures and their stamps: by frames.csv, else row by row with poses.csv, else by the rate."""
-    found = {name.rsplit(".", 1)[0]: name for name in list_names(folder / "rgb", layout.COLOUR_SUFFIXES)}
+    where, suffixes = ("rgb", layout.COLOUR_SUFFIXES) if video is None else ("depth", (".png",))
+    found = {name.rsplit(".", 1)[0]: name for name in list_names(folder / where, suffixes)}
+    if video is not None and len(found) != len(video):
+        raise RecordingError(
+            f"{video.path} has {len(video)} frames, but {folder / 'depth'} has {len(found)} pictures; "
+            "each frame needs its depth."
+        )
     path = folder / layout.FRAMES
     if path.exists():
         rows = list(_listed(path, report))
@@ -119,7 +158,7 @@ def _find_pictures(folder: Path, description: Description, known: _Poses, report
         stamps_s: Float[np.ndarray, " n"] | None = np.array([stamp for _, stamp in rows], np.float64)
     else:
         names = list(found)
-        stamps_s = _stamps_without_list(folder, names, description, known, report)
+        stamps_s = video.stamps_s if video else _stamps_without_list(folder, names, description, known, report)
     colour = [f"rgb/{found.get(name, name + '.png')}" for name in names]
     if description.frames is not None and description.frames != len(names):
         where = path.name if path.exists() else "rgb/"
@@ -156,7 +195,7 @@ def _stamps_without_list(
     return np.arange(len(names), dtype=np.float64)
 
 
-def _pose_pictures(found: _Pictures, known: _Poses, description: Description) -> tuple[Shots, tuple[str, ...], float]:
+def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, tuple[str, ...], float]:
     """Give every picture a pose: its own row's, or one interpolated at its stamp (NaN where none can be told)."""
     notices: list[str] = []
     stamps_s = known.stamps_s if found.stamps_s is None else found.stamps_s

@@ -1,12 +1,13 @@
 """What `recording.json` of our own folder format holds, and the names of the files beside it.
 
 recording.json    this file's Description; written last, so that a folder without it is unfinished
-rgb/              colour pictures, PNG or JPEG
+rgb/              colour pictures, PNG or JPEG; or one video instead, rgb.mp4 (.mkv, .mov, .webm, .avi)
 depth/            16-bit PNG of the same names; 0 and 65535 say that nothing was measured
 poses.csv         stamp_s,tx,ty,tz,qx,qy,qz,qw: poses of the depth camera, at any rate
 frames.csv        name,stamp_s: when each picture was taken. It may be left out where poses.csv has one row for
-                  each picture (in the order of the names), or where rgb_rate_hz is given and names are numbers
-audio.flac        or .wav, .ogg: the sound track
+                  each picture (in the order of the names), where rgb_rate_hz is given and names are numbers, or
+                  where a video's own stamps tell; a video's frames are the depth pictures in the order of names
+audio.flac        or .wav, .ogg: the sound track; without it that of the video
 events.csv, semantic/, objects.json   truth, which mapping never reads
 """
 
@@ -27,6 +28,7 @@ POSES = "poses.csv"
 FRAMES = "frames.csv"
 POSES_HEADER = "stamp_s,tx,ty,tz,qx,qy,qz,qw"
 FRAMES_HEADER = "name,stamp_s"
+VIDEO_SUFFIXES = (".mp4", ".mkv", ".mov", ".webm", ".avi")
 COLOUR_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 

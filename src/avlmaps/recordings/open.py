@@ -18,7 +18,6 @@ from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Report, stop_at_first
 from avlmaps.recordings.types import Recording
 
-_VIDEO_SUFFIXES = (".mp4", ".mkv", ".mov", ".webm", ".avi")
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
 # A folder of a million files must not be listed to be recognised.
 _LOOKED_AT = 2000
@@ -67,10 +66,6 @@ def _is_rosbag(path: Path) -> bool:
     return (path / "metadata.yaml").exists() and _some_name(path, "*.db3", "*.mcap", "*.db3.*", "*.mcap.*")
 
 
-def _is_video(path: Path) -> bool:
-    return path.is_file() and path.suffix.lower() in _VIDEO_SUFFIXES
-
-
 def _some_name(folder: Path, *patterns: str) -> bool:
     if not folder.is_dir():
         return False
@@ -80,7 +75,12 @@ def _some_name(folder: Path, *patterns: str) -> bool:
 
 _HERE = "avlmaps.recordings"
 FORMATS: tuple[Format, ...] = (
-    Format("folder", "recording.json with rgb/, depth/ and poses.csv", _is_folder, f"{_HERE}.folder:open_folder"),
+    Format(
+        "folder",
+        "recording.json with rgb/ (or rgb.mp4), depth/ and poses.csv",
+        _is_folder,
+        f"{_HERE}.folder:open_folder",
+    ),
     Format(
         "7scenes",
         "frame-000000.color.jpg or .png, .depth.png and .pose.txt",
@@ -106,13 +106,6 @@ FORMATS: tuple[Format, ...] = (
         "a .bag or .mcap file, or a ROS 2 bag's folder with metadata.yaml",
         _is_rosbag,
         f"{_HERE}.rosbag:open_rosbag",
-        tells_faults=False,
-    ),
-    Format(
-        "video",
-        "a video file (.mp4, .mkv, .mov, .webm, .avi)",
-        _is_video,
-        f"{_HERE}.video:open_video",
         tells_faults=False,
     ),
 )
@@ -159,6 +152,11 @@ def find_format(path: Path, name: str = "auto") -> Format:
 
 def _unknown(path: Path) -> str:
     formats = "; ".join(f"{f.name}: {f.looks_for}" for f in FORMATS)
+    if path.is_file() and path.suffix.lower() in layout.VIDEO_SUFFIXES:
+        return (
+            f"{path} is a video, which has neither depth nor poses; make a folder of it, as rgb{path.suffix.lower()} "
+            f"beside {layout.DESCRIPTION}, {layout.POSES} and depth/, or give it as the sound track of a recording."
+        )
     if path.is_file():
         return f"{path} is a file of no known format; known are: {formats}."
     with os.scandir(path) as entries:

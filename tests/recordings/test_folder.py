@@ -1,0 +1,386 @@
+"""Our own folder format: written by hand, written by the writer, cut short, and asked for a lot of frames."""
+
+import json
+import re
+import tracemalloc
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from recording_scenes import CAMERA, metres, pose_line, rig, save_depth, shot, shots, write_folder, write_seven_scenes
+
+import avlmaps
+from avlmaps.core import poses
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.audio import Sound
+from avlmaps.recordings.open import open_recording
+from avlmaps.recordings.types import Frame, Recording
+from avlmaps.recordings.writer import RecordingWriter, write_recording
+
+
+def _frame(index: int, stamp_s: float, name: str | None = None) -> Frame:
+    taken = shot(index)
+    return Frame(
+        index, name or f"{index:06d}", stamp_s, taken.rgb, metres(taken.depth_mm), taken.world_from_camera, rig()
+    )
+
+
+def _describe(path: Path, **changes: object) -> None:
+    described = json.loads((path / "recording.json").read_text())
+    (path / "recording.json").write_text(json.dumps(described | changes))
+
+
+def _assert_same_frames(recording: Recording, count: int = 5) -> None:
+    assert len(recording) == count
+    for index, frame in enumerate(recording.frames()):
+        taken = shot(index)
+        assert np.array_equal(frame.rgb, taken.rgb)
+        assert np.array_equal(frame.depth_m, metres(taken.depth_mm))
+        assert np.allclose(frame.world_from_camera, taken.world_from_camera, atol=1e-12)
+
+
+def test_a_folder_written_by_hand_opens(tmp_path: Path):
+    recording = avlmaps.open_recording(write_folder(tmp_path / "walk"))
+    _assert_same_frames(recording)
+    assert recording.format == "folder" and recording.audio is None and recording.notices == ()
+    assert recording.rig.rgb == CAMERA and recording.rig.registered
+    assert np.array_equal(recording.up_in_world, [0.0, 0.0, 1.0])
+    assert recording.stamps_s.tolist() == [0.0, 0.1, 0.2, 0.3, 0.4]
+    assert recording.frame(3).name == recording.name(3) == "000003"
+
+
+def test_what_the_writer_writes_is_read_back(tmp_path: Path):
+    rng = np.random.default_rng(0)
+    sound = Sound((0.1 * rng.standard_normal(8000)).astype(np.float32), 8000)
+    rotated = Rig(CAMERA, CAMERA, shot(2).world_from_camera)
+    with RecordingWriter(tmp_path / "walk", rotated, up_in_world=np.array([0.0, -1.0, 0.0])) as writer:
+        for index, stamp_s in enumerate([0.5, 0.75, 1.25]):
+            taken = shot(index)
+            depth_m, pose = metres(taken.depth_mm), taken.world_from_camera
+            writer.add(Frame(index, f"kitchen-{9 - index}", stamp_s, taken.rgb, depth_m, pose, rotated))
+        writer.set_audio(sound, start_s=0.25)
+    recording = open_recording(tmp_path / "walk")
+    _assert_same_frames(recording, 3)
+    assert recording.stamps_s.tolist() == [0.5, 0.75, 1.25]
+    assert [recording.name(i) for i in range(3)] == ["kitchen-9", "kitchen-8", "kitchen-7"]
+    assert np.array_equal(recording.up_in_world, [0.0, -1.0, 0.0])
+    assert np.array_equal(recording.rig.rgb_from_depth, rotated.rgb_from_depth)
+    assert recording.audio is not None and recording.audio.start_s == 0.25
+    assert recording.audio.duration_s == pytest.approx(1.0)
+
+
+def test_colour_may_be_written_as_jpeg(tmp_path: Path):
+    with RecordingWriter(tmp_path / "walk", rig(), colour="jpg") as writer:
+        writer.add(_frame(0, 0.0))
+    frame = open_recording(tmp_path / "walk").frame(0)
+    assert (tmp_path / "walk/rgb/000000.jpg").exists()
+    assert np.abs(frame.rgb.astype(int) - shot(0).rgb).mean() < 12
+
+
+def test_depth_beyond_the_range_of_the_format_is_left_out(tmp_path: Path):
+    frame = _frame(0, 0.0)
+    frame.depth_m[5, 5], frame.depth_m[6, 6] = 80.0, 65.534
+    with RecordingWriter(tmp_path / "walk", rig()) as writer:
+        writer.add(frame)
+    depth_m = open_recording(tmp_path / "walk").frame(0).depth_m
+    assert depth_m[5, 5] == 0.0 and depth_m[6, 6] == pytest.approx(65.534)
+
+
+def test_a_recording_that_was_cut_short_is_refused_and_can_be_written_again(tmp_path: Path):
+    with pytest.raises(RuntimeError), RecordingWriter(tmp_path / "walk", rig()) as writer:
+        writer.add(_frame(0, 0.0))
+        raise RuntimeError("the robot fell over")
+    sentence = f"{tmp_path / 'walk'} was never finished: whatever wrote it stopped before its end; record it again."
+    with pytest.raises(RecordingError, match=re.escape(sentence)):
+        open_recording(tmp_path / "walk")
+    with RecordingWriter(tmp_path / "walk", rig()) as writer:
+        writer.add(_frame(1, 0.0, "other"))
+    recording = open_recording(tmp_path / "walk")
+    assert len(recording) == 1 and recording.name(0) == "other"
+    assert not (tmp_path / "walk/rgb/000000.png").exists()
+
+
+def test_a_folder_that_holds_something_is_never_written_into(tmp_path: Path):
+    write_folder(tmp_path / "walk")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(RecordingError, match=r"walk is not empty \(it holds .*\); choose another folder or empty it."):
+        RecordingWriter(tmp_path / "walk", rig()).__enter__()
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("second", "sentence"),
+    [
+        (("000000", 1.0), "cannot hold a frame called '000000': the name is taken or no file name."),
+        (("a/b", 1.0), "cannot hold a frame called 'a/b'"),
+        (("000001", 0.0), "Frame 000001 has the stamp 0.0 s after 0.0 s; stamps must rise."),
+        (("000001", float("nan")), "Frame 000001 has the stamp nan s"),
+    ],
+)
+def test_the_writer_refuses_what_could_not_be_read_back(tmp_path: Path, second: tuple[str, float], sentence: str):
+    with RecordingWriter(tmp_path / "walk", rig()) as writer:
+        writer.add(_frame(0, 0.0))
+        with pytest.raises(RecordingError, match=re.escape(sentence)):
+            writer.add(_frame(1, second[1], second[0]))
+    assert len(open_recording(tmp_path / "walk")) == 1
+
+
+def test_a_recording_without_frames_is_not_finished(tmp_path: Path):
+    with (
+        pytest.raises(RecordingError, match=r"walk got no frame, so there is no recording to finish."),
+        RecordingWriter(tmp_path / "walk", rig()),
+    ):
+        pass
+
+
+def test_poses_at_another_rate_are_interpolated_at_the_frames(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    (path / "frames.csv").write_text("name,stamp_s\n" + "".join(f"{i:06d},{0.05 + 0.1 * i}\n" for i in range(5)))
+    lines = [f"{0.1 * i}, {0.1 * i}, 0, 0, 0, 0, {np.sin(0.05 * i)}, {np.cos(0.05 * i)}" for i in range(8)]
+    (path / "poses.csv").write_text("\n".join(lines))
+    recording = open_recording(path)
+    assert np.allclose(recording.world_from_camera[:, 0, 3], [0.05, 0.15, 0.25, 0.35, 0.45])
+    angle = np.arctan2(recording.world_from_camera[:, 1, 0], recording.world_from_camera[:, 0, 0])
+    assert np.allclose(angle, [0.05, 0.15, 0.25, 0.35, 0.45])
+
+
+def test_frames_outside_the_poses_are_left_out_and_told(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    (path / "poses.csv").write_text("".join(f"{t},0,0,0,0,0,0,1\n" for t in (0.0, 0.1, 0.2)))
+    _describe(path, rgb_rate_hz=10.0)
+    recording = open_recording(path)
+    assert recording.stamps_s.tolist() == [0.0, 0.1, 0.2]
+    assert recording.notices[0] == "2 frame(s) lie outside the poses of poses.csv or in a gap of them."
+
+
+def test_pictures_and_poses_that_do_not_match_are_told_with_what_to_add(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    (path / "poses.csv").write_text("0,0,0,0,0,0,0,1\n")
+    sentence = (
+        f"{path} has 5 pictures in rgb/ and 1 lines in poses.csv; add frames.csv (name,stamp_s), or rgb_rate_hz in "
+        "recording.json and numbers as names."
+    )
+    with pytest.raises(RecordingError, match=re.escape(sentence)):
+        open_recording(path)
+
+
+def test_stamps_that_are_dates_are_counted_from_the_first(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    lines = [f"{1.7e9 + 0.1 * i},{pose_line(s.world_from_camera).replace(' ', ',')}" for i, s in enumerate(shots())]
+    (path / "poses.csv").write_text("\n".join(lines))
+    recording = open_recording(path)
+    assert np.allclose(recording.stamps_s, [0.0, 0.1, 0.2, 0.3, 0.4], atol=1e-6)
+    assert recording.notices == ("The stamps are dates; time 0 is the first frame's, 1700000000.000000 s since 1970.",)
+
+
+def test_frames_without_a_pose_are_left_out_and_told(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    lines = (path / "poses.csv").read_text().splitlines()
+    lines[2] = "0.1,nan,nan,nan,nan,nan,nan,nan"
+    (path / "poses.csv").write_text("\n".join(lines))
+    recording = open_recording(path)
+    assert [recording.name(i) for i in range(len(recording))] == ["000000", "000002", "000003", "000004"]
+    assert recording.notices == ("1 frame(s) without a pose (lost tracking) are left out: 000001.",)
+    assert np.allclose(recording.frame(1).world_from_camera, shot(2).world_from_camera)
+
+
+def test_a_clock_that_was_set_back_costs_the_shorter_part_and_no_more(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    lines = (path / "poses.csv").read_text().splitlines()
+    poses_only = [line.split(",", 1)[1] for line in lines[1:]]
+    stamps = [50.0, 50.1, 7.0, 7.1, 7.2]
+    (path / "poses.csv").write_text("\n".join(f"{s},{p}" for s, p in zip(stamps, poses_only, strict=True)))
+    recording = open_recording(path)
+    assert recording.stamps_s.tolist() == [7.0, 7.1, 7.2]
+    assert recording.notices[0].startswith("The clock of the frames jumps back 1 time(s), by up to 43.1 s; the longest")
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"schema_version": 2}, "has schema version 2; this avlmaps reads version 1: update avlmaps."),
+        ({"schema_version": 0}, "has schema version 0; this avlmaps reads version 1: write the recording again."),
+        ({"depth_units_per_m": "1000"}, "recording.json at depth_units_per_m: expected `float`, got `str`; mend the"),
+        ({"depth_units_per_m": 0}, "recording.json: depth_units_per_m is 0.0; it must be positive; mend the file."),
+        ({"rgb_rate_hz": -1}, "recording.json: rgb_rate_hz is -1.0; it must be positive; mend the file."),
+        ({"depth_scale": 5000}, "recording.json: object contains unknown field `depth_scale`; mend the file."),
+        ({"world_from_camera": "opengl"}, "recording.json at world_from_camera: invalid enum value 'opengl'; mend"),
+        ({"up_in_world": [0, 0, 9.81]}, "it must be a unit vector, or null where up is not known; mend the file."),
+        ({"intrinsics": {}}, "recording.json at intrinsics: object missing required field `rgb`; mend the file."),
+    ],
+)
+def test_a_description_that_cannot_be_is_told_by_file_and_field(tmp_path: Path, change: dict, sentence: str):
+    path = write_folder(tmp_path / "walk")
+    _describe(path, **change)
+    with pytest.raises(RecordingError, match=re.escape(sentence)):
+        open_recording(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"{", "recording.json is not JSON (input data was truncated); mend the file."),
+        (
+            b'{"schema_version": 1,\n "origin": "caf\xe9"}',
+            "recording.json, line 2: this is not UTF-8 text; save the file",
+        ),
+        (b"[]", "recording.json: expected `object`, got `array`; mend the file."),
+    ],
+)
+def test_a_description_that_is_no_json_is_told(tmp_path: Path, content: bytes, sentence: str):
+    path = write_folder(tmp_path / "walk")
+    (path / "recording.json").write_bytes(content)
+    with pytest.raises(RecordingError, match=re.escape(sentence)):
+        open_recording(path)
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ("0.1,0,0", "poses.csv, line 3: there are 3 numbers where 8 belong; mend the line."),
+        ("0.1,0,0,zero,0,0,0,1", "poses.csv, line 3: '0.1,0,0,zero,0,0,0,1' is not all numbers; mend the line."),
+        ("0.1,0,0,0,0,0,0,2", "poses.csv, line 3: the quaternion has length 2, so this is no rotation;"),
+        ("0.1,0,0,0,0,0,0,0", "poses.csv, line 3: the quaternion has length 0, so this is no rotation;"),
+    ],
+)
+def test_a_bad_pose_is_told_by_its_line(tmp_path: Path, line: str, sentence: str):
+    path = write_folder(tmp_path / "walk")
+    lines = (path / "poses.csv").read_text().splitlines()
+    lines[2] = line
+    (path / "poses.csv").write_text("\n".join(lines))
+    with pytest.raises(RecordingError, match=re.escape(sentence)):
+        open_recording(path)
+
+
+def test_a_broken_frame_is_met_when_it_is_asked_for_and_named(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    (path / "depth/000002.png").write_bytes((path / "depth/000002.png").read_bytes()[:100])
+    (path / "rgb/000003.png").unlink()
+    (path / "frames.csv").write_text("".join(f"{i:06d},{i / 10}\n" for i in range(5)))
+    recording = open_recording(path)
+    with pytest.raises(RecordingError, match=r"depth/000002.png is truncated \(100 bytes\)"):
+        recording.frame(2)
+    with pytest.raises(RecordingError, match=r"rgb/000003.png is missing"):
+        recording.frame(3)
+    assert recording.frame(4).index == 4
+    with pytest.raises(IndexError, match="there is no frame 5; the recording has 5"):
+        recording.frame(5)
+
+
+def test_a_video_may_hold_the_colour(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    import av
+
+    with av.open(str(path / "rgb.mp4"), "w") as container:
+        stream = container.add_stream("libx264", rate=10)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for index in range(5):
+            grey = np.full((48, 64, 3), 40 * index + 20, np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(grey, format="rgb24")))
+        container.mux(stream.encode())
+    for file in (path / "rgb").iterdir():
+        file.unlink()
+    (path / "rgb").rmdir()
+    recording = open_recording(path)
+    assert np.allclose(recording.stamps_s, [0.0, 0.1, 0.2, 0.3, 0.4])
+    levels = [float(recording.frame(i).rgb.mean()) for i in (4, 0, 2)]
+    assert np.allclose(levels, [180, 20, 100], atol=6)
+    assert recording.audio is None and recording.colour_file(0) is None
+    copy = open_recording(write_recording(recording, tmp_path / "copy"))
+    assert np.array_equal(copy.frame(2).rgb, recording.frame(2).rgb)
+    (path / "depth/000004.png").unlink()
+    with pytest.raises(RecordingError, match=r"rgb.mp4 has 5 frames, but .*depth has 4 pictures; each frame needs its"):
+        open_recording(path)
+
+
+def test_the_fingerprint_follows_the_recording_and_not_its_place(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    first = open_recording(path).fingerprint
+    assert re.fullmatch("[0-9a-f]{64}", first)
+    path.rename(tmp_path / "moved")
+    path = tmp_path / "moved"
+    assert open_recording(path).fingerprint == first
+    with (path / "rgb/000001.png").open("ab") as stream:
+        stream.write(b"x")
+    changed = open_recording(path).fingerprint
+    assert changed != first
+    lines = (path / "poses.csv").read_text().splitlines()
+    (path / "poses.csv").write_text("\n".join([*lines[:-1], lines[-1].replace("0.4,", "0.45,", 1)]))
+    assert open_recording(path).fingerprint not in (first, changed)
+
+
+def test_a_copy_is_the_same_recording_bit_for_bit(tmp_path: Path):
+    original = open_recording(write_seven_scenes(tmp_path / "scene"))
+    write_recording(original, tmp_path / "copy", audio=Sound(np.zeros(8000, np.float32), 8000))
+    copy = open_recording(tmp_path / "copy")
+    assert np.array_equal(copy.stamps_s, original.stamps_s)
+    assert np.allclose(copy.world_from_camera, original.world_from_camera, atol=1e-14)
+    assert copy.up_in_world is None and copy.rig.rgb == original.rig.rgb and copy.rig.depth == original.rig.depth
+    assert copy.audio is not None and copy.audio.duration_s == pytest.approx(1.0)
+    for index in range(len(original)):
+        source = original.colour_file(index)
+        target = copy.colour_file(index)
+        assert source is not None and target is not None
+        assert source.read_bytes() == target.read_bytes()
+        assert np.array_equal(original.frame(index).depth_m, copy.frame(index).depth_m)
+        assert original.name(index) == copy.name(index)
+
+
+def test_a_copy_without_links_shares_no_file_with_the_original(tmp_path: Path):
+    original = open_recording(write_seven_scenes(tmp_path / "scene"))
+    write_recording(original, tmp_path / "copy", link=False)
+    file = open_recording(tmp_path / "copy").colour_file(0)
+    assert file is not None and file.stat().st_nlink == 1
+
+
+def test_a_copy_takes_its_sound_track_along(tmp_path: Path):
+    with RecordingWriter(tmp_path / "walk", rig()) as writer:
+        writer.add(_frame(0, 0.0))
+        writer.set_audio(Sound(np.full(4000, 0.5, np.float32), 8000), start_s=-0.25)
+    write_recording(open_recording(tmp_path / "walk"), tmp_path / "copy")
+    audio = open_recording(tmp_path / "copy").audio
+    assert audio is not None and audio.start_s == -0.25 and audio.duration_s == pytest.approx(0.5)
+
+
+def test_opening_twenty_thousand_frames_opens_no_picture_and_takes_little_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    count = 20_000
+    path = write_folder(tmp_path / "walk", count=1)
+    picture = path / "depth/000000.png"
+    for folder in ("rgb", "depth"):
+        (path / folder / "000000.png").rename(tmp_path / f"{folder}.png")
+        for index in range(count):
+            (path / folder / f"{index:06d}.png").symlink_to(tmp_path / f"{folder}.png")
+    (path / "poses.csv").write_text("".join(f"{i / 30},{i / 100},0,0,0,0,0,1\n" for i in range(count)))
+    monkeypatch.setattr(cv2, "imdecode", None)
+    opened: list[Path] = []
+    read_bytes = Path.read_bytes
+    monkeypatch.setattr(Path, "read_bytes", lambda self: (opened.append(self), read_bytes(self))[1])
+    tracemalloc.start()
+    recording = open_recording(path)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(recording) == count
+    assert [file.name for file in opened] == ["recording.json"]
+    assert peak < 40e6
+    monkeypatch.undo()
+    assert picture.exists()
+    assert recording.frame(count - 1).world_from_camera[0, 3] == pytest.approx((count - 1) / 100)
+
+
+def test_two_cameras_of_different_size_are_read(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    small = Pinhole(30.0, 30.0, 16.0, 12.0, 32, 24)
+    described = json.loads((path / "recording.json").read_text())
+    described["intrinsics"]["depth"] = {"fx": 30, "fy": 30, "cx": 16, "cy": 12, "width": 32, "height": 24}
+    described["depth_units_per_m"] = 500
+    (path / "recording.json").write_text(json.dumps(described))
+    for index in range(5):
+        save_depth(path / f"depth/{index:06d}.png", np.full((24, 32), 1000))
+    frame = open_recording(path).frame(0)
+    assert frame.rig.depth == small and frame.depth_m.shape == (24, 32)
+    assert np.all(frame.depth_m == 2.0)
+    assert poses.rotation_angle_rad(frame.world_from_camera, shot(0).world_from_camera) < 1e-6
