@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Float16, Float32
 
 from avlmaps.core.camera import Rig
-from avlmaps.core.errors import BackendError, RecordingError
+from avlmaps.core.errors import BackendError, MapError, RecordingError
 from avlmaps.maps import fusion_kernels as kernels
 from avlmaps.maps.fusion_settings import FusionSettings
 from avlmaps.maps.grid import GridSpec
@@ -143,9 +143,9 @@ class VoxelAccumulator:
         lookup = look_up(rig, feature_rows, feature_columns)
         reach = lookup.longest_ray * self.settings.max_depth_m / self.grid.voxel_size_m
         if reach >= kernels.REACH_VOXELS - 1:
-            raise ValueError(
-                f"a depth of {self.settings.max_depth_m} m spans {reach:.0f} voxels of {self.grid.voxel_size_m} m; "
-                f"fewer than {kernels.REACH_VOXELS - 1} fit into a frame"
+            raise MapError(
+                f"A depth of {self.settings.max_depth_m} m spans {reach:.0f} voxels of {self.grid.voxel_size_m} m, and "
+                f"a frame takes fewer than {kernels.REACH_VOXELS - 1}; choose larger voxels or a smaller depth."
             )
         self._scratch = kernels.make_scratch(rig.depth.height, rig.depth.width)
         self._lookup = rig, feature_rows, feature_columns, lookup

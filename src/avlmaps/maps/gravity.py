@@ -30,7 +30,7 @@ class Up:
 
     Attributes:
         direction: unit vector in the world.
-        support: share of the measured surface normals within 8 degrees of up or of down, in [0, 1]; below 0.1
+        support: share of the measured surface normals within 8 degrees of up or of down, in [0, 1]; below 0.05
             there is hardly a level surface in view and the direction is a guess.
     """
 
