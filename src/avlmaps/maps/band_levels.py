@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Float32, Int64
 
 from avlmaps.recordings.audio import Sound
 
@@ -16,6 +16,12 @@ EDGES_HZ = (80.0, 200.0, 400.0, 800.0, 1600.0, 3200.0, 6400.0, 12_800.0)
 def band_count(rate_hz: int) -> int:
     """Return how many bands lie (at least by half) below the Nyquist frequency; one or more."""
     return max(1, int(np.searchsorted(np.sqrt(np.multiply(EDGES_HZ[:-1], EDGES_HZ[1:])), rate_hz / 2.0)))
+
+
+def band_lines(rate_hz: int) -> Float32[np.ndarray, " bands"]:
+    """Return how many spectral lines each band has."""
+    starts, end = _lines(rate_hz)
+    return np.diff(np.append(starts, end)).clip(1).astype(np.float32)
 
 
 def hop_samples(rate_hz: int) -> int:
@@ -60,9 +66,13 @@ def _spectra(samples: Float32[np.ndarray, " n"], count: int, rate_hz: int) -> Fl
     window = np.hanning(size + 1)[:-1].astype(np.float32)
     frames = frames - frames.mean(axis=1, keepdims=True)  # a constant offset would leak into the lowest band
     power = np.abs(np.asarray(rfft(frames * window, axis=1), np.complex64)) ** 2
-    hz = np.fft.rfftfreq(size, 1.0 / rate_hz)
-    starts = np.searchsorted(hz, EDGES_HZ[: band_count(rate_hz)])
-    end = int(np.searchsorted(hz, EDGES_HZ[band_count(rate_hz)]))
-    starts = np.minimum(starts, max(end - 1, 0))
+    starts, end = _lines(rate_hz)
     scale = np.float32(2.0 / (size * float((window**2).sum())))
     return np.add.reduceat(power[:, :end], starts, axis=1).astype(np.float32) * scale
+
+
+def _lines(rate_hz: int) -> tuple[Int64[np.ndarray, " bands"], int]:
+    """Return the first spectral line of each band, and the line after the last band."""
+    hz = np.fft.rfftfreq(_window_samples(rate_hz), 1.0 / rate_hz)
+    *starts, end = np.searchsorted(hz, EDGES_HZ[: band_count(rate_hz) + 1]).tolist()
+    return np.minimum(np.array(starts, np.int64), max(end - 1, 0)), end

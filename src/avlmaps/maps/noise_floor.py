@@ -10,13 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float32
 
-from avlmaps.maps.band_levels import HOP_S
+from avlmaps.maps.band_levels import HOP_S, band_lines
 
 _BLOCK_FRAMES = 50
-_QUANTILE = 0.1
-# The low quantile of the blocks' medians lies below the mean power of steady noise by so much (measured on white and
-# pink noise; it hardly depends on the band).
-_BIAS = 10.0**0.16
+_QUANTILES = (0.1, 0.3)
+# Where the background itself comes and goes (waves, a crowd), the higher quantile lies above the lower one, and the
+# background is put as high as that; not more than so many dB higher, since sounds close together have the same effect.
+_MOST_RESTLESS_DB = 4.0
+# A low quantile of medians lies below the mean power of steady noise, the more the fewer spectral lines a band has:
+# by about so many dB, divided by the root of their number (measured on white and pink noise, right within 0.2 dB).
+_BIAS_DB = 2.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +48,13 @@ class NoiseFloor:
 
 
 def find_noise_floor(
-    powers: Iterable[Float32[np.ndarray, "frames bands"]], window_s: float, range_db: float
+    powers: Iterable[Float32[np.ndarray, "frames bands"]], rate_hz: int, window_s: float, range_db: float
 ) -> NoiseFloor:
     """Go through a track's band powers once and find its background.
 
     Args:
         powers: band powers, frame by frame.
+        rate_hz: samples a second of the track.
         window_s: how many seconds around a moment tell its background.
         range_db: the background is never put lower than this below the track's loudest frame, so that in digital
             silence not every whisper is a sound.
@@ -71,19 +75,25 @@ def find_noise_floor(
     lowest = max(loudest * 10.0 ** (-range_db / 10.0), 1e-30)
     if not medians:
         return NoiseFloor(np.full((1, 1), lowest, np.float32), loudest, frames)
+    bias = 10.0 ** (_BIAS_DB / 10.0 / np.sqrt(band_lines(rate_hz)))
     reach = max(1, round(window_s / 2.0 / (HOP_S * _BLOCK_FRAMES)))
-    return NoiseFloor(np.maximum(_low(np.array(medians), reach) * _BIAS, lowest).astype(np.float32), loudest, frames)
+    low, higher = _quantiles(np.log(np.maximum(np.array(medians) * bias, lowest)), reach)
+    restless = (higher - low).mean(axis=1, keepdims=True)
+    power = np.exp(low + np.minimum(restless, _MOST_RESTLESS_DB * np.log(10.0) / 10.0))
+    return NoiseFloor(power.astype(np.float32), loudest, frames)
 
 
-def _low(medians: Float32[np.ndarray, "blocks bands"], reach: int) -> Float32[np.ndarray, "blocks bands"]:
-    """Return the low quantile over ``2 reach + 1`` blocks; at the ends over the nearest so many blocks."""
-    length = min(2 * reach + 1, len(medians))
-    low = np.stack(
+def _quantiles(
+    levels: Float32[np.ndarray, "blocks bands"], reach: int
+) -> tuple[Float32[np.ndarray, "blocks bands"], Float32[np.ndarray, "blocks bands"]]:
+    """Return two low quantiles over ``2 reach + 1`` blocks; at the ends over the nearest so many blocks."""
+    length = min(2 * reach + 1, len(levels))
+    found = np.stack(
         [
-            np.quantile(np.lib.stride_tricks.sliding_window_view(band, length), _QUANTILE, axis=1, method="lower")
-            for band in medians.T  # one band at a time: a day's windows need not be in memory at once
+            np.quantile(np.lib.stride_tricks.sliding_window_view(band, length), _QUANTILES, axis=1, method="lower")
+            for band in levels.T  # one band at a time: a day's windows need not be in memory at once
         ],
-        axis=1,
+        axis=-1,
     )
-    nearest = np.clip(np.arange(len(medians)) - (length - 1) // 2, 0, len(low) - 1)
-    return low[nearest]
+    nearest = np.clip(np.arange(len(levels)) - (length - 1) // 2, 0, found.shape[1] - 1)
+    return found[0][nearest], found[1][nearest]

@@ -48,7 +48,7 @@ class SegmentationSettings:
     """adaptive: energy against the background as it is there and then; silence: the paper's fixed threshold."""
     onset_db: float = 6.0
     """A sound must somewhere be this much above the background, dB."""
-    release_db: float = 3.0
+    release_db: float = 2.5
     """It lasts as long as it is this much above the background, dB."""
     smoothing_s: float = 0.05
     """The excess over the background is averaged over so many seconds before it is compared."""
@@ -109,7 +109,9 @@ def segment(track: AudioTrack, settings: SegmentationSettings = SegmentationSett
         runs = _loud_runs(track, settings)
     else:
         step_s = hop_samples(track.rate_hz) / track.rate_hz
-        floor = find_noise_floor(band_powers(track.blocks(_BLOCK_S)), settings.background_window_s, settings.range_db)
+        floor = find_noise_floor(
+            band_powers(track.blocks(_BLOCK_S)), track.rate_hz, settings.background_window_s, settings.range_db
+        )
         if floor.loudest <= 0.0:
             return []
         runs = _merged(_runs(_excess(track, floor), settings, step_s), settings, step_s)
