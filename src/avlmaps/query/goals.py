@@ -83,7 +83,8 @@ def find_goals(heat: Heatmap, top: int) -> list[Goal]:
     score = shares.peak * lead.confidence
     goals: list[Goal] = []
     taken: list[np.ndarray] = []
-    for instance in np.argsort(-score, kind="stable"):
+    extent = np.bincount(lead.instance, minlength=len(score))  # the larger of two equally good ones leads
+    for instance in np.lexsort((-extent, -np.round(score, 3))):
         if len(goals) >= top or score[instance] <= 0.0:
             break
         position = _position(heat, lead, shares, int(instance))

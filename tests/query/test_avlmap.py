@@ -1,0 +1,187 @@
+from pathlib import Path
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+from query_fakes import fake_map, fake_profile, furnished_map, keyframes_at, sounds_of, voxels_of
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.core.errors import AudioError, BackendError, QueryError
+from avlmaps.query import locate as locate_module
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.question import Modality, Part, Question, Role
+from avlmaps.recordings.audio import AudioTrack, Sound
+
+CHAIR = Part(Modality.OBJECT, "chair")
+DOG = Part(Modality.SOUND, "dog")
+HERE = np.array([[1.0, 1.0, 1.2]])
+
+
+@pytest.fixture
+def heard() -> AVLMap:
+    return AVLMap(furnished_map(sounds=sounds_of([HERE], [0.8])))
+
+
+def locating(monkeypatch: pytest.MonkeyPatch, pose: np.ndarray | None, inliers: int = 200) -> None:
+    located = SimpleNamespace(world_from_camera=pose, inliers=inliers)
+    monkeypatch.setattr(locate_module, "locate", lambda stored, rgb, camera, rng: located)
+
+
+def test_the_answer_has_the_keys_of_the_contract(heard: AVLMap) -> None:
+    answer = heard.ask(Question.of([CHAIR, DOG]), top=1).to_json()
+    assert list(answer) == ["goals", "found", "parts", "elapsed_ms"]
+    (goal,) = answer["goals"]
+    assert list(goal) == ["position", "score", "size", "parts"]
+    assert set(goal["parts"]) == {"object", "sound"}
+    assert [part["role"] for part in answer["parts"]] == ["primary", "context"]
+    assert [part["modality"] for part in answer["parts"]] == ["object", "sound"]
+    assert [part["query"] for part in answer["parts"]] == ["chair", "dog"]
+    assert [round(part["peak"], 3) for part in answer["parts"]] == [1.0, pytest.approx(0.8, abs=0.01)]
+    assert answer["found"] is True
+    assert answer["elapsed_ms"] > 0.0
+
+
+def test_asking_gives_what_multiplying_gives(heard: AVLMap) -> None:
+    answer = heard.ask(Question.of([CHAIR, DOG]))
+    product = heard.object("chair", primary=True) * heard.sound("dog")
+    assert answer.heat is not None
+    np.testing.assert_array_equal(answer.heat.values, product.values)
+    assert list(answer.goals) == product.goals()
+
+
+def test_any_part_can_be_the_primary_one() -> None:
+    roles = [part.role for part in Question.of([CHAIR, DOG], Modality.SOUND).parts]
+    assert roles == [Role.CONTEXT, Role.PRIMARY]
+    with pytest.raises(QueryError, match=r"^The primary part is to be a image, but none is asked for"):
+        Question.of([CHAIR, DOG], Modality.IMAGE)
+
+
+def test_a_question_without_parts_is_refused() -> None:
+    with pytest.raises(QueryError, match=r"^The question is empty; name an object, a sound, an area or a picture\.$"):
+        Question.of([])
+
+
+@pytest.mark.parametrize("way", ["object", "sound", "area"])
+def test_an_empty_phrase_is_refused(heard: AVLMap, way: str) -> None:
+    with pytest.raises(QueryError, match=rf"^The {way} asked for is empty; name one, such as '"):
+        getattr(heard, way)("  ")
+
+
+def test_an_empty_map_answers_honestly(monkeypatch: pytest.MonkeyPatch) -> None:
+    full = furnished_map()
+    empty = AVLMap(fake_map(voxels_of(np.zeros((0, 3)), np.zeros((0, 4))), profile=full.profile))
+    locating(monkeypatch, None, inliers=0)
+    picture = np.zeros((48, 64, 3), np.uint8)
+    for heat in (empty.object("chair"), empty.sound("dog"), empty.image(picture)):
+        assert (heat.peak, heat.found, heat.goals(), len(heat)) == (0.0, False, [], 0)
+        assert heat.factors[0].note
+    answer = empty.ask(Question.of([CHAIR, DOG])).to_json()
+    assert (answer["goals"], answer["found"]) == ([], False)
+    assert [part["note"] for part in answer["parts"]] == ["the map holds no voxels", "the map holds no sounds"]
+
+
+def test_a_profile_without_view_encoder_says_so(heard: AVLMap) -> None:
+    expected = r"^The profile 'fake' has no views backend; choose another profile \(avlmaps profiles\)\.$"
+    with pytest.raises(BackendError, match=expected):
+        heard.area("kitchen")
+
+
+def test_a_sound_that_was_not_heard_is_absent(heard: AVLMap) -> None:
+    heat = heard.sound("helicopter")
+    assert (heat.peak, heat.found) == (0.0, False)
+    expected = "none of the 1 heard sounds is like 'helicopter'; the best score is 0.00, below 0.50"
+    assert heat.factors[0].note == expected
+
+
+def test_a_clip_asks_as_words_do(heard: AVLMap, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clip = Sound(np.full(1600, 0.1, np.float32), 16000)
+    (tmp_path / "bark.wav").write_bytes(b"RIFF")
+    monkeypatch.setattr(AudioTrack, "open", lambda path: SimpleNamespace(read=lambda: clip))
+    by_file = heard.ask(Question.of([Part(Modality.SOUND, str(tmp_path / "bark.wav"), is_file=True)]))
+    assert by_file.found
+    np.testing.assert_array_equal(by_file.heat.values, heard.sound_clip(clip, primary=True).values)  # pyright: ignore
+
+
+def test_clips_that_cannot_be_asked_with_are_refused(
+    heard: AVLMap, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    missing = tmp_path / "none.wav"
+    with pytest.raises(QueryError, match=f"^The clip {missing} is not there; check the name\\.$"):
+        heard.sound_clip(missing)
+    with pytest.raises(QueryError, match=r"^The clip a clip is silent \(its loudest sample is 0\); ask with one"):
+        heard.sound_clip(Sound(np.zeros(1600, np.float32), 16000))
+    with pytest.raises(QueryError, match=r"^The clip a clip has no samples; ask with another one\.$"):
+        heard.sound_clip(Sound(np.zeros(0, np.float32), 16000))
+    with pytest.raises(QueryError, match=r"^The clip a clip holds NaN or infinity; ask with another one\.$"):
+        heard.sound_clip(Sound(np.full(10, np.nan, np.float32), 16000))
+
+    def unreadable(path: Path) -> None:
+        raise AudioError("it is text.")
+
+    text = tmp_path / "text.wav"
+    text.write_text("no sound")
+    monkeypatch.setattr(AudioTrack, "open", unreadable)
+    with pytest.raises(QueryError, match=f"^The clip {text} cannot be read as sound: it is text\\.$"):
+        heard.sound_clip(text)
+
+
+def test_a_picture_heats_the_place_of_its_camera(
+    heard: AVLMap, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pose = np.eye(4)
+    pose[:3, 3] = [3.0, 2.0, 1.5]
+    locating(monkeypatch, pose)
+    photo = tmp_path / "photo.png"
+    cv2.imwrite(str(photo), np.zeros((48, 64, 3), np.uint8))
+    heat = heard.image(photo, primary=True)
+    flat = np.linalg.norm(heard.space.centres[:, :2] - [3.0, 2.0], axis=1)
+    np.testing.assert_allclose(heat.values, np.maximum(1.0 - 2.0 * flat, 0.0), atol=1e-6)
+    (goal,) = heat.goals()
+    assert goal.position == (3.0, 2.0, 1.5)
+    assert (heat.found, goal.score, goal.size) == (True, 1.0, (0.0, 0.0, 0.0))
+
+
+def test_a_picture_that_is_not_located_is_not_found(heard: AVLMap, monkeypatch: pytest.MonkeyPatch) -> None:
+    locating(monkeypatch, None, inliers=7)
+    heat = heard.image(np.zeros((48, 64, 3), np.uint8))
+    assert (heat.peak, heat.found, heat.goals()) == (0.0, False, [])
+    assert heat.factors[0].note == "the picture could not be located (7 points agree)"
+
+
+def test_pictures_that_cannot_be_asked_with_are_refused(heard: AVLMap, tmp_path: Path) -> None:
+    missing, text = tmp_path / "none.png", tmp_path / "text.png"
+    text.write_text("no picture")
+    with pytest.raises(QueryError, match=f"^The picture {missing} is not there; check the name\\.$"):
+        heard.image(missing)
+    with pytest.raises(QueryError, match=f"^The picture {text} cannot be read as an image; use a PNG or a JPEG\\.$"):
+        heard.image(text)
+    with pytest.raises(QueryError, match=r"^The picture has 64x48 pixels, its intrinsics are for 10x10; give those"):
+        heard.image(np.zeros((48, 64, 3), np.uint8), Pinhole(10.0, 10.0, 5.0, 5.0, 10, 10))
+
+
+def test_an_area_is_told_from_other_areas() -> None:
+    from query_fakes import FakeViews
+
+    places = np.array([[1.0, 1.0, 1.4], [5.0, 3.0, 1.4]])
+    view = np.array([[1.0, 0.0], [0.0, 1.0]], np.float32)
+    m = AVLMap(furnished_map(keyframes=keyframes_at(places, view), views=FakeViews()))
+    assert m.area("kitchen").found
+    assert m.area("kitchen", primary=True).goals()[0].position == pytest.approx((1.0, 1.0, 1.4))
+    nowhere = AVLMap(furnished_map(keyframes=keyframes_at(places[1:], view[1:]), views=FakeViews())).area("kitchen")
+    assert not nowhere.found
+    assert nowhere.factors[0].note.startswith("no view is like 'kitchen'; the best score is 0.0")
+
+
+def test_a_models_mismatch_is_told_before_anything_is_compared() -> None:
+    stored = furnished_map(sounds=sounds_of([HERE], [0.8]))
+
+    def refuse(kind: object) -> None:
+        raise BackendError(f"another model for {kind}")
+
+    stored.require_model = refuse
+    with pytest.raises(BackendError, match="another model for pixels"):
+        AVLMap(stored).object("chair")
+    with pytest.raises(BackendError, match="another model for sounds"):
+        AVLMap(stored).sound("dog")
+    assert fake_profile().name == "fake"

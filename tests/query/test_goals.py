@@ -1,0 +1,143 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from query_fakes import UP, furnished_map, keyframes_at, sounds_of
+
+from avlmaps.maps.grid import GridSpec
+from avlmaps.query.areas import modes
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.heatmap import Heatmap, NearAnchors
+from avlmaps.query.level import Space
+from avlmaps.query.question import Modality, Part, Role
+
+
+def track(x: float, y: float, z: float = 1.2, length_m: float = 1.0) -> np.ndarray:
+    return np.stack([np.linspace(x, x + length_m, 5), np.full(5, y), np.full(5, z)], axis=1)
+
+
+def test_each_chair_is_one_goal_and_the_larger_one_leads() -> None:
+    goals = AVLMap(furnished_map()).object("chair", primary=True).goals(top=5)
+    assert len(goals) == 2
+    assert goals[0].size == pytest.approx((0.2, 0.2, 0.4))
+    assert goals[1].size == pytest.approx((0.2, 0.2, 0.3))
+    assert goals[0].score >= goals[1].score > 0.5
+    assert goals[0].position == pytest.approx((0.6, 0.6, 0.25), abs=0.06)  # the middle of the chair
+    assert goals[0].parts == {"object": 1.0}
+
+
+def test_no_two_goals_share_an_instance() -> None:
+    m = AVLMap(furnished_map(sounds=sounds_of([track(4.0, 3.0)], [0.9])))
+    goals = (m.object("chair", primary=True) * m.sound("dog")).goals(top=10)
+    assert len({goal.position for goal in goals}) == len(goals) == 2
+
+
+def test_a_sound_decides_between_two_chairs() -> None:
+    for x, y, nearest in ((0.3, 0.6, (0.6, 0.6)), (5.0, 3.1, (5.1, 3.1))):
+        m = AVLMap(furnished_map(sounds=sounds_of([track(x, y, length_m=0.2)], [0.9])))
+        heat = m.object("chair", primary=True) * m.sound("dog")
+        best = heat.goals()[0]
+        assert best.position[:2] == pytest.approx(nearest, abs=0.15)
+        assert best.parts["object"] == 1.0
+        assert best.parts["sound"] == pytest.approx(0.9, abs=0.1)
+        assert heat.found
+
+
+def test_the_best_goal_of_sure_instances_is_the_highest_place() -> None:
+    m = AVLMap(furnished_map(sounds=sounds_of([track(1.0, 2.0), track(4.0, 1.0)], [0.9, 0.7])))
+    heat = m.object("chair", primary=True) * m.sound("dog")
+    highest = m.space.centres[int(np.argmax(heat.values))]
+    assert heat.goals()[0].position == pytest.approx(tuple(highest), abs=0.3)
+    assert heat.goals()[0].parts["object"] * heat.goals()[0].parts["sound"] == pytest.approx(heat.peak, abs=1e-6)
+
+
+def test_a_sound_alone_is_put_where_it_was_heard_not_at_any_height() -> None:
+    m = AVLMap(furnished_map(sounds=sounds_of([track(1.0, 2.0, z=1.3), track(4.0, 1.0, z=0.9)], [0.9, 0.7])))
+    first, second = m.sound("dog", primary=True).goals(top=5)
+    assert first.position == pytest.approx((1.5, 2.0, 1.3))  # the middle of its track
+    assert second.position == pytest.approx((4.5, 1.0, 0.9))
+    assert (first.score, second.score) == pytest.approx((0.9, 0.7))
+    assert first.size == pytest.approx((1.0, 0.0, 0.0), abs=1e-6)
+
+
+def test_two_sounds_at_one_place_are_one_goal() -> None:
+    m = AVLMap(furnished_map(sounds=sounds_of([track(1.0, 2.0), track(1.1, 2.2)], [0.9, 0.8])))
+    assert len(m.sound("dog", primary=True).goals(top=5)) == 1
+
+
+def test_a_column_between_anchors_is_put_at_the_height_of_the_lead() -> None:
+    m = AVLMap(furnished_map(sounds=sounds_of([track(1.0, 2.0, z=1.3)], [0.9])))
+    camera = Part(Modality.IMAGE, "x.png", is_file=True)
+    image = Heatmap.of(
+        NearAnchors(m.space, camera, 0.2, np.array([[4.0, 2.0, 5.0]]), np.ones(1), np.zeros(1, int), True)
+    )
+    goal = (m.sound("dog", primary=True) * image).goals()[0]
+    assert goal.position[2] == pytest.approx(1.3)
+    assert goal.parts["sound"] * goal.parts["image"] == pytest.approx(goal.score)
+
+
+def test_it_is_not_found_where_the_parts_do_not_come_together() -> None:
+    far = AVLMap(furnished_map(sounds=sounds_of([track(30.0, 30.0)], [0.9])))
+    heat = far.object("chair", primary=True) * far.sound("dog")
+    assert all(factor.found for factor in heat.factors)
+    assert not heat.found
+    assert heat.goals() == []
+
+
+def test_it_is_not_found_where_one_part_is_not() -> None:
+    m = AVLMap(furnished_map(sounds=sounds_of([track(0.5, 0.5)], [0.4])))
+    heat = m.object("chair", primary=True) * m.sound("dog")
+    assert not heat.found
+    assert heat.goals()[0].score < 0.5
+
+
+@pytest.mark.parametrize("primary", [True, False])
+def test_heat_alone_never_makes_an_absent_thing_found(primary: bool) -> None:
+    heat = AVLMap(furnished_map(sounds=sounds_of([track(1.0, 2.0)], [0.49]))).sound("dog", primary)
+    assert not heat.found
+    assert "the best score is 0.49, below 0.50" in heat.factors[0].note
+
+
+def test_a_second_part_of_a_modality_has_a_name_of_its_own() -> None:
+    m = AVLMap(furnished_map())
+    heat = m.object("chair", primary=True) * m.object("table") * m.object("floor")
+    assert list(heat.goals()[0].parts) == ["object", "object_2", "object_3"]
+
+
+def test_sizes_lie_along_the_level_frame() -> None:
+    tilted = np.array([0.0, -1.0, 0.0])  # a camera's world: up is -y
+    column = np.stack([np.zeros(20), np.arange(20), np.zeros(20)], axis=1).astype(np.int32)
+    space = Space(GridSpec(0.05), column, tilted)
+    part = Part(Modality.SOUND, "dog", Role.PRIMARY)
+    anchors = np.array([[0.0, 0.0, 0.0], [0.0, 0.5, 0.0]])
+    heat = Heatmap.of(NearAnchors(space, part, 2.0, anchors, np.ones(2), np.zeros(2, int), True))
+    assert heat.goals()[0].size == pytest.approx((0.0, 0.0, 0.5))
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0, 1, 2, 30]))
+def test_modes_lead_uphill_to_a_local_maximum(seed, count) -> None:
+    rng = np.random.default_rng(seed)
+    points, score = rng.uniform(0, 4, (count, 2)), rng.choice([0.2, 0.5, 0.9], count)
+    group = modes(points, score, 1.0)
+    assert group.shape == (count,)
+    for k in range(count):
+        peak = score[group == group[k]].max()
+        assert score[k] <= peak
+        near = np.linalg.norm(points - points[k], axis=1) <= 1.0
+        assert score[near].max() <= peak + 1e-12 or score[k] < score[near].max()
+    assert not count or group[np.argmax(score)] == 0
+
+
+def test_two_kitchens_are_two_goals() -> None:
+    from query_fakes import FakeViews
+
+    places = np.stack([np.linspace(0.5, 5.5, 11), np.full(11, 2.0), np.full(11, 1.4)], axis=1)
+    view = np.zeros((11, 2), np.float32)
+    view[:, 1] = 1.0
+    view[[1, 2, 8, 9]] = [1.0, 0.0]
+    m = AVLMap(furnished_map(keyframes=keyframes_at(places, view), views=FakeViews()))
+    goals = m.area("kitchen", primary=True).goals(top=2)
+    assert sorted(goal.position[0] for goal in goals) == pytest.approx([1.25, 4.75], abs=0.3)
+    assert all(goal.position[2] == pytest.approx(1.4) for goal in goals)
+    assert m.area("kitchen").found
+    assert np.allclose(UP, m.stored.up_in_world)

@@ -1,0 +1,166 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from avlmaps.maps.grid import GridSpec
+from avlmaps.query.heatmap import Heatmap, HeatSettings, NearAnchors, anchor_heat, fused, normalised, object_heat
+from avlmaps.query.level import Space
+from avlmaps.query.question import Modality, Part, Role
+
+SIZE_M = 0.05
+FALLOFFS = st.sampled_from([0.2, 0.7, 2.0, 9.0])
+
+
+@st.composite
+def voxel_sets(draw: st.DrawFn, least: int = 0) -> np.ndarray:
+    """Sparse, clustered, of any sign, with repeats removed and sorted; sometimes none."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    count, spread = draw(st.integers(least, 300)), draw(st.sampled_from([3, 12, 60]))
+    near = rng.integers(-spread, spread, (count, 3)) + rng.integers(-40, 40, (1, 3))
+    return np.unique(near, axis=0).astype(np.int32)
+
+
+@st.composite
+def ups(draw: st.DrawFn) -> np.ndarray:
+    vector = np.array(draw(st.tuples(*[st.integers(-9, 9)] * 3)), np.float64)
+    return vector / np.linalg.norm(vector) if vector.any() else np.array([0.0, 0.0, 1.0])
+
+
+@st.composite
+def anchor_sets(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    count = draw(st.sampled_from([0, 1, 2, 7, 60]))
+    scores = np.full(count, draw(st.floats(0, 1))) if draw(st.booleans()) else rng.uniform(0, 1, count)
+    return rng.normal(0, draw(st.sampled_from([0.0, 0.3, 3.0])), (count, 3)), scores
+
+
+def brute_force_object(space: Space, mask: np.ndarray, falloff: float) -> np.ndarray:
+    if not mask.any():
+        return np.zeros(len(space))
+    distance = np.linalg.norm(space.centres[:, None] - space.centres[mask][None], axis=-1).min(axis=1)
+    return np.maximum(1.0 - falloff * distance, 0.0)
+
+
+def brute_force_anchors(
+    space: Space, up: np.ndarray, anchors: np.ndarray, scores: np.ndarray, falloff: float
+) -> np.ndarray:
+    away = space.centres[:, None] - anchors[None]
+    flat = away - (away @ up)[..., None] * up
+    return np.maximum((scores - falloff * np.linalg.norm(flat, axis=-1)).max(axis=1, initial=0.0), 0.0)
+
+
+@given(voxel_sets(), st.integers(0, 2**32 - 1), st.floats(0, 1), FALLOFFS)
+def test_object_heat_is_the_equation_at_every_voxel(index, seed, share, falloff) -> None:
+    space = Space(GridSpec(SIZE_M), index, np.array([0.0, 0.0, 1.0]))
+    mask = np.random.default_rng(seed).uniform(0, 1, len(index)) < share
+    heat = object_heat(space, mask, falloff)
+    np.testing.assert_allclose(heat, brute_force_object(space, mask, falloff), atol=1e-6)
+    assert np.all(heat[mask] == 1.0)
+
+
+@given(voxel_sets(), ups(), anchor_sets(), FALLOFFS)
+def test_anchor_heat_is_the_equation_at_every_voxel(index, up, anchors_and_scores, falloff) -> None:
+    anchors, scores = anchors_and_scores
+    space = Space(GridSpec(SIZE_M), index, up)
+    heat, winner = anchor_heat(space, anchors, scores, falloff)
+    np.testing.assert_allclose(heat, brute_force_anchors(space, up, anchors, scores, falloff), atol=1e-6)
+    assert heat.shape == (len(index),)
+    assert np.array_equal(winner >= 0, heat > 0.0)
+    warm = winner >= 0
+    away = space.level(space.centres[warm])[:, :2] - space.level(anchors[winner[warm]])[:, :2]
+    own_cone = scores[winner[warm]] - falloff * np.linalg.norm(away, axis=1)
+    np.testing.assert_allclose(heat[warm], own_cone, atol=1e-6)
+
+
+@given(voxel_sets(least=2), st.integers(0, 2**32 - 1), FALLOFFS)
+def test_object_heat_never_rises_with_distance(index, seed, falloff) -> None:
+    space = Space(GridSpec(SIZE_M), index, np.array([0.0, 0.0, 1.0]))
+    mask = np.zeros(len(index), bool)
+    mask[np.random.default_rng(seed).integers(len(index))] = True
+    distance = np.linalg.norm(space.centres - space.centres[mask], axis=1)
+    heat = object_heat(space, mask, falloff)
+    assert np.all(np.diff(heat[np.argsort(distance)]) <= 1e-6)
+
+
+def test_primary_reaches_half_a_metre_and_context_five() -> None:
+    line = np.stack([np.arange(120), np.zeros(120), np.zeros(120)], axis=1).astype(np.int32)
+    space, settings = Space(GridSpec(SIZE_M), line, np.array([0.0, 0.0, 1.0])), HeatSettings()
+    first = np.arange(120) == 0
+    primary = object_heat(space, first, settings.falloff_per_m(Role.PRIMARY))
+    context = object_heat(space, first, settings.falloff_per_m(Role.CONTEXT))
+    assert np.flatnonzero(primary > 1e-6).max() == 9  # 0.45 m; at 0.50 m it is nothing
+    assert np.flatnonzero(context > 1e-6).max() == 99
+    assert context[20] == pytest.approx(0.8)
+
+
+def test_anchor_heat_is_the_same_all_the_way_up() -> None:
+    up = np.array([0.0, -0.8, -0.6])
+    column = np.unique(np.round(np.arange(40)[:, None] * 5 * up).astype(np.int32), axis=0)
+    space = Space(GridSpec(SIZE_M), column, up)
+    heat, _ = anchor_heat(space, np.array([[0.7, 0.0, 0.0]]), np.array([1.0]), 0.2)
+    assert np.ptp(heat) < 0.02  # voxels round the line by half a voxel
+
+
+def factor(space: Space, anchors: np.ndarray, scores: np.ndarray, role: Role = Role.CONTEXT) -> NearAnchors:
+    part = Part(Modality.SOUND, "dog", role)
+    return NearAnchors(space, part, 0.2, anchors, scores, np.arange(len(anchors)), True)
+
+
+@given(voxel_sets(), anchor_sets(), anchor_sets())
+def test_a_product_is_element_wise_and_keeps_its_factors(index, first, second) -> None:
+    space = Space(GridSpec(SIZE_M), index, np.array([0.0, 0.0, 1.0]))
+    a, b = Heatmap.of(factor(space, *first)), Heatmap.of(factor(space, *second))
+    np.testing.assert_array_equal((a * b).values, a.values * b.values)
+    np.testing.assert_array_equal((a * b).values, (b * a).values)
+    assert (a * b).factors == (*a.factors, *b.factors)
+    assert fused([a, b]).peak <= min(a.peak, b.peak) + 1e-6
+    assert np.all((a.values >= 0.0) & (a.values <= 1.0))
+
+
+@given(anchor_sets(), hnp.arrays(np.float64, (5, 3), elements=st.floats(-3, 3)))
+def test_heat_at_a_point_is_the_equation_too(anchors_and_scores, points) -> None:
+    anchors, scores = anchors_and_scores
+    space = Space(GridSpec(SIZE_M), np.zeros((0, 3), np.int32), np.array([0.0, 0.0, 1.0]))
+    flat = np.linalg.norm(points[:, None, :2] - anchors[None, :, :2], axis=-1)
+    expected = np.maximum((scores - 0.2 * flat).max(axis=1, initial=0.0), 0.0)
+    np.testing.assert_allclose(factor(space, anchors, scores).at(points), expected, atol=1e-9)
+
+
+def test_heatmaps_of_two_maps_do_not_multiply() -> None:
+    spaces = [Space(GridSpec(SIZE_M), np.zeros((1, 3), np.int32), np.array([0.0, 0.0, 1.0])) for _ in range(2)]
+    a, b = (Heatmap.of(factor(space, np.zeros((1, 3)), np.ones(1))) for space in spaces)
+    with pytest.raises(ValueError, match="two heatmaps of different maps cannot be multiplied"):
+        a * b
+
+
+def test_an_empty_map_has_no_heat_and_no_goals() -> None:
+    space = Space(GridSpec(SIZE_M), np.zeros((0, 3), np.int32), np.array([0.0, 0.0, 1.0]))
+    heat = Heatmap.of(factor(space, np.zeros((0, 3)), np.zeros(0)))
+    assert (heat.peak, heat.goals(), len(heat)) == (0.0, [], 0)
+
+
+@given(hnp.arrays(np.float64, st.integers(0, 8), elements=st.floats(-5, 5)))
+def test_normalised_scores_lie_in_0_1_and_keep_their_order(scores) -> None:
+    stretched = normalised(scores)
+    assert stretched.shape == scores.shape
+    assert np.isfinite(stretched).all()
+    assert np.all((stretched >= 0.0) & (stretched <= 1.0))
+    assert np.all(np.diff(stretched[np.argsort(scores, kind="stable")]) >= 0.0)
+    assert not len(scores) or stretched[np.argmax(scores)] == 1.0
+
+
+def test_one_score_and_equal_scores_become_one() -> None:
+    np.testing.assert_array_equal(normalised(np.array([0.3])), [1.0])
+    np.testing.assert_array_equal(normalised(np.array([-2.0, -2.0])), [1.0, 1.0])
+    np.testing.assert_array_equal(normalised(np.array([0.0, 5.0])), [0.0, 1.0])
+    assert len(normalised(np.zeros(0))) == 0
+
+
+def test_scores_that_are_no_numbers_are_refused() -> None:
+    with pytest.raises(ValueError, match="a score is NaN or infinite"):
+        normalised(np.array([0.1, np.nan]))
+    space = Space(GridSpec(SIZE_M), np.zeros((0, 3), np.int32), np.array([0.0, 0.0, 1.0]))
+    with pytest.raises(ValueError, match="an anchor's score is outside"):
+        factor(space, np.zeros((1, 3)), np.array([np.nan]))

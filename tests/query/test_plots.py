@@ -1,0 +1,60 @@
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from query_fakes import UP, box, fake_map, furnished_map, keyframes_at, sounds_of, voxels_of
+
+from avlmaps.core.errors import QueryError
+from avlmaps.maps.grid import GridSpec
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.level import Space
+from avlmaps.query.plots import plot_map
+from avlmaps.query.topdown import TopDown
+
+WALK = np.stack([np.linspace(1, 5, 20), 1 + np.sin(np.linspace(0, 3, 20)), np.full(20, 1.4)], axis=1)
+
+
+def colours_in(path: Path) -> int:
+    return len(np.unique(cv2.imread(str(path)).reshape(-1, 3), axis=0))
+
+
+def test_a_product_has_a_panel_for_each_part_and_one_for_all(tmp_path: Path) -> None:
+    m = AVLMap(furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK)))
+    one = m.object("chair", primary=True).plot(tmp_path / "one.png")
+    three = (m.object("chair", primary=True) * m.sound("dog")).plot(tmp_path / "deep" / "three.png")
+    assert colours_in(one) > 50
+    assert cv2.imread(str(three)).shape[1] > 1.5 * cv2.imread(str(one)).shape[1]
+
+
+def test_a_map_is_drawn_with_its_sounds(tmp_path: Path) -> None:
+    stored = furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK))
+    assert colours_in(plot_map(stored, tmp_path / "map.png")) > 20
+
+
+def test_an_empty_map_can_be_drawn(tmp_path: Path) -> None:
+    stored = fake_map(voxels_of(np.zeros((0, 3)), np.zeros((0, 4))), profile=furnished_map().profile)
+    assert plot_map(stored, tmp_path / "map.png").is_file()
+    assert AVLMap(stored).sound("dog").plot(tmp_path / "dog.png").is_file()
+
+
+def test_a_picture_of_an_unknown_kind_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(QueryError, match=r"^A picture cannot be written as 'x\.doc'; give it the suffix \.png, "):
+        plot_map(furnished_map(), tmp_path / "x.doc")
+
+
+def test_the_colour_from_above_is_that_of_the_highest_voxels_under_the_ceiling() -> None:
+    low, top, ceiling = box((0, 0, 0), (4, 4, 1)), box((0, 0, 10), (2, 2, 13)), box((0, 0, 60), (4, 4, 61))
+    voxels = voxels_of(np.concatenate([low, top, ceiling]), np.zeros((16 + 12 + 16, 1)))
+    rgb = np.zeros((len(voxels), 3), np.uint8)
+    for colour, height in ((10, 0), (200, 10), (200, 11), (200, 12), (255, 60)):
+        rgb[voxels.index[:, 2] == height] = colour
+    stored = fake_map(type(voxels)(voxels.index, voxels.feature, voxels.weight, rgb, voxels.last_seen_s, voxels.hits))
+    stored.keyframes = keyframes_at(np.array([[0.1, 0.1, 1.4]]))
+    view = TopDown.of(Space(GridSpec(0.05), voxels.index, UP, stored))
+    seen = view.rgb[view.seen].reshape(4, 4, 3)[..., 0]
+    np.testing.assert_array_equal(seen, [[200, 200, 10, 10], [200, 200, 10, 10], [10] * 4, [10] * 4])
+    values = np.zeros(len(voxels), np.float32)
+    values[0] = 0.7
+    assert view.heat(values).max() == np.float32(0.7)
+    assert view.extent == pytest.approx((-0.3, 0.5, -0.3, 0.5))
