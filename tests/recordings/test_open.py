@@ -1,0 +1,117 @@
+"""Opening by content: every format is found, and what is none gets a sentence that helps."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+from recording_scenes import save_rgb, shot, write_folder, write_seven_scenes
+
+import avlmaps
+from avlmaps.core.errors import AudioError, RecordingError
+from avlmaps.recordings.open import FORMATS, find_format, open_recording
+
+
+def _touch(path: Path, *names: str) -> Path:
+    for name in names:
+        file = path / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.mkdir() if name.endswith("/") else file.touch()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("names", "format"),
+    [
+        (("recording.json",), "folder"),
+        (("UNFINISHED",), "folder"),
+        (("frame-000000.pose.txt",), "7scenes"),
+        (("frame-000000.color.png", "camera-intrinsics.txt"), "7scenes"),
+        (("rgb.txt", "depth.txt", "groundtruth.txt", "rgb/", "depth/"), "tum"),
+        (("traj.txt", "results/"), "replica"),
+        (("color/", "depth/", "pose/", "intrinsic/"), "scannet"),
+        (("poses.txt", "rgb/", "depth/"), "avlmaps"),
+        (("metadata.yaml", "walk_0.db3"), "rosbag"),
+        (("metadata.yaml", "walk_0.mcap"), "rosbag"),
+    ],
+)
+def test_a_folder_is_known_by_what_it_holds(tmp_path: Path, names: tuple[str, ...], format: str):
+    assert find_format(_touch(tmp_path / "x", *names)).name == format
+
+
+@pytest.mark.parametrize("name", ["walk.bag", "walk.mcap", "walk.db3", "WALK.BAG"])
+def test_a_bag_is_known_by_its_name(tmp_path: Path, name: str):
+    assert find_format(_touch(tmp_path, name) / name).name == "rosbag"
+
+
+def test_a_named_format_is_taken_at_its_word(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    assert open_recording(path, format="folder").format == "folder"
+    with pytest.raises(RecordingError, match="walk holds no frame with its three files"):
+        open_recording(path, format="7scenes")
+
+
+def test_a_string_opens_like_a_path(tmp_path: Path):
+    assert len(avlmaps.open_recording(str(write_seven_scenes(tmp_path / "seq")))) == 5
+
+
+def test_another_sound_track_takes_the_place_of_the_recordings_own(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    soundfile.write(path / "audio.wav", np.zeros(4000), 8000)
+    soundfile.write(tmp_path / "other.flac", np.zeros(16000), 8000)
+    own, other = open_recording(path), open_recording(path, audio=tmp_path / "other.flac")
+    assert own.audio is not None and own.audio.duration_s == pytest.approx(0.5)
+    assert other.audio is not None and other.audio.duration_s == pytest.approx(2.0)
+    assert own.fingerprint != other.fingerprint
+    with pytest.raises(AudioError):
+        open_recording(path, audio=tmp_path / "gone.wav")
+
+
+def test_nothing_there_is_told(tmp_path: Path):
+    with pytest.raises(RecordingError, match=r"There is nothing at .*gone; give the folder or file of a recording."):
+        open_recording(tmp_path / "gone")
+
+
+def test_an_unknown_format_lists_the_known_ones(tmp_path: Path):
+    sentence = (
+        "There is no recording format called 'kitti'; known are: auto, folder, 7scenes, tum, replica, scannet, "
+        "avlmaps, rosbag."
+    )
+    with pytest.raises(RecordingError, match=re.escape(sentence)):
+        open_recording(tmp_path, format="kitti")
+
+
+def test_a_folder_of_nothing_known_is_told_what_each_format_looks_for(tmp_path: Path):
+    save_rgb(tmp_path / "pictures/holiday.jpg", shot(0).rgb)
+    with pytest.raises(RecordingError, match="pictures is of no known format; looked for: ") as caught:
+        open_recording(tmp_path / "pictures")
+    for known in FORMATS:
+        assert f"{known.name}: {known.looks_for}" in str(caught.value)
+
+
+def test_a_folder_of_recordings_names_them(tmp_path: Path):
+    for name in ("seq-01", "seq-02"):
+        write_seven_scenes(tmp_path / "kitchen" / name)
+    sentence = "kitchen holds recordings but is none itself; open one of them: seq-01, seq-02."
+    with pytest.raises(RecordingError, match=re.escape(sentence)):
+        open_recording(tmp_path / "kitchen")
+
+
+def test_a_file_of_nothing_known_is_told(tmp_path: Path):
+    (tmp_path / "notes.txt").write_text("hello")
+    with pytest.raises(RecordingError, match=r"notes.txt is a file of no known format; known are: folder: "):
+        open_recording(tmp_path / "notes.txt")
+
+
+def test_a_bare_video_is_told_what_it_lacks(tmp_path: Path):
+    (tmp_path / "walk.MP4").write_bytes(b"")
+    sentence = "walk.MP4 is a video, which has neither depth nor poses; make a folder of it, as rgb.mp4 beside"
+    with pytest.raises(RecordingError, match=re.escape(sentence)):
+        open_recording(tmp_path / "walk.MP4")
+
+
+def test_a_damaged_bag_is_a_sentence(tmp_path: Path):
+    (tmp_path / "walk.bag").write_bytes(b"#ROSBAG V2.0\n")
+    with pytest.raises(RecordingError, match=r"walk.bag"):
+        open_recording(tmp_path / "walk.bag")
