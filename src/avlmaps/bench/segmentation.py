@@ -19,7 +19,7 @@ from avlmaps.core.progress import progress
 from avlmaps.maps.segmentation import Segment, SegmentationSettings, segment
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.background import background
-from avlmaps.recordings.clips import Clip, find_clips, prepared
+from avlmaps.recordings.clips import Clip, amplified, audible_part, find_clips, gain_for
 
 COLUMNS = (
     "clips",
@@ -151,7 +151,7 @@ def measure(
     order = rng.permutation(len(clips))
     with TemporaryDirectory() as scratch:
         for begin in range(0, len(order), _CLIPS_A_TRACK):
-            sounds = [prepared(clips[i], _RATE_HZ, _LOUDNESS_DB)[0] for i in order[begin : begin + _CLIPS_A_TRACK]]
+            sounds = [_prepared(clips[i]) for i in order[begin : begin + _CLIPS_A_TRACK]]
             samples, truth = _track(sounds, rng)
             if snr_db is not None:
                 samples += _noise(kind, _LOUDNESS_DB - snr_db, len(samples), rng)
@@ -160,6 +160,11 @@ def measure(
             track = AudioTrack.open(path)
             tally.add(truth, segment(track, settings), track.duration_s)
     return tally
+
+
+def _prepared(clip: Clip) -> Sound:
+    sound = audible_part(clip, _RATE_HZ)
+    return amplified(sound, gain_for(sound, _LOUDNESS_DB))
 
 
 def _track(sounds: Sequence[Sound], rng: np.random.Generator) -> tuple[Float32[np.ndarray, " n"], list[Segment]]:

@@ -18,7 +18,7 @@ _ACTIVE_DB = -30.0  # below the loudest 10 ms; pauses inside a clip do not count
 _FRAME_S = 0.01
 _EDGE_S = 0.005  # fade at both ends: a cut must not click
 _SILENT = 1e-5  # less than one step of 16-bit sound
-_PEAK = 0.89  # -1 dB: no clip is made so loud that it would be cut off
+_HIGHEST_PEAK_DB = -1.0  # no clip is made so loud that it would be cut off
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,27 +95,27 @@ def loudness_db(sound: Sound) -> float:
     return float(10.0 * np.log10(level[level >= level.max() * 10.0 ** (_ACTIVE_DB / 10.0)].mean()))
 
 
-def prepared(clip: Clip, rate_hz: int, wanted_db: float, longest_s: float | None = None) -> tuple[Sound, float]:
-    """Read a clip, cut it to its audible part, and bring it to a rate and a loudness.
-
-    Args:
-        clip: the clip.
-        rate_hz: wanted samples a second.
-        wanted_db: wanted loudness, dB relative to full scale; a clip whose peak would pass -1 dB gets less.
-        longest_s: cut what is longer, with a fade.
-
-    Returns:
-        The sound, and the gain in dB that it got.
+def audible_part(clip: Clip, rate_hz: int, longest_s: float | None = None) -> Sound:
+    """Read a clip, cut it to its audible part (and to a length), and fade its ends within 5 ms.
 
     Raises:
         AudioError: the clip cannot be read or is silent.
     """
     sound = audible(resampled(AudioTrack.open(clip.path).read(), rate_hz), str(clip.path))
-    if longest_s is not None and sound.duration_s > longest_s:
+    if longest_s is not None:
         sound = Sound(sound.samples[: round(longest_s * rate_hz)], rate_hz)
-    gain = 10.0 ** ((wanted_db - loudness_db(sound)) / 20.0)
-    gain = min(gain, _PEAK / float(np.abs(sound.samples).max()))
-    return Sound((sound.samples * gain * _edges(sound)).astype(np.float32), rate_hz), float(20.0 * np.log10(gain))
+    return Sound(sound.samples * _edges(sound), rate_hz)
+
+
+def gain_for(sound: Sound, wanted_db: float) -> float:
+    """Return the gain in dB that brings a sound to a loudness, or its peak to -1 dB where that comes first."""
+    peak_db = 20.0 * np.log10(float(np.abs(sound.samples).max()))
+    return float(min(wanted_db - loudness_db(sound), _HIGHEST_PEAK_DB - peak_db))
+
+
+def amplified(sound: Sound, gain_db: float) -> Sound:
+    """Return the sound with a gain in dB."""
+    return Sound(sound.samples * np.float32(10.0 ** (gain_db / 20.0)), sound.rate_hz)
 
 
 def _frame_samples(sound: Sound) -> int:

@@ -1,0 +1,317 @@
+"""Putting recorded sounds into the track of a walk, with the truth of what sounds where, as the paper did."""
+
+import csv
+import io
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float32
+
+from avlmaps.core.errors import AudioError
+from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.progress import progress as shown
+from avlmaps.core.progress import say
+from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
+from avlmaps.recordings.background import background as noise_of
+from avlmaps.recordings.background import seconds_of
+from avlmaps.recordings.clips import Clip, amplified, audible_part, find_clips, gain_for, loudness_db
+from avlmaps.recordings.spacing import Placer, Spacing, Walk, capacity, chosen_spacing
+from avlmaps.recordings.types import Recording
+
+EVENTS = "events.csv"
+EVENTS_HEADER = ("onset_s", "offset_s", "category", "clip", "x", "y", "z", "gain_db")
+_RATE_HZ = 44_100
+_USUAL_LENGTH_S = 5.0
+_WANTED = 4  # where whole clips leave room for fewer sounds than this, they are cut short
+_SHORTEST_CUT_S = 2.0
+_SNR_DB = 20.0  # of a background for which none is asked
+_TRIES = 12  # clips that are tried for the last gaps, before the track counts as full
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A sound that was put into a track.
+
+    Attributes:
+        onset_s: where it begins, the recording's time.
+        offset_s: where it ends.
+        category: what it is.
+        clip: the clip's name.
+        position: where the robot was when the sound was half over, metres, world.
+        gain_db: how much the clip was amplified.
+    """
+
+    onset_s: float
+    offset_s: float
+    category: str
+    clip: str
+    position: tuple[float, float, float]
+    gain_db: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {
+            "onset_s": self.onset_s,
+            "offset_s": self.offset_s,
+            "category": self.category,
+            "clip": self.clip,
+            "position": list(self.position),
+            "gain_db": self.gain_db,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class _Placed:
+    """A sound in the track: read twice, so that the sounds of hours need not be in memory at once."""
+
+    clip: Clip
+    begin: int
+    length: int
+    gain_db: float
+    loudness_db: float
+
+
+def add_sounds(
+    recording: Recording,
+    clips: Path,
+    out: Path,
+    *,
+    categories: Sequence[str] | None = None,
+    seed: int = 0,
+    interval_s: float = 2.0,
+    min_distance_m: float = 2.0,
+    loudness_db: float = -20.0,
+    background: str | Path | None = None,
+    snr_db: float | None = None,
+    progress: bool = True,
+) -> list[Event]:
+    """Copy a recording and put sounds into its track; the same seed gives the same bytes.
+
+    Sounds follow one another along the walk, each as early as the rule allows, no two at the same time. Categories
+    are drawn without replacement until all were heard, then anew. No two sounds are heard within
+    ``min_distance_m`` of each other in a straight line, as in the paper; in a room too small for three sounds
+    by that rule the distance is measured along the walk instead. Where whole clips leave room for fewer than
+    four sounds, they are cut short, to no less than two seconds. A notice tells each of these.
+
+    Args:
+        recording: the walk; a track that it has already is kept below the sounds.
+        clips: a folder with a subfolder for each category, or with an index.csv (path, category).
+        out: the new recording's folder, in our own format; it must be empty.
+        categories: only these.
+        seed: of what is drawn at random.
+        interval_s: least silence between two sounds, seconds.
+        min_distance_m: least distance between two sounds; 0 allows any.
+        loudness_db: loudness of each sound (RMS of its loud frames), dB relative to full scale.
+        background: ``white``, ``pink``, ``room`` or a sound file, put under the whole track.
+        snr_db: how much louder every sound is than the background (20 if None); for it, all sounds are made as
+            quiet as the clip with the highest peaks has to be.
+        progress: whether to show it on standard error.
+
+    Returns:
+        The events, also written to ``events.csv``.
+
+    Raises:
+        AudioError: there are no clips, no room for one sound, or options that make no sense.
+        RecordingError: the recording cannot be copied.
+    """
+    if snr_db is not None and background is None:
+        background = "white"
+    _check(interval_s, min_distance_m, loudness_db, snr_db)
+    rng = np.random.default_rng(seed)
+    found = find_clips(clips, categories)
+    rate_hz = recording.audio.rate_hz if recording.audio else _RATE_HZ
+    walk = Walk.along(recording.stamps_s, recording.world_from_camera[:, :3, 3])
+    placer, longest_s, notices = _rule(walk, Spacing(interval_s, min_distance_m))
+    placed = _place(found, placer, (rate_hz, loudness_db, longest_s), rng, notices)
+    if not placed:
+        raise AudioError(
+            f"The walk of {recording.path} lasts {recording.duration_s:.1f} s and has no room for a single sound; choose "
+            "shorter clips or a longer recording."
+        )
+    noise = None
+    if background is not None:
+        placed = _equally_loud(placed, loudness_db, notices)
+        noise = noise_of(background, placed[0].loudness_db - (_SNR_DB if snr_db is None else snr_db), rate_hz, rng)
+    events = [_event(sound, walk, rate_hz) for sound in placed]
+    seconds = _mixed(recording, placed, noise, rate_hz)
+    _write(recording, out, shown(seconds, "mixing", unit="second") if progress else seconds, events)
+    if progress:
+        for notice in notices:
+            say(f"note: {notice}")
+    return events
+
+
+def read_events(path: Path) -> list[Event]:
+    """Read an ``events.csv``.
+
+    Raises:
+        AudioError: there is none, or a line does not hold what the header says.
+    """
+    if not path.is_file():
+        raise AudioError(f"There is no {path}; make one with avlmaps add-sounds.")
+    events: list[Event] = []
+    with path.open(newline="", encoding="utf-8") as stream:
+        rows = csv.reader(stream)
+        if tuple(next(rows, ())) != EVENTS_HEADER:
+            raise AudioError(f"{path} does not begin with the line {','.join(EVENTS_HEADER)}; it is no list of events.")
+        for number, row in enumerate(rows, start=2):
+            try:
+                onset, offset, category, clip, x, y, z, gain = row
+                place = (float(x), float(y), float(z))
+                events.append(Event(float(onset), float(offset), category, clip, place, float(gain)))
+            except ValueError:
+                raise AudioError(f"{path}, line {number} does not hold {len(EVENTS_HEADER)} values; mend it.") from None
+    return events
+
+
+def _check(interval_s: float, min_distance_m: float, loudness_db: float, snr_db: float | None) -> None:
+    for name, value in (("interval", interval_s), ("least distance", min_distance_m)):
+        if not np.isfinite(value) or value < 0.0:
+            raise AudioError(f"The {name} between sounds is {value}; choose 0 or more.")
+    if not -90.0 <= loudness_db <= 0.0:
+        raise AudioError(f"The loudness is {loudness_db} dB; choose between -90 and 0, dB relative to full scale.")
+    if snr_db is not None and not -30.0 <= snr_db <= 90.0:
+        raise AudioError(f"The signal-to-noise ratio is {snr_db} dB; choose between -30 and 90.")
+
+
+def _rule(walk: Walk, asked: Spacing) -> tuple[Placer, float | None, list[str]]:
+    """Choose how distance is measured and how long a sound may be, so that a small room holds several."""
+    notices: list[str] = []
+    spacing = chosen_spacing(walk, asked, _USUAL_LENGTH_S)
+    if spacing.measure != asked.measure:
+        notices.append(
+            f"The walk stays within so small a place that few sounds are {asked.distance_m:g} m apart in a straight "
+            "line; they are that far apart along the walk instead (--min-distance-m 0 allows any distance)."
+        )
+    lengths_s = np.arange(_USUAL_LENGTH_S, _SHORTEST_CUT_S - 1e-9, -0.5)
+    room = [capacity(walk, spacing, float(length_s), _WANTED) for length_s in lengths_s]
+    if room[0] >= _WANTED or max(room) <= room[0]:
+        return Placer(walk, spacing), None, notices
+    longest_s = float(lengths_s[int(np.argmax(room))])
+    notices.append(
+        f"Sounds of {_USUAL_LENGTH_S:g} s would leave room for {room[0]} of them, so they are cut to {longest_s:g} s, "
+        f"which leaves room for {max(room)}; a smaller --min-distance-m leaves room for more."
+    )
+    return Placer(walk, spacing), longest_s, notices
+
+
+def _place(
+    clips: Sequence[Clip],
+    placer: Placer,
+    wanted: tuple[int, float, float | None],
+    rng: np.random.Generator,
+    notices: list[str],
+) -> list[_Placed]:
+    """Draw clips and put them one after the other, until none of several fits any more."""
+    rate_hz, wanted_db, longest_s = wanted
+    placed: list[_Placed] = []
+    failures = 0
+    for clip in _draws(clips, rng):
+        try:
+            sound = audible_part(clip, rate_hz, longest_s)
+        except AudioError as error:  # one bad clip in a collection must not keep the others out
+            notices.append(f"Left out: {error}")
+            failures += 1
+        else:
+            onset_s = placer.place(sound.duration_s)
+            failures = failures + 1 if onset_s is None else 0
+            if onset_s is not None:
+                gain_db = gain_for(sound, wanted_db)
+                begin, heard_db = round(onset_s * rate_hz), loudness_db(sound) + gain_db
+                placed.append(_Placed(clip, begin, len(sound.samples), gain_db, heard_db))
+        if failures >= _TRIES:
+            return placed
+    return placed
+
+
+def _draws(clips: Sequence[Clip], rng: np.random.Generator) -> Iterator[Clip]:
+    """Yield clips without end: every category once in a random order, then again; within one likewise."""
+    stacks: dict[str, list[Clip]] = {clip.category: [] for clip in clips}
+    while True:
+        for category in rng.permutation(sorted(stacks)):
+            if not stacks[category]:
+                own = [clip for clip in clips if clip.category == category]
+                stacks[category] = [own[i] for i in rng.permutation(len(own))]
+            yield stacks[category].pop()
+
+
+def _equally_loud(placed: list[_Placed], wanted_db: float, notices: list[str]) -> list[_Placed]:
+    """Make every sound as quiet as the quietest, so that each has the signal-to-noise ratio that is asked."""
+    quietest_db = min(sound.loudness_db for sound in placed)
+    if quietest_db < wanted_db - 0.5:
+        notices.append(
+            f"All sounds have a loudness of {quietest_db:.1f} dB instead of {wanted_db:g}: louder, the peaks of one "
+            "would be cut off, and then not all would be equally loud against the background."
+        )
+    return [
+        replace(sound, gain_db=sound.gain_db + quietest_db - sound.loudness_db, loudness_db=quietest_db)
+        for sound in placed
+    ]
+
+
+def _event(sound: _Placed, walk: Walk, rate_hz: int) -> Event:
+    onset_s, offset_s = sound.begin / rate_hz, (sound.begin + sound.length) / rate_hz
+    x, y, z = (round(float(axis), 4) for axis in walk.position[walk.index((onset_s + offset_s) / 2.0)])
+    return Event(
+        round(onset_s, 6), round(offset_s, 6), sound.clip.category, sound.clip.name, (x, y, z), round(sound.gain_db, 2)
+    )
+
+
+def _mixed(
+    recording: Recording, placed: Sequence[_Placed], noise: Iterator[np.ndarray] | None, rate_hz: int
+) -> Iterator[Sound]:
+    """Yield the track second by second: what was there, the background, and the sounds."""
+    end_s = max(float(recording.stamps_s[-1]), recording.audio.end_s if recording.audio else 0.0)
+    end = max(int(np.ceil(end_s * rate_hz)), *(sound.begin + sound.length for sound in placed))
+    there, below = _there(recording.audio, rate_hz), seconds_of(noise, rate_hz)
+    waiting = list(placed)
+    sounding: list[tuple[int, np.ndarray]] = []
+    for begin in range(0, end, rate_hz):
+        mix = next(there) + next(below).samples
+        while waiting and waiting[0].begin < begin + rate_hz:
+            sound = waiting.pop(0)
+            part = audible_part(sound.clip, rate_hz, sound.length / rate_hz)
+            sounding.append((sound.begin, amplified(part, sound.gain_db).samples))
+        for at, samples in sounding:
+            first, last = max(at, begin), min(at + len(samples), begin + rate_hz)
+            if first < last:
+                mix[first - begin : last - begin] += samples[first - at : last - at]
+        sounding = [(at, samples) for at, samples in sounding if at + len(samples) > begin + rate_hz]
+        yield Sound(mix[: end - begin], rate_hz)
+
+
+def _there(track: AudioTrack | None, rate_hz: int) -> Iterator[Float32[np.ndarray, " second"]]:
+    """Yield what a recording's own track holds, second by second from the recording's time 0, then silence."""
+    waiting = np.zeros(0, np.float32)
+    if track is not None:
+        late = round(track.start_s * rate_hz)
+        waiting = np.zeros(max(late, 0), np.float32)
+        early = max(-late, 0)
+        for block in track.blocks(1.0):
+            waiting = np.concatenate([waiting, block.samples[early:]])
+            early = max(early - len(block.samples), 0)
+            while len(waiting) >= rate_hz:
+                yield waiting[:rate_hz].copy()
+                waiting = waiting[rate_hz:]
+    yield np.pad(waiting, (0, rate_hz - len(waiting)))
+    while True:
+        yield np.zeros(rate_hz, np.float32)
+
+
+def _write(recording: Recording, out: Path, seconds: Iterable[Sound], events: Sequence[Event]) -> None:
+    from avlmaps.recordings.writer import write_recording
+
+    with TemporaryDirectory() as scratch:
+        track = Path(scratch) / "audio.flac"
+        write_flac(track, seconds)
+        origin = f"{recording.format} {recording.path.name} with {len(events)} sounds put into its track"
+        write_recording(recording, out, audio=track, origin=origin)
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(EVENTS_HEADER)
+    writer.writerows([(e.onset_s, e.offset_s, e.category, e.clip, *e.position, e.gain_db) for e in events])
+    write_bytes_atomically(out / EVENTS, text.getvalue().encode("utf-8"))
