@@ -53,17 +53,21 @@ class PartInfo(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A finished part, its sums memory-mapped.
+    """A finished part.
 
     Attributes:
         folder: where it lies.
         info: which frames it covers.
-        sums: sums over them.
+        key: hash of all that its sums depend on.
     """
 
     folder: Path
     info: PartInfo
-    sums: VoxelSums
+    key: str
+
+    def sums(self) -> VoxelSums:
+        """Return the sums over its frames, memory-mapped anew, so that memory is let go with them."""
+        return VoxelSums(**load_checkpoint(self.folder, PartInfo, self.key).arrays)
 
 
 def pixel_encoder_of(used: Profile) -> PixelEncoder | None:
@@ -162,9 +166,9 @@ def merge_parts(folders: Sequence[Path | str], out: Path | str) -> Part:
 
 def add_up(parts: Sequence[Part], grid: GridSpec) -> VoxelAccumulator:
     """Add the sums of parts, in the order given; in memory is only the total."""
-    total = VoxelAccumulator(grid, parts[0].sums.feature_sum.shape[1])
+    total = VoxelAccumulator(grid, parts[0].sums().feature_sum.shape[1])
     for part in parts:
-        total.merge(part.sums)
+        total.merge(part.sums())
     return total
 
 
@@ -180,18 +184,22 @@ def find_part(folder: Path, key: str, span: Span) -> Part | None:
 
 
 def _part(found: Checkpoint[PartInfo]) -> Part:
-    return Part(found.folder, found.facts, VoxelSums(**found.arrays))
+    return Part(found.folder, found.facts, found.key)
 
 
 def check_disjoint(parts: Sequence[Part]) -> None:
     """Raise ``MapError`` if two parts cover the same frame: it would count twice."""
-    owner: dict[int, Path] = {}
-    for part in parts:
-        for span in part.info.spans:
-            for frame in range(*span):
-                if frame in owner:
-                    raise MapError(f"{owner[frame]} and {part.folder} both cover frame {frame}; leave one of them out.")
-                owner[frame] = part.folder
+    frames = max((span[1] for part in parts for span in part.info.spans), default=0)
+    owner = np.full(frames, -1)
+    for number, part in enumerate(parts):
+        for start, stop, step in part.info.spans:
+            taken = np.flatnonzero(owner[start:stop:step] >= 0)
+            if len(taken):
+                frame = start + step * int(taken[0])
+                raise MapError(
+                    f"{parts[owner[frame]].folder} and {part.folder} both cover frame {frame}; leave one of them out."
+                )
+            owner[start:stop:step] = number
 
 
 class Tolerance:

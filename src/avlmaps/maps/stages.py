@@ -89,7 +89,8 @@ def _look_for_up(plan: Plan) -> UpInfo:
     try:
         up = up_of_planes(_spread(plan.recording, plan.settings.gravity.frames), plan.rng(_GRAVITY))
     except RecordingError:  # too little smooth surface: people and robots hold cameras upright, more or less
-        return UpInfo.of(-plan.recording.world_from_camera[:, :3, 1].mean(axis=0), "camera", 0.0)
+        held = -plan.recording.world_from_camera[:, :3, 1].mean(axis=0)
+        return UpInfo.of(held if np.linalg.norm(held) > 0.01 else np.array([0.0, 0.0, 1.0]), "camera", 0.0)
     return UpInfo.of(up.direction, "planes", float(up.support))
 
 

@@ -89,6 +89,9 @@ def sweep(path: Path, info: MapInfo) -> None:
             if old not in kept and old.is_file():
                 with suppress(OSError):
                     old.unlink()
+    for unfinished in path.glob(f".{MANIFEST}.*.partial"):
+        with suppress(OSError):
+            unfinished.unlink()
     shutil.rmtree(path / PARTS, ignore_errors=True)
 
 
@@ -99,4 +102,4 @@ def is_map_or_free(path: Path) -> bool:
     if not path.is_dir():
         return False
     names = {entry.name for entry in path.iterdir()}
-    return not names - {LOCK} or bool(names & {MANIFEST, PARTS})
+    return bool(names & {MANIFEST, PARTS}) or names <= {LOCK, *SECTIONS}
