@@ -35,7 +35,7 @@ class Augmentation:
     equaliser_db: float = 4.0
     reverberation: float = 0.3
     noisy: float = 0.6
-    snr_db: tuple[float, float] = (0.0, 35.0)
+    snr_db: tuple[float, float] = (-3.0, 30.0)
     trimmed: float = 0.3
     masks: tuple[int, int] = (8, 50)
 
@@ -88,14 +88,14 @@ def coloured(power: Tensor, how: Augmentation, generator: torch.Generator) -> Te
 
 def in_rooms(power: Tensor, how: Augmentation, generator: torch.Generator) -> Tensor:
     """Add an exponential tail to some sounds: one reverberation time of 0.2 to 1 s a batch, levels of their own."""
-    n = len(power)
+    chosen = torch.rand(len(power), generator=generator) < how.reverberation
     seconds = float(torch.empty(1).uniform_(0.2, 1.0, generator=generator))
-    level = 10.0 ** (torch.empty(n).uniform_(-2.0, -0.5, generator=generator)) * (
-        torch.rand(n, generator=generator) < how.reverberation
-    )
+    level = 10.0 ** torch.empty(int(chosen.sum())).uniform_(-2.0, -0.5, generator=generator)
     lag = (torch.arange(FRAMES)[:, None] - torch.arange(FRAMES)[None, :]).float() * logmel.HOP_SAMPLES / logmel.RATE_HZ
     tail = torch.exp(-13.8 * lag.clamp_min(0.0) / seconds) * (lag > 0)
-    return power + level[:, None, None] * (tail @ power)
+    power = power.clone()
+    power[chosen] += level[:, None, None] * (tail @ power[chosen])
+    return power
 
 
 def in_noise(power: Tensor, noise: Tensor, how: Augmentation, generator: torch.Generator) -> Tensor:

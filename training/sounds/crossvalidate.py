@@ -83,55 +83,50 @@ def condition_mels(corpus: Corpus, rows: np.ndarray, condition: str) -> np.ndarr
     return np.stack(mels)
 
 
-def train_fold(
-    corpus: Corpus, fold: int, words: torch.Tensor, settings: Settings, without: Sequence[str] = ()
-) -> SoundNet:
-    """Fit a network on every fold but one."""
-    folds = np.array([clip.fold for clip in corpus.clips])
-    label = f"fold {fold}" + (f" without {', '.join(without)}" if without else "")
-    return fit(corpus.examples(folds != fold, without), words, replace(settings, seed=settings.seed + fold), label)
+@dataclass(frozen=True, slots=True)
+class Networks:
+    """Fits networks, or takes those that were fitted before from the work folder.
 
-
-def cached(file: Path, make: object) -> SoundNet:
-    """Load a network from a file, or make and save it."""
-    if not file.exists():
-        net = make()  # pyright: ignore[reportCallIssue]
-        file.parent.mkdir(parents=True, exist_ok=True)
-        torch.save(net.state_dict(), file)
-    state = torch.load(file, weights_only=True)
-    net = SoundNet(dim=state["head.weight"].shape[0])
-    net.load_state_dict(state)
-    return net.eval()
-
-
-def held_out_features(
-    corpus: Corpus, encode_words: EncodeWords, settings: Settings, seeds: int, cache: Path, refit: bool
-) -> dict[str, np.ndarray]:
-    """Return the feature of every recorded clip by networks that never heard its fold, under every condition.
-
-    The ensemble's feature is the normalised mean of its members'.
+    A network that was fitted to other words (another checksum) keeps its layers; only its last one is fitted anew.
     """
-    words = targets(encode_words)
-    folds = np.array([clip.fold for clip in corpus.clips])
-    features = {c: np.zeros((len(corpus.clips), words.shape[2]), np.float32) for c in CONDITIONS}
-    others = {
-        clip.path: logmel.windows(logmel.normalised(logmel.mel_power(read_samples(corpus.folder / clip.path))))
-        for clip in corpus.others
-    }
-    other_features = []
-    for fold in FOLDS:
-        rows = np.flatnonzero(folds == fold)
+
+    corpus: Corpus
+    encode_words: EncodeWords
+    words_checksum: str
+    settings: Settings
+    members: int
+    work: Path
+
+    def of_fold(self, fold: int, without: tuple[str, ...] = ()) -> list[SoundNet]:
+        """Return the ensemble that never heard a fold, nor some kinds at all."""
+        folds = np.array([clip.fold for clip in self.corpus.clips])
+        name = "-".join([f"fold{fold}", *(kind.replace(" ", "_") for kind in without)])
+        return self._ensemble(name, self.corpus.examples(folds != fold, without), fold)
+
+    def of_all(self) -> list[SoundNet]:
+        """Return the ensemble that heard every fold."""
+        return self._ensemble("all", self.corpus.examples(np.ones(len(self.corpus.clips), bool)), 0)
+
+    def _ensemble(self, name: str, examples: Examples, offset: int) -> list[SoundNet]:
+        words = targets(self.encode_words)
         nets = []
-        for seed in range(seeds):
-            own = replace(settings, seed=settings.seed + 100 * seed)
-            net = cached(cache / f"fold{fold}-{own.seed}.pt", lambda f=fold, o=own: train_fold(corpus, f, words, o))
-            nets.append(fit_head(net, corpus.examples(folds != fold), words, own) if refit else net)
-        for condition in CONDITIONS:
-            mels = condition_mels(corpus, rows, condition)
-            features[condition][rows] = ensemble(nets, mels)
-        other_features.append([ensemble(nets, mels) for mels in others.values()])
-        say(f"fold {fold} done")
-    return features | {f"other {fold}": np.array(f, object) for fold, f in zip(FOLDS, other_features, strict=True)}
+        for member in range(self.members):
+            settings = replace(self.settings, seed=100 * member + offset)
+            file = self.work / f"{name}-{settings.steps}-{settings.seed}.pt"
+            if not file.exists():
+                net = fit(examples, words, settings, f"{name} {member + 1}/{self.members}")
+                self.work.mkdir(parents=True, exist_ok=True)
+                torch.save({"words": self.words_checksum, "state": net.state_dict()}, file)
+            kept = torch.load(file, weights_only=True)
+            state = kept["state"]
+            net = SoundNet(state["head.weight"].shape[0], state["stem.weight"].shape[0])
+            net.load_state_dict(state)
+            if kept["words"] != self.words_checksum:
+                say(f"{file.name}: fitting the last layer to other words")
+                net = fit_head(net.eval(), examples, words, settings)
+                torch.save({"words": self.words_checksum, "state": net.state_dict()}, file)
+            nets.append(net.eval())
+        return nets
 
 
 def ensemble(nets: Sequence[SoundNet], mels: np.ndarray) -> np.ndarray:

@@ -24,6 +24,7 @@ class Settings:
 
     Attributes:
         steps: batches.
+        width: of the network.
         recorded: recorded clips in a batch.
         synthetic: synthetic clips in a batch.
         temperature: of the softmax over kinds.
@@ -35,11 +36,12 @@ class Settings:
     """
 
     steps: int = 900
+    width: int = 24
     recorded: int = 32
     synthetic: int = 16
     temperature: float = 0.07
     smoothing: float = 0.1
-    rate: float = 2e-3
+    rate: float = 3e-3
     decay: float = 2e-2
     averaging: float = 0.995
     seed: int = 0
@@ -62,9 +64,9 @@ def targets(encode_words: EncodeWords) -> Tensor:
 
 
 def steady_noise(count: int, generator: torch.Generator) -> Tensor:
-    """Return mel power of noise of random colour, from falling by 30 dB over the bands to rising by 10."""
+    """Return mel power of noise of random colour: from falling by 25 dB over the bands to rising by 16 (white: 12)."""
     power = 0.5 + 0.5 * torch.empty(count, logmel.WINDOW_FRAMES, logmel.BANDS).exponential_(generator=generator)
-    tilt_db = 40.0 * torch.rand(count, 1, 1, generator=generator) - 30.0
+    tilt_db = 41.0 * torch.rand(count, 1, 1, generator=generator) - 25.0
     return power * 10.0 ** (tilt_db * torch.linspace(0.0, 1.0, logmel.BANDS) / 10.0)
 
 
@@ -100,7 +102,7 @@ def fit(examples: Examples, words: Tensor, settings: Settings, label: str = "") 
     torch.manual_seed(settings.seed)
     generator = torch.Generator().manual_seed(settings.seed)
     batches = _Batches(examples, settings)
-    net = SoundNet(dim=words.shape[2]).to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+    net = SoundNet(words.shape[2], settings.width).to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
     average = copy.deepcopy(net).eval()
     optimiser = torch.optim.AdamW(net.parameters(), lr=settings.rate, weight_decay=settings.decay)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, settings.rate, settings.steps, pct_start=0.1)
@@ -119,7 +121,7 @@ def fit(examples: Examples, words: Tensor, settings: Settings, label: str = "") 
         optimiser.step()
         schedule.step()
         _blend(average, net, min(settings.averaging, (1 + step) / (10 + step)))
-        total += float(loss)
+        total += loss.item()
         if (step + 1) % 100 == 0:
             say(f"{label} step {step + 1}/{settings.steps} loss {total / 100:.3f}")
             total = 0.0
@@ -161,7 +163,9 @@ def fit_head(net: SoundNet, examples: Examples, words: Tensor, settings: Setting
     for _ in range(batches):
         power, kinds = source.draw()
         noise = steady_noise(len(power), generator)
-        seen.append(pooled(net, augmented(power, noise, settings.augmentation, generator)))
+        x = augmented(power, noise, settings.augmentation, generator)
+        with torch.autocast("cpu", torch.bfloat16):
+            seen.append(pooled(net, x.to(memory_format=torch.channels_last)).float())
         kinds_seen.append(kinds)
     features, kinds = torch.cat(seen), torch.cat(kinds_seen)
     head = torch.nn.Linear(net.head.in_features, words.shape[2])

@@ -27,7 +27,7 @@ class Block(nn.Module):
 class SoundNet(nn.Module):
     """From (n, 2, 64, 448) to unit vectors (n, dim)."""
 
-    def __init__(self, dim: int = 128, width: int = 32, dropout: float = 0.2) -> None:
+    def __init__(self, dim: int = 128, width: int = 24, dropout: float = 0.2) -> None:
         super().__init__()
         self.stem = nn.Conv2d(2, width, (5, 7), stride=(2, 4), padding=(2, 3), bias=False)
         self.stem_norm = nn.BatchNorm2d(width)

@@ -1,0 +1,140 @@
+"""Fit the constants that turn cosines into probabilities, on clips that the networks had not heard."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from training.sounds.fit import EncodeWords, targets
+from training.sounds.kinds import CALLED, KINDS, RECORDED
+
+from avlmaps.perception.embedded.sound_calibration import (
+    Calibration,
+    kinds_of_phrases,
+    kinds_of_windows,
+    log_odds,
+    softmax,
+)
+
+START = Calibration(0.07, (0.0, 0.0, 0.0), 0.05, (0.0, 0.0), (0.0, 1.0), (0.0, 0.0, 0.0), (0.5, 8.0))
+
+# Phrases that name no sound; with the kinds' other names they fit what counts as naming one. Not used for testing.
+NO_SOUNDS = (
+    "chair table sofa bed lamp carpet curtain wardrobe bookshelf pillow mirror picture frame|wooden stool|red cabinet|"
+    "blanket drawer shelf desk rug vase candle towel bathtub|kitchen worktop|window sill|potted plant|paper basket|"
+    "yellow flower pot|magazine notebook poster jacket shoe hat umbrella suitcase|blue armchair|coffee table|"
+    "dining room|bedroom corridor balcony garage basement|cereal box|banana apple orange|cardboard box|socket ladder|"
+    "bottle|soap dish|yoga mat|dumbbell backpack wallet|the colour green|mathematics|justice|tomorrow|sweater"
+)
+
+
+def phrases_without_sound() -> list[str]:
+    """Return them one by one: bars part phrases, and single words within a part stand for themselves."""
+    parts = NO_SOUNDS.split("|")
+    return [p for part in parts for p in ([part] if len(part.split()) <= 2 else part.split())]
+
+
+def fit_logistic(x: np.ndarray, y: np.ndarray, weights: np.ndarray | None = None, ridge: float = 1e-2) -> np.ndarray:
+    """Return (bias, slopes) of a logistic regression by Newton's method."""
+    design = np.hstack([np.ones((len(x), 1)), x.reshape(len(x), -1)])
+    w = np.ones(len(x)) if weights is None else weights
+    beta = np.zeros(design.shape[1])
+    penalty = ridge * np.eye(len(beta))
+    penalty[0, 0] = 1e-6
+    for _ in range(50):
+        p = 1.0 / (1.0 + np.exp(-design @ beta))
+        gradient = design.T @ (w * (p - y)) + penalty @ beta
+        hessian = (design * (w * p * (1.0 - p))[:, None]).T @ design + penalty
+        step = np.linalg.solve(hessian, gradient)
+        beta -= step
+        if np.abs(step).max() < 1e-8:
+            break
+    return beta
+
+
+def prototypes(encode_words: EncodeWords) -> np.ndarray:
+    """Return the unit vectors (kinds, dim) that the networks aim at, as the encoder makes them."""
+    total = targets(encode_words).numpy().sum(axis=0)
+    return total / np.linalg.norm(total, axis=1, keepdims=True)
+
+
+def fit_temperature(cosines: np.ndarray, kinds: np.ndarray) -> float:
+    """Return the temperature at which held-out kinds are the most likely."""
+
+    def surprise(log_t: float) -> float:
+        p = softmax(cosines / np.exp(log_t))
+        return float(-np.log(p[np.arange(len(kinds)), kinds] + 1e-9).mean())
+
+    return float(np.exp(minimize_scalar(surprise, bounds=(np.log(0.01), np.log(0.3)), method="bounded").x))
+
+
+def lead_features(cosines: np.ndarray) -> np.ndarray:
+    """Return the highest cosine and its lead over the next."""
+    best = np.sort(cosines, axis=1)[:, -2:]
+    return np.stack([best[:, 1], best[:, 1] - best[:, 0]], axis=1)
+
+
+def fit_phrases(encode_words: EncodeWords, c: Calibration) -> Calibration:
+    """Fit what a phrase means on the kinds' other names, and what names no sound on the list above."""
+    names = encode_words(CALLED)
+    others = [(k, word) for k, called in enumerate(KINDS.values()) for word in called[1:]]
+    cosines = encode_words([word for _, word in others]) @ names.T
+    means = np.array([k for k, _ in others])
+    temperature = fit_temperature(cosines, means)
+    nothing = (encode_words(phrases_without_sound()) @ names.T).max(axis=1)
+    x = np.concatenate([cosines[np.arange(len(means)), means], nothing])
+    y = np.concatenate([np.ones(len(means)), np.zeros(len(nothing))])
+    bias, slope = fit_logistic(x, y)
+    return replace(c, phrase_temperature=temperature, phrase=(float(bias), float(slope)))
+
+
+def heard_kinds(features: np.ndarray, aims: np.ndarray, c: Calibration) -> np.ndarray:
+    """Return how likely each one-window sound is of each kind, as ``EmbeddedSounds`` finds it."""
+    posterior, known = kinds_of_windows(features @ aims.T, c)
+    return posterior * known[:, None]
+
+
+def fit_known(known: np.ndarray, unknown: np.ndarray, c: Calibration) -> Calibration:
+    """Fit the refusal of unknown sounds on cosines (n, kinds) of both, each side weighing the same."""
+    x = np.concatenate([lead_features(known), lead_features(unknown)])
+    y = np.concatenate([np.ones(len(known)), np.zeros(len(unknown))])
+    weights = np.concatenate([np.full(len(known), 1.0 / len(known)), np.full(len(unknown), 1.0 / len(unknown))])
+    beta = fit_logistic(x, y, weights * len(x) / 2.0)
+    return replace(c, known=(float(beta[0]), float(beta[1]), float(beta[2])))
+
+
+def matching_odds(
+    features: np.ndarray, aims: np.ndarray, phrases: Sequence[str], encode_words: EncodeWords, c: Calibration
+) -> np.ndarray:
+    """Return log-odds (sounds, phrases) before the last logistic."""
+    names = encode_words([word for called in KINDS.values() for word in called])
+    starts = np.cumsum([0, *(len(called) for called in KINDS.values())])[:-1]
+    cosines = np.maximum.reduceat(encode_words(phrases) @ names.T, starts, axis=1)
+    share, named = kinds_of_phrases(cosines, c)
+    return log_odds(heard_kinds(features, aims, c) @ share.T * named)
+
+
+def fit_word(features: np.ndarray, kinds: np.ndarray, encode_words: EncodeWords, c: Calibration) -> Calibration:
+    """Fit the last step of a question in words: held-out clips against the ten recorded names, one of them right."""
+    odds = matching_odds(features, prototypes(encode_words), [KINDS[name][0] for name in RECORDED], encode_words, c)
+    right = kinds[:, None] == np.arange(len(RECORDED))[None, :]
+    bias, slope = fit_logistic(odds.ravel(), right.ravel().astype(float))
+    return replace(c, word=(float(bias), float(slope)))
+
+
+def pair_features(features: np.ndarray, aims: np.ndarray, c: Calibration) -> np.ndarray:
+    """Return cosine and agreement of every pair (n, n, 2)."""
+    direction = np.sqrt(heard_kinds(features, aims, c))
+    return np.stack([features @ features.T, direction @ direction.T], axis=2)
+
+
+def fit_pairs(
+    features: np.ndarray, kinds: np.ndarray, folds: np.ndarray, aims: np.ndarray, c: Calibration
+) -> Calibration:
+    """Fit the question by a clip on pairs of held-out clips of one fold, which one network has heard."""
+    pairs = pair_features(features, aims, c)
+    first, second = np.triu_indices(len(kinds), 1)
+    together = folds[first] == folds[second]
+    first, second = first[together], second[together]
+    beta = fit_logistic(pairs[first, second], (kinds[first] == kinds[second]).astype(float))
+    return replace(c, pair=(float(beta[0]), float(beta[1]), float(beta[2])))
