@@ -129,8 +129,8 @@ def add_sounds(
     placed = _place(found, placer, (rate_hz, loudness_db, longest_s), rng, notices)
     if not placed:
         raise AudioError(
-            f"The walk of {recording.path} lasts {recording.duration_s:.1f} s and has no room for a single sound; choose "
-            "shorter clips or a longer recording."
+            f"The walk of {recording.path} lasts {recording.duration_s:.1f} s and has no room for a single sound; "
+            "choose shorter clips or a longer recording."
         )
     noise = None
     if background is not None:

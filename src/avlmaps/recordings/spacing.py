@@ -108,7 +108,9 @@ class Placer:
             walk, spans = self.walk, zip(self.onsets_s, self.lengths_s, strict=True)
             heard = [walk.position[walk.index(at) : walk.index(at + length) + 1] for at, length in spans]
             self._tree, self._in_tree = KDTree(np.concatenate(heard)), len(heard)
-        return self._tree
+        tree = self._tree
+        assert tree is not None
+        return tree
 
 
 def capacity(walk: Walk, spacing: Spacing, length_s: float, enough: int) -> int:

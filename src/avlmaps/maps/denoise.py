@@ -1,0 +1,159 @@
+"""Taking a steady background out of a sound: a Wiener filter whose noise spectrum is learnt from quiet stretches.
+
+Short-time spectra (32 ms, Hann, three quarters overlap). Power is averaged over a small neighbourhood in time and
+frequency before it is compared with the noise, so that single bins do not flicker ("musical noise"); the gain is
+ξ/(1 + ξ) with ξ the power over the noise less one, never below a floor, so that what is taken for noise by mistake is
+only quieter. Where the noise is silent the gain is one: a clean sound comes out as it went in.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex64, Float32
+
+from avlmaps.recordings.audio import Sound
+
+_WINDOW_S = 0.032
+_OVERLAP = 4
+_SMOOTH_FRAMES, _SMOOTH_BINS = 5, 3
+_STEEPNESS = 1.5  # noise is taken for so much stronger than it is on average, since single frames exceed the average
+_CHUNK_S = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseProfile:
+    """The spectrum of a background.
+
+    Attributes:
+        power: mean power of each bin of a windowed short-time spectrum.
+        rate_hz: samples a second that it holds for.
+    """
+
+    power: Float32[np.ndarray, " bins"]
+    rate_hz: int
+
+
+def noise_profile(quiet: Iterable[Sound]) -> NoiseProfile | None:
+    """Learn the background's spectrum from stretches in which nothing else sounds.
+
+    Each bin's median over time, scaled to a mean as for noise, so that a stray click does not count.
+
+    Args:
+        quiet: stretches of one rate.
+
+    Returns:
+        The profile, or None where the stretches are too short to tell (less than 0.2 s in all).
+    """
+    powers: list[np.ndarray] = []
+    rate_hz = 0
+    for sound in quiet:
+        size, hop = _sizes(sound.rate_hz)
+        rate_hz = sound.rate_hz
+        if len(sound.samples) >= size:
+            powers.append(np.abs(_spectra(sound.samples, size, hop)) ** 2)
+    frames = sum(len(power) for power in powers)
+    if frames * _WINDOW_S / _OVERLAP < 0.2:
+        return None
+    return NoiseProfile((np.median(np.concatenate(powers), axis=0) / np.log(2.0)).astype(np.float32), rate_hz)
+
+
+def denoised(sound: Sound, profile: NoiseProfile, reduction_db: float = 12.0) -> Sound:
+    """Return the sound with the background made quieter, of the same length.
+
+    Args:
+        sound: the sound with its background.
+        profile: the background.
+        reduction_db: at most by so much, dB.
+    """
+    samples = [block.samples for block in denoised_blocks([sound], profile, reduction_db)]
+    return Sound(np.concatenate(samples) if samples else sound.samples, sound.rate_hz)
+
+
+def denoised_blocks(blocks: Iterable[Sound], profile: NoiseProfile, reduction_db: float = 12.0) -> Iterator[Sound]:
+    """Take the background out of a long track block by block; how it is cut into blocks changes nothing.
+
+    Args:
+        blocks: the track, in the rate of the profile.
+        profile: the background.
+        reduction_db: at most by so much, dB.
+
+    Raises:
+        ValueError: a block has another rate than the profile.
+    """
+    size, hop = _sizes(profile.rate_hz)
+    reach = _SMOOTH_FRAMES // 2  # frames of context that smoothing needs on either side
+    late = size - hop  # what comes out first lies before the track
+    waiting, tail = np.zeros(late + reach * hop, np.float32), np.zeros(late, np.float32)
+    owed = 0
+    for samples, is_end in _with_end(blocks, profile.rate_hz, np.zeros(2 * size + reach * hop, np.float32)):
+        owed += 0 if is_end else len(samples)
+        waiting = np.concatenate([waiting, samples])
+        count = (len(waiting) - size) // hop + 1 - 2 * reach
+        if count < 1:
+            continue
+        spectra = _spectra(waiting[: (count + 2 * reach - 1) * hop + size], size, hop)
+        cleaned = spectra[reach : reach + count] * _gains(spectra, profile, reduction_db)
+        added = _overlapped(cleaned, size, hop)
+        added[: len(tail)] += tail
+        waiting, tail = waiting[count * hop :], added[count * hop :]
+        done = added[min(late, count * hop) : count * hop][:owed]
+        late = max(0, late - count * hop)
+        owed -= len(done)
+        if len(done):
+            yield Sound(done, profile.rate_hz)
+
+
+def _with_end(
+    blocks: Iterable[Sound], rate_hz: int, end: Float32[np.ndarray, " n"]
+) -> Iterator[tuple[Float32[np.ndarray, " _"], bool]]:
+    """Yield the samples in chunks that fit into memory as spectra, and at last what flushes the filter."""
+    chunk = round(_CHUNK_S * rate_hz)
+    for block in blocks:
+        if block.rate_hz != rate_hz:
+            raise ValueError(f"a block has {block.rate_hz} samples a second, the profile is for {rate_hz}")
+        for at in range(0, len(block.samples), chunk):
+            yield block.samples[at : at + chunk], False
+    yield end, True
+
+
+def _sizes(rate_hz: int) -> tuple[int, int]:
+    hop = max(1, round(_WINDOW_S * rate_hz / _OVERLAP))
+    return hop * _OVERLAP, hop
+
+
+def _window(size: int) -> Float32[np.ndarray, " size"]:
+    """Return the root of a Hann window, whose squares add up to two at three quarters overlap."""
+    return np.sqrt(np.hanning(size + 1)[:-1]).astype(np.float32)
+
+
+def _spectra(samples: Float32[np.ndarray, " n"], size: int, hop: int) -> Complex64[np.ndarray, "frames bins"]:
+    from scipy.fft import rfft
+
+    frames = np.lib.stride_tricks.sliding_window_view(samples, size)[::hop]
+    return np.asarray(rfft(frames * _window(size), axis=1), np.complex64)
+
+
+def _overlapped(spectra: Complex64[np.ndarray, "frames bins"], size: int, hop: int) -> Float32[np.ndarray, " n"]:
+    from scipy.fft import irfft
+
+    frames = np.asarray(irfft(spectra, n=size, axis=1), np.float32) * (_window(size) / (_OVERLAP / 2))
+    quarters = frames.reshape(len(frames), _OVERLAP, hop)
+    added = np.zeros((len(frames) + _OVERLAP - 1, hop), np.float32)
+    for k in range(_OVERLAP):
+        added[k : k + len(frames)] += quarters[:, k]
+    return added.ravel()
+
+
+def _gains(
+    spectra: Complex64[np.ndarray, "frames bins"], profile: NoiseProfile, reduction_db: float
+) -> Float32[np.ndarray, "inner bins"]:
+    """Return the filter for every frame that has enough neighbours on both sides."""
+    from scipy.ndimage import uniform_filter1d
+
+    power = uniform_filter1d(np.abs(spectra) ** 2, _SMOOTH_BINS, axis=1, mode="nearest")
+    summed = np.cumsum(np.pad(power, ((1, 0), (0, 0))), axis=0, dtype=np.float64)
+    mean = (summed[_SMOOTH_FRAMES:] - summed[:-_SMOOTH_FRAMES]) / _SMOOTH_FRAMES
+    above = np.maximum(mean - _STEEPNESS * profile.power, 0.0)
+    floor = 10.0 ** (-reduction_db / 20.0)
+    return np.maximum(above / np.maximum(above + profile.power, 1e-30), floor).astype(np.float32)
