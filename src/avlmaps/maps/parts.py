@@ -5,7 +5,7 @@ A stopped build goes on from the parts that it had finished, and machines that s
 """
 
 import dataclasses
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import islice
@@ -31,6 +31,7 @@ from avlmaps.recordings.types import Frame, Recording
 BUILD_VERSION = 1  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
 
 Span = tuple[int, int, int]
+_Perceived = tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]
 
 
 class PartInfo(msgspec.Struct, frozen=True, kw_only=True):
@@ -255,15 +256,10 @@ def fuse_spans(
         seen = progress(ahead, "fusing", total=done + len(every), done=done)
         for span, folder in jobs:
             begin = perf_counter()
-            dim = 0 if encoder is None else encoder.card.dim
-            total = VoxelAccumulator(GridSpec(settings.voxel_size_m), dim, settings.fusion)
-            bad: list[BadFrame] = []
-            for frame, features in islice(seen, len(range(*span))):
-                if isinstance(frame, BadFrame):
-                    bad.append(frame)
-                    tolerance.meet(frame)
-                else:
-                    total.add(frame, features)
+            total = VoxelAccumulator(
+                GridSpec(settings.voxel_size_m), encoder.card.dim if encoder else 0, settings.fusion
+            )
+            bad = _fuse(islice(seen, len(range(*span))), total, tolerance)
             info = PartInfo(
                 recording=recording.path.name,
                 spans=(span,),
@@ -276,9 +272,19 @@ def fuse_spans(
             pass
 
 
-def _perceived(
-    recording: Recording, frames: Sequence[int], encoder: PixelEncoder | None
-) -> Generator[tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]]:
+def _fuse(seen: Iterable[_Perceived], total: VoxelAccumulator, tolerance: Tolerance) -> list[BadFrame]:
+    """Add frames up; return those that could not be read."""
+    bad: list[BadFrame] = []
+    for frame, features in seen:
+        if isinstance(frame, BadFrame):
+            bad.append(frame)
+            tolerance.meet(frame)
+        else:
+            total.add(frame, features)
+    return bad
+
+
+def _perceived(recording: Recording, frames: Sequence[int], encoder: PixelEncoder | None) -> Generator[_Perceived]:
     for index in frames:
         try:
             frame = recording.frame(index)

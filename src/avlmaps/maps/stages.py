@@ -215,47 +215,55 @@ def commit(
     merged: tuple[Voxels, float],
 ) -> MapInfo:
     """Write the map and, last of all, its manifest; then the parts go."""
-    voxels, merge_s = merged
+    voxels, merging_s = merged
     content = MapContent(voxels, pictures.keyframes, pictures.place_state, heard.sounds, heard.clips_folder)
     stages_s = {
         "up": up[1],
         "fusion": sum(part.info.elapsed_s for part in parts),
         "keyframes": pictures.elapsed_s,
         "sounds": heard.elapsed_s,
-        "merging": merge_s,
+        "merging": merging_s,
     }
-    bad = tuple(sorted((frame for part in parts for frame in part.info.bad_frames), key=lambda frame: frame.index))
-    fused = sum(part.info.fused for part in parts)
-    recording, settings = plan.recording, plan.settings
-    info = MapInfo(
+    finished = datetime.now(UTC).isoformat(timespec="seconds")
+    timings = Timings(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)
+    return write_map(plan.path, content, _manifest(plan, up[0], parts, content, timings))
+
+
+def _manifest(plan: Plan, up: UpInfo, parts: Sequence[Part], content: MapContent, timings: Timings) -> MapInfo:
+    bad = sorted((frame for part in parts for frame in part.info.bad_frames), key=lambda frame: frame.index)
+    return MapInfo(
         avlmaps_version=__version__,
         build_key=plan.key,
-        voxel_size_m=settings.voxel_size_m,
-        up=up[0],
-        rig=RigInfo.of(recording.rig),
+        voxel_size_m=plan.settings.voxel_size_m,
+        up=up,
+        rig=RigInfo.of(plan.recording.rig),
         profile=plan.used.name,
         models=plan.models,
-        settings=settings,
-        seed=settings.seed,
-        recording=RecordingInfo(
-            name=recording.path.name,
-            format=recording.format,
-            fingerprint=recording.fingerprint,
-            frames=len(recording),
-            duration_s=recording.duration_s,
-            notices=tuple(without_place(notice, recording) for notice in recording.notices),
+        settings=plan.settings,
+        seed=plan.settings.seed,
+        recording=_recording_info(plan.recording),
+        counts=Counts(
+            frames=sum(part.info.fused for part in parts),
+            keyframes=len(content.keyframes),
+            voxels=len(content.voxels),
+            sounds=len(content.sounds),
         ),
-        counts=Counts(frames=fused, keyframes=len(pictures.keyframes), voxels=len(voxels), sounds=len(heard.sounds)),
-        bounding_box_m=_box(voxels, settings.voxel_size_m),
-        bad_frames=bad,
-        notices=tuple(_notices(plan, up[0], len(bad))),
-        timings=Timings(
-            finished=datetime.now(UTC).isoformat(timespec="seconds"),
-            elapsed_s=sum(stages_s.values()),
-            stages_s=stages_s,
-        ),
+        bounding_box_m=_box(content.voxels, plan.settings.voxel_size_m),
+        bad_frames=tuple(bad),
+        notices=tuple(_notices(plan, up, len(bad))),
+        timings=timings,
     )
-    return write_map(plan.path, content, info)
+
+
+def _recording_info(recording: Recording) -> RecordingInfo:
+    return RecordingInfo(
+        name=recording.path.name,
+        format=recording.format,
+        fingerprint=recording.fingerprint,
+        frames=len(recording),
+        duration_s=recording.duration_s,
+        notices=tuple(without_place(notice, recording) for notice in recording.notices),
+    )
 
 
 def _box(voxels: Voxels, voxel_size_m: float) -> Box:
