@@ -43,7 +43,7 @@ def main() -> None:
     corpus = read_corpus(arguments.sounds, arguments.work, arguments.each)
     words = EmbeddedWords()
     settings = replace(Settings(), steps=arguments.steps)
-    networks = Networks(corpus, words.encode, words.card.checksum, settings, arguments.members, arguments.work)
+    networks = Networks(corpus, words.encode, settings, arguments.members, arguments.work)
 
     held_out = {condition: np.zeros((len(corpus.clips), words.card.dim), np.float32) for condition in CONDITIONS}
     folds = np.array([clip.fold for clip in corpus.clips])

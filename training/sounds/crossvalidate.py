@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from training.sounds.clips import Clip, mels_of, read_index, read_samples, recorded_mels, synthetic_mels
-from training.sounds.fit import EncodeWords, Examples, Settings, encode, fit, fit_head, recorded_index, targets
+from training.sounds.fit import EncodeWords, Examples, Settings, encode, fit, recorded_index, targets, turned
 from training.sounds.kinds import RECORDED
 from training.sounds.network import SoundNet
 
@@ -87,12 +87,11 @@ def condition_mels(corpus: Corpus, rows: np.ndarray, condition: str) -> np.ndarr
 class Networks:
     """Fits networks, or takes those that were fitted before from the work folder.
 
-    A network that was fitted to other words (another checksum) keeps its layers; only its last one is fitted anew.
+    The features of a network that was fitted to other words are turned into the space of these.
     """
 
     corpus: Corpus
     encode_words: EncodeWords
-    words_checksum: str
     settings: Settings
     members: int
     work: Path
@@ -116,15 +115,14 @@ class Networks:
             if not file.exists():
                 net = fit(examples, words, settings, f"{name} {member + 1}/{self.members}")
                 self.work.mkdir(parents=True, exist_ok=True)
-                torch.save({"words": self.words_checksum, "state": net.state_dict()}, file)
+                torch.save({"targets": words, "state": net.state_dict()}, file)
             kept = torch.load(file, weights_only=True)
             state = kept["state"]
             net = SoundNet(state["head.weight"].shape[0], state["stem.weight"].shape[0])
             net.load_state_dict(state)
-            if kept["words"] != self.words_checksum:
-                say(f"{file.name}: fitting the last layer to other words")
-                net = fit_head(net.eval(), examples, words, settings)
-                torch.save({"words": self.words_checksum, "state": net.state_dict()}, file)
+            if not torch.allclose(kept["targets"], words, atol=1e-6):
+                say(f"{file.name}: turning the features into the space of other words")
+                net = turned(net, kept["targets"], words)
             nets.append(net.eval())
         return nets
 

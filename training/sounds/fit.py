@@ -146,46 +146,25 @@ def encode(net: SoundNet, mels: np.ndarray) -> np.ndarray:
 
 
 @torch.no_grad()
-def pooled(net: SoundNet, x: Tensor) -> Tensor:
-    """Return what the last layer sees."""
-    return net.pooled(x)
+def turned(net: SoundNet, old: Tensor, new: Tensor) -> SoundNet:
+    """Turn the network's features from the space of one word encoder into that of another.
 
+    The rotation is the one that brings what all kinds are called in the old space nearest to the new (orthogonal
+    Procrustes; Schönemann 1966). It keeps every angle between sounds, so the word encoder may be improved without
+    hearing everything again.
 
-def fit_head(net: SoundNet, examples: Examples, words: Tensor, settings: Settings, batches: int = 150) -> SoundNet:
-    """Fit the last layer anew to other words; the rest stays.
-
-    The word encoder may be improved without hearing everything again: what the layers under the last one tell
-    apart does not depend on where the words lie.
+    Args:
+        net: a network fitted to the old words.
+        old: targets (templates, kinds, dim) that it was fitted to.
+        new: targets of the other word encoder.
     """
-    generator = torch.Generator().manual_seed(settings.seed + 1)
-    source = _Batches(examples, settings)
-    seen, kinds_seen = [], []
-    for _ in range(batches):
-        power, kinds = source.draw()
-        noise = steady_noise(len(power), generator)
-        x = augmented(power, noise, settings.augmentation, generator)
-        with torch.autocast("cpu", torch.bfloat16):
-            seen.append(pooled(net, x.to(memory_format=torch.channels_last)).float())
-        kinds_seen.append(kinds)
-    features, kinds = torch.cat(seen), torch.cat(kinds_seen)
-    head = torch.nn.Linear(net.head.in_features, words.shape[2])
-    optimiser = torch.optim.AdamW(head.parameters(), lr=5e-3, weight_decay=settings.decay)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, 1500)
-    for _ in range(1500):
-        rows = torch.randint(len(features), (256,), generator=generator)
-        dropped = functional.dropout(features[rows], net.dropout.p)
-        y = functional.normalize(head(dropped), dim=1)
-        template = words[int(torch.randint(len(words), (1,), generator=generator))]
-        loss = functional.cross_entropy(
-            y @ template.T / settings.temperature, kinds[rows], label_smoothing=settings.smoothing
-        )
-        optimiser.zero_grad()
-        loss.backward()
-        optimiser.step()
-        schedule.step()
-    fitted = copy.deepcopy(net)
-    fitted.head = head
-    return fitted.eval()
+    dim = new.shape[2]
+    u, _, v = torch.linalg.svd(new.reshape(-1, dim).T @ old.reshape(-1, dim))
+    rotation = u @ v
+    copied = copy.deepcopy(net)
+    copied.head.weight.copy_(rotation @ net.head.weight)
+    copied.head.bias.copy_(rotation @ net.head.bias)
+    return copied
 
 
 def recorded_index(kind: str) -> int:

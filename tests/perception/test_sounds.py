@@ -1,0 +1,177 @@
+"""The embedded sound encoder: its promises, and a smoke test on recordings (which its weights have heard)."""
+
+from importlib.resources import files
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from avlmaps.core.errors import AudioError
+from avlmaps.perception.embedded import logmel
+from avlmaps.perception.embedded.sounds import EmbeddedSounds
+from avlmaps.perception.protocols import SoundEncoder
+from avlmaps.recordings.audio import AudioTrack, Sound
+
+RATE_HZ = 44_100
+
+
+@pytest.fixture(scope="module")
+def encoder(tmp_path_factory: pytest.TempPathFactory) -> EmbeddedSounds:
+    return EmbeddedSounds(folder=tmp_path_factory.mktemp("profile"))
+
+
+def noise(seconds: float, rate_hz: int = RATE_HZ, seed: int = 0) -> Sound:
+    samples = 0.1 * np.random.default_rng(seed).standard_normal(max(1, round(seconds * rate_hz)))
+    return Sound(samples.astype(np.float32), rate_hz)
+
+
+def beeps(hz: float, seconds: float = 3.0) -> Sound:
+    t = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
+    return Sound((0.3 * np.sin(2 * np.pi * hz * t) * (t % 0.5 < 0.2)).astype(np.float32), RATE_HZ)
+
+
+def test_is_a_sound_encoder(encoder: EmbeddedSounds) -> None:
+    assert isinstance(encoder, SoundEncoder)
+    assert encoder.card.dim == 128
+    assert len(encoder.card.checksum) == 64
+
+
+def test_weights_take_at_most_four_megabytes() -> None:
+    weights = files("avlmaps.perception.embedded") / "weights"
+    assert sum(len((weights / name).read_bytes()) for name in ("sounds.onnx", "sounds.json")) <= 4_000_000
+
+
+@given(seconds=st.floats(0.0, 20.0), rate_hz=st.sampled_from([8_000, 16_000, 22_050, 44_100, 48_000]))
+def test_any_length_gives_unit_vectors(seconds: float, rate_hz: int) -> None:
+    encoder = _shared()
+    features = encoder.encode(noise(seconds, rate_hz))
+    assert features.dtype == np.float32
+    assert features.shape[1] == 128
+    np.testing.assert_allclose(np.linalg.norm(features, axis=1), 1.0, atol=1e-5)
+
+
+_encoders: list[EmbeddedSounds] = []
+
+
+def _shared() -> EmbeddedSounds:
+    if not _encoders:
+        _encoders.append(EmbeddedSounds())
+    return _encoders[0]
+
+
+@given(frames=st.integers(1, 3000))
+def test_windows_cover_every_frame(frames: int) -> None:
+    mels = np.repeat(np.arange(1, frames + 1, dtype=np.float32)[:, None], logmel.BANDS, axis=1)
+    windows = logmel.windows(mels)
+    assert set(np.arange(1, frames + 1)) <= set(windows[:, :, 0].ravel().round().astype(int))
+    if frames > logmel.WINDOW_FRAMES:
+        assert windows.min() >= 1.0  # none is padded
+        assert len(windows) == 1 + -(-(frames - logmel.WINDOW_FRAMES) // logmel.WINDOW_HOP_FRAMES)
+
+
+def test_long_sounds_are_heard_to_their_end(encoder: EmbeddedSounds) -> None:
+    quiet = noise(30.0)
+    late = quiet.samples.copy() * 0.01
+    late[-RATE_HZ * 3 :] += beeps(2000.0).samples
+    features = encoder.encode(Sound(late, RATE_HZ))
+    start = encoder.encode(Sound(late[: RATE_HZ * 5], RATE_HZ))
+    assert len(features) > 8
+    assert float(features[-1] @ start[0]) < 0.9
+
+
+def test_loudness_does_not_matter(encoder: EmbeddedSounds) -> None:
+    sound = beeps(1000.0)
+    soft = Sound(sound.samples * np.float32(0.01), RATE_HZ)
+    np.testing.assert_allclose(encoder.encode(sound), encoder.encode(soft), atol=1e-3)
+
+
+def test_the_same_sound_gives_the_same_features(encoder: EmbeddedSounds) -> None:
+    np.testing.assert_array_equal(encoder.encode(noise(7.0)), encoder.encode(noise(7.0)))
+
+
+def test_silence_has_features_but_is_nothing(encoder: EmbeddedSounds) -> None:
+    features = encoder.encode(Sound(np.zeros(RATE_HZ, np.float32), RATE_HZ))
+    np.testing.assert_allclose(np.linalg.norm(features, axis=1), 1.0, atol=1e-5)
+    assert encoder.score_words([features], ["dog bark", "rain", "sneezing"]).max() < 0.5
+
+
+def test_a_sound_without_samples_is_refused(encoder: EmbeddedSounds) -> None:
+    with pytest.raises(AudioError) as refused:
+        encoder.encode(Sound(np.zeros(0, np.float32), RATE_HZ))
+    assert str(refused.value) == "The sound has no samples; give a sound of at least a few milliseconds."
+
+
+def test_samples_that_are_no_numbers_are_refused(encoder: EmbeddedSounds) -> None:
+    samples = np.zeros(1000, np.float32)
+    samples[3] = np.nan
+    with pytest.raises(AudioError) as refused:
+        encoder.encode(Sound(samples, RATE_HZ))
+    assert str(refused.value) == (
+        "The sound has 1 samples of 1000 that are no finite numbers; convert it again from its source."
+    )
+
+
+def test_words_are_unit_vectors_of_the_same_space(encoder: EmbeddedSounds) -> None:
+    vectors = encoder.encode_words(["dog bark", "the sound of rain"])
+    assert vectors.shape == (2, 128)
+    np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), 1.0, atol=1e-5)
+
+
+def test_scores_are_probabilities_of_the_right_shape(encoder: EmbeddedSounds) -> None:
+    sounds = [encoder.encode(noise(1.0)), encoder.encode(beeps(900.0, 12.0))]
+    words = encoder.score_words(sounds, ["rain", "alarm clock", "chair"])
+    clips = encoder.score_sounds(sounds, sounds[0])
+    assert words.shape == (2, 3)
+    assert clips.shape == (2,)
+    for scores in (words, clips):
+        assert scores.dtype == np.float32
+        assert 0.0 <= scores.min() and scores.max() <= 1.0
+    assert encoder.score_words([], ["rain"]).shape == (0, 1)
+    assert encoder.score_words(sounds, []).shape == (2, 0)
+    assert encoder.score_sounds([], sounds[0]).shape == (0,)
+
+
+def test_a_sound_is_of_its_own_kind(encoder: EmbeddedSounds) -> None:
+    features = encoder.encode(noise(3.0))
+    other = encoder.encode(beeps(3000.0))
+    scores = encoder.score_sounds([features, other], features)
+    assert scores[0] > scores[1]
+
+
+def test_a_phrase_that_names_no_sound_finds_none(encoder: EmbeddedSounds) -> None:
+    features = [encoder.encode(noise(3.0)), encoder.encode(beeps(2500.0))]
+    assert encoder.score_words(features, ["cardboard box", "blue armchair"]).max() < 0.5
+
+
+def test_every_kind_says_what_it_was_learnt_from(encoder: EmbeddedSounds) -> None:
+    origins = {kind.name: kind.origin for kind in encoder.kinds}
+    assert set(origins.values()) == {"recorded", "synthesised"}
+    assert sum(origin == "recorded" for origin in origins.values()) == 10
+    assert origins["dog bark"] == "recorded"
+    assert origins["glass breaking"] == "synthesised"
+    assert len(origins) == len(encoder.kinds) >= 60
+
+
+def test_encodes_a_hundred_times_faster_than_real_time(encoder: EmbeddedSounds) -> None:
+    sound = noise(30.0)
+    encoder.encode(sound)
+    best_s = np.inf
+    for _ in range(3):
+        start = process_time()
+        encoder.encode(sound)
+        best_s = min(best_s, process_time() - start)
+    assert 30.0 / best_s >= 100.0
+
+
+def test_recordings_are_recognised(encoder: EmbeddedSounds, shared_data: Path) -> None:
+    folder = shared_data / "data" / "sounds" / "esc10"
+    kinds = {"dog_bark": "a dog barking", "rain": "rainfall", "rooster": "rooster", "crying_baby": "infant crying"}
+    clips = [sorted((folder / kind).glob("*.ogg"))[0] for kind in kinds]
+    features = [encoder.encode(AudioTrack.open(clip).read()) for clip in clips]
+    scores = encoder.score_words(features, list(kinds.values()))
+    assert (scores.argmax(axis=0) == np.arange(4)).all()
+    assert np.diag(scores).min() >= 0.5
+    assert (scores - np.diag(np.diag(scores))).max() < 0.5

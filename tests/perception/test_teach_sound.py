@@ -1,0 +1,158 @@
+"""Teaching the encoder a sound of one's own, and forgetting it again."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+
+from avlmaps.core.errors import AudioError, BackendError
+from avlmaps.perception.embedded.sounds import EmbeddedSounds
+from avlmaps.perception.taught import forget_sound, sounds_folder, taught_sounds, teach_sound
+from avlmaps.perception.user_folder import user_folder
+from avlmaps.recordings.audio import AudioTrack, Sound
+
+RATE_HZ = 22_050
+
+
+@pytest.fixture(scope="module")
+def encoder(tmp_path_factory: pytest.TempPathFactory) -> EmbeddedSounds:
+    return EmbeddedSounds(folder=tmp_path_factory.mktemp("profile"))
+
+
+@pytest.fixture
+def knowing(encoder: EmbeddedSounds, tmp_path: Path) -> EmbeddedSounds:
+    encoder._folder = tmp_path
+    return encoder
+
+
+def sparkle(seed: int) -> Sound:
+    """A made-up toy: a fast arpeggio of glassy pings, different in every clip."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(0.25 * RATE_HZ)) / RATE_HZ
+    samples = 0.002 * rng.standard_normal(3 * RATE_HZ)
+    for k, onset in enumerate(np.arange(0.2, 2.6, 0.11 + 0.01 * rng.random())):
+        hz = 700.0 * (1.0 + 0.03 * rng.standard_normal()) * 2 ** ((k % 6) / 3)
+        ping = np.sin(2 * np.pi * hz * t) * np.exp(-t / 0.06)
+        start = round(onset * RATE_HZ)
+        samples[start : start + len(ping)] += 0.3 * ping[: len(samples) - start]
+    return Sound(samples.astype(np.float32), RATE_HZ)
+
+
+def hiss(seed: int) -> Sound:
+    return Sound((0.1 * np.random.default_rng(seed).standard_normal(3 * RATE_HZ)).astype(np.float32), RATE_HZ)
+
+
+def test_a_taught_sound_is_known_by_its_name_and_a_paraphrase(knowing: EmbeddedSounds, tmp_path: Path) -> None:
+    sounds = [knowing.encode(sparkle(9)), knowing.encode(hiss(0))]
+    before = knowing.score_words(sounds, ["toy robot"])
+    teach_sound("toy robot", [sparkle(seed) for seed in range(3)], tmp_path, knowing)
+    after = knowing.score_words(sounds, ["toy robot", "the robot toy", "rain"])
+    assert before.max() < 0.5
+    assert after[0, 0] >= 0.5
+    assert after[0, 1] >= 0.5
+    assert after[1, :2].max() < 0.5
+    assert after[0, 2] < 0.5
+    assert knowing.vocabulary[-1] == "toy robot"
+
+
+def test_a_forgotten_sound_is_known_no_more(knowing: EmbeddedSounds, tmp_path: Path) -> None:
+    teach_sound("toy robot", [sparkle(0)], tmp_path, knowing)
+    forget_sound("Toy  robot", tmp_path)
+    assert taught_sounds(tmp_path) == []
+    assert "toy robot" not in knowing.vocabulary
+    with pytest.raises(BackendError) as refused:
+        forget_sound("toy robot", tmp_path)
+    assert str(refused.value) == "No sound called 'toy robot' was taught; taught are: none."
+
+
+def test_what_is_kept_is_what_was_taught(knowing: EmbeddedSounds, tmp_path: Path) -> None:
+    file = tmp_path / "clip.wav"
+    soundfile.write(file, sparkle(0).samples, RATE_HZ)
+    taught = teach_sound("  our   kettle's whistle ", [file, sparkle(1)], tmp_path, knowing)
+    (kept,) = taught_sounds(tmp_path)
+    assert kept.name == taught.name == "our kettle's whistle"
+    assert kept.clips == ("clip.wav", "the clip")
+    assert kept.own_cosine == taught.own_cosine
+    assert kept.checksum == knowing.card.checksum
+    np.testing.assert_array_equal(kept.features, taught.features)
+
+
+def test_names_that_look_alike_as_files_stay_apart(knowing: EmbeddedSounds, tmp_path: Path) -> None:
+    for name in ("Tür", "Tur", "门铃", "../../etc"):
+        teach_sound(name, [sparkle(0)], tmp_path, knowing)
+    assert {taught.name for taught in taught_sounds(tmp_path)} == {"Tür", "Tur", "门铃", "../../etc"}
+    assert all(path.parent == sounds_folder(tmp_path) for path in sounds_folder(tmp_path).iterdir())
+
+
+def test_teaching_again_replaces(knowing: EmbeddedSounds, tmp_path: Path) -> None:
+    teach_sound("toy", [sparkle(0)], tmp_path, knowing)
+    teach_sound("Toy", [sparkle(1), sparkle(2)], tmp_path, knowing)
+    (kept,) = taught_sounds(tmp_path)
+    assert kept.name == "Toy"
+    assert len(kept.clips) == 2
+
+
+def test_sounds_taught_to_other_weights_are_left_out(knowing: EmbeddedSounds, tmp_path: Path) -> None:
+    teach_sound("toy", [sparkle(0)], tmp_path, knowing)
+    (notes,) = sounds_folder(tmp_path).glob("*/sound.json")
+    notes.write_text(notes.read_text().replace(knowing.card.checksum, "0" * 64))
+    assert knowing.taught == ()
+    assert [taught.name for taught in taught_sounds(tmp_path)] == ["toy"]
+
+
+def test_silence_teaches_nothing(knowing: EmbeddedSounds, tmp_path: Path) -> None:
+    file = tmp_path / "silence.wav"
+    soundfile.write(file, np.zeros(RATE_HZ), RATE_HZ)
+    with pytest.raises(AudioError) as refused:
+        teach_sound("nothing", [file], tmp_path, knowing)
+    assert str(refused.value) == (
+        "There is nothing to hear in silence.wav (peak 0.000000 of 1); give a clip that holds the sound."
+    )
+    assert taught_sounds(tmp_path) == []
+
+
+def test_what_cannot_be_read_is_refused(knowing: EmbeddedSounds, tmp_path: Path) -> None:
+    broken = tmp_path / "broken.wav"
+    broken.write_bytes(b"no sound at all")
+    with pytest.raises(AudioError, match=r"broken\.wav"):
+        teach_sound("broken", [broken], tmp_path, knowing)
+    with pytest.raises(AudioError, match=r"missing\.wav"):
+        teach_sound("missing", [tmp_path / "missing.wav"], tmp_path, knowing)
+    with pytest.raises(AudioError) as refused:
+        teach_sound("none", [], tmp_path, knowing)
+    assert str(refused.value) == "No clips were given to learn 'none' from; give at least one sound file."
+    with pytest.raises(BackendError) as unnamed:
+        teach_sound("  ", [sparkle(0)], tmp_path, knowing)
+    assert str(unnamed.value) == "A taught sound needs a name; give one, as you would ask for it."
+
+
+def test_damaged_notes_are_named(knowing: EmbeddedSounds, tmp_path: Path) -> None:
+    teach_sound("toy", [sparkle(0)], tmp_path, knowing)
+    (notes,) = sounds_folder(tmp_path).glob("*/sound.json")
+    notes.write_text("{")
+    with pytest.raises(BackendError) as refused:
+        taught_sounds(tmp_path)
+    assert str(refused.value).startswith(f"The taught sound in {notes.parent} is damaged")
+    assert str(refused.value).endswith("; delete it and teach it again.")
+
+
+def test_the_profile_folder_can_be_moved(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("AVLMAPS_HOME", str(tmp_path))
+    assert user_folder() == tmp_path
+    monkeypatch.delenv("AVLMAPS_HOME")
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    monkeypatch.setattr("sys.platform", "linux")
+    assert user_folder() == tmp_path / "avlmaps"
+    monkeypatch.setattr("sys.platform", "win32")
+    monkeypatch.setenv("APPDATA", str(tmp_path / "roaming"))
+    assert user_folder() == tmp_path / "roaming" / "avlmaps"
+
+
+def test_real_recordings_can_be_taught(knowing: EmbeddedSounds, tmp_path: Path, shared_data: Path) -> None:
+    folder = shared_data / "data" / "sounds" / "other"
+    guitars = sorted((folder / "guitar").glob("*"))
+    teach_sound("guitar", guitars[:1], tmp_path, knowing)
+    heard = [AudioTrack.open(path).read(4.0) for path in (guitars[0], folder / "thunder" / "max_thunder.wav")]
+    scores = knowing.score_words([knowing.encode(sound) for sound in heard], ["guitar"])[:, 0]
+    assert scores[0] >= 0.5 > scores[1]
