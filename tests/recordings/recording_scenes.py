@@ -46,7 +46,8 @@ def metres(depth_mm: np.ndarray) -> np.ndarray:
 
 def save_rgb(path: Path, rgb: np.ndarray) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    assert cv2.imwrite(str(path), rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 98])
+    options = [cv2.IMWRITE_JPEG_QUALITY, 98] if path.suffix == ".jpg" else []
+    assert cv2.imwrite(str(path), rgb[..., ::-1], options)
 
 
 def save_depth(path: Path, raw: np.ndarray) -> None:

@@ -23,6 +23,7 @@ from avlmaps.recordings.avlmaps_layout import (
     reference_map_from_world,
 )
 from avlmaps.recordings.open import open_recording
+from avlmaps.recordings.writer import write_recording
 
 
 def _base_pose(index: int) -> np.ndarray:
@@ -169,3 +170,12 @@ def test_what_cannot_be_used_is_told_by_file(tmp_path: Path, file: str, content:
     (path / file).write_text(content)
     with pytest.raises(RecordingError, match=re.escape(sentence)):
         open_recording(path)
+
+
+def test_a_copy_keeps_the_depth_to_half_a_millimetre(tmp_path: Path):
+    path = _write(tmp_path / "scene_1")
+    fine = metres(shot(0).depth_mm) + np.float32(0.0003) * (shot(0).depth_mm > 0)
+    np.save(path / "depth/000000.npy", fine)
+    copy = open_recording(write_recording(open_recording(path), tmp_path / "copy"))
+    assert np.abs(copy.frame(0).depth_m - fine).max() <= 0.0005 + 1e-6
+    assert np.array_equal(copy.frame(1).rgb, shot(1).rgb)

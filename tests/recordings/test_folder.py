@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 import tracemalloc
 from pathlib import Path
 
@@ -17,6 +19,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame, Recording
+from avlmaps.recordings.validate import validate
 from avlmaps.recordings.writer import RecordingWriter, write_recording
 
 
@@ -152,7 +155,7 @@ def test_frames_outside_the_poses_are_left_out_and_told(tmp_path: Path):
     _describe(path, rgb_rate_hz=10.0)
     recording = open_recording(path)
     assert recording.stamps_s.tolist() == [0.0, 0.1, 0.2]
-    assert recording.notices[0] == "2 frame(s) lie outside the poses of poses.csv or in a gap of them."
+    assert recording.notices[0] == "2 frame(s) lie outside the poses of poses.csv or in a gap of them; left out."
 
 
 def test_pictures_and_poses_that_do_not_match_are_told_with_what_to_add(tmp_path: Path):
@@ -384,3 +387,41 @@ def test_two_cameras_of_different_size_are_read(tmp_path: Path):
     assert frame.rig.depth == small and frame.depth_m.shape == (24, 32)
     assert np.all(frame.depth_m == 2.0)
     assert poses.rotation_angle_rad(frame.world_from_camera, shot(0).world_from_camera) < 1e-6
+
+
+def test_a_copy_takes_truth_along_but_not_the_events_of_another_track(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    (path / "objects.json").write_text("[]")
+    (path / "events.csv").write_text("category,onset_s\n")
+    for index in (0, 7):
+        save_depth(path / f"semantic/{index:06d}.png", np.zeros((48, 64)))
+    recording = open_recording(path)
+    same = write_recording(recording, tmp_path / "same")
+    other = write_recording(recording, tmp_path / "other", audio=Sound(np.zeros(80, np.float32), 8000))
+    assert (same / "events.csv").exists() and not (other / "events.csv").exists()
+    for copy in (same, other):
+        assert (copy / "objects.json").read_text() == "[]"
+        assert [file.name for file in (copy / "semantic").iterdir()] == ["000000.png"]
+
+
+def test_a_recording_whose_writer_was_killed_is_refused(tmp_path: Path):
+    program = (
+        "import os, sys; sys.path.insert(0, sys.argv[1])\n"
+        "from pathlib import Path\n"
+        "from recording_scenes import CAMERA, rig, shot, metres\n"
+        "from avlmaps.recordings.types import Frame\n"
+        "from avlmaps.recordings.writer import RecordingWriter\n"
+        "with RecordingWriter(Path(sys.argv[2]), rig()) as writer:\n"
+        "    for i in range(3):\n"
+        "        s = shot(i)\n"
+        "        frame = Frame(i, str(i), float(i), s.rgb, metres(s.depth_mm), s.world_from_camera, rig())\n"
+        "        writer.add(frame)\n"
+        "    os.kill(os.getpid(), 9)\n"
+    )
+    here = str(Path(__file__).parent)
+    done = subprocess.run([sys.executable, "-c", program, here, str(tmp_path / "walk")], check=False)
+    assert done.returncode == -9
+    with pytest.raises(RecordingError, match="walk was never finished: whatever wrote it stopped before its end"):
+        open_recording(tmp_path / "walk")
+    (fault,) = validate(tmp_path / "walk")
+    assert fault.fatal and fault.file == tmp_path / "walk/UNFINISHED"

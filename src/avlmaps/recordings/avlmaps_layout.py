@@ -34,7 +34,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.file_recording import FileRecording, Shots, find_audio, list_names, settle
-from avlmaps.recordings.images import picture_size
+from avlmaps.recordings.images import first_picture_size
 from avlmaps.recordings.tables import read_table
 
 RATE_HZ = 25.0
@@ -181,7 +181,7 @@ def _camera_poses(
 
 def _rig(path: Path, shots: Shots, given: CameraFile) -> Rig:
     """Make the camera: 90 degrees of horizontal view, the middle of the picture, unless the file says otherwise."""
-    width, height = picture_size(path / shots.colour[0])
+    width, height = first_picture_size(path, shots.colour)
     fx = given.fx if given.fx is not None else width / 2
     fy = given.fy if given.fy is not None else fx
     cx = given.cx if given.cx is not None else width / 2
@@ -190,4 +190,4 @@ def _rig(path: Path, shots: Shots, given: CameraFile) -> Rig:
         rgb = Pinhole(fx, fy, cx, cy, width, height)
     except ValueError as error:
         raise RecordingError(f"{path / 'camera.json'} holds no camera: {error}; mend the file.") from None
-    return Rig(rgb, rgb.resized(*picture_size(path / shots.depth[0])) if shots.depth else rgb)
+    return Rig(rgb, rgb.resized(*first_picture_size(path, shots.depth)) if shots.depth else rgb)

@@ -199,9 +199,10 @@ class FileRecording(Recording):
         for numbers in (up, self.stamps_s, self.world_from_camera):
             # Rounded, so that another machine's last bit makes no other recording; + 0.0 turns -0.0 into 0.0.
             digest.update(np.ascontiguousarray(np.round(numbers, 9) + 0.0, "<f8").tobytes())
+        folder = f"{self.path}{os.sep}"  # joining a million paths the long way takes seconds
         video = [self.video.path.name] if self.video is not None else []
         for name in (*video, *self.shots.colour, *self.shots.depth):
-            digest.update(f"{name}\0{_size(self.path / name)}\n".encode())
+            digest.update(f"{name}\0{_size(f'{folder}{name}')}\n".encode())
         if self.audio is not None:
             digest.update(f"{self.audio.path.name}\0{_size(self.audio.path)}\0{self.audio.start_s}".encode())
         return digest.hexdigest()
@@ -214,9 +215,9 @@ def _numbers(rig: Rig) -> list[float]:
     return [*camera(rig.rgb), *camera(rig.depth), *map(float, rig.rgb_from_depth.ravel())]
 
 
-def _size(path: Path) -> int:
+def _size(path: Path | str) -> int:
     try:
-        return path.stat().st_size
+        return os.stat(path).st_size  # noqa: PTH116
     except OSError:
         return -1
 
@@ -230,6 +231,8 @@ def list_names(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
     try:
         with os.scandir(folder) as entries:
             names = [entry.name for entry in entries if entry.name.lower().endswith(suffixes)]
+    except FileNotFoundError:
+        raise RecordingError(f"{folder} is missing; the recording needs it.") from None
     except OSError as error:
         raise RecordingError(f"{folder} cannot be listed ({error.strerror or error}); check the folder.") from None
     return sorted((name for name in names if not name.startswith(".")), key=_by_number)

@@ -1,8 +1,8 @@
 """Reading our own folder format; `layout.py` tells what is in it, `writer.py` writes it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -37,15 +37,12 @@ def open_folder(path: Path, report: Report = stop_at_first) -> FileRecording:
     if not (path / layout.DESCRIPTION).exists() and (path / layout.UNFINISHED).exists():
         sentence = f"{path} was never finished: whatever wrote it stopped before its end; record it again."
         report(Fault(sentence, path / layout.UNFINISHED))
+        raise RecordingError(sentence)
     description = layout.read_description(path, report)
-    if description is None:
-        raise RecordingError(f"{path / layout.DESCRIPTION} cannot be used, so the recording cannot be opened.")
     known = _read_poses(path, report)
     video = _find_video(path, description)
     found = _find_pictures(path, description, known, video, report)
     shots, notices, start_s = _pose_pictures(found, known)
-    if video is not None:
-        shots = replace(shots, colour=[], video_frames=range(len(shots.names)))
     shots, more = settle(path, shots, report, pose_file=None)
     audio_start_s = description.audio_start_s - (start_s if description.audio_start_s > _DATE_S else 0.0)
     up = description.up_in_world
@@ -90,10 +87,13 @@ class _Pictures:
     colour: list[str]
     depth: list[str]
     stamps_s: Float[np.ndarray, " n"] | None
+    video_frames: Sequence[int] = ()
 
 
 def _read_poses(folder: Path, report: Report) -> _Poses:
     path = folder / layout.POSES
+    if not path.is_file():
+        raise RecordingError(f"{path} is missing; the recording needs it.")
     table = read_table(path, (8,), report, header=True)
     stamps_s, translation, quaternion = table.values[:, 0], table.values[:, 1:4], table.values[:, 4:8]
     length = np.linalg.norm(quaternion, axis=1)
@@ -121,7 +121,7 @@ def _read_poses(folder: Path, report: Report) -> _Poses:
     pose = poses.from_quaternion(translation, quaternion)
     pose[~usable] = np.nan
     if len(stamps_s) == 0:
-        report(Fault(f"{path} holds no pose, so there is nothing to map.", path))
+        raise RecordingError(f"{path} holds no pose, so there is nothing to map.")
     return _Poses(stamps_s, pose, usable)
 
 
@@ -144,6 +144,8 @@ def _find_pictures(
     folder: Path, description: Description, known: _Poses, video: VideoFrames | None, report: Report
 ) -> _Pictures:
     """Find the pictures and their stamps: by frames.csv, else row by row with poses.csv, else by the rate."""
+    if not (folder / "depth").is_dir():
+        raise RecordingError(f"{folder / 'depth'} is missing; the recording needs it.")
     where, suffixes = ("rgb", layout.COLOUR_SUFFIXES) if video is None else ("depth", (".png",))
     found = {name.rsplit(".", 1)[0]: name for name in list_names(folder / where, suffixes)}
     if video is not None and len(found) != len(video):
@@ -156,6 +158,8 @@ def _find_pictures(
         rows = list(_listed(path, report))
         names = [name for name, _ in rows]
         stamps_s: Float[np.ndarray, " n"] | None = np.array([stamp for _, stamp in rows], np.float64)
+        if not names:
+            raise RecordingError(f"{path} lists no frame, so there is nothing to map.")
     else:
         names = list(found)
         stamps_s = video.stamps_s if video else _stamps_without_list(folder, names, description, known, report)
@@ -164,12 +168,15 @@ def _find_pictures(
         where = path.name if path.exists() else "rgb/"
         sentence = f"{folder / layout.DESCRIPTION} tells of {description.frames} frames, but {where} has {len(names)}."
         report(Fault(sentence, folder / layout.DESCRIPTION, fatal=False))
-    return _Pictures(names, colour, [f"depth/{name}.png" for name in names], stamps_s)
+    depth = [f"depth/{name}.png" for name in names]
+    if video is not None:
+        return _Pictures(names, [], depth, stamps_s, range(len(names)))
+    return _Pictures(names, colour, depth, stamps_s)
 
 
 def _listed(path: Path, report: Report) -> Iterator[tuple[str, float]]:
     for number, text in text_lines(path, report):
-        if text == layout.FRAMES_HEADER:
+        if text.replace(" ", "") == layout.FRAMES_HEADER:
             continue
         name, _, stamp = text.rpartition(",")
         try:
@@ -196,30 +203,42 @@ def _stamps_without_list(
 
 
 def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, tuple[str, ...], float]:
-    """Give every picture a pose: its own row's, or one interpolated at its stamp (NaN where none can be told)."""
-    notices: list[str] = []
+    """Give every picture a pose: its own row's, or one interpolated at its stamp where that can be told.
+
+    Returns:
+        The shots, what is to be told of them, and the date that was subtracted from the stamps, seconds.
+    """
     stamps_s = known.stamps_s if found.stamps_s is None else found.stamps_s
-    own_row = len(stamps_s) == len(known.stamps_s) and np.array_equal(stamps_s, known.stamps_s, equal_nan=True)
-    if own_row:
-        world_from_camera = known.world_from_camera
-    else:
-        world_from_camera = np.full((len(stamps_s), 4, 4), np.nan)
-        usable = np.flatnonzero(known.usable)
-        if len(usable) < len(known.usable):
-            notices.append(f"{len(known.usable) - len(usable)} pose(s) of {layout.POSES} are NaN and not used.")
-        order = timeline.in_order(known.stamps_s[usable], f"poses of {layout.POSES}")
-        notices += order.notices
-        rows = usable[order.index]
-        if len(rows):
-            trajectory = timeline.Trajectory(known.stamps_s[rows], known.world_from_camera[rows])
-            covered = trajectory.covers(stamps_s)
-            world_from_camera[covered] = trajectory.at(stamps_s[covered])
-            if not covered.all():
-                notices.append(
-                    f"{int((~covered).sum())} frame(s) lie outside the poses of {layout.POSES} or in a gap of them."
-                )
-    start_s = 0.0
-    if len(stamps_s) and np.nanmin(stamps_s) > _DATE_S:
+    start_s, notices = 0.0, []
+    if np.nanmin(np.append(stamps_s, np.inf)) > _DATE_S:
         start_s = float(np.nanmin(stamps_s))
         notices.append(f"The stamps are dates; time 0 is the first frame's, {start_s:.6f} s since 1970.")
-    return Shots(found.names, found.colour, found.depth, stamps_s - start_s, world_from_camera), tuple(notices), start_s
+    own_row = len(stamps_s) == len(known.stamps_s) and np.array_equal(stamps_s, known.stamps_s, equal_nan=True)
+    covered, world_from_camera = np.ones(len(stamps_s), bool), known.world_from_camera
+    if not own_row:
+        covered, world_from_camera, more = _interpolated(stamps_s, known)
+        notices += more
+    shots = Shots(found.names, found.colour, found.depth, stamps_s - start_s, world_from_camera, found.video_frames)
+    return shots.take(np.flatnonzero(covered)), tuple(notices), start_s
+
+
+def _interpolated(
+    stamps_s: Float[np.ndarray, " n"], known: _Poses
+) -> tuple[Bool[np.ndarray, " n"], Float[np.ndarray, "n 4 4"], list[str]]:
+    """Return where a pose can be told, the poses (NaN elsewhere), and sentences about what cannot be used."""
+    notices: list[str] = []
+    usable = np.flatnonzero(known.usable)
+    if len(usable) < len(known.usable):
+        notices.append(f"{len(known.usable) - len(usable)} pose(s) of {layout.POSES} are NaN and not used.")
+    order = timeline.in_order(known.stamps_s[usable], f"poses of {layout.POSES}")
+    notices += order.notices
+    rows = usable[order.index]
+    covered, world_from_camera = np.zeros(len(stamps_s), bool), np.full((len(stamps_s), 4, 4), np.nan)
+    if len(rows):
+        trajectory = timeline.Trajectory(known.stamps_s[rows], known.world_from_camera[rows])
+        covered = trajectory.covers(stamps_s)
+        world_from_camera[covered] = trajectory.at(stamps_s[covered])
+    if not covered.all():
+        lost = int((~covered).sum())
+        notices.append(f"{lost} frame(s) lie outside the poses of {layout.POSES} or in a gap of them; left out.")
+    return covered, world_from_camera, notices

@@ -2,6 +2,8 @@
 
 import struct
 import zlib
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ _JPEG = b"\xff\xd8"
 # A JPEG's frame headers carry its size; of the codes C0 to CF these three mean something else.
 _JPEG_SIZE_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _HEADER_BYTES = 1 << 18
+_TRIED = 10
 DEPTH_SATURATED = 65535
 
 
@@ -82,6 +85,18 @@ def picture_size(path: Path, content: bytes | None = None) -> tuple[int, int]:
         if len(shape) >= 2:
             return shape[1], shape[0]
     raise RecordingError(f"{path} is no PNG, JPEG or NPY picture (or is cut off); copy it again.")
+
+
+def first_picture_size(folder: Path, names: Sequence[str]) -> tuple[int, int]:
+    """Return the size of the first picture that has one, so that a recording opens though its first file is broken.
+
+    Raises:
+        RecordingError: none of the first few has; the sentence is about the first.
+    """
+    for name in names[:_TRIED]:
+        with suppress(RecordingError):
+            return picture_size(folder / name)
+    return picture_size(folder / names[0])
 
 
 def _head(path: Path) -> bytes:

@@ -108,29 +108,28 @@ class _Version(msgspec.Struct):
     schema_version: int
 
 
-def read_description(folder: Path, report: Report) -> Description | None:
-    """Read ``recording.json``; report what is wrong with it and return None where it cannot be used."""
+def read_description(folder: Path, report: Report) -> Description:
+    """Read ``recording.json``.
+
+    Raises:
+        RecordingError: it is missing, not UTF-8, not JSON, of another version, or a field has the wrong type or
+            an impossible value; whoever listens to faults was told of it before.
+    """
     path = folder / DESCRIPTION
     try:
-        description = decode_json(path, Description)
+        description = _decode(path)
+        fault = _impossible(description)
+        if fault:
+            raise RecordingError(f"{path}: {fault}; mend the file.")
     except RecordingError as error:
         report(Fault(str(error), path))
-        return None
-    fault = _impossible(description)
-    if fault:
-        report(Fault(f"{path}: {fault}; mend the file.", path))
-        return None
+        raise
     return description
 
 
-def decode_json(path: Path, kind: type[Description]) -> Description:
-    """Decode a versioned JSON file.
-
-    Raises:
-        RecordingError: it is missing, not UTF-8, not JSON, of another version, or a field has the wrong type.
-    """
+def _decode(path: Path) -> Description:
     try:
-        content = path.read_bytes()
+        content = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
         content.decode("utf-8")
         version = msgspec.json.decode(content, type=_Version).schema_version
         if version != SCHEMA_VERSION:
@@ -138,10 +137,12 @@ def decode_json(path: Path, kind: type[Description]) -> Description:
                 f"{path} has schema version {version}; this avlmaps reads version {SCHEMA_VERSION}: "
                 f"{'update avlmaps' if version > SCHEMA_VERSION else 'write the recording again'}."
             )
-        return msgspec.json.decode(content, type=kind)
+        return msgspec.json.decode(content, type=Description)
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         raise RecordingError(f"{path}, line {line}: this is not UTF-8 text; save the file as UTF-8.") from None
+    except FileNotFoundError:
+        raise RecordingError(f"{path} is missing; every recording in this format has one.") from None
     except OSError as error:
         raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None
     except msgspec.ValidationError as error:
@@ -153,7 +154,8 @@ def decode_json(path: Path, kind: type[Description]) -> Description:
 
 
 def _lower(message: str) -> str:
-    return message[:1].lower() + message[1:]
+    """Begin a message in the middle of a sentence, unless it begins with a name like JSON."""
+    return message if message[1:2].isupper() else message[:1].lower() + message[1:]
 
 
 def _impossible(description: Description) -> str:

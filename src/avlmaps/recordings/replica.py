@@ -16,7 +16,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.file_recording import FileRecording, Shots, find_audio, list_names, settle
-from avlmaps.recordings.images import picture_size
+from avlmaps.recordings.images import first_picture_size
 from avlmaps.recordings.tables import read_table
 
 RATE_HZ = 30.0
@@ -107,7 +107,7 @@ def _camera(path: Path, shots: Shots) -> tuple[Rig, float, tuple[str, ...]]:
             raise ValueError(f"scale is {given.scale}; it must be positive")
     except ValueError as error:
         raise RecordingError(f"{file} holds no camera: {error}; mend the file.") from None
-    rgb_size, depth_size = picture_size(path / shots.colour[0]), picture_size(path / shots.depth[0])
+    rgb_size, depth_size = first_picture_size(path, shots.colour), first_picture_size(path, shots.depth)
     rig = Rig(camera.resized(*rgb_size), camera.resized(*depth_size))
     told = () if file else ("There is no cam_params.json; the camera of the published scenes is assumed.",)
     return rig, given.scale, told

@@ -15,7 +15,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.file_recording import FileRecording, Shots, find_audio, list_names, settle
-from avlmaps.recordings.images import picture_size
+from avlmaps.recordings.images import first_picture_size
 from avlmaps.recordings.tables import read_matrix
 
 RATE_HZ = 30.0
@@ -72,8 +72,8 @@ def open_scannet(path: Path, report: Report = stop_at_first) -> FileRecording:
 
 
 def _rig(path: Path, shots: Shots) -> Rig:
-    rgb = _camera(path / "intrinsic" / "intrinsic_color.txt", picture_size(path / shots.colour[0]))
-    depth = _camera(path / "intrinsic" / "intrinsic_depth.txt", picture_size(path / shots.depth[0]))
+    rgb = _camera(path / "intrinsic" / "intrinsic_color.txt", first_picture_size(path, shots.colour))
+    depth = _camera(path / "intrinsic" / "intrinsic_depth.txt", first_picture_size(path, shots.depth))
     body_from_rgb = _extrinsic(path / "intrinsic" / "extrinsic_color.txt")
     body_from_depth = _extrinsic(path / "intrinsic" / "extrinsic_depth.txt")
     return Rig(rgb, depth, poses.inverse(body_from_rgb) @ body_from_depth)

@@ -16,7 +16,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.file_recording import FileRecording, Shots, find_audio, list_names, settle
-from avlmaps.recordings.images import picture_size
+from avlmaps.recordings.images import first_picture_size
 from avlmaps.recordings.tables import read_matrix
 
 RATE_HZ = 30.0
@@ -88,8 +88,8 @@ def _poses(path: Path, stems: list[str], report: Report) -> np.ndarray:
 
 def _rig(path: Path, shots: Shots) -> tuple[Rig, tuple[str, ...]]:
     """Make the cameras of the intrinsics file, or of the Kinect where there is none."""
-    rgb_size = picture_size(path / shots.colour[0])
-    depth_size = picture_size(path / shots.depth[0])
+    rgb_size = first_picture_size(path, shots.colour)
+    depth_size = first_picture_size(path, shots.depth)
     file = next((f for f in (path / _INTRINSICS, path.parent / _INTRINSICS) if f.is_file()), None)
     notices: tuple[str, ...] = ()
     if file is None:

@@ -59,12 +59,12 @@ def read_table(path: Path, columns: tuple[int, ...], report: Report, header: boo
         header: whether the first line may name the columns instead.
     """
     values, lines, width = array("d"), array("q"), 0
-    for number, text in text_lines(path, report):
+    for row_number, (number, text) in enumerate(text_lines(path, report)):
         fields = text.replace(",", " ").split()
         try:
             row = [_number(field) for field in fields]
         except ValueError:
-            if header and not lines and not _any_number(fields):
+            if header and row_number == 0 and not _any_number(fields):
                 continue
             report(Fault(f"{path}, line {number}: {text[:40]!r} is not all numbers; mend the line.", path, number))
             continue

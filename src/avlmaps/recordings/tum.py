@@ -17,7 +17,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.file_recording import FileRecording, Shots, find_audio, settle
-from avlmaps.recordings.images import picture_size
+from avlmaps.recordings.images import first_picture_size
 from avlmaps.recordings.tables import read_table, text_lines
 
 UNITS_PER_M = 5000.0
@@ -142,7 +142,7 @@ def _camera(path: Path, shots: Shots) -> tuple[Rig, Float[np.ndarray, "3"] | Non
     key = next((k for k in _CAMERAS if k in name), "default")
     fx, fy, cx, cy = _CAMERAS[key]
     camera = Pinhole(fx, fy, cx + 0.5, cy + 0.5, 640, 480)
-    rgb_size, depth_size = picture_size(path / shots.colour[0]), picture_size(path / shots.depth[0])
+    rgb_size, depth_size = first_picture_size(path, shots.colour), first_picture_size(path, shots.depth)
     rig = Rig(camera.resized(*rgb_size), camera.resized(*depth_size))
     if key == "default":
         told = "The folder is not called freiburg1, 2 or 3, so the default camera (525) is assumed; up is not known."

@@ -259,7 +259,9 @@ def write_recording(
 ) -> Path:
     """Write any recording in our own format: the same pictures bit for bit, the same stamps and poses.
 
-    Pictures that are JPEG or PNG files already are linked or copied; others are encoded without loss.
+    Pictures that are JPEG or PNG files already are linked or copied; others are encoded as PNG, depth in whole
+    millimetres. Truth that lies beside a recording in our own format (``semantic/``, ``objects.json``, and
+    ``events.csv`` where the sound track stays) goes along, so that the copy can be evaluated as well.
 
     Args:
         recording: what to copy.
@@ -287,8 +289,23 @@ def write_recording(
                 writer.add_files(recording.name(index), stamp_s, pose, colour, depth, link)
             else:
                 writer.add(recording.frame(index))
+        if recording.format == "folder":
+            _take_truth(recording, out, keep_events=audio is None, link=link)
         if audio is not None:
             writer.set_audio(audio, audio_start_s)
         elif recording.audio is not None:
             writer.set_audio(recording.audio)
     return out
+
+
+def _take_truth(recording: Recording, out: Path, keep_events: bool, link: bool) -> None:
+    for name in ("objects.json", *(["events.csv"] if keep_events else [])):
+        if (recording.path / name).is_file():
+            _take(recording.path / name, out / name, link=False)
+    if not (recording.path / "semantic").is_dir():
+        return
+    (out / "semantic").mkdir()
+    copied = {recording.name(index) for index in range(len(recording))}
+    for file in (recording.path / "semantic").iterdir():
+        if file.stem in copied:
+            _take(file, out / "semantic" / file.name, link)
