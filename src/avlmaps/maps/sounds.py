@@ -141,6 +141,6 @@ def _tell_outside(recording: Recording, found: Sequence[Segment]) -> None:
     outside = [one for one in found if one.offset_s < first_s or one.onset_s > last_s]
     if outside:
         say(
-            f"note: {len(outside)} of {len(found)} sounds lie outside the frames' time ({first_s:.2f} to {last_s:.2f} s), "
+            f"note: {len(outside)} of {len(found)} sounds lie outside the frames, {first_s:.2f} to {last_s:.2f} s, "
             f"the first at {outside[0].onset_s:.2f} s; they are put where the nearest frame was taken."
         )
