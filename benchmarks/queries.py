@@ -38,7 +38,7 @@ def building(voxels: int, rng: np.random.Generator) -> np.ndarray:
     return index[np.sort(rng.choice(len(index), min(voxels, len(index)), replace=False))]
 
 
-def best_ms(work: Callable[[], object], repeats: int = 7) -> float:
+def best_ms(work: Callable[[], object], repeats: int = 25) -> float:
     """Return the least time of several, in milliseconds, after one call that compiles."""
     work()
     times = []

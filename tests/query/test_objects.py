@@ -122,7 +122,17 @@ def test_a_speck_is_not_found() -> None:
     encoder = FakePixels(("chair",))
     found = asked_of(encoder, box((0, 0, 0), (1, 1, 1)), encoder.encode_words(["chair"]), "chair")
     assert not found.found
+    assert not found.mask.any()
     assert found.note.startswith("the best of the 1 voxels closest to 'chair' make an instance of confidence 0.2")
+
+
+def test_specks_give_no_heat_beside_a_thing() -> None:
+    encoder = FakePixels(("chair",))
+    index = np.concatenate([[[-9, 0, 0]], box((0, 0, 0), (3, 3, 3)), [[20, 0, 0]], box((40, 0, 0), (4 + 40, 4, 4))])
+    found = asked_of(encoder, index, encoder.encode_words(["chair"] * len(index)), "chair")
+    assert found.mask.sum() == 27 + 64
+    np.testing.assert_array_equal(np.bincount(found.instance), [27, 64])
+    assert len(found.confidence) == 2
 
 
 def test_a_vocabulary_can_be_replaced() -> None:

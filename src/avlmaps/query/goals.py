@@ -83,8 +83,8 @@ def find_goals(heat: Heatmap, top: int) -> list[Goal]:
     score = shares.peak * lead.confidence
     goals: list[Goal] = []
     taken: list[np.ndarray] = []
-    extent = np.bincount(lead.instance, minlength=len(score))  # the larger of two equally good ones leads
-    for instance in np.lexsort((-extent, -np.round(score, 3))):
+    extent = np.bincount(lead.instance, minlength=len(score))  # the larger of two that are equally good leads
+    for instance in np.lexsort((-extent, -np.round(score, 2))):
         if len(goals) >= top or score[instance] <= 0.0:
             break
         position = _position(heat, lead, shares, int(instance))

@@ -130,7 +130,8 @@ def undominated(horizontal, score, falloff_per_m):
         for k in range(count):
             i = kept[k]
             dx, dy = horizontal[j, 0] - horizontal[i, 0], horizontal[j, 1] - horizontal[i, 1]
-            if score[j] <= score[i] - falloff_per_m * np.sqrt(dx * dx + dy * dy):
+            lead = score[i] - score[j]
+            if falloff_per_m * falloff_per_m * (dx * dx + dy * dy) <= lead * lead:
                 hidden = True
                 break
         if not hidden:
@@ -157,26 +158,35 @@ def _cones_near(x, y, slack, anchors, score, falloff_per_m, near):
     """Write which cones can be the highest somewhere within a circle, and return how many.
 
     ``slack`` is the falloff times the circle's radius: a cone's heat in it lies that much round its middle's. A
-    cone whose best in the circle stays below another's worst is not highest anywhere in it.
+    cone whose best in the circle stays below another's worst is not highest anywhere in it. Scores fall, so that
+    both passes can stop early; squares are compared to save roots.
     """
-    worst = 0.0
+    worst, squared = 0.0, falloff_per_m * falloff_per_m
     for a in range(len(score)):
-        if score[a] - slack > worst:
-            d = np.sqrt((anchors[a, 0] - x) ** 2 + (anchors[a, 1] - y) ** 2)
-            worst = max(worst, score[a] - falloff_per_m * d - slack)
+        above = score[a] - slack - worst
+        if above <= 0.0:
+            break
+        d2 = (anchors[a, 0] - x) ** 2 + (anchors[a, 1] - y) ** 2
+        if squared * d2 < above * above:
+            worst += above - falloff_per_m * np.sqrt(d2)
     count = 0
     for a in range(len(score)):
-        if score[a] + slack >= worst:
-            d = np.sqrt((anchors[a, 0] - x) ** 2 + (anchors[a, 1] - y) ** 2)
-            if score[a] - falloff_per_m * d + slack >= worst:
-                near[count] = a
-                count += 1
+        above = score[a] + slack - worst
+        if above < 0.0:
+            break
+        d2 = (anchors[a, 0] - x) ** 2 + (anchors[a, 1] - y) ** 2
+        if squared * d2 <= above * above:
+            near[count] = a
+            count += 1
     return count
 
 
 @njit(cache=True, nogil=True)
 def cone_heat(points, starts, anchors, score, falloff_per_m, out, winner, first_block, last_block):
-    """Write max over anchors of s − ε·d, floored at 0, for horizontal points in blocks, and who won (−1: none)."""
+    """Write max over anchors of s − ε·d, floored at 0, for horizontal points in blocks, and who won (−1: none).
+
+    Anchors come in falling score.
+    """
     near = np.empty(len(score), np.int64)
     for b in range(first_block, last_block):
         x, y, radius = _circle(points, starts[b], starts[b + 1])

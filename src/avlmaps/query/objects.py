@@ -31,6 +31,8 @@ class ObjectSettings:
     """An instance that wins its voxels by this much on average is as likely right as wrong."""
     area_yes_m2: float = 0.01
     """Surface below which an instance is probably noise; a mug shows about 0.02 m²."""
+    least_confidence: float = 0.3
+    """Instances below this are noise (one or two voxels of 5 cm) and give no heat; 0 keeps all, as the paper does."""
     link_m: float = 0.1
     """Voxels of an object no farther apart than this along every axis belong to one instance."""
 
@@ -191,8 +193,20 @@ def object_factor(
     note = "" if best >= 0.5 else _absence(part.query, len(mask), int(mask.sum()), best)
     if understood and understood != part.query.strip().lower():
         note = f"understood only {understood!r} of {part.query!r}" + ("; " + note if note else "")
+    mask, instance, confidence = _without_specks(mask, instance, confidence, settings.least_confidence)
     falloff = heat.falloff_per_m(part.role)
     return NearThings(space, part, falloff, mask, instance, confidence, best >= 0.5, understood, note)
+
+
+def _without_specks(
+    mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"], confidence: Float32[np.ndarray, " i"], least: float
+) -> tuple[Bool[np.ndarray, " n"], Int[np.ndarray, " b"], Float32[np.ndarray, " j"]]:
+    """Return the voxels, instances and confidences of the instances that are sure enough to count."""
+    kept = confidence >= least
+    stays = kept[instance]
+    thinned = np.zeros(len(mask), bool)
+    thinned[np.flatnonzero(mask)[stays]] = True
+    return thinned, (np.cumsum(kept) - 1)[instance[stays]], confidence[kept]
 
 
 def _absence(word: str, voxels: int, won: int, best: float) -> str:
