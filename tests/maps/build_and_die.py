@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 import cv2
-from build_fakes import SETTINGS, Walk, register_fakes
+from build_fakes import SETTINGS, Walk, register_fakes, write_beeps
 
 from avlmaps.maps.build import build_map
 
@@ -20,8 +20,10 @@ FRAMES = 14
 DEADLY = ("fsync", "replace", "unlink", "rmdir", "mkdir")
 
 
-def build(path: str, seed: int) -> None:
-    build_map(Walk(FRAMES, seed=seed, bad=(5,)), Path(path), "fake", SETTINGS, progress=False, overwrite=True)
+def build(path: str, seed: int, audio: Path) -> None:
+    build_map(
+        Walk(FRAMES, seed=seed, bad=(5,), audio=audio), Path(path), "fake", SETTINGS, progress=False, overwrite=True
+    )
 
 
 def count_steps(fatal: int | None) -> list[str]:
@@ -44,11 +46,11 @@ def count_steps(fatal: int | None) -> list[str]:
     return steps
 
 
-def child(order: dict) -> None:
+def child(order: dict, audio: Path) -> None:
     status = 1
     try:
         steps = count_steps(order.get("step"))
-        build(order["path"], order["seed"])
+        build(order["path"], order["seed"], audio)
         Path(order["log"]).write_text(str(len(steps)))
         status = 0
     finally:
@@ -60,13 +62,18 @@ def main() -> None:
     register_fakes()
     cv2.setNumThreads(1)
     with tempfile.TemporaryDirectory() as folder:
-        build(f"{folder}/warm.avlmap", 0)
+        audio = write_beeps(Path(folder) / "beeps.flac")
+        build(f"{folder}/warm.avlmap", 0, audio)
+        obey(audio)
+
+
+def obey(audio: Path) -> None:
     for line in sys.stdin:
         order = json.loads(line)
         begin = time.perf_counter()
         pid = os.fork()
         if pid == 0:
-            child(order)
+            child(order, audio)
         if order.get("delay_s") is not None:
             time.sleep(order["delay_s"])
             os.kill(pid, signal.SIGKILL)

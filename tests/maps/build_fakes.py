@@ -14,6 +14,7 @@ from avlmaps.maps.keyframes import KeyframeSettings
 from avlmaps.maps.settings import BuildSettings, FrameSettings
 from avlmaps.perception.profiles import Profile, register_profile
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
+from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.types import Frame, Recording
 
 RIG = Rig(Pinhole(20.0, 20.0, 16.0, 12.0, 32, 24), Pinhole(20.0, 20.0, 16.0, 12.0, 32, 24))
@@ -25,7 +26,15 @@ SETTINGS = BuildSettings(
 class Walk(Recording):
     """Sideways past a wall whose colours are random squares; the same seed gives the same walk."""
 
-    def __init__(self, frames: int = 22, *, seed: int = 0, bad: tuple[int, ...] = (), name: str = "walk") -> None:
+    def __init__(
+        self,
+        frames: int = 22,
+        *,
+        seed: int = 0,
+        bad: tuple[int, ...] = (),
+        name: str = "walk",
+        audio: Path | None = None,
+    ) -> None:
         self.path = Path("/nowhere/of/mine") / name
         self.format = "fake"
         self.rig = RIG
@@ -34,7 +43,7 @@ class Walk(Recording):
         self.world_from_camera[:, :3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # looks along +y, up is +z
         self.world_from_camera[:, 0, 3] = 0.1 * np.arange(frames)
         self.up_in_world = np.array([0.0, 0.0, 1.0])
-        self.audio = None
+        self.audio = AudioTrack.open(audio) if audio else None
         self.notices = (f"{self.path} is made up.",)
         self.seed, self.bad = seed, bad
 
@@ -52,6 +61,18 @@ class Walk(Recording):
     @cached_property
     def fingerprint(self) -> str:
         return hashlib.sha256(f"{self.path.name} {len(self)} {self.seed}".encode()).hexdigest()
+
+
+def write_beeps(path: Path, onsets_s: tuple[float, ...] = (0.3, 2.0)) -> Path:
+    """Write a track of four seconds with a beep of 0.4 s at each onset, in faint noise."""
+    rate_hz = 16_000
+    samples = np.random.default_rng(0).normal(scale=1e-4, size=4 * rate_hz).astype(np.float32)
+    tone = (0.3 * np.sin(2 * np.pi * 800.0 * np.arange(int(0.4 * rate_hz)) / rate_hz)).astype(np.float32)
+    for onset_s in onsets_s:
+        start = int(onset_s * rate_hz)
+        samples[start : start + len(tone)] += tone
+    write_flac(path, Sound(samples, rate_hz))
+    return path
 
 
 def _card(name: str, dim: int) -> ModelCard:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from build_fakes import SETTINGS, Walk, register_fakes
+from build_fakes import SETTINGS, Walk, register_fakes, write_beeps
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,6 +19,7 @@ from avlmaps.maps.build import build_map, build_part, describe, merge_parts
 from avlmaps.maps.parts import load_part, plan_spans
 from avlmaps.maps.settings import BuildSettings, FrameSettings
 from avlmaps.maps.stored import StoredMap, open_stored, verify_stored
+from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.subset import Subset
 
 PROFILE = register_fakes()
@@ -299,6 +300,37 @@ def test_what_is_told_of_a_map_is_plain_json(tmp_path: Path) -> None:
     centres = stored.grid.centre_of(stored.voxels.index)
     np.testing.assert_allclose(centres.min(axis=0) - 0.025, low, atol=1e-6)
     np.testing.assert_allclose(centres.max(axis=0) + 0.025, high, atol=1e-6)
+
+
+def test_sounds_are_kept_with_their_clips(tmp_path: Path) -> None:
+    walk = Walk(22, audio=write_beeps(tmp_path / "beeps.flac"))
+    stored = build(walk, tmp_path / "a.avlmap")
+    assert len(stored.sounds) == 2
+    np.testing.assert_allclose(stored.sounds.feature, [[0.6, 0.8]] * 2, rtol=1e-6)
+    np.testing.assert_allclose(stored.sounds.onset_s, [0.3, 2.0], atol=0.1)
+    for number in range(2):
+        assert AudioTrack.open(stored.clip_path(number)).duration_s == pytest.approx(0.4, abs=0.1)
+    first, second = describe(stored)["sounds"]
+    assert first["position"] == pytest.approx([0.5, 0.0, 0.0], abs=0.1)
+    assert second["position"] == pytest.approx([2.1, 0.0, 0.0], abs=0.1)
+    assert not any("no sounds" in notice for notice in stored.info.notices)
+
+
+def test_another_sound_track_is_another_map(tmp_path: Path) -> None:
+    path = build(Walk(6, audio=write_beeps(tmp_path / "beeps.flac")), tmp_path / "a.avlmap").path
+    with pytest.raises(MapError, match="of walk with another sound track"):
+        build(Walk(6, audio=write_beeps(tmp_path / "others.flac", (1.0,))), path)
+
+
+def test_finished_keyframes_and_sounds_are_not_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    walk = Walk(12, audio=write_beeps(tmp_path / "beeps.flac"))
+    with monkeypatch.context() as patch:
+        patch.setattr("avlmaps.maps.build.merge", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            build(walk, tmp_path / "a")
+    monkeypatch.setattr("avlmaps.maps.keyframes.perceive_keyframes", None)
+    monkeypatch.setattr("avlmaps.maps.sounds.hear", None)
+    assert len(build(walk, tmp_path / "a").sounds) == 2
 
 
 @given(st.integers(1, 30), st.integers(1, 5))

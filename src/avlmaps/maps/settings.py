@@ -6,6 +6,7 @@ from typing import Literal
 from avlmaps.core.errors import MapError
 from avlmaps.maps.fusion_settings import FusionSettings
 from avlmaps.maps.keyframes import KeyframeSettings
+from avlmaps.maps.sounds import HearingSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +53,8 @@ class BuildSettings:
     """Finding which way is up."""
     keyframes: KeyframeSettings = field(default_factory=KeyframeSettings)
     """Which frames stand for the walk."""
+    hearing: HearingSettings = field(default_factory=HearingSettings)
+    """From the sound track to the sounds of a map."""
     seed: int = 0
     """Seed of what is drawn at random (visual words, RANSAC)."""
 
