@@ -127,10 +127,10 @@ class VoxelAccumulator:
 
     def _cells(self, features: np.ndarray | None) -> tuple[Float32[np.ndarray, "cells d"], tuple[int, int]]:
         """Return the features as rows of cells, and how many rows and columns of cells there are."""
-        if features is None:
-            return np.zeros((0, self.dim), np.float32), (0, 0)
-        if features.ndim != 3 or features.shape[2] != self.dim or 0 in features.shape[:2]:
+        if features is not None and (features.ndim != 3 or features.shape[2] != self.dim or 0 in features.shape[:2]):
             raise ValueError(f"features have shape {features.shape}; this map takes (rows, columns, {self.dim})")
+        if features is None or self.dim == 0:
+            return np.zeros((0, self.dim), np.float32), (0, 0)
         cells = np.ascontiguousarray(features, np.float32).reshape(-1, self.dim)
         return cells, (features.shape[0], features.shape[1])
 

@@ -40,8 +40,9 @@ class Scratch(NamedTuple):
     Of each pixel of a row: ``key`` (of its voxel), ``weight``, ``picture`` (its colour pixel), ``cell`` (its cell of
     the feature map), the latter two linear indices, -1 outside. Of the frame's voxels: a hash table (``slot_key``,
     ``slot_voxel``), ``voxel_key``, ``voxel_sum`` (what the frame adds), ``voxel_row`` (where in the map),
-    ``voxel_start`` (where in ``pair_order`` their pairs begin). Of each pair: ``pair_voxel``, ``pair_cell``,
-    ``pair_weight``; ``recent`` remembers the pairs used last. Of one voxel: ``live_cell``, ``live_weight``.
+    ``voxel_start`` (where their pairs begin in ``grouped_cell`` and ``grouped_weight``). Of each pair, as they are
+    met: ``pair_voxel``, ``pair_cell``, ``pair_weight``; ``recent`` remembers those used last. Of one voxel:
+    ``live_cell`` and ``live_weight``, the pairs that have a feature.
     """
 
     key: np.ndarray
@@ -57,7 +58,8 @@ class Scratch(NamedTuple):
     pair_voxel: np.ndarray
     pair_cell: np.ndarray
     pair_weight: np.ndarray
-    pair_order: np.ndarray
+    grouped_cell: np.ndarray
+    grouped_weight: np.ndarray
     recent: np.ndarray
     live_cell: np.ndarray
     live_weight: np.ndarray
@@ -81,7 +83,8 @@ def make_scratch(height: int, width: int) -> Scratch:
         pair_voxel=np.empty(pixels, np.int32),
         pair_cell=np.empty(pixels, np.int32),
         pair_weight=np.empty(pixels, np.float64),
-        pair_order=np.empty(pixels, np.int32),
+        grouped_cell=np.empty(pixels, np.int32),
+        grouped_weight=np.empty(pixels, np.float64),
         recent=np.empty(RECENT_PAIRS, np.int32),
         live_cell=np.empty(pixels + 4, np.int64),
         live_weight=np.empty(pixels + 4, np.float32),
@@ -174,41 +177,41 @@ def _enter_voxel(slot, key, scratch, voxels, mask):
 
 
 @njit(**OPTIONS)
-def _add_pair(voxel, cell, amount, scratch, pairs):
+def _add_pair(voxel, cell, amount, recent, pair_voxel, pair_cell, pair_weight, pairs):
     """Add weight to the pair (voxel, cell) if it was met lately, else begin a new one; return the count of pairs."""
     slot = (np.int64(cell) * 5 + np.int64(voxel) * 1237) & (RECENT_PAIRS - 1)
-    pair = scratch.recent[slot]
-    if pair >= 0 and scratch.pair_voxel[pair] == voxel and scratch.pair_cell[pair] == cell:
-        scratch.pair_weight[pair] += amount
+    pair = recent[slot]
+    if pair >= 0 and pair_voxel[pair] == voxel and pair_cell[pair] == cell:
+        pair_weight[pair] += amount
         return pairs
-    scratch.recent[slot] = pairs
-    scratch.pair_voxel[pairs] = voxel
-    scratch.pair_cell[pairs] = cell
-    scratch.pair_weight[pairs] = amount
+    recent[slot] = pairs
+    pair_voxel[pairs] = voxel
+    pair_cell[pairs] = cell
+    pair_weight[pairs] = amount
     return pairs + 1
 
 
 @njit(**OPTIONS)
-def _add_run(u, scratch, rgb, voxel_sum):
+def _add_run(u, keys, cells, weights, picture, rgb, voxel, voxel_sum):
     """Add the pixels from ``u`` on that share voxel and cell to the voxel; return where they end and their weight."""
-    key, cell = scratch.key[u], scratch.cell[u]
+    key, cell = keys[u], cells[u]
     start = u
     total = red = green = blue = seen = 0.0
-    while u < scratch.key.shape[0] and scratch.key[u] == key and scratch.cell[u] == cell:
-        weight = scratch.weight[u]
+    while u < keys.shape[0] and keys[u] == key and cells[u] == cell:
+        weight = weights[u]
         total += weight
-        pixel = scratch.picture[u]
+        pixel = picture[u]
         if pixel >= 0:
             seen += weight
             red += weight * rgb[pixel, 0]
             green += weight * rgb[pixel, 1]
             blue += weight * rgb[pixel, 2]
         u += 1
-    voxel_sum[RED] += red
-    voxel_sum[GREEN] += green
-    voxel_sum[BLUE] += blue
-    voxel_sum[RGB_WEIGHT] += seen
-    voxel_sum[HITS] += u - start
+    voxel_sum[voxel, RED] += red
+    voxel_sum[voxel, GREEN] += green
+    voxel_sum[voxel, BLUE] += blue
+    voxel_sum[voxel, RGB_WEIGHT] += seen
+    voxel_sum[voxel, HITS] += u - start
     return u, total
 
 
@@ -229,35 +232,47 @@ def trace(depth, rays, pose, limits, rgb, tables, projection, scratch):
     Returns:
         Counts of points, of voxels and of pairs.
     """
+    # Single arrays go to the innermost functions: a whole scratch would have each of its arrays counted as held.
+    keys, cells, weights, picture = scratch.key, scratch.cell, scratch.weight, scratch.picture
+    slot_key, slot_voxel, voxel_sum = scratch.slot_key, scratch.slot_voxel, scratch.voxel_sum
+    recent, pair_voxel, pair_cell, pair_weight = (
+        scratch.recent,
+        scratch.pair_voxel,
+        scratch.pair_cell,
+        scratch.pair_weight,
+    )
     mask = np.int64(FIRST_SLOTS - 1)
-    scratch.slot_key[:FIRST_SLOTS] = -1
-    scratch.recent[:] = -1
-    points = voxels = pairs = np.int64(0)
+    slot_key[:FIRST_SLOTS] = -1
+    recent[:] = -1
+    points = voxels = pairs = voxel = np.int64(0)
+    last_key = np.int64(-1)
     for v in range(depth.shape[0]):
-        _measure_row(depth[v], rays[0], rays[1][v], pose, limits, scratch.key, scratch.weight)
+        _measure_row(depth[v], rays[0], rays[1][v], pose, limits, keys, weights)
         if projection[0]:
-            _project_row(depth[v], rays[0], rays[1][v], projection, scratch.picture, scratch.cell)
+            _project_row(depth[v], rays[0], rays[1][v], projection, picture, cells)
         else:
-            _combine_row(tables[0], tables[1][v], scratch.picture)
-            _combine_row(tables[2], tables[3][v], scratch.cell)
+            _combine_row(tables[0], tables[1][v], picture)
+            _combine_row(tables[2], tables[3][v], cells)
         u = np.int64(0)
         while u < depth.shape[1]:
-            key, cell = scratch.key[u], scratch.cell[u]
+            key, cell = keys[u], cells[u]
             if key < 0:
                 u += 1
                 continue
-            slot = _find_slot(scratch.slot_key, mask, key)
-            if scratch.slot_key[slot] == key:
-                voxel = np.int64(scratch.slot_voxel[slot])
-            else:
-                voxel = voxels
-                mask = _enter_voxel(slot, key, scratch, voxels, mask)
-                voxels += 1
-            end, weight = _add_run(u, scratch, rgb, scratch.voxel_sum[voxel])
+            if key != last_key:
+                last_key = key
+                slot = _find_slot(slot_key, mask, key)
+                if slot_key[slot] == key:
+                    voxel = np.int64(slot_voxel[slot])
+                else:
+                    voxel = voxels
+                    mask = _enter_voxel(slot, key, scratch, voxels, mask)
+                    voxels += 1
+            end, weight = _add_run(u, keys, cells, weights, picture, rgb, voxel, voxel_sum)
             points += end - u
             u = end
             if cell >= 0:
-                pairs = _add_pair(voxel, cell, weight, scratch, pairs)
+                pairs = _add_pair(voxel, cell, weight, recent, pair_voxel, pair_cell, pair_weight, pairs)
     return points, voxels, pairs
 
 
@@ -299,7 +314,7 @@ def commit(voxels, scratch, origin, stamp_s, slots, geometry, count):
 
 @njit(**OPTIONS)
 def _group_pairs(voxels, pairs, scratch):
-    """Counting sort: the pairs of voxel v are ``pair_order[voxel_start[v] : voxel_start[v + 1]]``, as they were met."""
+    """Sort pairs by voxel, by counting: those of v are then ``voxel_start[v] : voxel_start[v + 1]``, as they were met."""
     start = scratch.voxel_start
     for voxel in range(voxels + 1):
         start[voxel] = 0
@@ -309,32 +324,41 @@ def _group_pairs(voxels, pairs, scratch):
         start[voxel + 1] += start[voxel]
     for pair in range(pairs):
         voxel = scratch.pair_voxel[pair]
-        scratch.pair_order[start[voxel]] = pair
-        start[voxel] += 1
+        place = start[voxel]
+        scratch.grouped_cell[place] = scratch.pair_cell[pair]
+        scratch.grouped_weight[place] = scratch.pair_weight[pair]
+        start[voxel] = place + 1
     for voxel in range(voxels, 0, -1):
         start[voxel] = start[voxel - 1]
     start[0] = 0
 
 
 @njit(**OPTIONS)
-def _gather_pairs(voxel, scratch, features):
-    """Collect the voxel's pairs whose feature is not all zero, and pad to fours; return their count and weight."""
+def _find_speaking(features, speaks):
+    """Note which cells have a feature that is not all zero; nearly always the first number tells."""
+    for cell in range(features.shape[0]):
+        speaks[cell] = features[cell, 0] != 0.0
+    for cell in range(features.shape[0]):
+        column = 1
+        while not speaks[cell] and column < features.shape[1]:
+            speaks[cell] = features[cell, column] != 0.0
+            column += 1
+
+
+@njit(**OPTIONS)
+def _gather_pairs(first, last, cells, weights, speaks, live_cell, live_weight):
+    """Collect a voxel's pairs whose cell has a feature, and pad to fours; return their count and weight."""
     count = 0
     amount = 0.0
-    for n in range(scratch.voxel_start[voxel], scratch.voxel_start[voxel + 1]):
-        pair = scratch.pair_order[n]
-        cell = scratch.pair_cell[pair]
-        column = 0
-        while column < features.shape[1] and features[cell, column] == 0.0:
-            column += 1
-        if column < features.shape[1]:
-            scratch.live_cell[count] = cell
-            scratch.live_weight[count] = scratch.pair_weight[pair]
-            amount += scratch.pair_weight[pair]
+    for n in range(first, last):
+        live_cell[count] = cells[n]
+        live_weight[count] = weights[n]
+        if speaks[cells[n]]:
+            amount += weights[n]
             count += 1
     while count % 4 != 0:
-        scratch.live_cell[count] = scratch.live_cell[count - 1]
-        scratch.live_weight[count] = 0.0
+        live_cell[count] = live_cell[count - 1]
+        live_weight[count] = 0.0
         count += 1
     return count, amount
 
@@ -381,15 +405,18 @@ def flush(voxels, pairs, scratch, features, feature_sum, weight):
         How many voxels were passed over because their features are not finite.
     """
     _group_pairs(voxels, pairs, scratch)
+    speaks = np.empty(features.shape[0], np.bool_)
+    _find_speaking(features, speaks)
+    start, cells, weights = scratch.voxel_start, scratch.grouped_cell, scratch.grouped_weight
+    live_cell, live_weight, rows = scratch.live_cell, scratch.live_weight, scratch.voxel_row
     total = np.empty(features.shape[1], np.float32)
     faults = 0
     for voxel in range(voxels):
-        count, amount = _gather_pairs(voxel, scratch, features)
+        count, amount = _gather_pairs(start[voxel], start[voxel + 1], cells, weights, speaks, live_cell, live_weight)
         if count > 0:
-            _sum_features(count, scratch.live_cell, scratch.live_weight, features, total)
-            row = scratch.voxel_row[voxel]
-            if _add_if_finite(row, total, feature_sum):
-                weight[row] += amount
+            _sum_features(count, live_cell, live_weight, features, total)
+            if _add_if_finite(rows[voxel], total, feature_sum):
+                weight[rows[voxel]] += amount
             else:
                 faults += 1
     return faults

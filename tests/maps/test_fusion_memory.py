@@ -1,0 +1,26 @@
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BENCHMARK = Path(__file__).resolve().parents[2] / "benchmarks" / "fusion_memory.py"
+
+
+def measured(*arguments: object) -> dict[str, float]:
+    """Build a map of 150,000 voxels by 512 in a process of its own; return what it measured."""
+    command = [sys.executable, str(BENCHMARK), "--voxels", "150000", "--json", *map(str, arguments)]
+    ran = subprocess.run(command, capture_output=True, text=True, check=True)
+    return json.loads(ran.stdout)["rows"][0]
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="measures the resident set as Linux counts it")
+def test_peak_memory_follows_the_voxels_and_not_the_frames():
+    once, often = measured(), measured("--rounds", 5)
+    assert often["voxels"] == once["voxels"]
+    assert often["frames"] == 5 * once["frames"]
+    # Sums in float32, an eighth of room to grow, and the means in float16; blocks and one frame's scratch beside.
+    expected_mb = 1.625 * once["sums_mb"] + 120.0
+    assert once["peak_finished_mb"] - once["before_mb"] < expected_mb
+    assert often["peak_finished_mb"] - often["before_mb"] < expected_mb
