@@ -112,18 +112,8 @@ def open_avlmaps(path: Path, report: Report = stop_at_first) -> FileRecording:
     habitat_from_body = read_habitat_poses(path / "poses.txt", report)
     colour = _numbered(path / "rgb", (".png", ".jpg"))
     depth = _numbered(path / "depth", (".npy", ".png")) if (path / "depth").is_dir() else {}
-    numbers = [n for n in sorted(colour) if n < len(habitat_from_body) and (not depth or n in depth)]
-    if not numbers:
-        raise RecordingError(
-            f"{path} has {len(colour)} pictures in rgb/, {len(depth)} in depth/ and {len(habitat_from_body)} lines in "
-            "poses.txt, but no number is in all of them; line 1 belongs to 000000."
-        )
-    partial = len(colour.keys() | depth.keys() | set(range(len(habitat_from_body)))) - len(numbers)
-    if partial:
-        notices.append(f"{partial} frame(s) lack their picture, their depth or their line in poses.txt; left out.")
-        report(Fault(f"{path}: {notices[-1]}", path, fatal=False))
-    if not depth:
-        notices.append("There is no depth, so only sounds and views can be mapped.")
+    numbers, more = _complete(path, colour, depth, len(habitat_from_body), report)
+    notices += more
     world_from_camera, notice = _camera_poses(habitat_from_body[numbers], given)
     shots = Shots(
         names=[f"{number:06d}" for number in numbers],
@@ -133,7 +123,7 @@ def open_avlmaps(path: Path, report: Report = stop_at_first) -> FileRecording:
         world_from_camera=world_from_camera,
     )
     rig = _rig(path, shots, given)
-    shots, more = settle(path, shots, report, lambda _: path / "poses.txt")
+    shots, further = settle(path, shots, report, lambda _: path / "poses.txt")
     audio = find_audio(path) or next(iter(sorted(path.glob("output_level_*.wav"))), None)
     return FileRecording(
         path=path,
@@ -142,8 +132,28 @@ def open_avlmaps(path: Path, report: Report = stop_at_first) -> FileRecording:
         shots=shots,
         up_in_world=np.array([0.0, 0.0, 1.0]),
         audio=AudioTrack.open(audio) if audio else None,
-        notices=(*notices, notice, *more),
+        notices=(*notices, notice, *further),
     )
+
+
+def _complete(
+    path: Path, colour: dict[int, str], depth: dict[int, str], poses_count: int, report: Report
+) -> tuple[list[int], list[str]]:
+    """Return the numbers that have all they need, and what is to be told of the others."""
+    numbers = [n for n in sorted(colour) if n < poses_count and (not depth or n in depth)]
+    if not numbers:
+        raise RecordingError(
+            f"{path} has {len(colour)} pictures in rgb/, {len(depth)} in depth/ and {poses_count} lines in poses.txt, "
+            "but no number is in all of them; line 1 belongs to 000000."
+        )
+    notices: list[str] = []
+    partial = len(colour.keys() | depth.keys() | set(range(poses_count))) - len(numbers)
+    if partial:
+        notices.append(f"{partial} frame(s) lack their picture, their depth or their line in poses.txt; left out.")
+        report(Fault(f"{path}: {notices[-1]}", path, fatal=False))
+    if not depth:
+        notices.append("There is no depth, so only sounds and views can be mapped.")
+    return numbers, notices
 
 
 def _numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, str]:

@@ -243,6 +243,12 @@ def _by_number(name: str) -> tuple[int, str]:
     return (int(stem) if stem.isascii() and stem.isdigit() else -1, name)
 
 
+def open_audio(folder: Path) -> AudioTrack | None:
+    """Open the sound track that someone put beside a recording's files, where there is one."""
+    file = find_audio(folder)
+    return AudioTrack.open(file) if file else None
+
+
 def find_audio(folder: Path) -> Path | None:
     """Return the folder's ``audio.flac``, ``audio.wav`` or ``audio.ogg``, the first that is there."""
     return next((p for p in (folder / f"audio.{kind}" for kind in ("flac", "wav", "ogg")) if p.is_file()), None)

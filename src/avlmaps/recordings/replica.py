@@ -13,9 +13,8 @@ import numpy as np
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.file_recording import FileRecording, Shots, find_audio, list_names, settle
+from avlmaps.recordings.file_recording import FileRecording, Shots, list_names, open_audio, settle
 from avlmaps.recordings.images import first_picture_size
 from avlmaps.recordings.tables import read_table
 
@@ -51,14 +50,11 @@ def open_replica(path: Path, report: Report = stop_at_first) -> FileRecording:
     table = read_table(path / "traj.txt", (16,), report)
     if not numbers or len(table.values) == 0:
         raise RecordingError(f"{path} has {len(numbers)} frames in results/ and {len(table.values)} poses in traj.txt.")
-    notices = ["The recording has no clock; 30 frames/s are assumed."]
     posed = [number for number in numbers if number < len(table.values)]
+    notices = ["The recording has no clock; 30 frames/s are assumed."]
     if len(posed) < len(numbers):
-        sentence = (
-            f"{path / 'traj.txt'} has {len(table.values)} poses for {len(numbers)} frames; the last are left out."
-        )
-        report(Fault(sentence, path / "traj.txt", fatal=False))
         notices.append(f"{len(numbers) - len(posed)} frame(s) have no line in traj.txt and are left out.")
+        report(Fault(f"{path}: {notices[-1]}", path / "traj.txt", fatal=False))
     names = [_digits(found[number]) for number in posed]
     shots = Shots(
         names=names,
@@ -69,7 +65,6 @@ def open_replica(path: Path, report: Report = stop_at_first) -> FileRecording:
     )
     rig, scale, notice = _camera(path, shots)
     shots, more = settle(path, shots, report, lambda _: path / "traj.txt")
-    audio = find_audio(path)
     return FileRecording(
         path=path,
         format="replica",
@@ -77,7 +72,7 @@ def open_replica(path: Path, report: Report = stop_at_first) -> FileRecording:
         shots=shots,
         depth_units=scale,
         up_in_world=np.array([0.0, 0.0, 1.0]),
-        audio=AudioTrack.open(audio) if audio else None,
+        audio=open_audio(path),
         notices=(*notices, *notice, *more),
     )
 

@@ -12,11 +12,10 @@ import numpy as np
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.file_recording import FileRecording, Shots, find_audio, list_names, settle
+from avlmaps.recordings.file_recording import FileRecording, Shots, list_names, open_audio, settle
 from avlmaps.recordings.images import first_picture_size
-from avlmaps.recordings.tables import read_matrix
+from avlmaps.recordings.tables import read_matrix, read_pose_files
 
 RATE_HZ = 30.0
 
@@ -39,34 +38,26 @@ def open_scannet(path: Path, report: Report = stop_at_first) -> FileRecording:
     if not names:
         raise RecordingError(f"{path} holds no frame with all of color/N.jpg, depth/N.png and pose/N.txt.")
     partial = len((colour.keys() | depth.keys() | posed) - set(names))
-    if partial:
-        sentence = f"{path}: {partial} frame(s) lack one of color, depth and pose; they are left out."
-        report(Fault(sentence, path, fatal=False))
-    world_from_camera = np.full((len(names), 4, 4), np.nan)
-    for i, name in enumerate(names):
-        file = path / "pose" / f"{name}.txt"
-        try:
-            world_from_camera[i] = read_matrix(file, 4, 4)
-        except RecordingError as error:
-            report(Fault(str(error), file))
+    left_out = (f"{partial} frame(s) lack one of color, depth and pose and are left out.",) if partial else ()
+    for sentence in left_out:
+        report(Fault(f"{path}: {sentence}", path, fatal=False))
+    pose_files = [path / "pose" / f"{name}.txt" for name in names]
     shots = Shots(
         names=names,
         colour=[f"color/{colour[name]}" for name in names],
         depth=[f"depth/{depth[name]}" for name in names],
         stamps_s=np.array([int(name) - int(names[0]) for name in names], np.float64) / RATE_HZ,
-        world_from_camera=world_from_camera,
+        world_from_camera=read_pose_files(pose_files, report),
     )
     rig = _rig(path, shots)
-    shots, more = settle(path, shots, report, lambda i: path / "pose" / f"{names[i]}.txt")
-    audio = find_audio(path)
-    left_out = (f"{partial} frame(s) lack one of color, depth and pose and are left out.",) if partial else ()
+    shots, more = settle(path, shots, report, pose_files.__getitem__)
     return FileRecording(
         path=path,
         format="scannet",
         rig=rig,
         shots=shots,
         up_in_world=np.array([0.0, 0.0, 1.0]),
-        audio=AudioTrack.open(audio) if audio else None,
+        audio=open_audio(path),
         notices=(*left_out, *more),
     )
 

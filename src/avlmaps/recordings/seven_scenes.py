@@ -7,17 +7,17 @@ not known. The raw Kinect data of 7-Scenes has depth that was never registered t
 comes with (585) are the depth camera's, and the colour camera fits a focal length of 525 (measured on red kitchen).
 """
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.file_recording import FileRecording, Shots, find_audio, list_names, settle
+from avlmaps.recordings.file_recording import FileRecording, Shots, list_names, open_audio, settle
 from avlmaps.recordings.images import first_picture_size
-from avlmaps.recordings.tables import read_matrix
+from avlmaps.recordings.tables import read_matrix, read_pose_files
 
 RATE_HZ = 30.0
 _INTRINSICS = "camera-intrinsics.txt"
@@ -38,52 +38,45 @@ def open_seven_scenes(path: Path, report: Report = stop_at_first) -> FileRecordi
     """
     files = set(list_names(path, (*_COLOUR, ".depth.png", ".pose.txt")))
     colour = {name[: -len(_COLOUR[0])]: name for name in sorted(files) if name.endswith(_COLOUR)}
-    whole = [s for s in colour if f"{s}.depth.png" in files and f"{s}.pose.txt" in files and _number(s) is not None]
-    stems = sorted(whole, key=lambda stem: _number(stem) or 0)
+    stems = _whole(colour, files)
     if not stems:
         raise RecordingError(
             f"{path} holds no frame with its three files (frame-000000.color.jpg or .png, .depth.png, .pose.txt)."
         )
     partial = sorted({name.split(".", 1)[0] for name in files} - set(stems))
     for stem in partial:
-        sentence = f"{path / stem}: not all of .color, .depth.png and .pose.txt are there; the frame is left out."
-        report(Fault(sentence, path / stem, fatal=False))
+        report(Fault(f"{path / stem}: one of .color, .depth.png and .pose.txt is missing.", path / stem, fatal=False))
     notices = [f"{len(partial)} frame(s) lack one of their three files and are left out."] if partial else []
-    numbers = np.array([_number(stem) for stem in stems], np.float64)
+    pose_files = [path / f"{stem}.pose.txt" for stem in stems]
+    numbers = np.array([_number(stem) for stem in stems], float)
     shots = Shots(
         names=[stem.removeprefix("frame-") for stem in stems],
         colour=[colour[stem] for stem in stems],
         depth=[f"{stem}.depth.png" for stem in stems],
         stamps_s=(numbers - numbers[0]) / RATE_HZ,
-        world_from_camera=_poses(path, stems, report),
+        world_from_camera=read_pose_files(pose_files, report),
     )
     rig, notice = _rig(path, shots)
-    shots, more = settle(path, shots, report, lambda i: path / f"{stems[i]}.pose.txt")
-    audio = find_audio(path)
+    shots, more = settle(path, shots, report, pose_files.__getitem__)
     return FileRecording(
         path=path,
         format="7scenes",
         rig=rig,
         shots=shots,
-        audio=AudioTrack.open(audio) if audio else None,
+        audio=open_audio(path),
         notices=(*notices, *notice, *more),
     )
+
+
+def _whole(colour: Iterable[str], files: set[str]) -> list[str]:
+    """Return the stems that have all three files, in the order of their numbers."""
+    whole = [s for s in colour if f"{s}.depth.png" in files and f"{s}.pose.txt" in files and _number(s) is not None]
+    return sorted(whole, key=lambda stem: _number(stem) or 0)
 
 
 def _number(stem: str) -> int | None:
     digits = stem.removeprefix("frame-")
     return int(digits) if digits.isascii() and digits.isdigit() else None
-
-
-def _poses(path: Path, stems: list[str], report: Report) -> np.ndarray:
-    poses = np.full((len(stems), 4, 4), np.nan)
-    for i, stem in enumerate(stems):
-        file = path / f"{stem}.pose.txt"
-        try:
-            poses[i] = read_matrix(file, 4, 4)
-        except RecordingError as error:
-            report(Fault(str(error), file))
-    return poses
 
 
 def _rig(path: Path, shots: Shots) -> tuple[Rig, tuple[str, ...]]:

@@ -1,7 +1,7 @@
 """Reading the small text files of recordings: numbers in lines, poses, lists; every fault with its line."""
 
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -115,3 +115,14 @@ def read_matrix(path: Path, rows: int, columns: int) -> Float[np.ndarray, "rows 
     if len(numbers) != rows * columns:
         raise RecordingError(f"{path} holds {len(numbers)} numbers where {rows}x{columns} belong; mend the file.")
     return np.array(numbers).reshape(rows, columns)
+
+
+def read_pose_files(files: Sequence[Path], report: Report) -> Float[np.ndarray, "n 4 4"]:
+    """Read one 4x4 pose from each file; a damaged file is reported, and its pose is NaN."""
+    poses = np.full((len(files), 4, 4), np.nan)
+    for i, file in enumerate(files):
+        try:
+            poses[i] = read_matrix(file, 4, 4)
+        except RecordingError as error:
+            report(Fault(str(error), file))
+    return poses

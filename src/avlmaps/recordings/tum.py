@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from avlmaps.core import poses, timeline
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.file_recording import FileRecording, Shots, find_audio, settle
+from avlmaps.recordings.file_recording import FileRecording, Shots, open_audio, settle
 from avlmaps.recordings.images import first_picture_size
 from avlmaps.recordings.tables import read_table, text_lines
 
@@ -47,37 +46,20 @@ def open_tum(path: Path, report: Report = stop_at_first) -> FileRecording:
     """
     colour, depth = _stream(path, "rgb.txt", report), _stream(path, "depth.txt", report)
     trajectory, notices = _trajectory(path / "groundtruth.txt", report)
-    notices = [*colour.notices, *depth.notices, *notices]
-    of_colour, of_depth = timeline.associate(colour.stamps_s, depth.stamps_s, _PAIR_TOLERANCE_S)
-    unpaired = len(colour.files) - len(of_colour)
-    if len(of_colour) == 0:
-        raise RecordingError(
-            f"{path}: no picture of rgb.txt ({len(colour.files)}) is within {_PAIR_TOLERANCE_S} s of one of depth.txt "
-            f"({len(depth.files)}); check that both use one clock."
-        )
-    if unpaired:
-        notices.append(f"{unpaired} colour picture(s) have no depth picture within {_PAIR_TOLERANCE_S} s; left out.")
+    of_colour, of_depth, unpaired = _pairs(path, colour, depth, trajectory)
+    notices = [*colour.notices, *depth.notices, *notices, *unpaired]
+    colour_files = [colour.files[i] for i in of_colour]
     stamps_s = depth.stamps_s[of_depth]
-    covered = trajectory.covers(stamps_s)
-    if not covered.any():
-        raise RecordingError(
-            f"{path / 'groundtruth.txt'} goes from {trajectory.stamps_s[0]:.3f} to {trajectory.stamps_s[-1]:.3f} s, "
-            f"but the pictures from {stamps_s[0]:.3f} to {stamps_s[-1]:.3f} s; check that both use one clock."
-        )
-    if not covered.all():
-        notices.append(f"{int((~covered).sum())} frame(s) lie outside groundtruth.txt or in a gap of it; left out.")
-    colour_files = [colour.files[i] for i in of_colour[covered]]
     start_s = min(colour.stamps_s[0], depth.stamps_s[0])
     shots = Shots(
         names=[Path(file).stem for file in colour_files],
         colour=colour_files,
-        depth=[depth.files[i] for i in of_depth[covered]],
-        stamps_s=stamps_s[covered] - start_s,
-        world_from_camera=trajectory.at(stamps_s[covered]),
+        depth=[depth.files[i] for i in of_depth],
+        stamps_s=stamps_s - start_s,
+        world_from_camera=trajectory.at(stamps_s),
     )
     rig, up_in_world, notice = _camera(path, shots)
     shots, more = settle(path, shots, report, pose_file=None)
-    audio = find_audio(path)
     return FileRecording(
         path=path,
         format="tum",
@@ -85,7 +67,7 @@ def open_tum(path: Path, report: Report = stop_at_first) -> FileRecording:
         shots=shots,
         depth_units=UNITS_PER_M,
         up_in_world=up_in_world,
-        audio=AudioTrack.open(audio) if audio else None,
+        audio=open_audio(path),
         notices=(*notices, *notice, *more),
     )
 
@@ -114,6 +96,31 @@ def _stream(folder: Path, name: str, report: Report) -> _Stream:
         raise RecordingError(f"{path} lists no picture, so there is nothing to map.")
     order = timeline.in_order(np.array(stamps), f"pictures of {name}")
     return _Stream(np.array(stamps)[order.index], [files[i] for i in order.index], order.notices)
+
+
+def _pairs(
+    path: Path, colour: _Stream, depth: _Stream, trajectory: timeline.Trajectory
+) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"], list[str]]:
+    """Pair colour with depth where a pose is known; return the rows of both and what is to be told of the others."""
+    of_colour, of_depth = timeline.associate(colour.stamps_s, depth.stamps_s, _PAIR_TOLERANCE_S)
+    if len(of_colour) == 0:
+        raise RecordingError(
+            f"{path}: no picture of rgb.txt ({len(colour.files)}) is within {_PAIR_TOLERANCE_S} s of one of depth.txt "
+            f"({len(depth.files)}); check that both use one clock."
+        )
+    stamps_s, known_s = depth.stamps_s[of_depth], trajectory.stamps_s
+    covered = trajectory.covers(stamps_s)
+    if not covered.any():
+        raise RecordingError(
+            f"{path / 'groundtruth.txt'} goes from {known_s[0]:.3f} to {known_s[-1]:.3f} s, but the pictures from "
+            f"{stamps_s[0]:.3f} to {stamps_s[-1]:.3f} s; check that both use one clock."
+        )
+    notices, unpaired = [], len(colour.files) - len(of_colour)
+    if unpaired:
+        notices.append(f"{unpaired} colour picture(s) have no depth picture within {_PAIR_TOLERANCE_S} s; left out.")
+    if not covered.all():
+        notices.append(f"{int((~covered).sum())} frame(s) lie outside groundtruth.txt or in a gap of it; left out.")
+    return of_colour[covered], of_depth[covered], notices
 
 
 def _trajectory(path: Path, report: Report) -> tuple[timeline.Trajectory, tuple[str, ...]]:

@@ -274,21 +274,11 @@ def write_recording(
     Raises:
         RecordingError: ``out`` is not empty, or a picture is missing.
     """
-    writer = RecordingWriter(
-        out,
-        recording.rig,
-        up_in_world=recording.up_in_world,
-        depth_units_per_m=recording.depth_units_per_m,
-        origin=origin or f"copied from {recording.format} {recording.path.name}",
-    )
-    with writer:
+    units, up = recording.depth_units_per_m, recording.up_in_world
+    origin = origin or f"copied from {recording.format} {recording.path.name}"
+    with RecordingWriter(out, recording.rig, up, depth_units_per_m=units, origin=origin) as writer:
         for index in progress(range(len(recording)), "copying frames", total=len(recording)):
-            colour, depth = recording.colour_file(index), recording.depth_file(index)
-            if colour is not None and depth is not None:
-                stamp_s, pose = float(recording.stamps_s[index]), recording.world_from_camera[index]
-                writer.add_files(recording.name(index), stamp_s, pose, colour, depth, link)
-            else:
-                writer.add(recording.frame(index))
+            _copy_frame(recording, index, writer, link)
         if recording.format == "folder":
             _take_truth(recording, out, keep_events=audio is None, link=link)
         if audio is not None:
@@ -296,6 +286,15 @@ def write_recording(
         elif recording.audio is not None:
             writer.set_audio(recording.audio)
     return out
+
+
+def _copy_frame(recording: Recording, index: int, writer: RecordingWriter, link: bool) -> None:
+    colour, depth = recording.colour_file(index), recording.depth_file(index)
+    if colour is None or depth is None:
+        writer.add(recording.frame(index))
+        return
+    stamp_s, pose = float(recording.stamps_s[index]), recording.world_from_camera[index]
+    writer.add_files(recording.name(index), stamp_s, pose, colour, depth, link)
 
 
 def _take_truth(recording: Recording, out: Path, keep_events: bool, link: bool) -> None:
