@@ -28,6 +28,9 @@ class FakePixels:
     def vocabulary(self) -> tuple[str, ...]:
         return self.words
 
+    def encode(self, frame: Any) -> np.ndarray:
+        return np.zeros((1, 1, self.card.dim), np.float32)
+
     def encode_words(self, words: Sequence[str]) -> np.ndarray:
         rows = np.zeros((len(words), len(self.words) + 1), np.float32)
         for row, word in zip(rows, words, strict=True):
@@ -62,6 +65,9 @@ class FakeViews:
     """Any name is an axis: kitchen the first, everything else the second."""
 
     card = ModelCard("fake/views", 2, "MIT", "0")
+
+    def encode(self, frames: Sequence[Any]) -> np.ndarray:
+        return np.zeros((len(frames), 2), np.float32)
 
     def encode_words(self, words: Sequence[str]) -> np.ndarray:
         return np.array([[1.0, 0.0] if word == "kitchen" else [0.0, 1.0] for word in words], np.float32)

@@ -6,6 +6,7 @@ from query_fakes import UP, FakePixels, box, voxels_of
 
 from avlmaps.core.errors import QueryError
 from avlmaps.maps.grid import GridSpec
+from avlmaps.perception.protocols import ModelCard
 from avlmaps.query.heatmap import HeatSettings
 from avlmaps.query.kernels import feature_scores, linked
 from avlmaps.query.level import Space
@@ -26,6 +27,10 @@ class RandomWords:
         self.table = dict(zip([*self.words, "asked"], unit_rows(rng, words + 1, dim), strict=True))
         self.table["other"] = unit_rows(rng, 1, dim)[0] if other else np.zeros(dim, np.float32)
         self.vocabulary = self.words
+        self.card = ModelCard("random/words", dim, "MIT", "0")
+
+    def encode(self, frame):
+        return np.zeros((1, 1, self.card.dim), np.float32)
 
     def encode_words(self, words):
         return np.stack([self.table[word] for word in words])
@@ -39,7 +44,7 @@ def test_the_margin_is_that_over_the_best_rival(seed, words, other, few) -> None
     rng = np.random.default_rng(seed)
     encoder = RandomWords(rng, words, 5, other)
     feature = unit_rows(rng, 3 if few else 200, 5).astype(np.float16)
-    rivals = Rivals.of(feature, encoder, encoder.vocabulary)  # pyright: ignore[reportArgumentType]
+    rivals = Rivals.of(feature, encoder, encoder.vocabulary)
     silent = np.append(rng.uniform(0, 1, words) < 0.5, [False] * other).astype(bool)
     asked = encoder.table["asked"]
     margin = object_margins(feature, rivals, asked, silent, 0.3)
@@ -99,7 +104,7 @@ def test_a_word_of_the_vocabulary_does_not_compete_with_itself() -> None:
 def test_a_voxel_without_a_feature_is_nothing() -> None:
     for other in (True, False):
         encoder = FakePixels(("chair",), other=other)
-        found = asked_of(encoder, box((0, 0, 0), (3, 3, 3)), np.zeros((27, 2)), "chair")
+        found = asked_of(encoder, box((0, 0, 0), (3, 3, 3)), np.zeros((27, 2), np.float32), "chair")
         assert not found.mask.any()
         assert not found.found
         assert found.note == "no voxel is closer to 'chair' than to other things"
@@ -148,4 +153,4 @@ def test_a_word_without_meaning_is_refused() -> None:
         r"^The pixel encoder fake/pixels understands nothing of 'sofa'; it knows: chair\. \(it is made up\)$"
     )  # fmt: skip
     with pytest.raises(QueryError, match=expected):
-        asked_of(FakePixels(("chair",)), box((0, 0, 0), (1, 1, 1)), np.zeros((1, 2)), "sofa")
+        asked_of(FakePixels(("chair",)), box((0, 0, 0), (1, 1, 1)), np.zeros((1, 2), np.float32), "sofa")

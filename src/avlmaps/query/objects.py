@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float16, Float32, Int
+from jaxtyping import Bool, Float, Float16, Float32, Int
 
 from avlmaps.core.errors import QueryError
 from avlmaps.perception.protocols import PixelEncoder
@@ -149,7 +149,7 @@ def instances_of(space: Space, mask: Bool[np.ndarray, " n"], link_m: float) -> I
 
 
 def instance_confidence(
-    margin: Float32[np.ndarray, " a"], instance: Int[np.ndarray, " a"], voxel_size_m: float, settings: ObjectSettings
+    margin: Float[np.ndarray, " a"], instance: Int[np.ndarray, " a"], voxel_size_m: float, settings: ObjectSettings
 ) -> Float32[np.ndarray, " i"]:
     """Return in [0, 1] how sure it is that each instance is the object: m / (m + m_yes) · (1 − exp(−area / area_yes)).
 
