@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from time import perf_counter
+from time import thread_time
 
 import numpy as np
 import pytest
@@ -83,18 +83,19 @@ def test_case_fillers_accents_and_widths_do_not_matter(words: EmbeddedWords, sai
     np.testing.assert_array_equal(words.encode([said]), words.encode([meant]))
 
 
-@pytest.mark.parametrize("empty", ["", "   ", "?!", "..."])
+@pytest.mark.parametrize("empty", ["", "   ", "\n\t"])
 def test_an_empty_phrase_is_refused_in_a_sentence(words: EmbeddedWords, empty: str):
     with pytest.raises(QueryError) as caught:
         words.encode([empty])
     assert str(caught.value) == f"The phrase {empty!r} is empty; name a thing, a room or a sound."
 
 
-def test_a_phrase_without_a_known_word_is_refused_in_a_sentence(words: EmbeddedWords):
+@pytest.mark.parametrize("unknown", ["ᚠᚢᚦᚨᚱᚲ", "привет", "椅子", "🐶", "?!"])
+def test_a_phrase_without_a_known_word_is_refused_in_a_sentence(words: EmbeddedWords, unknown: str):
     with pytest.raises(QueryError) as caught:
-        words.encode(["ᚠᚢᚦᚨᚱᚲ"])
+        words.encode([unknown])
     assert str(caught.value) == (
-        "The phrase 'ᚠᚢᚦᚨᚱᚲ' holds no word that the embedded text encoder knows; ask in English, in Latin letters."
+        f"The phrase {unknown!r} holds no word that the embedded text encoder knows; ask in English, in Latin letters."
     )
 
 
@@ -176,14 +177,14 @@ def test_the_weights_are_at_most_eight_megabytes():
 
 
 def test_a_phrase_takes_a_tenth_of_a_millisecond(words: EmbeddedWords):
+    # Processor time, and the best of ten parts: other work on the machine must not fail the test.
     phrases = [f"red {thing} number {number}" for number in range(250) for thing in ("chair", "dog barking")]
-    words.encode(phrases[:10])
     spent = []
-    for part in range(10):  # the best of ten parts: other work on the machine must not fail the test
-        start = perf_counter()
-        words.encode(phrases[10 + part * 45 : 55 + part * 45])
-        spent.append((perf_counter() - start) / 45)
-    assert min(spent) < 0.3e-3  # 0.05 ms where nothing else runs
+    for part in range(10):
+        start = thread_time()
+        words.encode(phrases[part * 50 : part * 50 + 50])
+        spent.append((thread_time() - start) / 50)
+    assert min(spent) < 0.1e-3
 
 
 def test_no_heavy_library_is_loaded():
@@ -204,7 +205,7 @@ def test_held_out_phrases_are_found_as_often_as_was_measured():
 
 def test_the_table_of_figures_names_counts_and_intervals():
     table = bench.run()
-    assert table["columns"] == ["queries", "encoder", "first", "among five", "ms a phrase"]
+    assert table["columns"] == ["queries", "encoder", "first", "among five", "CPU ms a phrase"]
     assert [row[:2] for row in table["rows"][-2:]] == [["all", "avlmaps/words-1"], ["all", "teacher"]]
     assert bench.wilson(50, 100) == pytest.approx((0.4038, 0.5962), abs=1e-4)
 

@@ -7,7 +7,7 @@ import csv
 import math
 from collections.abc import Sequence
 from importlib.resources import files
-from time import perf_counter
+from time import thread_time
 
 import numpy as np
 
@@ -43,11 +43,14 @@ def places(encoder: EmbeddedWords, rows: Sequence[tuple[str, str, str]]) -> np.n
 
 
 def _milliseconds_a_phrase(encoder: EmbeddedWords, phrases: Sequence[str]) -> float:
-    encoder.encode(phrases[:1])
-    fresh = [f"{phrase} {number}" for number, phrase in enumerate(phrases)]  # none of them remembered
-    start = perf_counter()
-    encoder.encode(fresh)
-    return (perf_counter() - start) * 1e3 / len(fresh)
+    """Return the best processor time of five runs over phrases not yet seen (the encoder remembers those it has)."""
+    spent = []
+    for turn in range(5):
+        fresh = [f"{phrase} {number} {turn}" for number, phrase in enumerate(phrases)]
+        start = thread_time()
+        encoder.encode(fresh)
+        spent.append((thread_time() - start) * 1e3 / len(fresh))
+    return min(spent)
 
 
 def _share(hits: int, count: int) -> str:
@@ -66,4 +69,4 @@ def run() -> dict[str, list]:
         count, first, five = len(these), int((these == 0).sum()), int((these < _FIVE).sum())
         table.append([kind, encoder.card.id, _share(first, count), _share(five, count), spent])
         table.append([kind, "teacher", _share(teacher_first, count), _share(teacher_five, count), ""])
-    return {"columns": ["queries", "encoder", "first", "among five", "ms a phrase"], "rows": table}
+    return {"columns": ["queries", "encoder", "first", "among five", "CPU ms a phrase"], "rows": table}

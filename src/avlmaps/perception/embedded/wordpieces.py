@@ -58,7 +58,12 @@ class WordPieces:
         self.longest_run = max((entry.count(" ") + 1 for entry in entries), default=1)
 
     def rows_of_word(self, word: str) -> list[int]:
-        """Return the rows of one word, greedily the longest piece first; none if a part of it is not known."""
+        """Return the rows of one word, greedily the longest piece first; none if a part of it is not known.
+
+        The teacher's pieces hold single letters of other scripts, which mean nothing: such words count as unknown.
+        """
+        if not word.isascii():
+            return []
         rows: list[int] = []
         start = 0
         while start < len(word):

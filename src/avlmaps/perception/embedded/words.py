@@ -153,10 +153,9 @@ class EmbeddedWords:
         return known
 
     def _compute(self, phrase: str) -> Float32[np.ndarray, " d"]:
-        words = clean_phrase(phrase).split()
-        if not words:
+        if not phrase.strip():
             raise QueryError(f"The phrase {phrase!r} is empty; name a thing, a room or a sound.")
-        rows, roles = self._pieces.rows_and_roles(replace_aliases(words, self._aliases))
+        rows, roles = self._pieces.rows_and_roles(replace_aliases(clean_phrase(phrase).split(), self._aliases))
         if not rows:
             raise QueryError(
                 f"The phrase {phrase!r} holds no word that the embedded text encoder knows; ask in English, in Latin "
