@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from avlmaps.maps.voxel_kernels import OPTIONS, find_or_insert
+from avlmaps.maps.voxel_kernels import OPTIONS, REASSOCIATING, find_or_insert
 
 # A voxel within one frame is named by one integer: three offsets from the camera's voxel, 21 bits each.
 OFFSET_BITS = 21
@@ -30,8 +30,6 @@ SUM_COLUMNS = 8  # one cache line
 STEPS = 64
 GREATEST_EXPONENT = 30.0 * np.log(10.0)
 _EXPONENTIALS = np.exp(-np.arange(STEPS * (int(GREATEST_EXPONENT) + 1) + 1) / STEPS)
-
-_REASSOCIATING = {**OPTIONS, "fastmath": {"contract", "nsz", "reassoc"}}
 
 
 class Scratch(NamedTuple):
@@ -314,7 +312,7 @@ def commit(voxels, scratch, origin, stamp_s, slots, geometry, count):
 
 @njit(**OPTIONS)
 def _group_pairs(voxels, pairs, scratch):
-    """Sort pairs by voxel, by counting: those of v are then ``voxel_start[v] : voxel_start[v + 1]``, as they were met."""
+    """Sort pairs by voxel, by counting: those of v are ``voxel_start[v] : voxel_start[v + 1]``, as they were met."""
     start = scratch.voxel_start
     for voxel in range(voxels + 1):
         start[voxel] = 0
@@ -376,7 +374,7 @@ def _sum_features(count, cells, weights, features, total):
             total[column] += ab + wc * features[c, column] + wd * features[d, column]
 
 
-@njit(**_REASSOCIATING)
+@njit(**REASSOCIATING)
 def _add_if_finite(row, total, feature_sum):
     """Add the total to a row of the map, unless it holds NaN or infinity; return whether it was added."""
     size = np.float32(0.0)

@@ -3,7 +3,9 @@
 import numpy as np
 from numba import njit
 
+# No "nnan" among them: NaN must stay visible. "reassoc" lets sums over a row be vectorised.
 OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}}
+REASSOCIATING = {**OPTIONS, "fastmath": {"contract", "nsz", "reassoc"}}
 
 
 @njit(**OPTIONS)
@@ -73,7 +75,7 @@ def add_rows(part, table, sums, feature_sum, weight, count):
     return count
 
 
-@njit(**OPTIONS)
+@njit(**REASSOCIATING)
 def unit_rows(feature_sum, rows, out):
     """Write the rows of ``feature_sum`` scaled to length 1 (a zero row stays zero) into ``out`` (len(rows), d)."""
     for n in range(rows.shape[0]):

@@ -9,7 +9,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.maps import voxel_kernels as kernels
 from avlmaps.maps.types import Voxels
 
-BLOCK_BYTES = 1 << 25  # merging and finishing go through features in blocks of this size
+BLOCK_BYTES = 1 << 22  # merging and finishing go through features in blocks of this size, which stay in the cache
 SMALLEST_ROOM = 4096  # rows
 
 
@@ -147,8 +147,10 @@ class VoxelTable:
         """Return the means, sorted; see `VoxelAccumulator.voxels`."""
         rows = self.sorted_rows()
         feature = feature_array(feature_out, (self.count, self.dim), np.float16)
-        for block in blocks(self.count, self.dim):
-            unit = np.empty((len(rows[block]), self.dim), np.float32)
+        parts = blocks(self.count, self.dim)
+        buffer = np.empty((parts[0].stop if parts else 0, self.dim), np.float32)
+        for block in parts:
+            unit = buffer[: block.stop - block.start]
             kernels.unit_rows(self.feature_sum, rows[block], unit)
             feature[block] = unit
         rgb_weight = self.rgb_weight[rows, None]
