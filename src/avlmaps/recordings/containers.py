@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _PLAIN = {".wav", ".w64", ".flac", ".ogg", ".oga", ".opus", ".aif", ".aiff", ".caf"}
 _PIECE_SAMPLES = 1 << 16
+_UNKNOWN = 1 << 48  # a FLAC that was written to a pipe may say that it has this many samples or more
 _PREROLL_S = 1.0  # a decoder that starts in the middle needs a while until its output is right
 _RESYNC_S = 0.05  # stamps are rounded (to 1 ms in mkv); only a larger jump is a gap
 _SLACK_S = 0.5  # containers round their durations, encoders drop or pad a few hundred samples
@@ -104,10 +105,11 @@ def _examine_plain(path: Path) -> tuple[int, int]:
         promised = _promised_wav_samples(path, file.channels)
         if promised is not None and count < promised:
             raise truncated(path, count / rate_hz, promised / rate_hz)
-        if file.format == "FLAC" and count:
-            last = _last_flac_sample(file, count)
-            if last < count:
-                raise truncated(path, last / rate_hz, count / rate_hz)
+        if file.format == "FLAC" and not _ends_at(file, count):
+            found = sum(len(piece) for piece in _readable(path))
+            if 0 < count < _UNKNOWN and found < count:
+                raise truncated(path, found / rate_hz, count / rate_hz)
+            count = found
     return rate_hz, count
 
 
@@ -131,23 +133,28 @@ def _promised_wav_samples(path: Path, channels: int) -> int | None:
     return None
 
 
-def _last_flac_sample(file: "soundfile.SoundFile", count: int) -> int:
-    """Return how many samples can be reached, found by halving (a truncated FLAC still tells its full length)."""
+def _ends_at(file: "soundfile.SoundFile", count: int) -> bool:
+    """Tell whether a file's last sample can be read (a truncated FLAC still promises its full length)."""
+    if not 0 < count < _UNKNOWN:
+        return False
+    try:
+        file.seek(count - 1)
+        return len(file.read(1, dtype="float32")) == 1
+    except RuntimeError:
+        return False
 
-    def reachable(index: int) -> bool:
-        try:
-            file.seek(index)
-            return len(file.read(1, dtype="float32")) == 1
-        except RuntimeError:
-            return False
 
-    if reachable(count - 1):
-        return count
-    low, high = 0, count - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if reachable(middle) else (low, middle)
-    return low
+def _readable(path: Path) -> Iterator[Float32[np.ndarray, " _"]]:
+    """Yield what can be read of a file, from its beginning to its end or its first fault."""
+    with _opened_plain(path) as file:
+        while True:
+            try:
+                piece = file.read(4096, dtype="float32", always_2d=True)
+            except RuntimeError:
+                return
+            if not len(piece):
+                return
+            yield piece[:, 0]
 
 
 def _examine_video(path: Path) -> tuple[int, int]:
