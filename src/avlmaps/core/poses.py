@@ -16,7 +16,7 @@ MAX_ROTATION_FAULT = 0.05
 
 
 def orthonormalized(
-    world_from_camera: Float[np.ndarray, "4 4"], name: str, max_fault: float = MAX_ROTATION_FAULT
+    world_from_camera: Float[np.ndarray, "*shape"], name: str, max_fault: float = MAX_ROTATION_FAULT
 ) -> Float[np.ndarray, "4 4"]:
     """Return the pose with its rotation replaced by the nearest one (in the Frobenius norm).
 
@@ -143,4 +143,4 @@ def rotation_to_level(up_in_world: Float[np.ndarray, "3"]) -> Float[np.ndarray, 
 def rotation_angle_rad(a: Float[np.ndarray, "*n 4 4"], b: Float[np.ndarray, "*n 4 4"]) -> Float[np.ndarray, "*n"]:
     """Return the angle between the rotations of two poses, in [0, π]."""
     trace = np.einsum("...ij,...ij->...", a[..., :3, :3], b[..., :3, :3])
-    return np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
+    return np.asarray(np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0)))

@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Literal, Self, TextIO
+from typing import Literal, TextIO
 
 import msgspec
 import numpy as np
@@ -57,7 +57,7 @@ class RecordingWriter:
     _poses: TextIO | None = field(default=None, init=False)
     _frames: TextIO | None = field(default=None, init=False)
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "RecordingWriter":
         _make_empty(self.path)
         (self.path / layout.UNFINISHED).write_text("A recording is being written here.\n", encoding="utf-8")
         for folder in ("rgb", "depth"):
