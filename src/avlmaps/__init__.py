@@ -6,6 +6,8 @@ Importing the package loads nothing heavy; each public name is imported when it 
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from avlmaps.core.version import __version__
+
 if TYPE_CHECKING:
     from avlmaps.core.errors import AvlmapsError
     from avlmaps.maps.build import build_map
@@ -13,8 +15,6 @@ if TYPE_CHECKING:
     from avlmaps.query.heatmap import Heatmap
     from avlmaps.recordings.open import open_recording
     from avlmaps.recordings.types import Frame, Recording
-
-__version__ = "0.1.0"
 
 _HOMES = {
     "AVLMap": "avlmaps.query.avlmap",
@@ -26,7 +26,7 @@ _HOMES = {
     "open_recording": "avlmaps.recordings.open",
 }
 
-__all__ = ["AVLMap", "AvlmapsError", "Frame", "Heatmap", "Recording", "build_map", "open_recording"]
+__all__ = ["AVLMap", "AvlmapsError", "Frame", "Heatmap", "Recording", "__version__", "build_map", "open_recording"]
 
 
 def __getattr__(name: str) -> Any:
@@ -36,4 +36,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return [*__all__, "__version__"]
+    return list(__all__)

@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     words = sys.argv[1:] if arguments is None else list(arguments)
     if words == ["--version"]:
-        from avlmaps import __version__
+        from avlmaps.core.version import __version__
 
         sys.stdout.write(f"avlmaps {__version__}\n")
         sys.exit(0)

@@ -126,7 +126,7 @@ def ask(verb: "Query") -> dict[str, Any]:
     camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
     answer = AVLMap.open(verb.map).ask(question, top=verb.top, intrinsics=camera)
     if verb.plot is not None and answer.heat is not None:
-        answer.heat.plot(verb.plot)
+        answer.heat.plot(verb.plot, top=verb.top)
     return answer.to_json()
 
 

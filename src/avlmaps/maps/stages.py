@@ -10,14 +10,14 @@ from time import perf_counter
 
 import msgspec
 import numpy as np
-from jaxtyping import Int
 
-from avlmaps import __version__
 from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.core.registry import Kind
+from avlmaps.core.version import __version__
 from avlmaps.maps.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
 from avlmaps.maps.checks import array_fields, assembled
 from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.keyframe_stage import KeptKeyframes
 from avlmaps.maps.manifest import Box, Counts, MapInfo, RecordingInfo, RigInfo, Timings, UpInfo
 from avlmaps.maps.parts import (
     BUILD_VERSION,
@@ -32,12 +32,11 @@ from avlmaps.maps.parts import (
 )
 from avlmaps.maps.plan import Plan, audio_key
 from avlmaps.maps.store import MapContent, write_map
-from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
-from avlmaps.recordings.subset import Subset
+from avlmaps.maps.types import HeardSounds, Voxels
 from avlmaps.recordings.types import Frame, Recording
 
-# Numbers of the stages that draw at random; a stage keeps its number for ever.
-_GRAVITY, _KEYFRAMES = 1, 2
+# Number of the stage as a source of randomness (keyframes have 2).
+_GRAVITY = 1
 # Below this share of agreeing surface the direction that was found is told as a guess.
 _GUESS = 0.1
 
@@ -48,15 +47,6 @@ class _UpFacts(msgspec.Struct):
 
 
 class _Facts(msgspec.Struct):
-    elapsed_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class KeptKeyframes:
-    """Outcome of the keyframe stage: the pictures, what the place encoder learned, and the seconds it took."""
-
-    keyframes: Keyframes
-    place_state: dict[str, np.ndarray]
     elapsed_s: float
 
 
@@ -131,40 +121,6 @@ def merge(plan: Plan, parts: Sequence[Part]) -> tuple[Voxels, float]:
             f"{plan.settings.fusion.max_depth_m} m, so that the map would be empty; check the recording's depth scale."
         )
     return voxels, perf_counter() - begin
-
-
-def keep_keyframes(plan: Plan, parts: Sequence[Part]) -> KeptKeyframes:
-    """Choose keyframes among the frames that were fused, and look at them."""
-    from avlmaps.maps.keyframes import perceive_keyframes, select_keyframes
-
-    indices = _fused_frames(parts)
-    cards = [plan.models.get(kind.value) for kind in (Kind.LOCAL, Kind.PLACE, Kind.VIEWS)]
-    settings = plan.settings.keyframes
-    ingredients = (plan.recording.fingerprint, settings, plan.settings.seed, cards, indices.tolist())
-    key = key_of("keyframes", BUILD_VERSION, ingredients)
-    folder = plan.folder("keyframes", key)
-    found = find_checkpoint(folder, _Facts, key)
-    if found is None:
-        begin = perf_counter()
-        good = Subset(plan.recording, indices)
-        chosen = select_keyframes(good, settings)
-        keyframes, state = perceive_keyframes(good, chosen, plan.used, plan.rng(_KEYFRAMES), settings=settings)
-        arrays = {f"keyframes/{name}": getattr(keyframes, name) for name in array_fields(Keyframes)}
-        arrays |= {f"state/{name}": array for name, array in state.items()}
-        save_checkpoint(folder, key, _Facts(perf_counter() - begin), arrays)
-        found = load_checkpoint(folder, _Facts, key)
-    keyframes = assembled(Keyframes, _below("keyframes/", found.arrays), str(folder))
-    return KeptKeyframes(keyframes, _below("state/", found.arrays), found.facts.elapsed_s)
-
-
-def _fused_frames(parts: Sequence[Part]) -> Int[np.ndarray, " n"]:
-    covered = [np.arange(*span) for part in parts for span in part.info.spans]
-    bad = [frame.index for part in parts for frame in part.info.bad_frames]
-    return np.setdiff1d(np.concatenate(covered), np.array(bad, np.int64))
-
-
-def _below(prefix: str, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
 
 
 def hear_sounds(plan: Plan) -> KeptSounds:

@@ -35,6 +35,8 @@ class ObjectSettings:
     """Instances below this are noise (one or two voxels of 5 cm) and give no heat; 0 keeps all, as the paper does."""
     link_m: float = 0.1
     """Voxels of an object no farther apart than this along every axis belong to one instance."""
+    join_m: float = 0.3
+    """Pieces over one another with no larger gap in height are one thing (the legs and the back of a chair)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,6 +196,10 @@ def object_factor(
     if understood and understood != part.query.strip().lower():
         note = f"understood only {understood!r} of {part.query!r}" + ("; " + note if note else "")
     mask, instance, confidence = _without_specks(mask, instance, confidence, settings.least_confidence)
+    joined = joined_pieces(space.level(space.centres[mask]), instance, settings.link_m, settings.join_m)
+    if len(confidence) > joined.max(initial=-1) + 1:
+        instance = joined[instance]
+        confidence = instance_confidence(margin[mask], instance, space.grid.voxel_size_m, settings)
     falloff = heat.falloff_per_m(part.role)
     return NearThings(space, part, falloff, mask, instance, confidence, best >= 0.5, understood, note)
 
@@ -209,9 +215,36 @@ def _without_specks(
     return thinned, (np.cumsum(kept) - 1)[instance[stays]], confidence[kept]
 
 
-def _absence(word: str, voxels: int, won: int, best: float) -> str:
-    if not voxels:
-        return "the map holds no voxels"
-    if not won:
-        return f"no voxel is closer to {word!r} than to other things"
-    return f"the best of the {won} voxels closest to {word!r} make an instance of confidence {best:.2f}, below 0.50"
+def joined_pieces(
+    points_level: Float[np.ndarray, "a 3"], instance: Int[np.ndarray, " a"], link_m: float, join_m: float
+) -> Int[np.ndarray, " i"]:
+    """Return for each instance the number of the thing that it is a piece of.
+
+    A thing of thin parts comes in pieces: the camera saw a chair's legs and its back and little between. Two
+    pieces are one thing where the smaller one's footprint lies mostly within the larger one's (widened by
+    ``link_m``) and the gap between them in height is at most ``join_m``.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count = int(instance.max(initial=-1)) + 1
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(low, instance, points_level)
+    np.maximum.at(high, instance, points_level)
+    low[:, :2] -= link_m / 2
+    high[:, :2] += link_m / 2
+    footprint = np.prod(high[:, :2] - low[:, :2], axis=1)
+    # Sorted by their left edge, a piece can only overlap those whose left edge lies before its right one.
+    order = np.argsort(low[:, 0], kind="stable")
+    last = np.searchsorted(low[order, 0], high[order, 0])
+    a = np.repeat(np.arange(count), last - np.arange(count))
+    b = np.arange(len(a)) - np.repeat(np.cumsum(last - np.arange(count)) - last, last - np.arange(count))
+    a, b = order[a], order[b]
+    shared = np.minimum(high[a], high[b]) - np.maximum(low[a], low[b])
+    overlap = np.prod(np.maximum(shared[:, :2], 0.0), axis=1)
+    same = (overlap > 0.5 * np.minimum(footprint[a], footprint[b])) & (shared[:, 2] >= -join_m)
+    links = coo_array((np.ones(int(same.sum()), bool), (a[same], b[same])), shape=(count, count))
+    return connected_components(links, directed=False)[1]
+
+
+"the best of the {won} voxels closest to {word!r} make an instance of confidence {best:.2f}, below 0.50"

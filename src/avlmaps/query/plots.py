@@ -206,7 +206,7 @@ def _save(figure: "Figure", path: Path) -> Path:
         raise QueryError(f"A picture cannot be written as {path.name!r}; give it the suffix .png, .jpg, .svg or .pdf.")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path)
+        figure.savefig(path, bbox_inches="tight", pad_inches=0.15)
     except OSError as fault:
         raise QueryError(f"The picture {path} cannot be written ({fault.strerror}); choose another place.") from fault
     return path
