@@ -16,9 +16,11 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.maps.ahead import run_ahead
 from avlmaps.maps.build import build_map, build_part, describe, merge_parts
+from avlmaps.maps.checks import array_fields
 from avlmaps.maps.parts import load_part, plan_spans
 from avlmaps.maps.settings import BuildSettings, FrameSettings
 from avlmaps.maps.stored import StoredMap, open_stored, verify_stored
+from avlmaps.maps.types import Keyframes
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.subset import Subset
 
@@ -328,9 +330,19 @@ def test_finished_keyframes_and_sounds_are_not_made_again(tmp_path: Path, monkey
         patch.setattr("avlmaps.maps.build.merge", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             build(walk, tmp_path / "a")
-    monkeypatch.setattr("avlmaps.maps.keyframes.perceive_keyframes", None)
+    monkeypatch.setattr("avlmaps.maps.keyframe_stage.see_keyframe", None)
     monkeypatch.setattr("avlmaps.maps.sounds.hear", None)
     assert len(build(walk, tmp_path / "a").sounds) == 2
+
+
+def test_keyframes_come_out_the_same_in_lots_of_any_size(tmp_path: Path) -> None:
+    few, many = (
+        build(Walk(16), tmp_path / str(size), replace(SETTINGS, frames=FrameSettings(per_part=size)))
+        for size in (4, 400)
+    )
+    assert len(few.keyframes) > 4
+    for name in array_fields(Keyframes):
+        assert getattr(few.keyframes, name).tobytes() == getattr(many.keyframes, name).tobytes()
 
 
 @given(st.integers(1, 30), st.integers(1, 5))

@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avlmaps.core.progress import silenced
+from avlmaps.maps.keyframe_stage import keep_keyframes
 from avlmaps.maps.lock import locked
 from avlmaps.maps.parts import build_part, merge_parts
 from avlmaps.maps.plan import claim, make_plan
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
-from avlmaps.maps.stages import commit, find_up, fuse, hear_sounds, keep_keyframes, merge
+from avlmaps.maps.stages import commit, find_up, fuse, hear_sounds, merge
 from avlmaps.maps.stored import StoredMap, describe, open_stored
 from avlmaps.perception.profiles import profile as profile_of
 from avlmaps.recordings.types import Recording

@@ -12,7 +12,7 @@ from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 T = TypeVar("T")
 
 # Ragged arrays: the field of offsets and the field whose rows it divides.
-_RAGGED: dict[type, tuple[tuple[str, str], ...]] = {
+RAGGED: dict[type, tuple[tuple[str, str], ...]] = {
     Keyframes: (("offsets", "xy"), ("thumbnail_offsets", "thumbnails")),
     HeardSounds: (("track_offsets", "track"), ("feature_offsets", "feature")),
 }
@@ -42,7 +42,7 @@ def assembled(kind: type[T], values: Mapping[str, Any], where: str) -> T:
         if hasattr(field.type, "dim_str"):
             _check_array(f"{where}, {field.name}", values[field.name], field.type, sizes)
     whole = kind(**values)
-    for offsets, rows in _RAGGED.get(kind, ()):
+    for offsets, rows in RAGGED.get(kind, ()):
         _check_offsets(f"{where}, {offsets}", getattr(whole, offsets), len(getattr(whole, rows)), len(whole))  # pyright: ignore[reportArgumentType]
     return whole
 

@@ -1,0 +1,115 @@
+"""The build's keyframe stage: some keyframes at a time, each lot kept when it has been looked at."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from time import perf_counter
+
+import msgspec
+import numpy as np
+from jaxtyping import Int
+
+from avlmaps.core.progress import progress
+from avlmaps.core.registry import Kind
+from avlmaps.maps.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
+from avlmaps.maps.checks import RAGGED, array_fields, assembled
+from avlmaps.maps.keyframes import assembled as put_together
+from avlmaps.maps.keyframes import learn_places, see_keyframe, select_keyframes
+from avlmaps.maps.parts import BUILD_VERSION, Part
+from avlmaps.maps.plan import Plan
+from avlmaps.maps.types import Keyframes
+from avlmaps.perception.protocols import LocalFeatures
+from avlmaps.recordings.subset import Subset
+from avlmaps.recordings.types import Recording
+
+_RANDOMNESS = 2  # number of the stage as a source of randomness (gravity has 1)
+
+
+class _Facts(msgspec.Struct):
+    elapsed_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class KeptKeyframes:
+    """Outcome of the stage: the pictures, what the place encoder learned, and the seconds it took."""
+
+    keyframes: Keyframes
+    place_state: dict[str, np.ndarray]
+    elapsed_s: float
+
+
+def keep_keyframes(plan: Plan, parts: Sequence[Part]) -> KeptKeyframes:
+    """Choose keyframes among the frames that were fused, and look at them."""
+    fused = fused_frames(parts)
+    good = Subset(plan.recording, fused)
+    chosen = select_keyframes(good, plan.settings.keyframes)
+    cards = [plan.models.get(kind.value) for kind in (Kind.LOCAL, Kind.PLACE, Kind.VIEWS)]
+    seed, settings = plan.settings.seed, plan.settings.keyframes
+    key = key_of("keyframes", BUILD_VERSION, plan.recording.fingerprint, settings, seed, cards, fused[chosen].tolist())
+    home = plan.folder("keyframes", key)
+    place_state, local, learning_s = _learn(plan, good, chosen, home / "places", key)
+    size = max(1, plan.settings.frames.per_part // 4)  # looking takes longer than fusing
+    lots = {home / f"{start:08d}": chosen[start : start + size] for start in range(0, len(chosen), size)}
+    missing = {folder: lot for folder, lot in lots.items() if find_checkpoint(folder, _Facts, key) is None}
+    _look(plan, good, missing, len(chosen), place_state, local, key)
+    kept = [load_checkpoint(folder, _Facts, key) for folder in lots]
+    pieces = [assembled(Keyframes, lot.arrays, str(lot.folder)) for lot in kept]
+    return KeptKeyframes(joined(pieces), place_state, learning_s + sum(lot.facts.elapsed_s for lot in kept))
+
+
+def _learn(
+    plan: Plan, good: Recording, chosen: Int[np.ndarray, " k"], folder: Path, key: str
+) -> tuple[dict[str, np.ndarray], dict[int, LocalFeatures], float]:
+    """Return what the place encoder learns, the keypoints that it learned from (if it did now), and the seconds."""
+    local: dict[int, LocalFeatures] = {}
+    found = find_checkpoint(folder, _Facts, key)
+    if found is None:
+        begin = perf_counter()
+        state, local = learn_places(good, chosen, plan.used, plan.rng(_RANDOMNESS))
+        save_checkpoint(folder, key, _Facts(perf_counter() - begin), state)
+        found = load_checkpoint(folder, _Facts, key)
+    return found.arrays, local, found.facts.elapsed_s
+
+
+def _look(
+    plan: Plan,
+    good: Recording,
+    lots: dict[Path, Int[np.ndarray, " k"]],
+    total: int,
+    place_state: dict[str, np.ndarray],
+    local: dict[int, LocalFeatures],
+    key: str,
+) -> None:
+    """Look at lots of keyframes and keep each in its folder."""
+    every = [int(index) for lot in lots.values() for index in lot]
+    ahead = progress(every, "seeing", total=total, done=total - len(every), unit="keyframe")
+    for folder, lot in lots.items():
+        begin = perf_counter()
+        seen = [
+            see_keyframe(good.frame(index), plan.used, place_state, plan.settings.keyframes, local.get(index))
+            for index in islice(ahead, len(lot))
+        ]
+        pieces = put_together(seen)
+        arrays = {name: getattr(pieces, name) for name in array_fields(Keyframes)}
+        save_checkpoint(folder, key, _Facts(perf_counter() - begin), arrays)
+    for _ in ahead:  # nothing is left; this completes the bar
+        pass
+
+
+def fused_frames(parts: Sequence[Part]) -> Int[np.ndarray, " n"]:
+    """Return the numbers of the frames that are in the parts, rising."""
+    covered = [np.arange(*span) for part in parts for span in part.info.spans]
+    bad = [frame.index for part in parts for frame in part.info.bad_frames]
+    return np.setdiff1d(np.concatenate(covered), np.array(bad, np.int64))
+
+
+def joined(pieces: Sequence[Keyframes]) -> Keyframes:
+    """Put keyframes one after the other; the offsets of ragged arrays run on."""
+    if not pieces:
+        return put_together([])
+    arrays = {name: [getattr(piece, name) for piece in pieces] for name in array_fields(Keyframes)}
+    for offsets, _ in RAGGED[Keyframes]:
+        lengths = np.concatenate([np.diff(piece) for piece in arrays[offsets]])
+        arrays[offsets] = [np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)]
+    return Keyframes(**{name: np.concatenate(values) for name, values in arrays.items()})
