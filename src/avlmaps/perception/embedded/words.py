@@ -3,7 +3,7 @@
 A phrase is cleaned, its aliases are put in their canonical form, and it is cut into rows of a table of word pieces,
 whole words and runs of words. The rows are summed by their role (before the head noun, the head, after it), each
 role with its own scaling; a small correction follows; the result has unit length. ``training/words`` makes the
-table; ``measurements`` of how well it does stand in ``training/words/README.md``.
+table; how well it does stands in ``training/words/README.md``.
 """
 
 import hashlib
