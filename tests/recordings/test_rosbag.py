@@ -13,8 +13,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import from_quaternion, inverse
+from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.ros_messages import depth_of
-from avlmaps.recordings.rosbag import RosTopics, open_rosbag
+from avlmaps.recordings.rosbag import open_rosbag
 
 WIDTH, HEIGHT, RATE_HZ = 32, 24, 8000
 BODY_FROM_CAMERA = np.array([[0.0, 0, 1, 0.1], [-1, 0, 0, 0.0], [0, -1, 0, 0.9], [0, 0, 0, 1]])
@@ -189,7 +190,7 @@ def test_odometry_of_a_body_without_a_mounted_camera_asks_for_tf_static(tmp_path
 
 def test_a_topic_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="has no image topic '/left/image'"):
-        open_rosbag(write_bag(tmp_path, "ros2"), RosTopics(rgb="/left/image"))
+        open_rosbag(write_bag(tmp_path, "ros2"), {"rgb": "/left/image"})
 
 
 def test_a_truncated_bag_says_how_to_mend_it(tmp_path: Path) -> None:
@@ -220,3 +221,13 @@ def test_a_static_chain_is_inverted_where_the_tree_asks() -> None:
     tree.add("base", "b", base_from_b, 0.0, static=True)
     assert tree.fixed("a", "b") == pytest.approx(inverse(base_from_a) @ base_from_b)
     assert tree.fixed("a", "elsewhere") is None
+
+
+def test_topics_can_be_named_when_any_recording_is_opened(tmp_path: Path) -> None:
+    path = write_bag(tmp_path, "ros2", poses="odometry")
+    recording = open_recording(path, topics={"pose": "/odom", "depth": "/camera/depth/image_raw"})
+    assert len(recording) == 5
+    with pytest.raises(
+        RecordingError, match="There is no 'lidar' among the topics that can be named: rgb, depth, pose"
+    ):
+        open_recording(path, topics={"lidar": "/scan"})

@@ -29,7 +29,7 @@ def build(verb: "Build") -> dict[str, Any]:
     begin = perf_counter()
     if verb.resume and not has_unfinished_build(verb.out):
         raise MapError(f"{verb.out} holds no unfinished build to resume; leave --resume out to start one.")
-    recording = open_recording(verb.recording, format=verb.format, audio=verb.audio)
+    recording = open_recording(verb.recording, format=verb.format, audio=verb.audio, topics=_topics(verb.topics))
     for notice in recording.notices:
         say(f"note: {notice}")
     settings = BuildSettings(
@@ -40,6 +40,13 @@ def build(verb: "Build") -> dict[str, Any]:
     )
     stored = build_map(recording, verb.out, profile=verb.profile, settings=settings, overwrite=verb.overwrite)
     return {**describe(stored), "elapsed_s": round(perf_counter() - begin, 3)}
+
+
+def _topics(words: tuple[str, ...]) -> dict[str, str]:
+    for word in words:
+        if not all(word.partition("=")):
+            raise UsageError(f"--topics takes words like rgb=/camera/color/image_raw, not {word!r}.")
+    return dict(word.split("=", 1) for word in words)
 
 
 def describe_path(path: Path, format: str, verify: bool, plot: Path | None) -> dict[str, Any]:

@@ -116,12 +116,16 @@ class Build(Verb):
     """Format of the recording, where it cannot be told from its files."""
     audio: Path | None = None
     """A sound file to use in place of the recording's own track."""
+    topics: tuple[str, ...] = ()
+    """Topics of a ROS bag that are not to be found by type: rgb=, depth=, pose= or audio=TOPIC."""
     frame_step: int = 1
     """Fuse every n-th frame."""
     max_depth_m: float = 10.0
     """Ignore depth beyond this, metres."""
     resume: bool = False
-    """Insist on going on with a stopped build. It is gone on with anyway; with this, there must be one."""
+    """Go on with a stopped build. This is what happens anyway; the flag is for scripts that say so."""
+    fresh: bool = False
+    """Begin anew, whatever a stopped build had finished."""
     overwrite: bool = False
     """Replace a finished map at --out that was built from something else."""
     seed: int = 0

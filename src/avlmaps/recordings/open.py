@@ -6,7 +6,7 @@ opener, which is imported when it is needed.
 
 import importlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from itertools import islice
@@ -33,6 +33,7 @@ class Format:
         matches: the same as a quick test.
         opener: ``package.module:function``, called with the path (and ``report=`` if it tells faults one by one).
         tells_faults: whether the opener takes ``report``.
+        has_topics: whether the opener takes topics by name.
     """
 
     name: str
@@ -40,11 +41,20 @@ class Format:
     matches: Callable[[Path], bool]
     opener: str
     tells_faults: bool = True
+    has_topics: bool = False
 
-    def open(self, path: Path, report: Report = stop_at_first) -> Recording:
-        """Open a recording with this format's opener."""
+    def open(self, path: Path, report: Report = stop_at_first, topics: Mapping[str, str] | None = None) -> Recording:
+        """Open a recording with this format's opener.
+
+        Raises:
+            RecordingError: it cannot be used, or topics are named and this format has none.
+        """
         module, _, function = self.opener.partition(":")
         opener = getattr(importlib.import_module(module), function)
+        if self.has_topics:
+            return opener(path, topics or {})
+        if topics:
+            raise RecordingError(f"{path} is of the format {self.name}, which has no topics; leave them out.")
         return opener(path, report=report) if self.tells_faults else opener(path)
 
 
@@ -107,24 +117,31 @@ FORMATS: tuple[Format, ...] = (
         _is_rosbag,
         f"{_HERE}.rosbag:open_rosbag",
         tells_faults=False,
+        has_topics=True,
     ),
 )
 
 
-def open_recording(path: Path | str, format: str = "auto", audio: Path | str | None = None) -> Recording:
+def open_recording(
+    path: Path | str,
+    format: str = "auto",
+    audio: Path | str | None = None,
+    topics: Mapping[str, str] | None = None,
+) -> Recording:
     """Open a recording in place: nothing is copied, and no picture is read before it is asked for.
 
     Args:
         path: a folder or a file.
         format: one of the names in ``FORMATS``, or ``auto`` to find out.
         audio: another sound track, beginning with the recording; it takes the place of the recording's own.
+        topics: of a ROS bag, by what they are for (``rgb``, ``depth``, ``pose``, ``audio``); the others are found.
 
     Raises:
         RecordingError: there is nothing there, it is of no known format, or it cannot be used.
         AudioError: the sound track cannot be used.
     """
     path = Path(path)
-    recording = find_format(path, format).open(path)
+    recording = find_format(path, format).open(path, topics=topics)
     if audio is not None:
         recording.audio = AudioTrack.open(Path(audio))
     return recording

@@ -1,6 +1,6 @@
 """ROS 1 bags, ROS 2 bags and MCAP files, read in place through `rosbags`; no ROS is needed.
 
-Topics are found by type, or named: ``RosTopics(rgb="/camera/color/image_raw", pose="/odom")``. The pose of the
+Topics are found by type, or named: ``{"rgb": "/camera/color/image_raw", "pose": "/odom"}``. The pose of the
 depth camera comes from /tf where the tree reaches from the camera to a world that it moves in, else from odometry
 or a pose topic together with the static transforms from the body to the camera. World: the tree's root (``map``,
 ``odom``), which by ROS's own convention (REP 103) has z up.
@@ -9,7 +9,8 @@ or a pose topic together with the static transforms from the body to the camera.
 import hashlib
 import tempfile
 import threading
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -54,13 +55,21 @@ class RosTopics:
     audio: str = ""
 
 
-def open_rosbag(path: Path, topics: RosTopics | None = None) -> "RosbagRecording":
+def open_rosbag(path: Path, topics: Mapping[str, str] | None = None) -> "RosbagRecording":
     """Open a ROS 1 ``.bag``, a ROS 2 bag's folder, an ``.mcap`` or a ``.db3`` file.
+
+    Args:
+        path: the file or folder.
+        topics: names by what they are for, see ``RosTopics``; the others are found by type.
 
     Raises:
         RecordingError: it cannot be read, has no depth or colour images, no calibration or no poses.
     """
-    return RosbagRecording(Path(path), topics or RosTopics())
+    known = [f.name for f in fields(RosTopics)]
+    for name in topics or {}:
+        if name not in known:
+            raise RecordingError(f"There is no {name!r} among the topics that can be named: {', '.join(known)}.")
+    return RosbagRecording(Path(path), RosTopics(**(topics or {})))
 
 
 class _Bag:
