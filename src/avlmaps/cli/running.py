@@ -5,7 +5,6 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from avlmaps.cli.output import UsageError
-from avlmaps.core.errors import MapError
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -23,12 +22,11 @@ def build(verb: "Build") -> dict[str, Any]:
     """Build a map and describe it."""
     from avlmaps.maps.build import build_map, describe
     from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings
-    from avlmaps.maps.stored import has_unfinished_build
     from avlmaps.recordings.open import open_recording
 
     begin = perf_counter()
-    if verb.resume and not has_unfinished_build(verb.out):
-        raise MapError(f"{verb.out} holds no unfinished build to resume; leave --resume out to start one.")
+    if verb.resume and verb.fresh:
+        raise UsageError("--resume goes on with a stopped build and --fresh begins anew; choose one of them.")
     recording = open_recording(verb.recording, format=verb.format, audio=verb.audio, topics=_topics(verb.topics))
     for notice in recording.notices:
         say(f"note: {notice}")
@@ -38,7 +36,7 @@ def build(verb: "Build") -> dict[str, Any]:
         fusion=FusionSettings(max_depth_m=verb.max_depth_m),
         seed=verb.seed,
     )
-    stored = build_map(recording, verb.out, profile=verb.profile, settings=settings, overwrite=verb.overwrite)
+    stored = build_map(recording, verb.out, verb.profile, settings, resume=not verb.fresh, overwrite=verb.overwrite)
     return {**describe(stored), "elapsed_s": round(perf_counter() - begin, 3)}
 
 

@@ -269,7 +269,7 @@ def info_lines(answer: dict[str, Any]) -> list[str]:
             lines += [f"  {s['onset_s']:8.2f} - {s['offset_s']:.2f} s at {place(s['position'])}" for s in value]
         elif isinstance(value, list) and value and isinstance(value[0], str):
             lines += [f"{key}:", *[f"  {line}" for line in value]]
-        elif key == "bytes":
+        elif key == "bytes" and isinstance(value, int):
             lines.append(f"size: {size_of(value)}")
         elif value not in (None, [], {}):
             lines.append(f"{key.replace('_', ' ')}: {value}")
