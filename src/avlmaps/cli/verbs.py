@@ -58,7 +58,7 @@ class AddSounds(Verb):
     """Only clips of these categories. Default: all of them."""
     seed: int = 0
     """Which clips go where."""
-    interval_s: float = 1.0
+    interval_s: float = 2.0
     """Least silence between two sounds, seconds."""
     min_distance_m: float = 2.0
     """Least distance between the places where two sounds are heard, metres; 0 allows any."""
