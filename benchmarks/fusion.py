@@ -53,8 +53,8 @@ def room_frames(count: int) -> list[Frame]:
         rays = DEPTH.rays() @ pose[:3, :3].T
         walls = np.where(rays > 0, np.array([2.5, 1.4, 2.0]), np.array([-2.5, -1.2, -2.0]))
         depth = ((walls - pose[:3, 3]) / rays).min(axis=-1)
-        depth += rng.normal(scale=0.003, size=depth.shape) * depth**2
-        depth[rng.random((480, 640)) < 0.11] = 0.0
+        depth += rng.normal(scale=0.0015, size=depth.shape) * depth**2
+        depth[np.kron(rng.random((30, 40)) < 0.11, np.ones((16, 16), bool))] = 0.0
         rgb = rng.integers(0, 256, (480, 640, 3), dtype=np.uint8)
         frames.append(Frame(n, f"{n:06d}", n / 15, rgb, depth.astype(np.float32), pose, rig))
     return frames

@@ -12,6 +12,7 @@ from jaxtyping import Float, Float16, Float32
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import BackendError, MapError, RecordingError
 from avlmaps.maps import fusion_kernels as kernels
+from avlmaps.maps import fusion_sums as sums
 from avlmaps.maps.fusion_settings import FusionSettings
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.pixel_lookup import PixelLookup, look_up
@@ -92,8 +93,8 @@ class VoxelAccumulator:
         table = self._table
         table.reserve(voxels)
         stamp_s = float(frame.stamp_s)
-        table.count = kernels.commit(voxels, self._scratch, pose[2], stamp_s, table.slots, table.geometry, table.count)
-        faults = kernels.flush(voxels, pairs, self._scratch, cells, table.feature_sum, table.weight) if pairs else 0
+        table.count = sums.commit(voxels, self._scratch, pose[2], stamp_s, table.slots, table.geometry, table.count)
+        faults = sums.flush(voxels, pairs, self._scratch, cells, table.feature_sum, table.weight) if pairs else 0
         if faults:
             raise BackendError(
                 f"The pixel encoder gave NaN or infinite features for frame {frame.name} (in {faults} voxels); "
