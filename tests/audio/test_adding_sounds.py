@@ -7,7 +7,7 @@ import pytest
 import soundfile
 from audio_fakes import FakeWalk, quiet, straight_walk, tone, track_of
 
-from avlmaps.core.errors import AudioError
+from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.maps.segmentation import segment
 from avlmaps.recordings.add_sounds import add_sounds, read_events
 from avlmaps.recordings.audio import AudioTrack, Sound
@@ -198,6 +198,15 @@ def test_options_that_make_no_sense_are_told(tmp_path: Path, clips: Path) -> Non
         assert str(caught.value) == sentence
     with pytest.raises(AudioError, match="has no room for a single sound"):
         add_sounds(straight_walk(0.3, 0.5), clips, tmp_path / "out", progress=False)
+
+
+def test_a_recording_is_never_overwritten(tmp_path: Path, clips: Path) -> None:
+    walk = straight_walk(10.0, 0.5)
+    add_sounds(walk, clips, tmp_path / "out", progress=False)
+    before = digest(tmp_path / "out")
+    with pytest.raises(RecordingError, match=r"out holds a recording already; choose another folder or remove it\."):
+        add_sounds(walk, clips, tmp_path / "out", seed=1, progress=False)
+    assert digest(tmp_path / "out") == before
 
 
 @pytest.mark.shared

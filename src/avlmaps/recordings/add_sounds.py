@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32
 
-from avlmaps.core.errors import AudioError
+from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.progress import progress as shown
 from avlmaps.core.progress import say
@@ -19,6 +19,7 @@ from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.background import background as noise_of
 from avlmaps.recordings.background import seconds_of
 from avlmaps.recordings.clips import Clip, amplified, audible_part, find_clips, gain_for, loudness_db
+from avlmaps.recordings.layout import DESCRIPTION
 from avlmaps.recordings.spacing import Placer, Spacing, Walk, capacity, chosen_spacing
 from avlmaps.recordings.types import Recording
 
@@ -116,11 +117,13 @@ def add_sounds(
 
     Raises:
         AudioError: there are no clips, no room for one sound, or options that make no sense.
-        RecordingError: the recording cannot be copied.
+        RecordingError: the recording cannot be copied, or ``out`` holds one already.
     """
     if snr_db is not None and background is None:
         background = "white"
     _check(interval_s, min_distance_m, loudness_db, snr_db)
+    if (out / DESCRIPTION).exists():  # told before the work is done, not after
+        raise RecordingError(f"{out} holds a recording already; choose another folder or remove it.")
     rng = np.random.default_rng(seed)
     found = find_clips(clips, categories)
     rate_hz = recording.audio.rate_hz if recording.audio else _RATE_HZ
