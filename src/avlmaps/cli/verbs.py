@@ -43,7 +43,9 @@ class AddSounds(Verb):
     """Put recorded sounds into the track of a recording; events.csv tells where and when.
 
     Without options: as many sounds as the walk has room for, no two of them heard within 2 m of one another, as
-    the paper did. The same seed gives the same track. Example:
+    the paper did. In a place too small for three sounds by that rule the 2 m are counted along the walk, and where
+    whole clips leave room for fewer than four, they are cut short (to 2 s at least); notes on standard error tell.
+    The same seed gives the same track. Example:
 
     avlmaps add-sounds REC --clips sounds/ --category "dog bark" sneezing --out REC2
     """
@@ -63,11 +65,12 @@ class AddSounds(Verb):
     min_distance_m: float = 2.0
     """Least distance between the places where two sounds are heard, metres; 0 allows any."""
     loudness_db: float = -20.0
-    """Loudness of each sound, dB relative to full scale."""
+    """Loudness of each sound, dB relative to full scale (less for a clip whose peaks would be cut off)."""
     background: str | None = None
     """Background noise: white, pink, room, or a sound file."""
     snr_db: float | None = None
-    """How much louder the sounds are than the background, dB."""
+    """How much louder every sound is than the background, dB (20 if there is a background; white noise if only this
+    is given)."""
     format: str = "auto"
     """Format of the recording."""
 
