@@ -138,7 +138,7 @@ def _runs(
     at = 0
     for both in _smoothed(excess, max(1, round(settings.smoothing_s / step_s))):
         edges = np.flatnonzero(np.diff(both[:, 1] > release, prepend=False, append=False))
-        starts, ends = edges[::2], edges[1::2]
+        starts, ends = edges[::2].tolist(), edges[1::2].tolist()
         for start, end in zip(starts, ends, strict=True):
             if start > 0 or not len(open_run):
                 yield from _closed(open_run, begin, onset, release, settings)

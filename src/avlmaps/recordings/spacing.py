@@ -95,7 +95,7 @@ class Placer:
         walk = self.walk
         if self.spacing.measure == "walked":  # how far it had walked never falls, so the last sound is the nearest
             here, there = onset_s + length_s / 2.0, self.onsets_s[-1] + self.lengths_s[-1] / 2.0
-            return walk.walked_m[walk.index(here)] - walk.walked_m[walk.index(there)] >= distance_m
+            return bool(walk.walked_m[walk.index(here)] - walk.walked_m[walk.index(there)] >= distance_m)
         own = walk.position[walk.index(onset_s) : walk.index(onset_s + length_s) + 1]
         nearest_m, _ = self._places().query(own, distance_upper_bound=distance_m)
         return bool(np.isinf(nearest_m).all())
