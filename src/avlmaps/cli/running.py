@@ -5,6 +5,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from avlmaps.cli.output import UsageError
+from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -53,15 +54,14 @@ def describe_path(path: Path, format: str, verify: bool, plot: Path | None) -> d
         return _describe_map(path, verify, plot)
     if plot is not None:
         raise UsageError(f"--plot draws a map, and {path} is a recording; build one first.")
-    from avlmaps.recordings.open import open_recording
+    from avlmaps.recordings.open import find_format, open_recording
     from avlmaps.recordings.validate import validate
 
+    find_format(path, format)  # a place that holds no recording has no faults to list
     faults = [str(fault) for fault in validate(path, format, None if verify else DECODED_BY_INFO)]
-    if faults:
-        say(f"{len(faults)} fault(s) found")
     try:
         recording = open_recording(path, format=format)
-    except Exception:
+    except AvlmapsError:
         for fault in faults:
             say(f"fault: {fault}")
         raise
@@ -197,7 +197,7 @@ def teach(name: str, clips: tuple[Path, ...]) -> dict[str, Any]:
         teach_sound(name, list(clips))
     else:
         forget_sound(name)
-    return {"name": name, "clips": len(clips), "taught": list(taught_sounds())}
+    return {"name": name, "clips": len(clips), "taught": [sound.name for sound in taught_sounds()]}
 
 
 def list_profiles() -> dict[str, Any]:

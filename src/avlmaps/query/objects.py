@@ -247,4 +247,9 @@ def joined_pieces(
     return connected_components(links, directed=False)[1]
 
 
-"the best of the {won} voxels closest to {word!r} make an instance of confidence {best:.2f}, below 0.50"
+def _absence(word: str, voxels: int, won: int, best: float) -> str:
+    if not voxels:
+        return "the map holds no voxels"
+    if not won:
+        return f"no voxel is closer to {word!r} than to other things"
+    return f"the best of the {won} voxels closest to {word!r} make an instance of confidence {best:.2f}, below 0.50"

@@ -1,0 +1,207 @@
+"""Each verb from end to end, held to the JSON contract that scripts depend on, and to its errors."""
+
+import json
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import soundfile
+
+from avlmaps.core.poses import rotation_angle_rad
+from avlmaps.sim.raycast import render
+from avlmaps.sim.room import Room
+
+from .conftest import CAMERA, RATE_HZ, beeps
+
+
+def test_build_and_info_tell_the_contracts_keys(built: Path, answer) -> None:
+    told = answer("info", built)
+    assert {"frames", "keyframes", "voxels", "sounds", "profile", "bytes", "elapsed_s"} <= told.keys()
+    assert told["frames"] == 24
+    assert told["profile"] == "embedded"
+    assert told["bytes"] > 0
+    (sound,) = told["sounds"]
+    assert {"onset_s", "offset_s", "position"} <= sound.keys()
+    assert sound["onset_s"] == pytest.approx(2.0, abs=0.15)
+    assert sound["offset_s"] == pytest.approx(3.75, abs=0.3)
+
+
+def test_building_again_changes_nothing(built: Path, walk: Path, answer) -> None:
+    before = (built / "map.json").read_bytes()
+    told = answer("build", walk, "--out", built, "--voxel-size-m", "0.1", "--resume")
+    assert told["voxels"] == answer("info", built)["voxels"]
+    assert (built / "map.json").read_bytes() == before
+
+
+def test_another_map_is_not_built_over_a_finished_one(built: Path, walk: Path, run) -> None:
+    status, out, err = run("build", walk, "--out", built, "--voxel-size-m", "0.2")
+    assert status == 1
+    assert out == ""
+    assert "room.avlmap" in err
+    assert err.count("\n") == 1
+
+
+def test_a_query_by_words_finds_the_cabinet(built: Path, answer) -> None:
+    told = answer("query", built, "the red cabinet", "--top", 2)
+    assert {"goals", "found", "parts", "elapsed_ms"} == told.keys()
+    assert told["found"] is True
+    goal = told["goals"][0]
+    assert {"position", "score", "size", "parts"} == goal.keys()
+    cabinet = next(t for t in Room().things if t.category == "cabinet" and t.low[0] > 5)
+    low, high = np.array(cabinet.low) - 0.15, np.array(cabinet.high) + 0.15
+    assert (low < goal["position"]).all() and (goal["position"] < high).all()
+    assert goal["parts"]["object"] == pytest.approx(1.0)
+    assert told["parts"][0]["modality"] == "object"
+    assert told["parts"][0]["role"] == "primary"
+    assert "understood only 'red'" in told["parts"][0]["note"]
+
+
+def test_a_query_for_what_is_not_there_says_so(built: Path, answer) -> None:
+    assert answer("query", built, "--object", "turquoise chair")["found"] is False
+
+
+def test_a_query_by_clip_finds_where_it_was_heard(built: Path, answer, tmp_path: Path) -> None:
+    clip = tmp_path / "beep.wav"
+    soundfile.write(clip, beeps(1.5, 2050.0), RATE_HZ)
+    told = answer("query", built, "--sound-clip", clip, "--top", 1)
+    walked = Room().walk()[100:196:4][8:16, :3, 3]
+    assert np.linalg.norm(walked - told["goals"][0]["position"], axis=1).min() < 0.5
+
+
+def test_parts_are_fused_and_drawn(built: Path, answer, tmp_path: Path) -> None:
+    clip, plot = tmp_path / "beep.wav", tmp_path / "heat.png"
+    soundfile.write(clip, beeps(1.5, 2050.0), RATE_HZ)
+    told = answer("query", built, "--object", "red", "--sound-clip", clip, "--primary", "object", "--plot", plot)
+    assert [part["role"] for part in told["parts"]] == ["primary", "context"]
+    assert all({"object", "sound"} <= goal["parts"].keys() for goal in told["goals"])
+    picture = cv2.imread(str(plot))
+    assert picture is not None and picture.std() > 10
+
+
+def test_a_photo_is_located_to_the_contract(built: Path, answer, tmp_path: Path) -> None:
+    truth = Room().walk()[146]  # between two frames of the map
+    view = render(Room().scene, CAMERA, truth)
+    photo = tmp_path / "photo.png"
+    cv2.imwrite(str(photo), view.rgb[..., ::-1])
+    told = answer("locate", built, photo)
+    assert {"world_from_camera", "inliers", "reference", "elapsed_ms"} <= told.keys()
+    pose = np.array(told["world_from_camera"])
+    assert np.linalg.norm(pose[:3, 3] - truth[:3, 3]) < 0.05
+    assert np.rad2deg(rotation_angle_rad(pose, truth)) < 1.0
+    given = answer("locate", built, photo, "--intrinsics", f"{CAMERA.fx},{CAMERA.fy},{CAMERA.cx},{CAMERA.cy}")
+    assert np.allclose(given["world_from_camera"], pose, atol=1e-6)
+
+
+def test_a_photo_of_another_place_is_not_located(built: Path, answer, run, tmp_path: Path) -> None:
+    photo = tmp_path / "elsewhere.png"
+    noise = np.random.default_rng(3).integers(0, 256, (45, 60, 3), np.uint8)
+    cv2.imwrite(str(photo), cv2.resize(noise, (240, 180), interpolation=cv2.INTER_CUBIC))
+    told = answer("locate", built, photo)
+    assert told["world_from_camera"] is None
+    assert told["inliers"] >= 0
+    assert "not located" in run("locate", built, photo)[1]
+
+
+def test_info_tells_a_recordings_faults(walk: Path, answer, tmp_path: Path) -> None:
+    copy = tmp_path / "rec"
+    shutil.copytree(walk, copy)
+    depth = sorted((copy / "depth").iterdir())
+    depth[3].write_bytes(depth[3].read_bytes()[:200])
+    depth[5].unlink()
+    told = answer("info", copy)
+    assert told["frames"] == 24
+    faults = " ".join(told["faults"])
+    assert depth[3].name in faults and depth[5].name in faults
+
+
+def test_add_sounds_writes_the_same_recording_for_the_same_seed(walk: Path, answer, tmp_path: Path) -> None:
+    clips = tmp_path / "clips"
+    for category, pitch in (("high beep", 3000.0), ("low beep", 500.0)):
+        (clips / category).mkdir(parents=True)
+        soundfile.write(clips / category / "a.wav", beeps(1.0, pitch), RATE_HZ)
+    words = ("add-sounds", walk, "--clips", clips, "--min-distance-m", 0, "--seed", 3)
+    told = answer(*words, "--out", tmp_path / "one")
+    answer(*words, "--out", tmp_path / "two")
+    one, two = ((tmp_path / name / "audio.flac").read_bytes() for name in ("one", "two"))
+    assert one == two
+    assert told["sounds"] == len((tmp_path / "one" / "events.csv").read_text().splitlines()) - 1 > 0
+
+
+def test_a_sound_is_taught_and_forgotten(answer, run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("AVLMAPS_HOME", str(tmp_path / "home"))
+    for k in range(3):
+        soundfile.write(tmp_path / f"{k}.wav", beeps(1.5, 900.0 + 20 * k), RATE_HZ)
+    told = answer("teach-sound", "robot beep", *(tmp_path / f"{k}.wav" for k in range(3)))
+    assert told["taught"] == ["robot beep"]
+    assert answer("teach-sound", "robot beep", "--forget")["taught"] == []
+    assert run("teach-sound", "robot beep")[0] == 2
+
+
+def test_profiles_lists_every_backend_with_its_state(answer, run) -> None:
+    told = answer("profiles")
+    (embedded,) = [entry for entry in told["profiles"] if entry["name"] == "embedded"]
+    states = {backend["module"]: backend["state"] for backend in embedded["backends"]}
+    assert states["sounds"] == states["pixels"] == states["local"] == "ready"
+    assert states["views"] == "none yet"
+    assert "avlmaps/colour-words" in run("profiles")[1]
+
+
+def test_the_words_bench_writes_json_markdown_and_a_picture(answer, tmp_path: Path) -> None:
+    told = answer("bench", "words", "--out", tmp_path)
+    assert {"suite", "scenes", "tables"} <= told.keys()
+    assert json.loads((tmp_path / "words.json").read_text())["tables"] == told["tables"]
+    assert (tmp_path / "words.md").read_text().startswith("###")
+    assert cv2.imread(str(tmp_path / "words.png")) is not None
+
+
+WRONG_WORDS = (
+    (("query", "MAP"), "query takes a sentence, or parts"),
+    (("query", "MAP", "the chair", "--object", "red"), "and not both"),
+    (("query", "MAP", "--object", "red", "--top", "0"), "--top is 0; it must be 1 or more"),
+    (("query", "MAP", "--object", "red", "--intrinsics", "1,2,3,4"), "--intrinsics belongs to a photo"),
+    (("teach-sound", "x"), "teach-sound takes clips to learn from, or --forget"),
+    (("info", "REC", "--plot", "x.png"), "--plot draws a map"),
+)
+
+
+@pytest.mark.parametrize(("words", "sentence"), WRONG_WORDS, ids=lambda value: str(value)[:40])
+def test_words_that_do_not_fit_exit_2_with_a_sentence(words, sentence, built: Path, walk: Path, run) -> None:
+    status, out, err = run(*[{"MAP": built, "REC": walk}.get(word, word) for word in words])
+    assert (status, out) == (2, "")
+    assert sentence in err
+    assert err.count("\n") == 1
+
+
+KNOWN_ERRORS = (
+    (("query", "MAP", ""), 2, "query takes a sentence"),
+    (("query", "MAP", "near near"), 1, "is not understood"),
+    (("query", "MAP", "--object", " "), 1, "The object asked for is empty"),
+    (("query", "MAP", "--object", "chair"), 1, "understands nothing of 'chair'"),
+    (("query", "MAP", "--area", "kitchen"), 1, "has no views backend"),
+    (("query", "MAP", "--sound-clip", "nothing.wav"), 1, "nothing.wav"),
+    (("query", "MAP", "--image", "nothing.png"), 1, "nothing.png"),
+    (("query", "nowhere.avlmap", "the red chair"), 1, "nowhere.avlmap"),
+    (("locate", "MAP", "MAP/map.json"), 1, "map.json"),
+    (("info", "nowhere"), 1, "nowhere"),
+    (("build", "nowhere", "--out", "x.avlmap"), 1, "There is nothing at nowhere"),
+    (("build", "REC", "--out", "OUT", "--profile", "magic"), 1, "no profile called 'magic'"),
+    (("build", "REC", "--out", "OUT", "--voxel-size-m", "0"), 1, "voxel size is 0.0 m"),
+    (("build", "REC", "--out", "OUT", "--format", "tum"), 1, "rgb.txt"),
+    (("build", "REC", "--out", "OUT", "--audio", "nothing.wav"), 1, "nothing.wav"),
+    (("add-sounds", "REC", "--clips", "nowhere", "--out", "OUT"), 1, "nowhere"),
+    (("bench", "sounds"), 1, "name it with --sounds"),
+    (("nonsense",), 2, ""),
+)
+
+
+@pytest.mark.parametrize(("words", "code", "sentence"), KNOWN_ERRORS, ids=lambda value: str(value)[:40])
+def test_a_known_error_is_one_sentence(words, code, sentence, built: Path, walk: Path, run, tmp_path: Path) -> None:
+    places = {"MAP": built, "REC": walk, "OUT": tmp_path / "out", "MAP/map.json": built / "map.json"}
+    status, out, err = run(*[places.get(word, word) for word in words])
+    assert (status, out) == (code, ""), err
+    assert sentence in err
+    assert "Traceback" not in err
+    if code == 1:
+        assert err.count("\n") == 1, err
