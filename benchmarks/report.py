@@ -31,9 +31,9 @@ SUITES = {
 }
 INTRODUCTION = """# Benchmarks
 
-Made by `make bench` on {machine}, Python {python}, {when}. Speed is told as a ratio against another way of doing the same in
-the same run, because machines differ and are busy; quality is told with counts and 95 % intervals, on data that nothing was trained
-on or chosen by. `avlmaps bench SUITE` makes any of the quality tables again.
+Made by `make bench` on {machine}, Python {python}, {when}. Speed is told as a ratio against another way of doing the same
+in the same run, because machines differ and are busy; quality is told with counts and 95 % intervals, on data that nothing
+was trained on or chosen by. `avlmaps bench SUITE` makes any of the quality tables again.
 """
 
 
@@ -49,7 +49,7 @@ def speed() -> Iterator[str]:
 
 def quality(sounds: Path, recording: Path, folder: Path) -> Iterator[str]:
     """Run the suites of `avlmaps bench`."""
-    from avlmaps.bench.suites import markdown, run_suite
+    from avlmaps.bench.suites import Asked, markdown, run_suite
 
     for suite, title in SUITES.items():
         needs = {"sounds": sounds, "segmentation": sounds, "locate": recording}.get(suite)
@@ -57,11 +57,8 @@ def quality(sounds: Path, recording: Path, folder: Path) -> Iterator[str]:
             yield f"## {title}\n\nNot measured: there is no {needs.name} folder.\n"
             continue
         print(f"running suite {suite}", file=sys.stderr)
-        given = {
-            "sounds": sounds if suite in ("sounds", "segmentation") else None,
-            "recording": recording if suite == "locate" else None,
-        }
-        answer = run_suite(suite, **given, out=folder)
+        scenes = (recording,) if suite == "locate" else ()
+        answer = run_suite(suite, Asked(sounds=sounds if needs == sounds else None, scenes=scenes), folder)
         yield f"## {title}\n\n{markdown(answer['tables'])}"
 
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,24 +16,43 @@ class BenchError(AvlmapsError):
     """A suite cannot be run: what it measures on was not given."""
 
 
-def run_suite(
-    suite: str, *, sounds: Path | None = None, recording: Path | None = None, out: Path, seed: int = 0
-) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a suite measures on.
+
+    Attributes:
+        sounds: folder of clips with an index.csv, for the suites of sound.
+        scenes: recordings with poses, for ``locate``.
+        profile: which models are measured.
+        seed: of what is drawn at random.
+    """
+
+    sounds: Path | None = None
+    scenes: tuple[Path, ...] = ()
+    profile: str = "embedded"
+    seed: int = 0
+
+
+def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
     """Run a suite and write SUITE.json, SUITE.md and SUITE.png into ``out``.
 
     Args:
         suite: ``words``, ``sounds``, ``segmentation`` or ``locate``.
-        sounds: folder of clips with an index.csv, for the suites of sound.
-        recording: recording with poses, for ``locate``.
+        asked: what it measures on.
         out: folder to write into.
-        seed: of what is drawn at random.
 
     Raises:
-        BenchError: the folder or recording that the suite needs was not given.
+        BenchError: the folder or recording that the suite needs was not given, or the profile cannot be measured.
     """
-    tables = _SUITES[suite](sounds, recording, seed)
-    scenes = [str(source.name) for source in (sounds, recording) if source is not None]
-    answer = {"suite": suite, "scenes": scenes, "seed": seed, "tables": {k: dict(v) for k, v in tables.items()}}
+    tables = _SUITES[suite](asked)
+    scenes = [source.resolve().name for source in (asked.sounds, *asked.scenes) if source is not None]
+    answer = {
+        "suite": suite,
+        "scenes": scenes,
+        "profile": asked.profile,
+        "seed": asked.seed,
+        "tables": {name: dict(table) for name, table in tables.items()},
+    }
     out.mkdir(parents=True, exist_ok=True)
     write_bytes_atomically(out / f"{suite}.json", (json.dumps(answer, indent=1) + "\n").encode())
     write_bytes_atomically(out / f"{suite}.md", markdown(tables).encode())
@@ -40,36 +60,44 @@ def run_suite(
     return answer
 
 
-def _words(sounds: Path | None, recording: Path | None, seed: int) -> dict[str, Table]:
+def _words(asked: Asked) -> dict[str, Table]:
     from avlmaps.bench import words
 
-    return {"words kept out of training": words.run()}
+    _embedded_only(asked, "words")
+    return {"phrases kept out of training": words.run()}
 
 
-def _sounds(sounds: Path | None, recording: Path | None, seed: int) -> dict[str, Table]:
-    from avlmaps.bench import sounds as suite
+def _sounds(asked: Asked) -> dict[str, Table]:
+    from avlmaps.bench import sounds
 
-    return suite.run(_given(sounds, "--sounds", "a folder of clips with an index.csv"))
+    _embedded_only(asked, "sounds")
+    return sounds.run(_clips(asked))
 
 
-def _segmentation(sounds: Path | None, recording: Path | None, seed: int) -> dict[str, Table]:
+def _segmentation(asked: Asked) -> dict[str, Table]:
     from avlmaps.bench import segmentation
 
-    return {"segmentation": segmentation.run(_given(sounds, "--sounds", "a folder of clips with an index.csv"), seed)}
+    return {"sounds found in a track": segmentation.run(_clips(asked), asked.seed)}
 
 
-def _locate(sounds: Path | None, recording: Path | None, seed: int) -> dict[str, Table]:
+def _locate(asked: Asked) -> dict[str, Table]:
     from avlmaps.bench import locate
     from avlmaps.recordings.open import open_recording
 
-    path = _given(recording, "--recording", "a recording with poses")
-    opened = open_recording(path)
-    if len(opened) < 20:
-        raise RecordingError(f"{path} has {len(opened)} frames; half of them as map and half as photos takes 20.")
-    return {"locating photos": locate.run(opened, seed)}
+    if not asked.scenes:
+        raise BenchError("This suite measures on recordings with poses; name one or more with --scenes.")
+    tables: dict[str, Table] = {}
+    for path in asked.scenes:
+        recording = open_recording(path)
+        if len(recording) < 20:
+            raise RecordingError(f"{path} has {len(recording)} frames; half as map and half as photos takes 20.")
+        tables[f"photos located in {path.resolve().name}"] = locate.run(
+            recording, asked.seed, profile_name=asked.profile
+        )
+    return tables
 
 
-_SUITES: dict[str, Callable[[Path | None, Path | None, int], dict[str, Table]]] = {
+_SUITES: dict[str, Callable[[Asked], dict[str, Table]]] = {
     "words": _words,
     "sounds": _sounds,
     "segmentation": _segmentation,
@@ -77,10 +105,15 @@ _SUITES: dict[str, Callable[[Path | None, Path | None, int], dict[str, Table]]] 
 }
 
 
-def _given(path: Path | None, flag: str, what: str) -> Path:
-    if path is None:
-        raise BenchError(f"This suite measures on {what}; name it with {flag}.")
-    return path
+def _clips(asked: Asked) -> Path:
+    if asked.sounds is None:
+        raise BenchError("This suite measures on a folder of clips with an index.csv; name it with --sounds.")
+    return asked.sounds
+
+
+def _embedded_only(asked: Asked, suite: str) -> None:
+    if asked.profile != "embedded":
+        raise BenchError(f"The suite {suite} measures the embedded encoder; it has no figures for {asked.profile!r}.")
 
 
 def markdown(tables: Mapping[str, Table]) -> str:

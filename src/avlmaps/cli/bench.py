@@ -18,15 +18,17 @@ class Bench(Verb):
 
     words: household phrases kept out of training; needs nothing.
     sounds, segmentation: need --sounds, a folder of clips with an index.csv.
-    locate: needs --recording; half of its frames become the map, the others are asked.
+    locate: needs --scenes, recordings with poses; half of the frames become the map, the others are asked.
     """
 
     suite: Positional[Suite]
     """What to measure."""
     sounds: Path | None = None
     """Folder of sound clips with an index.csv (path, category, fold)."""
-    recording: Path | None = None
-    """A recording with poses."""
+    scenes: tuple[Path, ...] = ()
+    """Recordings with poses."""
+    profile: str = "embedded"
+    """Which models are measured."""
     out: Path = Path("bench_out")
     """Folder for SUITE.json, SUITE.md and SUITE.png."""
     seed: int = 0
@@ -34,9 +36,10 @@ class Bench(Verb):
 
     def run(self) -> None:
         """Measure, write the tables, print them."""
-        from avlmaps.bench.suites import run_suite
+        from avlmaps.bench.suites import Asked, run_suite
 
-        answer = run_suite(self.suite, sounds=self.sounds, recording=self.recording, out=self.out, seed=self.seed)
+        asked = Asked(sounds=self.sounds, scenes=self.scenes, profile=self.profile, seed=self.seed)
+        answer = run_suite(self.suite, asked, self.out)
         lines: list[str] = []
         for name, table in answer["tables"].items():
             lines += [name, *["  " + line for line in table_lines(table["columns"], table["rows"])]]

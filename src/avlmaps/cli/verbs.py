@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, emit, place, size_of, table_lines
 
@@ -60,7 +60,7 @@ class AddSounds(Verb):
     """Only clips of these categories. Default: all of them."""
     seed: int = 0
     """Which clips go where."""
-    interval_s: float = 2.0
+    interval_s: Annotated[float, arg(name="interval", metavar="S")] = 2.0
     """Least silence between two sounds, seconds."""
     min_distance_m: float = 2.0
     """Least distance between the places where two sounds are heard, metres; 0 allows any."""
