@@ -1,11 +1,12 @@
 """Where a picture was taken, from image points and the 3D points that they show."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from avlmaps.core.camera import Pinhole
+from avlmaps.core.poses import apply, inverse
 from avlmaps.perception.protocols import Pose
 
 _FEWEST_POINTS = 4
@@ -20,9 +21,6 @@ class PoseSettings:
 
     max_iterations: int = 2000
     """RANSAC gives up after so many samples."""
-
-    depth_noise_per_m: float = 0.002
-    """Standard deviation of a map point along its ray grows as this times the squared distance in metres."""
 
 
 def estimate_pose(
@@ -65,7 +63,89 @@ def estimate_pose(
         return None
     camera_from_world = np.eye(4)
     camera_from_world[:3, :3], camera_from_world[:3, 3] = found.R, found.t
-    return Pose(np.linalg.inv(camera_from_world), int(inlier.sum())), inlier
+    return Pose(inverse(camera_from_world), int(inlier.sum())), inlier
+
+
+def agreement(
+    xy: Float[np.ndarray, "n 2"],
+    points_world: Float[np.ndarray, "n 3"],
+    camera: Pinhole,
+    world_from_camera: Float[np.ndarray, "4 4"],
+    max_error_px: float,
+) -> float:
+    """Return how well points agree with a pose: each adds 1 - (error / limit)² or nothing (MSAC, Torr 2000)."""
+    points = apply(inverse(world_from_camera), points_world)
+    front = points[:, 2] > 0.0
+    error_px = np.linalg.norm(camera.project(points[front]) - xy[front], axis=1)
+    return float(np.maximum(0.0, 1.0 - (error_px / max_error_px) ** 2).sum())
+
+
+def refined_focal(
+    xy: Float[np.ndarray, "n 2"],
+    points_world: Float[np.ndarray, "n 3"],
+    camera: Pinhole,
+    world_from_camera: Float[np.ndarray, "4 4"],
+    settings: PoseSettings = PoseSettings(),
+    rounds: int = 15,
+) -> Pinhole:
+    """Let the focal length go along with the pose, and return the camera that fits the points best.
+
+    Gauss-Newton with Cauchy weights on the reprojection error, over rotation, translation and the logarithm of one
+    factor on both focal lengths. Points that face the camera flatly tell the focal length badly: let it replace a
+    given one only where that gains much ``agreement``.
+
+    Args:
+        xy: image coordinates, pixels.
+        points_world: what they show, metres; a few may be wrong.
+        camera: the camera as given.
+        world_from_camera: the pose found with it.
+        settings: the tolerance.
+        rounds: steps.
+    """
+    camera_from_world = inverse(world_from_camera)
+    log_factor = 0.0
+    focal = np.array([camera.fx, camera.fy])
+    tolerance_px = settings.max_error_rad * float(focal.mean())
+    for _ in range(rounds):
+        points = apply(camera_from_world, points_world)
+        front = points[:, 2] > 0.05
+        residual, jacobian = _reprojection(xy[front], points[front], focal * np.exp(log_factor), (camera.cx, camera.cy))
+        weight = 1.0 / (1.0 + (residual**2).sum(axis=1) / tolerance_px**2)
+        weighted = jacobian * weight[:, None, None]
+        normal = np.einsum("nri,nrj->ij", weighted, jacobian) + 1e-9 * np.eye(7)
+        step = np.linalg.solve(normal, -np.einsum("nri,nr->i", weighted, residual))
+        camera_from_world = _small_motion(step[:6]) @ camera_from_world
+        log_factor = float(np.clip(log_factor + step[6], -0.5, 0.5))
+    factor = float(np.exp(log_factor))
+    return replace(camera, fx=camera.fx * factor, fy=camera.fy * factor)
+
+
+def _reprojection(
+    xy: Float[np.ndarray, "n 2"],
+    points_camera: Float[np.ndarray, "n 3"],
+    focal: Float[np.ndarray, "2"],
+    centre: tuple[float, float],
+) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2 7"]]:
+    """Return residuals in pixels and their derivatives by a small rotation, a small shift and the log focal length."""
+    x, y, z = points_camera.T
+    seen = np.stack([x / z, y / z], axis=1) * focal
+    by_point = np.zeros((len(xy), 2, 3))
+    by_point[:, 0, 0], by_point[:, 1, 1] = focal[0] / z, focal[1] / z
+    by_point[:, :, 2] = -seen / z[:, None]
+    by_rotation = np.zeros((len(xy), 3, 3))  # the derivative of w x p by w
+    by_rotation[:, 0, 1], by_rotation[:, 0, 2] = z, -y
+    by_rotation[:, 1, 0], by_rotation[:, 1, 2] = -z, x
+    by_rotation[:, 2, 0], by_rotation[:, 2, 1] = y, -x
+    jacobian = np.concatenate([by_point @ by_rotation, by_point, seen[:, :, None]], axis=2)
+    return seen + centre - xy, jacobian
+
+
+def _small_motion(step: Float[np.ndarray, "6"]) -> Float[np.ndarray, "4 4"]:
+    from scipy.spatial.transform import Rotation
+
+    motion = np.eye(4)
+    motion[:3, :3], motion[:3, 3] = Rotation.from_rotvec(step[:3]).as_matrix(), step[3:]
+    return motion
 
 
 def _as_poselib(camera: Pinhole) -> dict[str, object]:
