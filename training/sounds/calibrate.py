@@ -1,7 +1,7 @@
 """Fit the constants that turn cosines into probabilities, on clips that the networks had not heard."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -13,6 +13,7 @@ from avlmaps.perception.embedded.sound_calibration import (
     kinds_of_phrases,
     kinds_of_windows,
     log_odds,
+    nearness,
     softmax,
 )
 
@@ -58,6 +59,45 @@ def prototypes(encode_words: EncodeWords) -> np.ndarray:
     return total / np.linalg.norm(total, axis=1, keepdims=True)
 
 
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What speaks for every kind in sounds of one window.
+
+    Attributes:
+        features: (n, dim).
+        cosines: (n, kinds), to the words of every kind; -1 for kinds that the network was fitted without.
+        near: (n, kinds), to the nearest example that the network was fitted to; likewise.
+    """
+
+    features: np.ndarray
+    cosines: np.ndarray
+    near: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.features)
+
+    def at(self, chosen: np.ndarray) -> "Evidence":
+        """Return some of the sounds."""
+        return Evidence(self.features[chosen], self.cosines[chosen], self.near[chosen])
+
+
+def joined(parts: Sequence[Evidence]) -> Evidence:
+    """Return the sounds of several one after another."""
+    return Evidence(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("features", "cosines", "near")))
+
+
+def evidence_of(
+    features: np.ndarray, aims: np.ndarray, examples: np.ndarray, kinds: np.ndarray, without: Sequence[int] = ()
+) -> Evidence:
+    """Compare features with the words and with the examples (of the given kinds, sorted)."""
+    near = np.full((len(features), len(aims)), -1.0)
+    present, starts = np.unique(kinds, return_index=True)
+    near[:, present] = nearness(features, examples, starts)
+    cosines = (features @ aims.T).astype(np.float64)
+    cosines[:, list(without)] = -1.0
+    return Evidence(features, cosines, near)
+
+
 def fit_temperature(cosines: np.ndarray, kinds: np.ndarray) -> float:
     """Return the temperature at which held-out kinds are the most likely."""
 
@@ -66,12 +106,6 @@ def fit_temperature(cosines: np.ndarray, kinds: np.ndarray) -> float:
         return float(-np.log(p[np.arange(len(kinds)), kinds] + 1e-9).mean())
 
     return float(np.exp(minimize_scalar(surprise, bounds=(np.log(0.01), np.log(0.3)), method="bounded").x))
-
-
-def lead_features(cosines: np.ndarray) -> np.ndarray:
-    """Return the highest cosine and its lead over the next."""
-    best = np.sort(cosines, axis=1)[:, -2:]
-    return np.stack([best[:, 1], best[:, 1] - best[:, 0]], axis=1)
 
 
 def fit_phrases(encode_words: EncodeWords, c: Calibration) -> Calibration:
@@ -88,51 +122,52 @@ def fit_phrases(encode_words: EncodeWords, c: Calibration) -> Calibration:
     return replace(c, phrase_temperature=temperature, phrase=(float(bias), float(slope)))
 
 
-def heard_kinds(features: np.ndarray, aims: np.ndarray, c: Calibration) -> np.ndarray:
-    """Return how likely each one-window sound is of each kind, as ``EmbeddedSounds`` finds it."""
-    posterior, known = kinds_of_windows(features @ aims.T, c)
+def heard_kinds(heard: Evidence, c: Calibration) -> np.ndarray:
+    """Return how likely each sound is of each kind, as ``EmbeddedSounds`` finds it."""
+    posterior, known = kinds_of_windows(heard.cosines, heard.near, c)
     return posterior * known[:, None]
 
 
-def fit_known(known: np.ndarray, unknown: np.ndarray, c: Calibration) -> Calibration:
-    """Fit the refusal of unknown sounds on cosines (n, kinds) of both, each side weighing the same."""
-    x = np.concatenate([lead_features(known), lead_features(unknown)])
+def fit_known(known: Evidence, unknown: Evidence, c: Calibration) -> Calibration:
+    """Fit the refusal of unknown sounds, both sides weighing the same."""
+
+    def clues(heard: Evidence) -> np.ndarray:
+        best = np.sort((heard.cosines + heard.near) / 2.0, axis=1)
+        return np.stack([heard.near.max(axis=1), best[:, -1] - best[:, -2]], axis=1)
+
+    x = np.concatenate([clues(known), clues(unknown)])
     y = np.concatenate([np.ones(len(known)), np.zeros(len(unknown))])
     weights = np.concatenate([np.full(len(known), 1.0 / len(known)), np.full(len(unknown), 1.0 / len(unknown))])
     beta = fit_logistic(x, y, weights * len(x) / 2.0)
     return replace(c, known=(float(beta[0]), float(beta[1]), float(beta[2])))
 
 
-def matching_odds(
-    features: np.ndarray, aims: np.ndarray, phrases: Sequence[str], encode_words: EncodeWords, c: Calibration
-) -> np.ndarray:
+def matching_odds(heard: Evidence, phrases: Sequence[str], encode_words: EncodeWords, c: Calibration) -> np.ndarray:
     """Return log-odds (sounds, phrases) before the last logistic."""
     names = encode_words([word for called in KINDS.values() for word in called])
     starts = np.cumsum([0, *(len(called) for called in KINDS.values())])[:-1]
     cosines = np.maximum.reduceat(encode_words(phrases) @ names.T, starts, axis=1)
     share, named = kinds_of_phrases(cosines, c)
-    return log_odds(heard_kinds(features, aims, c) @ share.T * named)
+    return log_odds(heard_kinds(heard, c) @ share.T * named)
 
 
-def fit_word(features: np.ndarray, kinds: np.ndarray, encode_words: EncodeWords, c: Calibration) -> Calibration:
+def fit_word(heard: Evidence, kinds: np.ndarray, encode_words: EncodeWords, c: Calibration) -> Calibration:
     """Fit the last step of a question in words: held-out clips against the ten recorded names, one of them right."""
-    odds = matching_odds(features, prototypes(encode_words), [KINDS[name][0] for name in RECORDED], encode_words, c)
+    odds = matching_odds(heard, [KINDS[name][0] for name in RECORDED], encode_words, c)
     right = kinds[:, None] == np.arange(len(RECORDED))[None, :]
     bias, slope = fit_logistic(odds.ravel(), right.ravel().astype(float))
     return replace(c, word=(float(bias), float(slope)))
 
 
-def pair_features(features: np.ndarray, aims: np.ndarray, c: Calibration) -> np.ndarray:
+def pair_features(heard: Evidence, c: Calibration) -> np.ndarray:
     """Return cosine and agreement of every pair (n, n, 2)."""
-    direction = np.sqrt(heard_kinds(features, aims, c))
-    return np.stack([features @ features.T, direction @ direction.T], axis=2)
+    direction = np.sqrt(heard_kinds(heard, c))
+    return np.stack([heard.features @ heard.features.T, direction @ direction.T], axis=2)
 
 
-def fit_pairs(
-    features: np.ndarray, kinds: np.ndarray, folds: np.ndarray, aims: np.ndarray, c: Calibration
-) -> Calibration:
+def fit_pairs(heard: Evidence, kinds: np.ndarray, folds: np.ndarray, c: Calibration) -> Calibration:
     """Fit the question by a clip on pairs of held-out clips of one fold, which one network has heard."""
-    pairs = pair_features(features, aims, c)
+    pairs = pair_features(heard, c)
     first, second = np.triu_indices(len(kinds), 1)
     together = folds[first] == folds[second]
     first, second = first[together], second[together]

@@ -93,3 +93,50 @@ def synthetic_mels(each: int, seed: int, cache: Path) -> tuple[Float32[np.ndarra
 def recorded_kind(clip: Clip) -> int:
     """Return the index of a clip's kind among the recorded ones."""
     return list(RECORDED).index(clip.kind)
+
+
+@dataclass(frozen=True, slots=True)
+class Examples:
+    """What is learnt from: mel power (n, frames, bands) and the index of each one's kind in ``NAMES``."""
+
+    recorded: np.ndarray
+    recorded_kinds: np.ndarray
+    synthetic: np.ndarray
+    synthetic_kinds: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Corpus:
+    """All that is learnt from and tested on.
+
+    Attributes:
+        folder: of the recorded sounds.
+        clips: the recorded clips with a fold.
+        mels: their mel power.
+        synthetic: mel power of the synthetic clips.
+        synthetic_kinds: index in ``NAMES`` of each.
+        others: the clips without a fold, only for testing.
+    """
+
+    folder: Path
+    clips: tuple[Clip, ...]
+    mels: np.ndarray
+    synthetic: np.ndarray
+    synthetic_kinds: np.ndarray
+    others: tuple[Clip, ...]
+
+    def examples(self, chosen: np.ndarray, without: Sequence[str] = ()) -> Examples:
+        """Return the chosen recorded clips (a mask) that may ship and all synthetic ones, without some kinds."""
+        may = np.array([clip.may_ship and clip.kind not in without for clip in self.clips])
+        rows = np.flatnonzero(chosen & may)
+        kinds = np.array([recorded_kind(self.clips[i]) for i in rows])
+        return Examples(self.mels[rows], kinds, self.synthetic, self.synthetic_kinds)
+
+
+def read_corpus(folder: Path, cache: Path, each: int = 24, seed: int = 0) -> Corpus:
+    """Read the recorded clips and make the synthetic ones (or take them from the cache)."""
+    index = read_index(folder)
+    clips = tuple(clip for clip in index if clip.fold)
+    others = tuple(clip for clip in index if not clip.fold)
+    synthetic, kinds = synthetic_mels(each, seed, cache)
+    return Corpus(folder, clips, recorded_mels(folder, clips), synthetic, kinds + len(RECORDED), others)

@@ -6,53 +6,26 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from training.sounds.clips import Clip, mels_of, read_index, read_samples, recorded_mels, synthetic_mels
-from training.sounds.fit import EncodeWords, Examples, Settings, encode, fit, recorded_index, targets, turned
+from training.sounds.calibrate import Evidence, evidence_of, joined
+from training.sounds.clips import (
+    Corpus,
+    Examples,
+    mels_of,
+    read_samples,
+    recorded_kind,
+)
+from training.sounds.fit import EncodeWords, Settings, encode, fit, targets, turned
 from training.sounds.kinds import RECORDED
 from training.sounds.network import SoundNet
 
 from avlmaps.core.progress import say
 from avlmaps.perception.embedded import logmel
 
+LEFT_OUT = (tuple(RECORDED)[::2], tuple(RECORDED)[1::2])
+LEFT_OUT_FOLD = 5
+BANK_EACH = 4  # synthetic examples of a kind
 FOLDS = (2, 3, 4, 5)
 CONDITIONS = ("clean", "white 10 dB", "pink 10 dB", "white 0 dB")
-
-
-@dataclass(frozen=True, slots=True)
-class Corpus:
-    """All that is learnt from and tested on.
-
-    Attributes:
-        folder: of the recorded sounds.
-        clips: the recorded clips with a fold.
-        mels: their mel power.
-        synthetic: mel power of the synthetic clips.
-        synthetic_kinds: index in ``NAMES`` of each.
-        others: the clips without a fold, only for testing.
-    """
-
-    folder: Path
-    clips: tuple[Clip, ...]
-    mels: np.ndarray
-    synthetic: np.ndarray
-    synthetic_kinds: np.ndarray
-    others: tuple[Clip, ...]
-
-    def examples(self, chosen: np.ndarray, without: Sequence[str] = ()) -> Examples:
-        """Return the chosen recorded clips (a mask) that may ship and all synthetic ones, without some kinds."""
-        may = np.array([clip.may_ship and clip.kind not in without for clip in self.clips])
-        rows = np.flatnonzero(chosen & may)
-        kinds = np.array([recorded_index(self.clips[i].kind) for i in rows])
-        return Examples(self.mels[rows], kinds, self.synthetic, self.synthetic_kinds)
-
-
-def read_corpus(folder: Path, cache: Path, each: int = 24, seed: int = 0) -> Corpus:
-    """Read the recorded clips and make the synthetic ones (or take them from the cache)."""
-    index = read_index(folder)
-    clips = tuple(clip for clip in index if clip.fold)
-    others = tuple(clip for clip in index if not clip.fold)
-    synthetic, kinds = synthetic_mels(each, seed, cache)
-    return Corpus(folder, clips, recorded_mels(folder, clips), synthetic, kinds + len(RECORDED), others)
 
 
 def with_noise(samples: np.ndarray, snr_db: float, pink: bool, rng: np.random.Generator) -> np.ndarray:
@@ -99,7 +72,7 @@ class Networks:
     def of_fold(self, fold: int, without: tuple[str, ...] = ()) -> list[SoundNet]:
         """Return the ensemble that never heard a fold, nor some kinds at all."""
         folds = np.array([clip.fold for clip in self.corpus.clips])
-        name = "-".join([f"fold{fold}", *(kind.replace(" ", "_") for kind in without)])
+        name = "-".join([f"fold{fold}", *(kind.split()[0] for kind in without)])
         return self._ensemble(name, self.corpus.examples(folds != fold, without), fold)
 
     def of_all(self) -> list[SoundNet]:
@@ -125,6 +98,88 @@ class Networks:
                 net = turned(net, kept["targets"], words)
             nets.append(net.eval())
         return nets
+
+
+@dataclass(frozen=True, slots=True)
+class Stranger:
+    """What networks that were fitted without some kinds make of a fold they never heard.
+
+    Attributes:
+        heard: of every clip of the fold.
+        without: the kinds left out.
+        unknown: which clips are of those.
+    """
+
+    heard: Evidence
+    without: tuple[int, ...]
+    unknown: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """What the cross-validation heard.
+
+    Attributes:
+        kinds: the right kind of every recorded clip.
+        folds: its fold.
+        held_out: under every condition, by the networks that never heard the clip's fold.
+        others: for every fold's networks, every clip without a fold (all its windows).
+        strangers: by networks fitted without half of the recorded kinds.
+    """
+
+    kinds: np.ndarray
+    folds: np.ndarray
+    held_out: dict[str, Evidence]
+    others: list[list[Evidence]]
+    strangers: list[Stranger]
+
+
+def example_bank(nets: Sequence[SoundNet], examples: Examples) -> tuple[np.ndarray, np.ndarray]:
+    """Return the features of the recorded examples and of a few synthetic ones of each kind, sorted by kind."""
+    few = np.concatenate(
+        [np.flatnonzero(examples.synthetic_kinds == k)[:BANK_EACH] for k in np.unique(examples.synthetic_kinds)]
+    )
+    features = np.concatenate([ensemble(nets, examples.recorded), ensemble(nets, examples.synthetic[few])])
+    kinds = np.concatenate([examples.recorded_kinds, made[few]])
+    order = np.argsort(kinds, kind="stable")
+    return features[order], kinds[order]
+
+
+def hear_held_out(corpus: Corpus, networks: Networks, aims: np.ndarray) -> Answers:
+    """Let every fold be heard by networks that never heard it."""
+    kinds = np.array([recorded_kind(clip) for clip in corpus.clips])
+    folds = np.array([clip.fold for clip in corpus.clips])
+    order = np.concatenate([np.flatnonzero(folds == fold) for fold in FOLDS])
+    parts: dict[str, list[Evidence]] = {condition: [] for condition in CONDITIONS}
+    windows = [
+        logmel.windows(logmel.normalised(logmel.mel_power(read_samples(corpus.folder / clip.path))))
+        for clip in corpus.others
+    ]
+    others = []
+    for fold in FOLDS:
+        nets = networks.of_fold(fold)
+        bank = example_bank(nets, corpus.examples(folds != fold))
+        rows = np.flatnonzero(folds == fold)
+        for condition in CONDITIONS:
+            parts[condition].append(evidence_of(ensemble(nets, condition_mels(corpus, rows, condition)), aims, *bank))
+        others.append([evidence_of(ensemble(nets, mels), aims, *bank) for mels in windows])
+    held_out = {condition: joined(found) for condition, found in parts.items()}
+    return Answers(kinds[order], folds[order], held_out, others, hear_strangers(corpus, networks, aims))
+
+
+def hear_strangers(corpus: Corpus, networks: Networks, aims: np.ndarray) -> list[Stranger]:
+    """Let one fold be heard by networks that were fitted without half of the recorded kinds."""
+    folds = np.array([clip.fold for clip in corpus.clips])
+    rows = np.flatnonzero(folds == LEFT_OUT_FOLD)
+    kinds = np.array([recorded_kind(corpus.clips[i]) for i in rows])
+    found = []
+    for half in LEFT_OUT:
+        nets = networks.of_fold(LEFT_OUT_FOLD, half)
+        bank = example_bank(nets, corpus.examples(folds != LEFT_OUT_FOLD, half))
+        without = tuple(list(RECORDED).index(kind) for kind in half)
+        heard = evidence_of(ensemble(nets, corpus.mels[rows]), aims, *bank, without)
+        found.append(Stranger(heard, without, np.isin(kinds, without)))
+    return found
 
 
 def ensemble(nets: Sequence[SoundNet], mels: np.ndarray) -> np.ndarray:

@@ -6,7 +6,8 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from training.sounds.calibrate import fit_pairs, heard_kinds, matching_odds, pair_features, prototypes
+from training.sounds.calibrate import Evidence, fit_pairs, heard_kinds, matching_odds, pair_features
+from training.sounds.crossvalidate import Stranger
 from training.sounds.fit import EncodeWords
 from training.sounds.kinds import KINDS, RECORDED
 
@@ -33,27 +34,27 @@ def share(hits: int, count: int) -> list[Any]:
 
 
 def first_by_words(
-    features: np.ndarray, kinds: np.ndarray, phrases: Sequence[str], encode: EncodeWords, c: Calibration
+    heard: Evidence, kinds: np.ndarray, phrases: Sequence[str], encode: EncodeWords, c: Calibration
 ) -> np.ndarray:
     """Tell for each clip whether the right one of ten phrases ranks first."""
-    return matching_odds(features, prototypes(encode), phrases, encode, c).argmax(axis=1) == kinds
+    return matching_odds(heard, phrases, encode, c).argmax(axis=1) == kinds
 
 
 def words_table(
-    features: dict[str, np.ndarray], kinds: np.ndarray, encode: EncodeWords, c: Calibration
+    held_out: dict[str, Evidence], kinds: np.ndarray, encode: EncodeWords, c: Calibration
 ) -> tuple[Table, Table]:
     """Return the questions by words under every condition: in all, and for every kind."""
     names = [KINDS[name][0] for name in RECORDED]
-    right = {condition: first_by_words(found, kinds, names, encode, c) for condition, found in features.items()}
-    sets = [first_by_words(features["clean"], kinds, phrases, encode, c) for phrases in read_paraphrases()]
+    right = {condition: first_by_words(found, kinds, names, encode, c) for condition, found in held_out.items()}
+    sets = [first_by_words(held_out["clean"], kinds, phrases, encode, c) for phrases in read_paraphrases()]
     right["paraphrases, clean"] = np.stack(sets, axis=1)
-    noisy = [first_by_words(features["pink 10 dB"], kinds, phrases, encode, c) for phrases in read_paraphrases()]
+    noisy = [first_by_words(held_out["pink 10 dB"], kinds, phrases, encode, c) for phrases in read_paraphrases()]
     right["paraphrases, pink 10 dB"] = np.stack(noisy, axis=1)
     rows = [[condition, *share(int(hits.sum()), hits.size)] for condition, hits in right.items()]
     overall = {"columns": ["asked by", "first", "of", "%", "95 %"], "rows": rows}
     columns = ["kind", "clips", *(f"{condition} %" for condition in right), "clean 95 %", "taken for"]
     by_kind = []
-    answers = matching_odds(features["clean"], prototypes(encode), names, encode, c).argmax(axis=1)
+    answers = matching_odds(held_out["clean"], names, encode, c).argmax(axis=1)
     for k, name in enumerate(RECORDED):
         mine = kinds == k
         wrong = [list(RECORDED)[a] for a in answers[mine] if a != k]
@@ -64,22 +65,19 @@ def words_table(
     return overall, {"columns": columns, "rows": by_kind}
 
 
-def clips_table(
-    features: np.ndarray, kinds: np.ndarray, folds: np.ndarray, encode: EncodeWords, c: Calibration
-) -> Table:
+def clips_table(heard: Evidence, kinds: np.ndarray, folds: np.ndarray, c: Calibration) -> Table:
     """Return the questions by a clip.
 
     Each clip of the fold that was kept out asks for its kind among one other clip of every kind, drawn from the same
     fold by seed; the last constants are fitted on the three other folds. Ranked by the score, and by the cosine alone.
     """
     rng = np.random.default_rng(0)
-    aims = prototypes(encode)
-    pairs = pair_features(features, aims, c)
+    pairs = pair_features(heard, c)
     counts = {"score": [0, 0], "cosine": [0, 0], "score, all": [0, 0], "cosine, all": [0, 0]}
     by_kind = np.zeros((len(RECORDED), 2), int)
     for fold in np.unique(folds):
         others = folds != fold
-        fitted = fit_pairs(features[others], kinds[others], folds[others], aims, c)
+        fitted = fit_pairs(heard.at(others), kinds[others], folds[others], c)
         rows = np.flatnonzero(folds == fold)
         scores = {
             "score": same_kind(pairs[:, :, 0], pairs[:, :, 1], fitted),
@@ -129,18 +127,16 @@ def area_under_curve(known: np.ndarray, unknown: np.ndarray) -> tuple[float, flo
     return area, max(0.0, area - half), min(1.0, area + half)
 
 
-def recorded_scores(features: np.ndarray, encode: EncodeWords, c: Calibration, kinds: Sequence[int]) -> np.ndarray:
+def recorded_scores(heard: Evidence, c: Calibration, kinds: Sequence[int]) -> np.ndarray:
     """Return how likely each one-window sound is the most likely of some kinds."""
-    return heard_kinds(features, prototypes(encode), c)[:, list(kinds)].max(axis=1)
+    return heard_kinds(heard, c)[:, list(kinds)].max(axis=1)
 
 
 def refusal_table(
-    features: np.ndarray,
-    kinds: np.ndarray,
+    heard: Evidence,
     other_categories: Sequence[str],
-    other_features: Sequence[Sequence[np.ndarray]],
-    strangers: Sequence[dict[str, Any]],
-    encode: EncodeWords,
+    others: Sequence[Sequence[Evidence]],
+    strangers: Sequence[Stranger],
     c: Calibration,
 ) -> Table:
     """Return how well sounds of no recorded kind are told from those of the ten.
@@ -151,27 +147,26 @@ def refusal_table(
     """
     rows = []
     ten = range(len(RECORDED))
-    known = recorded_scores(features, encode, c, ten)
+    known = recorded_scores(heard, c, ten)
     foreign = [i for i, category in enumerate(other_categories) if category not in RECORDED]
     for what, chosen in (
         ("recordings of other categories", foreign),
-        ("the same, those longer than one window (5.2 s)", [i for i in foreign if other_features[0][i].shape[0] > 1]),
+        ("the same, those longer than one window (5.2 s)", [i for i in foreign if len(others[0][i]) > 1]),
     ):
         unknown = np.array([
-            recorded_scores(of_fold[i], encode, c, ten).max() for of_fold in other_features for i in chosen
+            recorded_scores(of_fold[i], c, ten).max() for of_fold in others for i in chosen
         ])  # fmt: skip
         rows.append(_refusal_row(what, known, unknown, len(chosen)))
     scores_known, scores_unknown, any_known, any_unknown = [], [], [], []
     for one in strangers:
-        left = [k for k in ten if k not in one["without"]]
-        every = [k for k in range(len(KINDS)) if k not in one["without"]]
-        mine = np.isin(one["kinds"], one["without"])
-        of_left, of_any = (recorded_scores(one["features"], encode, c, which) for which in (left, every))
-        scores_known.append(of_left[~mine])
-        scores_unknown.append(of_left[mine])
-        any_known.append(of_any[~mine])
-        any_unknown.append(of_any[mine])
-    two = "clips of two recorded kinds left out of training, five times"
+        left = [k for k in ten if k not in one.without]
+        every = [k for k in range(len(KINDS)) if k not in one.without]
+        of_left, of_any = (recorded_scores(one.heard, c, which) for which in (left, every))
+        scores_known.append(of_left[~one.unknown])
+        scores_unknown.append(of_left[one.unknown])
+        any_known.append(of_any[~one.unknown])
+        any_unknown.append(of_any[one.unknown])
+    two = "clips of five recorded kinds left out of training, twice"
     rows.append(_refusal_row(two, np.concatenate(scores_known), np.concatenate(scores_unknown)))
     whole = f"{two}; score of the most likely of all {len(KINDS)} kinds"
     rows.append(_refusal_row(whole, np.concatenate(any_known), np.concatenate(any_unknown)))
@@ -190,13 +185,13 @@ def _refusal_row(what: str, known: np.ndarray, unknown: np.ndarray, clips: int |
     ]  # fmt: skip
 
 
-def yes_table(held_out: dict[str, np.ndarray], kinds: np.ndarray, encode: EncodeWords, c: Calibration) -> Table:
+def yes_table(held_out: dict[str, Evidence], kinds: np.ndarray, encode: EncodeWords, c: Calibration) -> Table:
     """Return how often the score says yes to the right name of ten, and to a wrong one."""
     names = [KINDS[name][0] for name in RECORDED]
     rows = []
-    for condition, features in held_out.items():
+    for condition, heard in held_out.items():
         bias, slope = c.word
-        yes = bias + slope * matching_odds(features, prototypes(encode), names, encode, c) >= 0.0
+        yes = bias + slope * matching_odds(heard, names, encode, c) >= 0.0
         right = kinds[:, None] == np.arange(len(RECORDED))[None, :]
         rows.append(
             [

@@ -9,7 +9,8 @@ import torch
 import torch.nn.functional as functional
 from torch import Tensor
 from training.sounds.augmentation import Augmentation, augmented, heard
-from training.sounds.kinds import CALLED, RECORDED, TEMPLATES
+from training.sounds.clips import Examples
+from training.sounds.kinds import CALLED, TEMPLATES
 from training.sounds.network import SoundNet
 
 from avlmaps.core.progress import say
@@ -46,16 +47,6 @@ class Settings:
     averaging: float = 0.995
     seed: int = 0
     augmentation: Augmentation = field(default_factory=Augmentation)
-
-
-@dataclass(frozen=True, slots=True)
-class Examples:
-    """What is learnt from: mel power (n, frames, bands) and the index of each one's kind in ``NAMES``."""
-
-    recorded: np.ndarray
-    recorded_kinds: np.ndarray
-    synthetic: np.ndarray
-    synthetic_kinds: np.ndarray
 
 
 def targets(encode_words: EncodeWords) -> Tensor:
@@ -165,8 +156,3 @@ def turned(net: SoundNet, old: Tensor, new: Tensor) -> SoundNet:
     copied.head.weight.copy_(rotation @ net.head.weight)
     copied.head.bias.copy_(rotation @ net.head.bias)
     return copied
-
-
-def recorded_index(kind: str) -> int:
-    """Return a recorded kind's index in ``NAMES``."""
-    return list(RECORDED).index(kind)

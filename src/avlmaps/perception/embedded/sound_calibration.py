@@ -17,8 +17,9 @@ class Calibration:
     """The fitted constants.
 
     Attributes:
-        temperature: of the softmax over kinds of a window's cosines.
-        known: weights (bias, highest cosine, lead over the runner-up) of the log-odds that a window is of a known kind.
+        temperature: of the softmax over kinds of what speaks for each.
+        known: weights (bias, nearness of the nearest example, lead over the runner-up) of the log-odds that a window is
+            of a known kind.
         phrase_temperature: of the softmax over kinds of a phrase's cosines.
         phrase: (bias, highest cosine) of the log-odds that a phrase names a known kind.
         word: (bias, log-odds of the matched posterior) of the log-odds that a sound is what a phrase names.
@@ -52,14 +53,31 @@ def softmax(x: Array) -> Array:
     return e / e.sum(axis=-1, keepdims=True)
 
 
+def nearness(
+    features: Float[np.ndarray, "windows d"], examples: Float[np.ndarray, "n d"], starts: np.ndarray
+) -> Float[np.ndarray, "windows kinds"]:
+    """Return each window's cosine to the nearest example of every kind; examples lie by kind, from ``starts``."""
+    return np.maximum.reduceat(features @ examples.T, starts, axis=1)
+
+
 def kinds_of_windows(
-    cosines: Float[np.ndarray, "windows kinds"], c: Calibration
+    cosines: Float[np.ndarray, "windows kinds"], near: Float[np.ndarray, "windows kinds"], c: Calibration
 ) -> tuple[Float[np.ndarray, "windows kinds"], Float[np.ndarray, " windows"]]:
-    """Return each window's posterior over the known kinds, and how likely it is of any of them."""
-    posterior = softmax(np.asarray(cosines, np.float64) / c.temperature)
-    best = np.sort(cosines, axis=1)[:, -2:].astype(np.float64)
-    bias, highest, lead = c.known
-    return posterior, sigmoid(bias + highest * best[:, 1] + lead * (best[:, 1] - best[:, 0]))
+    """Return each window's posterior over the known kinds, and how likely it is of any of them.
+
+    Two things speak for a kind: the cosine to the words that it is called, which the network was fitted to, and the
+    cosine to the nearest example, which tells strangers apart far better (a stranger lies between the kinds).
+
+    Args:
+        cosines: to the words of every kind.
+        near: to the nearest example of every kind.
+        c: the constants.
+    """
+    evidence = (np.asarray(cosines, np.float64) + near) / 2.0
+    best = np.sort(evidence, axis=1)
+    bias, by_nearness, by_lead = c.known
+    known = sigmoid(bias + by_nearness * near.max(axis=1) + by_lead * (best[:, -1] - best[:, -2]))
+    return softmax(evidence / c.temperature), known
 
 
 def kinds_of_phrases(

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
 from importlib.resources import files
+from io import BytesIO
 from pathlib import Path
 from typing import Any, cast
 
@@ -26,6 +27,7 @@ from avlmaps.perception.embedded.sound_calibration import (
     kinds_of_phrases,
     kinds_of_windows,
     matched,
+    nearness,
     same_kind,
     sigmoid,
 )
@@ -79,18 +81,21 @@ class EmbeddedSounds:
 
     def __init__(self, words: WordEncoder | None = None, folder: Path | None = None) -> None:
         weights = files("avlmaps.perception.embedded") / "weights"
-        network, notes = (weights / "sounds.onnx").read_bytes(), (weights / "sounds.json").read_bytes()
+        network, notes, examples = ((weights / f"sounds.{end}").read_bytes() for end in ("onnx", "json", "npy"))
         self._network = network
         self._folder = folder
         about = json.loads(notes)
         self._words: WordEncoder = cast(WordEncoder, load(Kind.WORDS, "embedded")) if words is None else words
         self.kinds = tuple(KnownKind(k["name"], tuple(k["called"]), k["origin"], k["clips"]) for k in about["kinds"])
+        # features of some of the clips that the network learnt from, sorted by kind
+        self._examples = np.load(BytesIO(examples), allow_pickle=False).astype(np.float32)
+        self._starts = np.cumsum([0, *(k["examples"] for k in about["kinds"][:-1])])
         self.calibration = msgspec.convert(about["calibration"], Calibration)
         self.card = ModelCard(
             id=about["id"],
             dim=about["dim"],
             licence="MIT",
-            checksum=sha256(network + notes).hexdigest(),
+            checksum=sha256(network + notes + examples).hexdigest(),
             prompts=tuple(about["templates"]),
             note=about["note"],
         )
@@ -204,7 +209,8 @@ class EmbeddedSounds:
 
     def _hear(self, features: Float32[np.ndarray, "windows d"], taught: Sequence[TaughtSound]) -> Heard:
         """Return the kinds in a sound: for each the most likely window."""
-        posterior, known = kinds_of_windows(features @ self._prototypes.T, self.calibration)
+        near = nearness(features, self._examples, self._starts)
+        posterior, known = kinds_of_windows(features @ self._prototypes.T, near, self.calibration)
         likely = posterior * known[:, None]
         if taught:
             own = np.stack([self._taught_likely(features, t) for t in taught], axis=1)
