@@ -60,27 +60,27 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
     return answer
 
 
-def _words(asked: Asked) -> dict[str, Table]:
+def _words(asked: Asked) -> Mapping[str, Table]:
     from avlmaps.bench import words
 
     _embedded_only(asked, "words")
     return {"phrases kept out of training": words.run()}
 
 
-def _sounds(asked: Asked) -> dict[str, Table]:
+def _sounds(asked: Asked) -> Mapping[str, Table]:
     from avlmaps.bench import sounds
 
     _embedded_only(asked, "sounds")
     return sounds.run(_clips(asked))
 
 
-def _segmentation(asked: Asked) -> dict[str, Table]:
+def _segmentation(asked: Asked) -> Mapping[str, Table]:
     from avlmaps.bench import segmentation
 
     return {"sounds found in a track": segmentation.run(_clips(asked), asked.seed)}
 
 
-def _locate(asked: Asked) -> dict[str, Table]:
+def _locate(asked: Asked) -> Mapping[str, Table]:
     from avlmaps.bench import locate
     from avlmaps.recordings.open import open_recording
 
@@ -97,7 +97,7 @@ def _locate(asked: Asked) -> dict[str, Table]:
     return tables
 
 
-_SUITES: dict[str, Callable[[Asked], dict[str, Table]]] = {
+_SUITES: dict[str, Callable[[Asked], Mapping[str, Table]]] = {
     "words": _words,
     "sounds": _sounds,
     "segmentation": _segmentation,

@@ -37,8 +37,8 @@ def write_report(report: "DemoReport", heard: "Sequence[Heard]") -> Path:
     body = [
         "<h1>A room that can be asked</h1>",
         "<p>A robot walked through a room with an RGB-D camera and a microphone. What it saw and heard was fused "
-        "into one map; then the map was asked, in words, by a photo and by a sound. Nothing below knew where things are: the "
-        "truth was looked up afterwards, to say how far each answer is off.</p>",
+        "into one map; then the map was asked, in words, by a photo and by a sound. Nothing below knew where things "
+        "are: the truth was looked up afterwards, to say how far each answer is off.</p>",
         '<ul class="facts">'
         + "".join(f"<li><b>{escape(value)}</b>{escape(name)}</li>" for name, value in facts)
         + "</ul>",

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from avlmaps.sim.room import Room
 
 MARKER = ".avlmaps-demo"
+# A first goal within this distance of a true place, horizontally, is right (the paper's success radius).
+REACH_M = 1.0
 Point = tuple[float, float, float]
 
 
@@ -34,7 +36,6 @@ class Step:
         answer: what the map said, as `avlmaps query --json` prints it.
         picture: file name of its plot, in the demonstration's folder.
         truth: places that would be right, metres; empty where the right answer is that there is none.
-        reach_m: a first goal within this distance of a true place, horizontally, is right.
     """
 
     title: str
@@ -42,7 +43,6 @@ class Step:
     answer: dict[str, Any]
     picture: str
     truth: tuple[Point, ...]
-    reach_m: float = 1.0
 
     @property
     def off_m(self) -> float | None:
@@ -57,7 +57,7 @@ class Step:
         """Whether the answer is right: the place, or that there is none."""
         if not self.truth:
             return not self.answer["found"]
-        return bool(self.answer["found"]) and self.off_m is not None and self.off_m <= self.reach_m
+        return bool(self.answer["found"]) and self.off_m is not None and self.off_m <= REACH_M
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,23 +210,23 @@ def _ask_all(
     clip = out / "another_microwave.wav"
     sound = _synthesised("microwave beep", rng)
     soundfile.write(clip, sound.samples, sound.rate_hz)
-    at = {event.category: event.robot for event in heard}
+    at = {event.category: event.track for event in heard}
     red = tuple(t.centre for t in room.things if t.colour == "red")
     east_chair, west_chair = _thing(room, "chair", "yellow", (9, 2)), _thing(room, "chair", "yellow", (1, 2))
 
-    def step(title: str, question: Question, command: str, truth: Sequence[Point], reach_m: float = 1.0) -> Step:
+    def step(title: str, question: Question, command: str, truth: Sequence[Point]) -> Step:
         number = len(steps) + 1
         answer: Answer = asked.ask(question)
         picture = f"question_{number}.png"
         if answer.heat is not None:
             answer.heat.plot(out / picture)
-        return Step(title, command, answer.to_json(), picture, tuple(truth), reach_m)
+        return Step(title, command, answer.to_json(), picture, tuple(truth))
 
-    def sentence(text: str, truth: Sequence[Point], reach_m: float = 1.0) -> Step:
-        return step(text, parse_sentence(text), f'avlmaps query room.avlmap "{text}"', truth, reach_m)
+    def sentence(text: str, truth: Sequence[Point]) -> Step:
+        return step(text, parse_sentence(text), f'avlmaps query room.avlmap "{text}"', truth)
 
-    def parts(title: str, options: str, truth: Sequence[Point], *named: Part, reach_m: float = 1.0) -> Step:
-        return step(title, Question.of(named), f"avlmaps query room.avlmap {options}", truth, reach_m)
+    def parts(title: str, options: str, truth: Sequence[Point], *named: Part) -> Step:
+        return step(title, Question.of(named), f"avlmaps query room.avlmap {options}", truth)
 
     steps: list[Step] = []
     steps.append(sentence("the red cabinet", red))
@@ -234,7 +234,7 @@ def _ask_all(
     steps.append(sentence("the yellow chair near the sound of breaking glass", [west_chair]))
     clip_part = Part(Modality.SOUND, str(clip), is_file=True)
     title = "where a sound like this clip was heard (another microwave)"
-    steps.append(parts(title, f"--sound-clip {clip.name}", [at["microwave beep"]], clip_part, reach_m=1.5))
+    steps.append(parts(title, f"--sound-clip {clip.name}", at["microwave beep"], clip_part))
     chair, picture = Part(Modality.OBJECT, "yellow chair"), Part(Modality.IMAGE, str(photo), is_file=True)
     options = f'--object "yellow chair" --image {photo.name}'
     steps.append(parts("the yellow chair near this photo", options, [east_chair], chair, picture))

@@ -46,13 +46,18 @@ class Heard:
         category: what was heard.
         onset_s: start.
         offset_s: end.
-        robot: where the robot was at the onset.
+        track: where the robot was from onset to offset, one place a frame, at least one.
     """
 
     category: str
     onset_s: float
     offset_s: float
-    robot: tuple[float, float, float]
+    track: tuple[tuple[float, float, float], ...]
+
+    @property
+    def robot(self) -> tuple[float, float, float]:
+        """Where the robot was at the onset."""
+        return self.track[0]
 
 
 def record_room(
@@ -100,8 +105,10 @@ def mix(
         gain = 0.25 / max(float(distance_m[frame]), 1.0) / max(float(np.abs(piece).max()), 1e-6)
         samples[start : start + len(piece)] += gain * piece
         free_s = (start + len(piece)) / rate_hz
-        at = robot[min(round(onset_s * FRAME_RATE_HZ), len(robot) - 1)]
-        heard.append(Heard(source.category, start / rate_hz, free_s, (float(at[0]), float(at[1]), float(at[2]))))
+        first = min(round(onset_s * FRAME_RATE_HZ), len(robot) - 1)
+        along = robot[first : max(round(free_s * FRAME_RATE_HZ), first + 1)]
+        track = tuple((float(x), float(y), float(z)) for x, y, z in along)
+        heard.append(Heard(source.category, start / rate_hz, free_s, track))
     return Sound(np.clip(samples, -1.0, 1.0).astype(np.float32), rate_hz), heard
 
 
