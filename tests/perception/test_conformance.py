@@ -8,7 +8,6 @@ import pytest
 from avlmaps.core.registry import Backend, Kind, backends, load
 from avlmaps.perception.conformance import NonConformanceError, check
 
-
 OURS = [backend for backend in backends() if backend.target.startswith("avlmaps.")]
 
 
