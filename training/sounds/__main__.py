@@ -67,7 +67,11 @@ def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.Calibra
     c = replace(calibrate.START, temperature=calibrate.fit_temperature(evidence, answers.kinds))
     c = calibrate.fit_phrases(encode, c)
     c = calibrate.fit_known(heard, calibrate.joined([s.heard.at(s.unknown) for s in answers.strangers]), c)
-    c = calibrate.fit_word(heard, answers.kinds, encode, c)
+    c = calibrate.fit_taught([lesson for s in answers.strangers for lesson in s.lessons(3)], c)
+    unknown = [
+        (s.heard.at(s.unknown), [k for k in range(len(RECORDED)) if k not in s.without]) for s in answers.strangers
+    ]
+    c = calibrate.fit_word(heard, answers.kinds, unknown, encode, c)
     return calibrate.fit_pairs(heard, answers.kinds, answers.folds, c)
 
 
@@ -82,6 +86,7 @@ def all_tables(
         "asked by words, each kind": by_kind,
         "asked by a clip": figures.clips_table(heard, answers.kinds, answers.folds, c),
         "refusing the unknown": figures.refusal_table(heard, other_categories, answers.others, answers.strangers, c),
+        "taught kinds": figures.taught_table(answers.strangers, c),
         "yes and no at 0.5": figures.yes_table(answers.held_out, answers.kinds, encode, c),
     }
 

@@ -15,9 +15,10 @@ from avlmaps.perception.embedded.sound_calibration import (
     log_odds,
     nearness,
     softmax,
+    taught_lead,
 )
 
-START = Calibration(0.07, (0.0, 0.0, 0.0), 0.05, (0.0, 0.0), (0.0, 1.0), (0.0, 0.0, 0.0), (0.5, 8.0))
+START = Calibration(0.07, (0.0, 0.0, 0.0), 0.05, (0.0, 0.0), (0.0, 1.0), (0.0, 0.0, 0.0), (-4.0, 8.0))
 
 # Phrases that name no sound; with the kinds' other names they fit what counts as naming one. Not used for testing.
 NO_SOUNDS = (
@@ -151,11 +152,34 @@ def matching_odds(heard: Evidence, phrases: Sequence[str], encode_words: EncodeW
     return log_odds(heard_kinds(heard, c) @ share.T * named)
 
 
-def fit_word(heard: Evidence, kinds: np.ndarray, encode_words: EncodeWords, c: Calibration) -> Calibration:
-    """Fit the last step of a question in words: held-out clips against the ten recorded names, one of them right."""
+def fit_word(
+    heard: Evidence,
+    kinds: np.ndarray,
+    unknown: Sequence[tuple[Evidence, Sequence[int]]],
+    encode_words: EncodeWords,
+    c: Calibration,
+) -> Calibration:
+    """Fit the last step of a question in words, as if every other sound of a building were of no known kind.
+
+    Args:
+        heard: held-out clips of the ten recorded kinds; each is asked for by all ten names.
+        kinds: which kind each is.
+        unknown: clips of kinds that a network was fitted without, and the recorded kinds that it was fitted with, by
+            whose names each is asked for.
+        encode_words: the word encoder.
+        c: the constants so far.
+    """
     odds = matching_odds(heard, [KINDS[name][0] for name in RECORDED], encode_words, c)
     right = kinds[:, None] == np.arange(len(RECORDED))[None, :]
-    bias, slope = fit_logistic(odds.ravel(), right.ravel().astype(float))
+    parts, labels, weights = [odds.ravel()], [right.ravel()], [np.ones(odds.size)]
+    count = sum(len(strange) for strange, _ in unknown)
+    for strange, asked in unknown:
+        wrong = matching_odds(strange, [KINDS[list(RECORDED)[k]][0] for k in asked], encode_words, c).ravel()
+        parts.append(wrong)
+        labels.append(np.zeros(wrong.size, bool))
+        weights.append(np.full(wrong.size, len(heard) / count * len(RECORDED) / len(asked)))
+    x, y, w = (np.concatenate(part) for part in (parts, labels, weights))
+    bias, slope = fit_logistic(x, y.astype(float), w)
     return replace(c, word=(float(bias), float(slope)))
 
 
@@ -173,3 +197,50 @@ def fit_pairs(heard: Evidence, kinds: np.ndarray, folds: np.ndarray, c: Calibrat
     first, second = first[together], second[together]
     beta = fit_logistic(pairs[first, second], (kinds[first] == kinds[second]).astype(float))
     return replace(c, pair=(float(beta[0]), float(beta[1]), float(beta[2])))
+
+
+@dataclass(frozen=True, slots=True)
+class Lesson:
+    """A kind that the networks were fitted without, taught from a few clips, and clips from other sources to tell.
+
+    Attributes:
+        kind: which.
+        lead: of every clip to tell, by ``taught_lead``.
+        right: which of them are of the kind.
+    """
+
+    kind: int
+    lead: np.ndarray
+    right: np.ndarray
+
+
+def lessons(heard: Evidence, kinds: np.ndarray, sources: np.ndarray, taught: Sequence[int], clips: int) -> list[Lesson]:
+    """Teach each kind twenty times from some clips, drawn by seed, no two of one source.
+
+    Args:
+        heard: one-window clips, by networks that know nothing of the taught kinds.
+        kinds: their kinds.
+        sources: of which recording each was cut; those that taught and their siblings are not asked about.
+        taught: the kinds to teach.
+        clips: how many to teach from, where there are so many sources.
+    """
+    rng = np.random.default_rng(0)
+    found = []
+    for kind in taught:
+        own = np.flatnonzero(kinds == kind)
+        for _ in range(20):
+            order = rng.permutation(own)
+            _, firsts = np.unique(sources[order], return_index=True)
+            chosen = order[np.sort(firsts)][:clips]
+            rest = ~np.isin(sources, sources[chosen])
+            lead = taught_lead(heard.features[rest], heard.features[chosen], heard.near[rest])
+            found.append(Lesson(kind, lead, kinds[rest] == kind))
+    return found
+
+
+def fit_taught(given: Sequence[Lesson], c: Calibration) -> Calibration:
+    """Fit what counts as a taught kind; those that are and those that are not weigh the same."""
+    lead, right = (np.concatenate([getattr(lesson, name) for lesson in given]) for name in ("lead", "right"))
+    weights = np.where(right, (~right).sum() / right.sum(), 1.0)
+    bias, slope = fit_logistic(lead, right.astype(float), weights)
+    return replace(c, taught=(float(bias), float(slope)))

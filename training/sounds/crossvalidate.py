@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from training.sounds.calibrate import Evidence, evidence_of, joined
+from training.sounds.calibrate import Evidence, Lesson, evidence_of, joined, lessons
 from training.sounds.clips import (
     Corpus,
     Examples,
@@ -108,11 +108,19 @@ class Stranger:
         heard: of every clip of the fold.
         without: the kinds left out.
         unknown: which clips are of those.
+        kinds: the right kind of every clip.
+        sources: the recording that each was cut from.
     """
 
     heard: Evidence
     without: tuple[int, ...]
     unknown: np.ndarray
+    kinds: np.ndarray
+    sources: np.ndarray
+
+    def lessons(self, clips: int) -> list[Lesson]:
+        """Teach the kinds left out, each from some clips."""
+        return lessons(self.heard, self.kinds, self.sources, self.without, clips)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,9 +144,8 @@ class Answers:
 
 def example_bank(nets: Sequence[SoundNet], examples: Examples) -> tuple[np.ndarray, np.ndarray]:
     """Return the features of the recorded examples and of a few synthetic ones of each kind, sorted by kind."""
-    few = np.concatenate(
-        [np.flatnonzero(examples.synthetic_kinds == k)[:BANK_EACH] for k in np.unique(examples.synthetic_kinds)]
-    )
+    made = examples.synthetic_kinds
+    few = np.concatenate([np.flatnonzero(made == kind)[:BANK_EACH] for kind in np.unique(made)])
     features = np.concatenate([ensemble(nets, examples.recorded), ensemble(nets, examples.synthetic[few])])
     kinds = np.concatenate([examples.recorded_kinds, made[few]])
     order = np.argsort(kinds, kind="stable")
@@ -172,13 +179,14 @@ def hear_strangers(corpus: Corpus, networks: Networks, aims: np.ndarray) -> list
     folds = np.array([clip.fold for clip in corpus.clips])
     rows = np.flatnonzero(folds == LEFT_OUT_FOLD)
     kinds = np.array([recorded_kind(corpus.clips[i]) for i in rows])
+    sources = np.array([Path(corpus.clips[i].path).stem.rsplit("-", 1)[0] for i in rows])
     found = []
     for half in LEFT_OUT:
         nets = networks.of_fold(LEFT_OUT_FOLD, half)
         bank = example_bank(nets, corpus.examples(folds != LEFT_OUT_FOLD, half))
         without = tuple(list(RECORDED).index(kind) for kind in half)
         heard = evidence_of(ensemble(nets, corpus.mels[rows]), aims, *bank, without)
-        found.append(Stranger(heard, without, np.isin(kinds, without)))
+        found.append(Stranger(heard, without, np.isin(kinds, without), kinds, sources))
     return found
 
 

@@ -33,7 +33,6 @@ class TaughtSound:
     Attributes:
         name: what it is called.
         features: the unit features of its clips' windows.
-        own_cosine: how alike its own clips are (mean cosine of each to the nearest other), 0.9 where there is but one.
         clips: the names of the clips.
         model: the id of the encoder that made the features.
         checksum: of that encoder's weights; another encoder cannot use them.
@@ -41,7 +40,6 @@ class TaughtSound:
 
     name: str
     features: Float32[np.ndarray, "windows d"]
-    own_cosine: float
     clips: tuple[str, ...]
     model: str
     checksum: str
@@ -74,11 +72,9 @@ def teach_sound(
         raise AudioError(f"No clips were given to learn {name!r} from; give at least one sound file.")
     encoder = _embedded() if encoder is None else encoder
     sounds = [_audible(clip) for clip in clips]
-    of_clips = [encoder.encode(sound) for _, sound in sounds]
     taught = TaughtSound(
         name=name,
-        features=np.concatenate(of_clips).astype(np.float32),
-        own_cosine=_own_cosine(of_clips),
+        features=np.concatenate([encoder.encode(sound) for _, sound in sounds]).astype(np.float32),
         clips=tuple(label for label, _ in sounds),
         model=encoder.card.id,
         checksum=encoder.card.checksum,
@@ -145,16 +141,6 @@ def _audible(clip: Path | str | Sound) -> tuple[str, Sound]:
     return label, sound
 
 
-def _own_cosine(of_clips: Sequence[Float32[np.ndarray, "windows d"]]) -> float:
-    if len(of_clips) < 2:
-        return 0.9
-    nearest = []
-    for i, features in enumerate(of_clips):
-        rest = np.concatenate([other for j, other in enumerate(of_clips) if j != i])
-        nearest.append(float((features @ rest.T).max()))
-    return float(np.clip(np.mean(nearest), 0.5, 0.98))
-
-
 def _keep(taught: TaughtSound, root: Path) -> None:
     place = root / _slug(taught.name)
     place.mkdir(parents=True, exist_ok=True)
@@ -164,7 +150,6 @@ def _keep(taught: TaughtSound, root: Path) -> None:
     notes = {
         "schema": SCHEMA,
         "name": taught.name,
-        "own_cosine": taught.own_cosine,
         "clips": list(taught.clips),
         "model": taught.model,
         "checksum": taught.checksum,
@@ -185,7 +170,6 @@ def _read(notes_file: Path) -> TaughtSound:
         return TaughtSound(
             str(notes["name"]),
             features,
-            float(notes["own_cosine"]),
             tuple(notes["clips"]),
             notes["model"],
             notes["checksum"],

@@ -24,7 +24,7 @@ class Calibration:
         phrase: (bias, highest cosine) of the log-odds that a phrase names a known kind.
         word: (bias, log-odds of the matched posterior) of the log-odds that a sound is what a phrase names.
         pair: (bias, cosine, agreement of posteriors) of the log-odds that two sounds are of one kind.
-        taught: (middle between strangers and its own, slope) for taught kinds, in units of the gap between them.
+        taught: (bias, ``taught_lead``) of the log-odds that a window is of a taught kind.
     """
 
     temperature: float
@@ -103,3 +103,12 @@ def same_kind(cosine: Array, agreement: Array, c: Calibration) -> Array:
     """Return how likely two sounds are of one kind."""
     bias, by_cosine, by_agreement = c.pair
     return sigmoid(bias + by_cosine * cosine + by_agreement * agreement)
+
+
+def taught_lead(
+    features: Float[np.ndarray, "windows d"],
+    examples: Float[np.ndarray, "n d"],
+    near: Float[np.ndarray, "windows kinds"],
+) -> Float[np.ndarray, " windows"]:
+    """Return how much nearer each window is to the nearest taught example than to any known one (cosines)."""
+    return (features @ examples.T).max(axis=1).astype(np.float64) - near.max(axis=1)

@@ -30,6 +30,7 @@ from avlmaps.perception.embedded.sound_calibration import (
     nearness,
     same_kind,
     sigmoid,
+    taught_lead,
 )
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.perception.taught import TaughtSound, sounds_folder, taught_sounds
@@ -37,7 +38,6 @@ from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.resample import resampled
 
 _BATCH = 16
-_NARROWEST_GAP = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,23 +213,13 @@ class EmbeddedSounds:
         posterior, known = kinds_of_windows(features @ self._prototypes.T, near, self.calibration)
         likely = posterior * known[:, None]
         if taught:
-            own = np.stack([self._taught_likely(features, t) for t in taught], axis=1)
+            bias, slope = self.calibration.taught
+            leads = np.stack([taught_lead(features, t.features, near) for t in taught], axis=1)
+            own = sigmoid(bias + slope * leads)
             # what the user taught goes before what the network believes of a sound it was not made for
             likely = np.hstack([likely * (1.0 - own.max(axis=1, keepdims=True)), own])
             known = np.maximum(known, own.max(axis=1))
         return Heard(likely.max(axis=0), float(known.max()))
-
-    def _taught_likely(self, features: Float32[np.ndarray, "windows d"], taught: TaughtSound) -> np.ndarray:
-        """Return how likely each window is of a taught kind.
-
-        The scale runs from how alike the taught clips are to the nearest known kind, to how alike they are to each
-        other.
-        """
-        stranger = float((taught.features @ self._prototypes.T).max(axis=1).mean())
-        gap = max(taught.own_cosine - stranger, _NARROWEST_GAP)
-        middle, slope = self.calibration.taught
-        cosine = (features @ taught.features.T).max(axis=1)
-        return sigmoid(slope * ((cosine - taught.own_cosine) / gap + 1.0 - middle))
 
 
 def _direction(kinds: Float[np.ndarray, " kinds"]) -> Float[np.ndarray, " kinds"]:
