@@ -11,6 +11,7 @@ from avlmaps.cli.bench import Bench
 from avlmaps.cli.output import UsageError
 from avlmaps.cli.verbs import AddSounds, Build, Demo, Info, Locate, Profiles, Query, TeachSound
 from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.progress import end_bars
 
 _DESCRIPTION = """Audio-Visual-Language Maps: what a robot saw and heard, as one 3D map that can be asked.
 
@@ -28,6 +29,7 @@ Command = (
     | Annotated[Profiles, tyro.conf.subcommand("profiles")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
 )
+_SHOWN = 200
 _CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff)
 
 
@@ -46,6 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     # One BLAS thread: small matrices, ours among them, run many times slower on several when a machine is busy.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # a truncated picture is told in our words
     verb = tyro.cli(Command, prog="avlmaps", description=_DESCRIPTION, args=words, config=_CONFIG)
     sys.exit(_run(verb))
 
@@ -61,12 +64,22 @@ def _run(verb: Command) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        return _complain(error, 1)
+        return _complain(_sentence(error), 1)
     except KeyboardInterrupt:
         return _complain("stopped; the same command goes on where this one ended, where it can", 130)
     return 0
 
 
+def _sentence(error: OSError) -> str:
+    """Tell what the system refused, without its numbers for it."""
+    if error.filename is None or error.strerror is None:
+        return f"{error}; check the files and the space on the disk."
+    name = str(error.filename)
+    shown = name if len(name) <= _SHOWN else f"{name[: _SHOWN // 2]}...{name[-_SHOWN // 2 :]}"
+    return f"{shown}: {error.strerror}; check the path, its permissions and the space on the disk."
+
+
 def _complain(what: object, status: int) -> int:
+    end_bars()
     sys.stderr.write(f"avlmaps: {what}\n")
     return status

@@ -3,10 +3,11 @@
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import TypeVar
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 _quiet = False
+_open_bars: list[Any] = []
 
 
 def silence(quiet: bool = True) -> None:
@@ -41,7 +42,7 @@ def progress(
     from tqdm import tqdm
 
     on_terminal = sys.stderr.isatty()
-    yield from tqdm(
+    bar = tqdm(
         items,
         desc=label,
         total=total,
@@ -53,6 +54,18 @@ def progress(
         dynamic_ncols=on_terminal,
         ascii=not on_terminal,
     )
+    _open_bars.append(bar)
+    try:
+        yield from bar
+    finally:
+        bar.close()
+        _open_bars.remove(bar)
+
+
+def end_bars() -> None:
+    """End the line of every bar that an error left open: its loop is closed only when the error is forgotten."""
+    for bar in _open_bars:
+        bar.close()
 
 
 def say(message: str) -> None:

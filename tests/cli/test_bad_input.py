@@ -1,0 +1,37 @@
+"""What strangers hand in: each time one sentence, on a line of its own, and nothing on standard output."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+
+def test_an_error_in_the_middle_of_a_loop_stands_on_its_own_last_line(walk: Path, run, tmp_path: Path) -> None:
+    copy = tmp_path / "rec"
+    shutil.copytree(walk, copy)
+    for depth in sorted((copy / "depth").iterdir())[:12]:
+        depth.write_bytes(depth.read_bytes()[:200])
+    status, out, err = run("build", copy, "--out", tmp_path / "map")
+    assert (status, out) == (1, "")
+    last = err.rstrip("\n").replace("\r", "\n").split("\n")[-1]
+    assert last.startswith("avlmaps: ")
+    assert "frames cannot be read" in last
+
+
+def test_a_name_that_the_system_refuses_is_told_without_its_number_for_it(built: Path, run) -> None:
+    status, out, err = run("query", built, "--image", "x" * 300 + ".png")
+    assert (status, out) == (1, "")
+    assert err.count("\n") == 1
+    assert "Errno" not in err
+    assert "File name too long; check the path" in err
+
+
+def test_a_truncated_photo_is_told_in_our_words_alone(built: Path, walk: Path, tmp_path: Path) -> None:
+    photo = tmp_path / "photo.png"
+    photo.write_bytes(next((walk / "rgb").iterdir()).read_bytes()[:1500])
+    words = [sys.executable, "-m", "avlmaps", "locate", str(built), str(photo)]
+    plain = {name: value for name, value in os.environ.items() if name != "OPENCV_LOG_LEVEL"}
+    told = subprocess.run(words, capture_output=True, text=True, env=plain, check=False)
+    assert (told.returncode, told.stdout) == (1, "")
+    assert told.stderr == f"avlmaps: The picture {photo} cannot be read as an image; use a PNG or a JPEG.\n"
