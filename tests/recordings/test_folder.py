@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tracemalloc
+import warnings
 from pathlib import Path
 
 import cv2
@@ -206,7 +207,8 @@ def test_a_clock_that_was_set_back_costs_the_shorter_part_and_no_more(tmp_path: 
         ({"schema_version": 2}, "has schema version 2; this avlmaps reads version 1: update avlmaps."),
         ({"schema_version": 0}, "has schema version 0; this avlmaps reads version 1: write the recording again."),
         ({"depth_units_per_m": "1000"}, "recording.json at depth_units_per_m: expected `float`, got `str`; mend the"),
-        ({"depth_units_per_m": 0}, "recording.json: depth_units_per_m is 0.0; it must be positive; mend the file."),
+        ({"depth_units_per_m": 0}, "recording.json: depth_units_per_m is 0; it must be positive and at most 1e+06, 10"),
+        ({"depth_units_per_m": 1e300}, "depth_units_per_m is 1e+300; it must be positive and at most 1e+06, 1000 for"),
         ({"rgb_rate_hz": -1}, "recording.json: rgb_rate_hz is -1.0; it must be positive; mend the file."),
         ({"depth_scale": 5000}, "recording.json: object contains unknown field `depth_scale`; mend the file."),
         ({"world_from_camera": "opengl"}, "recording.json at world_from_camera: invalid enum value 'opengl'; mend"),
@@ -425,3 +427,13 @@ def test_a_recording_whose_writer_was_killed_is_refused(tmp_path: Path):
         open_recording(tmp_path / "walk")
     (fault,) = validate(tmp_path / "walk")
     assert fault.fatal and fault.file == tmp_path / "walk/UNFINISHED"
+
+
+def test_stamps_that_are_no_numbers_are_refused_without_a_warning(tmp_path: Path):
+    folder = write_folder(tmp_path / "rec")
+    rows = (folder / "poses.csv").read_text().splitlines()
+    (folder / "poses.csv").write_text("\n".join([rows[0], *("nan," + row.split(",", 1)[1] for row in rows[1:])]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(RecordingError, match="has no frame with a usable pose"):
+            open_recording(folder)

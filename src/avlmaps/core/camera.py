@@ -5,6 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
+# Focal lengths and principal points beyond so many sizes of the image are mistakes, and would overflow further on.
+_MOST_SIZES = 1e6
+_MOST_PIXELS = 1 << 28
+
 
 @dataclass(frozen=True, slots=True)
 class Pinhole:
@@ -32,6 +36,11 @@ class Pinhole:
             raise ValueError(f"a camera needs finite numbers and positive focal lengths, not {numbers}")
         if self.width < 1 or self.height < 1:
             raise ValueError(f"a camera needs at least one pixel, not {self.width}x{self.height}")
+        if self.width * self.height > _MOST_PIXELS:
+            raise ValueError(f"a camera of {self.width}x{self.height} pixels is larger than any that is known")
+        most = _MOST_SIZES * max(self.width, self.height)
+        if max(abs(number) for number in numbers) > most or min(self.fx, self.fy) < 1.0 / _MOST_SIZES:
+            raise ValueError(f"{numbers} cannot be fx, fy, cx, cy of a {self.width}x{self.height} picture")
 
     @property
     def matrix(self) -> Float[np.ndarray, "3 3"]:

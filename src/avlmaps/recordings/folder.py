@@ -210,8 +210,9 @@ def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, tuple[str, .
     """
     stamps_s = known.stamps_s if found.stamps_s is None else found.stamps_s
     start_s, notices = 0.0, []
-    if np.nanmin(np.append(stamps_s, np.inf)) > _DATE_S:
-        start_s = float(np.nanmin(stamps_s))
+    finite_s = stamps_s[np.isfinite(stamps_s)]
+    if len(finite_s) and finite_s.min() > _DATE_S:
+        start_s = float(finite_s.min())
         notices.append(f"The stamps are dates; time 0 is the first frame's, {start_s:.6f} s since 1970.")
     own_row = len(stamps_s) == len(known.stamps_s) and np.array_equal(stamps_s, known.stamps_s, equal_nan=True)
     covered, world_from_camera = np.ones(len(stamps_s), bool), known.world_from_camera

@@ -29,6 +29,8 @@ FRAMES = "frames.csv"
 POSES_HEADER = "stamp_s,tx,ty,tz,qx,qy,qz,qw"
 FRAMES_HEADER = "name,stamp_s"
 VIDEO_SUFFIXES = (".mp4", ".mkv", ".mov", ".webm", ".avi")
+# 16-bit depth in finer units than this would end within 7 cm of the camera.
+_MOST_DEPTH_UNITS = 1e6
 COLOUR_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
@@ -164,8 +166,11 @@ def _impossible(description: Description) -> str:
         description.rig()
     except ValueError as error:
         return str(error)
-    if not description.depth_units_per_m > 0.0:
-        return f"depth_units_per_m is {description.depth_units_per_m}; it must be positive"
+    if not 0.0 < description.depth_units_per_m <= _MOST_DEPTH_UNITS:
+        return (
+            f"depth_units_per_m is {description.depth_units_per_m:g}; it must be positive and at most "
+            f"{_MOST_DEPTH_UNITS:g}, 1000 for millimetres"
+        )
     if description.rgb_rate_hz is not None and not description.rgb_rate_hz > 0.0:
         return f"rgb_rate_hz is {description.rgb_rate_hz}; it must be positive"
     if description.up_in_world is not None and not 0.99 < float(np.linalg.norm(description.up_in_world)) < 1.01:
