@@ -19,6 +19,7 @@ UNDERSTOOD = {
     "the chair near where the dog barking can be heard": [("object", "chair"), ("sound", "dog barking")],
     "the chair where you heard the dog bark": [("object", "chair"), ("sound", "dog bark")],
     "the chair where I heard the sound of rain": [("object", "chair"), ("sound", "rain")],
+    "where a baby was heard crying": [("sound", "baby crying")],
     "go to the barking of a dog": [("sound", "dog barking")],
     "the sound of a baby crying": [("sound", "baby crying")],
     "the table in the kitchen": [("object", "table"), ("area", "kitchen")],
@@ -76,3 +77,9 @@ def test_what_is_not_understood_is_named() -> None:
         parse_sentence("the chair near near the table")
     with pytest.raises(QueryError, match=r"^'%' is not understood at the start of the sentence"):
         parse_sentence("% of")
+
+
+def test_a_text_that_is_no_question_is_refused_by_its_length() -> None:
+    with pytest.raises(QueryError, match=r"^The sentence has 12000 characters, more than 500; say it shorter, like: the"):
+        parse_sentence("red " * 3000)
+    assert len(parse_sentence("red " * 120).parts) == 1

@@ -8,7 +8,7 @@ from importlib.resources import files
 from typing import Any
 
 from avlmaps.core.errors import QueryError
-from avlmaps.query.question import Modality, Part, Question
+from avlmaps.query.question import MOST_CHARACTERS, Modality, Part, Question
 
 # A phrase that ends in one of these is an area; "kitchen table" ends in a thing.
 AREA_WORDS = frozenset({
@@ -25,12 +25,16 @@ def parse_sentence(sentence: str) -> Question:
     """Return the question that a sentence asks; its first part is sought, the others say where it is.
 
     Raises:
-        QueryError: the sentence is empty or is of no form that is understood; it names the place.
+        QueryError: the sentence is empty, too long, or of no form that is understood; it names the place.
     """
     from lark.exceptions import UnexpectedEOF, UnexpectedInput, UnexpectedToken
 
     if not sentence.strip(" \t\r\n.,?!"):
         raise QueryError(f"The sentence is empty; say what is sought, such as: {_EXAMPLE}.")
+    if len(sentence) > MOST_CHARACTERS:
+        raise QueryError(
+            f"The sentence has {len(sentence)} characters, more than {MOST_CHARACTERS}; say it shorter, like: {_EXAMPLE}."
+        )
     try:
         tree = _parser().parse(sentence)
     except UnexpectedInput as fault:
@@ -74,7 +78,7 @@ def _part(node: Any) -> Part:
         return Part(Modality.SOUND, _file(node, "CLIP_FILE"), is_file=True)
     if node.data == "picture":
         return Part(Modality.IMAGE, _file(node, "IMAGE_FILE"), is_file=True)
-    words = _words(inner[0])
+    words = [word for phrase in inner for word in _words(phrase)]
     if node.data == "sound_verb":
         verb = next(str(token) for token in node.children if getattr(token, "type", "") == "SOUND_VERB")
         return Part(Modality.SOUND, f"{' '.join(words)} {verb.lower()}")
