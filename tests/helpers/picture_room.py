@@ -81,9 +81,17 @@ class Room:
             # The box wears the walls' paint, shifted, so that it looks like nothing else in the room.
             shift = np.where(on_box[mine], 2.9, 0.0)[:, None]
             texel = ((hit[mine][:, across] + shift) / _TEXEL_M).astype(np.float32) % 511
-            if len(texel):
-                picture[mine] = cv2.remap(wall, texel[None, :, 0], texel[None, :, 1], cv2.INTER_LINEAR)[0]
+            picture[mine] = between_texels(wall, texel)
         return picture, depth
+
+
+def between_texels(picture: np.ndarray, xy: np.ndarray) -> np.ndarray:
+    """Return bilinear samples at (n, 2) places within a picture."""
+    column, row = np.floor(xy).astype(int).T
+    right, down = (xy - np.floor(xy)).T[..., None]
+    above = picture[row, column] * (1 - right) + picture[row, column + 1] * right
+    below = picture[row + 1, column] * (1 - right) + picture[row + 1, column + 1] * right
+    return (above * (1 - down) + below * down).round().astype(np.uint8)
 
 
 class RoomWalk(Recording):
