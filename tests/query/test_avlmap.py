@@ -185,3 +185,20 @@ def test_a_models_mismatch_is_told_before_anything_is_compared() -> None:
     with pytest.raises(BackendError, match="another model for sounds"):
         AVLMap(stored).sound("dog")
     assert fake_profile().name == "fake"
+
+
+def test_a_phrase_that_is_a_whole_text_is_refused() -> None:
+    with pytest.raises(QueryError, match=r"^The sound asked for has 10000 characters, more than 500; name it in a few"):
+        Part(Modality.SOUND, "x" * 10000)
+    assert Part(Modality.IMAGE, "x" * 600 + ".png", is_file=True).is_file
+
+
+def test_the_peak_of_a_picture_taken_far_from_any_voxel_is_that_of_its_place(
+    heard: AVLMap, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pose = np.eye(4)
+    pose[:3, 3] = [30.0, 20.0, 1.5]
+    locating(monkeypatch, pose)
+    monkeypatch.setattr("avlmaps.query.avlmap.read_picture", lambda path: np.zeros((48, 64, 3), np.uint8))
+    answer = heard.ask(Question.of([Part(Modality.IMAGE, "photo.png", is_file=True)]))
+    assert (answer.goals[0].score, answer.parts[0].peak) == (1.0, 1.0)

@@ -33,7 +33,8 @@ def parse_sentence(sentence: str) -> Question:
         raise QueryError(f"The sentence is empty; say what is sought, such as: {_EXAMPLE}.")
     if len(sentence) > MOST_CHARACTERS:
         raise QueryError(
-            f"The sentence has {len(sentence)} characters, more than {MOST_CHARACTERS}; say it shorter, like: {_EXAMPLE}."
+            f"The sentence has {len(sentence)} characters, more than {MOST_CHARACTERS}; say it shorter, like: "
+            f"{_EXAMPLE}."
         )
     try:
         tree = _parser().parse(sentence)

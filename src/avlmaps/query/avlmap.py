@@ -13,7 +13,7 @@ from jaxtyping import UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.registry import Kind
 from avlmaps.query.areas import AreaSettings, area_factor
-from avlmaps.query.heatmap import Heatmap, HeatSettings, fused
+from avlmaps.query.heatmap import Factor, Heatmap, HeatSettings, NearAnchors, fused
 from avlmaps.query.images import image_factor, read_picture, require_fitting
 from avlmaps.query.level import Space
 from avlmaps.query.objects import ObjectSettings, Rivals, object_factor
@@ -198,10 +198,16 @@ class AVLMap:
         goals, found = heat.goals(top), heat.found
         elapsed_ms = 1e3 * (time.perf_counter() - begin)
         parts = [
-            PartAnswer(part, float(factor.values.max(initial=0.0)), factor.found, factor.understood, factor.note)
+            PartAnswer(part, _peak(factor), factor.found, factor.understood, factor.note)
             for part, factor in zip(question.parts, heat.factors, strict=True)
         ]
         return Answer(tuple(goals), found, tuple(parts), elapsed_ms, heat)
+
+
+def _peak(factor: Factor) -> float:
+    """Return the highest heat; that of places is highest where the robot stood, far from any voxel maybe."""
+    at_places = factor.scores.max(initial=0.0) if isinstance(factor, NearAnchors) else 0.0
+    return float(max(factor.values.max(initial=0.0), at_places))
 
 
 def _role(primary: bool) -> Role:

@@ -10,6 +10,9 @@ from avlmaps.core.errors import QueryError
 if TYPE_CHECKING:
     from avlmaps.query.heatmap import Heatmap
 
+# Nobody calls a thing by more; a text that was pasted by mistake would be read for minutes.
+MOST_CHARACTERS = 500
+
 
 class Modality(StrEnum):
     """The four ways to point at a place; the value is the word on the command line."""
@@ -46,6 +49,11 @@ class Part:
     def __post_init__(self) -> None:
         if not self.query.strip():
             raise QueryError(f"The {self.modality} asked for is empty; name one, such as {_EXAMPLES[self.modality]}.")
+        if len(self.query) > MOST_CHARACTERS and not self.is_file:
+            raise QueryError(
+                f"The {self.modality} asked for has {len(self.query)} characters, more than {MOST_CHARACTERS}; name it "
+                f"in a few words, such as {_EXAMPLES[self.modality]}."
+            )
 
 
 _EXAMPLES = {
@@ -120,7 +128,7 @@ class PartAnswer:
 
     Attributes:
         part: the part.
-        peak: its highest heat anywhere in the map.
+        peak: its highest heat anywhere: at the map's voxels and at the places that the heat falls from.
         found: whether the map holds it, by itself.
         understood: what the encoder could act on.
         note: why it was not found, or what to know; ``""`` for nothing.
