@@ -216,33 +216,28 @@ def _without_specks(
 
 
 def joined_pieces(
-    points_level: Float[np.ndarray, "a 3"], instance: Int[np.ndarray, " a"], link_m: float, join_m: float
+    points_level: Float[np.ndarray, "a 3"], instance: Int[np.ndarray, " a"], cell_m: float, join_m: float
 ) -> Int[np.ndarray, " i"]:
     """Return for each instance the number of the thing that it is a piece of.
 
     A thing of thin parts comes in pieces: the camera saw a chair's legs and its back and little between. Two
-    pieces are one thing where the smaller one's footprint lies mostly within the larger one's (widened by
-    ``link_m``) and the gap between them in height is at most ``join_m``.
+    pieces are one thing where at least half of the smaller one's columns (of ``cell_m``, seen from above) hold the
+    other too, with nothing else between them and at most ``join_m`` in height.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     count = int(instance.max(initial=-1)) + 1
-    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    np.minimum.at(low, instance, points_level)
-    np.maximum.at(high, instance, points_level)
-    low[:, :2] -= link_m / 2
-    high[:, :2] += link_m / 2
-    footprint = np.prod(high[:, :2] - low[:, :2], axis=1)
-    # Sorted by their left edge, a piece can only overlap those whose left edge lies before its right one.
-    order = np.argsort(low[:, 0], kind="stable")
-    last = np.searchsorted(low[order, 0], high[order, 0])
-    a = np.repeat(np.arange(count), last - np.arange(count))
-    b = np.arange(len(a)) - np.repeat(np.cumsum(last - np.arange(count)) - last, last - np.arange(count))
-    a, b = order[a], order[b]
-    shared = np.minimum(high[a], high[b]) - np.maximum(low[a], low[b])
-    overlap = np.prod(np.maximum(shared[:, :2], 0.0), axis=1)
-    same = (overlap > 0.5 * np.minimum(footprint[a], footprint[b])) & (shared[:, 2] >= -join_m)
+    cell = np.unique(np.floor(points_level[:, :2] / cell_m), axis=0, return_inverse=True)[1].reshape(-1)
+    columns = np.bincount(np.unique(np.stack([instance, cell]), axis=1)[0], minlength=count)
+    order = np.lexsort((points_level[:, 2], cell))
+    below, above = order[:-1], order[1:]
+    near = (cell[below] == cell[above]) & (points_level[above, 2] - points_level[below, 2] <= join_m)
+    meeting = near & (instance[below] != instance[above])
+    a, b = np.sort(np.stack([instance[below], instance[above]])[:, meeting], axis=0)
+    met = np.unique(np.stack([a, b, cell[below][meeting]]), axis=1)[:2]
+    (a, b), times = np.unique(met, axis=1, return_counts=True)
+    same = 2 * times >= np.minimum(columns[a], columns[b])
     links = coo_array((np.ones(int(same.sum()), bool), (a[same], b[same])), shape=(count, count))
     return connected_components(links, directed=False)[1]
 
