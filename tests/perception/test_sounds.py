@@ -1,5 +1,6 @@
 """The embedded sound encoder: its promises, and a smoke test on recordings (which its weights have heard)."""
 
+import json
 from importlib.resources import files
 from pathlib import Path
 from time import process_time
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import AudioError
 from avlmaps.perception.embedded import logmel
 from avlmaps.perception.embedded.sounds import EmbeddedSounds
+from avlmaps.perception.embedded.words import EmbeddedWords
 from avlmaps.perception.protocols import SoundEncoder
 from avlmaps.recordings.audio import AudioTrack, Sound
 
@@ -42,6 +44,11 @@ def test_is_a_sound_encoder(encoder: EmbeddedSounds) -> None:
 def test_weights_take_at_most_four_megabytes() -> None:
     weights = files("avlmaps.perception.embedded") / "weights"
     assert sum(len((weights / name).read_bytes()) for name in ("sounds.onnx", "sounds.json", "sounds.npy")) <= 4_000_000
+
+
+def test_the_weights_live_in_the_space_of_the_shipped_words() -> None:
+    notes = json.loads((files("avlmaps.perception.embedded") / "weights" / "sounds.json").read_text())
+    assert notes["words"] == EmbeddedWords().card.checksum, "run python -m training.sounds to turn the features"
 
 
 @given(seconds=st.floats(0.0, 20.0), rate_hz=st.sampled_from([8_000, 16_000, 22_050, 44_100, 48_000]))

@@ -20,6 +20,8 @@ from avlmaps.perception.embedded.sound_calibration import (
 
 START = Calibration(0.07, (0.0, 0.0, 0.0), 0.05, (0.0, 0.0), (0.0, 1.0), (0.0, 0.0, 0.0), (-4.0, 8.0))
 
+UNKNOWN_SHARE = 0.2
+
 # Phrases that name no sound; with the kinds' other names they fit what counts as naming one. Not used for testing.
 NO_SOUNDS = (
     "chair table sofa bed lamp carpet curtain wardrobe bookshelf pillow mirror picture frame|wooden stool|red cabinet|"
@@ -159,7 +161,7 @@ def fit_word(
     encode_words: EncodeWords,
     c: Calibration,
 ) -> Calibration:
-    """Fit the last step of a question in words, as if every other sound of a building were of no known kind.
+    """Fit the last step of a question in words, as if UNKNOWN_SHARE of a building's sounds were of no known kind.
 
     Args:
         heard: held-out clips of the ten recorded kinds; each is asked for by all ten names.
@@ -173,11 +175,12 @@ def fit_word(
     right = kinds[:, None] == np.arange(len(RECORDED))[None, :]
     parts, labels, weights = [odds.ravel()], [right.ravel()], [np.ones(odds.size)]
     count = sum(len(strange) for strange, _ in unknown)
+    odds_unknown = UNKNOWN_SHARE / (1.0 - UNKNOWN_SHARE)
     for strange, asked in unknown:
         wrong = matching_odds(strange, [KINDS[list(RECORDED)[k]][0] for k in asked], encode_words, c).ravel()
         parts.append(wrong)
         labels.append(np.zeros(wrong.size, bool))
-        weights.append(np.full(wrong.size, len(heard) / count * len(RECORDED) / len(asked)))
+        weights.append(np.full(wrong.size, odds_unknown * len(heard) / count * len(RECORDED) / len(asked)))
     x, y, w = (np.concatenate(part) for part in (parts, labels, weights))
     bias, slope = fit_logistic(x, y.astype(float), w)
     return replace(c, word=(float(bias), float(slope)))
@@ -239,8 +242,8 @@ def lessons(heard: Evidence, kinds: np.ndarray, sources: np.ndarray, taught: Seq
 
 
 def fit_taught(given: Sequence[Lesson], c: Calibration) -> Calibration:
-    """Fit what counts as a taught kind; those that are and those that are not weigh the same."""
+    """Fit what counts as a taught kind; those that are weigh half of those that are not."""
     lead, right = (np.concatenate([getattr(lesson, name) for lesson in given]) for name in ("lead", "right"))
-    weights = np.where(right, (~right).sum() / right.sum(), 1.0)
+    weights = np.where(right, 0.5 * (~right).sum() / right.sum(), 1.0)
     bias, slope = fit_logistic(lead, right.astype(float), weights)
     return replace(c, taught=(float(bias), float(slope)))
