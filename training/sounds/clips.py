@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float32
 from training.sounds.kinds import RECORDED, SYNTHESISED
-from training.sounds.synthesis import MAKERS
 
 from avlmaps.core.progress import progress
 from avlmaps.perception.embedded import logmel
+from avlmaps.sim.synthesis import MAKERS
 
 SHIPPABLE = ("CC0", "CC-BY ")  # the start of a licence with which a clip may teach weights that ship
 
