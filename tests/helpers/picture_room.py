@@ -51,18 +51,10 @@ class Room:
     @cached_property
     def walls(self) -> list[np.ndarray]:
         rng = np.random.default_rng(self.seed)
-        return [painting(rng) for _ in range(6)]
+        return [cv2.GaussianBlur(painting(rng), (0, 0), 0.8) for _ in range(6)]
 
     def render(self, world_from_camera: np.ndarray, camera: Pinhole = CAMERA) -> tuple[np.ndarray, np.ndarray]:
-        """Return the colour picture, averaged over four samples a pixel, and the exact z-depth at pixel centres."""
-        fine = camera.resized(2 * camera.width, 2 * camera.height)
-        colour = cv2.resize(
-            self.shot(world_from_camera, fine)[0], (camera.width, camera.height), interpolation=cv2.INTER_AREA
-        )
-        return colour, self.shot(world_from_camera, camera)[1].astype(np.float32)
-
-    def shot(self, world_from_camera: np.ndarray, camera: Pinhole) -> tuple[np.ndarray, np.ndarray]:
-        """Return colour and depth, one sample a pixel."""
+        """Return the colours and the exact z-depths at pixel centres; paint is as soft as a pixel at 2 m is wide."""
         eye = world_from_camera[:3, 3]
         rays = camera.rays() @ world_from_camera[:3, :3].T
         rays = np.where(np.abs(rays) < 1e-12, 1e-12, rays)
@@ -82,7 +74,7 @@ class Room:
             shift = np.where(on_box[mine], 2.9, 0.0)[:, None]
             texel = ((hit[mine][:, across] + shift) / _TEXEL_M).astype(np.float32) % 511
             picture[mine] = between_texels(wall, texel)
-        return picture, depth
+        return picture, depth.astype(np.float32)
 
 
 def between_texels(picture: np.ndarray, xy: np.ndarray) -> np.ndarray:
@@ -111,8 +103,9 @@ class RoomWalk(Recording):
 
     def frame(self, index: int) -> Frame:
         world_from_depth = self.world_from_camera[index]
-        rgb = self.room.render(world_from_depth @ inverse(self.rig.rgb_from_depth), self.rig.rgb)[0]
-        depth_m = self.room.shot(world_from_depth, self.rig.depth)[1].astype(np.float32)
+        rgb, depth_m = self.room.render(world_from_depth @ inverse(self.rig.rgb_from_depth), self.rig.rgb)
+        if depth_m.shape != (self.rig.depth.height, self.rig.depth.width) or not self.rig.registered:
+            depth_m = self.room.render(world_from_depth, self.rig.depth)[1]
         return Frame(index, f"{index:06d}", float(self.stamps_s[index]), rgb, depth_m, world_from_depth, self.rig)
 
 

@@ -16,6 +16,7 @@ from avlmaps.perception.profiles import Profile
 from avlmaps.perception.protocols import LocalFeatures, Pose
 
 _SAME_ASPECT = 0.01
+_SAME_SIDE = 0.25  # cosine: no descriptor bears a change of view by more than 75 degrees
 
 
 class LocatableMap(Protocol):
@@ -162,8 +163,10 @@ def locate_features(
 
 def alike(keyframes: Keyframes, place: Float32[np.ndarray, " d"], count: int) -> Int[np.ndarray, " k"]:
     """Return the keyframes whose place descriptors are the most like the given one, best first."""
+    if not len(keyframes):
+        return np.zeros(0, np.int64)
     likeness = keyframes.place @ place
-    best = np.argpartition(-likeness, min(count, len(likeness)) - 1)[:count] if len(likeness) else np.zeros(0, int)
+    best = np.argpartition(-likeness, min(count, len(likeness)) - 1)[:count]
     return best[np.lexsort((best, -likeness[best]))]
 
 
@@ -204,6 +207,9 @@ def _fit(
     if settings.refine_focal:
         camera, estimate = _with_better_focal(xy, pairs.points_world, camera, estimate, rng, settings)
     pose, agrees = estimate
+    agrees = agrees & _seen_from_the_same_side(stored.keyframes, pairs, pose.world_from_camera)
+    if not agrees.any():
+        return None
     keypoints = np.unique(pairs.keypoint[agrees])
     score = min(
         _confidence(len(keypoints), settings.min_inliers),
@@ -273,6 +279,19 @@ def _matched_points(stored: LocatableMap, local: LocalFeatures, references: Int[
         keyframe.append(np.full(int(has_point.sum()), reference))
         points.append(points_world[has_point])
     return _Pairs(np.concatenate(keypoint), np.concatenate(keyframe), np.concatenate(points))
+
+
+def _seen_from_the_same_side(
+    keyframes: Keyframes, pairs: _Pairs, world_from_camera: Float[np.ndarray, "4 4"]
+) -> Bool[np.ndarray, " n"]:
+    """Return which points are seen from about where their keyframe saw them.
+
+    Nothing looks the same from the other side; but a mirrored wall does fit a camera that stands behind the wall.
+    """
+    now = pairs.points_world - world_from_camera[:3, 3]
+    then = pairs.points_world - keyframes.world_from_camera[pairs.keyframe, :3, 3]
+    cosine = (now * then).sum(axis=1) / (np.linalg.norm(now, axis=1) * np.linalg.norm(then, axis=1) + 1e-12)
+    return cosine > _SAME_SIDE
 
 
 def _camera_of(rgb: UInt8[np.ndarray, "h w 3"], camera: Pinhole | None, own: Pinhole) -> Pinhole:

@@ -1,0 +1,175 @@
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from avlmaps.bench.locate import MapOfPictures, map_of
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import QueryError
+from avlmaps.core.poses import inverse, rotation_angle_rad
+from avlmaps.maps.keyframes import assembled
+from avlmaps.perception.profiles import profile
+from avlmaps.query.locate import Located, LocateSettings, alike, locate, nearest
+from helpers.picture_room import CAMERA, Room, RoomWalk, looking, painting
+
+PHOTO_FROM = looking((2.9, 1.9, 1.3), (0.2, 0.4, 1.0))
+APART = np.eye(4)
+APART[:3, 3] = (-0.05, 0.01, 0.0)
+WALK = RoomWalk(frames=30)
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+@pytest.fixture(scope="module")
+def stored() -> MapOfPictures:
+    return map_of(WALK, profile("embedded"), rng())
+
+
+@pytest.fixture(scope="module")
+def photo() -> np.ndarray:
+    return WALK.room.render(PHOTO_FROM)[0]
+
+
+def assert_at(found: Located, true: np.ndarray, cm: float = 1.5, deg: float = 0.5) -> None:
+    assert found.world_from_camera is not None
+    assert 100 * np.linalg.norm(found.world_from_camera[:3, 3] - true[:3, 3]) < cm
+    assert np.rad2deg(rotation_angle_rad(found.world_from_camera, true)) < deg
+
+
+def test_a_photo_from_a_place_where_no_keyframe_was_taken_is_located(stored: MapOfPictures, photo: np.ndarray) -> None:
+    found = locate(stored, photo, None, rng())
+    assert_at(found, PHOTO_FROM)
+    assert found.inliers > 60
+    assert 0.5 <= found.score < 1.0
+    assert found.reference_stamp_s in stored.keyframes.stamp_s
+    assert found.elapsed_ms > 0.0
+    assert found.camera == CAMERA
+
+
+def test_a_keyframe_itself_is_located_where_it_was_taken(stored: MapOfPictures) -> None:
+    frame = WALK.frame(7)
+    found = locate(stored, frame.rgb, None, rng())
+    assert_at(found, frame.world_from_camera, cm=0.5, deg=0.2)
+    assert found.reference_stamp_s == frame.stamp_s
+
+
+def test_the_same_question_has_the_same_answer(stored: MapOfPictures, photo: np.ndarray) -> None:
+    a, b = (locate(stored, photo, None, rng()) for _ in range(2))
+    np.testing.assert_array_equal(a.world_from_camera, b.world_from_camera)
+    assert replace(a, world_from_camera=None, elapsed_ms=0.0) == replace(b, world_from_camera=None, elapsed_ms=0.0)
+
+
+def test_a_photo_of_another_size_is_taken_for_the_maps_own_camera(stored: MapOfPictures) -> None:
+    large = WALK.room.render(PHOTO_FROM, CAMERA.resized(480, 360))[0]
+    assert_at(locate(stored, large, None, rng()), PHOTO_FROM)
+
+
+def test_a_photo_of_another_shape_needs_intrinsics(stored: MapOfPictures, photo: np.ndarray) -> None:
+    upright = np.ascontiguousarray(photo[:, 70:250])
+    with pytest.raises(QueryError) as caught:
+        locate(stored, upright, None, rng())
+    assert str(caught.value) == (
+        "The picture is 180x240 and the map's own camera 320x240, so another camera took it; "
+        "say which: --intrinsics fx,fy,cx,cy."
+    )
+    cropped = Pinhole(CAMERA.fx, CAMERA.fy, CAMERA.cx - 70.0, CAMERA.cy, 180, 240)
+    assert_at(locate(stored, upright, cropped, rng()), PHOTO_FROM)
+
+
+def test_a_camera_of_another_size_than_the_photo_is_a_mistake(stored: MapOfPictures, photo: np.ndarray) -> None:
+    with pytest.raises(ValueError, match="the camera is 640x480 and the picture 320x240"):
+        locate(stored, photo, CAMERA.resized(640, 480), rng())
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.0, 585 / 525])
+def test_a_focal_length_that_does_not_fit_is_found_out(stored: MapOfPictures, photo: np.ndarray, factor: float) -> None:
+    found = locate(stored, photo, replace(CAMERA, fx=CAMERA.fx * factor, fy=CAMERA.fy * factor), rng())
+    assert_at(found, PHOTO_FROM, cm=3.0)
+    assert found.camera.fx == pytest.approx(CAMERA.fx, rel=0.01)
+
+
+def test_the_focal_length_is_kept_where_the_caller_is_sure(stored: MapOfPictures, photo: np.ndarray) -> None:
+    sure = replace(CAMERA, fx=CAMERA.fx * 1.1, fy=CAMERA.fy * 1.1)
+    found = locate(stored, photo, sure, rng(), LocateSettings(refine_focal=False))
+    assert found.camera == sure
+
+
+def test_the_pose_is_that_of_the_camera_that_took_the_photo() -> None:
+    """With a colour camera beside the depth camera, whose poses the recording holds."""
+    recording = RoomWalk(rig=Rig(CAMERA, Pinhole(290.0, 290.0, 160.0, 120.0, 320, 240), APART))
+    apart = map_of(recording, profile("embedded"), rng())
+    frame = recording.frame(5)
+    found = locate(apart, frame.rgb, None, rng())
+    assert_at(found, frame.world_from_camera @ inverse(APART), cm=1.0)
+
+
+def test_two_hundred_pictures_of_other_places_are_refused(stored: MapOfPictures) -> None:
+    other = RoomWalk(frames=40, seed=99)
+    pictures = [other.frame(i).rgb for i in range(40)]
+    pictures += [painting(np.random.default_rng(seed), 240, 320, shapes=300) for seed in range(140)]
+    pictures += [np.random.default_rng(seed).integers(0, 256, (240, 320, 3)).astype(np.uint8) for seed in range(20)]
+    found = [locate(stored, picture, None, rng()) for picture in pictures]
+    assert [one.world_from_camera for one in found] == [None] * len(pictures)
+    assert max(one.score for one in found) < 0.5
+    assert max(one.inliers for one in found) < LocateSettings().min_inliers
+
+
+def test_the_mirrored_room_is_another_place(stored: MapOfPictures) -> None:
+    for index in range(0, 30, 3):
+        mirrored = np.ascontiguousarray(WALK.frame(index).rgb[:, ::-1])
+        assert locate(stored, mirrored, None, rng()).world_from_camera is None
+
+
+def test_one_known_poster_in_another_place_is_no_place(stored: MapOfPictures, photo: np.ndarray) -> None:
+    elsewhere = Room(seed=99).render(PHOTO_FROM)[0]
+    elsewhere[100:145, 130:190] = photo[100:145, 130:190]
+    assert locate(stored, elsewhere, None, rng()).world_from_camera is None
+
+
+@pytest.mark.parametrize("value", [0, 255])
+def test_a_blank_picture_is_not_located(stored: MapOfPictures, value: int) -> None:
+    found = locate(stored, np.full((240, 320, 3), value, np.uint8), None, rng())
+    assert (found.world_from_camera, found.inliers, found.reference_stamp_s, found.score) == (None, 0, None, 0.0)
+
+
+def test_a_map_without_keyframes_locates_nothing(stored: MapOfPictures, photo: np.ndarray) -> None:
+    empty = replace(stored, keyframes=assembled([]))
+    assert locate(empty, photo, None, rng()).world_from_camera is None
+
+
+def test_a_map_without_any_depth_locates_nothing(stored: MapOfPictures, photo: np.ndarray) -> None:
+    nowhere = np.full_like(stored.keyframes.points_world, np.nan)
+    flat = replace(stored, keyframes=replace(stored.keyframes, points_world=nowhere))
+    found = locate(flat, photo, None, rng())
+    assert (found.world_from_camera, found.inliers) == (None, 0)
+
+
+def test_one_keyframe_is_enough_for_a_map(stored: MapOfPictures) -> None:
+    single = map_of(RoomWalk(frames=1), profile("embedded"), rng())
+    assert_at(locate(single, WALK.frame(0).rgb, None, rng()), WALK.world_from_camera[0])
+
+
+def test_a_dark_and_blurred_photo_is_located_or_refused_but_never_wrong(
+    stored: MapOfPictures, photo: np.ndarray
+) -> None:
+    for blur in (0.8, 1.5, 2.5, 4.0):
+        spoilt = (cv2.GaussianBlur(photo, (0, 0), blur) * 0.4).astype(np.uint8)
+        found = locate(stored, spoilt, None, rng())
+        if found.world_from_camera is not None:
+            assert_at(found, PHOTO_FROM, cm=5.0, deg=2.0)
+
+
+def test_the_most_alike_come_first_and_never_more_than_there_are(stored: MapOfPictures) -> None:
+    place = stored.keyframes.place[4]
+    order = alike(stored.keyframes, place, 3)
+    likeness = stored.keyframes.place @ place
+    np.testing.assert_array_equal(order, np.argsort(-likeness)[:3])
+    assert len(alike(stored.keyframes, place, 10_000)) == len(stored.keyframes)
+
+
+def test_the_nearest_keyframe_to_its_own_pose_is_itself(stored: MapOfPictures) -> None:
+    for k in (0, 3, len(stored.keyframes) - 1):
+        assert nearest(stored.keyframes, stored.keyframes.world_from_camera[k]) == k
