@@ -58,3 +58,12 @@ def test_the_colour_from_above_is_that_of_the_highest_voxels_under_the_ceiling()
     values[0] = 0.7
     assert view.heat(values).max() == np.float32(0.7)
     assert view.extent == pytest.approx((-0.3, 0.5, -0.3, 0.5))
+
+
+def test_without_a_path_a_plot_is_a_figure_for_a_notebook() -> None:
+    from matplotlib.figure import Figure
+
+    m = AVLMap(furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK)))
+    figure = (m.object("chair", primary=True) * m.sound("dog")).plot()
+    assert isinstance(figure, Figure)
+    assert len(figure.axes) >= 3

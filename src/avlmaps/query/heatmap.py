@@ -10,12 +10,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from avlmaps.query.level import Space
 from avlmaps.query.question import Goal, Modality, Part, Role
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,6 +205,8 @@ class Heatmap:
             raise ValueError(f"heat has shape {self.values.shape}; the map has {len(self.space)} voxels")
 
     def __mul__(self, other: "Heatmap") -> "Heatmap":
+        if not isinstance(other, Heatmap):
+            return NotImplemented
         if self.space is not other.space:
             raise ValueError("two heatmaps of different maps cannot be multiplied; ask both of the same AVLMap")
         return Heatmap(self.space, self.factors + other.factors, self.values * other.values)
@@ -231,11 +237,24 @@ class Heatmap:
 
         return find_goals(self, top)
 
-    def plot(self, path: str | Path, *, top: int = 3) -> Path:
-        """Write a picture: the map from above, each factor's heat and the product, the goals numbered."""
-        from avlmaps.query.plots import plot_heat
+    @overload
+    def plot(self, path: str | Path, *, top: int = 3) -> Path: ...
+    @overload
+    def plot(self, path: None = None, *, top: int = 3) -> "Figure": ...
+    def plot(self, path: str | Path | None = None, *, top: int = 3) -> "Path | Figure":
+        """Draw the map from above, each factor's heat and the product, with the goals numbered.
 
-        return plot_heat(self, Path(path), self.goals(top))
+        Args:
+            path: the picture to write; without one, the figure is returned, for a notebook to show.
+            top: how many goals are numbered.
+
+        Raises:
+            QueryError: the picture cannot be written there.
+        """
+        from avlmaps.query.plots import draw_heat, plot_heat
+
+        goals = self.goals(top)
+        return draw_heat(self, goals) if path is None else plot_heat(self, Path(path), goals)
 
 
 def fused(heatmaps: Sequence[Heatmap]) -> Heatmap:

@@ -25,7 +25,8 @@ def read_picture(path: Path) -> UInt8[np.ndarray, "h w 3"]:
     import cv2
 
     if not path.is_file():
-        raise QueryError(f"The picture {path} is not there; check the name.")
+        kind = "is a folder" if path.is_dir() else "is not there"
+        raise QueryError(f"The picture {path} {kind}; check the name.")
     encoded = np.frombuffer(path.read_bytes(), np.uint8)
     # The pose is that of the picture as its pixels lie, so a camera's turn flag must not rotate it.
     picture = cv2.imdecode(encoded, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION) if len(encoded) else None
@@ -35,7 +36,11 @@ def read_picture(path: Path) -> UInt8[np.ndarray, "h w 3"]:
 
 
 def require_fitting(rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None) -> None:
-    """Raise ``QueryError`` where a picture is not of the size that its intrinsics are for."""
+    """Raise ``QueryError`` where a picture is not RGB of whole bytes, or not of the size its intrinsics are for."""
+    if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8 or rgb.size == 0:
+        raise QueryError(
+            f"The picture is an array of {rgb.dtype} and shape {rgb.shape}; give RGB, uint8 of (height, width, 3)."
+        )
     height, width = rgb.shape[:2]
     if intrinsics is not None and (intrinsics.width, intrinsics.height) != (width, height):
         raise QueryError(

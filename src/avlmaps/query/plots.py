@@ -39,6 +39,11 @@ def plot_heat(heat: Heatmap, path: Path, goals: Sequence[Goal]) -> Path:
     Raises:
         QueryError: the picture cannot be written there.
     """
+    return _save(draw_heat(heat, goals), path)
+
+
+def draw_heat(heat: Heatmap, goals: Sequence[Goal]) -> "Figure":
+    """Draw a heatmap as ``plot_heat`` does, for a notebook."""
     view = TopDown.of(heat.space)
     panels = len(heat.factors) + (len(heat.factors) > 1)
     figure, axes = _panels(view, panels)
@@ -55,7 +60,7 @@ def plot_heat(heat: Heatmap, path: Path, goals: Sequence[Goal]) -> Path:
         axes[-1].set_title(title, fontsize=10, color=_INK, loc="left", fontweight="bold")
     _draw_goals(axes[-1], heat.space, goals)
     _finish(figure, axes, with_heat=True)
-    return _save(figure, path)
+    return figure
 
 
 def plot_map(stored: "StoredMap", path: Path | str) -> Path:
