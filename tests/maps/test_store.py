@@ -370,3 +370,14 @@ def test_sounds_without_any_are_whole() -> None:
     }
     assert len(assembled(HeardSounds, empty, "here")) == 0
     assert array_fields(HeardSounds) == [name for name in empty if name != "clips"]
+
+
+def test_an_array_that_may_not_be_read_is_not_called_damaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    info = write_array(tmp_path, "a", np.zeros(SMALL_BYTES, np.uint8))
+
+    def refuse(*arguments: object, **named: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(np, "load", refuse)
+    with pytest.raises(MapError, match=r"cannot be read \(Permission denied\); check its permissions\.$"):
+        read_array(tmp_path, info)

@@ -115,3 +115,11 @@ def test_a_damaged_bag_is_a_sentence(tmp_path: Path):
     (tmp_path / "walk.bag").write_bytes(b"#ROSBAG V2.0\n")
     with pytest.raises(RecordingError, match=r"walk.bag"):
         open_recording(tmp_path / "walk.bag")
+
+
+def test_a_map_is_told_from_a_recording(tmp_path: Path):
+    (tmp_path / "map.json").write_text("{}")
+    with pytest.raises(
+        RecordingError, match=r"is a map, not a recording; ask it with `avlmaps query`, or give the rec"
+    ):
+        open_recording(tmp_path)

@@ -126,6 +126,8 @@ def read_array(folder: Path, info: FileInfo, *, verify: bool = False) -> np.ndar
     path = checked_path(folder, info, verify=verify)
     try:
         array = np.load(path, mmap_mode=None if info.bytes <= SMALL_BYTES else "r", allow_pickle=False)
+    except PermissionError as fault:
+        raise MapError(f"{path} cannot be read ({fault.strerror}); check its permissions.") from fault
     except (ValueError, OSError, EOFError) as fault:
         raise MapError(f"{path} is damaged: it is not an array that numpy can read ({fault}); {_MEND}.") from fault
     if array.dtype.str != np.dtype(info.dtype).str or array.shape != info.shape:

@@ -19,6 +19,8 @@ from avlmaps.recordings.faults import Report, stop_at_first
 from avlmaps.recordings.types import Recording
 
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
+# What a map's folder holds and no recording's does.
+_MAP = "map.json"
 # A folder of a million files must not be listed to be recognised.
 _LOOKED_AT = 2000
 
@@ -176,6 +178,10 @@ def _unknown(path: Path) -> str:
         )
     if path.is_file():
         return f"{path} is a file of no known format; known are: {formats}."
+    if (path / _MAP).is_file():
+        return (
+            f"{path} is a map, not a recording; ask it with `avlmaps query`, or give the recording it was built from."
+        )
     with os.scandir(path) as entries:
         folders = sorted(Path(e.path) for e in islice(entries, _LOOKED_AT) if e.is_dir())
     below = [folder.name for folder in folders[:50] if any(f.matches(folder) for f in FORMATS)]
