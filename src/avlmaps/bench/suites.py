@@ -134,7 +134,7 @@ def draw(tables: Mapping[str, Table], path: Path) -> None:
     from matplotlib.figure import Figure
 
     heights = [0.35 * (len(table["rows"]) + 1) + 0.6 for table in tables.values()]
-    figure = Figure(figsize=(12, sum(heights)), layout="constrained")
+    figure = Figure(figsize=(12, sum(heights)))
     panes = figure.subplots(len(tables), 1, height_ratios=heights, squeeze=False)[:, 0]
     for axes, (name, table) in zip(panes, tables.items(), strict=True):
         axes.axis("off")
@@ -142,7 +142,7 @@ def draw(tables: Mapping[str, Table], path: Path) -> None:
         if not table["rows"]:
             continue
         cells = [[str(cell) for cell in row] for row in table["rows"]]
-        drawn = axes.table(cells, colLabels=[str(column) for column in table["columns"]], loc="center", cellLoc="left")
+        drawn = axes.table(cells, colLabels=[str(column) for column in table["columns"]], loc="upper left", cellLoc="left")
         drawn.auto_set_font_size(False)
         drawn.set_fontsize(9)
         drawn.auto_set_column_width(list(range(len(table["columns"]))))
@@ -150,4 +150,4 @@ def draw(tables: Mapping[str, Table], path: Path) -> None:
             cell.set_edgecolor("#dddddd")
             if row == 0:
                 cell.set_text_props(fontweight="bold")
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=110, bbox_inches="tight")
