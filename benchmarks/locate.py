@@ -2,7 +2,7 @@
 
 python benchmarks/locate.py [--keyframes 100] [--photos 10] [--json]
 
-The pictures are painted at random (640x480, about 1,000 keypoints); a photo is a keyframe seen anew, shifted, with noise.
+The pictures are painted at random (640x480, about 1,000 keypoints); a photo is a keyframe shifted, with noise.
 """
 
 import timing

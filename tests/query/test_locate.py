@@ -99,7 +99,7 @@ def test_the_focal_length_is_kept_where_the_caller_is_sure(stored: MapOfPictures
 
 def test_the_pose_is_that_of_the_camera_that_took_the_photo() -> None:
     """With a colour camera beside the depth camera, whose poses the recording holds."""
-    recording = RoomWalk(rig=Rig(CAMERA, Pinhole(290.0, 290.0, 160.0, 120.0, 320, 240), APART))
+    recording = RoomWalk(frames=8, turn=0.3, rig=Rig(CAMERA, Pinhole(290.0, 290.0, 160.0, 120.0, 320, 240), APART))
     apart = map_of(recording, profile("embedded"), rng())
     frame = recording.frame(5)
     found = locate(apart, frame.rgb, None, rng())

@@ -2,7 +2,7 @@
 
 import time
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, UInt8
@@ -19,6 +19,7 @@ _SAME_ASPECT = 0.01
 _SAME_SIDE = 0.25  # cosine: no descriptor bears a change of view by more than 75 degrees
 
 
+@runtime_checkable
 class LocatableMap(Protocol):
     """What ``locate`` needs of a stored map."""
 
@@ -316,6 +317,6 @@ def _spread(xy: Float[np.ndarray, "n 2"], camera: Pinhole) -> float:
     return float(deviation[0] * deviation[1] / (camera.width * camera.height))
 
 
-def _confidence(value: float, threshold: float) -> float:
+def _confidence(value: float | int, threshold: float | int) -> float:
     """Return a number in [0, 1) that rises with the value and is 0.5 at the threshold."""
     return value / (value + threshold)
