@@ -67,3 +67,10 @@ def test_another_packages_entry_point_is_a_backend(monkeypatch: pytest.MonkeyPat
     assert Backend(Kind.SOUNDS, "theirs", "collections:Counter") in registry.backends()
     assert type(registry.load(Kind.SOUNDS, "theirs")).__name__ == "Counter"
     assert not any(b.name in ("x", "") for b in registry.backends())
+
+
+@pytest.mark.parametrize("target", ["no_such_module_here:Model", "fractions:NoSuchClass"])
+def test_a_backend_that_cannot_be_imported_is_told_by_its_place(target: str):
+    registry.register(Backend(Kind.VIEWS, "broken", target))
+    with pytest.raises(BackendError, match=f"^The views backend 'broken' cannot be loaded from {target} "):
+        registry.load(Kind.VIEWS, "broken")

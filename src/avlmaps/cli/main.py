@@ -73,7 +73,7 @@ def _run(verb: Command) -> int:
 def _sentence(error: OSError) -> str:
     """Tell what the system refused, without its numbers for it."""
     if error.filename is None or error.strerror is None:
-        return f"{error}; check the files and the space on the disk."
+        return f"{error.strerror or error}; check the files and the space on the disk."
     name = str(error.filename)
     shown = name if len(name) <= _SHOWN else f"{name[: _SHOWN // 2]}...{name[-_SHOWN // 2 :]}"
     return f"{shown}: {error.strerror}; check the path, its permissions and the space on the disk."

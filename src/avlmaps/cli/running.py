@@ -5,7 +5,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from avlmaps.cli.output import UsageError
-from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -219,7 +219,10 @@ def list_profiles() -> dict[str, Any]:
                 else f"pip install {' '.join(backend.missing)}"
             )
             return {**entry, "state": "missing", "note": how}
-        card = load(kind, name).card
+        try:
+            card = load(kind, name).card
+        except BackendError as error:  # one broken package must not hide the others
+            return {**entry, "state": "broken", "note": str(error)}
         return {
             **entry,
             "state": "ready",

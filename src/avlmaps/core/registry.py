@@ -91,7 +91,7 @@ def load(kind: Kind, name: str) -> Any:
     """Return the backend of that kind and name, made once in a process.
 
     Raises:
-        BackendError: there is none of that name, or a package that it needs is missing.
+        BackendError: there is none of that name, a package that it needs is missing, or it cannot be imported.
     """
     return _load(kind, name)
 
@@ -108,4 +108,11 @@ def _load(kind: Kind, name: str) -> Any:
         missing = ", ".join(backend.missing)
         raise BackendError(f"The {kind} backend {name!r} needs {missing}; get it with: {backend.how_to_get}")
     module, _, attribute = backend.target.partition(":")
-    return getattr(importlib.import_module(module), attribute)()
+    try:
+        made = getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError) as fault:
+        raise BackendError(
+            f"The {kind} backend {name!r} cannot be loaded from {backend.target} ({fault}); mend or remove the package "
+            "that brings it."
+        ) from fault
+    return made()
