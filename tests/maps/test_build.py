@@ -397,3 +397,8 @@ def test_maps_can_be_moved_and_copied(tmp_path: Path) -> None:
     path = build(Walk(6), tmp_path / "a").path
     moved = Path(shutil.move(path, tmp_path / "elsewhere"))
     assert open_stored(moved, verify=True).info.counts.frames == 6
+
+
+def test_merging_no_parts_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(MapError, match=r"^There are no parts to merge into .*; name the folders that build_part wrote"):
+        merge_parts([], tmp_path / "sum")

@@ -148,8 +148,10 @@ def merge_parts(folders: Sequence[Path | str], out: Path | str) -> Part:
         out: the folder of the sum.
 
     Raises:
-        MapError: a part is damaged or made otherwise than the first, or two cover the same frame.
+        MapError: there is none, one is damaged or made otherwise than the first, or two cover the same frame.
     """
+    if not folders:
+        raise MapError(f"There are no parts to merge into {out}; name the folders that build_part wrote.")
     key = _key_in(Path(folders[0]))
     parts = sorted((load_part(Path(folder), key) for folder in folders), key=lambda part: part.info.spans)
     check_disjoint(parts)
