@@ -142,10 +142,11 @@ def draw(tables: Mapping[str, Table], path: Path) -> None:
         if not table["rows"]:
             continue
         cells = [[str(cell) for cell in row] for row in table["rows"]]
-        drawn = axes.table(cells, colLabels=[str(column) for column in table["columns"]], loc="upper left", cellLoc="left")
+        columns = [str(column) for column in table["columns"]]
+        drawn = axes.table(cells, colLabels=columns, loc="upper left", cellLoc="left")
         drawn.auto_set_font_size(False)
         drawn.set_fontsize(9)
-        drawn.auto_set_column_width(list(range(len(table["columns"]))))
+        drawn.auto_set_column_width(list(range(len(columns))))
         for (row, _), cell in drawn.get_celld().items():
             cell.set_edgecolor("#dddddd")
             if row == 0:
