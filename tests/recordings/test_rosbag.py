@@ -14,7 +14,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import from_quaternion, inverse
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.ros_messages import depth_of
+from avlmaps.recordings.ros_messages import camera_of, depth_of
 from avlmaps.recordings.rosbag import open_rosbag
 
 WIDTH, HEIGHT, RATE_HZ = 32, 24, 8000
@@ -231,3 +231,19 @@ def test_topics_can_be_named_when_any_recording_is_opened(tmp_path: Path) -> Non
         RecordingError, match="There is no 'lidar' among the topics that can be named: rgb, depth, pose"
     ):
         open_recording(path, topics={"lidar": "/scan"})
+
+
+def test_a_named_topic_of_the_wrong_kind_is_refused(tmp_path: Path) -> None:
+    path = write_bag(tmp_path, "ros2")
+    with pytest.raises(
+        RecordingError, match="is of the type sensor_msgs/msg/Image, which tells no poses; name a topic"
+    ):
+        open_rosbag(path, {"pose": "/camera/color/image_raw"})
+    with pytest.raises(RecordingError, match=r"has no topic '/ear'; name one that it has \(audio=TOPIC\)\.$"):
+        open_rosbag(path, {"audio": "/ear"})
+
+
+def test_a_calibration_of_no_camera_is_refused() -> None:
+    info = SimpleNamespace(k=[1e300, 0, 16, 0, 30, 12, 0, 0, 1], d=[], width=32, height=24)
+    with pytest.raises(RecordingError, match=r"^The camera calibration /info is no camera: .*; calibrate it again\.$"):
+        camera_of(info, "/info")

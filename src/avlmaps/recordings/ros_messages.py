@@ -117,7 +117,7 @@ def camera_of(info: Any, name: str) -> tuple[Pinhole, bool]:
     ROS counts pixel centres as whole numbers; ours lie at +0.5.
 
     Raises:
-        RecordingError: the calibration is empty.
+        RecordingError: the calibration is empty, or of no camera.
     """
     k = np.asarray(getattr(info, "k", None) if hasattr(info, "k") else info.K, np.float64)
     d = np.asarray(getattr(info, "d", None) if hasattr(info, "d") else info.D, np.float64)
@@ -125,7 +125,10 @@ def camera_of(info: Any, name: str) -> tuple[Pinhole, bool]:
         raise RecordingError(
             f"The camera calibration {name} is empty (K = {k.tolist()}); name a calibrated camera's topics."
         )
-    camera = Pinhole(k[0], k[4], k[2] + 0.5, k[5] + 0.5, int(info.width), int(info.height))
+    try:
+        camera = Pinhole(k[0], k[4], k[2] + 0.5, k[5] + 0.5, int(info.width), int(info.height))
+    except ValueError as error:
+        raise RecordingError(f"The camera calibration {name} is no camera: {error}; calibrate it again.") from None
     return camera, bool(np.abs(d).max(initial=0.0) > 1e-9)
 
 

@@ -32,6 +32,7 @@ _POSE_TYPES = (
     "geometry_msgs/msg/PoseWithCovarianceStamped",
     "geometry_msgs/msg/PoseStamped",
 )
+_TRANSFORM_TYPE = "geometry_msgs/msg/TransformStamped"
 _AUDIO_INFO_TYPES = ("audio_common_msgs/msg/AudioInfo",)
 _AUDIO_TYPES = ("audio_common_msgs/msg/AudioData", "audio_common_msgs/msg/AudioDataStamped")
 # A colour and a depth picture at most this far apart are taken for one moment.
@@ -205,6 +206,8 @@ class RosbagRecording(Recording):
         found = [topics.audio] if topics.audio else self._bag.topics_of(_AUDIO_TYPES)
         if not found:
             return None, ()
+        if not self._bag.connections(found[0]):
+            raise RecordingError(f"{self.path} has no topic {found[0]!r}; name one that it has (audio=TOPIC).")
         # The bag's sound goes to a file of its own for as long as this recording is open: a track is read by pieces.
         self._folder = tempfile.TemporaryDirectory(prefix="avlmaps-rosbag-")
         infos = self._bag.topics_of(_AUDIO_INFO_TYPES)
@@ -287,6 +290,17 @@ def _add_tf(bag: _Bag, topic: str, tree: TransformTree) -> None:
             tree.add(transform.header.frame_id, transform.child_frame_id, pose_of(transform), stamp_s, static)
 
 
+def _check_pose_topic(bag: _Bag, topic: str) -> None:
+    found = sorted({connection.msgtype for connection in bag.connections(topic)})
+    if not found:
+        raise RecordingError(f"{bag.path} has no topic {topic!r}; name one that it has (pose=TOPIC).")
+    if not set(found) & {*_POSE_TYPES, _TRANSFORM_TYPE}:
+        known = ", ".join(kind.rsplit("/", 1)[1] for kind in (*_POSE_TYPES, _TRANSFORM_TYPE))
+        raise RecordingError(
+            f"{topic!r} of {bag.path} is of the type {found[0]}, which tells no poses; name a topic of {known}."
+        )
+
+
 def _read_tree(bag: _Bag, topics: RosTopics, camera_frame: str) -> tuple[TransformTree, str]:
     """Return the tree of frames and the frame in it that is the camera."""
     tree = TransformTree()
@@ -295,14 +309,14 @@ def _read_tree(bag: _Bag, topics: RosTopics, camera_frame: str) -> tuple[Transfo
         _add_tf(bag, "/tf", tree)
         if tree.moves(camera_frame):
             return tree, camera_frame
+    if topics.pose:
+        _check_pose_topic(bag, topics.pose)
     candidates = [topics.pose] if topics.pose else bag.topics_of(_POSE_TYPES)
     if not candidates:
         raise RecordingError(
             f"{bag.path} has no poses: no /tf that moves {camera_frame!r}, no odometry and no pose topic; "
             "record one of them."
         )
-    if not bag.connections(candidates[0]):
-        raise RecordingError(f"{bag.path} has no topic {candidates[0]!r}; name one that it has (pose=TOPIC).")
     body = ""
     for _, message in bag.messages(candidates[0]):
         stamp = message.header.stamp
