@@ -39,7 +39,7 @@ def test_a_truncated_photo_is_told_in_our_words_alone(built: Path, walk: Path, t
     assert told.stderr == f"avlmaps: The picture {photo} cannot be read as an image; use a PNG or a JPEG.\n"
 
 
-def test_a_broken_package_does_not_hide_the_other_backends(answer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_broken_package_does_not_hide_the_other_backends(answer, run, monkeypatch: pytest.MonkeyPatch) -> None:
     from avlmaps.core import registry
 
     broken = registry.Backend(registry.Kind.VIEWS, "broken", "no_such_module_here:Model")
@@ -49,6 +49,7 @@ def test_a_broken_package_does_not_hide_the_other_backends(answer, monkeypatch: 
     assert other["state"] == "broken"
     assert "cannot be loaded from no_such_module_here:Model" in other["note"]
     assert told["profiles"][0]["name"] == "embedded"
+    assert "broken" in run("profiles")[1].split("in no profile:")[1]
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")

@@ -258,9 +258,15 @@ class Profiles(Verb):
         lines: list[str] = []
         for entry in answer["profiles"]:
             lines += [f"{entry['name']}: {entry['about']}"]
-            cells = [(b["module"], b["name"], b["state"], b["model"], b["note"]) for b in entry["backends"]]
-            lines += ["  " + line for line in table_lines(("module", "backend", "state", "model", "note"), cells)]
+            lines += _backend_lines(entry["backends"])
+        if answer["other_backends"]:
+            lines += ["in no profile:", *_backend_lines(answer["other_backends"])]
         emit(answer, lines, self.json)
+
+
+def _backend_lines(backends: list[dict[str, Any]]) -> list[str]:
+    cells = [(b["module"], b["name"], b["state"], b["model"], b["note"]) for b in backends]
+    return ["  " + line for line in table_lines(("module", "backend", "state", "model", "note"), cells)]
 
 
 def info_lines(answer: dict[str, Any]) -> list[str]:
