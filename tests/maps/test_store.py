@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from build_fakes import RIG, SETTINGS, Walk, register_fakes
@@ -380,4 +381,10 @@ def test_an_array_that_may_not_be_read_is_not_called_damaged(tmp_path: Path, mon
 
     monkeypatch.setattr(np, "load", refuse)
     with pytest.raises(MapError, match=r"cannot be read \(Permission denied\); check its permissions\.$"):
+        read_array(tmp_path, info)
+
+
+def test_an_array_of_another_type_than_the_map_says_is_damaged(tmp_path: Path) -> None:
+    info = msgspec.structs.replace(write_array(tmp_path, "a", np.zeros(3, np.float32)), dtype="nonsense")
+    with pytest.raises(MapError, match=r"is damaged: it holds float32 of \(3,\), the map says nonsense of \(3,\);"):
         read_array(tmp_path, info)

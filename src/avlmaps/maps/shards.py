@@ -130,14 +130,22 @@ def read_array(folder: Path, info: FileInfo, *, verify: bool = False) -> np.ndar
         raise MapError(f"{path} cannot be read ({fault.strerror}); check its permissions.") from fault
     except (ValueError, OSError, EOFError) as fault:
         raise MapError(f"{path} is damaged: it is not an array that numpy can read ({fault}); {_MEND}.") from fault
-    if array.dtype.str != np.dtype(info.dtype).str or array.shape != info.shape:
+    if array.dtype.str != info.dtype or array.shape != info.shape:
         raise MapError(
-            f"{path} is damaged: it holds {array.dtype} of {array.shape}, the map says {np.dtype(info.dtype)} of "
+            f"{path} is damaged: it holds {array.dtype} of {array.shape}, the map says {_type_name(info.dtype)} of "
             f"{info.shape}; {_MEND}."
         )
     if not array.flags.c_contiguous:
         raise MapError(f"{path} is damaged: its elements are not in the order that avlmaps writes; {_MEND}.")
     return array
+
+
+def _type_name(said: str) -> str:
+    """Return numpy's name of a type; what a damaged manifest says, as it stands there."""
+    try:
+        return str(np.dtype(said))
+    except TypeError:
+        return said
 
 
 def checked_path(folder: Path, info: FileInfo, *, verify: bool = False) -> Path:
