@@ -173,7 +173,7 @@ def _sources(room: "Room", rng: np.random.Generator) -> list[Any]:
     placed = (
         ("glass breaking", _thing(room, "table", "brown", (0, 0))),
         ("microwave beep", _thing(room, "fridge", "white", (0, 0))),
-        ("phone ringing", _thing(room, "chair", "yellow", (9, 2))),
+        ("keyboard typing", _thing(room, "chair", "yellow", (9, 2))),
         ("snoring", _thing(room, "sofa", "blue", (6, 6))),
         ("doorbell", _thing(room, "bookcase", "brown", (0, 5))),
     )
@@ -230,7 +230,7 @@ def _ask_all(
 
     steps: list[Step] = []
     steps.append(sentence("the red cabinet", red))
-    steps.append(sentence("the yellow chair near the sound of a phone ringing", [east_chair]))
+    steps.append(sentence("the yellow chair near the sound of typing on a keyboard", [east_chair]))
     steps.append(sentence("the yellow chair near the sound of breaking glass", [west_chair]))
     clip_part = Part(Modality.SOUND, str(clip), is_file=True)
     title = "where a sound like this clip was heard (another microwave)"
