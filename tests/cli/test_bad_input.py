@@ -6,7 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+import soundfile
+
+from .conftest import RATE_HZ, beeps
 
 
 def test_an_error_in_the_middle_of_a_loop_stands_on_its_own_last_line(walk: Path, run, tmp_path: Path) -> None:
@@ -60,3 +64,65 @@ def test_a_full_disk_under_standard_output_is_one_sentence(walk: Path) -> None:
     last = told.stderr.replace("\r", "\n").rstrip("\n").split("\n")[-1]
     assert last == "avlmaps: No space left on device; check the files and the space on the disk."
     assert told.returncode == 1
+
+
+def clips_of(folder: Path, *contents: np.ndarray) -> Path:
+    (folder / "beep").mkdir(parents=True)
+    for k, samples in enumerate(contents):
+        soundfile.write(folder / "beep" / f"{k}.wav", samples, RATE_HZ)
+    return folder
+
+
+def test_a_seed_below_zero_is_refused(walk: Path, run, tmp_path: Path) -> None:
+    clips = clips_of(tmp_path / "clips", beeps())
+    status, out, err = run("add-sounds", walk, "--clips", clips, "--out", tmp_path / "out", "--seed", -1)
+    assert (status, out) == (1, "")
+    assert err == "avlmaps: The seed is -1; choose 0 or more.\n"
+
+
+def test_clips_of_which_none_can_be_heard_are_told_by_the_first(walk: Path, run, tmp_path: Path) -> None:
+    clips = clips_of(tmp_path / "clips", np.zeros(RATE_HZ), np.zeros(RATE_HZ))
+    status, _, err = run("add-sounds", walk, "--clips", clips, "--out", tmp_path / "out")
+    assert status == 1
+    assert "No clip that was tried in" in err and "is silent from end to end" in err
+
+
+def test_an_index_of_clips_in_another_encoding_is_named(walk: Path, run, tmp_path: Path) -> None:
+    clips = clips_of(tmp_path / "clips", beeps())
+    (clips / "index.csv").write_bytes("path,category\nbeep/0.wav,T\xfcrklingel\n".encode("latin-1"))
+    status, _, err = run("add-sounds", walk, "--clips", clips, "--out", tmp_path / "out")
+    assert status == 1
+    assert "index.csv is no CSV table in UTF-8" in err
+
+
+def test_a_track_of_one_sample_a_second_is_no_sound(built: Path, run, tmp_path: Path) -> None:
+    soundfile.write(tmp_path / "slow.wav", np.zeros(20), 1)
+    status, _, err = run("query", built, "--sound-clip", tmp_path / "slow.wav")
+    assert status == 1
+    assert "has 1 samples a second, too few for sounds" in err
+
+
+def test_a_name_too_long_to_ask_for_is_not_taught(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("AVLMAPS_HOME", str(tmp_path / "home"))
+    soundfile.write(tmp_path / "a.wav", beeps(), RATE_HZ)
+    status, _, err = run("teach-sound", "b" * 200, tmp_path / "a.wav")
+    assert status == 1
+    assert "The name has 200 characters; choose one of at most 80" in err
+
+
+def test_a_full_disk_is_told_with_the_file(tmp_path: Path) -> None:
+    code = (
+        "import resource, signal, sys, numpy as np\n"
+        "from pathlib import Path\n"
+        "from avlmaps.recordings.audio import Sound, write_flac\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))\n"
+        "noise = np.random.default_rng(0).uniform(-0.5, 0.5, 200_000).astype(np.float32)\n"
+        "try: write_flac(Path(sys.argv[1]), Sound(noise, 22050))\n"
+        "except Exception as error: print(type(error).__name__, error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(tmp_path / "a.flac")], capture_output=True, text=True)
+    assert done.stdout.startswith("AudioError")
+    assert "a.flac could not be written" in done.stdout
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []

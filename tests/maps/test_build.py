@@ -159,7 +159,7 @@ def test_frames_that_cannot_be_read_are_left_out_and_told(tmp_path: Path) -> Non
 def test_too_many_bad_frames_stop_the_build_and_the_count_survives_a_resume(tmp_path: Path) -> None:
     said = (
         "5 of 20 frames cannot be read, more than the 4 that may be left out; mend the recording or allow more "
-        "(frames.max_bad_share). The last: walk/000014.png is truncated; leave that frame out."
+        "(--max-bad-share). The last: walk/000014.png is truncated; leave that frame out."
     )
     for _ in range(2):
         with pytest.raises(RecordingError) as fault:

@@ -106,7 +106,9 @@ def world_from_body(stamp_s: float) -> np.ndarray:
     return pose
 
 
-def write_bag(folder: Path, kind: str, poses: str = "tf", sound: bool = False, depth: bool = True) -> Path:
+def write_bag(
+    folder: Path, kind: str, poses: str = "tf", sound: bool = False, depth: bool = True, depth_info: bool = True
+) -> Path:
     maker = BagMaker(kind, folder)
     with maker.writer:
         if poses != "odometry without mount":
@@ -122,7 +124,8 @@ def write_bag(folder: Path, kind: str, poses: str = "tf", sound: bool = False, d
             rgb = np.full((HEIGHT, WIDTH, 3), (10 * i, 100, 200), np.uint8)
             millimetres = np.full((HEIGHT, WIDTH), 1000 + i, np.uint16)
             maker.camera_info("/camera/color/camera_info", stamp_s)
-            maker.camera_info("/camera/depth/camera_info", stamp_s)
+            if depth_info:
+                maker.camera_info("/camera/depth/camera_info", stamp_s)
             maker.image("/camera/color/image_raw", stamp_s + 0.004, rgb, "rgb8", "camera_optical")
             if depth:
                 maker.image("/camera/depth/image_raw", stamp_s, millimetres, "16UC1", "camera_optical")
@@ -247,3 +250,9 @@ def test_a_calibration_of_no_camera_is_refused() -> None:
     info = SimpleNamespace(k=[1e300, 0, 16, 0, 30, 12, 0, 0, 1], d=[], width=32, height=24)
     with pytest.raises(RecordingError, match=r"^The camera calibration /info is no camera: .*; calibrate it again\.$"):
         camera_of(info, "/info")
+
+
+def test_registered_depth_without_a_calibration_takes_that_of_colour(tmp_path: Path) -> None:
+    recording = open_rosbag(write_bag(tmp_path, "ros2", depth_info=False))
+    assert recording.rig.depth == recording.rig.rgb
+    assert any("that of /camera/color/image_raw is used" in notice for notice in recording.notices)

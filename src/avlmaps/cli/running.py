@@ -33,7 +33,7 @@ def build(verb: "Build") -> dict[str, Any]:
         say(f"note: {notice}")
     settings = BuildSettings(
         voxel_size_m=verb.voxel_size_m,
-        frames=FrameSettings(step=verb.frame_step),
+        frames=FrameSettings(step=verb.frame_step, max_bad_share=verb.max_bad_share),
         fusion=FusionSettings(max_depth_m=verb.max_depth_m),
         seed=verb.seed,
     )

@@ -123,6 +123,8 @@ class Build(Verb):
     """Topics of a ROS bag that are not to be found by type: rgb=, depth=, pose= or audio=TOPIC."""
     frame_step: int = 1
     """Fuse every n-th frame."""
+    max_bad_share: float = 0.05
+    """Stop when more than this share of the frames cannot be read; fewer are left out and told."""
     max_depth_m: float = 10.0
     """Ignore depth beyond this, metres."""
     resume: bool = False

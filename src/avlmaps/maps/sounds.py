@@ -59,7 +59,8 @@ def hear(recording: Recording, encoder: SoundEncoder, settings: HearingSettings,
     clips_folder.mkdir(parents=True, exist_ok=True)
     found = segment(recording.audio, settings.segmentation)
     heard: list[_Heard] = []
-    for i in progress(range(len(found)), "hearing", total=len(found), unit="sound"):
+    each = range(len(found))
+    for i in progress(each, "hearing", unit="sound") if found else each:
         sound = recording.audio.read(found[i].onset_s, found[i].offset_s)
         clip = f"{found[i].onset_s:010.3f}.flac"
         write_flac(clips_folder / clip, sound)

@@ -24,6 +24,7 @@ from avlmaps.recordings.audio import AudioTrack, Sound
 SCHEMA = 1
 SILENT_PEAK = 1e-4  # three steps of 16-bit sound
 LONGEST_CLIP_S = 600.0
+LONGEST_NAME = 80
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,11 +64,13 @@ def teach_sound(
 
     Raises:
         AudioError: a clip cannot be read, is silent or much too long, or there is none.
-        BackendError: the name is empty.
+        BackendError: the name is empty or too long.
     """
     name = " ".join(name.split())
     if not name:
         raise BackendError("A taught sound needs a name; give one, as you would ask for it.")
+    if len(name) > LONGEST_NAME:
+        raise BackendError(f"The name has {len(name)} characters; choose one of at most {LONGEST_NAME}.")
     if not clips:
         raise AudioError(f"No clips were given to learn {name!r} from; give at least one sound file.")
     encoder = _embedded() if encoder is None else encoder

@@ -80,11 +80,11 @@ def find_goals(heat: Heatmap, top: int) -> list[Goal]:
     """Return up to ``top`` goals, best first, by heat times the confidence of the lead's instance."""
     lead = lead_of(heat)
     shares = _shares(heat, lead)
-    score = shares.peak * lead.confidence
     goals: list[Goal] = []
     taken: list[np.ndarray] = []
-    extent = np.bincount(lead.instance, minlength=len(score))  # the larger of two that are equally good leads
-    for instance in np.lexsort((-extent, -np.round(score, 2))):
+    score = np.round(shares.peak * lead.confidence, 2)  # more digits would be noise; of equals the larger leads
+    extent = np.bincount(lead.instance, minlength=len(score))
+    for instance in np.lexsort((-extent, -score)):
         if len(goals) >= top or score[instance] <= 0.0:
             break
         position = _position(heat, lead, shares, int(instance))

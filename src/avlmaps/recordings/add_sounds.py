@@ -26,6 +26,7 @@ from avlmaps.recordings.types import Recording
 EVENTS = "events.csv"
 EVENTS_HEADER = ("onset_s", "offset_s", "category", "clip", "x", "y", "z", "gain_db")
 _RATE_HZ = 44_100
+_LEFT_OUT = "Left out: "
 _USUAL_LENGTH_S = 5.0
 _WANTED = 4  # where whole clips leave room for fewer sounds than this, they are cut short
 _SHORTEST_CUT_S = 2.0
@@ -122,6 +123,8 @@ def add_sounds(
     if snr_db is not None and background is None:
         background = "white"
     _check(interval_s, min_distance_m, loudness_db, snr_db)
+    if seed < 0:
+        raise AudioError(f"The seed is {seed}; choose 0 or more.")
     if (out / DESCRIPTION).exists():  # told before the work is done, not after
         raise RecordingError(f"{out} holds a recording already; choose another folder or remove it.")
     rng = np.random.default_rng(seed)
@@ -130,6 +133,9 @@ def add_sounds(
     walk = Walk.along(recording.stamps_s, recording.world_from_camera[:, :3, 3])
     placer, longest_s, notices = _rule(walk, Spacing(interval_s, min_distance_m))
     placed = _place(found, placer, (rate_hz, loudness_db, longest_s), rng, notices)
+    left_out = [notice.removeprefix(_LEFT_OUT) for notice in notices if notice.startswith(_LEFT_OUT)]
+    if not placed and left_out:
+        raise AudioError(f"No clip that was tried in {clips} can be used; of the first: {left_out[0]}")
     if not placed:
         raise AudioError(
             f"The walk of {recording.path} lasts {recording.duration_s:.1f} s and has no room for a single sound; "
@@ -217,7 +223,7 @@ def _place(
         try:
             sound = audible_part(clip, rate_hz, longest_s)
         except AudioError as error:  # one bad clip in a collection must not keep the others out
-            notices.append(f"Left out: {error}")
+            notices.append(f"{_LEFT_OUT}{error}")
             failures += 1
         else:
             onset_s = placer.place(sound.duration_s)

@@ -2,12 +2,16 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import AudioError
+
+LOWEST_RATE_HZ = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +72,10 @@ class AudioTrack:
 
         path = Path(path)
         rate_hz, count = containers.examine(path)
+        if rate_hz < LOWEST_RATE_HZ:
+            raise AudioError(
+                f"{path} has {rate_hz} samples a second, too few for sounds; at least {LOWEST_RATE_HZ} are needed."
+            )
         return cls(path, rate_hz, count / rate_hz, start_s)
 
     @property
@@ -126,7 +134,7 @@ def write_flac(path: Path, sound: Sound | Iterable[Sound]) -> None:
         sound: what to write; blocks must share one rate. Samples beyond [-1, 1] are clipped.
 
     Raises:
-        AudioError: there is not one block.
+        AudioError: there is not one block, or the disk is full.
     """
     import soundfile
 
@@ -136,17 +144,21 @@ def write_flac(path: Path, sound: Sound | Iterable[Sound]) -> None:
     first = next(blocks, None)
     if first is None:
         raise AudioError(f"There is no sound to write to {path}; give at least one block.")
-    with (
-        replaced_atomically(path) as stream,
-        soundfile.SoundFile(stream, "w", first.rate_hz, 1, "PCM_16", format="FLAC") as file,
-    ):
-        block: Sound | None = first
-        while block is not None:
-            if block.rate_hz != first.rate_hz:
-                raise ValueError(f"a block has {block.rate_hz} samples a second, the first had {first.rate_hz}")
-            for at in range(0, len(block.samples), block.rate_hz):
-                file.write(np.clip(block.samples[at : at + block.rate_hz], -1.0, 1.0))
-            block = next(blocks, None)
+    # Written by name: through a stream of ours, libsndfile would tell of a full disk on standard error by itself.
+    with replaced_atomically(path) as stream:
+        try:
+            with soundfile.SoundFile(stream.name, "w", first.rate_hz, 1, "PCM_16", format="FLAC") as file:
+                for block in chain([first], blocks):
+                    _write_block(file, block, first.rate_hz)
+        except (soundfile.SoundFileError, AssertionError) as error:  # it asserts that all samples were taken
+            raise AudioError(f"{path} could not be written ({error or 'the disk may be full'}).") from error
+
+
+def _write_block(file: Any, block: Sound, rate_hz: int) -> None:
+    if block.rate_hz != rate_hz:
+        raise ValueError(f"a block has {block.rate_hz} samples a second, the first had {rate_hz}")
+    for at in range(0, len(block.samples), rate_hz):  # a second at a time: long writes have crashed
+        file.write(np.clip(block.samples[at : at + rate_hz], -1.0, 1.0))
 
 
 def _checked(samples: Float[np.ndarray, " n"], path: Path, rate_hz: int, at: int) -> Float[np.ndarray, " n"]:

@@ -145,12 +145,16 @@ def _plain(category: str) -> str:
 
 
 def _indexed(index: Path) -> list[Clip]:
-    with index.open(newline="", encoding="utf-8") as stream:
-        reader = csv.DictReader(stream)
-        missing = {"path", "category"} - set(reader.fieldnames or ())
-        if missing:
-            raise AudioError(f"{index} lacks the column {' and '.join(sorted(missing))}; add it, or remove the file.")
-        rows = [(row["path"], _plain(row["category"] or "")) for row in reader if row["path"]]
+    try:
+        lines = index.read_text(encoding="utf-8-sig").splitlines()
+        reader = csv.DictReader(lines)
+        fields = set(reader.fieldnames or ())
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise AudioError(f"{index} is no CSV table in UTF-8 ({error}); save it as one.") from None
+    missing = {"path", "category"} - fields
+    if missing:
+        raise AudioError(f"{index} lacks the column {' and '.join(sorted(missing))}; add it, or remove the file.")
+    rows = [(row["path"], _plain(row["category"] or "")) for row in reader if row["path"]]
     clips = [Clip(index.parent / path, category, path) for path, category in rows]
     if absent := [clip.name for clip in clips if not clip.path.is_file()]:
         raise AudioError(f"{index} lists {len(absent)} files that do not exist, the first {absent[0]}; mend the index.")

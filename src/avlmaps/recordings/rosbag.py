@@ -27,6 +27,7 @@ from avlmaps.recordings.ros_transforms import TransformTree
 from avlmaps.recordings.types import Frame, Recording
 
 _IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+_INFO_TYPES = ("sensor_msgs/msg/CameraInfo",)
 _POSE_TYPES = (
     "nav_msgs/msg/Odometry",
     "geometry_msgs/msg/PoseWithCovarianceStamped",
@@ -246,6 +247,12 @@ def _read_rig(bag: _Bag, rgb_topic: str, depth_topic: str) -> tuple[Rig, list[st
     frames: dict[str, str] = {}
     for topic in (rgb_topic, depth_topic):
         info_topic = _info_topic(bag, topic)
+        if not info_topic and topic == depth_topic:  # drivers that register depth often publish one calibration
+            info_topic = _info_topic(bag, rgb_topic)
+            notices.append(f"{depth_topic} has no CameraInfo; that of {rgb_topic} is used, as for registered depth.")
+        if not info_topic:
+            has = ", ".join(bag.topics_of(_INFO_TYPES)) or "none"
+            raise RecordingError(f"{bag.path} has no CameraInfo beside {topic} (it has: {has}); record it too.")
         first = next(iter(bag.messages(info_topic)), None)
         if first is None:
             raise RecordingError(f"{bag.path} has no message on {info_topic}, the calibration of {topic}.")
@@ -269,16 +276,14 @@ def _read_rig(bag: _Bag, rgb_topic: str, depth_topic: str) -> tuple[Rig, list[st
 
 
 def _info_topic(bag: _Bag, image_topic: str) -> str:
-    infos = bag.topics_of(("sensor_msgs/msg/CameraInfo",))
+    """Return the calibration published beside an image topic, or nothing."""
+    infos = bag.topics_of(_INFO_TYPES)
     parts = image_topic.split("/")
     for length in range(len(parts) - 1, 0, -1):
         beside = "/".join([*parts[:length], "camera_info"])
         if beside in infos:
             return beside
-    raise RecordingError(
-        f"{bag.path} has no CameraInfo beside {image_topic} (it has: {', '.join(infos) or 'none'}); "
-        "record the calibration too."
-    )
+    return ""
 
 
 def _add_tf(bag: _Bag, topic: str, tree: TransformTree) -> None:
