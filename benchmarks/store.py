@@ -6,7 +6,6 @@ Opening is measured in processes of their own, with the files in the system's ca
 without.
 """
 
-import argparse
 import json
 import os
 import resource
@@ -20,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+import timing
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.camera import Rig as CameraRig
 from avlmaps.maps.checkpoints import save_checkpoint
@@ -164,8 +164,8 @@ def write_parts(folder: Path, voxels: int, dim: int, parts: int = 4) -> None:
 
 
 def main() -> None:
-    """Measure and print one JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    """Measure and print a table, or one JSON object."""
+    parser = timing.parser(__doc__.splitlines()[0])
     parser.add_argument("--voxels", type=int, default=1_000_000)
     parser.add_argument("--dim", type=int, default=512)
     parser.add_argument("--folder", type=Path, default=None)
@@ -192,7 +192,34 @@ def main() -> None:
         result["merge_parts"] = in_a_process(MERGE, folder)
     finally:
         shutil.rmtree(folder)
-    print(json.dumps(result, indent=2))
+    if options.json:
+        print(json.dumps(result, indent=2))
+        return
+    cold, warm, checked, merged = (
+        result[k] or {} for k in ("open_cold", "open_warm", "open_and_verify", "merge_parts")
+    )
+    rows = [
+        {
+            "what": "write, with fsync and sha256",
+            "seconds": result["write_s"],
+            "peak_mb": "+" + _mb(result["write_extra_mb"]),
+        },
+        {"what": "open, not in the file cache", "seconds": cold.get("open_s", "-"), "peak_mb": ""},
+        {
+            "what": "then read 5,000 features at random",
+            "seconds": cold.get("then_5000_rows_s", "-"),
+            "peak_mb": _mb(cold.get("peak_mb")),
+        },
+        {"what": "open, in the file cache", "seconds": warm["open_s"], "peak_mb": ""},
+        {"what": "open and check every file", "seconds": checked["open_s"], "peak_mb": _mb(checked["peak_mb"])},
+        {"what": f"merge {merged['parts']} parts", "seconds": merged["merge_s"], "peak_mb": _mb(merged["peak_mb"])},
+    ]
+    title = f"A map of {options.voxels:,} voxels by {options.dim}, {result['bytes'] / 1e9:.2f} GB"
+    timing.show(title, rows, {}, as_json=False)
+
+
+def _mb(value: float | None) -> str:
+    return "-" if value is None else f"{value:,.0f}"
 
 
 if __name__ == "__main__":
