@@ -31,7 +31,9 @@ SUITES = {
 }
 INTRODUCTION = """# Benchmarks
 
-Made by `make bench` on {machine}, Python {python}, {when}. Speed is told as a ratio against another way of doing the
+Made by `make bench` on {machine}, Python {python}, {when}.
+
+Speed is told as a ratio against another way of doing the
 same in the same run, because machines differ and are busy; quality is told with counts and 95 % intervals, on data
 that nothing was trained on or chosen by. `avlmaps bench SUITE` makes any of the quality tables again.
 """
@@ -44,7 +46,7 @@ def speed() -> Iterator[str]:
         done = subprocess.run([sys.executable, HERE / script], capture_output=True, text=True)
         if done.returncode:
             sys.exit(f"{script} failed:\n{done.stderr}")
-        yield f"## {title}\n\n```\n{done.stdout.strip()}\n```\n"
+        yield f"## {title}\n\n```\n{done.stdout.rstrip()}\n```\n"
 
 
 def quality(sounds: Path, recording: Path, folder: Path) -> Iterator[str]:
