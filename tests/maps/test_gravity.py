@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,6 +9,7 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.maps.gravity import find_up, surface_normals
+from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame
 
 CAMERA = Pinhole(120.0, 120.0, 80.0, 60.0, 160, 120)
@@ -139,3 +142,12 @@ def test_table_and_floor_of_the_real_kitchen_are_level(shared_data):
     assert count[floor] > 2.5 * np.median(count[floor + 5 : table - 5])
     assert 0.68 < edge[table] - edge[floor] < 0.76  # a table is so high
     assert up.support > 0.15
+
+
+@pytest.mark.shared
+def test_up_in_the_real_kitchen_agrees_with_the_direction_that_came_with_it(shared_data: Path) -> None:
+    folder = shared_data / "data" / "redkitchen"
+    down = np.loadtxt(folder / "gravity-direction.txt")
+    recording = open_recording(folder)
+    found = find_up((recording.frame(i) for i in range(0, len(recording), 25)), np.random.default_rng(0))
+    assert angle_deg(found.direction, -down) < 2.5

@@ -178,13 +178,17 @@ def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.images import read_picture
 
-    found = AVLMap.open(map_path).locate(read_picture(picture), _camera_for(picture, intrinsics))
-    pose = found.world_from_camera
+    given = _camera_for(picture, intrinsics)
+    found = AVLMap.open(map_path).locate(read_picture(picture), given)
+    pose, camera = found.world_from_camera, found.camera
+    if pose is not None and given is not None and camera != given:
+        say(f"note: the focal length {given.fx:g} does not fit the photo; {camera.fx:.1f} was used.")
     return {
         "world_from_camera": None if pose is None else [[float(value) for value in row] for row in pose],
         "inliers": int(found.inliers),
         "reference": found.reference_stamp_s,
         "score": found.score,
+        "intrinsics": [camera.fx, camera.fy, camera.cx, camera.cy],
         "elapsed_ms": found.elapsed_ms,
     }
 
