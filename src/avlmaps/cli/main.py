@@ -3,13 +3,13 @@
 import os
 import sys
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Any, Union
 
 import tyro
 
 from avlmaps.cli.bench import Bench
 from avlmaps.cli.output import UsageError
-from avlmaps.cli.verbs import AddSounds, Build, Demo, Info, Locate, Profiles, Query, TeachSound
+from avlmaps.cli.verbs import AddSounds, Build, Demo, Info, Locate, Profiles, Query, TeachSound, Verb
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.progress import end_bars
 
@@ -18,19 +18,19 @@ _DESCRIPTION = """Audio-Visual-Language Maps: what a robot saw and heard, as one
 Every verb takes --json (one JSON object on standard output) and --help. Progress goes to standard error.
 Exit status: 0 done, 1 a known error (one sentence says which), 2 a wrong command line."""
 
-Command = (
-    Annotated[Demo, tyro.conf.subcommand("demo")]
-    | Annotated[AddSounds, tyro.conf.subcommand("add-sounds")]
-    | Annotated[Build, tyro.conf.subcommand("build")]
-    | Annotated[Info, tyro.conf.subcommand("info")]
-    | Annotated[Query, tyro.conf.subcommand("query")]
-    | Annotated[Locate, tyro.conf.subcommand("locate")]
-    | Annotated[TeachSound, tyro.conf.subcommand("teach-sound")]
-    | Annotated[Profiles, tyro.conf.subcommand("profiles")]
-    | Annotated[Bench, tyro.conf.subcommand("bench")]
-)
-_SHOWN = 200
+VERBS: dict[str, type[Verb]] = {
+    "demo": Demo,
+    "add-sounds": AddSounds,
+    "build": Build,
+    "info": Info,
+    "query": Query,
+    "locate": Locate,
+    "teach-sound": TeachSound,
+    "profiles": Profiles,
+    "bench": Bench,
+}
 _CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff)
+_SHOWN = 200
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -49,11 +49,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # a truncated picture is told in our words
-    verb = tyro.cli(Command, prog="avlmaps", description=_DESCRIPTION, args=words, config=_CONFIG)
+    shortly = not words or words[0].startswith("-")
+    verb = tyro.cli(_any_verb(shortly), prog="avlmaps", description=_DESCRIPTION, args=words, config=_CONFIG)
     sys.exit(_run(verb))
 
 
-def _run(verb: Command) -> int:
+def _any_verb(shortly: bool) -> Any:
+    """Return the union of the verbs; the list of them all tells one line of each."""
+
+    def described(name: str, verb: type[Verb]) -> Any:
+        first_line = (verb.__doc__ or "").partition("\n")[0]
+        return Annotated[verb, tyro.conf.subcommand(name, description=first_line if shortly else None)]
+
+    return Union[tuple(described(name, verb) for name, verb in VERBS.items())]  # noqa: UP007 - made at run time
+
+
+def _run(verb: Verb) -> int:
     try:
         verb.run()
     except UsageError as error:

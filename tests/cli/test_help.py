@@ -1,0 +1,32 @@
+"""What `--help` says is kept as snapshots: a change of the command line is seen, and meant.
+
+After a change that is meant: AVLMAPS_UPDATE_SNAPSHOTS=1 make test
+"""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from avlmaps.cli.main import VERBS
+
+SNAPSHOTS = Path(__file__).parent / "snapshots"
+
+
+@pytest.mark.parametrize("verb", ["", *VERBS])
+def test_help_is_as_it_was(verb: str, run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "100")
+    status, out, _ = run(*([verb] if verb else []), "--help")
+    assert status == 0
+    said = "\n".join(line.rstrip() for line in out.strip().splitlines()) + "\n"
+    kept = SNAPSHOTS / f"{verb or 'avlmaps'}.txt"
+    if os.environ.get("AVLMAPS_UPDATE_SNAPSHOTS"):
+        kept.write_text(said, encoding="utf-8")
+    assert said == kept.read_text(encoding="utf-8")
+
+
+def test_each_verb_tells_what_it_does_and_every_option(run) -> None:
+    for verb in VERBS:
+        out = run(verb, "--help")[1]
+        assert "--json" in out
+        assert "(required)" in out or verb in ("demo", "profiles")
