@@ -33,9 +33,9 @@ INTRODUCTION = """# Benchmarks
 
 Made by `make bench` on {machine}, Python {python}, {when}.
 
-Speed is told as a ratio against another way of doing the
-same in the same run, because machines differ and are busy; quality is told with counts and 95 % intervals, on data
-that nothing was trained on or chosen by. `avlmaps bench SUITE` makes any of the quality tables again.
+Speed is told as a ratio against another way of doing the same in the same run, because machines differ and are busy;
+quality is told with counts and 95 % intervals, on data that nothing was trained on or chosen by. `avlmaps bench SUITE`
+makes any of the quality tables again.
 """
 
 
