@@ -149,11 +149,6 @@ class Room:
             room_colours=np.array([(0.55, 0.50, 0.44), (0.80, 0.79, 0.74), (0.92, 0.92, 0.92)]),
         )
 
-    @cached_property
-    def part_category(self) -> tuple[str, ...]:
-        """The category of each box of the scene, in its order."""
-        return tuple(thing.category for thing in self.things for _ in thing.parts)
-
     def walk(
         self, speed_m_s: float = 0.5, rate_hz: float = 10.0, pitch_deg: float = 12.0
     ) -> Float64[np.ndarray, "n 4 4"]:
