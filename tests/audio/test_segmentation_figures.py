@@ -3,7 +3,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from avlmaps.bench.segmentation import COLUMNS, Tally, clips_to_test, count_interval, measure, share_interval
+from avlmaps.bench.intervals import poisson, wilson
+from avlmaps.bench.segmentation import COLUMNS, Tally, clips_to_test, measure
 from avlmaps.maps.segmentation import Segment, SegmentationSettings
 
 
@@ -18,10 +19,10 @@ def test_a_segment_over_two_sounds_finds_one_of_them() -> None:
 
 
 def test_intervals_are_the_textbooks() -> None:
-    np.testing.assert_allclose(share_interval(0, 10), (0.0, 27.75), atol=0.01)
-    np.testing.assert_allclose(share_interval(95, 100), (88.82, 97.85), atol=0.01)
-    np.testing.assert_allclose(count_interval(0), (0.0, 3.689), atol=0.001)
-    np.testing.assert_allclose(count_interval(10), (4.795, 18.390), atol=0.001)
+    np.testing.assert_allclose(100.0 * np.array(wilson(0, 10)), (0.0, 27.75), atol=0.01)
+    np.testing.assert_allclose(100.0 * np.array(wilson(95, 100)), (88.82, 97.85), atol=0.01)
+    np.testing.assert_allclose(poisson(0), (0.0, 3.689), atol=0.001)
+    np.testing.assert_allclose(poisson(10), (4.795, 18.390), atol=0.001)
 
 
 @pytest.mark.shared

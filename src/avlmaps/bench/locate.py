@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from avlmaps.bench.words import wilson
+from avlmaps.bench.intervals import wilson
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.core.progress import progress
@@ -197,7 +197,7 @@ def _percent(hits: int, count: int) -> float:
 
 
 def _interval(hits: int, count: int) -> str:
-    low, high = wilson(hits, count) if count else (0.0, 1.0)
+    low, high = wilson(hits, count)
     return f"{100 * low:.1f} to {100 * high:.1f}"
 
 

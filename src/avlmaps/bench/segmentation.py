@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32
 
+from avlmaps.bench.intervals import poisson, wilson
 from avlmaps.core.progress import progress
 from avlmaps.maps.segmentation import Segment, SegmentationSettings, segment
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
@@ -98,9 +99,9 @@ class Tally:
             "clean" if snr_db is None else snr_db,
             self.sounds,
             round(100.0 * self.found / max(self.sounds, 1), 1),
-            "{:.1f} to {:.1f}".format(*share_interval(self.found, self.sounds)),
+            "{:.1f} to {:.1f}".format(*(100.0 * bound for bound in wilson(self.found, self.sounds))),
             round(self.false_alarms / minutes, 2),
-            "{:.2f} to {:.2f}".format(*(bound / minutes for bound in count_interval(self.false_alarms))),
+            "{:.2f} to {:.2f}".format(*(bound / minutes for bound in poisson(self.false_alarms))),
             round(self.pieces / max(self.found, 1), 2),
             *(percentiles or [0.0] * 4),
             round(100.0 * near / max(self.found, 1), 1),
@@ -184,21 +185,3 @@ def _track(sounds: Sequence[Sound], rng: np.random.Generator) -> tuple[Float32[n
 def _noise(kind: str, level_db: float, count: int, rng: np.random.Generator) -> Float32[np.ndarray, " n"]:
     seconds: Iterator[np.ndarray] = background(kind, level_db, _RATE_HZ, rng)
     return np.concatenate(list(islice(seconds, -(-count // _RATE_HZ))))[:count]
-
-
-def share_interval(found: int, total: int) -> tuple[float, float]:
-    """Return Wilson's 95 % interval of a share, in per cent."""
-    if total == 0:
-        return 0.0, 100.0
-    z, share = 1.959964, found / total
-    middle = (share + z * z / (2 * total)) / (1 + z * z / total)
-    half = z * np.sqrt(share * (1 - share) / total + z * z / (4 * total * total)) / (1 + z * z / total)
-    return 100.0 * max(0.0, middle - half), 100.0 * min(1.0, middle + half)
-
-
-def count_interval(count: int) -> tuple[float, float]:
-    """Return the exact 95 % interval of the mean of a Poisson count."""
-    from scipy.special import gammaincinv
-
-    low = float(gammaincinv(count, 0.025)) if count else 0.0
-    return low, float(gammaincinv(count + 1, 0.975))

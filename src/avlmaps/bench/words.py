@@ -4,13 +4,13 @@ The list is ``data/words_heldout.csv``: every query is ranked against the labels
 """
 
 import csv
-import math
 from collections.abc import Sequence
 from importlib.resources import files
 from time import thread_time
 
 import numpy as np
 
+from avlmaps.bench.intervals import wilson
 from avlmaps.perception.embedded.words import EmbeddedWords
 
 _FIVE = 5
@@ -23,14 +23,6 @@ def heldout() -> list[tuple[str, str, str]]:
     """Return the rows (query, label, kind) of the held-out list."""
     text = files("avlmaps.bench").joinpath("data/words_heldout.csv").read_text(encoding="utf-8")
     return [(row["query"], row["label"], row["kind"]) for row in csv.DictReader(text.splitlines())]
-
-
-def wilson(hits: int, count: int, z: float = 1.96) -> tuple[float, float]:
-    """Return the 95 % interval of a share after Wilson (1927)."""
-    share = hits / count
-    middle = (share + z * z / (2 * count)) / (1 + z * z / count)
-    half = z / (1 + z * z / count) * math.sqrt(share * (1 - share) / count + z * z / (4 * count * count))
-    return middle - half, middle + half
 
 
 def places(encoder: EmbeddedWords, rows: Sequence[tuple[str, str, str]]) -> np.ndarray:

@@ -1,0 +1,23 @@
+"""The 95 % intervals that stand beside every figure."""
+
+import math
+
+_Z = 1.959964  # of the normal distribution, two-sided 95 %
+
+
+def wilson(hits: int, count: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share after Wilson (1927), within [0, 1]; all of it where nothing was counted."""
+    if count == 0:
+        return 0.0, 1.0
+    share, square = hits / count, _Z * _Z
+    middle = (share + square / (2 * count)) / (1 + square / count)
+    half = _Z / (1 + square / count) * math.sqrt(share * (1 - share) / count + square / (4 * count * count))
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def poisson(count: int) -> tuple[float, float]:
+    """Return the exact 95 % interval of the mean of a Poisson count."""
+    from scipy.special import gammaincinv
+
+    low = float(gammaincinv(count, 0.025)) if count else 0.0
+    return low, float(gammaincinv(count + 1, 0.975))
