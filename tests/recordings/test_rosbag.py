@@ -107,7 +107,13 @@ def world_from_body(stamp_s: float) -> np.ndarray:
 
 
 def write_bag(
-    folder: Path, kind: str, poses: str = "tf", sound: bool = False, depth: bool = True, depth_info: bool = True
+    folder: Path,
+    kind: str,
+    poses: str = "tf",
+    sound: bool = False,
+    depth: bool = True,
+    depth_info: bool = True,
+    colour_topic: str = "/camera/color/image_raw",
 ) -> Path:
     maker = BagMaker(kind, folder)
     with maker.writer:
@@ -126,7 +132,7 @@ def write_bag(
             maker.camera_info("/camera/color/camera_info", stamp_s)
             if depth_info:
                 maker.camera_info("/camera/depth/camera_info", stamp_s)
-            maker.image("/camera/color/image_raw", stamp_s + 0.004, rgb, "rgb8", "camera_optical")
+            maker.image(colour_topic, stamp_s + 0.004, rgb, "rgb8", "camera_optical")
             if depth:
                 maker.image("/camera/depth/image_raw", stamp_s, millimetres, "16UC1", "camera_optical")
         if sound:
@@ -179,6 +185,11 @@ def test_a_second_thread_reads_the_same_frames(tmp_path: Path) -> None:
 def test_a_bag_without_depth_says_what_it_has(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"has no topic of depth images \(image topics: /camera/color/image_raw\)"):
         open_rosbag(write_bag(tmp_path, "ros2", depth=False))
+
+
+def test_a_bag_without_colour_says_by_which_word_to_name_it(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"has no topic of colour images .*; name it \(rgb=TOPIC\)"):
+        open_rosbag(write_bag(tmp_path, "ros2", colour_topic="/camera/depth/second"))
 
 
 def test_a_bag_without_poses_says_what_to_record(tmp_path: Path) -> None:

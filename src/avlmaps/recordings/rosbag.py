@@ -143,7 +143,9 @@ class RosbagRecording(Recording):
         self.path = path
         self._bag = _Bag(path)
         self._rgb_topic, self._depth_topic = _image_topics(self._bag, topics)
-        self.rig, rig_notices, self._depth_frame = _read_rig(self._bag, self._rgb_topic, self._depth_topic)
+        tree = TransformTree()
+        _add_tf(self._bag, "/tf_static", tree)
+        self.rig, rig_notices, camera_frame = _read_rig(self._bag, self._rgb_topic, self._depth_topic, tree)
         rgb_s, rgb_ns = self._bag.stamps(self._rgb_topic)
         depth_s, depth_ns = self._bag.stamps(self._depth_topic)
         rgb_order, depth_order = in_order(rgb_s, "colour images"), in_order(depth_s, "depth images")
@@ -153,7 +155,7 @@ class RosbagRecording(Recording):
         if len(a) < len(depth):
             notices.append(f"{len(depth) - len(a)} of {len(depth)} depth images have no colour image within 50 ms.")
         stamps_s = depth_s[depth][a]
-        tree, camera_frame = _read_tree(self._bag, topics, self._depth_frame)
+        _add_motion(self._bag, topics, camera_frame, tree)
         poses, known = tree.root_from(camera_frame, stamps_s)
         if not known.any():
             raise RecordingError(
@@ -228,9 +230,9 @@ def _image_topics(bag: _Bag, topics: RosTopics) -> tuple[str, str]:
         [t for t in images if t != depth and "depth" not in t.lower()], ("color", "rgb", "colour")
     )
     if not depth or not rgb:
-        missing = "depth" if not depth else "colour"
+        missing, name = ("depth", "depth") if not depth else ("colour", "rgb")
         raise RecordingError(
-            f"{bag.path} has no topic of {missing} images (image topics: {every}); name it ({missing}=TOPIC)."
+            f"{bag.path} has no topic of {missing} images (image topics: {every}); name it ({name}=TOPIC)."
         )
     return rgb, depth
 
@@ -241,7 +243,8 @@ def _pick(candidates: list[str], better: tuple[str, ...]) -> str:
     return next(iter(likely or candidates), "")
 
 
-def _read_rig(bag: _Bag, rgb_topic: str, depth_topic: str) -> tuple[Rig, list[str], str]:
+def _read_rig(bag: _Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree) -> tuple[Rig, list[str], str]:
+    """Return the cameras, what is worth telling of them, and the depth camera's frame; ``mounts`` links the two."""
     cameras: dict[str, Any] = {}
     notices: list[str] = []
     frames: dict[str, str] = {}
@@ -263,10 +266,7 @@ def _read_rig(bag: _Bag, rgb_topic: str, depth_topic: str) -> tuple[Rig, list[st
             )
         image = next(iter(bag.messages(topic)), None)
         frames[topic] = (image[1] if image else first[1]).header.frame_id
-    tree = TransformTree()
-    for topic in ("/tf_static", "/tf"):
-        _add_tf(bag, topic, tree)
-    rgb_from_depth = tree.fixed(frames[rgb_topic], frames[depth_topic])
+    rgb_from_depth = mounts.fixed(frames[rgb_topic], frames[depth_topic])
     if rgb_from_depth is None:
         rgb_from_depth = np.eye(4)
         notices.append(
@@ -306,14 +306,12 @@ def _check_pose_topic(bag: _Bag, topic: str) -> None:
         )
 
 
-def _read_tree(bag: _Bag, topics: RosTopics, camera_frame: str) -> tuple[TransformTree, str]:
-    """Return the tree of frames and the frame in it that is the camera."""
-    tree = TransformTree()
-    _add_tf(bag, "/tf_static", tree)
+def _add_motion(bag: _Bag, topics: RosTopics, camera_frame: str, tree: TransformTree) -> None:
+    """Add to the tree of mounts what moves the camera: /tf, else odometry or a pose topic."""
     if not topics.pose:
         _add_tf(bag, "/tf", tree)
         if tree.moves(camera_frame):
-            return tree, camera_frame
+            return
     if topics.pose:
         _check_pose_topic(bag, topics.pose)
     candidates = [topics.pose] if topics.pose else bag.topics_of(_POSE_TYPES)
@@ -329,9 +327,8 @@ def _read_tree(bag: _Bag, topics: RosTopics, camera_frame: str) -> tuple[Transfo
         tree.add(
             message.header.frame_id or "world", body, pose_of(message), stamp.sec + stamp.nanosec * 1e-9, static=False
         )
-    if tree.moves(camera_frame):
-        return tree, camera_frame
-    raise RecordingError(
-        f"{bag.path} has poses of {body!r} on {candidates[0]} but no static transform from there to the camera "
-        f"{camera_frame!r}; record /tf_static."
-    )
+    if not tree.moves(camera_frame):
+        raise RecordingError(
+            f"{bag.path} has poses of {body!r} on {candidates[0]} but no static transform from there to the camera "
+            f"{camera_frame!r}; record /tf_static."
+        )
