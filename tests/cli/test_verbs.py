@@ -205,3 +205,13 @@ def test_a_known_error_is_one_sentence(words, code, sentence, built: Path, walk:
     assert "Traceback" not in err
     if code == 1:
         assert err.count("\n") == 1, err
+
+
+def test_adding_sounds_without_progress_says_nothing(walk: Path, tmp_path: Path, capsys) -> None:
+    from avlmaps.recordings.add_sounds import add_sounds
+    from avlmaps.recordings.open import open_recording
+
+    (tmp_path / "clips" / "beep").mkdir(parents=True)
+    soundfile.write(tmp_path / "clips" / "beep" / "a.wav", beeps(1.0), RATE_HZ)
+    assert add_sounds(open_recording(walk), tmp_path / "clips", tmp_path / "out", min_distance_m=0.0, progress=False)
+    assert capsys.readouterr() == ("", "")

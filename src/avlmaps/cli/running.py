@@ -160,10 +160,15 @@ def _camera_for(picture: Path | None, intrinsics: str | None) -> "Pinhole | None
         return None
     if picture is None:
         raise UsageError("--intrinsics belongs to a photo (--image); there is none.")
-    from avlmaps.core.camera import Pinhole
     from avlmaps.query.images import read_picture
 
     height, width = read_picture(picture).shape[:2]
+    return _camera_of(intrinsics, width, height)
+
+
+def _camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":
+    from avlmaps.core.camera import Pinhole
+
     try:
         fx, fy, cx, cy = (float(word) for word in intrinsics.split(","))
         return Pinhole(fx, fy, cx, cy, width=width, height=height)
@@ -178,8 +183,9 @@ def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.images import read_picture
 
-    given = _camera_for(picture, intrinsics)
-    found = AVLMap.open(map_path).locate(read_picture(picture), given)
+    rgb = read_picture(picture)
+    given = None if intrinsics is None else _camera_of(intrinsics, rgb.shape[1], rgb.shape[0])
+    found = AVLMap.open(map_path).locate(rgb, given)
     pose, camera = found.world_from_camera, found.camera
     if pose is not None and given is not None and camera != given:
         say(f"note: the focal length {given.fx:g} does not fit the photo; {camera.fx:.1f} was used.")

@@ -59,6 +59,14 @@ class Step:
             return not self.answer["found"]
         return bool(self.answer["found"]) and self.off_m is not None and self.off_m <= REACH_M
 
+    @property
+    def said(self) -> str:
+        """The answer in words, and how far off it is."""
+        if not self.answer["found"]:
+            return "not here"
+        place = ", ".join(f"{value:.2f}" for value in self.answer["goals"][0]["position"])
+        return f"({place})" + ("" if self.off_m is None else f", {self.off_m:.2f} m from the true one")
+
 
 @dataclass(frozen=True, slots=True)
 class DemoReport:
@@ -97,20 +105,10 @@ class DemoReport:
 
     def lines(self) -> list[str]:
         """Return it as a person reads it."""
-        lines = []
-        for step in self.steps:
-            where = "not here" if not step.answer["found"] else f"{step.answer['goals'][0]['position']}"
-            off = "" if step.off_m is None or not step.answer["found"] else f", {step.off_m:.2f} m from the true one"
-            lines.append(f"{'right' if step.right else 'WRONG'}  {step.title}  ->  {_rounded(where)}{off}")
+        lines = [f"{'right' if step.right else 'WRONG'}  {step.title}  ->  {step.said}" for step in self.steps]
         if self.located is not None:
             lines.append(f"photo located within {self.located[0]:.1f} cm and {self.located[1]:.2f} degrees")
         return [*lines, f"look at {self.out / 'report.html'}"]
-
-
-def _rounded(text: str) -> str:
-    if not text.startswith("["):
-        return text
-    return "(" + ", ".join(f"{float(word):.2f}" for word in text.strip("[]").split(",")) + ")"
 
 
 def run_demo(out: Path, seed: int = 0) -> DemoReport:

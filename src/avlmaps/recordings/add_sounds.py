@@ -14,7 +14,7 @@ from jaxtyping import Float32
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.progress import progress as shown
-from avlmaps.core.progress import say
+from avlmaps.core.progress import say, silenced
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.background import background as noise_of
 from avlmaps.recordings.background import seconds_of
@@ -147,8 +147,8 @@ def add_sounds(
         noise = noise_of(background, placed[0].loudness_db - (_SNR_DB if snr_db is None else snr_db), rate_hz, rng)
     events = [_event(sound, walk, rate_hz) for sound in placed]
     seconds = _mixed(recording, placed, noise, rate_hz)
-    _write(recording, out, shown(seconds, "mixing", unit="second") if progress else seconds, events)
-    if progress:
+    with silenced(not progress):
+        _write(recording, out, shown(seconds, "mixing", unit="second"), events)
         for notice in notices:
             say(f"note: {notice}")
     return events
