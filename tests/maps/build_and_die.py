@@ -71,6 +71,7 @@ def obey(audio: Path) -> None:
     for line in sys.stdin:
         order = json.loads(line)
         begin = time.perf_counter()
+        cv2.setNumThreads(0)  # threads do not survive a fork: a child would wait for the pool for ever
         pid = os.fork()
         if pid == 0:
             child(order, audio)
