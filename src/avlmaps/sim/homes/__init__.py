@@ -1,0 +1,1 @@
+"""Homes and offices by rule, from a seed."""
