@@ -1,0 +1,252 @@
+"""Where a robot can stand on a floor, and how far it is from one such place to another. World frame, metres."""
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy import ndimage, sparse
+from scipy.sparse import csgraph
+
+from avlmaps.sim.grid_kernels import mark_slab
+from avlmaps.sim.scene import Scene
+
+FLOOR_CATEGORIES = frozenset({"floor", "carpet", "rug", "mat"})
+STRUCTURE = frozenset({"wall", "floor", "ceiling", "column", "stairs", "railing"})
+_STEP_M = 0.1  # what is lower than this can be driven over
+_THRESHOLD_M = 0.3  # gaps in the floor up to this wide (door sills, seams of a scan) count as floor
+_FLAT = 0.8  # the upward part of the normal of what can be stood on
+_STOREY_M = 1.5  # floors closer together than this are steps of one floor
+_NEIGHBOURS = ((1, 0), (0, 1), (1, 1), (1, -1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeSpace:
+    """The places of one floor where a round robot can stand, as a grid; cell (i, j) covers x from origin + i cells.
+
+    Attributes:
+        free: (nx, ny) where its middle may be.
+        clearance_m: (nx, ny) distance to the nearest obstacle, never overstated.
+        origin: (2,) xy of the grid's lowest corner.
+        cell_m: side of a cell.
+        floor_m: height of the floor.
+    """
+
+    free: Bool[np.ndarray, "nx ny"]
+    clearance_m: Float[np.ndarray, "nx ny"]
+    origin: Float[np.ndarray, "2"]
+    cell_m: float
+    floor_m: float
+    _number: np.ndarray = field(init=False, repr=False)
+    _graph: sparse.csr_matrix = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        number = np.full(self.free.shape, -1, np.int64)
+        number[self.free] = np.arange(np.count_nonzero(self.free))
+        object.__setattr__(self, "_number", number)
+        object.__setattr__(self, "_graph", _graph(number, self.clearance_m, self.cell_m))
+
+    @property
+    def area_m2(self) -> float:
+        """How much floor the robot's middle can reach."""
+        return float(np.count_nonzero(self.free)) * self.cell_m**2
+
+    def cell_of(self, xy: Float[np.ndarray, "*n 2"]) -> np.ndarray:
+        """Return the cell (i, j) of each place, which may lie off the grid."""
+        return np.floor((np.asarray(xy, float) - self.origin) / self.cell_m).astype(np.int64)
+
+    def middle_of(self, cell: np.ndarray) -> Float[np.ndarray, "*n 2"]:
+        """Return the xy of the middle of each cell."""
+        return self.origin + (np.asarray(cell) + 0.5) * self.cell_m
+
+    def middles(self) -> Float[np.ndarray, "n 2"]:
+        """Return the xy of the middle of every free cell."""
+        return self.middle_of(np.argwhere(self.free))
+
+    def is_free(self, xy: Float[np.ndarray, "*n 2"]) -> np.ndarray:
+        """Tell at which places the robot can stand."""
+        cell = self.cell_of(xy)
+        inside = np.all((cell >= 0) & (cell < self.free.shape), axis=-1)
+        i, j = np.moveaxis(np.where(inside[..., None], cell, 0), -1, 0)
+        return inside & self.free[i, j]
+
+    def nearest(self, xy: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
+        """Return the free place nearest to a place as the crow flies: the place itself where it is free.
+
+        Raises:
+            ValueError: nothing is free.
+        """
+        xy = np.asarray(xy, float)
+        if bool(self.is_free(xy)):
+            return xy
+        middles = self.middles()
+        if not len(middles):
+            raise ValueError("no place of this floor is free")
+        return middles[np.argmin(np.sum((middles - xy) ** 2, axis=1))]
+
+    def distances_m(self, xy: Float[np.ndarray, "2"]) -> Float[np.ndarray, "nx ny"]:
+        """Return how far the robot drives from a place to every cell, inf where it cannot go."""
+        weights, _ = csgraph.dijkstra(self._metric(), indices=self._node(xy), return_predecessors=True)
+        grid = np.full(self.free.shape, np.inf)
+        grid[self.free] = weights
+        return grid
+
+    def distance_m(self, a: Float[np.ndarray, "2"], b: Float[np.ndarray, "2"]) -> float:
+        """Return how far the robot drives from a to b (from the free places nearest to them), inf where it cannot."""
+        i, j = self.cell_of(self.nearest(b))
+        return float(self.distances_m(a)[i, j])
+
+    def paths(self, places: Float[np.ndarray, "k 2"]) -> tuple[np.ndarray, np.ndarray]:
+        """Return the cost (k, k) of driving between places, and for each the way back to it, for `path`.
+
+        The cost of a metre rises near obstacles, up to twice, so that paths keep to the middle of doors.
+        """
+        nodes = [self._node(place) for place in places]
+        cost, before = csgraph.dijkstra(self._graph, indices=nodes, return_predecessors=True)
+        return cost[:, nodes], before
+
+    def path(self, before: np.ndarray, goal: Float[np.ndarray, "2"]) -> Float[np.ndarray, "m 2"]:
+        """Return the cells' middles from the place whose row of `paths` is given to a goal, both included."""
+        nodes = [self._node(goal)]
+        while before[nodes[-1]] >= 0:
+            nodes.append(int(before[nodes[-1]]))
+        return self.middles()[nodes[::-1]]
+
+    def part_with(self, xy: Float[np.ndarray, "2"]) -> "FreeSpace":
+        """Return the part of it that is connected with a place."""
+        return self._kept(np.isfinite(self.distances_m(xy)))
+
+    def _kept(self, mask: np.ndarray) -> "FreeSpace":
+        return FreeSpace(self.free & mask, self.clearance_m, self.origin, self.cell_m, self.floor_m)
+
+    def _node(self, xy: Float[np.ndarray, "2"]) -> int:
+        i, j = self.cell_of(self.nearest(xy))
+        return int(self._number[i, j])
+
+    def _metric(self) -> sparse.csr_matrix:
+        return _graph(self._number, None, self.cell_m)
+
+
+def floor_heights(scene: Scene) -> tuple[float, ...]:
+    """Return the height of every floor of a building, lowest first.
+
+    From its areas where it has any; else from what is called floor; else from the level surfaces that are at least
+    a third as large as the largest and have nothing as large within a storey under them.
+    """
+    if scene.areas:
+        heights = np.array([area.floor_m for area in scene.areas])
+        return _levels(heights, np.ones(len(heights)))
+    flat, height, area = _flat_triangles(scene, only_named=_has_floor(scene))
+    return _levels(height[flat], area[flat], share=0.34) if flat.any() else (0.0,)
+
+
+def free_space(
+    scene: Scene, radius_m: float = 0.22, height_m: float = 1.6, cell_m: float = 0.05, floor: int | None = None
+) -> FreeSpace:
+    """Return where a robot can stand: on a floor, with nothing of the scene within its radius and its height.
+
+    Args:
+        scene: what stands in the way.
+        radius_m: of the robot.
+        height_m: of the robot; what is lower than 0.1 m it drives over.
+        cell_m: side of a cell of the grid.
+        floor: which floor, counted from the lowest; the one with most to stand on where it is not said.
+    """
+    heights = floor_heights(scene)
+    if floor is not None:
+        return _one_floor(scene, heights[floor], radius_m, height_m, cell_m)
+    floors = [_one_floor(scene, height, radius_m, height_m, cell_m) for height in heights]
+    return max(floors, key=lambda space: space.area_m2)
+
+
+def occupied(
+    scene: Scene, space: FreeSpace, low_m: float, high_m: float
+) -> Bool[np.ndarray, "nx ny"]:
+    """Return over which cells of a grid the scene has something between two heights above the floor."""
+    grid = np.zeros(space.free.shape, np.bool_)
+    corners = scene.mesh.corners().astype(np.float64)
+    mark_slab(corners, space.floor_m + low_m, space.floor_m + high_m, space.origin, space.cell_m, grid)
+    return grid
+
+
+def _one_floor(scene: Scene, floor_m: float, radius_m: float, height_m: float, cell_m: float) -> FreeSpace:
+    corners = scene.mesh.corners().astype(np.float64)
+    origin = np.floor((scene.mesh.low[:2].astype(np.float64) - 2 * cell_m) / cell_m) * cell_m
+    shape = np.ceil((scene.mesh.high[:2] - origin) / cell_m).astype(int) + 2
+    ground = np.zeros(shape, np.bool_)
+    flat, _, _ = _flat_triangles(scene, only_named=_has_floor(scene))
+    mark_slab(corners[flat], floor_m - 0.25, floor_m + 0.15, origin, cell_m, ground)
+    gap = 2 * round(_THRESHOLD_M / cell_m / 2) + 1
+    ground = cv2.morphologyEx(ground.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((gap, gap), np.uint8)) > 0
+    blocked = np.zeros(shape, np.bool_)
+    mark_slab(corners, floor_m + _STEP_M, floor_m + height_m, origin, cell_m, blocked)
+    apart = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    # Anything in a cell may lie in its nearest corner, and the robot's middle in its own.
+    clearance = np.maximum(apart - np.sqrt(2.0), 0.0) * cell_m
+    return FreeSpace(ground & (clearance >= radius_m), clearance, origin, cell_m, floor_m)
+
+
+def _graph(number: np.ndarray, clearance_m: np.ndarray | None, cell_m: float) -> sparse.csr_matrix:
+    """Join every free cell with its eight neighbours; metres cost up to double near obstacles where they are given."""
+    nx, ny = number.shape
+    rows, columns, weights = [], [], []
+    dear = None if clearance_m is None else 1.0 + np.exp(-((np.maximum(clearance_m - 0.2, 0) / 0.2) ** 2))
+    for di, dj in _NEIGHBOURS:
+        a = (slice(0, nx - di), slice(max(0, -dj), ny - max(0, dj)))
+        b = (slice(di, nx), slice(max(0, dj), ny - max(0, -dj)))
+        both = (number[a] >= 0) & (number[b] >= 0)
+        if di and dj:  # no cutting of corners
+            both &= (number[di:nx, a[1]] >= 0) & (number[0 : nx - di, b[1]] >= 0)
+        rows.append(number[a][both])
+        columns.append(number[b][both])
+        length = cell_m * float(np.hypot(di, dj))
+        weights.append(np.full(len(rows[-1]), length) if dear is None else length * 0.5 * (dear[a] + dear[b])[both])
+    row, column, weight = np.concatenate(rows), np.concatenate(columns), np.concatenate(weights)
+    count = int(number.max()) + 1
+    both_ways = (np.concatenate([weight, weight]), (np.concatenate([row, column]), np.concatenate([column, row])))
+    return sparse.csr_matrix(both_ways, shape=(count, count))
+
+
+def _has_floor(scene: Scene) -> bool:
+    return any(thing.category == "floor" for thing in scene.objects)
+
+
+def _flat_triangles(scene: Scene, only_named: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return which triangles can be stood on, and every triangle's middle height and area."""
+    mesh = scene.mesh
+    flat = np.abs(mesh.normals()[:, 2]) > _FLAT
+    if only_named:
+        named = np.array([thing.category in FLOOR_CATEGORIES for thing in scene.objects], bool)
+        flat &= named[scene.instance]
+    return flat, mesh.corners()[:, :, 2].mean(axis=1), mesh.areas_m2()
+
+
+def _levels(height: np.ndarray, weight: np.ndarray, share: float = 0.0) -> tuple[float, ...]:
+    """Return the heavy heights, lowest first: the weighted median of each group of heights within one storey."""
+    edge = np.floor(height / 0.1).astype(int)
+    first = int(edge.min())
+    total = np.bincount(edge - first, weights=weight)
+    heavy = np.flatnonzero(total >= max(share * total.max(), 1e-12)) + first
+    levels: list[float] = []
+    for bin_number in heavy:
+        near = (edge >= bin_number - 1) & (edge <= bin_number + 1)
+        level = float(np.average(height[near], weights=weight[near]))
+        if not levels or level - levels[-1] > _STOREY_M:
+            levels.append(level)
+    return tuple(levels)
+
+
+def reaching_part(scene: Scene, space: FreeSpace) -> FreeSpace:
+    """Return the connected part that reaches most areas, and among those the largest."""
+    label, count = ndimage.label(space.free)  # type: ignore[misc]
+    if count <= 1:
+        return space
+    size = np.bincount(label.ravel())[1:]
+    reached = np.zeros(count)
+    xy = space.middles()
+    parts = label[space.free] - 1
+    for area in scene.areas:
+        if abs(area.floor_m - space.floor_m) < _STOREY_M:
+            reached[np.unique(parts[area.contains(xy)])] += 1
+    best = int(np.lexsort((size, reached))[-1])
+    return space._kept(label == best + 1)
