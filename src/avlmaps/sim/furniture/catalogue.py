@@ -18,7 +18,8 @@ Families = Literal["training", "held-out", "all"]
 
 # Modules with recipes, imported at the first question.
 _MODULES = ("seating", "tables", "beds", "storage", "kitchen", "bathroom", "appliances", "electronics", "decor",
-            "openings", "clutter", "leisure", "office")  # fmt: skip
+            "lighting", "chandeliers", "plants", "drapes", "openings", "clutter", "containers", "leisure", "fitness",
+            "office")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

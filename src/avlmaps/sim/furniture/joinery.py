@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.sim.furniture.catalogue import Piece, Support
+from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined, triangles_of
 from avlmaps.sim.shapes import box, loft
 
@@ -98,3 +99,11 @@ def finished(meshes: Sequence[Mesh], light: Sequence[Triple] = (), supports: Seq
         Support((s.low[0] - x, s.low[1] - y), (s.high[0] - x, s.high[1] - y), s.z - z, s.clearance_m) for s in supports
     )
     return Piece(whole.moved(-x, -y, -z), tops, tuple((a - x, b - y, c - z) for a, b, c in light))
+
+
+def pictured(kind: str, rng: np.random.Generator, plain: str) -> Material:
+    """Draw a material of a kind that carries a picture, or a plain one where there is no such kind."""
+    try:
+        return material(kind, rng)
+    except KeyError:
+        return material(plain, rng)
