@@ -1,0 +1,143 @@
+"""Batches for training: random windows of rendered frames, mirrored, stretched, tilted and spoiled a little more."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from training.pixels.labels import UNLABELLED
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.perception.embedded.geometry import channels
+
+WIDTH, HEIGHT = 160, 128
+
+
+@dataclass(frozen=True)
+class Frames:
+    """One shard, mapped into memory."""
+
+    depth: np.ndarray
+    label: np.ndarray
+    rgb: np.ndarray
+    rgb_row: np.ndarray
+    room: np.ndarray
+    camera: np.ndarray
+
+    @classmethod
+    def open(cls, folder: Path) -> "Frames":
+        """Map a shard's arrays; a shard that is replaced meanwhile stays readable."""
+        names = ("depth", "label", "rgb", "rgb_row", "room", "camera")
+        return cls(**{name: np.load(folder / f"{name}.npy", mmap_mode="r") for name in names})
+
+
+@dataclass
+class Batch:
+    """Arrays for the network.
+
+    Attributes:
+        geometry: (n, 8, h, w).
+        colour: (n, 3, h, w) in about −1 to 1, all zero where colour is withheld.
+        label: (n, h/2, w/2).
+        weight: (n, h/2, w/2) of each pixel in the loss.
+        room: (n, rooms) share of the view in each kind.
+    """
+
+    geometry: np.ndarray
+    colour: np.ndarray
+    label: np.ndarray
+    weight: np.ndarray
+    room: np.ndarray
+
+
+class Shards:
+    """Draws frames from the shards in a folder; looks for new ones when told to."""
+
+    def __init__(self, folder: Path) -> None:
+        """Open the shards that are there."""
+        self.folder = folder
+        self._open: dict[str, tuple[int, Frames]] = {}
+        self.refresh()
+
+    def refresh(self) -> int:
+        """Look for shards that are new; return how many frames there are."""
+        found: dict[str, tuple[int, Frames]] = {}
+        for folder in sorted(self.folder.glob("[0-9]*")):
+            try:
+                stamp = (folder / "about.json").stat().st_mtime_ns
+                old = self._open.get(folder.name)
+                found[folder.name] = old if old and old[0] == stamp else (stamp, Frames.open(folder))
+            except OSError:  # it is being replaced at this moment
+                continue
+        self._open = found
+        return sum(len(frames.depth) for _, frames in found.values())
+
+    def draw(self, rng: np.random.Generator) -> tuple[Frames, int]:
+        """Return a shard and the number of a frame in it."""
+        _, frames = list(self._open.values())[int(rng.integers(len(self._open)))]
+        return frames, int(rng.integers(len(frames.depth)))
+
+
+def draw_batch(shards: Shards, size: int, rng: np.random.Generator, colour_kept: float) -> Batch:
+    """Draw a batch; ``colour_kept`` is the share of pictures with colour that keep it."""
+    items = [_sample(*shards.draw(rng), rng, colour_kept) for _ in range(size)]
+    return Batch(*(np.stack([item[i] for item in items]) for i in range(5)))
+
+
+def _sample(frames: Frames, index: int, rng: np.random.Generator, colour_kept: float) -> tuple[np.ndarray, ...]:
+    h, w = frames.depth.shape[1:]
+    wide = rng.uniform(WIDTH, w * 0.9999) if rng.random() < 0.8 else WIDTH * rng.uniform(0.75, 1.0)
+    wide = min(wide, h * WIDTH / HEIGHT)
+    tall = wide * HEIGHT / WIDTH
+    left, top = rng.uniform(0, w - wide), rng.uniform(0, h - tall)
+    column = np.clip((left + (np.arange(WIDTH) + 0.5) * wide / WIDTH).astype(int), 0, w - 1)
+    row = np.clip((top + (np.arange(HEIGHT) + 0.5) * tall / HEIGHT).astype(int), 0, h - 1)
+    depth = frames.depth[index][row[:, None], column].astype(np.float32) / 1000.0
+    label = np.array(frames.label[index][row[:, None], column])
+    fx, fy, cx, cy, *up, height = frames.camera[index]
+    scale = WIDTH / wide
+    fx, fy, cx, cy = fx * scale, fy * scale, (cx - left) * scale, (cy - top) * scale
+    up = np.array(up)
+    colour = np.zeros((3, HEIGHT, WIDTH), np.float32)
+    rgb_row = int(frames.rgb_row[index])
+    if rgb_row >= 0 and rng.random() < colour_kept:
+        colour = _other_light(frames.rgb[rgb_row][row[:, None], column], rng)
+    if rng.random() < 0.5:
+        depth, label, colour = depth[:, ::-1], label[:, ::-1], colour[:, :, ::-1]
+        up, cx = up * (-1, 1, 1), WIDTH - cx
+    # Things come larger and smaller than the recipes make them; odometry and gravity are never quite right.
+    stretch = np.exp(rng.normal(0.0, 0.07))
+    up = up + rng.normal(0.0, 0.012, 3)
+    off = rng.normal(0.0, 0.03) if rng.random() < 0.95 else rng.normal(0.0, 0.25)
+    depth = np.ascontiguousarray(depth * stretch)
+    if rng.random() < 0.3:
+        depth = _with_holes(depth, rng)
+    camera = Pinhole(fx, fy, cx, cy, WIDTH, HEIGHT)
+    geometry = channels(depth, camera, up / np.linalg.norm(up), height * stretch + off)
+    i, j = rng.integers(2, size=2)  # a cell of the output stands for four pixels
+    label, z = np.array(label[i::2, j::2]), depth[i::2, j::2]
+    label[z == 0.0] = UNLABELLED
+    weight = np.minimum(1.0, 3.0 / np.maximum(z, 0.5)).astype(np.float32)
+    return geometry, np.ascontiguousarray(colour), label.astype(np.int64), weight, np.array(frames.room[index])
+
+
+def _with_holes(depth: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    depth = depth.copy()
+    if rng.random() < 0.5:  # a sensor that sees less far
+        depth[depth > rng.uniform(2.5, 6.0)] = 0.0
+    for _ in range(rng.integers(1, 5)):
+        h, w = rng.integers(4, 40, 2)
+        r, c = rng.integers(0, HEIGHT - 4), rng.integers(0, WIDTH - 4)
+        depth[r : r + h, c : c + w] = 0.0
+    return depth
+
+
+def _other_light(rgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return the picture as another camera under another light might show it, (3, h, w)."""
+    x = rgb.astype(np.float32) / 255.0
+    if rng.random() < 0.5:  # any colour of things is as likely as another
+        x = x[..., rng.permutation(3)]
+    grey = x.mean(axis=2, keepdims=True)
+    x = grey + (x - grey) * rng.uniform(0.0, 1.4)
+    x = x ** np.exp(rng.normal(0, 0.25)) * rng.uniform(0.6, 1.4) * np.exp(rng.normal(0, 0.08, 3))
+    x = x + rng.normal(0, rng.uniform(0.0, 0.06), x.shape)
+    return np.clip(x, 0.0, 1.2).astype(np.float32).transpose(2, 0, 1) * 2.0 - 1.0

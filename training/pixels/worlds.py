@@ -1,0 +1,217 @@
+"""Rendering the worlds that the network learns from: ``python -m training.pixels.worlds --out build/pixels/training``.
+
+Each shard holds the frames of some homes as plain arrays, so that training maps them into memory. It may run on
+while training does: a shard counts from the moment that its folder has its final name, and beyond ``--shards`` the
+oldest is replaced.
+"""
+
+import json
+import os
+import shutil
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter, time
+
+import numpy as np
+import tyro
+from training.pixels.labels import CATEGORIES, ROOM_OF_AREA, ROOMS, UNLABELLED
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.sim.furniture.catalogue import Families
+from avlmaps.sim.mesh import Mesh, joined
+from avlmaps.sim.scene import Scene, SceneObject
+
+WIDTH, HEIGHT = 320, 240
+# Seeds of homes: training below, held-out homes (figures, calibration) from here on; nothing else divides them.
+FIRST_HELD_OUT_SEED = 1_000_000
+_NAME = {name: number for number, name in enumerate(CATEGORIES)}
+_ROOM = {name: number for number, name in enumerate(ROOMS)}
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to render."""
+
+    out: Path = Path("build/pixels/training")
+    """Folder of the shards."""
+    shards: int = 60
+    """How many shards are kept; then the oldest is replaced."""
+    homes_per_shard: int = 8
+    """Homes in a shard."""
+    frames_per_home: int = 48
+    """Views of each home."""
+    first_seed: int = 0
+    """Seed of the first home."""
+    step: int = 1
+    """Distance of the seeds, for several processes side by side."""
+    which: Families = "training"
+    """Families of shapes."""
+    lit: float = 0.5
+    """Share of homes rendered in colour; of the others only shape is learnt."""
+    once: bool = False
+    """Stop when there are enough shards instead of replacing old ones."""
+
+
+def scene_of(seed: int, which: Families, rng: np.random.Generator) -> Scene:
+    """Return the home or office of a seed, with some things in it that are nothing in particular."""
+    from avlmaps.sim.homes import make_home, make_office
+
+    scene = make_office(seed, which) if seed % 6 == 5 else make_home(seed, which)
+    return with_oddities(scene, rng)
+
+
+def with_oddities(scene: Scene, rng: np.random.Generator) -> Scene:
+    """Return the scene with some meaningless assemblies of simple solids on its floors: the category ``other``."""
+    meshes, instances, objects = [scene.mesh], [scene.instance], list(scene.objects)
+    for area in scene.areas:
+        for _ in range(rng.poisson(0.5)):
+            low, high = area.polygon.min(axis=0), area.polygon.max(axis=0)
+            x, y = rng.uniform(low, high)
+            if not area.contains(np.array([x, y])):
+                continue
+            mesh = _oddity(rng).moved(float(x), float(y), area.floor_m + max(0.0, rng.uniform(-1.5, 1.5)))
+            corners = [tuple(float(v) for v in corner) for corner in (mesh.low, mesh.high)]
+            instances.append(np.full(len(mesh.triangle), len(objects), np.int32))
+            objects.append(SceneObject("other", corners[0], corners[1]))  # pyright: ignore[reportArgumentType]
+            meshes.append(mesh)
+    return Scene(scene.name, joined(meshes), np.concatenate(instances), tuple(objects), scene.areas, scene.lights)
+
+
+def _oddity(rng: np.random.Generator) -> Mesh:
+    from avlmaps.sim.materials import material
+    from avlmaps.sim.shapes import box, cylinder, ellipsoid, lathe
+
+    size, parts = rng.uniform(0.1, 0.9), []
+    for _ in range(rng.integers(1, 6)):
+        look = material(str(rng.choice(["wood", "plastic", "fabric", "metal", "painted"])), rng)
+        x, y, z = rng.uniform(-size / 2, size / 2, 3) + (0, 0, size / 2)
+        a, b, c = rng.uniform(0.03, 0.6, 3) * size
+        kind = rng.integers(4)
+        if kind == 0:
+            part = box((x - a, y - b, z - c), (x + a, y + b, z + c), look)
+        elif kind == 1:
+            part = cylinder(x, y, z, a, b + c, look)
+        elif kind == 2:
+            part = ellipsoid((x, y, z), (a, b, c), look)
+        else:
+            part = lathe([(r, z + i * c / 4) for i, r in enumerate(rng.uniform(0.1, 1.0, 5) * a)], look, x, y)
+        parts.append(part.tilted("x", rng.normal(0, 0.3)))
+    return joined(parts).standing()
+
+
+def camera_of(rng: np.random.Generator) -> Pinhole:
+    """Return a camera with a horizontal view of 54 to 98 degrees, its middle not quite the picture's."""
+    focal = WIDTH / 2 / np.tan(np.deg2rad(rng.uniform(54.0, 98.0)) / 2)
+    cx, cy = WIDTH / 2 + rng.normal(0, 3), HEIGHT / 2 + rng.normal(0, 3)
+    return Pinhole(focal, focal * rng.uniform(0.98, 1.02), cx, cy, WIDTH, HEIGHT)
+
+
+@dataclass
+class Shard:
+    """Frames collected so far."""
+
+    depth: list[np.ndarray]
+    label: list[np.ndarray]
+    rgb: list[np.ndarray]
+    rgb_row: list[int]
+    room: list[np.ndarray]
+    camera: list[np.ndarray]
+
+
+def add_home(shard: Shard, seed: int, options: Options) -> None:
+    """Render the views of one home into the shard."""
+    from avlmaps.sim.render import Renderer
+    from avlmaps.sim.walk import random_views
+
+    rng = np.random.default_rng([seed, 7])
+    scene = scene_of(seed, options.which, rng)
+    lit = rng.random() < options.lit
+    renderer = Renderer(scene, lit=lit)
+    names = scene.categories
+    number = np.array([_NAME.get(name, UNLABELLED) for name in names] + [UNLABELLED], np.uint8)
+    views = random_views(scene, rng, options.frames_per_home, camera_of(rng))
+    for pose in views:
+        camera = camera_of(rng)
+        view = renderer.render(camera, pose)
+        rgb, depth_m = _sensor(rng).spoil(view, camera, rng)
+        row = -1
+        if lit:
+            row = len(shard.rgb)
+            shard.rgb.append(rgb)
+        shard.rgb_row.append(row)
+        shard.depth.append(np.rint(np.clip(depth_m, 0, 65) * 1000).astype(np.uint16))
+        shard.label.append(number[view.category])
+        shard.room.append(_rooms_seen(scene, view.depth_m, camera, pose))
+        up = pose[:3, :3].T @ np.array([0.0, 0.0, 1.0])
+        shard.camera.append(
+            np.array([camera.fx, camera.fy, camera.cx, camera.cy, *up, pose[2, 3] - _floor_under(scene, pose)])
+        )
+
+
+def _sensor(rng: np.random.Generator):
+    from avlmaps.sim import sensor
+
+    return (sensor.CLEAN, sensor.KINECT, sensor.KINECT, sensor.REALSENSE)[int(rng.integers(4))]
+
+
+def _floor_under(scene: Scene, pose: np.ndarray) -> float:
+    area = scene.area_at(pose[:3, 3].tolist())
+    return scene.areas[area].floor_m if area >= 0 else 0.0
+
+
+def _rooms_seen(scene: Scene, depth_m: np.ndarray, camera: Pinhole, pose: np.ndarray) -> np.ndarray:
+    """Return the share of the view (within 6 m) that lies in each kind of room; the rest of it in none."""
+    small = camera.resized(WIDTH // 8, HEIGHT // 8)
+    z = depth_m[4::8, 4::8].astype(np.float64)
+    v, u = np.nonzero((z > 0) & (z < 6.0))
+    z = z[v, u]
+    points = np.stack([(u + 0.5 - small.cx) / small.fx * z, (v + 0.5 - small.cy) / small.fy * z, z], axis=1)
+    world = points @ pose[:3, :3].T + pose[:3, 3]
+    share = np.zeros(len(ROOMS), np.float32)
+    for area in scene.areas:
+        kind = _ROOM.get(ROOM_OF_AREA.get(area.kind, area.kind))
+        if kind is not None:
+            inside = area.contains(world[:, :2]) & (np.abs(world[:, 2] - area.floor_m - 1.3) < 1.8)
+            share[kind] += inside.mean() if len(inside) else 0.0
+    return share
+
+
+def write_shard(shard: Shard, folder: Path) -> None:
+    """Write the shard so that its final name appears when it is whole."""
+    scratch = folder.with_name(f".{folder.name}.{os.getpid()}")
+    scratch.mkdir(parents=True)
+    empty = np.zeros((0, HEIGHT, WIDTH, 3), np.uint8)
+    np.save(scratch / "depth.npy", np.stack(shard.depth))
+    np.save(scratch / "label.npy", np.stack(shard.label))
+    np.save(scratch / "rgb.npy", np.stack(shard.rgb) if shard.rgb else empty)
+    np.save(scratch / "rgb_row.npy", np.array(shard.rgb_row, np.int32))
+    np.save(scratch / "room.npy", np.stack(shard.room))
+    np.save(scratch / "camera.npy", np.stack(shard.camera))
+    (scratch / "about.json").write_text(json.dumps({"categories": CATEGORIES, "rooms": ROOMS, "made": time()}))
+    shutil.rmtree(folder, ignore_errors=True)
+    scratch.rename(folder)
+
+
+def run(options: Options) -> None:
+    """Render shards until there are enough, or for ever, replacing the oldest."""
+    seed, number = options.first_seed, 0
+    while not (options.once and number >= options.shards):
+        shard, begin = Shard([], [], [], [], [], []), perf_counter()
+        for _ in range(options.homes_per_shard):
+            try:
+                add_home(shard, seed, options)
+            except (ValueError, IndexError, RuntimeError, KeyError, ZeroDivisionError) as fault:
+                print(f"home {seed} left out: {type(fault).__name__}: {fault}", file=sys.stderr, flush=True)
+            seed += options.step
+        if not shard.depth:
+            continue
+        name = f"{options.first_seed:07d}-{number % options.shards:04d}"
+        write_shard(shard, options.out / name)
+        number += 1
+        rate = len(shard.depth) / (perf_counter() - begin)
+        print(f"{name}: {len(shard.depth)} frames, {rate:.1f} a second, next seed {seed}", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    run(tyro.cli(Options))
