@@ -1,6 +1,7 @@
 """Where a robot can stand on a floor, and how far it is from one such place to another. World frame, metres."""
 
 from dataclasses import dataclass, field
+from typing import cast
 
 import cv2
 import numpy as np
@@ -159,9 +160,7 @@ def free_space(
     return max(floors, key=lambda space: space.area_m2)
 
 
-def occupied(
-    scene: Scene, space: FreeSpace, low_m: float, high_m: float
-) -> Bool[np.ndarray, "nx ny"]:
+def occupied(scene: Scene, space: FreeSpace, low_m: float, high_m: float) -> Bool[np.ndarray, "nx ny"]:
     """Return over which cells of a grid the scene has something between two heights above the floor."""
     grid = np.zeros(space.free.shape, np.bool_)
     corners = scene.mesh.corners().astype(np.float64)
@@ -172,7 +171,8 @@ def occupied(
 def _one_floor(scene: Scene, floor_m: float, radius_m: float, height_m: float, cell_m: float) -> FreeSpace:
     corners = scene.mesh.corners().astype(np.float64)
     origin = np.floor((scene.mesh.low[:2].astype(np.float64) - 2 * cell_m) / cell_m) * cell_m
-    shape = np.ceil((scene.mesh.high[:2] - origin) / cell_m).astype(int) + 2
+    nx, ny = (int(np.ceil(extent / cell_m)) + 2 for extent in scene.mesh.high[:2] - origin)
+    shape = (nx, ny)
     ground = np.zeros(shape, np.bool_)
     flat, _, _ = _flat_triangles(scene, only_named=_has_floor(scene))
     mark_slab(corners[flat], floor_m - 0.25, floor_m + 0.15, origin, cell_m, ground)
@@ -223,7 +223,7 @@ def _flat_triangles(scene: Scene, only_named: bool) -> tuple[np.ndarray, np.ndar
 
 def _levels(height: np.ndarray, weight: np.ndarray, share: float = 0.0) -> tuple[float, ...]:
     """Return the heavy heights, lowest first: the weighted median of each group of heights within one storey."""
-    edge = np.floor(height / 0.1).astype(int)
+    edge = np.floor(height / 0.1).astype(np.int64)
     first = int(edge.min())
     total = np.bincount(edge - first, weights=weight)
     heavy = np.flatnonzero(total >= max(share * total.max(), 1e-12)) + first
@@ -238,7 +238,7 @@ def _levels(height: np.ndarray, weight: np.ndarray, share: float = 0.0) -> tuple
 
 def reaching_part(scene: Scene, space: FreeSpace) -> FreeSpace:
     """Return the connected part that reaches most areas, and among those the largest."""
-    label, count = ndimage.label(space.free)  # type: ignore[misc]
+    label, count = cast("tuple[np.ndarray, int]", ndimage.label(space.free))
     if count <= 1:
         return space
     size = np.bincount(label.ravel())[1:]

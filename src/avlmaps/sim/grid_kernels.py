@@ -71,29 +71,57 @@ def _mark_column(polygon, count, i, origin, cell_m, grid, ny):  # pragma: no cov
 
 
 @njit(cache=True)
+def _in_sight(ex, ey, low, high, opaque, origin, cell_m):  # pragma: no cover - compiled
+    """Tell whether nothing opaque lies between a place and a box (xy corners), along the line to its middle."""
+    tx, ty = (low[0] + high[0]) / 2, (low[1] + high[1]) / 2
+    steps = int(np.hypot(tx - ex, ty - ey) / (0.5 * cell_m)) + 1
+    for s in range(1, steps):
+        x, y = ex + (tx - ex) * s / steps, ey + (ty - ey) * s / steps
+        if low[0] <= x <= high[0] and low[1] <= y <= high[1]:
+            return True
+        i, j = int(np.floor((x - origin[0]) / cell_m)), int(np.floor((y - origin[1]) / cell_m))
+        if 0 <= i < opaque.shape[0] and 0 <= j < opaque.shape[1] and opaque[i, j]:
+            return False
+    return True
+
+
+@njit(cache=True)
 def sees(eyes, low, high, reach_m, opaque, origin, cell_m):  # pragma: no cover - compiled
-    """Tell which eyes (e, 2) have a free line to the nearest or the middle point of which boxes (b, 2)-(b, 2)."""
+    """Tell which eyes (e, 2) are within reach and in sight of which boxes (b, 2)-(b, 2)."""
     seen = np.zeros((eyes.shape[0], low.shape[0]), np.bool_)
     for e in range(eyes.shape[0]):
-        ex, ey = eyes[e, 0], eyes[e, 1]
         for b in range(low.shape[0]):
-            tx, ty = (low[b, 0] + high[b, 0]) / 2, (low[b, 1] + high[b, 1]) / 2
-            nx, ny = min(max(ex, low[b, 0]), high[b, 0]), min(max(ey, low[b, 1]), high[b, 1])
-            if np.hypot(nx - ex, ny - ey) > reach_m:
-                continue
-            far = np.hypot(tx - ex, ty - ey)
-            steps = int(far / (0.5 * cell_m)) + 1
-            blocked = False
-            for s in range(1, steps):
-                x, y = ex + (tx - ex) * s / steps, ey + (ty - ey) * s / steps
-                if low[b, 0] <= x <= high[b, 0] and low[b, 1] <= y <= high[b, 1]:
-                    break
-                i, j = int(np.floor((x - origin[0]) / cell_m)), int(np.floor((y - origin[1]) / cell_m))
-                if 0 <= i < opaque.shape[0] and 0 <= j < opaque.shape[1] and opaque[i, j]:
-                    blocked = True
-                    break
-            seen[e, b] = not blocked
+            x, y = eyes[e, 0], eyes[e, 1]
+            dx = max(low[b, 0] - x, x - high[b, 0], 0.0)
+            dy = max(low[b, 1] - y, y - high[b, 1], 0.0)
+            if np.hypot(dx, dy) <= reach_m:
+                seen[e, b] = _in_sight(x, y, low[b], high[b], opaque, origin, cell_m)
     return seen
+
+
+@njit(cache=True)
+def sees_pairs(eyes, low, high, opaque, origin, cell_m):  # pragma: no cover - compiled
+    """Tell which eyes (n, 2) have each its own box (n, 2)-(n, 2) in sight."""
+    seen = np.zeros(eyes.shape[0], np.bool_)
+    for k in range(eyes.shape[0]):
+        seen[k] = _in_sight(eyes[k, 0], eyes[k, 1], low[k], high[k], opaque, origin, cell_m)
+    return seen
+
+
+@njit(cache=True)
+def cast(eyes, headings, reach_m, opaque, origin, cell_m):  # pragma: no cover - compiled
+    """Return how far from each eye along its heading the first opaque cell lies; reach_m where there is none."""
+    distance = np.full(eyes.shape[0], reach_m)
+    steps = int(reach_m / (0.5 * cell_m))
+    for k in range(eyes.shape[0]):
+        for s in range(1, steps):
+            along = 0.5 * cell_m * s
+            i = int(np.floor((eyes[k, 0] + along * np.cos(headings[k]) - origin[0]) / cell_m))
+            j = int(np.floor((eyes[k, 1] + along * np.sin(headings[k]) - origin[1]) / cell_m))
+            if 0 <= i < opaque.shape[0] and 0 <= j < opaque.shape[1] and opaque[i, j]:
+                distance[k] = along
+                break
+    return distance
 
 
 @njit(cache=True)

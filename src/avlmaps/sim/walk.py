@@ -1,14 +1,18 @@
 """A path through a whole floor, as a person would drive a robot to show it everything: poses at the frame rate."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from avlmaps.sim.free_space import FreeSpace, free_space, reaching_part
 from avlmaps.sim.grid_kernels import relax
 from avlmaps.sim.scene import Scene
 from avlmaps.sim.viewpoints import viewpoints
+from avlmaps.sim.views import camera_poses, random_views
+
+__all__ = ["WalkSettings", "random_views", "walk_through"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,16 +89,14 @@ def walk_through(
     return _poses(place, heading, space.floor_m + eye_m, settings, rng)
 
 
-def _tour(
-    scene: Scene, space: FreeSpace, settings: WalkSettings, eye_m: float, rng: np.random.Generator
-) -> _Tour:
+def _tour(scene: Scene, space: FreeSpace, settings: WalkSettings, eye_m: float, rng: np.random.Generator) -> _Tour:
     """Order the viewpoints, join them and pull the way smooth; between two stops all its points stay free."""
     views = viewpoints(scene, space, settings.reach_m, eye_m)
     cost, before = space.paths(views.place)
     order = _order(cost, rng)
     points, stops = [views.place[order[:1]]], [(0, views.headings_rad[order[0]])]
     count = 1
-    for a, b in zip(order[:-1], order[1:], strict=True):
+    for a, b in pairwise(order):
         leg = space.path(before[a], views.place[b])[1:]
         points.append(leg)
         count += len(leg)
@@ -127,13 +129,12 @@ def _improved(tour: list[int], cost: np.ndarray) -> list[int]:
         better = False
         for i in range(len(tour) - 1):
             for j in range(i + 1, len(tour)):
-                old = (cost[tour[i - 1], tour[i]] if i else 0.0) + (
-                    cost[tour[j], tour[j + 1]] if j + 1 < len(tour) else 0.0
-                )
-                new = (cost[tour[i - 1], tour[j]] if i else 0.0) + (
-                    cost[tour[i], tour[j + 1]] if j + 1 < len(tour) else 0.0
-                )
-                if new < old - 1e-9:
+                longer = 0.0
+                if i:
+                    longer += cost[tour[i - 1], tour[j]] - cost[tour[i - 1], tour[i]]
+                if j + 1 < len(tour):
+                    longer += cost[tour[i], tour[j + 1]] - cost[tour[j], tour[j + 1]]
+                if longer < -1e-9:
                     tour[i : j + 1] = tour[i : j + 1][::-1]
                     better = True
     return tour
@@ -143,24 +144,30 @@ def _wrapped(angle: float) -> float:
     return float((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
-def _sweep(headings: Float[np.ndarray, " m"], heading: float, field_rad: float = np.deg2rad(60.0)) -> list[float]:
+def _sweep(headings: Float[np.ndarray, " m"], heading: float, seen_rad: float = np.deg2rad(30.0)) -> list[float]:
     """Return where to turn to, one after the other, to have looked along all headings; none if they are in view.
 
     The turn leaves out the widest gap between the headings, and begins at the end that is nearer.
+
+    Args:
+        headings: where there is something to see.
+        heading: where the camera looks.
+        seen_rad: how far beside its middle the camera shows a thing well.
     """
     if not len(headings):
         return []
     offsets = np.sort([_wrapped(h - heading) for h in headings])
     gaps = np.diff(np.append(offsets, offsets[0] + 2 * np.pi))
     widest = int(np.argmax(gaps))
-    span = 2 * np.pi - gaps[widest]
-    first = float(offsets[(widest + 1) % len(offsets)])
-    margin = min(field_rad / 3, span / 2)
-    low, high = _wrapped(first + margin), _wrapped(first + margin) + max(span - 2 * margin, 0.0)
-    if low > np.deg2rad(-20) and high < np.deg2rad(20):
+    span = 2 * np.pi - float(gaps[widest])
+    margin = min(seen_rad, span / 2)
+    first = _wrapped(float(offsets[(widest + 1) % len(offsets)]) + margin)
+    length = span - 2 * margin
+    last = _wrapped(first + length)
+    if max(abs(first), abs(last)) < seen_rad:
         return []
-    ends = [heading + low, heading + high]
-    return ends if abs(low) <= abs(_wrapped(high)) else [heading + _wrapped(high), heading + _wrapped(high) - (high - low)]
+    turns = (first, first + length) if abs(first) <= abs(last) else (last, last - length)
+    return [heading + turn for turn in turns]
 
 
 @dataclass(slots=True)
@@ -235,24 +242,3 @@ def _poses(
     pitch = -settings.pitch_down_rad + settings.pitch_sway_rad * sway[0]
     position = np.column_stack([place, height_m + 0.005 * sway[1]])
     return camera_poses(position, heading, pitch, np.deg2rad(0.5) * sway[2])
-
-
-def camera_poses(
-    position: Float[np.ndarray, "n 3"],
-    heading_rad: Float[np.ndarray, " n"],
-    pitch_rad: Float[np.ndarray, " n"],
-    roll_rad: Float[np.ndarray, " n"],
-) -> Float[np.ndarray, "n 4 4"]:
-    """Return ``world_from_camera`` of cameras that look along a heading, up by a pitch, turned clockwise by a roll."""
-    c, s = np.cos(heading_rad), np.sin(heading_rad)
-    cp, sp = np.cos(pitch_rad), np.sin(pitch_rad)
-    forward = np.stack([c * cp, s * cp, sp], axis=1)
-    level = np.stack([s, -c, np.zeros_like(c)], axis=1)
-    down = np.cross(forward, level)
-    cr, sr = np.cos(roll_rad)[:, None], np.sin(roll_rad)[:, None]
-    poses = np.tile(np.eye(4), (len(position), 1, 1))
-    poses[:, :3, 0] = cr * level + sr * down
-    poses[:, :3, 1] = cr * down - sr * level
-    poses[:, :3, 2] = forward
-    poses[:, :3, 3] = position
-    return poses
