@@ -1,32 +1,109 @@
-"""Materials by kind, with variety: `material("wood", rng)`."""
+"""Materials by kind, with variety: `material("wood", rng)`.
+
+A kind has a pool of textures that are made when they are first drawn and then kept, so that the hundreds of
+materials of a home cost little. What is drawn depends on the generator alone, never on what is already in the pool:
+texture number i of a kind is made by a generator of its own.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from avlmaps.sim.mesh import Material, Triple
+from avlmaps.sim.textures import Texture, plain, wood
 
-# Kind: colours to draw from (sRGB), gloss.
-_PALETTE: dict[str, tuple[tuple[Triple, ...], float]] = {
-    "wood": (((0.45, 0.29, 0.16), (0.62, 0.44, 0.27), (0.75, 0.6, 0.42), (0.3, 0.19, 0.12), (0.83, 0.73, 0.58)), 0.2),
-    "painted": (((0.93, 0.92, 0.9), (0.85, 0.84, 0.8), (0.2, 0.22, 0.25), (0.55, 0.62, 0.66), (0.6, 0.25, 0.2)), 0.2),
-    "fabric": (((0.5, 0.5, 0.52), (0.25, 0.28, 0.36), (0.65, 0.58, 0.48), (0.55, 0.2, 0.2), (0.2, 0.35, 0.3)), 0.0),
-    "leather": (((0.12, 0.1, 0.09), (0.4, 0.22, 0.13), (0.85, 0.8, 0.72), (0.45, 0.1, 0.1)), 0.3),
-    "metal": (((0.75, 0.75, 0.77), (0.25, 0.25, 0.27), (0.55, 0.55, 0.57), (0.72, 0.6, 0.35)), 0.7),
-    "plastic": (((0.9, 0.9, 0.9), (0.1, 0.1, 0.1), (0.8, 0.2, 0.15), (0.2, 0.4, 0.75), (0.9, 0.75, 0.2)), 0.3),
-    "ceramic": (((0.95, 0.95, 0.94), (0.9, 0.88, 0.82), (0.6, 0.7, 0.75)), 0.6),
-    "stone": (((0.2, 0.2, 0.21), (0.8, 0.78, 0.75), (0.5, 0.48, 0.46), (0.35, 0.3, 0.27)), 0.4),
-    "glass": (((0.75, 0.85, 0.88),), 0.9),
-    "plant": (((0.16, 0.36, 0.14), (0.25, 0.45, 0.18), (0.35, 0.5, 0.2)), 0.1),
-    "paper": (((0.95, 0.94, 0.9),), 0.0),
-    "white": (((0.94, 0.94, 0.93),), 0.3),
-    "black": (((0.06, 0.06, 0.07),), 0.3),
+Maker = Callable[[np.random.Generator], Texture]
+
+
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """How a kind looks.
+
+    Attributes:
+        colours: tints to draw from, sRGB.
+        gloss: middle of the gloss.
+        grey: maker of textures to be tinted, or None.
+        pictured: maker of textures in colours of their own, or None.
+        share: how often the pictured ones are taken where both are there and no colour is asked for.
+        pool: textures of each sort that are kept.
+        opacity: 1 for solid.
+    """
+
+    colours: tuple[Triple, ...]
+    gloss: float
+    grey: Maker | None = None
+    pictured: Maker | None = None
+    share: float = 0.5
+    pool: int = 48
+    opacity: float = 1.0
+
+
+_WOOD = ((0.45, 0.29, 0.16), (0.62, 0.44, 0.27), (0.75, 0.6, 0.42), (0.3, 0.19, 0.12), (0.83, 0.73, 0.58),
+         (0.55, 0.3, 0.18), (0.68, 0.62, 0.55), (0.5, 0.46, 0.42), (0.9, 0.86, 0.79), (0.2, 0.14, 0.11))  # fmt: skip
+_KIND: dict[str, _Kind] = {
+    "wood": _Kind(_WOOD, 0.2, wood.wood, pool=96),
+    "parquet": _Kind(_WOOD[:9], 0.3, wood.parquet, pool=64),
+    "painted": _Kind(((0.93, 0.92, 0.9), (0.85, 0.84, 0.8), (0.2, 0.22, 0.25), (0.55, 0.62, 0.66), (0.6, 0.25, 0.2),
+                      (0.78, 0.82, 0.8), (0.87, 0.8, 0.68), (0.4, 0.47, 0.4), (0.25, 0.32, 0.45)), 0.2, plain.painted),
+    "fabric": _Kind(((0.5, 0.5, 0.52), (0.25, 0.28, 0.36), (0.65, 0.58, 0.48), (0.55, 0.2, 0.2), (0.2, 0.35, 0.3)),
+                    0.0, plain.painted),
+    "leather": _Kind(((0.12, 0.1, 0.09), (0.4, 0.22, 0.13), (0.85, 0.8, 0.72), (0.45, 0.1, 0.1)), 0.3, plain.plastic),
+    "metal": _Kind(((0.75, 0.75, 0.77), (0.25, 0.25, 0.27), (0.55, 0.55, 0.57), (0.72, 0.6, 0.35), (0.88, 0.88, 0.89)),
+                   0.7, plain.metal, pool=32),
+    "plastic": _Kind(((0.9, 0.9, 0.9), (0.1, 0.1, 0.1), (0.8, 0.2, 0.15), (0.2, 0.4, 0.75), (0.9, 0.75, 0.2),
+                      (0.3, 0.6, 0.35), (0.5, 0.5, 0.52), (0.9, 0.5, 0.6)), 0.3, plain.plastic, pool=32),
+    "ceramic": _Kind(((0.95, 0.95, 0.94), (0.9, 0.88, 0.82), (0.6, 0.7, 0.75), (0.35, 0.45, 0.5), (0.75, 0.5, 0.38)),
+                     0.6, plain.ceramic, pool=32),
+    "stone": _Kind(((0.2, 0.2, 0.21), (0.8, 0.78, 0.75), (0.5, 0.48, 0.46), (0.35, 0.3, 0.27)), 0.4, plain.ceramic),
+    "glass": _Kind(((0.75, 0.85, 0.88),), 0.9, plain.glass, pool=12, opacity=0.3),
+    "plant": _Kind(((0.16, 0.36, 0.14), (0.25, 0.45, 0.18), (0.35, 0.5, 0.2), (0.2, 0.32, 0.22), (0.45, 0.52, 0.3)),
+                   0.1, plain.plant),
+    "paper": _Kind(((0.95, 0.94, 0.9), (0.9, 0.86, 0.76)), 0.0, plain.paper, pool=16),
+    "white": _Kind(((0.94, 0.94, 0.93),), 0.3, plain.enamel, pool=24),
+    "black": _Kind(((0.06, 0.06, 0.07),), 0.3, plain.enamel, pool=24),
+    "mirror": _Kind(((0.62, 0.68, 0.74), (0.7, 0.73, 0.75), (0.5, 0.56, 0.62)), 1.0, plain.mirror, pool=16),
 }  # fmt: skip
+
+KINDS: tuple[str, ...] = tuple(_KIND)
+_NUMBER = {kind: number for number, kind in enumerate(sorted(_KIND))}
+
+
+@lru_cache(maxsize=None)
+def _texture(kind: str, pictured: bool, number: int) -> Texture:
+    """Return one texture of a kind's pool, made at the first call."""
+    look = _KIND[kind]
+    maker = look.pictured if pictured else look.grey
+    assert maker is not None
+    return maker(np.random.default_rng([*kind.encode(), pictured, number]))
+
+
+def _drawn_colour(look: _Kind, rng: np.random.Generator) -> np.ndarray:
+    base = np.array(look.colours[int(rng.integers(len(look.colours)))])
+    return np.clip(base * rng.uniform(0.8, 1.15) + rng.uniform(-0.05, 0.05, 3), 0.02, 0.98)
 
 
 def material(kind: str, rng: np.random.Generator, colour: Triple | None = None) -> Material:
-    """Draw a material of a kind; a colour that is given is kept."""
-    colours, gloss = _PALETTE[kind]
-    base = np.array(colour if colour is not None else colours[int(rng.integers(len(colours)))])
-    if colour is None:
-        base = np.clip(base * rng.uniform(0.8, 1.15) + rng.uniform(-0.05, 0.05, 3), 0.02, 0.98)
-    red, green, blue = (float(c) for c in base)
-    return Material((red, green, blue), gloss=gloss, opacity=0.3 if kind == "glass" else 1.0)
+    """Draw a material of a kind.
+
+    Args:
+        kind: one of `KINDS`. Pictures such as a painting, a rug, a screen fill a sheet once (``fill=True``).
+        rng: source of the choice; the same state gives the same material.
+        colour: sRGB in [0, 1] that the surface has on average, as far as its texture can be as bright; without it
+            the kind chooses.
+    """
+    look = _KIND[kind]
+    pictured = look.grey is None or (look.pictured is not None and colour is None and rng.random() < look.share)
+    texture = _texture(kind, pictured, int(rng.integers(look.pool)))
+    if colour is None and pictured:
+        tint = rng.uniform(0.85, 1.0) * rng.uniform(0.94, 1.0, 3)
+    else:
+        wanted = np.array(colour) if colour is not None else _drawn_colour(look, rng)
+        tint = np.clip(wanted / np.maximum(texture.mean, 0.02), 0.0, 1.0)
+    scale = 1.0 if texture.size_m == (1.0, 1.0) else float(rng.uniform(0.85, 1.2))
+    red, green, blue = (float(c) for c in tint)
+    return Material(
+        (red, green, blue), texture.image, (texture.size_m[0] * scale, texture.size_m[1] * scale), texture.emission,
+        min(1.0, look.gloss * float(rng.uniform(0.8, 1.2))), look.opacity,
+    )  # fmt: skip
