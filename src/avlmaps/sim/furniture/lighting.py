@@ -3,7 +3,6 @@
 A chandelier's top is its mount on the ceiling.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +16,8 @@ from avlmaps.sim.shapes import circle, cylinder, ellipsoid, lathe, loft, rounded
 
 def shining(rng: np.random.Generator, kind: str | None = None) -> Material:
     """Draw what a lamp's shade or globe is made of, lit or not."""
-    warm = (1.0, draw(rng, 0.86, 0.97), draw(rng, 0.66, 0.92))
+    green = draw(rng, 0.88, 0.98)
+    warm = (1.0, green, green * draw(rng, 0.72, 0.97))
     plain = material(kind, rng) if kind else material("white", rng, warm)
     return replace(plain, emission=draw(rng, 0.25, 0.9) if chance(rng, 0.55) else draw(rng, 0.0, 0.1))
 
