@@ -1,0 +1,153 @@
+"""Where doors and windows go: every room is reached, by way of halls where that can be."""
+
+import heapq
+from dataclasses import replace
+
+import numpy as np
+
+from avlmaps.sim.furniture.joinery import chance, draw, pick
+from avlmaps.sim.homes.plan import OUTSIDE, Hole, Room, Wall
+
+HUBS = ("hallway", "corridor", "entrance hall", "open-plan office", "reception")
+SOCIAL = ("living room", "kitchen", "dining room")
+_LEAST_DOOR_M = 1.15  # of a wall that can take a door
+_OPEN_KINDS = (*SOCIAL, "hallway", "entrance hall", "kitchenette", "open-plan office", "reception", "corridor")
+
+
+def _price(a: str, b: str) -> float:
+    """Return how little a door between two kinds of room is wanted."""
+    if a in HUBS or b in HUBS:
+        return 1.0
+    if a in SOCIAL and b in SOCIAL:
+        return 1.2
+    if a in SOCIAL or b in SOCIAL:
+        return 3.0
+    if "bathroom" in (a, b) and "bedroom" in (a, b):
+        return 5.0
+    return 25.0 if "bathroom" in (a, b) or "toilet" in (a, b) else 9.0
+
+
+def joined_up(rng: np.random.Generator, rooms: list[Room], walls: list[Wall], open_plan: float) -> list[Wall] | None:
+    """Put doors into the walls so that every room can be reached; None where that cannot be.
+
+    Args:
+        rng: draws kinds and places of doors.
+        rooms: of one floor.
+        walls: between them, without holes.
+        open_plan: the probability that rooms of an open plan have no wall between them.
+    """
+    start = min(range(len(rooms)), key=lambda i: (rooms[i].kind not in ("entrance hall", *HUBS), i))
+    wanted = _tree(rooms, walls, start)
+    if wanted is None:
+        return None
+    out = list(walls)
+    for index, wall in enumerate(walls):
+        if wall.right == OUTSIDE or wall.length_m < _LEAST_DOOR_M:
+            continue
+        a, b = rooms[wall.left].kind, rooms[wall.right].kind
+        both_social = a in SOCIAL and b in SOCIAL
+        if both_social and chance(rng, open_plan):
+            out[index] = _opened(rng, wall, rooms)
+        elif index in wanted or (_price(a, b) <= 3.0 and chance(rng, 0.2)):
+            if a in _OPEN_KINDS and b in _OPEN_KINDS and chance(rng, 0.3 + 0.3 * open_plan):
+                out[index] = _opened(rng, wall, rooms)
+            else:
+                out[index] = wall.with_hole(_door(rng, wall, rooms))
+    return out
+
+
+def _tree(rooms: list[Room], walls: list[Wall], start: int) -> set[int] | None:
+    """Return the walls that need a door so that the way from the start to each room costs least."""
+    best = {start: 0.0}
+    through: dict[int, int] = {}
+    queue = [(0.0, start)]
+    while queue:
+        cost, room = heapq.heappop(queue)
+        if cost > best[room]:
+            continue
+        for index, wall in enumerate(walls):
+            if room not in (wall.left, wall.right) or OUTSIDE in (wall.left, wall.right):
+                continue
+            other = wall.right if wall.left == room else wall.left
+            if wall.length_m < _LEAST_DOOR_M:
+                continue
+            price = cost + _price(rooms[room].kind, rooms[other].kind)
+            if price < best.get(other, np.inf):
+                best[other], through[other] = price, index
+                heapq.heappush(queue, (price, other))
+    return set(through.values()) if len(best) == len(rooms) else None
+
+
+def _opened(rng: np.random.Generator, wall: Wall, rooms: list[Room]) -> Wall:
+    """Return the wall as an open plan has it: not built at all, or with a wide gap."""
+    ceiling = min(rooms[wall.left].height_m, rooms[wall.right].height_m)
+    if chance(rng, 0.45) or wall.length_m < 1.7:
+        return replace(wall, built=False)
+    width = min(wall.length_m - 0.3, draw(rng, 1.2, 4.0))
+    at = draw(rng, 0.15 + width / 2, wall.length_m - 0.15 - width / 2)
+    head = ceiling if chance(rng, 0.4) else min(draw(rng, 2.05, 2.5), ceiling - 0.1)
+    return wall.with_hole(Hole("gap", at, width, 0.0, head))
+
+
+def _door(rng: np.random.Generator, wall: Wall, rooms: list[Room]) -> Hole:
+    ceiling = min(rooms[wall.left].height_m, rooms[wall.right].height_m)
+    width = min(draw(rng, 0.9, 1.05), wall.length_m - 0.22)
+    if wall.length_m > 3.0 and chance(rng, 0.12):
+        width = draw(rng, 1.5, 1.9)
+    kind = pick(rng, ("door", "door", "door", "door", "doorless"))
+    ends = (0.12 + width / 2, wall.length_m - 0.12 - width / 2)
+    at = draw(rng, *ends) if chance(rng, 0.4) else pick(rng, ends)
+    if kind == "door" and chance(rng, 0.05) and width > 1.4:
+        kind = "folding door"
+    smaller_left = rooms[wall.left].kind not in HUBS and (rooms[wall.right].kind in HUBS or chance(rng, 0.5))
+    head = min(draw(rng, 2.0, 2.2), ceiling - 0.12)
+    return Hole(kind, at, width, 0.0, head, draw(rng, 1.35, 1.75), smaller_left)
+
+
+def lit_by_day(rng: np.random.Generator, rooms: list[Room], walls: list[Wall]) -> list[Wall]:
+    """Put windows into outer walls and one closed door to the outside."""
+    entrance = _entrance(rng, rooms, walls)
+    style = draw(rng, 0.0, 0.9), draw(rng, 0.7, 1.1), pick(rng, (0.5, 0.7, 0.9))
+    out = []
+    for index, wall in enumerate(walls):
+        if wall.right != OUTSIDE or wall.length_m < 0.9:
+            out.append(wall)
+            continue
+        room = rooms[wall.left]
+        if index == entrance:
+            width = min(draw(rng, 0.88, 1.05), wall.length_m - 0.25)
+            at = draw(rng, 0.12 + width / 2, wall.length_m - 0.12 - width / 2)
+            out.append(wall.with_hole(Hole("closed door", at, width, 0.0, min(2.1, room.height_m - 0.15))))
+            continue
+        out.append(_with_windows(rng, wall, room, style))
+    return out
+
+
+def _entrance(rng: np.random.Generator, rooms: list[Room], walls: list[Wall]) -> int:
+    outer = [i for i, wall in enumerate(walls) if wall.right == OUTSIDE and wall.length_m > 1.2]
+    order = ("entrance hall", "reception", "hallway", "corridor", "living room", "kitchen")
+    rank = {kind: number for number, kind in enumerate(order)}
+    return min(outer, key=lambda i: (rank.get(rooms[walls[i].left].kind, 9), rng.random())) if outer else -1
+
+
+def _with_windows(rng: np.random.Generator, wall: Wall, room: Room, style: tuple[float, float, float]) -> Wall:
+    low_sill, sill, share = style
+    if room.kind in ("storage",) or not chance(rng, 0.35 if room.kind in HUBS else share):
+        return wall
+    if room.kind in ("bathroom", "toilet", "laundry room"):
+        sizes = (0.5, 0.9, draw(rng, 1.1, 1.5))
+    elif chance(rng, low_sill * 0.4):
+        sizes = (1.2, 3.2, pick(rng, (0.03, 0.25, 0.45)))
+    else:
+        sizes = (0.7, 2.2, sill)
+    head = min(max(draw(rng, 2.05, 2.3), sizes[2] + 0.6), room.height_m - 0.15)
+    number = 1 if wall.length_m < 3.5 else int(rng.integers(1, 2 + int(wall.length_m / 3.5)))
+    each = wall.length_m / number
+    width = min(draw(rng, sizes[0], sizes[1]), each - 0.4)
+    if width < 0.45 or head - sizes[2] < 0.4:
+        return wall
+    for k in range(number):
+        slack = max(each - width - 0.4, 0.0)
+        at = (k + 0.5) * each + slack * draw(rng, -0.4, 0.4)
+        wall = wall.with_hole(Hole("window", at, width, sizes[2], head))
+    return wall

@@ -1,0 +1,269 @@
+"""The hands that furnish a room: try places for a piece until one is free, put it there, put things on it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.sim.furniture import Families, Piece, categories, make
+from avlmaps.sim.furniture.joinery import draw
+from avlmaps.sim.homes.placing import Footprint, Ground, Place, Side
+from avlmaps.sim.homes.polygons import corners_of, middle, overlapping
+from avlmaps.sim.mesh import Mesh
+from avlmaps.sim.scene import Light, SceneBuilder
+
+_TOUCH_M = 0.006  # pieces stand so far from the wall behind them
+
+
+def try_make(category: str, rng: np.random.Generator, which: Families, name: str | None = None) -> Piece | None:
+    """Make a piece, or None while its category has no recipe."""
+    return make(category, rng, which, name) if category in categories() else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stood:
+    """A piece that has its place.
+
+    Attributes:
+        piece: what.
+        place: where its origin is.
+        foot: its box.
+        z: height of the floor under it, above the world's.
+    """
+
+    piece: Piece
+    place: Place
+    foot: Footprint
+    floor_m: float
+
+    @property
+    def centre(self) -> Float[np.ndarray, "2"]:
+        """Middle of its box, seen from above."""
+        return self.to_world(self.foot.middle)
+
+    def to_world(self, xy: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
+        """Return places of its own frame in the room's."""
+        c, s = np.cos(self.place.heading_rad), np.sin(self.place.heading_rad)
+        return np.asarray(xy) @ np.array([[c, s], [-s, c]]) + (self.place.x, self.place.y)
+
+
+def footprint(mesh: Mesh) -> Footprint:
+    """Return the box of a mesh in its own frame."""
+    low, high = mesh.low.astype(np.float64), mesh.high.astype(np.float64)
+    return Footprint((low + high)[:2] / 2, (high - low)[:2] / 2, float(low[2]), float(high[2]))
+
+
+@dataclass
+class Furnisher:
+    """Furnishes one room.
+
+    Attributes:
+        rng: draws everything.
+        builder: the scene.
+        ground: what of the room is taken.
+        area: the room's index.
+        floor_m: height of its floor.
+        height_m: of its ceiling above the floor.
+        which: families of shapes to use.
+        stood: what stands in it so far.
+    """
+
+    rng: np.random.Generator
+    builder: SceneBuilder
+    ground: Ground
+    area: int
+    floor_m: float
+    height_m: float
+    which: Families
+    stood: list[Stood] = field(default_factory=list)
+
+    def new(self, category: str, name: str | None = None) -> Piece | None:
+        """Make a piece of a category that has recipes."""
+        return try_make(category, self.rng, self.which, name)
+
+    def put(self, piece: Piece, place: Place, front_m: float = 0.0, solid: bool = True) -> Stood:
+        """Add a piece to the scene at a place, and keep its place and a zone before it from others."""
+        foot = footprint(piece.mesh)
+        stood = Stood(piece, place, foot, self.floor_m)
+        mesh = piece.mesh.turned(place.heading_rad).moved(place.x, place.y, place.z + self.floor_m)
+        self.builder.add(piece.category, mesh, place.heading_rad, piece.family, area=self.area)
+        for x, y, z in piece.light:
+            at = stood.to_world(np.array([x, y]))
+            strength = draw(self.rng, 0.25, 0.6)
+            warm = (strength, strength * draw(self.rng, 0.82, 1.0), strength * draw(self.rng, 0.6, 0.95))
+            self.builder.lights.append(
+                Light((float(at[0]), float(at[1]), float(z + place.z + self.floor_m)), warm)
+            )
+        if solid:
+            self.ground.take(foot, stood.centre, place.heading_rad, place.z, front_m)
+        self.stood.append(stood)
+        return stood
+
+    def try_at(
+        self, piece: Piece, centre: Float[np.ndarray, "n 2"], heading_rad: Float[np.ndarray, " n"], z: float = 0.0,
+        front_m: float = 0.0, solid: bool = True, zones: bool = True,
+    ) -> Stood | None:  # fmt: skip
+        """Put a piece at the first of several places that is free and leaves the ways free."""
+        foot = footprint(piece.mesh)
+        if z + foot.high_m > self.height_m - 0.02:
+            return None
+        good = self.ground.fits(foot, centre, heading_rad, z, zones)
+        for index in np.flatnonzero(good)[:5].tolist():
+            heading = float(heading_rad[index])
+            if not solid or self.ground.keeps_ways(foot, centre[index], heading, z, front_m):
+                return self.put(piece, foot.place(centre[index], heading, z), front_m, solid)
+        return None
+
+    def sides(self, least_m: float = 0.3) -> list[Side]:
+        """Return the sides of the room in random order, longer ones rather earlier."""
+        sides = [side for side in self.ground.sides if side.length_m >= least_m]
+        weight = [side.length_m * self.rng.uniform(0.3, 1.0) for side in sides]
+        return [sides[i] for i in np.argsort(weight)[::-1]]
+
+    def along(
+        self, piece: Piece, sides: Sequence[Side] | None = None, front_m: float = 0.5, gap_m: float = 0.0,
+        z: float = 0.0, corner: float = 0.3, near: Float[np.ndarray, "2"] | None = None, tries: int = 14,
+        at_middle: float = 0.0,
+    ) -> Stood | None:  # fmt: skip
+        """Stand a piece against a wall, looking into the room.
+
+        Args:
+            piece: what.
+            sides: the walls to try, in this order; all in random order where not said.
+            front_m: how deep a zone before it stays clear.
+            gap_m: between it and the wall.
+            z: height of its origin above the floor.
+            corner: the probability that a corner is tried first.
+            near: places close to this are tried first.
+            tries: places per wall.
+            at_middle: the probability that the middle of the wall is tried first.
+        """
+        foot = footprint(piece.mesh)
+        for side in self.sides(foot.width_m) if sides is None else sides:
+            room = side.length_m - foot.width_m
+            if room < 0:
+                continue
+            start = self.rng.uniform(0.0, room, tries)
+            if self.rng.random() < corner:
+                start[:2] = (0.004, room - 0.004) if self.rng.random() < 0.5 else (room - 0.004, 0.004)
+            elif self.rng.random() < at_middle:
+                start[0] = room / 2
+            start = np.clip(start, min(0.004, room / 2), max(room - 0.004, room / 2))
+            start = start[side.is_free(start, start + foot.width_m, z + foot.low_m, z + foot.high_m)]
+            if not len(start):
+                continue
+            inward = _TOUCH_M + gap_m + foot.half[0]
+            centre = side.a + (start + foot.half[1])[:, None] * side.along + inward * side.inward
+            if near is not None:
+                centre = centre[np.argsort(np.hypot(*(centre - near).T))]
+            heading = np.full(len(centre), side.heading_rad)
+            if (found := self.try_at(piece, centre, heading, z, front_m)) is not None:
+                return found
+        return None
+
+    def beside(self, piece: Piece, anchor: Stood, gap_m: float = 0.05, back: bool = True) -> Stood | None:
+        """Stand a piece to the left or right of another, backs in line (or fronts), looking the same way."""
+        foot = footprint(piece.mesh)
+        x = anchor.foot.middle[0] + (foot.half[0] - anchor.foot.half[0]) * (1 if back else -1)
+        y = anchor.foot.half[1] + gap_m + foot.half[1]
+        order = (1, -1) if self.rng.random() < 0.5 else (-1, 1)
+        local = np.array([(x, anchor.foot.middle[1] + side * y) for side in order])
+        return self.try_at(piece, anchor.to_world(local), np.full(2, anchor.place.heading_rad))
+
+    def before(
+        self, piece: Piece, anchor: Stood, gap_m: float, facing: bool = True, aside_m: float = 0.0, turn_rad: float = 0.0,
+        front_m: float = 0.0, zones: bool = False, solid: bool = True,
+    ) -> Stood | None:  # fmt: skip
+        """Stand a piece before the front of another, looking at it or the same way."""
+        foot = footprint(piece.mesh)
+        x = anchor.foot.middle[0] + anchor.foot.half[0] + gap_m + foot.half[0]
+        centre = anchor.to_world(np.array([[x, anchor.foot.middle[1] + aside_m]]))
+        heading = anchor.place.heading_rad + (np.pi if facing else 0.0) + turn_rad
+        return self.try_at(piece, centre, np.array([heading]), front_m=front_m, zones=zones, solid=solid)
+
+    def somewhere(
+        self, piece: Piece, front_m: float = 0.0, tries: int = 24, square: float = 0.5, z: float = 0.0,
+        near: Float[np.ndarray, "2"] | None = None, solid: bool = True,
+    ) -> Stood | None:  # fmt: skip
+        """Stand a piece anywhere on the floor, turned at random or square to a wall."""
+        low, high = self.ground.polygon.min(axis=0), self.ground.polygon.max(axis=0)
+        centre = self.rng.uniform(low, high, (tries, 2))
+        if near is not None:
+            centre = near + self.rng.normal(0.0, 0.7, (tries, 2))
+        heading = self.rng.uniform(-np.pi, np.pi, tries)
+        if self.rng.random() < square:
+            base = self.ground.sides[0].heading_rad
+            heading = base + np.pi / 2 * self.rng.integers(0, 4, tries)
+        return self.try_at(piece, centre, heading, z, front_m, solid)
+
+    def in_middle(self, piece: Piece, spread: float = 0.15, front_m: float = 0.0, tries: int = 16) -> Stood | None:
+        """Stand a piece about the middle of the room, square to its longest wall."""
+        span = np.ptp(self.ground.polygon, axis=0)
+        centre = middle(self.ground.polygon) + self.rng.normal(0.0, spread, (tries, 2)) * span
+        side = max(self.ground.sides, key=lambda s: s.length_m)
+        heading = side.heading_rad + np.pi / 2 * self.rng.integers(0, 4, tries)
+        return self.try_at(piece, centre, heading, front_m=front_m)
+
+    def hang(
+        self, piece: Piece, low_m: tuple[float, float], sides: Sequence[Side] | None = None, tries: int = 10,
+        near: Float[np.ndarray, "2"] | None = None,
+    ) -> Stood | None:  # fmt: skip
+        """Hang a piece on a wall, its lowest edge between two heights."""
+        top = self.height_m - 0.08 - float(piece.mesh.high[2])
+        z = min(draw(self.rng, *low_m), top)
+        if z < 0.2:
+            return None
+        return self.along(piece, sides, front_m=0.0, gap_m=-_TOUCH_M + 0.001, z=z, near=near, tries=tries, corner=0.0)
+
+    def from_ceiling(self, piece: Piece, centre: Float[np.ndarray, "2"]) -> Stood | None:
+        """Hang a lamp from the ceiling over a place."""
+        foot = footprint(piece.mesh)
+        z = self.height_m - foot.high_m - 0.001
+        if z + foot.low_m < 1.2:
+            return None
+        heading = float(self.rng.uniform(-np.pi, np.pi))
+        if not self.ground.fits(foot, centre[None], np.array([heading]), z, zones=False)[0]:
+            return None
+        return self.put(piece, foot.place(centre, heading, z))
+
+    def on(self, anchor: Stood, wanted: Sequence[str], turn_rad: float | None = None, middle_first: bool = False,
+           tries: int = 6) -> list[Stood]:  # fmt: skip
+        """Stand small things on the tops of a piece, meeting nothing there.
+
+        Args:
+            anchor: what they stand on.
+            wanted: categories, each tried once, on a top drawn at random.
+            turn_rad: how far they may be turned out of the piece's own direction; any way where not said.
+            middle_first: try the middle of the top first.
+            tries: places per thing.
+        """
+        out: list[Stood] = []
+        taken: dict[int, list[np.ndarray]] = {}
+        tops = anchor.piece.supports
+        for category in wanted if tops else ():
+            piece = self.new(category)
+            if piece is None:
+                continue
+            number = int(self.rng.integers(len(tops)))
+            top, foot = tops[number], footprint(piece.mesh)
+            if foot.high_m > top.clearance_m - 0.01:
+                continue
+            low, high = np.array(top.low), np.array(top.high)
+            centre = self.rng.uniform(low, high, (tries, 2))
+            if middle_first:
+                centre[0] = (low + high) / 2
+            limit = np.pi if turn_rad is None else turn_rad
+            heading = self.rng.uniform(-limit, limit, tries)
+            corner = corners_of(centre, np.broadcast_to(foot.half, centre.shape), heading)
+            good = np.all((corner >= low) & (corner <= high), axis=(1, 2))
+            if (others := taken.get(number)) and good.any():
+                good[good] = ~overlapping(corner[good], np.array(others), 0.002).any(axis=1)
+            if not good.any():
+                continue
+            k = int(np.flatnonzero(good)[0])
+            taken.setdefault(number, []).append(corner[k])
+            place = foot.place(anchor.to_world(centre[k]), anchor.place.heading_rad + float(heading[k]),
+                               anchor.place.z + top.z + 0.001)  # fmt: skip
+            out.append(self.put(piece, place, solid=False))
+        return out

@@ -1,0 +1,178 @@
+"""How a floor is divided into rooms: outlines cut again and again by lines, in the proportions of a programme."""
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.sim.furniture.joinery import chance, count, draw, pick
+from avlmaps.sim.homes.polygons import area_m2, half, middle, rectangle, widths_m
+
+Polygon = Float[np.ndarray, "k 2"]
+Programme = list[tuple[str, float]]  # kinds of room and the area each should have, m²; neighbours stand together
+
+LEAST_WIDTH_M = {"hallway": 1.15, "entrance hall": 1.3, "storage": 1.3, "toilet": 1.2, "bathroom": 1.6,
+                 "laundry room": 1.6, "copy room": 1.6, "corridor": 1.4, "kitchen": 2.0, "bedroom": 2.4,
+                 "living room": 2.8, "dining room": 2.4, "kitchenette": 1.8}  # fmt: skip
+_PASSAGES = ("hallway", "corridor", "entrance hall")
+
+
+def cut(polygon: Polygon, share: float, direction: Float[np.ndarray, "2"]) -> tuple[Polygon, Polygon]:
+    """Cut a convex polygon by a line across a direction, so that the first part has a share of the area."""
+    reach = polygon @ direction
+    low, high = float(reach.min()), float(reach.max())
+    goal = share * area_m2(polygon)
+    for _ in range(22):
+        at = (low + high) / 2
+        first = half(polygon, at * direction, direction)
+        low, high = (at, high) if len(first) < 3 or area_m2(first) < goal else (low, at)
+    at = (low + high) / 2
+    return half(polygon, at * direction, direction), half(polygon, at * direction, -direction)
+
+
+def divided(
+    rng: np.random.Generator, polygon: Polygon, programme: Programme, slant: float
+) -> list[tuple[str, Polygon]]:
+    """Divide a convex polygon among a programme.
+
+    Args:
+        rng: chooses where to cut.
+        polygon: what to divide.
+        programme: rooms with their areas; only the proportions count.
+        slant: the probability that a cut is not at right angles to the sides.
+    """
+    if len(programme) == 1:
+        return [(programme[0][0], polygon)]
+    sizes = np.array([size for _, size in programme])
+    share = np.cumsum(sizes)[:-1] / sizes.sum()
+    weight = np.exp(-(((share - 0.5) / 0.16) ** 2)) + 1e-3
+    at = int(rng.choice(len(share), p=weight / weight.sum()))
+    direction = _long_way(polygon) if not chance(rng, 0.08) else _long_way(polygon)[::-1] * (1, -1)
+    if chance(rng, slant):
+        turn = draw(rng, 0.06, 0.26) * (1 if chance(rng, 0.5) else -1)
+        c, s = np.cos(turn), np.sin(turn)
+        direction = np.array([c * direction[0] - s * direction[1], s * direction[0] + c * direction[1]])
+    if chance(rng, 0.5):
+        direction = -direction
+    first, second = cut(polygon, float(share[at]), direction)
+    return divided(rng, first, programme[: at + 1], slant) + divided(rng, second, programme[at + 1 :], slant)
+
+
+def along_corridor(
+    rng: np.random.Generator, polygon: Polygon, programme: Programme, slant: float, corridor: str
+) -> list[tuple[str, Polygon]]:
+    """Divide a polygon by a corridor along its middle, with rooms on both sides and sometimes one at its end."""
+    way = _long_way(polygon)
+    if chance(rng, 0.5):
+        way = -way
+    side = np.array([-way[1], way[0]])
+    rooms = list(programme)
+    total = sum(size for _, size in rooms)
+    out: list[tuple[str, Polygon]] = []
+    if chance(rng, 0.55) and len(rooms) > 3:  # the largest neighbours take one end, from wall to wall
+        group = 1 if chance(rng, 0.5) else 2
+        end, rooms = rooms[:group], rooms[group:]
+        taken = sum(size for _, size in end) / total
+        head, polygon = cut(polygon, min(taken, 0.6), way)
+        out += divided(rng, head, end, slant)
+    depth = float(np.ptp(polygon @ side))
+    width = draw(rng, 1.25, 2.0) if corridor == "hallway" else draw(rng, 1.5, 2.6)
+    first_share = draw(rng, 0.38, 0.62) * (1 - width / depth)
+    lower, rest = cut(polygon, first_share, side)
+    middle_part, upper = cut(rest, width / depth / (1 - first_share), side)
+    out.append((corridor, middle_part))
+    split = _index_of_share(rooms, first_share / (1 - width / depth))
+    for part, some in ((lower, rooms[:split]), (upper, rooms[split:])):
+        out += divided(rng, part, some, slant)
+    return out
+
+
+def _index_of_share(rooms: Programme, share: float) -> int:
+    sizes = np.cumsum([size for _, size in rooms])
+    return int(np.clip(np.argmin(np.abs(sizes / sizes[-1] - share)) + 1, 1, len(rooms) - 1))
+
+
+def outlines(rng: np.random.Generator, size_m2: float, shape: str) -> list[Polygon]:
+    """Return the convex parts of an outline: one rectangle, two of an L or a T; sometimes with a corner cut off.
+
+    Args:
+        rng: draws proportions.
+        size_m2: area of all of it.
+        shape: ``rectangle``, ``L`` or ``T``.
+    """
+    if shape == "rectangle":
+        aspect = draw(rng, 1.0, 1.9)
+        wide = float(np.sqrt(size_m2 * aspect))
+        part = rectangle(0.0, 0.0, wide, size_m2 / wide)
+        return [_without_corner(rng, part)] if chance(rng, 0.25) else [part]
+    share = draw(rng, 0.5, 0.72)
+    wide = float(np.sqrt(size_m2 * share * draw(rng, 1.3, 2.2)))
+    deep = size_m2 * share / wide
+    wing_wide = wide * draw(rng, 0.4, 0.6)
+    wing_deep = size_m2 * (1 - share) / wing_wide
+    start = 0.0 if shape == "L" else (wide - wing_wide) * draw(rng, 0.25, 0.75)
+    parts = [rectangle(0.0, 0.0, wide, deep), rectangle(start, deep, start + wing_wide, deep + wing_deep)]
+    if chance(rng, 0.5):
+        parts = [np.ascontiguousarray((p * (-1.0, 1.0))[::-1]) for p in parts]
+    return parts
+
+
+def _without_corner(rng: np.random.Generator, polygon: Polygon) -> Polygon:
+    corner = polygon[count(rng, 0, 3)]
+    inward = middle(polygon) - corner
+    inward /= np.linalg.norm(inward)
+    turn = draw(rng, -0.35, 0.35)
+    c, s = np.cos(turn), np.sin(turn)
+    outward = -np.array([c * inward[0] - s * inward[1], s * inward[0] + c * inward[1]])
+    return half(polygon, corner - outward * draw(rng, 1.0, 2.2), outward)
+
+
+def sound(rooms: list[tuple[str, Polygon]]) -> bool:
+    """Tell whether every room is wide enough for its kind and none is a strip."""
+    for kind, polygon in rooms:
+        if len(polygon) < 3 or np.min(np.linalg.norm(polygon - np.roll(polygon, 1, axis=0), axis=1)) < 0.5:
+            return False
+        least, most = widths_m(polygon)
+        longest = 9.0 if kind in _PASSAGES else 2.6
+        if least < LEAST_WIDTH_M.get(kind, 2.2) or most > longest * least:
+            return False
+    return True
+
+
+def floor_of(
+    rng: np.random.Generator, programme: Programme, corridor: str = "hallway", slanted: float = 0.12
+) -> list[tuple[str, Polygon]]:
+    """Lay out a floor: draw an outline and divide it, again until every room is sound.
+
+    Args:
+        rng: draws everything.
+        programme: rooms and their areas, m²; a passage among them is a room like others where no corridor is cut.
+        corridor: what the room of a corridor is called.
+        slanted: share of cuts that are not at right angles.
+    """
+    slant = slanted if chance(rng, 0.4) else 0.0
+    size = sum(area for _, area in programme)
+    inner = [room for room in programme if room[0] not in _PASSAGES]
+    for attempt in range(200):
+        shape = pick(rng, ("rectangle", "rectangle", "L", "T")) if size > 60 else "rectangle"
+        parts = outlines(rng, size, shape)
+        use_corridor = len(inner) >= 4 and chance(rng, 0.6 if attempt < 100 else 0.3)
+        rooms: list[tuple[str, Polygon]] = []
+        left = inner if use_corridor else list(programme)
+        for number, part in enumerate(parts):
+            last = number == len(parts) - 1
+            split = len(left) if last else _index_of_share(left, area_m2(part) / size)
+            mine, left = left[:split], left[split:]
+            if not mine:
+                break
+            if use_corridor and number == 0 and len(mine) >= 3:
+                rooms += along_corridor(rng, part, mine, slant, corridor)
+            else:
+                rooms += divided(rng, part, mine, slant)
+        if sound(rooms) and any(kind in _PASSAGES or len(rooms) < 6 for kind, _ in rooms):
+            return rooms
+    return divided(rng, rectangle(0.0, 0.0, np.sqrt(size) * 1.2, np.sqrt(size) / 1.2), programme, 0.0)
+
+
+def _long_way(polygon: Polygon) -> Float[np.ndarray, "2"]:
+    along = np.roll(polygon, -1, axis=0) - polygon
+    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    return along[int(np.argmax(np.ptp(polygon @ along.T, axis=0)))]
