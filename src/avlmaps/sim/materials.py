@@ -7,12 +7,12 @@ texture number i of a kind is made by a generator of its own.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 
 from avlmaps.sim.mesh import Material, Triple
-from avlmaps.sim.textures import Texture, plain, wood
+from avlmaps.sim.textures import Texture, mineral, plain, wood, woven
 
 Maker = Callable[[np.random.Generator], Texture]
 
@@ -28,6 +28,7 @@ class _Kind:
         pictured: maker of textures in colours of their own, or None.
         share: how often the pictured ones are taken where both are there and no colour is asked for.
         pool: textures of each sort that are kept.
+        drift: how far each channel of a drawn tint may stray.
         opacity: 1 for solid.
     """
 
@@ -37,40 +38,62 @@ class _Kind:
     pictured: Maker | None = None
     share: float = 0.5
     pool: int = 48
+    drift: float = 0.05
     opacity: float = 1.0
 
 
 _WOOD = ((0.45, 0.29, 0.16), (0.62, 0.44, 0.27), (0.75, 0.6, 0.42), (0.3, 0.19, 0.12), (0.83, 0.73, 0.58),
-         (0.55, 0.3, 0.18), (0.68, 0.62, 0.55), (0.5, 0.46, 0.42), (0.9, 0.86, 0.79), (0.2, 0.14, 0.11))  # fmt: skip
+         (0.55, 0.3, 0.18), (0.68, 0.62, 0.55), (0.5, 0.46, 0.42), (0.9, 0.86, 0.79), (0.2, 0.14, 0.11))
+_PAINT = ((0.93, 0.92, 0.9), (0.85, 0.84, 0.8), (0.2, 0.22, 0.25), (0.55, 0.62, 0.66), (0.6, 0.25, 0.2),
+          (0.78, 0.82, 0.8), (0.87, 0.8, 0.68), (0.4, 0.47, 0.4), (0.25, 0.32, 0.45))
+_CLOTH = ((0.5, 0.5, 0.52), (0.25, 0.28, 0.36), (0.65, 0.58, 0.48), (0.55, 0.2, 0.2), (0.2, 0.35, 0.3),
+          (0.8, 0.77, 0.72), (0.35, 0.32, 0.3), (0.75, 0.6, 0.25), (0.45, 0.55, 0.65), (0.6, 0.45, 0.5),
+          (0.15, 0.16, 0.18), (0.9, 0.88, 0.85))
+_WALL = ((0.93, 0.92, 0.9), (0.9, 0.88, 0.82), (0.86, 0.87, 0.88), (0.88, 0.83, 0.72), (0.78, 0.83, 0.8),
+         (0.72, 0.78, 0.84), (0.85, 0.75, 0.68), (0.62, 0.63, 0.64), (0.45, 0.52, 0.5))
+_TILE = ((0.93, 0.93, 0.92), (0.82, 0.78, 0.7), (0.62, 0.62, 0.62), (0.35, 0.36, 0.38), (0.68, 0.42, 0.3),
+         (0.55, 0.68, 0.7), (0.4, 0.55, 0.45), (0.85, 0.82, 0.78), (0.25, 0.35, 0.5))
+_CANE = ((0.72, 0.56, 0.36), (0.5, 0.36, 0.22), (0.85, 0.78, 0.66), (0.3, 0.24, 0.2), (0.6, 0.58, 0.55))
 _KIND: dict[str, _Kind] = {
-    "wood": _Kind(_WOOD, 0.2, wood.wood, pool=96),
-    "parquet": _Kind(_WOOD[:9], 0.3, wood.parquet, pool=64),
-    "painted": _Kind(((0.93, 0.92, 0.9), (0.85, 0.84, 0.8), (0.2, 0.22, 0.25), (0.55, 0.62, 0.66), (0.6, 0.25, 0.2),
-                      (0.78, 0.82, 0.8), (0.87, 0.8, 0.68), (0.4, 0.47, 0.4), (0.25, 0.32, 0.45)), 0.2, plain.painted),
-    "fabric": _Kind(((0.5, 0.5, 0.52), (0.25, 0.28, 0.36), (0.65, 0.58, 0.48), (0.55, 0.2, 0.2), (0.2, 0.35, 0.3)),
-                    0.0, plain.painted),
-    "leather": _Kind(((0.12, 0.1, 0.09), (0.4, 0.22, 0.13), (0.85, 0.8, 0.72), (0.45, 0.1, 0.1)), 0.3, plain.plastic),
+    "wood": _Kind(_WOOD, 0.2, wood.wood, pool=96, drift=0.02),
+    "parquet": _Kind(_WOOD[:9], 0.3, wood.parquet, pool=64, drift=0.02),
+    "painted": _Kind(_PAINT, 0.2, plain.painted),
+    "fabric": _Kind(_CLOTH, 0.0, woven.fabric, woven.patterned_fabric, 0.35, pool=96),
+    "leather": _Kind(((0.12, 0.1, 0.09), (0.4, 0.22, 0.13), (0.85, 0.8, 0.72), (0.45, 0.1, 0.1), (0.62, 0.42, 0.26)),
+                     0.3, woven.leather, pool=24, drift=0.03),
     "metal": _Kind(((0.75, 0.75, 0.77), (0.25, 0.25, 0.27), (0.55, 0.55, 0.57), (0.72, 0.6, 0.35), (0.88, 0.88, 0.89)),
-                   0.7, plain.metal, pool=32),
+                   0.7, plain.metal, pool=32, drift=0.01),
     "plastic": _Kind(((0.9, 0.9, 0.9), (0.1, 0.1, 0.1), (0.8, 0.2, 0.15), (0.2, 0.4, 0.75), (0.9, 0.75, 0.2),
                       (0.3, 0.6, 0.35), (0.5, 0.5, 0.52), (0.9, 0.5, 0.6)), 0.3, plain.plastic, pool=32),
     "ceramic": _Kind(((0.95, 0.95, 0.94), (0.9, 0.88, 0.82), (0.6, 0.7, 0.75), (0.35, 0.45, 0.5), (0.75, 0.5, 0.38)),
                      0.6, plain.ceramic, pool=32),
-    "stone": _Kind(((0.2, 0.2, 0.21), (0.8, 0.78, 0.75), (0.5, 0.48, 0.46), (0.35, 0.3, 0.27)), 0.4, plain.ceramic),
+    "stone": _Kind(((0.2, 0.2, 0.21), (0.8, 0.78, 0.75), (0.5, 0.48, 0.46), (0.35, 0.3, 0.27), (0.65, 0.6, 0.52)),
+                   0.4, mineral.stone, drift=0.02),
+    "marble": _Kind(((0.93, 0.92, 0.9), (0.15, 0.15, 0.16), (0.8, 0.74, 0.64), (0.35, 0.42, 0.38), (0.6, 0.4, 0.34)),
+                    0.6, mineral.marble, pool=32, drift=0.02),
+    "concrete": _Kind(((0.62, 0.61, 0.59), (0.75, 0.74, 0.72), (0.45, 0.45, 0.45)), 0.1, mineral.concrete, pool=32,
+                      drift=0.02),
+    "plaster": _Kind(_WALL, 0.05, mineral.plaster, pool=64, drift=0.03),
+    "wallpaper": _Kind(_WALL, 0.05, mineral.plain_wallpaper, mineral.wallpaper, 0.6, pool=64, drift=0.03),
+    "brick": _Kind(_WALL, 0.05, None, mineral.brick, pool=32),
+    "tile": _Kind(_TILE, 0.5, mineral.tile, mineral.patterned_tile, 0.35, pool=64, drift=0.03),
+    "carpet": _Kind(_CLOTH, 0.0, woven.carpet, woven.patterned_carpet, 0.3, drift=0.03),
+    "curtain": _Kind(_CLOTH + _WALL, 0.0, woven.curtain, woven.patterned_curtain, 0.35),
+    "wicker": _Kind(_CANE, 0.1, woven.wicker, pool=24, drift=0.02),
     "glass": _Kind(((0.75, 0.85, 0.88),), 0.9, plain.glass, pool=12, opacity=0.3),
     "plant": _Kind(((0.16, 0.36, 0.14), (0.25, 0.45, 0.18), (0.35, 0.5, 0.2), (0.2, 0.32, 0.22), (0.45, 0.52, 0.3)),
                    0.1, plain.plant),
-    "paper": _Kind(((0.95, 0.94, 0.9), (0.9, 0.86, 0.76)), 0.0, plain.paper, pool=16),
-    "white": _Kind(((0.94, 0.94, 0.93),), 0.3, plain.enamel, pool=24),
-    "black": _Kind(((0.06, 0.06, 0.07),), 0.3, plain.enamel, pool=24),
-    "mirror": _Kind(((0.62, 0.68, 0.74), (0.7, 0.73, 0.75), (0.5, 0.56, 0.62)), 1.0, plain.mirror, pool=16),
+    "paper": _Kind(((0.95, 0.94, 0.9), (0.9, 0.86, 0.76)), 0.0, plain.paper, pool=16, drift=0.02),
+    "white": _Kind(((0.94, 0.94, 0.93),), 0.3, plain.enamel, pool=24, drift=0.02),
+    "black": _Kind(((0.06, 0.06, 0.07),), 0.3, plain.enamel, pool=24, drift=0.01),
+    "mirror": _Kind(((0.62, 0.68, 0.74), (0.7, 0.73, 0.75), (0.5, 0.56, 0.62)), 1.0, plain.mirror, pool=16, drift=0.02),
 }  # fmt: skip
 
 KINDS: tuple[str, ...] = tuple(_KIND)
 _NUMBER = {kind: number for number, kind in enumerate(sorted(_KIND))}
 
 
-@lru_cache(maxsize=None)
+@cache
 def _texture(kind: str, pictured: bool, number: int) -> Texture:
     """Return one texture of a kind's pool, made at the first call."""
     look = _KIND[kind]
@@ -81,7 +104,7 @@ def _texture(kind: str, pictured: bool, number: int) -> Texture:
 
 def _drawn_colour(look: _Kind, rng: np.random.Generator) -> np.ndarray:
     base = np.array(look.colours[int(rng.integers(len(look.colours)))])
-    return np.clip(base * rng.uniform(0.8, 1.15) + rng.uniform(-0.05, 0.05, 3), 0.02, 0.98)
+    return np.clip(base * rng.uniform(0.8, 1.15) + rng.uniform(-look.drift, look.drift, 3), 0.02, 0.98)
 
 
 def material(kind: str, rng: np.random.Generator, colour: Triple | None = None) -> Material:

@@ -4,15 +4,16 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
+import scipy.fft
 from jaxtyping import Float32
 
 
-@lru_cache(maxsize=64)
-def _wavenumber(size: int, along: float, across: float) -> Float32[np.ndarray, "h w2"]:
-    """Return cycles per picture of each coefficient, weighted along the columns and the rows; 1 at least."""
-    down = np.fft.fftfreq(size, 1.0 / size)[:, None] * across
-    right = np.fft.rfftfreq(size, 1.0 / size)[None, :] * along
-    return np.maximum(np.hypot(down, right), 1.0).astype(np.float32)
+@lru_cache(maxsize=32)
+def _log_wavenumber(size: int, stretch: float) -> Float32[np.ndarray, "h w2"]:
+    """Return the logarithm of the cycles per picture of each coefficient, those along the rows weighted; 0 at least."""
+    down = np.fft.fftfreq(size, 1.0 / size)[:, None]
+    right = np.fft.rfftfreq(size, 1.0 / size)[None, :] * stretch
+    return np.log(np.maximum(np.hypot(down, right), 1.0)).astype(np.float32)
 
 
 def cloud(
@@ -33,11 +34,14 @@ def cloud(
         low: waves of fewer cycles per picture are left out.
         high: waves of more cycles per picture are left out.
     """
-    k = _wavenumber(size, stretch, 1.0)
-    amplitude = np.where((k >= low) & (k <= high), k**-slope, 0.0).astype(np.float32)
-    white = np.fft.rfft2(rng.standard_normal((size, size), dtype=np.float32))
-    white[0, 0] = 0.0
-    field = np.fft.irfft2(white * amplitude, s=(size, size)).astype(np.float32)
+    log_k = _log_wavenumber(size, stretch)
+    amplitude = np.exp(log_k * np.float32(-slope))
+    if low > 1.0 or high < size:
+        amplitude *= (log_k >= np.log(low)) & (log_k <= np.log(high))
+    waves = rng.standard_normal((*amplitude.shape, 2), dtype=np.float32).view(np.complex64)[..., 0]
+    waves *= amplitude
+    waves[0, 0] = 0.0
+    field = scipy.fft.irfft2(waves, s=(size, size), overwrite_x=True)
     return field / max(float(field.std()), 1e-6)
 
 
@@ -60,8 +64,7 @@ def speckles(rng: np.random.Generator, size: int, count: int, radius_px: float) 
     field = np.zeros((size, size), np.float32)
     spot = rng.integers(0, size * size, count)
     field.reshape(-1)[spot] = rng.uniform(0.3, 1.0, count)
-    blurred = softened(field, radius_px)
-    return np.clip(blurred * (2 * np.pi * radius_px**2), 0.0, 1.0)
+    return np.clip(softened(field, radius_px) * (1.3 * np.pi * radius_px**2), 0.0, 1.0)
 
 
 def warped(

@@ -58,7 +58,7 @@ def plant(rng: np.random.Generator) -> Texture:
         veins = np.abs((y * int(rng.integers(2, 7)) + np.abs(x - 0.5) * 2.0) % 1.0 - 0.5)
         mottled = mottled * (1.0 - 0.25 * np.exp(-((veins / 0.06) ** 2)))
     edge = float(rng.uniform(0.06, 0.2))
-    return grey(mottled, (edge, edge), 0.12 * cloud(rng, size, 1.4))
+    return grey(mottled, (edge, edge), 0.045 * cloud(rng, size, 1.4))
 
 
 def paper(rng: np.random.Generator) -> Texture:

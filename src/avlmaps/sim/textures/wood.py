@@ -45,7 +45,7 @@ def wood(rng: np.random.Generator) -> Texture:
         value = value * rng.uniform(0.82, 1.08, boards)[board][:, None]
         value[np.flatnonzero(np.diff(board, prepend=-1))] *= float(rng.uniform(0.45, 0.8))
     along, across = float(rng.uniform(0.5, 1.0)), float(rng.uniform(0.25, 0.6))
-    hue = 0.03 * cloud(rng, size, 1.8)
+    hue = 0.012 * cloud(rng, size, 1.8)
     if rng.random() < 0.5:
         return grey(value.T, (across, along), hue.T)
     return grey(value, (along, across), hue)
