@@ -9,10 +9,12 @@ near to far, and leaves out those that lie behind what is drawn. Only pixels tha
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float32, Int, Int32, UInt8
+from jaxtyping import Bool, Float, Float32, Int, Int32, UInt8
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.sim import raster_kernels, shade_kernels
+from avlmaps.sim.atlas import atlas_of, picture_maps
+from avlmaps.sim.lighting import LightMap, light_map
 from avlmaps.sim.mesh import Mesh
 from avlmaps.sim.scene import NOTHING, Scene
 
@@ -21,6 +23,10 @@ SKY = (178, 204, 232)  # sRGB of pixels that show no triangle
 _CELL_M = 0.8  # triangles of one group lie in one cell of this size
 _GROUP = 96  # triangles in a group at most
 _LARGE_M = 1.6  # triangles longer than this are drawn first: they hide others
+_GLOW = 2.5  # linear light of a surface of emission 1 and of colour 1
+_MIDDLE_GREY = 0.24  # linear: to this the mean of a view is brought, as a camera's exposure does
+_GAINS = (0.45, 3.5)  # as far as the exposure goes
+_METER_STEP = 61  # every so manieth pixel decides on the exposure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,44 +53,36 @@ class _Groups:
     order: Int[np.ndarray, " t"]
     first: Int[np.ndarray, " g1"]
     box: Float[np.ndarray, "g 6"]
-    large: Int[np.ndarray, " g"]
+    large: Bool[np.ndarray, " g"]
+    clear: Bool[np.ndarray, " g"]
 
 
 def _grouped(mesh: Mesh) -> _Groups:
-    """Sort triangles into groups that lie close together, the large ones apart."""
+    """Sort triangles into groups that lie close together, the large ones and those one sees through apart."""
     corners = mesh.corners().astype(np.float64)
     low, high = corners.min(axis=1), corners.max(axis=1)
     large = (high - low).max(axis=1, initial=0.0) > _LARGE_M
+    clear = np.array([m.opacity < 1.0 for m in mesh.materials], bool)[mesh.material]
     cell = np.floor((low + high) / (2 * _CELL_M)).astype(np.int64)
-    order = np.lexsort((cell[:, 2], cell[:, 1], cell[:, 0], ~large))
-    key = np.column_stack([large, cell])[order]
+    order = np.lexsort((cell[:, 2], cell[:, 1], cell[:, 0], ~large, clear))
+    if not len(order):
+        none = np.zeros(0, bool)
+        return _Groups(order, np.zeros(1, np.int64), np.zeros((0, 6)), none, none)
+    key = np.column_stack([large, clear, cell])[order]
     starts = np.ones(len(order), bool)
     starts[1:] = (key[1:] != key[:-1]).any(axis=1)
     run = np.arange(len(order)) - np.maximum.accumulate(np.where(starts, np.arange(len(order)), 0))
     first = np.flatnonzero(run % _GROUP == 0)
-    if not len(order):
-        return _Groups(order, np.zeros(1, np.int64), np.zeros((0, 6)), np.zeros(0, np.int64))
     box = np.concatenate([np.minimum.reduceat(low[order], first), np.maximum.reduceat(high[order], first)], axis=1)
-    return _Groups(order, np.append(first, len(order)), box, key[first, 0])
+    return _Groups(order, np.append(first, len(order)), box, large[order[first]], clear[order[first]])
 
 
-def _uv_map(mesh: Mesh, order: Int[np.ndarray, " t"]) -> Float32[np.ndarray, "t 2 4"]:
-    """Return for each triangle the affine map from a place in the world to the place on its picture."""
-    corners = mesh.corners()[order].astype(np.float64)
-    uv = mesh.uv[order].astype(np.float64)
-    edge, uv_edge = corners[:, 1:] - corners[:, :1], uv[:, 1:] - uv[:, :1]
-    dual = np.linalg.pinv(edge)  # (t, 3, 2): the fractions along both edges of a step in the world
-    linear = np.einsum("tij,tjk->tki", dual, uv_edge)
-    constant = uv[:, 0] - np.einsum("tki,ti->tk", linear, corners[:, 0])
-    return np.concatenate([linear, constant[..., None]], axis=2).astype(np.float32)
-
-
-def _curve() -> UInt8[np.ndarray, " n"]:
-    """Return the 8-bit sRGB of linear light from 0 to 2, with a shoulder instead of a hard white."""
-    linear = np.arange(4096) / 2048.0
-    linear = np.where(linear < 0.6, linear, 0.6 + 0.4 * np.tanh((linear - 0.6) / 0.5))
-    srgb = np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.clip(np.round(255.0 * srgb), 0, 255).astype(np.uint8)
+def _curve(shoulder: bool) -> UInt8[np.ndarray, " n"]:
+    """Return the 8-bit value by the root of linear light, from 0 to 2; a shoulder keeps bright places from white."""
+    linear = np.square(2 * np.arange(shade_kernels.LEVELS) / shade_kernels.LEVELS)
+    if shoulder:
+        linear = np.where(linear < 0.5, linear, 0.5 + 0.5 * np.tanh(0.9 * (linear - 0.5) / 0.5))
+    return np.clip(np.round(255.0 * np.sqrt(linear)), 0, 255).astype(np.uint8)
 
 
 class Renderer:
@@ -95,7 +93,7 @@ class Renderer:
 
         Args:
             scene: what to look at.
-            lit: work out lamps and shadows; without them colours are plain, which is enough for depth.
+            lit: work out lamps and shadows; without them surfaces show their plain colours.
         """
         mesh = scene.mesh
         self.scene = scene
@@ -103,13 +101,20 @@ class Renderer:
         order = self._groups.order
         self._corner = mesh.corners()[order].reshape(-1, 9)
         self._middle = (self._groups.box[:, :3] + self._groups.box[:, 3:]) / 2
-        colour = np.array([m.colour for m in mesh.materials], np.float64).reshape(-1, 3)
-        linear = np.where(colour < 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4).astype(np.float32)
-        glow = np.array([m.emission for m in mesh.materials], np.float32)
-        self._look = (mesh.normals()[order], _uv_map(mesh, order), mesh.material[order], scene.instance[order],
-                      linear, glow)  # fmt: skip
+        atlas = atlas_of(mesh.materials)
+        self._normal, self._material, self._instance = (
+            mesh.normals()[order],
+            mesh.material[order],
+            scene.instance[order],
+        )
+        self._picture, self._fraction, self._density = picture_maps(mesh, order, atlas)
+        glow = (_GLOW if lit else 0.0) * np.array([m.emission for m in mesh.materials], np.float32)
+        self._colours = (atlas.colour, glow, atlas.texel, atlas.table)
+        self._opacity = np.array([m.opacity for m in mesh.materials], np.float32)
+        self._lit = lit and len(order) > 0
+        self._lights = _tables(light_map(scene, atlas.mean) if self._lit else None, order)
         self._category = np.append(scene.category_of_instance, NOTHING).astype(np.int32)
-        self._curve = _curve()
+        self._curve = _curve(shoulder=self._lit)
 
     def render(self, camera: Pinhole, world_from_camera: Float[np.ndarray, "4 4"]) -> View:
         """Return what the camera sees from a pose."""
@@ -117,14 +122,58 @@ class Renderer:
         rotation = np.ascontiguousarray(world_from_camera[:3, :3].T, np.float64)
         origin = np.asarray(world_from_camera[:3, 3], np.float64)
         lens = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
-        inverse = np.zeros(height * width, np.float32)
-        shown = np.full(height * width, NOTHING, np.int32)
-        away = np.linalg.norm(self._middle - origin, axis=1) - 1e6 * self._groups.large
-        raster_kernels.draw(self._corner, self._groups.first, self._groups.box, np.argsort(away), rotation,
-                            -rotation @ origin, lens, width, height, inverse, shown)  # fmt: skip
+        front, behind = self._drawn(rotation, origin, lens, width, height)
+        eye = (lens.astype(np.float32), rotation.astype(np.float32), origin.astype(np.float32), width)
+        colour = self._coloured(*front, eye)
+        if self._groups.clear.any():
+            sky = np.square(np.array(SKY, np.float32) / 255.0)
+            shade_kernels.blend_fragments(front[1], behind[1], self._opacity, self._material, sky,
+                                          self._coloured(*behind, eye), colour)  # fmt: skip
+        gain = 1.0
+        if self._lit:
+            mean = shade_kernels.mean_log_light(front[1], colour, _METER_STEP)
+            gain = float(np.clip(_MIDDLE_GREY / np.exp(mean), *_GAINS))
         rgb = np.empty((height, width, 3), np.uint8)
         depth_m = np.empty((height, width), np.float32)
         instance = np.empty((height, width), np.int32)
-        shade_kernels.shade(inverse, shown, (lens, rotation, origin), self._look, self._curve,
-                            np.array(SKY, np.uint8), rgb, depth_m, instance)  # fmt: skip
+        shade_kernels.finish(*front, self._instance, colour, np.float32(gain), self._curve, np.array(SKY, np.uint8),
+                             rgb.reshape(-1, 3), depth_m.reshape(-1), instance.reshape(-1))  # fmt: skip
         return View(rgb, depth_m, instance, self._category[instance])
+
+    def _coloured(self, inverse: np.ndarray, shown: np.ndarray, eye: tuple) -> Float32[np.ndarray, "n 3"]:
+        """Return the linear light that comes from what each pixel shows."""
+        place, side = np.empty((len(shown), 3), np.float32), np.empty(len(shown), np.float32)
+        colour = np.ones((len(shown), 3), np.float32)
+        shade_kernels.place_fragments(inverse, shown, *eye, self._normal, place, side)
+        if self._lit:
+            shade_kernels.light_fragments(shown, place, side, self._fraction, *self._lights, colour)
+        shade_kernels.paint_fragments(inverse, shown, place, side, np.float32(1 / eye[0][0]), self._picture,
+                                      self._density, self._material, *self._colours, colour)  # fmt: skip
+        return colour
+
+    def _drawn(
+        self, rotation: np.ndarray, origin: np.ndarray, lens: np.ndarray, width: int, height: int
+    ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """Return inverse depth and triangle of the foremost surface, and of the foremost that hides what is behind."""
+        inverse = np.zeros(height * width, np.float32)
+        shown = np.full(height * width, NOTHING, np.int32)
+        groups = self._groups
+        away = np.linalg.norm(self._middle - origin, axis=1) - 1e6 * groups.large
+        order = np.argsort(away)
+        rest = (rotation, -rotation @ origin, lens, width, height)
+        raster_kernels.draw(self._corner, groups.first, groups.box, order[~groups.clear[order]], *rest, inverse, shown)
+        if not groups.clear.any():
+            return (inverse, shown), (inverse, shown)
+        front = inverse.copy(), shown.copy()
+        raster_kernels.draw(self._corner, groups.first, groups.box, order[groups.clear[order]], *rest, *front)
+        return front, (inverse, shown)
+
+
+def _tables(light: LightMap | None, order: Int[np.ndarray, " t"]) -> tuple[np.ndarray, ...]:
+    """Return the light map's tables by drawn triangle; empty ones where there is none."""
+    if light is None:
+        none = np.zeros((0, 3), np.int32)
+        one, pair = np.zeros(0, np.int64), np.zeros((0, 2), np.int64)
+        return none, np.zeros(0, bool), one, pair, pair, one, np.zeros((0, 2, 3), np.float32), np.float32(1)
+    return (light.sample[order], light.turned[order], light.first, light.axes, light.low, light.columns, light.light,
+            np.float32(light.step_m))  # fmt: skip

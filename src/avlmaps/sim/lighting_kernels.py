@@ -1,0 +1,296 @@
+"""Compiled light transport over a grid of small cells: what is solid, what sees a lamp, what light comes back."""
+
+import numpy as np
+from numba import njit
+
+RAYS_LEFT = -2.0  # the ray left the grid
+RAYS_CLEAR = -1.0  # nothing on the way
+_STEPS_A_CELL = 2.2  # points laid on a triangle per side of a cell, so that no cell on it is missed
+_OCCLUSION_M = 0.5  # how far away something still darkens a corner
+
+
+@njit(cache=True)
+def mark_solid(corner, low, cell_m, solid):  # pragma: no cover - compiled
+    """Mark the cells that hold a part of a triangle; ``corner`` is (t, 3, 3), ``solid`` is changed."""
+    nx, ny, nz = solid.shape
+    for t in range(len(corner)):
+        a, b, c = corner[t, 0], corner[t, 1], corner[t, 2]
+        longest = 0.0
+        for p, q in ((a, b), (b, c), (c, a)):
+            longest = max(longest, (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2)
+        along = np.sqrt(longest)
+        steps = int(along / cell_m * _STEPS_A_CELL) + 1
+        for i in range(steps + 1):
+            s = i / steps
+            for j in range(steps + 1 - i):
+                r = j / steps
+                x = int((a[0] + s * (b[0] - a[0]) + r * (c[0] - a[0]) - low[0]) / cell_m)
+                y = int((a[1] + s * (b[1] - a[1]) + r * (c[1] - a[1]) - low[1]) / cell_m)
+                z = int((a[2] + s * (b[2] - a[2]) + r * (c[2] - a[2]) - low[2]) / cell_m)
+                if 0 <= x < nx and 0 <= y < ny and 0 <= z < nz:
+                    solid[x, y, z] = 1
+
+
+@njit(cache=True)
+def march(solid, px, py, pz, dx, dy, dz, farthest):  # pragma: no cover - compiled
+    """Walk from a place along a unit direction, in cells; return the distance to the first solid cell, or why none."""
+    x, y, z = int(np.floor(px)), int(np.floor(py)), int(np.floor(pz))
+    nx, ny, nz = solid.shape
+    sx, sy, sz = (1 if dx > 0 else -1), (1 if dy > 0 else -1), (1 if dz > 0 else -1)
+    ax, ay, az = 1.0 / max(abs(dx), 1e-12), 1.0 / max(abs(dy), 1e-12), 1.0 / max(abs(dz), 1e-12)
+    tx = ((x + 1 - px) if dx > 0 else (px - x)) * ax
+    ty = ((y + 1 - py) if dy > 0 else (py - y)) * ay
+    tz = ((z + 1 - pz) if dz > 0 else (pz - z)) * az
+    t = 0.0
+    while t < farthest:
+        if x < 0 or y < 0 or z < 0 or x >= nx or y >= ny or z >= nz:
+            return RAYS_LEFT
+        if solid[x, y, z]:
+            return t
+        if tx < ty and tx < tz:
+            t, x, tx = tx, x + sx, tx + ax
+        elif ty < tz:
+            t, y, ty = ty, y + sy, ty + ay
+        else:
+            t, z, tz = tz, z + sz, tz + az
+    return RAYS_CLEAR
+
+
+@njit(cache=True)
+def _start(solid, place, nx, ny, nz, low, cell_m, out):  # pragma: no cover - compiled
+    """Lift a place off its surface until it is free; tell whether it is."""
+    for lift in (1.6, 0.9):
+        out[0] = (place[0] - low[0]) / cell_m + lift * nx
+        out[1] = (place[1] - low[1]) / cell_m + lift * ny
+        out[2] = (place[2] - low[2]) / cell_m + lift * nz
+        x, y, z = int(np.floor(out[0])), int(np.floor(out[1])), int(np.floor(out[2]))
+        if x < 0 or y < 0 or z < 0 or x >= solid.shape[0] or y >= solid.shape[1] or z >= solid.shape[2]:
+            return True
+        if not solid[x, y, z]:
+            return True
+    return False
+
+
+@njit(cache=True)
+def direct(place, normal, lamp, power, reach_m, solid, low, cell_m, light, free):  # pragma: no cover - compiled
+    """Add the light that comes straight from the lamps to both sides of each sample.
+
+    Args:
+        place: (s, 3) samples, metres.
+        normal: (s, 3) of side 0; side 1 looks the other way.
+        lamp: (l, 3) places of lamps.
+        power: (l, 3) linear RGB.
+        reach_m: lamps farther than this are left out.
+        solid: cells.
+        low: corner of the cells.
+        cell_m: their size.
+        light: (s, 2, 3) float32, changed.
+        free: (s, 2) bool, whether the side looks into free space; changed.
+    """
+    p = np.zeros(3)
+    for s in range(len(place)):
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            nx, ny, nz = sign * normal[s, 0], sign * normal[s, 1], sign * normal[s, 2]
+            free[s, side] = _start(solid, place[s], nx, ny, nz, low, cell_m, p)
+            if not free[s, side]:
+                continue
+            for k in range(len(lamp)):
+                dx, dy, dz = lamp[k, 0] - place[s, 0], lamp[k, 1] - place[s, 1], lamp[k, 2] - place[s, 2]
+                d2 = dx * dx + dy * dy + dz * dz
+                lambert = dx * nx + dy * ny + dz * nz
+                if lambert <= 0 or d2 > reach_m * reach_m:
+                    continue
+                qx, qy, qz = ((lamp[k, 0] - low[0]) / cell_m - p[0], (lamp[k, 1] - low[1]) / cell_m - p[1],
+                              (lamp[k, 2] - low[2]) / cell_m - p[2])  # fmt: skip
+                far = np.sqrt(qx * qx + qy * qy + qz * qz) + 1e-9
+                if march(solid, p[0], p[1], p[2], qx / far, qy / far, qz / far, far - 2.0) >= 0.0:
+                    continue
+                e = 2.0 * lambert / np.sqrt(d2 + 1e-9) / (d2 + 0.3)
+                e /= 1.0 + 0.35 * e  # a lamp has a size: what is close to it is not lit without end
+                for c in range(3):
+                    light[s, side, c] += e * power[k, c]
+
+
+@njit(cache=True)
+def _face(nx, ny, nz):  # pragma: no cover - compiled
+    """Return which of the six sides of a box a direction looks through most: 0 +x, 1 -x, 2 +y, 3 -y, 4 +z, 5 -z."""
+    ax, ay, az = abs(nx), abs(ny), abs(nz)
+    if ax >= ay and ax >= az:
+        return 0 if nx > 0 else 1
+    if ay >= az:
+        return 2 if ny > 0 else 3
+    return 4 if nz > 0 else 5
+
+
+@njit(cache=True)
+def splat(place, normal, albedo, glow, area, light, free, low, cell_m, sent):  # pragma: no cover - compiled
+    """Sum what the surfaces send out, by coarse cell and by the side they face; ``sent`` is (x, y, z, 6, 4), changed."""
+    nx, ny, nz = sent.shape[:3]
+    for s in range(len(place)):
+        for side in range(2):
+            if not free[s, side]:
+                continue
+            sign = 1.0 - 2.0 * side
+            ux, uy, uz = sign * normal[s, 0], sign * normal[s, 1], sign * normal[s, 2]
+            x = int((place[s, 0] + 0.05 * ux - low[0]) / cell_m)
+            y = int((place[s, 1] + 0.05 * uy - low[1]) / cell_m)
+            z = int((place[s, 2] + 0.05 * uz - low[2]) / cell_m)
+            if not (0 <= x < nx and 0 <= y < ny and 0 <= z < nz):
+                continue
+            f = _face(ux, uy, uz)
+            for c in range(3):
+                sent[x, y, z, f, c] += area[s] * albedo[s, c] * (light[s, side, c] + glow[s])
+            sent[x, y, z, f, 3] += area[s]
+
+
+@njit(cache=True)
+def _received(sent, x, y, z, dx, dy, dz, out):  # pragma: no cover - compiled
+    """Average what a coarse cell sends against a direction; tell whether it has any surface that does."""
+    if x < 0 or y < 0 or z < 0 or x >= sent.shape[0] or y >= sent.shape[1] or z >= sent.shape[2]:
+        return False
+    total = 0.0
+    out[:] = 0.0
+    for axis in range(3):
+        d = dx if axis == 0 else (dy if axis == 1 else dz)
+        f = 2 * axis + (1 if d > 0 else 0)
+        area = sent[x, y, z, f, 3]
+        if area > 0:
+            for c in range(3):
+                out[c] += abs(d) * sent[x, y, z, f, c] / area
+            total += abs(d)
+    if total <= 0.02:
+        return False
+    for c in range(3):
+        out[c] /= total
+    return True
+
+
+@njit(cache=True)
+def gather(probe, ray, solid, low, cell_m, sent, coarse, sky, cube, free):  # pragma: no cover - compiled
+    """Look round from each probe and keep what comes from each of the six sides.
+
+    Args:
+        probe: (p, 3) places, metres.
+        ray: (r, 3) unit directions.
+        solid: cells.
+        low: corner of the cells and of the coarse cells.
+        cell_m: size of the cells.
+        sent: (x, y, z, 6, 4) what surfaces send out, by coarse cell.
+        coarse: how many cells a coarse cell is wide.
+        sky: (3,) what comes from where nothing is.
+        cube: (p, 6, 3) float32, changed.
+        free: (p,) bool, changed: whether the probe lies outside everything solid.
+    """
+    seen = np.zeros(3)
+    weight = np.zeros(6)
+    for k in range(len(probe)):
+        px, py, pz = ((probe[k, 0] - low[0]) / cell_m, (probe[k, 1] - low[1]) / cell_m, (probe[k, 2] - low[2]) / cell_m)
+        free[k] = march(solid, px, py, pz, 1.0, 0.0, 0.0, 0.5) < 0.0
+        if not free[k]:
+            continue
+        weight[:] = 0.0
+        for r in range(len(ray)):
+            dx, dy, dz = ray[r, 0], ray[r, 1], ray[r, 2]
+            t = march(solid, px, py, pz, dx, dy, dz, 1e9)
+            seen[:] = sky
+            if t >= 0.0:
+                seen[:] = 0.0
+                for back in (1.0, -0.5, 3.0):
+                    s = t - back
+                    x, y, z = (int((px + s * dx) / coarse), int((py + s * dy) / coarse), int((pz + s * dz) / coarse))
+                    if _received(sent, x, y, z, dx, dy, dz, seen):
+                        break
+            for axis in range(3):
+                f = 2 * axis + (0 if ray[r, axis] > 0 else 1)
+                weight[f] += abs(ray[r, axis])
+                for c in range(3):
+                    cube[k, f, c] += abs(ray[r, axis]) * seen[c]
+        for f in range(6):
+            for c in range(3):
+                cube[k, f, c] /= max(weight[f], 1e-9)
+
+
+@njit(cache=True)
+def _occlusion(solid, p, nx, ny, nz, ring, cell_m):  # pragma: no cover - compiled
+    """Return how much of the nearby half space over a surface is open, 0 to 1."""
+    # two directions across the normal (Duff et al. 2017)
+    sign = 1.0 if nz >= 0 else -1.0
+    a = -1.0 / (sign + nz)
+    b = nx * ny * a
+    ux, uy, uz = 1.0 + sign * nx * nx * a, sign * b, -sign * nx
+    vx, vy, vz = b, sign + ny * ny * a, -ny
+    reach = _OCCLUSION_M / cell_m
+    closed = 0.0
+    for k in range(len(ring)):
+        dx = ring[k, 0] * ux + ring[k, 1] * vx + ring[k, 2] * nx
+        dy = ring[k, 0] * uy + ring[k, 1] * vy + ring[k, 2] * ny
+        dz = ring[k, 0] * uz + ring[k, 1] * vz + ring[k, 2] * nz
+        t = march(solid, p[0], p[1], p[2], dx, dy, dz, reach)
+        if t >= 0.0:
+            closed += 1.0 - t / reach
+    return 1.0 - closed / len(ring)
+
+
+@njit(cache=True)
+def ambient(
+    place, normal, ring, solid, low, cell_m, cube, probe_free, count, probe_m, bounce, light, free
+):  # pragma: no cover - compiled
+    """Add the light that comes back from everything, from the probes that each sample sees.
+
+    Args:
+        place: (s, 3) samples.
+        normal: (s, 3).
+        ring: (r, 3) directions round +z, for the darkness of corners.
+        solid: cells.
+        low: corner of the cells.
+        cell_m: their size.
+        cube: (p, 6, 3) light from the six sides at each probe.
+        probe_free: (p,) which probes count.
+        count: probes along x, y and z; the first lies half a step from ``low``.
+        probe_m: step between probes.
+        bounce: factor for the bounces that are not followed.
+        light: (s, 2, 3), changed.
+        free: (s, 2).
+    """
+    p = np.zeros(3)
+    total = np.zeros(3)
+    for s in range(len(place)):
+        for side in range(2):
+            if not free[s, side]:
+                continue
+            sign = 1.0 - 2.0 * side
+            n = (sign * normal[s, 0], sign * normal[s, 1], sign * normal[s, 2])
+            _start(solid, place[s], n[0], n[1], n[2], low, cell_m, p)
+            weight = 0.0
+            total[:] = 0.0
+            bounce_here = bounce
+            for demand in range(2):  # where no probe is seen, any free one is better than none
+                gx, gy, gz = (p[0] * cell_m / probe_m - 0.5, p[1] * cell_m / probe_m - 0.5,
+                              p[2] * cell_m / probe_m - 0.5)  # fmt: skip
+                bx, by, bz = int(np.floor(gx)), int(np.floor(gy)), int(np.floor(gz))
+                for corner in range(8):
+                    ix, iy, iz = bx + (corner & 1), by + ((corner >> 1) & 1), bz + (corner >> 2)
+                    if ix < 0 or iy < 0 or iz < 0 or ix >= count[0] or iy >= count[1] or iz >= count[2]:
+                        continue
+                    at = (ix * count[1] + iy) * count[2] + iz
+                    if not probe_free[at]:
+                        continue
+                    w = (1.001 - abs(gx - ix)) * (1.001 - abs(gy - iy)) * (1.001 - abs(gz - iz))
+                    qx, qy, qz = ((ix + 0.5) * probe_m / cell_m - p[0], (iy + 0.5) * probe_m / cell_m - p[1],
+                                  (iz + 0.5) * probe_m / cell_m - p[2])  # fmt: skip
+                    far = np.sqrt(qx * qx + qy * qy + qz * qz) + 1e-9
+                    if demand == 0 and march(solid, p[0], p[1], p[2], qx / far, qy / far, qz / far, far) >= 0.0:
+                        continue
+                    weight += w
+                    for axis in range(3):
+                        f = 2 * axis + (0 if n[axis] > 0 else 1)
+                        for c in range(3):
+                            total[c] += w * n[axis] * n[axis] * cube[at, f, c]
+                if weight > 0.0:
+                    break
+                bounce_here = 0.1 * bounce
+            if weight > 0.0:
+                open_part = _occlusion(solid, p, n[0], n[1], n[2], ring, cell_m)
+                for c in range(3):
+                    light[s, side, c] += bounce_here * (0.15 + 0.85 * open_part) * total[c] / weight
