@@ -1,0 +1,1 @@
+"""Radiators, air conditioners, fireplaces and water heaters."""

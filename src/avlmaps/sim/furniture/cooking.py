@@ -1,0 +1,1 @@
+"""Stoves, microwaves, dishwashers and range hoods."""

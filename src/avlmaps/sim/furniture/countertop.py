@@ -1,0 +1,1 @@
+"""Kettles, toasters and coffee machines."""

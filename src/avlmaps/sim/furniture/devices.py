@@ -1,0 +1,1 @@
+"""Printers, loudspeakers, keyboards, telephones and clocks."""
