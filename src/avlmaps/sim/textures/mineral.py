@@ -102,9 +102,7 @@ def _laid(
     shift = offset * (row % 2) if rows % 2 == 0 else np.zeros_like(row)
     u, v = x * columns + shift, y * rows
     wobble = 0.15 * cloud(rng, size, 1.2)
-    to_edge = np.minimum(
-        (0.5 - np.abs(u % 1.0 - 0.5)) * size / columns, (0.5 - np.abs(v % 1.0 - 0.5)) * size / rows
-    )
+    to_edge = np.minimum((0.5 - np.abs(u % 1.0 - 0.5)) * size / columns, (0.5 - np.abs(v % 1.0 - 0.5)) * size / rows)
     return u.astype(np.int64) % columns + columns * row, np.clip(to_edge + wobble - joint_px / 2 + 0.5, 0.0, 1.0)
 
 

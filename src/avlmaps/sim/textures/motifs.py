@@ -22,7 +22,7 @@ def _checks(rng: np.random.Generator, size: int) -> Int[np.ndarray, "s s"]:
 
 
 def _lattice(rng: np.random.Generator, size: int) -> tuple[Plane, Plane, Int[np.ndarray, "s s"]]:
-    """Return offsets from the middle of each cell, in (-0.5, 0.5), and the cells' numbers; every other row is shifted."""
+    """Return offsets from the middle of each cell, in (-0.5, 0.5), and the cells' numbers; rows may be staggered."""
     n = int(rng.choice((2, 4, 6)))
     x, y = grid(size)
     row = (y * n).astype(np.int64)

@@ -41,7 +41,7 @@ def cloud(
     waves = rng.standard_normal((*amplitude.shape, 2), dtype=np.float32).view(np.complex64)[..., 0]
     waves *= amplitude
     waves[0, 0] = 0.0
-    field = scipy.fft.irfft2(waves, s=(size, size), overwrite_x=True)
+    field = np.asarray(scipy.fft.irfft2(waves, s=(size, size), overwrite_x=True), np.float32)
     return field / max(float(field.std()), 1e-6)
 
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 def harmony(rng: np.random.Generator, count: int) -> Float[np.ndarray, "count 3"]:
     """Return ``count`` sRGB colours round one or two hues, from dark to light in random order."""
     hue, other = float(rng.random()), float(rng.choice((0.0, 0.08, 0.5, 0.33)))
-    muted = float(rng.choice((0.12, 0.35, 0.6, 0.85)))
+    muted = float(rng.choice((0.07, 0.2, 0.35, 0.5, 0.8)))
     values = np.linspace(rng.uniform(0.12, 0.4), rng.uniform(0.75, 0.97), count)
     rows = [
         colorsys.hsv_to_rgb(
