@@ -1,0 +1,315 @@
+"""Recording a scene: a robot drives through it, its camera and its microphone run, and truth is written beside."""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.progress import progress, say
+from avlmaps.recordings.audio import Sound
+from avlmaps.recordings.layout import DESCRIPTION
+from avlmaps.recordings.writer import RecordingWriter
+from avlmaps.sim.hearing import Recorded, ScheduleRule, Sounding, Synthesised, place_sources, schedule
+from avlmaps.sim.render import Renderer
+from avlmaps.sim.scene import Scene
+from avlmaps.sim.truth import SEMANTIC, clear_unfinished, write_true_poses, write_truth
+from avlmaps.sim.walk import WalkSettings, walk_through
+
+Hearing = Literal["overlay", "acoustic", "none"]
+SensorName = Literal["clean", "kinect", "realsense"]
+
+_SECONDS_A_SOUND = 12.0
+_FEWEST_FOR_PROCESSES = 60  # starting a process takes as long as drawing some tens of frames
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class RecordSettings:
+    """How a scene is recorded.
+
+    Attributes:
+        size: columns and rows of the pictures.
+        fov_deg: horizontal field of view.
+        fps: frames a second.
+        sensor: whose faults colour and depth have.
+        hearing: ``overlay``: dry clips as the paper mixed them; ``acoustic``: loudness, walls and reverberation
+            follow the geometry; ``none``: no track.
+        sounds: folder of clips, as ``avlmaps add-sounds`` reads it; None makes them by rule.
+        categories: only these kinds of sound; all that homes make if empty.
+        sources: how many sounds; one for every twelve seconds of the walk if None.
+        ambiguous: how many kinds of sound are heard in two places.
+        rate_hz: samples a second of the track.
+        snr_db: how far the room's noise lies below a sound at 1 m.
+        overlap_s: how much two sounds may overlap.
+        drift: odometry drift, metres a metre driven; 0 gives true poses.
+        max_frames: thins a longer walk evenly to so many frames.
+        semantic: whether instance images are written as well.
+        colour: file type of the colour pictures.
+        workers: processes that draw; 1 draws in this one.
+        walk: how the robot is driven; its rate is that of the frames.
+    """
+
+    size: tuple[int, int] = (320, 240)
+    fov_deg: float = 63.0
+    fps: float = 10.0
+    sensor: SensorName = "clean"
+    hearing: Hearing = "overlay"
+    sounds: Path | None = None
+    categories: tuple[str, ...] = ()
+    sources: int | None = None
+    ambiguous: int = 0
+    rate_hz: int = 22_050
+    snr_db: float = 30.0
+    overlap_s: float = 0.0
+    drift: float = 0.0
+    max_frames: int | None = None
+    semantic: bool = False
+    colour: Literal["png", "jpg"] = "png"
+    workers: int = 2
+    walk: WalkSettings = WalkSettings()
+
+    def __post_init__(self) -> None:
+        width, height = self.size
+        for wrong, sentence in (
+            (not (16 <= width <= 4096 and 16 <= height <= 4096), f"Pictures of {width}x{height} cannot be recorded; "
+             "choose from 16x16 to 4096x4096."),
+            (not 10.0 <= self.fov_deg <= 150.0, f"A field of view of {self.fov_deg:g} degrees is not possible; choose "
+             "from 10 to 150."),
+            (not 0.1 <= self.fps <= 240.0, f"{self.fps:g} frames a second cannot be recorded; choose from 0.1 to 240."),
+            (self.sources is not None and self.sources < 0, f"There cannot be {self.sources} sounds; choose 0 or more."),
+            (self.ambiguous < 0, f"{self.ambiguous} kinds cannot sound twice; choose 0 or more."),
+            (self.max_frames is not None and self.max_frames < 2, "A recording needs at least 2 frames."),
+            (not 0.0 <= self.drift <= 0.5, f"A drift of {self.drift:g} m a metre is not possible; choose from 0 to 0.5."),
+        ):  # fmt: skip
+            if wrong:
+                raise RecordingError(sentence)
+
+    @property
+    def camera(self) -> Pinhole:
+        """The camera of colour and depth."""
+        width, height = self.size
+        focal = width / 2 / np.tan(np.deg2rad(self.fov_deg) / 2)
+        return Pinhole(focal, focal, width / 2, height / 2, width, height)
+
+
+@dataclass(frozen=True, slots=True)
+class SceneRecording:
+    """What was recorded.
+
+    Attributes:
+        path: the folder.
+        frames: how many.
+        duration_s: length of the walk.
+        heard: the sounds in it.
+        left_out: sounds that were to be heard, but had no room in the walk.
+    """
+
+    path: Path
+    frames: int
+    duration_s: float
+    heard: tuple[Sounding, ...]
+    left_out: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Trip:
+    """Where the camera is when."""
+
+    stamps_s: Float[np.ndarray, " n"]
+    world_from_camera: Float[np.ndarray, "n 4 4"]
+    duration_s: float
+
+
+def record_scene(scene: Scene, out: Path, settings: RecordSettings | None = None, seed: int = 0) -> SceneRecording:
+    """Drive through a scene and write a recording in our folder format, with its truth beside it.
+
+    The same scene, settings and seed give the same bytes, on however many processes.
+
+    Args:
+        scene: the building.
+        out: the folder to make; it must be empty.
+        settings: the camera, its faults, and how sounds are heard.
+        seed: of the walk, the sounds and the faults.
+
+    Raises:
+        RecordingError: the folder is not empty, or nothing in the scene can be driven through.
+        AudioError: the folder of clips cannot be used.
+    """
+    settings = settings or RecordSettings()
+    if (out / DESCRIPTION).exists():  # told before the work is done, not after
+        raise RecordingError(f"{out} holds a recording already; choose another folder or remove it.")
+    for_walk, for_sounds, for_track, for_frames = np.random.default_rng(seed).spawn(4)
+    trip = _trip(scene, settings, for_walk)
+    soundings, left_out = _soundings(scene, settings, trip, for_sounds)
+    clear_unfinished(out)
+    origin = f"avlmaps record of {scene.name}, seed {seed}"
+    rig = Rig(settings.camera, settings.camera)
+    with RecordingWriter(out, rig, up_in_world=_UP, colour=settings.colour, origin=origin) as writer:
+        if (track := _track(scene, settings, trip, soundings, for_track)) is not None:
+            writer.set_audio(track)
+        _write_frames(scene, settings, trip, writer, for_frames)
+        write_truth(out, scene, soundings, {"scene": scene.name, "seed": seed, "settings": _plain(settings)})
+    return SceneRecording(out, len(trip.stamps_s), trip.duration_s, tuple(soundings), left_out)
+
+
+def _plain(settings: RecordSettings) -> dict[str, Any]:
+    """Return the settings as JSON can hold them; how many processes drew is no part of what was made."""
+    plain = asdict(replace(settings, sounds=None, workers=1))
+    return {**plain, "sounds": None if settings.sounds is None else settings.sounds.name}
+
+
+def _trip(scene: Scene, settings: RecordSettings, rng: np.random.Generator) -> _Trip:
+    try:
+        poses = walk_through(scene, rng, replace(settings.walk, rate_hz=settings.fps, max_frames=None))
+    except ValueError as error:
+        raise RecordingError(f"{scene.name} cannot be driven through: {error}.") from None
+    stamps_s = np.arange(len(poses)) / settings.fps
+    duration_s = len(poses) / settings.fps
+    if settings.max_frames is not None and len(poses) > settings.max_frames:
+        keep = np.linspace(0, len(poses) - 1, settings.max_frames).round().astype(int)
+        return _Trip(stamps_s[keep], poses[keep], duration_s)
+    return _Trip(stamps_s, poses, duration_s)
+
+
+def _soundings(
+    scene: Scene, settings: RecordSettings, trip: _Trip, rng: np.random.Generator
+) -> tuple[list[Sounding], int]:
+    """Place sounds and let each be heard as the robot comes by."""
+    if settings.hearing == "none":
+        return [], 0
+    bank = Synthesised() if settings.sounds is None else Recorded(settings.sounds, settings.rate_hz)
+    count = max(1, round(trip.duration_s / _SECONDS_A_SOUND)) if settings.sources is None else settings.sources
+    robot = trip.world_from_camera[:, :3, 3]
+    sources = place_sources(scene, rng, count, settings.categories, settings.ambiguous, bank=bank, walk=robot)
+    rule = ScheduleRule(pause_s=-settings.overlap_s if settings.overlap_s > 0.0 else ScheduleRule().pause_s)
+    soundings = schedule(scene, sources, trip.stamps_s, robot, rule)
+    left_out = len(sources) - len(soundings)
+    if left_out:
+        say(f"note: {left_out} of {len(sources)} sounds are not heard: the walk has no room for them.")
+    return soundings, left_out
+
+
+def _track(
+    scene: Scene, settings: RecordSettings, trip: _Trip, soundings: list[Sounding], rng: np.random.Generator
+) -> Sound | None:
+    if settings.hearing == "none":
+        return None
+    if settings.hearing == "overlay":
+        from avlmaps.sim.hearing import overlay
+
+        return overlay(soundings, trip.duration_s, rng, settings.rate_hz, snr_db=settings.snr_db)
+    from avlmaps.sim.hearing.acoustic import AcousticSettings, acoustic
+
+    wanted = AcousticSettings(rate_hz=settings.rate_hz, snr_db=settings.snr_db)
+    robot = trip.world_from_camera[:, :3, 3]
+    return acoustic(scene, soundings, trip.stamps_s, robot, trip.duration_s, rng, wanted)
+
+
+def _write_frames(
+    scene: Scene, settings: RecordSettings, trip: _Trip, writer: RecordingWriter, rng: np.random.Generator
+) -> None:
+    """Draw every frame, in several processes where it pays, and hand the finished files to the writer."""
+    seed = int(rng.integers(1 << 62))
+    count = len(trip.stamps_s)
+    names = [f"{index:06d}" for index in range(count)]
+    odometry = trip.world_from_camera
+    if settings.drift > 0.0:
+        from avlmaps.sim.sensor import drifted
+
+        odometry = drifted(trip.world_from_camera, settings.drift, rng)
+        write_true_poses(writer.path, trip.stamps_s, trip.world_from_camera)
+    if settings.semantic:
+        (writer.path / SEMANTIC).mkdir(exist_ok=True)
+    with TemporaryDirectory(prefix=".recording-", dir=writer.path.parent) as scratch:
+        artist = _Artist(Renderer(scene), settings, Path(scratch), seed)
+        jobs = [(index, names[index], trip.world_from_camera[index]) for index in range(count)]
+        for index in progress(_drawn(artist, jobs, settings.workers), "recording", total=count):
+            files = artist.files(names[index])
+            writer.add_files(names[index], float(trip.stamps_s[index]), odometry[index], files[0], files[1])
+            for file in files[:2]:
+                file.unlink()
+            if settings.semantic:
+                files[2].replace(writer.path / SEMANTIC / files[2].name)
+
+
+_Job = tuple[int, str, Float[np.ndarray, "4 4"]]
+
+
+class _Artist:
+    """Draws frames into files; every frame has its own random numbers, whoever draws it."""
+
+    def __init__(self, renderer: Renderer, settings: RecordSettings, folder: Path, seed: int) -> None:
+        self._renderer, self._settings, self._folder, self._seed = renderer, settings, folder, seed
+        self._sensor = None
+        if settings.sensor != "clean":
+            from avlmaps.sim.sensor import Sensor
+
+            self._sensor = Sensor.named(settings.sensor)
+
+    def files(self, name: str) -> tuple[Path, Path, Path]:
+        """Return where a frame's colour, depth and instances are."""
+        return (
+            self._folder / f"{name}.{self._settings.colour}",
+            self._folder / f"{name}.depth.png",
+            self._folder / f"{name}.png" if self._settings.colour == "jpg" else self._folder / f"{name}.semantic.png",
+        )
+
+    def draw(self, job: _Job) -> int:
+        """Draw one frame and return its index."""
+        index, name, pose = job
+        camera = self._settings.camera
+        view = self._renderer.render(camera, pose)
+        rgb, depth_m = view.rgb, view.depth_m
+        if self._sensor is not None:
+            rgb, depth_m = self._sensor.spoil(view, camera, np.random.default_rng([self._seed, index]))
+        colour, depth, semantic = self.files(name)
+        _write_png(colour, rgb[..., ::-1])
+        _write_png(depth, _millimetres(depth_m))
+        if self._settings.semantic:
+            _write_png(semantic, (view.instance + 1).astype(np.uint16))
+        return index
+
+
+def _millimetres(depth_m: Float[np.ndarray, "h w"]) -> np.ndarray:
+    raw = np.rint(depth_m.astype(np.float64) * 1000.0)
+    return np.where((raw > 0) & (raw <= 65534), raw, 0).astype(np.uint16)
+
+
+def _write_png(path: Path, picture: UInt8[np.ndarray, "..."] | np.ndarray) -> None:
+    import cv2
+
+    options = [cv2.IMWRITE_PNG_COMPRESSION, 1] if path.suffix == ".png" else [cv2.IMWRITE_JPEG_QUALITY, 95]
+    done, content = cv2.imencode(path.suffix, np.ascontiguousarray(picture), options)
+    if not done:
+        raise RecordingError(f"{path} could not be encoded; its picture is {picture.dtype} of {picture.shape}.")
+    path.write_bytes(content.tobytes())
+
+
+_artist: list[_Artist] = []
+
+
+def _take_up(artist: _Artist) -> None:
+    import cv2
+
+    cv2.setNumThreads(1)
+    _artist[:] = [artist]
+
+
+def _draw(job: _Job) -> int:
+    return _artist[0].draw(job)
+
+
+def _drawn(artist: _Artist, jobs: list[_Job], workers: int) -> Iterator[int]:
+    """Yield the index of each frame when its files are there, in order."""
+    if workers < 2 or len(jobs) < _FEWEST_FOR_PROCESSES:
+        yield from map(artist.draw, jobs)
+        return
+    with get_context("spawn").Pool(workers, _take_up, (artist,)) as pool:
+        yield from pool.imap(_draw, jobs, chunksize=4)
