@@ -55,9 +55,10 @@ def concrete(rng: np.random.Generator) -> Texture:
     value *= 1.0 - float(rng.uniform(0.0, 0.2)) * worn(rng, size, 0.1)
     if rng.random() < 0.4:
         every = size // int(rng.choice((1, 2, 4)))
-        value[::every] *= 0.75
+        first, second = rng.integers(0, every, 2).tolist()
+        value[first::every] *= 0.75
         if rng.random() < 0.5:
-            value[:, ::every] *= 0.75
+            value[:, second::every] *= 0.75
     edge = float(rng.uniform(1.2, 2.5))
     return grey(np.maximum(value, 0.2), (edge, edge), 0.01 * cloud(rng, size, 2.0))
 
@@ -75,8 +76,10 @@ def plaster(rng: np.random.Generator) -> Texture:
         value += 0.06 * (chips - np.roll(chips, (1, 1), (0, 1)))
     if rng.random() < 0.45:
         value *= 1.0 - float(rng.uniform(0.03, 0.12)) * worn(rng, size, float(rng.uniform(0.02, 0.1)))
-    if rng.random() < 0.5:
-        value *= 1.0 - 0.35 * speckles(rng, size, int(rng.integers(3, 30)), float(rng.uniform(0.7, 2.0)))
+    value += float(rng.uniform(0.003, 0.014)) * cloud(rng, size, 0.8, low=10.0, high=70.0)  # filled and sanded places
+    if rng.random() < 0.7:
+        dents = speckles(rng, size, int(rng.integers(5, 90)), float(rng.uniform(0.7, 2.0)))
+        value *= 1.0 - float(rng.uniform(0.05, 0.4)) * (dents - 0.5 * np.roll(dents, (2, 2), (0, 1)))
     if rng.random() < 0.2:
         gate = np.clip(cloud(rng, size, 2.0) - 0.5, 0.0, 1.0)
         value *= 1.0 - 0.3 * gate * np.exp(-((cloud(rng, size, 1.6) / 0.03) ** 2))
@@ -97,8 +100,8 @@ def _laid(
         offset: shift of every other row, as a fraction of a tile.
         joint_px: width of the joints.
     """
-    x, y = grid(size)
-    row = (y * rows).astype(np.int64)
+    x, y = ((place + float(rng.random())) % 1.0 for place in grid(size))  # joints lie anywhere on the picture
+    row = np.minimum((y * rows).astype(np.int64), rows - 1)
     shift = offset * (row % 2) if rows % 2 == 0 else np.zeros_like(row)
     u, v = x * columns + shift, y * rows
     wobble = 0.15 * cloud(rng, size, 1.2)
@@ -140,8 +143,8 @@ def patterned_tile(rng: np.random.Generator) -> Texture:
         ornament = repeat_pattern(rng, size // 4, harmony(rng, 4))
         half = np.concatenate([ornament, ornament[:, ::-1]], axis=1)
         rgb = np.tile(np.concatenate([half, half[::-1]], axis=0), (2, 2, 1))
-        number, face = _laid(rng, size, 4, 4, 0.0, 1.5)
-        size_m = (0.8, 0.8)
+        joint = np.arange(size) % (size // 4) < 2
+        face, size_m = 1.0 - (joint[:, None] | joint), (0.8, 0.8)
     else:
         shades = (harmony if sort == 1 else earthy)(rng, int(rng.integers(2, 6)))
         rgb = shades[rng.integers(0, len(shades), columns * rows)][number]
@@ -172,7 +175,7 @@ def wallpaper(rng: np.random.Generator) -> Texture:
     size = 256
     texture = 1.0 + float(rng.uniform(0.005, 0.02)) * cloud(rng, size, 0.3, stretch=float(rng.choice((0.2, 1.0, 5.0))))
     pale = rng.uniform(0.55, 0.97, 3) * 0.4 + float(rng.uniform(0.3, 0.58))
-    contrast = float(rng.choice((0.0, 0.05, 0.1, 0.2)))
+    contrast = float(rng.choice((0.03, 0.07, 0.12, 0.22)))
     if rng.random() < 0.2:
         rgb = repeat_pattern(rng, size, harmony(rng, 4) * 0.5 + 0.45)
     else:
@@ -188,7 +191,7 @@ def plain_wallpaper(rng: np.random.Generator) -> Texture:
     size = 256
     value = 1.0 + float(rng.uniform(0.005, 0.03)) * cloud(rng, size, 0.3, stretch=float(rng.choice((0.1, 1.0, 10.0))))
     if rng.random() < 0.65:
-        value *= 1.0 - float(rng.uniform(0.02, 0.12)) * levels(rng, size) / 3.0
+        value *= 1.0 - float(rng.uniform(0.03, 0.16)) * levels(rng, size) / 3.0
     value *= 1.0 - float(rng.uniform(0.0, 0.1)) * worn(rng, size, 0.08)
     edge = float(rng.choice((0.53, 1.06, 1.06, 1.6)))
     return grey(value + 0.008 * cloud(rng, size, 2.0), (edge, edge), 0.005 * cloud(rng, size, 2.0))

@@ -41,9 +41,9 @@ def wood(rng: np.random.Generator) -> Texture:
     value = 1.0 + float(rng.uniform(0.02, 0.11)) * grain + 0.03 * cloud(rng, size, 1.8)
     boards = int(rng.choice((0, 0, 0, 2, 3, 4)))
     if boards:
-        board = np.arange(size) * boards // size
+        board = (np.arange(size) + int(rng.integers(size))) % size * boards // size
         value = value * rng.uniform(0.82, 1.08, boards)[board][:, None]
-        value[np.flatnonzero(np.diff(board, prepend=-1))] *= float(rng.uniform(0.45, 0.8))
+        value[np.flatnonzero(board != np.roll(board, 1))] *= float(rng.uniform(0.45, 0.8))
     along, across = float(rng.uniform(0.5, 1.0)), float(rng.uniform(0.25, 0.6))
     hue = 0.012 * cloud(rng, size, 1.8)
     if rng.random() < 0.5:
@@ -88,7 +88,8 @@ def parquet(rng: np.random.Generator) -> Texture:
     """Draw a wooden floor: planks, strips, herringbone or basket blocks."""
     size = 256
     lay = (_strips, _strips, _strips, _herringbone, _blocks)[int(rng.integers(5))]
-    plank, standing = lay(rng, size)
+    shift = rng.integers(0, size, 2).tolist()
+    plank, standing = (np.roll(plan, shift, (0, 1)) for plan in lay(rng, size))
     grain = _grain(rng, size)
     moved = np.roll(grain, int(rng.integers(size)), axis=1)
     field = np.where(standing > 0, moved.T, np.where(plank % 2 == 0, grain, moved[::-1]))

@@ -95,7 +95,8 @@ def curtain(rng: np.random.Generator) -> Texture:
     size = 128
     folds = softened(cloud(rng, size, 0.8, high=14.0)[:1].repeat(size, axis=0), 1.5)
     sway = 0.3 * cloud(rng, size, 1.8, stretch=0.1)
-    value = _weave(rng, size) * (1.0 + float(rng.uniform(0.04, 0.14)) * (folds + sway))
+    weave = 1.0 + 0.35 * (_weave(rng, size) - 1.0)  # finer than the picture can show
+    value = weave * (1.0 + float(rng.uniform(0.04, 0.14)) * (folds + sway))
     if rng.random() < 0.3:
         x, _ = grid(size)
         value = value * (1.0 - 0.2 * (np.sin(2 * np.pi * x * int(rng.integers(2, 9))) > float(rng.uniform(0.0, 0.9))))
