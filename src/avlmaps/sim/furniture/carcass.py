@@ -14,6 +14,9 @@ Panel = Literal["flat", "framed", "raised", "glass", "mirror", "slatted"]
 Grip = Literal["bar", "knob", "cup", "bow", "groove", "none"]
 
 
+_SHADOW = Material((0.05, 0.045, 0.04), gloss=0.0)
+
+
 @dataclass(frozen=True, slots=True)
 class Room:
     """A box in the air that a carcass or its inside fills, metres.
@@ -59,7 +62,7 @@ def front_style(rng: np.random.Generator, look: Material, panels: tuple[Panel, .
     grip: Grip = pick(rng, ("bar", "knob", "knob", "cup", "bow", "groove", "none"))
     fronts = look if chance(rng, 0.7) else board_look(rng)
     metal = material(pick(rng, ("metal", "metal", "black", "wood")), rng)
-    return FrontStyle(panel, grip, draw(rng, 0.003, 0.008), draw(rng, 0.015, 0.025), fronts, metal)
+    return FrontStyle(panel, grip, draw(rng, 0.003, 0.01), draw(rng, 0.015, 0.025), fronts, metal)
 
 
 def carcass(room: Room, board: float, look: Material, back: Material | None = None) -> Mesh:
@@ -194,6 +197,12 @@ def split(low: float, high: float, shares: list[float]) -> list[tuple[float, flo
     return [(float(edge[i]), float(edge[i + 1])) for i in range(len(shares))]
 
 
+def _gap(x: float, low: tuple[float, float], high: tuple[float, float]) -> Mesh:
+    """Return the dark that one sees in the gaps round a closed front, just before x."""
+    (b, c), (e, f) = low, high
+    return sheet((x + 0.001, b, c), (0.0, e - b, 0.0), (0.0, 0.0, f - c), _SHADOW)
+
+
 def doors(
     rng: np.random.Generator, style: FrontStyle, room: Room, number: int, ajar: float = 0.1, panel: Panel | None = None
 ) -> list[Mesh]:  # fmt: skip
@@ -205,6 +214,8 @@ def doors(
         hinge = -1 if index % 2 == 0 and index < number - 1 else 1
         opened = draw(rng, 0.2, 1.7) if chance(rng, ajar) else 0.0
         parts.append(door(rng, style, leaf, hinge, opened, panel))
+        if not opened and (panel or style.panel) != "glass":
+            parts.append(_gap(d, (y0, c), (y1, f)))
     return parts
 
 
@@ -215,7 +226,10 @@ def drawers(rng: np.random.Generator, style: FrontStyle, room: Room, shares: lis
     for z0, z1 in split(c, f, shares):
         low = (d, b + style.gap / 2, z0 + style.gap / 2)
         front = Room(low, (d + style.thick, e - style.gap / 2, z1 - style.gap / 2))
-        parts.append(drawer(rng, style, front, draw(rng, 0.05, 0.25) if chance(rng, ajar) else 0.0))
+        pulled = draw(rng, 0.05, 0.25) if chance(rng, ajar) else 0.0
+        parts.append(drawer(rng, style, front, pulled))
+        if not pulled:
+            parts.append(_gap(d, (b, z0), (e, z1)))
     return parts
 
 
