@@ -28,3 +28,7 @@ class BackendError(AvlmapsError):
 
 class QueryError(AvlmapsError):
     """A question cannot be asked of this map: an empty phrase, an unreadable picture, a missing modality."""
+
+
+class SceneError(AvlmapsError):
+    """A scene cannot be read from its files: one is missing, truncated, or not what its layout says."""
