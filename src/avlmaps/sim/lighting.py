@@ -25,7 +25,7 @@ _SEND_CELLS = 5  # solid cells along a side of a coarse cell, in which sent ligh
 _REACH_M = 9.0
 _BOUNCE = 1.7  # light that has bounced more than once, as a factor of that which has once
 _GLOW = 2.5  # linear radiance of a surface of emission 1
-_SKY = (1.1, 1.3, 1.6)  # linear, what shines in where there is no wall
+_SKY = (1.15, 1.25, 1.4)  # linear, what shines in where there is no wall
 _DEFAULT_LAMP_M = 3.0  # lamps put by default stand so far apart
 _STRUCTURE = frozenset({"wall", "floor", "ceiling", "column", "stairs", "railing"})
 

@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Float32, Int, Int32, UInt8
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.sim import raster_kernels, shade_kernels
-from avlmaps.sim.atlas import atlas_of, picture_maps
+from avlmaps.sim.atlas import Atlas, atlas_of, picture_maps
 from avlmaps.sim.lighting import LightMap, light_map
 from avlmaps.sim.mesh import Mesh
 from avlmaps.sim.scene import NOTHING, Scene
@@ -38,12 +38,15 @@ class View:
         depth_m: z-depth at the pixels' centres, metres; 0 where nothing is.
         instance: index into the scene's ``objects``; -1 where nothing is.
         category: index into the scene's ``categories``; -1 where nothing is.
+        strength: how much of the light that a depth sensor sends out comes back, in 1/255 of what a matt white wall
+            does that faces it at the same distance: less from slanted, dark, glossy and clear surfaces.
     """
 
     rgb: UInt8[np.ndarray, "h w 3"]
     depth_m: Float32[np.ndarray, "h w"]
     instance: Int32[np.ndarray, "h w"]
     category: Int32[np.ndarray, "h w"]
+    strength: UInt8[np.ndarray, "h w"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,6 +88,14 @@ def _curve(shoulder: bool) -> UInt8[np.ndarray, " n"]:
     return np.clip(np.round(255.0 * np.sqrt(linear)), 0, 255).astype(np.uint8)
 
 
+def _returns(mesh: Mesh, atlas: Atlas) -> Float32[np.ndarray, " m"]:
+    """Return the share of a depth sensor's light that each material scatters back."""
+    gloss = np.array([m.gloss for m in mesh.materials], np.float32)
+    opacity = np.array([m.opacity for m in mesh.materials], np.float32)
+    brightness = np.sqrt(atlas.mean.max(axis=1, initial=0.0))  # many dark dyes are bright in the near infrared
+    return (opacity**2 * (1.0 - gloss) ** 1.5 * (0.05 + 0.95 * brightness)).astype(np.float32)
+
+
 class Renderer:
     """Draws views of one scene."""
 
@@ -111,6 +122,7 @@ class Renderer:
         glow = (_GLOW if lit else 0.0) * np.array([m.emission for m in mesh.materials], np.float32)
         self._colours = (atlas.colour, glow, atlas.texel, atlas.table)
         self._opacity = np.array([m.opacity for m in mesh.materials], np.float32)
+        self._returns = _returns(mesh, atlas)
         self._lit = lit and len(order) > 0
         self._lights = _tables(light_map(scene, atlas.mean) if self._lit else None, order)
         self._category = np.append(scene.category_of_instance, NOTHING).astype(np.int32)
@@ -124,11 +136,12 @@ class Renderer:
         lens = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
         front, behind = self._drawn(rotation, origin, lens, width, height)
         eye = (lens.astype(np.float32), rotation.astype(np.float32), origin.astype(np.float32), width)
-        colour = self._coloured(*front, eye)
+        colour, side = self._coloured(*front, eye)
         if self._groups.clear.any():
             sky = np.square(np.array(SKY, np.float32) / 255.0)
+            hidden = behind[0], np.where(behind[1] == front[1], NOTHING, behind[1])  # what needs no second look
             shade_kernels.blend_fragments(front[1], behind[1], self._opacity, self._material, sky,
-                                          self._coloured(*behind, eye), colour)  # fmt: skip
+                                          self._coloured(*hidden, eye)[0], colour)  # fmt: skip
         gain = 1.0
         if self._lit:
             mean = shade_kernels.mean_log_light(front[1], colour, _METER_STEP)
@@ -136,12 +149,14 @@ class Renderer:
         rgb = np.empty((height, width, 3), np.uint8)
         depth_m = np.empty((height, width), np.float32)
         instance = np.empty((height, width), np.int32)
-        shade_kernels.finish(*front, self._instance, colour, np.float32(gain), self._curve, np.array(SKY, np.uint8),
-                             rgb.reshape(-1, 3), depth_m.reshape(-1), instance.reshape(-1))  # fmt: skip
-        return View(rgb, depth_m, instance, self._category[instance])
+        strength = np.empty((height, width), np.uint8)
+        shade_kernels.finish(*front, side, self._instance, self._material, self._returns, colour, np.float32(gain), self._curve, np.array(SKY, np.uint8),
+                             rgb.reshape(-1, 3), depth_m.reshape(-1), instance.reshape(-1),
+                             strength.reshape(-1))  # fmt: skip
+        return View(rgb, depth_m, instance, self._category[instance], strength)
 
-    def _coloured(self, inverse: np.ndarray, shown: np.ndarray, eye: tuple) -> Float32[np.ndarray, "n 3"]:
-        """Return the linear light that comes from what each pixel shows."""
+    def _coloured(self, inverse: np.ndarray, shown: np.ndarray, eye: tuple) -> tuple[np.ndarray, np.ndarray]:
+        """Return the linear light that comes from what each pixel shows, and how far that faces the camera."""
         place, side = np.empty((len(shown), 3), np.float32), np.empty(len(shown), np.float32)
         colour = np.ones((len(shown), 3), np.float32)
         shade_kernels.place_fragments(inverse, shown, *eye, self._normal, place, side)
@@ -149,7 +164,7 @@ class Renderer:
             shade_kernels.light_fragments(shown, place, side, self._fraction, *self._lights, colour)
         shade_kernels.paint_fragments(inverse, shown, place, side, np.float32(1 / eye[0][0]), self._picture,
                                       self._density, self._material, *self._colours, colour)  # fmt: skip
-        return colour
+        return colour, side
 
     def _drawn(
         self, rotation: np.ndarray, origin: np.ndarray, lens: np.ndarray, width: int, height: int

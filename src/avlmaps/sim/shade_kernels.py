@@ -175,16 +175,19 @@ def mean_log_light(shown, colour, stride):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def finish(inverse, shown, owner, colour, gain, curve, sky, rgb, depth, instance):  # pragma: no cover - compiled
-    """Write the images: ``rgb`` (n, 3), ``depth`` (n,) and ``instance`` (n,)."""
+def finish(
+    inverse, shown, side, owner, material, returns, colour, gain, curve, sky, rgb, depth, instance, strength
+):  # pragma: no cover - compiled
+    """Write the images: ``rgb`` (n, 3), ``depth``, ``instance`` and ``strength`` (n,)."""
     top = np.float32(LEVELS / 2)
     for at in range(len(shown)):
         t = shown[at]
         if t < 0:
-            depth[at], instance[at] = _ZERO, -1
+            depth[at], instance[at], strength[at] = _ZERO, -1, 0
             for k in range(3):
                 rgb[at, k] = sky[k]
             continue
         depth[at], instance[at] = _ONE / inverse[at], owner[t]
+        strength[at] = np.uint8(min(np.float32(255.0) * abs(side[at]) * returns[material[t]], np.float32(255.0)))
         for k in range(3):
             rgb[at, k] = curve[min(LEVELS - 1, int(np.sqrt(colour[at, k] * gain) * top))]
