@@ -68,18 +68,18 @@ def plaster(rng: np.random.Generator) -> Texture:
     size, sort = 256, int(rng.integers(4))
     value = 1.0 + float(rng.uniform(0.004, 0.02)) * cloud(rng, size, 1.9) + 0.006 * cloud(rng, size, 0.2)
     if sort == 0:
-        value += float(rng.uniform(0.01, 0.035)) * cloud(rng, size, 0.4, low=20.0)
+        value += float(rng.uniform(0.015, 0.06)) * cloud(rng, size, 0.6, low=20.0)
     elif sort == 1:
         value += 0.02 * np.abs(cloud(rng, size, 0.9, stretch=float(rng.uniform(0.3, 3.0)), low=5.0))
     elif sort == 2:
         chips = speckles(rng, size, int(rng.integers(800, 2500)), 0.9)
-        value += 0.06 * (chips - np.roll(chips, (1, 1), (0, 1)))
+        value += float(rng.uniform(0.06, 0.16)) * (chips - np.roll(chips, (1, 1), (0, 1)))
     if rng.random() < 0.45:
         value *= 1.0 - float(rng.uniform(0.03, 0.12)) * worn(rng, size, float(rng.uniform(0.02, 0.1)))
     value += float(rng.uniform(0.003, 0.014)) * cloud(rng, size, 0.8, low=10.0, high=70.0)  # filled and sanded places
     if rng.random() < 0.7:
         dents = speckles(rng, size, int(rng.integers(5, 90)), float(rng.uniform(0.7, 2.0)))
-        value *= 1.0 - float(rng.uniform(0.05, 0.4)) * (dents - 0.5 * np.roll(dents, (2, 2), (0, 1)))
+        value *= 1.0 - float(rng.uniform(0.1, 0.6)) * (dents - 0.5 * np.roll(dents, (2, 2), (0, 1)))
     if rng.random() < 0.2:
         gate = np.clip(cloud(rng, size, 2.0) - 0.5, 0.0, 1.0)
         value *= 1.0 - 0.3 * gate * np.exp(-((cloud(rng, size, 1.6) / 0.03) ** 2))
@@ -175,7 +175,7 @@ def wallpaper(rng: np.random.Generator) -> Texture:
     size = 256
     texture = 1.0 + float(rng.uniform(0.005, 0.02)) * cloud(rng, size, 0.3, stretch=float(rng.choice((0.2, 1.0, 5.0))))
     pale = rng.uniform(0.55, 0.97, 3) * 0.4 + float(rng.uniform(0.3, 0.58))
-    contrast = float(rng.choice((0.03, 0.07, 0.12, 0.22)))
+    contrast = float(rng.choice((0.05, 0.12, 0.25, 0.45)))
     if rng.random() < 0.2:
         rgb = repeat_pattern(rng, size, harmony(rng, 4) * 0.5 + 0.45)
     else:
@@ -191,7 +191,7 @@ def plain_wallpaper(rng: np.random.Generator) -> Texture:
     size = 256
     value = 1.0 + float(rng.uniform(0.005, 0.03)) * cloud(rng, size, 0.3, stretch=float(rng.choice((0.1, 1.0, 10.0))))
     if rng.random() < 0.65:
-        value *= 1.0 - float(rng.uniform(0.03, 0.16)) * levels(rng, size) / 3.0
+        value *= 1.0 - float(rng.uniform(0.04, 0.3)) * levels(rng, size) / 3.0
     value *= 1.0 - float(rng.uniform(0.0, 0.1)) * worn(rng, size, 0.08)
     edge = float(rng.choice((0.53, 1.06, 1.06, 1.6)))
     return grey(value + 0.008 * cloud(rng, size, 2.0), (edge, edge), 0.005 * cloud(rng, size, 2.0))

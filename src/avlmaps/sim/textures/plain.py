@@ -10,11 +10,11 @@ def painted(rng: np.random.Generator) -> Texture:
     """Draw paint: brush or roller marks, uneven cover, sometimes scuffs and dirt."""
     size = 128
     roller = cloud(rng, size, 0.6, stretch=float(rng.choice((0.25, 1.0, 4.0))), low=6.0)
-    value = 1.0 + float(rng.uniform(0.004, 0.018)) * roller + float(rng.uniform(0.0, 0.02)) * cloud(rng, size, 2.0)
+    value = 1.0 + float(rng.uniform(0.005, 0.025)) * roller + float(rng.uniform(0.0, 0.02)) * cloud(rng, size, 2.0)
     if rng.random() < 0.35:
         value = value * (1.0 - float(rng.uniform(0.05, 0.25)) * worn(rng, size, float(rng.uniform(0.02, 0.12))))
     if rng.random() < 0.3:
-        value = value * (1.0 - 0.3 * speckles(rng, size, int(rng.integers(5, 40)), float(rng.uniform(0.7, 1.6))))
+        value = value * (1.0 - 0.5 * speckles(rng, size, int(rng.integers(5, 60)), float(rng.uniform(0.7, 1.6))))
     edge = float(rng.uniform(0.5, 1.6))
     return grey(value, (edge, edge), 0.006 * cloud(rng, size, 2.0))
 

@@ -38,7 +38,7 @@ def wood(rng: np.random.Generator) -> Texture:
     grain = _grain(rng, size)
     if rng.random() < 0.3:
         grain = _knotted(rng, grain)
-    value = 1.0 + float(rng.uniform(0.02, 0.11)) * grain + 0.03 * cloud(rng, size, 1.8)
+    value = 1.0 + float(rng.uniform(0.03, 0.16)) * grain + 0.03 * cloud(rng, size, 1.8)
     boards = int(rng.choice((0, 0, 0, 2, 3, 4)))
     if boards:
         board = (np.arange(size) + int(rng.integers(size))) % size * boards // size
@@ -94,8 +94,8 @@ def parquet(rng: np.random.Generator) -> Texture:
     moved = np.roll(grain, int(rng.integers(size)), axis=1)
     field = np.where(standing > 0, moved.T, np.where(plank % 2 == 0, grain, moved[::-1]))
     number = int(plank.max()) + 1
-    tone, warmth = rng.normal(1.0, rng.uniform(0.02, 0.1), number), rng.normal(0.0, 0.025, number)
-    value = tone[plank] * (1.0 + float(rng.uniform(0.02, 0.08)) * field)
+    tone, warmth = rng.normal(1.0, rng.uniform(0.03, 0.13), number), rng.normal(0.0, 0.025, number)
+    value = tone[plank] * (1.0 + float(rng.uniform(0.03, 0.13)) * field)
     joint = (plank != np.roll(plank, 1, axis=0)) | (plank != np.roll(plank, 1, axis=1))
     value = np.where(joint, value * float(rng.uniform(0.5, 0.85)), value)
     edge = float(rng.uniform(1.3, 2.4)) if lay is _strips else float(rng.uniform(0.9, 1.6))
