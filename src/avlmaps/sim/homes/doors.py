@@ -27,7 +27,9 @@ def _price(a: str, b: str) -> float:
     return 25.0 if "bathroom" in (a, b) or "toilet" in (a, b) else 9.0
 
 
-def joined_up(rng: np.random.Generator, rooms: list[Room], walls: list[Wall], open_plan: float) -> list[Wall] | None:
+def joined_up(
+    rng: np.random.Generator, rooms: list[Room], walls: list[Wall], open_plan: float, patience: float = np.inf
+) -> list[Wall] | None:
     """Put doors into the walls so that every room can be reached; None where that cannot be.
 
     Args:
@@ -35,9 +37,10 @@ def joined_up(rng: np.random.Generator, rooms: list[Room], walls: list[Wall], op
         rooms: of one floor.
         walls: between them, without holes.
         open_plan: the probability that rooms of an open plan have no wall between them.
+        patience: how dear the way to a room may be (see `_price`).
     """
     start = min(range(len(rooms)), key=lambda i: (rooms[i].kind not in ("entrance hall", *HUBS), i))
-    wanted = _tree(rooms, walls, start)
+    wanted = _tree(rooms, walls, start, patience)
     if wanted is None:
         return None
     out = list(walls)
@@ -56,7 +59,7 @@ def joined_up(rng: np.random.Generator, rooms: list[Room], walls: list[Wall], op
     return out
 
 
-def _tree(rooms: list[Room], walls: list[Wall], start: int) -> set[int] | None:
+def _tree(rooms: list[Room], walls: list[Wall], start: int, patience: float) -> set[int] | None:
     """Return the walls that need a door so that the way from the start to each room costs least."""
     best = {start: 0.0}
     through: dict[int, int] = {}
@@ -75,7 +78,7 @@ def _tree(rooms: list[Room], walls: list[Wall], start: int) -> set[int] | None:
             if price < best.get(other, np.inf):
                 best[other], through[other] = price, index
                 heapq.heappush(queue, (price, other))
-    return set(through.values()) if len(best) == len(rooms) else None
+    return set(through.values()) if len(best) == len(rooms) and max(best.values()) <= patience else None
 
 
 def _opened(rng: np.random.Generator, wall: Wall, rooms: list[Room]) -> Wall:
@@ -136,6 +139,8 @@ def _with_windows(rng: np.random.Generator, wall: Wall, room: Room, style: tuple
         return wall
     if room.kind in ("bathroom", "toilet", "laundry room"):
         sizes = (0.5, 0.9, draw(rng, 1.1, 1.5))
+    elif room.kind in ("kitchen", "kitchenette"):
+        sizes = (0.7, 1.8, draw(rng, 1.07, 1.2))  # over the counters
     elif chance(rng, low_sill * 0.4):
         sizes = (1.2, 3.2, pick(rng, (0.03, 0.25, 0.45)))
     else:

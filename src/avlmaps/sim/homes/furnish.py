@@ -9,7 +9,7 @@ from jaxtyping import Float
 from avlmaps.sim.furniture import Families, Piece, categories, make
 from avlmaps.sim.furniture.joinery import draw
 from avlmaps.sim.homes.placing import Footprint, Ground, Place, Side
-from avlmaps.sim.homes.polygons import corners_of, middle, overlapping
+from avlmaps.sim.homes.polygons import middle
 from avlmaps.sim.mesh import Mesh
 from avlmaps.sim.scene import Light, SceneBuilder
 
@@ -21,6 +21,18 @@ def try_make(category: str, rng: np.random.Generator, which: Families, name: str
     return make(category, rng, which, name) if category in categories() else None
 
 
+# How high the lowest edge of what hangs on a wall is, metres.
+HANGING_M = {"picture": (1.1, 1.6), "mirror": (0.9, 1.3), "clock": (1.5, 2.0), "air conditioner": (1.9, 2.3), "tv": (0.8, 1.3),
+             "wall shelf": (1.1, 1.7), "lamp": (1.4, 1.8), "kitchen cabinet": (1.38, 1.55), "range hood": (1.45, 1.7),
+             "water heater": (1.3, 1.7), "whiteboard": (0.8, 1.0), "towel": (0.9, 1.3), "radiator": (0.1, 0.15),
+             "coat rack": (1.4, 1.6), "plant": (1.4, 1.9), "telephone": (1.1, 1.4), "sink": (0.0, 0.0)}  # fmt: skip
+
+
+def hangs(piece: Piece) -> bool:
+    """Tell whether a piece is made to hang on a wall."""
+    return piece.family.startswith("wall")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Stood:
     """A piece that has its place.
@@ -29,13 +41,15 @@ class Stood:
         piece: what.
         place: where its origin is.
         foot: its box.
-        z: height of the floor under it, above the world's.
+        floor_m: height of the floor under it.
+        number: its number on the ground, −1 for what nothing can meet.
     """
 
     piece: Piece
     place: Place
     foot: Footprint
     floor_m: float
+    number: int = -1
 
     @property
     def centre(self) -> Float[np.ndarray, "2"]:
@@ -63,9 +77,13 @@ class Furnisher:
         builder: the scene.
         ground: what of the room is taken.
         area: the room's index.
+        kind: the room's kind.
         floor_m: height of its floor.
         height_m: of its ceiling above the floor.
         which: families of shapes to use.
+        has_ceiling: there is one to hang lamps from.
+        fill: how much stands in it, 1 for a room that has what it needs.
+        mess: how much lies about, from 0 to 1.
         stood: what stands in it so far.
     """
 
@@ -73,9 +91,13 @@ class Furnisher:
     builder: SceneBuilder
     ground: Ground
     area: int
+    kind: str
     floor_m: float
     height_m: float
     which: Families
+    has_ceiling: bool = True
+    fill: float = 1.0
+    mess: float = 0.3
     stood: list[Stood] = field(default_factory=list)
 
     def new(self, category: str, name: str | None = None) -> Piece | None:
@@ -86,6 +108,9 @@ class Furnisher:
         """Add a piece to the scene at a place, and keep its place and a zone before it from others."""
         foot = footprint(piece.mesh)
         stood = Stood(piece, place, foot, self.floor_m)
+        if solid:
+            number = self.ground.take(foot, stood.centre, place.heading_rad, place.z, front_m)
+            stood = Stood(piece, place, foot, self.floor_m, number)
         mesh = piece.mesh.turned(place.heading_rad).moved(place.x, place.y, place.z + self.floor_m)
         self.builder.add(piece.category, mesh, place.heading_rad, piece.family, area=self.area)
         for x, y, z in piece.light:
@@ -95,20 +120,18 @@ class Furnisher:
             self.builder.lights.append(
                 Light((float(at[0]), float(at[1]), float(z + place.z + self.floor_m)), warm)
             )
-        if solid:
-            self.ground.take(foot, stood.centre, place.heading_rad, place.z, front_m)
         self.stood.append(stood)
         return stood
 
     def try_at(
         self, piece: Piece, centre: Float[np.ndarray, "n 2"], heading_rad: Float[np.ndarray, " n"], z: float = 0.0,
-        front_m: float = 0.0, solid: bool = True, zones: bool = True,
+        front_m: float = 0.0, solid: bool = True, zones: bool = True, except_for: int = -1,
     ) -> Stood | None:  # fmt: skip
         """Put a piece at the first of several places that is free and leaves the ways free."""
         foot = footprint(piece.mesh)
         if z + foot.high_m > self.height_m - 0.02:
             return None
-        good = self.ground.fits(foot, centre, heading_rad, z, zones)
+        good = self.ground.fits(foot, centre, heading_rad, z, zones, except_for)
         for index in np.flatnonzero(good)[:5].tolist():
             heading = float(heading_rad[index])
             if not solid or self.ground.keeps_ways(foot, centre[index], heading, z, front_m):
@@ -227,43 +250,53 @@ class Furnisher:
             return None
         return self.put(piece, foot.place(centre, heading, z))
 
-    def on(self, anchor: Stood, wanted: Sequence[str], turn_rad: float | None = None, middle_first: bool = False,
-           tries: int = 6) -> list[Stood]:  # fmt: skip
-        """Stand small things on the tops of a piece, meeting nothing there.
+    def stand(self, category: str, share: float = 1.0, front_m: float = 0.45, corner: float = 0.3,
+              near: Float[np.ndarray, "2"] | None = None, sides: Sequence[Side] | None = None,
+              at_middle: float = 0.0) -> Stood | None:  # fmt: skip
+        """Stand a piece of a category against a wall in a share of the cases, or hang it if it is made to hang."""
+        if self.rng.random() > share * self.fill or (piece := self.new(category)) is None:
+            return None
+        if hangs(piece):
+            return self.hang(piece, HANGING_M.get(category, (1.2, 1.7)), sides, near=near)
+        return self.along(piece, sides, front_m, corner=corner, near=near, at_middle=at_middle)
 
-        Args:
-            anchor: what they stand on.
-            wanted: categories, each tried once, on a top drawn at random.
-            turn_rad: how far they may be turned out of the piece's own direction; any way where not said.
-            middle_first: try the middle of the top first.
-            tries: places per thing.
-        """
-        out: list[Stood] = []
-        taken: dict[int, list[np.ndarray]] = {}
-        tops = anchor.piece.supports
-        for category in wanted if tops else ():
+    def row(self, wanted: Sequence[str], sides: Sequence[Side] | None = None, front_m: float = 0.6,
+            deepest_m: float = 1.0) -> list[Stood]:  # fmt: skip
+        """Stand pieces side by side along one wall, as in a fitted kitchen; what does not fit is left out."""
+        pieces = [piece for name in wanted if (piece := self._shallow(name, deepest_m)) is not None]
+        best: list[Stood] = []
+        for side in (self.sides(1.2) if sides is None else sides)[:3]:
+            reached = 0.004 if self.rng.random() < 0.7 else draw(self.rng, 0.0, side.length_m / 4)
+            left = list(pieces)
+            while left and reached < side.length_m - 0.4:
+                stood = self._next_in_row(left, side, reached, front_m)
+                if stood is None:
+                    reached += 0.15
+                    continue
+                best.append(stood)
+                left = [piece for piece in left if piece is not stood.piece]
+                at = float((stood.centre - side.a) @ side.along)
+                reached = at + stood.foot.half[1] + 0.004
+            pieces = left
+            if len(left) < 2:
+                break
+        return best
+
+    def _shallow(self, category: str, deepest_m: float) -> Piece | None:
+        for _ in range(4):
             piece = self.new(category)
-            if piece is None:
+            if piece is None or (float(piece.mesh.size[0]) < deepest_m and not hangs(piece)):
+                return piece
+        return None
+
+    def _next_in_row(self, left: Sequence[Piece], side: Side, reached: float, front_m: float) -> Stood | None:
+        for piece in left[:3]:
+            foot = footprint(piece.mesh)
+            end = reached + foot.width_m
+            if not side.is_free(np.array([reached]), np.array([end]), foot.low_m, foot.high_m)[0]:
                 continue
-            number = int(self.rng.integers(len(tops)))
-            top, foot = tops[number], footprint(piece.mesh)
-            if foot.high_m > top.clearance_m - 0.01:
-                continue
-            low, high = np.array(top.low), np.array(top.high)
-            centre = self.rng.uniform(low, high, (tries, 2))
-            if middle_first:
-                centre[0] = (low + high) / 2
-            limit = np.pi if turn_rad is None else turn_rad
-            heading = self.rng.uniform(-limit, limit, tries)
-            corner = corners_of(centre, np.broadcast_to(foot.half, centre.shape), heading)
-            good = np.all((corner >= low) & (corner <= high), axis=(1, 2))
-            if (others := taken.get(number)) and good.any():
-                good[good] = ~overlapping(corner[good], np.array(others), 0.002).any(axis=1)
-            if not good.any():
-                continue
-            k = int(np.flatnonzero(good)[0])
-            taken.setdefault(number, []).append(corner[k])
-            place = foot.place(anchor.to_world(centre[k]), anchor.place.heading_rad + float(heading[k]),
-                               anchor.place.z + top.z + 0.001)  # fmt: skip
-            out.append(self.put(piece, place, solid=False))
-        return out
+            centre = side.a + (reached + foot.half[1]) * side.along + (_TOUCH_M + foot.half[0]) * side.inward
+            stood = self.try_at(piece, centre[None], np.array([side.heading_rad]), front_m=front_m)
+            if stood is not None:
+                return stood
+        return None

@@ -163,7 +163,7 @@ def floor_of(
             mine, left = left[:split], left[split:]
             if not mine:
                 break
-            if use_corridor and number == 0 and len(mine) >= 3:
+            if use_corridor and len(mine) >= 3:
                 rooms += along_corridor(rng, part, mine, slant, corridor)
             else:
                 rooms += divided(rng, part, mine, slant)

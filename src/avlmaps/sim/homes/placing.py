@@ -114,13 +114,26 @@ class Ground:
 
     def fits(
         self, foot: Footprint, centre: Float[np.ndarray, "n 2"], heading_rad: Float[np.ndarray, " n"], z: float = 0.0,
-        zones: bool = True,
+        zones: bool = True, except_for: int = -1,
     ) -> Bool[np.ndarray, " n"]:  # fmt: skip
-        """Tell where a piece can stand: within the walls, meeting nothing, and out of the zones kept clear."""
+        """Tell where a piece can stand: within the walls, meeting nothing, and out of the zones kept clear.
+
+        Args:
+            foot: its box.
+            centre: where the middle of its box would be.
+            heading_rad: where its front would look.
+            z: height of its origin.
+            zones: heed the zones kept clear.
+            except_for: number of a piece that it may meet (a chair its table).
+        """
         corner = corners_of(centre, np.broadcast_to(foot.half, centre.shape), heading_rad)
         good = np.all(inside(self.polygon, corner, 0.004), axis=1)
         low, high = z + foot.low_m, z + foot.high_m
-        others = [c for c, (lo, hi) in zip(self._corner, self._height, strict=True) if lo < high and hi > low]
+        others = [
+            corners
+            for number, (corners, (lo, hi)) in enumerate(zip(self._corner, self._height, strict=True))
+            if lo < high - 1e-4 and hi > low + 1e-4 and number != except_for
+        ]
         if zones and low < 1.2:
             others += self._zone
         if others and good.any():
@@ -163,8 +176,8 @@ class Ground:
         y = np.maximum(np.abs(c * away[..., 1] - s * away[..., 0]) - foot.half[1], 0.0)
         return np.hypot(x, y) < by_m
 
-    def take(self, foot: Footprint, centre: np.ndarray, heading_rad: float, z: float = 0.0, front_m: float = 0.0) -> None:
-        """Keep the place of a piece, and a zone before it clear of others."""
+    def take(self, foot: Footprint, centre: np.ndarray, heading_rad: float, z: float = 0.0, front_m: float = 0.0) -> int:
+        """Keep the place of a piece, and a zone before it clear of others; return the piece's number."""
         corner = corners_of(centre, foot.half, np.float64(heading_rad))
         self._corner.append(corner)
         self._height.append((z + foot.low_m, z + foot.high_m))
@@ -174,6 +187,7 @@ class Ground:
             ahead = np.array([np.cos(heading_rad), np.sin(heading_rad)])
             zone = centre + (foot.half[0] + front_m / 2) * ahead
             self.keep_clear(zone, np.array([front_m / 2 - 0.005, foot.half[1] * 0.9]), heading_rad)
+        return len(self._corner) - 1
 
     def keep_clear(self, centre: np.ndarray, half_m: np.ndarray, heading_rad: float) -> None:
         """Let nothing stand on an oriented rectangle."""

@@ -1,108 +1,242 @@
-"""What stands in which kind of room, and how: one function per kind."""
-
-from collections.abc import Callable
+"""What stands in the rooms people live in: living and dining rooms, bedrooms, studies."""
 
 import numpy as np
 
+from avlmaps.sim.furniture.decor import carpet
 from avlmaps.sim.furniture.joinery import chance, count, draw, pick
-from avlmaps.sim.homes.furnish import Furnisher, Stood
+from avlmaps.sim.homes.clutter import set_at
+from avlmaps.sim.homes.furnish import Furnisher, Stood, footprint, hangs
+from avlmaps.sim.homes.polygons import middle
+from avlmaps.sim.homes.seats import seat_round
+from avlmaps.sim.furniture import Piece
 
-Rule = Callable[[Furnisher], None]
+
+def several(f: Furnisher, wanted: dict[str, float], front_m: float = 0.4) -> list[Stood]:
+    """Stand pieces against walls, each with its own probability, in random order."""
+    names = list(wanted)
+    f.rng.shuffle(names)
+    return [stood for name in names if (stood := f.stand(name, wanted[name], front_m)) is not None]
 
 
-def seats_round(f: Furnisher, table: Stood, category: str = "chair", number: int = 6) -> None:
-    """Stand chairs round a table, each facing it, pushed in or drawn out."""
-    rng = f.rng
-    half_x, half_y = table.foot.half
-    places: list[tuple[float, float, float]] = []
-    for sign in (1.0, -1.0):
-        across = max(int(2 * half_y / 0.62), 1)
-        places += [(sign * half_x, (k + 0.5) / across * 2 * half_y - half_y, 0.0 if sign < 0 else np.pi) for k in range(across)]
-        places.append((0.0, sign * half_y, -sign * np.pi / 2))
-    rng.shuffle(places)
-    state = rng.bit_generator.state
-    for x, y, heading in places[:number]:
-        after = rng.bit_generator.state
-        rng.bit_generator.state = state  # the chairs of a table are alike
-        piece = f.new(category)
-        if piece is None:
+def under(f: Furnisher, about: np.ndarray, heading_rad: float, size_m: tuple[float, float]) -> None:
+    """Lay a carpet of about a size under what stands about a place."""
+    shape = pick(f.rng, ("plain", "fringed", "oval", "round"))
+    with_shape = carpet(f.rng, size_m[0], size_m[1], shape)
+    piece = Piece(with_shape.mesh, (), (), "carpet", shape)
+    foot = footprint(piece.mesh)
+    heading = np.array([heading_rad])
+    for _ in range(3):
+        if f.ground.fits(foot, about[None], heading, -1.0, zones=False)[0]:  # under all that stands
+            f.put(piece, foot.place(about, heading_rad), solid=False)
             return
-        rng.bit_generator.state = after
-        rng.random()
-        depth = float(piece.mesh.size[0])
-        out = depth / 2 + (draw(rng, 0.02, 0.35) if chance(rng, 0.4) else 0.02)
-        away = np.array([-np.cos(heading), -np.sin(heading)]) * out
-        centre = table.to_world(table.foot.middle + np.array([x, y]) + away)
-        turned = table.place.heading_rad + heading + rng.normal(0.0, 0.12)
-        f.try_at(piece, centre[None], np.array([turned]), zones=False)
-
-
-def bedroom(f: Furnisher) -> None:
-    """Furnish a bedroom."""
-    rng = f.rng
-    if (bed := f.new("bed")) is not None and (stood := f.along(bed, corner=0.3, at_middle=0.6, front_m=0.5)):
-        for _ in range(2):
-            if chance(rng, 0.8) and (stand := f.new("nightstand")) is not None:
-                where = f.beside(stand, stood, draw(rng, 0.02, 0.1))
-                if where is not None:
-                    f.on(where, [pick(rng, ("lamp", "book", "clock", "cup"))])
-    for category, share in (("wardrobe", 0.9), ("chest of drawers", 0.6), ("desk", 0.3), ("armchair", 0.3), ("mirror", 0.3),
-                            ("bookshelf", 0.3), ("plant", 0.4), ("laundry basket", 0.3)):  # fmt: skip
-        stand_if(f, category, share)
-
-
-def stand_if(f: Furnisher, category: str, share: float, front_m: float = 0.5) -> Stood | None:
-    """Stand a piece against a wall in a share of the cases."""
-    if not chance(f.rng, share) or (piece := f.new(category)) is None:
-        return None
-    return f.along(piece, front_m=front_m)
+        piece = Piece(piece.mesh.scaled(0.8, 0.8, 1.0), (), (), "carpet", shape)
+        foot = footprint(piece.mesh)
 
 
 def living_room(f: Furnisher) -> None:
-    """Furnish a living room."""
+    """Furnish a living room: seats that look at a screen over a low table."""
     rng = f.rng
-    if (sofa := f.new("sofa")) is not None and (stood := f.along(sofa, front_m=0.3, corner=0.1, at_middle=0.5)):
-        if (table := f.new("coffee table")) is not None:
-            f.before(table, stood, draw(rng, 0.3, 0.5))
-    for category, share in (("tv cabinet", 0.9), ("bookshelf", 0.6), ("armchair", 0.6), ("plant", 0.7), ("lamp", 0.5),
-                            ("cabinet", 0.4), ("piano", 0.1), ("fireplace", 0.1)):  # fmt: skip
-        stand_if(f, category, share)
+    screen = _screen(f)
+    sofa = f.new("sofa")
+    stood = None
+    if sofa is not None:
+        stood = _facing(f, sofa, screen) if screen is not None and chance(rng, 0.75) else None
+        stood = stood or f.along(sofa, front_m=0.35, corner=0.15, at_middle=0.5)
+    if stood is not None:
+        _sofa_corner(f, stood)
+    for _ in range(count(rng, 0, 2)):
+        f.stand("armchair", 0.7, 0.35)
+    if chance(rng, 0.25 * f.fill) and (second := f.new("sofa")) is not None:
+        f.along(second, front_m=0.35)
+    several(f, {"bookshelf": 0.6, "cabinet": 0.4, "piano": 0.1, "fireplace": 0.12, "plant": 0.7, "lamp": 0.5, "guitar": 0.1,
+                "aquarium": 0.07, "chest of drawers": 0.15, "pet bed": 0.08, "fan": 0.08, "ottoman": 0.2,
+                "loudspeaker": 0.15, "side table": 0.3})  # fmt: skip
+    if chance(rng, 0.3):
+        several(f, {"plant": 0.6, "bookshelf": 0.5, "desk": 0.2, "vase": 0.2, "lamp": 0.3})
+    if chance(rng, 0.05) and (table := f.new("pool table")) is not None:
+        f.in_middle(table)
 
 
-def kitchen(f: Furnisher) -> None:
-    """Furnish a kitchen."""
-    for category in ("refrigerator", "kitchen counter", "stove", "kitchen counter", "dishwasher"):
-        stand_if(f, category, 0.95, 0.6)
+def _screen(f: Furnisher) -> Stood | None:
+    """Stand a tv on its cabinet, or hang it."""
+    if not chance(f.rng, 0.85):
+        return None
+    cabinet = f.stand("tv cabinet", 0.85, 0.6, corner=0.1, at_middle=0.6)
+    tv = f.new("tv")
+    if tv is None:
+        return cabinet
+    if hangs(tv):
+        near = cabinet.centre if cabinet is not None else None
+        sides = None
+        if cabinet is not None:
+            sides = [s for s in f.ground.sides if abs(np.cos(s.heading_rad - cabinet.place.heading_rad) - 1) < 1e-6]
+        low = cabinet.foot.high_m + 0.15 if cabinet is not None else 0.8
+        return f.hang(tv, (low, low + 0.35), sides, near=near) or cabinet
+    if cabinet is not None:
+        set_at(f, cabinet, "tv", 0.35, 0.5)
+        return cabinet
+    return None
+
+
+def _facing(f: Furnisher, piece: Piece, screen: Stood) -> Stood | None:
+    """Stand a piece so that it looks at a screen from some metres."""
+    foot = footprint(piece.mesh)
+    ahead = np.array([np.cos(screen.place.heading_rad), np.sin(screen.place.heading_rad)])
+    away = draw(f.rng, 1.9, 3.6) + foot.half[0] + np.array([0.0, 0.3, -0.3, 0.7, -0.5, 1.1])
+    aside = f.rng.normal(0.0, 0.2, len(away))
+    centre = screen.centre + away[:, None] * ahead + aside[:, None] * np.array([-ahead[1], ahead[0]])
+    return f.try_at(piece, centre, np.full(len(away), screen.place.heading_rad + np.pi), front_m=0.3)
+
+
+def _sofa_corner(f: Furnisher, sofa: Stood) -> None:
+    rng = f.rng
+    ahead = np.array([np.cos(sofa.place.heading_rad), np.sin(sofa.place.heading_rad)])
+    table = None
+    if chance(rng, 0.8 * f.fill) and (piece := f.new("coffee table")) is not None:
+        table = f.before(piece, sofa, draw(rng, 0.28, 0.5), aside_m=draw(rng, -0.2, 0.2))
+    if chance(rng, 0.6):
+        under(f, sofa.centre + (sofa.foot.half[0] + 0.6) * ahead, sofa.place.heading_rad,
+              (draw(rng, 1.4, 2.2), draw(rng, 1.8, 3.0)))  # fmt: skip
+    if chance(rng, 0.5) and (lamp := f.new("lamp")) is not None and not hangs(lamp) and lamp.mesh.high[2] > 1.0:
+        f.beside(lamp, sofa, draw(rng, 0.03, 0.15))
+    if chance(rng, 0.4) and (side := f.new("side table")) is not None:
+        f.beside(side, sofa, draw(rng, 0.02, 0.1))
+    if table is not None and chance(rng, 0.35) and (chair := f.new("armchair")) is not None:
+        foot, base = footprint(chair.mesh), sofa.place.heading_rad
+        for sign in (1.0, -1.0):
+            across = np.array([-ahead[1], ahead[0]]) * sign
+            centre = table.centre + across * (table.foot.half[1] + 0.35 + foot.half[0])
+            if f.try_at(chair, centre[None], np.array([base - sign * np.pi / 2 + rng.normal(0, 0.2)]), zones=False):
+                break
+    if table is not None and chance(rng, 0.15) and (stool := f.new("ottoman")) is not None:
+        f.before(stool, table, draw(rng, 0.1, 0.3))
 
 
 def dining_room(f: Furnisher) -> None:
-    """Furnish a dining room."""
-    if (table := f.new("dining table")) is not None and (stood := f.in_middle(table)) is not None:
-        seats_round(f, stood, number=count(f.rng, 2, 8))
-    for category, share in (("cabinet", 0.7), ("plant", 0.5), ("chest of drawers", 0.2)):
-        stand_if(f, category, share)
+    """Furnish a dining room: a table with chairs, a cabinet for the tableware."""
+    dining_place(f, 1.0)
+    several(f, {"cabinet": 0.65, "plant": 0.5, "chest of drawers": 0.2, "lamp": 0.2, "console table": 0.2, "bookshelf": 0.15,
+                "piano": 0.05, "vase": 0.15, "fireplace": 0.05, "clock": 0.15})  # fmt: skip
 
 
-def bathroom(f: Furnisher) -> None:
-    """Furnish a bathroom."""
-    for category, share in (("bathtub", 0.5), ("shower", 0.6), ("toilet", 0.95), ("sink", 1.0), ("washing machine", 0.3)):
-        stand_if(f, category, share, 0.45)
+def dining_place(f: Furnisher, share: float, free_standing: float = 0.85) -> Stood | None:
+    """Stand a dining table with chairs round it, in a share of the cases."""
+    rng = f.rng
+    if not chance(rng, share) or (table := f.new("dining table")) is None:
+        return None
+    stood = f.in_middle(table, 0.14) if chance(rng, free_standing) else None
+    stood = stood or f.along(table, front_m=0.0, gap_m=0.0 if chance(rng, 0.5) else draw(rng, 0.5, 0.8), corner=0.5)
+    if stood is None:
+        return None
+    if chance(rng, 0.4):
+        size = 2 * stood.foot.half + draw(rng, 0.7, 1.3)
+        under(f, stood.centre, stood.place.heading_rad, (float(size[0]), float(size[1])))
+    chair = f.new(pick(rng, ("chair", "chair", "chair", "chair", "stool", "bench")))
+    if chair is not None:
+        seat_round(f, stood, chair, count(rng, 2, 10))
+    return stood
 
 
-def office(f: Furnisher) -> None:
+def bedroom(f: Furnisher) -> None:
+    """Furnish a bedroom: head of the bed to the wall, a nightstand on either side."""
+    rng = f.rng
+    bed = f.new("bed")
+    stood = None
+    if bed is not None:
+        stood = f.along(bed, front_m=0.35, corner=0.12, at_middle=0.65)
+    if stood is not None:
+        _bedside(f, stood)
+    several(f, {"wardrobe": 0.9, "chest of drawers": 0.55}, 0.6)
+    if chance(rng, 0.3):
+        desk_place(f)
+    several(f, {"armchair": 0.25, "mirror": 0.35, "bookshelf": 0.25, "plant": 0.35, "laundry basket": 0.25, "lamp": 0.25,
+                "bench": 0.15, "chair": 0.3, "tv cabinet": 0.15, "ottoman": 0.12, "crib": 0.06, "coat rack": 0.08,
+                "tv": 0.15, "fan": 0.06, "wardrobe": 0.15, "ironing board": 0.05, "guitar": 0.06})  # fmt: skip
+
+
+def _bedside(f: Furnisher, bed: Stood) -> None:
+    rng = f.rng
+    first = f.new("nightstand")
+    for _ in range(2):
+        if first is not None and chance(rng, 0.85 * f.fill):
+            stand = f.beside(first, bed, draw(rng, 0.015, 0.12))
+            if stand is not None and chance(rng, 0.6):
+                set_at(f, stand, "lamp", draw(rng, 0.2, 0.6), draw(rng, 0.3, 0.7), draw(rng, -0.3, 0.3))
+    if chance(rng, 0.45):
+        ahead = np.array([np.cos(bed.place.heading_rad), np.sin(bed.place.heading_rad)])
+        under(f, bed.centre + 0.5 * ahead, bed.place.heading_rad, (draw(rng, 1.6, 2.6), draw(rng, 2.0, 3.2)))
+    if chance(rng, 0.15) and (bench := f.new("bench")) is not None:
+        f.before(bench, bed, 0.05, facing=False)
+
+
+def childrens_room(f: Furnisher) -> None:
+    """Furnish a children's room: small beds, toys, a place to paint."""
+    rng = f.rng
+    if chance(rng, 0.12):
+        f.stand("crib", 1.0)
+    for _ in range(count(rng, 1, 2)):
+        if (bed := f.new(pick(rng, ("bed", "bunk bed", "crib", "bed")))) is not None:
+            f.along(bed, front_m=0.35, corner=0.7)
+    if chance(rng, 0.5):
+        desk_place(f)
+    if chance(rng, 0.6):
+        under(f, middle(f.ground.polygon), f.ground.sides[0].heading_rad, (draw(rng, 1.2, 2.0), draw(rng, 1.4, 2.6)))
+    several(f, {"wardrobe": 0.75, "chest of drawers": 0.5, "bookshelf": 0.6, "toy": 0.8, "rocking horse": 0.25,
+                "play tent": 0.25, "baby stroller": 0.12, "basket": 0.4, "ball": 0.4, "mat": 0.2, "stool": 0.2,
+                "armchair": 0.15, "lamp": 0.2, "plant": 0.15, "piano": 0.03, "guitar": 0.08, "box": 0.3, "nightstand": 0.3,
+                "laundry basket": 0.15, "bicycle": 0.06})  # fmt: skip
+    for _ in range(int(rng.poisson(1.0 + 4 * f.mess))):
+        toy = f.new(pick(rng, ("toy", "toy", "toy", "ball", "book", "cushion", "box")))
+        if toy is not None:
+            f.somewhere(toy, square=0.0, tries=6)
+
+
+def desk_place(f: Furnisher, computer: float = 0.75, front_m: float = 0.75) -> Stood | None:
+    """Stand a desk against a wall, with a chair before it and what one works with on it."""
+    rng = f.rng
+    if (desk := f.new("desk")) is None:
+        return None
+    stood = f.along(desk, front_m=front_m, corner=0.35)
+    if stood is not None:
+        equip(f, stood, computer)
+        seat = f.new("office chair" if chance(rng, 0.7) else "chair")
+        if seat is not None:
+            seat_round(f, stood, seat, 1, all_sides=False)
+    return stood
+
+
+def equip(f: Furnisher, desk: Stood, computer: float = 0.75) -> None:
+    """Put a screen and a keyboard, or a laptop, and a lamp on a desk."""
+    rng = f.rng
+    if chance(rng, computer):
+        at = draw(rng, 0.35, 0.65)
+        if chance(rng, 0.7):
+            if chance(rng, 0.25):
+                set_at(f, desk, "monitor", 0.12, 0.15, 0.15)
+                set_at(f, desk, "monitor", 0.12, 0.75, -0.15)
+                at = 0.5
+            else:
+                set_at(f, desk, "monitor", draw(rng, 0.05, 0.25), at, draw(rng, -0.12, 0.12))
+            set_at(f, desk, "keyboard", draw(rng, 0.75, 0.95), at, draw(rng, -0.06, 0.06))
+            if chance(rng, 0.5) and (computer_case := f.new("computer")) is not None:
+                f.beside(computer_case, desk, 0.04)
+        else:
+            set_at(f, desk, "laptop", draw(rng, 0.5, 0.9), at, draw(rng, -0.2, 0.2))
+    elif chance(rng, 0.5):
+        set_at(f, desk, "book", 0.7, 0.5, draw(rng, -1.0, 1.0))
+    if chance(rng, 0.5):
+        set_at(f, desk, "lamp", 0.05, float(pick(rng, (0.0, 1.0))), draw(rng, -0.5, 0.5))
+
+
+def study(f: Furnisher) -> None:
     """Furnish a study."""
-    for category, share in (("desk", 1.0), ("bookshelf", 0.8), ("filing cabinet", 0.4), ("sofa", 0.2), ("plant", 0.5)):
-        stand_if(f, category, share, 0.7)
-
-
-def hallway(f: Furnisher) -> None:
-    """Furnish a hall."""
-    for category, share in (("shoe rack", 0.5), ("coat rack", 0.5), ("console table", 0.4), ("plant", 0.3), ("bench", 0.2)):
-        stand_if(f, category, share, 0.3)
-
-
-RULES: dict[str, Rule] = {
-    "bedroom": bedroom, "children's room": bedroom, "living room": living_room, "kitchen": kitchen,
-    "dining room": dining_room, "bathroom": bathroom, "toilet": bathroom, "office": office, "hallway": hallway,
-    "entrance hall": hallway, "corridor": hallway,
-}  # fmt: skip
+    rng = f.rng
+    for _ in range(1 if chance(rng, 0.75) else 2):
+        desk_place(f, 0.85)
+    several(f, {"bookshelf": 0.85, "filing cabinet": 0.4, "cabinet": 0.25, "armchair": 0.3, "sofa": 0.2, "plant": 0.5,
+                "trash can": 0.5, "printer": 0.1, "lamp": 0.3, "whiteboard": 0.12, "guitar": 0.1, "chest of drawers": 0.15,
+                "piano": 0.05, "fan": 0.08, "chair": 0.2, "box": 0.25, "bag": 0.2})  # fmt: skip
+    if chance(rng, 0.6):
+        several(f, {"bookshelf": 0.8, "bicycle": 0.05, "locker": 0.03})
+    if chance(rng, 0.35):
+        under(f, middle(f.ground.polygon), f.ground.sides[0].heading_rad, (draw(rng, 1.2, 2.0), draw(rng, 1.4, 2.6)))
