@@ -9,7 +9,7 @@ import tyro
 
 from avlmaps.cli.bench import Bench
 from avlmaps.cli.output import UsageError
-from avlmaps.cli.verbs import AddSounds, Build, Demo, Info, Locate, Profiles, Query, TeachSound, Verb
+from avlmaps.cli.verbs import AddSounds, Build, Demo, Info, Locate, Profiles, Query, Record, TeachSound, Verb
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.progress import end_bars
 
@@ -20,6 +20,7 @@ Exit status: 0 done, 1 a known error (one sentence says which), 2 a wrong comman
 
 VERBS: dict[str, type[Verb]] = {
     "demo": Demo,
+    "record": Record,
     "add-sounds": AddSounds,
     "build": Build,
     "info": Info,

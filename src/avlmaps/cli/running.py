@@ -9,7 +9,7 @@ from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
-    from avlmaps.cli.verbs import Build, Query
+    from avlmaps.cli.verbs import Build, Query, Record
     from avlmaps.core.camera import Pinhole
     from avlmaps.query.question import Part
     from avlmaps.recordings.types import Recording
@@ -17,6 +17,64 @@ if TYPE_CHECKING:
 MAP_MANIFEST = "map.json"
 # `info` opens so many pictures of a recording, spread evenly; `info --verify` opens them all.
 DECODED_BY_INFO = 100
+
+
+def record(verb: "Record") -> dict[str, Any]:
+    """Record a simulated walk and tell what was heard."""
+    from avlmaps.sim.recorder import RecordSettings, record_scene
+    from avlmaps.sim.scenes import open_scene
+    from avlmaps.sim.sensor_settings import OdometryFaults
+
+    begin = perf_counter()
+    if verb.seed < 0:
+        raise UsageError(f"--seed takes a number of 0 or more, not {verb.seed}.")
+    settings = RecordSettings(
+        size=_size(verb.size),
+        fov_deg=verb.fov_deg,
+        fps=verb.fps,
+        sensor=verb.sensor,
+        hearing=verb.hearing,
+        sounds=verb.sounds,
+        categories=verb.category,
+        sources=verb.sources,
+        ambiguous=verb.ambiguous,
+        drift=OdometryFaults() if verb.drift else None,
+        max_frames=verb.max_frames,
+        semantic=verb.semantic,
+        workers=verb.workers,
+    )
+    scene = open_scene(verb.scene)
+    made = record_scene(scene, verb.out, settings, verb.seed)
+    names = [*(thing.name for thing in scene.objects), None]  # an instance of -1 is no object
+    events = [
+        {
+            "onset_s": s.onset_s,
+            "offset_s": s.offset_s,
+            "category": s.source.category,
+            "clip": s.source.clip,
+            "position": list(s.robot),
+            "source": list(s.source.position),
+            "object": names[s.source.instance],
+        }
+        for s in made.heard
+    ]
+    return {
+        "recording": str(verb.out),
+        "scene": scene.name,
+        "frames": made.frames,
+        "duration_s": round(made.duration_s, 3),
+        "hearing": verb.hearing,
+        "sounds": len(events),
+        "events": events,
+        "elapsed_s": round(perf_counter() - begin, 3),
+    }
+
+
+def _size(words: str) -> tuple[int, int]:
+    width, _, height = words.lower().partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise UsageError(f"--size takes columns and rows such as 320x240, not {words!r}.")
+    return int(width), int(height)
 
 
 def build(verb: "Build") -> dict[str, Any]:

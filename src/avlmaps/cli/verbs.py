@@ -39,6 +39,62 @@ class Demo(Verb):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Record(Verb):
+    """Drive a simulated robot through a building and record what it sees and hears, with the truth beside it.
+
+    The same scene, settings and seed give the same bytes. Example:
+
+    avlmaps record --scene house:7 --out REC --hearing acoustic
+    """
+
+    scene: str
+    """house:SEED or office:SEED, made by rule, or a file: .glb, or Matterport3D's .glb with its _semantic.ply."""
+    out: Path
+    """Where the recording goes (our folder format)."""
+    sounds: Path | None = None
+    """Folder of sound files, as `avlmaps add-sounds` reads it. Default: sounds made by rule."""
+    category: tuple[str, ...] = ()
+    """Only sounds of these categories. Default: all that homes make."""
+    sources: int | None = None
+    """How many sounds are heard. Default: one for every 12 seconds of the walk, as far as there is room."""
+    ambiguous: int = 0
+    """How many kinds of sound are heard in two places."""
+    hearing: Literal["overlay", "acoustic", "none"] = "overlay"
+    """overlay: dry clips, as the paper mixed them; acoustic: distance, walls and reverberation follow the building."""
+    sensor: Literal["clean", "kinect", "realsense"] = "clean"
+    """Whose faults colour and depth have."""
+    drift: bool = False
+    """Let the poses stray as odometry does; true_poses.csv keeps the true ones."""
+    seed: int = 0
+    """Another seed drives another way and hears other sounds."""
+    size: Annotated[str, arg(metavar="WxH")] = "320x240"
+    """Columns and rows of the pictures."""
+    fov_deg: float = 63.0
+    """Horizontal field of view, degrees."""
+    fps: float = 10.0
+    """Frames a second."""
+    max_frames: int | None = None
+    """Keep so many frames of a longer walk, evenly."""
+    semantic: bool = False
+    """Write which object each pixel shows into semantic/ as well (16-bit PNG: instance + 1, 0 for nothing)."""
+    workers: int = 0
+    """Processes that draw. Default: as many as there are cores."""
+
+    def run(self) -> None:
+        """Record."""
+        from avlmaps.cli.running import record
+
+        answer = record(self)
+        rows = [
+            (f"{e['onset_s']:.2f}", f"{e['offset_s']:.2f}", e["category"], place(e["source"]), e["object"] or "-")
+            for e in answer["events"]
+        ]
+        lines = table_lines(("onset_s", "offset_s", "category", "sounds at", "made by"), rows) if rows else []
+        said = f"wrote {self.out}: {answer['frames']} frames, {answer['duration_s']:.1f} s"
+        emit(answer, [*lines, f"{said}, in {answer['elapsed_s']:.1f} s"], self.json)
+
+
+@dataclass(frozen=True, kw_only=True)
 class AddSounds(Verb):
     """Put recorded sounds into the track of a recording; events.csv tells where and when.
 

@@ -1,7 +1,8 @@
 """Recording a scene: a robot drives through it, its camera and its microphone run, and truth is written beside."""
 
+import os
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,12 +20,11 @@ from avlmaps.recordings.writer import RecordingWriter
 from avlmaps.sim.hearing import Recorded, ScheduleRule, Sounding, Synthesised, place_sources, schedule
 from avlmaps.sim.render import Renderer
 from avlmaps.sim.scene import Scene
+from avlmaps.sim.sensor import PRESETS, OdometryFaults, Sensor, SensorName, Shift, drifted
 from avlmaps.sim.truth import SEMANTIC, clear_unfinished, write_true_poses, write_truth
 from avlmaps.sim.walk import WalkSettings, walk_through
 
 Hearing = Literal["overlay", "acoustic", "none"]
-SensorName = Literal["clean", "kinect", "realsense"]
-
 _SECONDS_A_SOUND = 12.0
 _FEWEST_FOR_PROCESSES = 60  # starting a process takes as long as drawing some tens of frames
 _UP = np.array([0.0, 0.0, 1.0])
@@ -48,11 +48,11 @@ class RecordSettings:
         rate_hz: samples a second of the track.
         snr_db: how far the room's noise lies below a sound at 1 m.
         overlap_s: how much two sounds may overlap.
-        drift: odometry drift, metres a metre driven; 0 gives true poses.
+        drift: how the poses stray, as odometry does; None gives true poses.
         max_frames: thins a longer walk evenly to so many frames.
         semantic: whether instance images are written as well.
         colour: file type of the colour pictures.
-        workers: processes that draw; 1 draws in this one.
+        workers: processes that draw; 1 draws in this one, 0 takes as many as there are cores.
         walk: how the robot is driven; its rate is that of the frames.
     """
 
@@ -68,28 +68,30 @@ class RecordSettings:
     rate_hz: int = 22_050
     snr_db: float = 30.0
     overlap_s: float = 0.0
-    drift: float = 0.0
+    drift: OdometryFaults | None = None
     max_frames: int | None = None
     semantic: bool = False
     colour: Literal["png", "jpg"] = "png"
-    workers: int = 2
-    walk: WalkSettings = WalkSettings()
+    workers: int = 0
+    walk: WalkSettings = field(default_factory=WalkSettings)
 
     def __post_init__(self) -> None:
         width, height = self.size
-        for wrong, sentence in (
-            (not (16 <= width <= 4096 and 16 <= height <= 4096), f"Pictures of {width}x{height} cannot be recorded; "
-             "choose from 16x16 to 4096x4096."),
-            (not 10.0 <= self.fov_deg <= 150.0, f"A field of view of {self.fov_deg:g} degrees is not possible; choose "
-             "from 10 to 150."),
-            (not 0.1 <= self.fps <= 240.0, f"{self.fps:g} frames a second cannot be recorded; choose from 0.1 to 240."),
-            (self.sources is not None and self.sources < 0, f"There cannot be {self.sources} sounds; choose 0 or more."),
-            (self.ambiguous < 0, f"{self.ambiguous} kinds cannot sound twice; choose 0 or more."),
-            (self.max_frames is not None and self.max_frames < 2, "A recording needs at least 2 frames."),
-            (not 0.0 <= self.drift <= 0.5, f"A drift of {self.drift:g} m a metre is not possible; choose from 0 to 0.5."),
-        ):  # fmt: skip
-            if wrong:
-                raise RecordingError(sentence)
+        checks = (
+            (16 <= width <= 4096 and 16 <= height <= 4096, f"pictures of {width}x{height}", "16x16 to 4096x4096"),
+            (10.0 <= self.fov_deg <= 150.0, f"a field of view of {self.fov_deg:g} degrees", "10 to 150"),
+            (0.1 <= self.fps <= 240.0, f"{self.fps:g} frames a second", "0.1 to 240"),
+            (self.sources is None or self.sources >= 0, f"{self.sources} sounds", "0 or more"),
+            (self.ambiguous >= 0, f"{self.ambiguous} kinds that sound twice", "0 or more"),
+            (0.0 <= self.overlap_s <= 5.0, f"sounds that overlap by {self.overlap_s:g} s", "0 to 5"),
+            (8_000 <= self.rate_hz <= 96_000, f"a track of {self.rate_hz} Hz", "8000 to 96000"),
+            (0.0 <= self.snr_db <= 90.0, f"a signal-to-noise ratio of {self.snr_db:g} dB", "0 to 90"),
+            (0 <= self.workers <= 256, f"{self.workers} processes", "0 (every core) to 256"),
+            (self.max_frames is None or self.max_frames >= 2, f"{self.max_frames} frames at most", "2 or more"),
+        )
+        for right, asked, choice in checks:
+            if not right:
+                raise RecordingError(f"A scene cannot be recorded with {asked}; choose {choice}.")
 
     @property
     def camera(self) -> Pinhole:
@@ -108,14 +110,12 @@ class SceneRecording:
         frames: how many.
         duration_s: length of the walk.
         heard: the sounds in it.
-        left_out: sounds that were to be heard, but had no room in the walk.
     """
 
     path: Path
     frames: int
     duration_s: float
     heard: tuple[Sounding, ...]
-    left_out: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,7 +147,7 @@ def record_scene(scene: Scene, out: Path, settings: RecordSettings | None = None
         raise RecordingError(f"{out} holds a recording already; choose another folder or remove it.")
     for_walk, for_sounds, for_track, for_frames = np.random.default_rng(seed).spawn(4)
     trip = _trip(scene, settings, for_walk)
-    soundings, left_out = _soundings(scene, settings, trip, for_sounds)
+    soundings = _soundings(scene, settings, trip, for_sounds)
     clear_unfinished(out)
     origin = f"avlmaps record of {scene.name}, seed {seed}"
     rig = Rig(settings.camera, settings.camera)
@@ -156,7 +156,7 @@ def record_scene(scene: Scene, out: Path, settings: RecordSettings | None = None
             writer.set_audio(track)
         _write_frames(scene, settings, trip, writer, for_frames)
         write_truth(out, scene, soundings, {"scene": scene.name, "seed": seed, "settings": _plain(settings)})
-    return SceneRecording(out, len(trip.stamps_s), trip.duration_s, tuple(soundings), left_out)
+    return SceneRecording(out, len(trip.stamps_s), trip.duration_s, tuple(soundings))
 
 
 def _plain(settings: RecordSettings) -> dict[str, Any]:
@@ -178,22 +178,22 @@ def _trip(scene: Scene, settings: RecordSettings, rng: np.random.Generator) -> _
     return _Trip(stamps_s, poses, duration_s)
 
 
-def _soundings(
-    scene: Scene, settings: RecordSettings, trip: _Trip, rng: np.random.Generator
-) -> tuple[list[Sounding], int]:
+def _soundings(scene: Scene, settings: RecordSettings, trip: _Trip, rng: np.random.Generator) -> list[Sounding]:
     """Place sounds and let each be heard as the robot comes by."""
     if settings.hearing == "none":
-        return [], 0
+        return []
     bank = Synthesised() if settings.sounds is None else Recorded(settings.sounds, settings.rate_hz)
     count = max(1, round(trip.duration_s / _SECONDS_A_SOUND)) if settings.sources is None else settings.sources
     robot = trip.world_from_camera[:, :3, 3]
-    sources = place_sources(scene, rng, count, settings.categories, settings.ambiguous, bank=bank, walk=robot)
-    rule = ScheduleRule(pause_s=-settings.overlap_s if settings.overlap_s > 0.0 else ScheduleRule().pause_s)
-    soundings = schedule(scene, sources, trip.stamps_s, robot, rule)
-    left_out = len(sources) - len(soundings)
-    if left_out:
-        say(f"note: {left_out} of {len(sources)} sounds are not heard: the walk has no room for them.")
-    return soundings, left_out
+    # More are drawn than are heard: not every place has its moment in the walk.
+    pairs = settings.ambiguous
+    sources = place_sources(scene, rng, 2 * (count + pairs), settings.categories, 2 * pairs, bank=bank, walk=robot)
+    pause_s = -settings.overlap_s if settings.overlap_s > 0.0 else ScheduleRule().pause_s
+    rule = ScheduleRule(pause_s=pause_s)
+    soundings = schedule(scene, sources, trip.stamps_s, robot, rule, most=count, pairs=pairs)
+    if len(soundings) < count and settings.sources is not None:
+        say(f"note: {len(soundings)} of {count} sounds are heard: the walk has no room for more.")
+    return soundings
 
 
 def _track(
@@ -220,17 +220,17 @@ def _write_frames(
     count = len(trip.stamps_s)
     names = [f"{index:06d}" for index in range(count)]
     odometry = trip.world_from_camera
-    if settings.drift > 0.0:
-        from avlmaps.sim.sensor import drifted
-
-        odometry = drifted(trip.world_from_camera, settings.drift, rng)
+    if settings.drift is not None:
+        odometry = drifted(trip.world_from_camera, rng, settings.drift)
         write_true_poses(writer.path, trip.stamps_s, trip.world_from_camera)
     if settings.semantic:
         (writer.path / SEMANTIC).mkdir(exist_ok=True)
     with TemporaryDirectory(prefix=".recording-", dir=writer.path.parent) as scratch:
         artist = _Artist(Renderer(scene), settings, Path(scratch), seed)
-        jobs = [(index, names[index], trip.world_from_camera[index]) for index in range(count)]
-        for index in progress(_drawn(artist, jobs, settings.workers), "recording", total=count):
+        shifts = artist.sensor.shifts(count, rng)
+        jobs = [(index, names[index], trip.world_from_camera[index], shifts[index]) for index in range(count)]
+        workers = settings.workers or os.cpu_count() or 1
+        for index in progress(_drawn(artist, jobs, workers), "recording", total=count):
             files = artist.files(names[index])
             writer.add_files(names[index], float(trip.stamps_s[index]), odometry[index], files[0], files[1])
             for file in files[:2]:
@@ -239,7 +239,7 @@ def _write_frames(
                 files[2].replace(writer.path / SEMANTIC / files[2].name)
 
 
-_Job = tuple[int, str, Float[np.ndarray, "4 4"]]
+_Job = tuple[int, str, Float[np.ndarray, "4 4"], Shift]
 
 
 class _Artist:
@@ -247,11 +247,7 @@ class _Artist:
 
     def __init__(self, renderer: Renderer, settings: RecordSettings, folder: Path, seed: int) -> None:
         self._renderer, self._settings, self._folder, self._seed = renderer, settings, folder, seed
-        self._sensor = None
-        if settings.sensor != "clean":
-            from avlmaps.sim.sensor import Sensor
-
-            self._sensor = Sensor.named(settings.sensor)
+        self.sensor = Sensor(PRESETS[settings.sensor])
 
     def files(self, name: str) -> tuple[Path, Path, Path]:
         """Return where a frame's colour, depth and instances are."""
@@ -263,12 +259,12 @@ class _Artist:
 
     def draw(self, job: _Job) -> int:
         """Draw one frame and return its index."""
-        index, name, pose = job
+        index, name, pose, shift = job
         camera = self._settings.camera
         view = self._renderer.render(camera, pose)
         rgb, depth_m = view.rgb, view.depth_m
-        if self._sensor is not None:
-            rgb, depth_m = self._sensor.spoil(view, camera, np.random.default_rng([self._seed, index]))
+        if self._settings.sensor != "clean":
+            rgb, depth_m = self.sensor.spoil(view, camera, np.random.default_rng([self._seed, index]), shift)
         colour, depth, semantic = self.files(name)
         _write_png(colour, rgb[..., ::-1])
         _write_png(depth, _millimetres(depth_m))

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -72,7 +73,7 @@ class Air:
             room[area.contains(middle)] = index
         if (room >= 0).any():  # doorways lie between rooms, and belong to the nearer one
             indoors = ndimage.binary_closing(room >= 0, iterations=_BETWEEN_ROOMS)
-            nearest = ndimage.distance_transform_edt(room < 0, return_distances=False, return_indices=True)
+            nearest: Any = ndimage.distance_transform_edt(room < 0, return_distances=False, return_indices=True)
             room = np.where(indoors, room[tuple(nearest)], -1)
         return cls(solid, room, areas, origin, floor_m)
 

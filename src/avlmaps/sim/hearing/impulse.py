@@ -1,9 +1,9 @@
 """The impulse response from a source to a microphone in a building.
 
 What is modelled, in units of the direct sound at 1 m:
-- the direct sound, 1/r, where no wall lies between; else what bends round through the doorways (1/length of the shortest
-  way, held back as a thin screen would by Kurze and Anderson's formula, at most 24 dB) and what comes through the walls
-  (1/r, each wall by a light partition's loss);
+- the direct sound, 1/r, where no wall lies between; else what bends round through the doorways (1/length of the
+  shortest way, held back as a thin screen would by Kurze and Anderson's formula, at most 24 dB) and what comes through
+  the walls (1/r, each wall by a light partition's loss);
 - early reflections in the source's own room, where the microphone is in it too: image sources of the room's polygon, by
   pyroomacoustics, with the room's mean absorption;
 - the late field in every room: noise that decays as the coupled rooms do (``rooms``), band by band.
@@ -12,6 +12,7 @@ shift, other floors than by their slab, the directivity of sources and microphon
 """
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -75,7 +76,7 @@ class Acoustics:
         here = [air.room_at(ear[:2]) for ear in ears]
         early = self._images(rooms, own, source, ears[[room == own for room in here]])
         found = []
-        for ear, room, way in zip(ears, here, air.ways(source, ears), strict=True):
+        for room, way in zip(here, air.ways(source, ears), strict=True):
             images = early.pop(0) if room == own and early else None
             found.append(self._response(way, images, late[room] if late is not None and room >= 0 else None))
         return found
@@ -200,7 +201,7 @@ def _counter_clockwise(area: Area) -> Float[np.ndarray, "k 2"]:
     return np.asarray(area.polygon if signed > 0 else area.polygon[::-1], np.float64)
 
 
-def _library():  # noqa: ANN202 - a module
+def _library() -> Any:
     try:
         import pyroomacoustics
     except ImportError:

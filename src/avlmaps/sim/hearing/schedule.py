@@ -1,7 +1,7 @@
 """When each source sounds: as the robot comes by, one after the other, far enough apart."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -53,58 +53,99 @@ def schedule(
     stamps_s: Float[np.ndarray, " n"],
     robot: Float[np.ndarray, "n 3"],
     rule: ScheduleRule | None = None,
+    most: int | None = None,
+    pairs: int | None = None,
 ) -> list[Sounding]:
-    """Let every source sound when the robot is nearest to it, as far as the rule allows; those without room are left out.
+    """Let sources sound when the robot is nearest to them, as far as the rule allows; what finds no room is left out.
 
-    Those with the fewest possible onsets choose first.
+    Kinds that have two sources come first, and are heard twice or count as one source.
 
     Args:
         scene: its rooms; a source in another room than the robot counts as farther away.
-        sources: what may sound.
+        sources: what may sound, the most wanted first.
         stamps_s: when the robot was where.
         robot: its places.
         rule: what keeps sounds apart.
+        most: how many are heard at most.
+        pairs: how many kinds are heard twice at most.
 
     Returns:
         In the order of their onsets.
     """
-    rule = rule or ScheduleRule()
-    walk = Walk.along(stamps_s, robot)
-    areas = np.array([scene.area_at(place) for place in walk.position])
-    wanted = [_mean_distance_m(scene, source, walk, areas) for source in sources]
-    order = sorted(range(len(sources)), key=lambda i: int((wanted[i] < rule.reach_m).sum()))
-    found: list[Sounding] = []
-    for i in order:
-        source, cost = sources[i], wanted[i]
-        free = _free_onsets(walk, found, _steps(source), rule)[: len(cost)] & (cost < rule.reach_m)
-        if free.any():
-            best = int(np.where(free, cost, np.inf).argmin())
-            onset_s = float(walk.stamps_s[best])
-            half = walk.position[walk.index(onset_s + source.sound.duration_s / 2)]
-            at = (float(half[0]), float(half[1]), float(half[2]))
-            found.append(Sounding(source, onset_s, onset_s + source.sound.duration_s, at))
-    return sorted(found, key=lambda sounding: sounding.onset_s)
+    planner = _Planner(scene, Walk.along(stamps_s, robot), rule or ScheduleRule())
+    most = len(sources) if most is None else most
+    kinds: dict[str, list[Source]] = {}
+    for source in sources:
+        kinds.setdefault(source.category, []).append(source)
+    single = list(kinds.values())
+    twice = [own for own in single if len(own) > 1]
+    for own in twice:
+        if len(planner.found) + 2 <= most and (pairs is None or planner.pairs < pairs) and planner.take_both(own[:2]):
+            single.remove(own)
+    for own in single:
+        if len(planner.found) < most:
+            planner.take_one_of(own)
+    return sorted(planner.found, key=lambda sounding: sounding.onset_s)
+
+
+@dataclass(slots=True)
+class _Planner:
+    """Takes sources into the schedule one by one."""
+
+    scene: Scene
+    walk: Walk
+    rule: ScheduleRule
+    found: list[Sounding] = field(default_factory=list)
+    pairs: int = 0
+    _areas: np.ndarray | None = None
+
+    def take_both(self, sources: Sequence[Source]) -> bool:
+        """Let all of these be heard, or none."""
+        before = len(self.found)
+        if all(self.take_one_of([source]) for source in sources):
+            self.pairs += 1
+            return True
+        del self.found[before:]
+        return False
+
+    def take_one_of(self, sources: Sequence[Source]) -> bool:
+        """Let the first of these be heard for which there is room."""
+        for source in sources:
+            cost = self._mean_distance_m(source)
+            free = _free_onsets(self.walk, self.found, _steps(source), self.rule) & (cost < self.rule.reach_m)
+            if free.any():
+                self.found.append(self._sounding(source, int(np.where(free, cost, np.inf).argmin())))
+                return True
+        return False
+
+    def _sounding(self, source: Source, step: int) -> Sounding:
+        onset_s = float(self.walk.stamps_s[step])
+        half = self.walk.position[self.walk.index(onset_s + source.sound.duration_s / 2)]
+        robot = (float(half[0]), float(half[1]), float(half[2]))
+        return Sounding(source, onset_s, onset_s + source.sound.duration_s, robot)
+
+    def _mean_distance_m(self, source: Source) -> Float[np.ndarray, " onsets"]:
+        """Return for every onset that leaves room how far away the robot is while it sounds, on average."""
+        if self._areas is None:
+            self._areas = np.array([self.scene.area_at(place) for place in self.walk.position])
+        distance_m = np.linalg.norm(self.walk.position - np.asarray(source.position), axis=1)
+        at_object = self.scene.objects[source.instance].area if source.instance >= 0 else -1
+        own = at_object if at_object >= 0 else self.scene.area_at(source.position)
+        if own >= 0:
+            distance_m = distance_m + _OTHER_ROOM_M * ((self._areas != own) & (self._areas >= 0))
+        steps = _steps(source)
+        total = np.concatenate([[0.0], np.cumsum(distance_m)])
+        return (total[steps:] - total[:-steps]) / steps if steps <= len(distance_m) else np.zeros(0)
 
 
 def _steps(source: Source) -> int:
     return int(np.ceil(source.sound.duration_s / _STEP_S)) + 1
 
 
-def _mean_distance_m(scene: Scene, source: Source, walk: Walk, areas: np.ndarray) -> Float[np.ndarray, " onsets"]:
-    """Return for every onset that leaves room how far away the robot is from the source while it sounds, on average."""
-    distance_m = np.linalg.norm(walk.position - np.asarray(source.position), axis=1)
-    own = scene.objects[source.instance].area if source.instance >= 0 else scene.area_at(source.position)
-    if own >= 0:
-        distance_m = distance_m + _OTHER_ROOM_M * ((areas != own) & (areas >= 0))
-    steps = _steps(source)
-    if steps > len(distance_m):
-        return np.zeros(0)
-    total = np.concatenate([[0.0], np.cumsum(distance_m)])
-    return (total[steps:] - total[:-steps]) / steps
-
-
 def _free_onsets(walk: Walk, found: Sequence[Sounding], steps: int, rule: ScheduleRule) -> Bool[np.ndarray, " onsets"]:
     """Tell at which onsets a sound of so many steps would keep the rule."""
+    if steps > len(walk.stamps_s):
+        return np.zeros(0, bool)
     taken = np.zeros(len(walk.stamps_s), bool)
     for other in found:
         begin, end = other.onset_s - rule.pause_s, other.offset_s + rule.pause_s
@@ -113,4 +154,4 @@ def _free_onsets(walk: Walk, found: Sequence[Sounding], steps: int, rule: Schedu
         away = np.linalg.norm(walk.position[:, None] - heard[None], axis=2).min(axis=1)
         taken |= away < rule.distance_m
     blocked = np.concatenate([[0], np.cumsum(taken)])
-    return blocked[steps:] == blocked[:-steps] if steps <= len(taken) else np.zeros(0, bool)
+    return blocked[steps:] == blocked[:-steps]

@@ -14,7 +14,8 @@ from avlmaps.sim.scene import Scene
 
 _REACH_M = 2.5  # a source is placed only where the robot comes so near
 _STOREY_M = 2.0
-_FLOOR_PLACES = 6  # candidates on the floor for each kind
+_FLOOR_PLACES = 12  # candidates on the floor for each kind
+_OFF_THE_WAY_M = 0.6  # nothing sounds where the robot drives
 _FROM_WALL_M = 0.4
 
 
@@ -166,7 +167,8 @@ def _on_floor(
         area = areas[int(rng.integers(len(areas)))]
         low, high = area.polygon.min(axis=0) + _FROM_WALL_M, area.polygon.max(axis=0) - _FROM_WALL_M
         xy = rng.uniform(np.minimum(low, high), np.maximum(low, high))
-        if bool(area.contains(xy)):
+        clear = walk is None or np.linalg.norm(walk[:, :2] - xy, axis=1).min() >= _OFF_THE_WAY_M
+        if clear and bool(area.contains(xy)):
             found.append(_Place((float(xy[0]), float(xy[1]), area.floor_m + kind.height_m), -1))
     return found
 
