@@ -152,7 +152,7 @@ def add_home(shard: Shard, seed: int, options: Options) -> None:
 def _sensor(rng: np.random.Generator):
     from avlmaps.sim import sensor
 
-    return (sensor.CLEAN, sensor.KINECT, sensor.KINECT, sensor.REALSENSE)[int(rng.integers(4))]
+    return sensor.Sensor((sensor.CLEAN, sensor.KINECT, sensor.KINECT, sensor.REALSENSE)[int(rng.integers(4))])
 
 
 def _floor_under(scene: Scene, pose: np.ndarray) -> float:

@@ -1,6 +1,8 @@
 """Progress on standard error: a bar with a rate on a terminal, a line now and then elsewhere."""
 
+import os
 import sys
+import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
@@ -8,6 +10,7 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 _quiet = False
 _open_bars: list[Any] = []
+_lock_owner = -1
 
 
 def silence(quiet: bool = True) -> None:
@@ -27,6 +30,17 @@ def silenced(quiet: bool = True) -> Iterator[None]:
         silence(before)
 
 
+def _keep_lock_to_this_process(bar: type) -> None:
+    """Give bars a lock of this process alone.
+
+    Theirs is shared with forked processes, so that one that is killed while it draws stops all others for ever.
+    """
+    global _lock_owner
+    if _lock_owner != os.getpid():
+        bar.set_lock(threading.RLock())  # pyright: ignore[reportAttributeAccessIssue]
+        _lock_owner = os.getpid()
+
+
 def progress(
     items: Iterable[T], label: str, *, total: int | None = None, done: int = 0, unit: str = "frame"
 ) -> Iterator[T]:
@@ -41,6 +55,7 @@ def progress(
     """
     from tqdm import tqdm
 
+    _keep_lock_to_this_process(tqdm)
     on_terminal = sys.stderr.isatty()
     bar = tqdm(
         items,

@@ -9,7 +9,7 @@ from avlmaps.maps.lock import locked
 from avlmaps.maps.parts import build_part, merge_parts
 from avlmaps.maps.plan import claim, make_plan
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
-from avlmaps.maps.stages import commit, find_up, fuse, hear_sounds, merge
+from avlmaps.maps.stages import commit, find_up, fuse, hear_sounds, merge, stand
 from avlmaps.maps.stored import StoredMap, describe, open_stored
 from avlmaps.perception.profiles import profile as profile_of
 from avlmaps.recordings.types import Recording
@@ -52,6 +52,7 @@ def build_map(
     with silenced(not progress), locked(plan.path):
         if claim(plan, resume, overwrite) is None:
             up = find_up(plan)
+            plan = stand(plan, up[0])
             fused = fuse(plan, parts)
             pictures = keep_keyframes(plan, fused)
             heard = hear_sounds(plan)

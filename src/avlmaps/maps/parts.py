@@ -21,6 +21,7 @@ from avlmaps.core.progress import progress
 from avlmaps.maps.ahead import run_ahead
 from avlmaps.maps.checkpoints import Checkpoint, find_checkpoint, key_of, load_checkpoint, save_checkpoint
 from avlmaps.maps.fusion import VoxelAccumulator, VoxelSums
+from avlmaps.maps.gravity_stage import grounded
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.manifest import BadFrame
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
@@ -28,7 +29,7 @@ from avlmaps.perception.profiles import Profile, profile
 from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.recordings.types import Frame, Recording
 
-BUILD_VERSION = 1  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
+BUILD_VERSION = 2  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
 
 Span = tuple[int, int, int]
 _Perceived = tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]
@@ -80,7 +81,8 @@ def fusion_key(recording: Recording, settings: BuildSettings, used: Profile) -> 
     """Return the hash of all that the sums of a frame depend on; parts are only ever added to parts of the same key."""
     encoder = pixel_encoder_of(used)
     card = None if encoder is None else encoder.card
-    return key_of("fusion", BUILD_VERSION, recording.fingerprint, settings.voxel_size_m, settings.fusion, card)
+    ground = (settings.gravity, settings.seed) if encoder is not None else None
+    return key_of("fusion", BUILD_VERSION, recording.fingerprint, settings.voxel_size_m, settings.fusion, card, ground)
 
 
 def plan_spans(frames: int, settings: BuildSettings, covered: Sequence[Span] = ()) -> list[Span]:
@@ -136,7 +138,8 @@ def build_part(
         if part.info.spans != (span,):
             raise MapError(f"{out} holds a part of other frames; give another folder, or remove it first.")
         return part
-    fuse_spans(recording, [(span, out)], used, settings)
+    known = grounded(recording, settings) if used.pixels else recording
+    fuse_spans(known, [(span, out)], used, settings)
     return load_part(out, key)
 
 

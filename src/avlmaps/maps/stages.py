@@ -2,8 +2,7 @@
 
 import shutil
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
@@ -11,12 +10,14 @@ from time import perf_counter
 import msgspec
 import numpy as np
 
-from avlmaps.core.errors import MapError, RecordingError
+from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.maps.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
 from avlmaps.maps.checks import array_fields, assembled
+from avlmaps.maps.gravity_stage import look_for_up, spread_frames
 from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.ground import GroundedRecording, find_ground
 from avlmaps.maps.keyframe_stage import KeptKeyframes
 from avlmaps.maps.manifest import Box, Counts, MapInfo, RecordingInfo, RigInfo, Timings, UpInfo
 from avlmaps.maps.parts import (
@@ -33,10 +34,8 @@ from avlmaps.maps.parts import (
 from avlmaps.maps.plan import Plan, audio_key
 from avlmaps.maps.store import MapContent, write_map
 from avlmaps.maps.types import HeardSounds, Voxels
-from avlmaps.recordings.types import Frame, Recording
+from avlmaps.recordings.types import Ground, Recording
 
-# Number of the stage as a source of randomness (keyframes have 2).
-_GRAVITY = 1
 # Below this share of agreeing surface the direction that was found is told as a guess.
 _GUESS = 0.1
 
@@ -68,27 +67,25 @@ def find_up(plan: Plan) -> tuple[UpInfo, float]:
     found = find_checkpoint(folder, _UpFacts, key)
     if found is None:
         begin = perf_counter()
-        save_checkpoint(folder, key, _UpFacts(_look_for_up(plan), perf_counter() - begin), {})
+        save_checkpoint(folder, key, _UpFacts(look_for_up(plan.recording, plan.settings), perf_counter() - begin), {})
         found = load_checkpoint(folder, _UpFacts, key)
     return found.facts.up, found.facts.elapsed_s
 
 
-def _look_for_up(plan: Plan) -> UpInfo:
-    from avlmaps.maps.gravity import find_up as up_of_planes
-
-    try:
-        up = up_of_planes(_spread(plan.recording, plan.settings.gravity.frames), plan.rng(_GRAVITY))
-    except RecordingError:  # too little smooth surface: people and robots hold cameras upright, more or less
-        held = -plan.recording.world_from_camera[:, :3, 1].mean(axis=0)
-        return UpInfo.of(held if np.linalg.norm(held) > 0.01 else np.array([0.0, 0.0, 1.0]), "camera", 0.0)
-    return UpInfo.of(up.direction, "planes", float(up.support))
-
-
-def _spread(recording: Recording, count: int) -> Iterator[Frame]:
-    """Read frames evenly spread over the recording; what cannot be read is told when it comes to fusing."""
-    for index in np.unique(np.linspace(0, len(recording) - 1, count).round().astype(int)):
-        with suppress(RecordingError):
-            yield recording.frame(int(index))
+def stand(plan: Plan, up: UpInfo) -> Plan:
+    """Return the plan with the recording's frames told where up and the floor are, if a model may ask for it."""
+    if not (plan.used.pixels or plan.used.views):
+        return plan
+    key = key_of("ground", BUILD_VERSION, plan.recording.fingerprint, plan.settings.gravity, up)
+    folder = plan.folder("ground", key)
+    found = find_checkpoint(folder, _Facts, key)
+    if found is None:
+        begin = perf_counter()
+        ground = find_ground(spread_frames(plan.recording, plan.settings.gravity.frames), np.array(up.direction))
+        arrays = {name: getattr(ground, name) for name in ("up_in_world", "camera_m", "floor_m")}
+        save_checkpoint(folder, key, _Facts(perf_counter() - begin), arrays)
+        found = load_checkpoint(folder, _Facts, key)
+    return replace(plan, recording=GroundedRecording(plan.recording, Ground(**found.arrays)))
 
 
 def fuse(plan: Plan, given: Sequence[Path | str]) -> list[Part]:

@@ -14,6 +14,27 @@ from avlmaps.recordings.audio import AudioTrack
 
 
 @dataclass(frozen=True, slots=True)
+class Ground:
+    """Which way is up, and where the floor is under a camera.
+
+    Attributes:
+        up_in_world: unit vector.
+        camera_m: (k,) rising heights of cameras along up.
+        floor_m: (k,) height along up of the floor under each of them.
+    """
+
+    up_in_world: Float[np.ndarray, "3"]
+    camera_m: Float[np.ndarray, " k"]
+    floor_m: Float[np.ndarray, " k"]
+
+    def camera_height_m(self, world_from_camera: Float[np.ndarray, "4 4"]) -> float:
+        """Return how high over the floor a camera is."""
+        height = float(world_from_camera[:3, 3] @ self.up_in_world)
+        nearest = int(np.argmin(np.abs(self.camera_m - height)))
+        return height - float(self.floor_m[nearest])
+
+
+@dataclass(frozen=True, slots=True)
 class Frame:
     """One moment of the camera.
 
@@ -25,6 +46,7 @@ class Frame:
         depth_m: z-depth in metres; 0 where there is none (never NaN).
         world_from_camera: 4x4 pose of the depth camera.
         rig: the two cameras.
+        ground: which way is up and where the floor is, once that is known (a build finds it out first).
     """
 
     index: int
@@ -34,6 +56,7 @@ class Frame:
     depth_m: Float[np.ndarray, "hd wd"]
     world_from_camera: Float[np.ndarray, "4 4"]
     rig: Rig
+    ground: Ground | None = None
 
     def __post_init__(self) -> None:
         rgb_size, depth_size = (
