@@ -38,7 +38,20 @@ ON_TOP: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 _DENSITY = {"bookshelf": 1.6, "wall shelf": 1.3, "kitchen counter": 1.4, "dining table": 0.9, "sofa": 0.7, "bed": 0.5,
             "chair": 0.06, "wardrobe": 0.25, "refrigerator": 0.2, "armchair": 0.3}  # fmt: skip
-_LYING = ("box", "bag", "toy", "shoes", "ball", "basket", "book", "cushion", "laundry basket", "dumbbell", "towel", "bottle")
+_LYING = (
+    "box",
+    "bag",
+    "toy",
+    "shoes",
+    "ball",
+    "basket",
+    "book",
+    "cushion",
+    "laundry basket",
+    "dumbbell",
+    "towel",
+    "bottle",
+)
 
 
 def things_on(f: Furnisher, anchor: Stood, wanted: Sequence[str], turn_rad: float | None = None) -> int:

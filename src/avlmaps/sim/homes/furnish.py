@@ -117,9 +117,7 @@ class Furnisher:
             at = stood.to_world(np.array([x, y]))
             strength = draw(self.rng, 0.25, 0.6)
             warm = (strength, strength * draw(self.rng, 0.82, 1.0), strength * draw(self.rng, 0.6, 0.95))
-            self.builder.lights.append(
-                Light((float(at[0]), float(at[1]), float(z + place.z + self.floor_m)), warm)
-            )
+            self.builder.lights.append(Light((float(at[0]), float(at[1]), float(z + place.z + self.floor_m)), warm))
         self.stood.append(stood)
         return stood
 

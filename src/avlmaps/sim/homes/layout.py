@@ -17,15 +17,33 @@ _PASSAGES = ("hallway", "corridor", "entrance hall")
 
 def cut(polygon: Polygon, share: float, direction: Float[np.ndarray, "2"]) -> tuple[Polygon, Polygon]:
     """Cut a convex polygon by a line across a direction, so that the first part has a share of the area."""
-    reach = polygon @ direction
-    low, high = float(reach.min()), float(reach.max())
-    goal = share * area_m2(polygon)
-    for _ in range(22):
-        at = (low + high) / 2
-        first = half(polygon, at * direction, direction)
-        low, high = (at, high) if len(first) < 3 or area_m2(first) < goal else (low, at)
-    at = (low + high) / 2
+    reach = (polygon @ direction).tolist()
+    across = (polygon @ np.array([-direction[1], direction[0]])).tolist()
+    sides = list(zip(reach, across, reach[1:] + reach[:1], across[1:] + across[:1], strict=True))
+    goal, done = share * area_m2(polygon), 0.0
+    levels = sorted(reach)
+    at = levels[-1]
+    for low, high in zip(levels, levels[1:], strict=False):
+        if high - low < 1e-9:
+            continue
+        # Between two corners the width changes evenly: widths a little inside both ends tell it all.
+        near, far = (_width_at(sides, low + f * (high - low)) for f in (0.001, 0.999))
+        slab = 0.5 * (near + far) * (high - low)
+        if done + slab >= goal:
+            slope = (far - near) / (high - low)
+            need = goal - done
+            step = need / near if abs(slope) < 1e-9 else (np.sqrt(max(near**2 + 2 * slope * need, 0.0)) - near) / slope
+            at = low + float(step)
+            break
+        done += slab
     return half(polygon, at * direction, direction), half(polygon, at * direction, -direction)
+
+
+def _width_at(sides: list[tuple[float, float, float, float]], level: float) -> float:
+    crossing = [
+        y0 + (level - x0) / (x1 - x0) * (y1 - y0) for x0, y0, x1, y1 in sides if (x0 < level) != (x1 < level)
+    ]
+    return max(crossing) - min(crossing) if crossing else 0.0
 
 
 def divided(
@@ -128,7 +146,7 @@ def _without_corner(rng: np.random.Generator, polygon: Polygon) -> Polygon:
 def sound(rooms: list[tuple[str, Polygon]]) -> bool:
     """Tell whether every room is wide enough for its kind and none is a strip."""
     for kind, polygon in rooms:
-        if len(polygon) < 3 or np.min(np.linalg.norm(polygon - np.roll(polygon, 1, axis=0), axis=1)) < 0.5:
+        if len(polygon) < 3 or np.min(np.hypot(*(polygon - polygon[[*range(1, len(polygon)), 0]]).T)) < 0.5:
             return False
         least, most = widths_m(polygon)
         longest = 9.0 if kind in _PASSAGES else 2.6
@@ -173,6 +191,8 @@ def floor_of(
 
 
 def _long_way(polygon: Polygon) -> Float[np.ndarray, "2"]:
-    along = np.roll(polygon, -1, axis=0) - polygon
-    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    along = polygon[[*range(1, len(polygon)), 0]] - polygon
+    length = np.hypot(along[:, 0], along[:, 1])
+    along = along[length > 0.45 * length.max()]  # a corner cut off does not turn the rooms
+    along = along / np.hypot(along[:, 0], along[:, 1])[:, None]
     return along[int(np.argmax(np.ptp(polygon @ along.T, axis=0)))]

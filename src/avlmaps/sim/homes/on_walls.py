@@ -36,7 +36,9 @@ def _at_window(side: Side, at_m: float, piece_depth_m: float) -> np.ndarray:
     return (side.a + at_m * side.along + (0.001 + piece_depth_m / 2) * side.inward)[None]
 
 
-def _curtain(f: Furnisher, side: Side, window: tuple[float, float, float, float], warm: bool, style: str | None) -> None:
+def _curtain(
+    f: Furnisher, side: Side, window: tuple[float, float, float, float], warm: bool, style: str | None
+) -> None:
     start, end, sill, head = window
     width = end - start + draw(f.rng, 0.1, 0.5)
     at = (start + end) / 2
@@ -136,4 +138,3 @@ def _lamp_places(f: Furnisher, size_m2: float) -> np.ndarray:
     number = count(f.rng, 2, 3) if size_m2 < 45 else count(f.rng, 3, 6)
     step = longest.length_m / number
     return centre + np.outer((np.arange(number) - (number - 1) / 2) * step, longest.along)
-

@@ -176,7 +176,9 @@ class Ground:
         y = np.maximum(np.abs(c * away[..., 1] - s * away[..., 0]) - foot.half[1], 0.0)
         return np.hypot(x, y) < by_m
 
-    def take(self, foot: Footprint, centre: np.ndarray, heading_rad: float, z: float = 0.0, front_m: float = 0.0) -> int:
+    def take(
+        self, foot: Footprint, centre: np.ndarray, heading_rad: float, z: float = 0.0, front_m: float = 0.0
+    ) -> int:
         """Keep the place of a piece, and a zone before it clear of others; return the piece's number."""
         corner = corners_of(centre, foot.half, np.float64(heading_rad))
         self._corner.append(corner)
@@ -218,7 +220,9 @@ def ground_of(plan: Plan, room: int) -> Ground:
             if inward @ side.inward < 0.999 or abs(float((wall.a - side.a) @ side.inward) + plan.wall_m / 2) > 1e-3:
                 continue
             if wall.right == OUTSIDE:
-                sides[number] = side = Side(side.a, side.along, side.inward, side.length_m, side.closed, side.windows, True)
+                sides[number] = side = Side(
+                    side.a, side.along, side.inward, side.length_m, side.closed, side.windows, True
+                )
             if not wall.built:
                 s, e = sorted((float((wall.a - side.a) @ side.along), float((wall.b - side.a) @ side.along)))
                 side.closed.append((s - 0.1, e + 0.1, 0.0, 9.0))

@@ -11,8 +11,8 @@ _SAME_M = 1e-6
 
 def area_m2(polygon: Float[np.ndarray, "k 2"]) -> float:
     """Return the area of a polygon, positive where it runs counter-clockwise."""
-    x, y = polygon[:, 0], polygon[:, 1]
-    return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+    corners: list[list[float]] = polygon.tolist()  # so few that plain numbers are faster
+    return 0.5 * sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(corners, corners[1:] + corners[:1], strict=True))
 
 
 def middle(polygon: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "2"]:
@@ -32,15 +32,17 @@ def half(
     polygon: Float[np.ndarray, "k 2"], point: Float[np.ndarray, "2"], normal: Float[np.ndarray, "2"]
 ) -> Float[np.ndarray, "j 2"]:
     """Return the part of a convex polygon on the side of a line that its normal points away from."""
-    aside = (polygon - point) @ normal
-    kept: list[np.ndarray] = []
-    for i in range(len(polygon)):
-        j = (i + 1) % len(polygon)
-        if aside[i] <= _SAME_M:
-            kept.append(polygon[i])
-        if (aside[i] < -_SAME_M and aside[j] > _SAME_M) or (aside[i] > _SAME_M and aside[j] < -_SAME_M):
-            share = aside[i] / (aside[i] - aside[j])
-            kept.append(polygon[i] + share * (polygon[j] - polygon[i]))
+    nx, ny = float(normal[0]), float(normal[1])
+    corners: list[list[float]] = polygon.tolist()
+    level = float(point[0]) * nx + float(point[1]) * ny
+    aside = [x * nx + y * ny - level for x, y in corners]
+    kept: list[list[float]] = []
+    for a, b, s, t in zip(corners, corners[1:] + corners[:1], aside, aside[1:] + aside[:1], strict=True):
+        if s <= _SAME_M:
+            kept.append(a)
+        if (s < -_SAME_M and t > _SAME_M) or (s > _SAME_M and t < -_SAME_M):
+            share = s / (s - t)
+            kept.append([a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])])
     return np.array(kept).reshape(-1, 2)
 
 
@@ -66,8 +68,8 @@ def inside(polygon: Float[np.ndarray, "k 2"], xy: Float[np.ndarray, "*n 2"], sla
 
 def widths_m(polygon: Float[np.ndarray, "k 2"]) -> tuple[float, float]:
     """Return the least width of a polygon and its extent across that (over the directions of its sides)."""
-    along = np.roll(polygon, -1, axis=0) - polygon
-    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    along = polygon[[*range(1, len(polygon)), 0]] - polygon
+    along = along / np.hypot(along[:, 0], along[:, 1])[:, None]
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     width = np.ptp(polygon @ across.T, axis=0)
     least = int(np.argmin(width))

@@ -38,7 +38,11 @@ def _seat_places(table: Stood, width_m: float) -> list[tuple[float, float, float
             number = int(2 * half_a / (width_m + 0.08))
             for k in range(max(number, 1 if half_a > 0.3 else 0)):
                 at = (k + 0.5) / max(number, 1) * 2 * half_a - half_a
-                place = (at, sign * half_b, -sign * np.pi / 2) if turned else (sign * half_b, at, np.pi if sign > 0 else 0.0)
+                place = (
+                    (at, sign * half_b, -sign * np.pi / 2)
+                    if turned
+                    else (sign * half_b, at, np.pi if sign > 0 else 0.0)
+                )
                 out.append(place)
     return out
 

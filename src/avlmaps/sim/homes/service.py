@@ -88,7 +88,11 @@ def bathroom(f: Furnisher) -> None:
     """Furnish a bathroom or a toilet."""
     rng = f.rng
     large = f.kind == "bathroom"
-    order = ["sink", "toilet", *(["bathtub", "shower"] if chance(rng, 0.3) else [pick(rng, ("bathtub", "shower", "shower"))])]
+    order = [
+        "sink",
+        "toilet",
+        *(["bathtub", "shower"] if chance(rng, 0.3) else [pick(rng, ("bathtub", "shower", "shower"))]),
+    ]
     if not large:
         order = ["toilet", "sink"]
     rng.shuffle(order)

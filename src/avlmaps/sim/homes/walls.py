@@ -120,7 +120,9 @@ def _pieces_of(wall: Wall, height: float, start: float, end: float) -> list[tupl
     return out
 
 
-def _skirting(wall: Wall, y: tuple[float, float], start: float, end: float, height: float) -> list[tuple[Triple, Triple]]:
+def _skirting(
+    wall: Wall, y: tuple[float, float], start: float, end: float, height: float
+) -> list[tuple[Triple, Triple]]:
     out, reached = [], start
     for hole in sorted(wall.holes, key=lambda h: h.at_m):
         if hole.sill_m > height:
@@ -134,9 +136,7 @@ def _skirting(wall: Wall, y: tuple[float, float], start: float, end: float, heig
     return out
 
 
-def wall_mesh(
-    plan: Plan, wall: Wall, looks: list[Looks], edge: Material, outer: Material, skirting_m: float
-) -> Mesh:
+def wall_mesh(plan: Plan, wall: Wall, looks: list[Looks], edge: Material, outer: Material, skirting_m: float) -> Mesh:
     """Return a wall in the world, with its holes and its skirting."""
     inner = plan.wall_m / 2
     rooms = [plan.rooms[i] for i in (wall.left, wall.right) if i != OUTSIDE]
