@@ -12,7 +12,7 @@ from avlmaps.sim.mesh import Material, Mesh, Triple, joined
 from avlmaps.sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, slab, tube
 
 
-def _china(rng: np.random.Generator) -> Material:
+def china(rng: np.random.Generator) -> Material:
     """Draw sanitary ware: white mostly, an old pastel or black at times."""
     if chance(rng, 0.82):
         return material("ceramic", rng, (w := draw(rng, 0.86, 0.97), w, w * draw(rng, 0.95, 1.0)))
@@ -107,7 +107,7 @@ def _sizes(rng: np.random.Generator) -> tuple[float, float, float, float]:
 
 @family("toilet", "close-coupled")
 def _close_coupled(rng: np.random.Generator) -> Piece:
-    (length, wide, rim_z, power), look, metal = _sizes(rng), _china(rng), chrome(rng)
+    (length, wide, rim_z, power), look, metal = _sizes(rng), china(rng), chrome(rng)
     deep, across, top = draw(rng, 0.15, 0.21), draw(rng, 0.34, 0.48), rim_z + draw(rng, 0.32, 0.42)
     foot = (draw(rng, 0.32, 0.48), draw(rng, 0.2, 0.27), deep + draw(rng, 0.16, 0.24))
     seat = look if chance(rng, 0.7) else material(pick(rng, ("wood", "plastic", "black")), rng)
@@ -120,7 +120,7 @@ def _close_coupled(rng: np.random.Generator) -> Piece:
 
 @family("toilet", "hung on a casing")
 def _on_casing(rng: np.random.Generator) -> Piece:
-    (length, wide, rim_z, power), look = _sizes(rng), _china(rng)
+    (length, wide, rim_z, power), look = _sizes(rng), china(rng)
     case_deep, case_wide, top = draw(rng, 0.1, 0.2), draw(rng, 0.5, 1.1), draw(rng, 0.95, 1.25)
     clad = pictured(pick(rng, ("tile", "plaster", "marble", "wood")), rng, "ceramic")
     foot = (length * 0.8, wide * 0.75, case_deep + length * 0.42)
@@ -135,7 +135,7 @@ def _on_casing(rng: np.random.Generator) -> Piece:
 
 @family("toilet", "back to wall")
 def _back_to_wall(rng: np.random.Generator) -> Piece:
-    (length, wide, rim_z, power), look, metal = _sizes(rng), _china(rng), chrome(rng)
+    (length, wide, rim_z, power), look, metal = _sizes(rng), china(rng), chrome(rng)
     deep, across, top = draw(rng, 0.14, 0.2), draw(rng, 0.36, 0.42), rim_z + draw(rng, 0.3, 0.4)
     skirt = (length + deep * 0.6, wide * 0.86, deep + length * 0.42)
     bowl = [(outline(skirt[0] * 0.93, skirt[1], 3.5, 20, 0.04, (skirt[2] * 0.92, 0.0)), 0.0),
@@ -152,7 +152,7 @@ def _back_to_wall(rng: np.random.Generator) -> Piece:
 
 @family("toilet", "one piece")
 def _one_piece(rng: np.random.Generator) -> Piece:
-    (length, wide, rim_z, power), look, metal = _sizes(rng), _china(rng), chrome(rng)
+    (length, wide, rim_z, power), look, metal = _sizes(rng), china(rng), chrome(rng)
     deep, top = draw(rng, 0.18, 0.24), rim_z + draw(rng, 0.16, 0.3)
     across = wide * draw(rng, 0.98, 1.1)
     foot = (length * 0.95, wide * 0.72, deep + length * 0.35)
@@ -166,7 +166,7 @@ def _one_piece(rng: np.random.Generator) -> Piece:
 
 @family("toilet", "washing seat", held_out=True)
 def _washing_seat(rng: np.random.Generator) -> Piece:
-    (length, wide, rim_z, _), look = _sizes(rng), _china(rng)
+    (length, wide, rim_z, _), look = _sizes(rng), china(rng)
     total, power = length + draw(rng, 0.12, 0.2), draw(rng, 3.0, 5.0)
     middle = (total / 2, 0.0)
     levels = [(outline(total * a, wide * b, power, 22, 0.07, (total / 2 - total * (1 - a) / 2, 0.0)), z)
@@ -182,7 +182,7 @@ def _washing_seat(rng: np.random.Generator) -> Piece:
 
 @family("toilet", "high tank", held_out=True)
 def _high_tank(rng: np.random.Generator) -> Piece:
-    (length, wide, rim_z, _), look, metal = _sizes(rng), _china(rng), chrome(rng)
+    (length, wide, rim_z, _), look, metal = _sizes(rng), china(rng), chrome(rng)
     wood = material("wood", rng)
     low = draw(rng, 0.85, 1.75)
     deep, across, tall = draw(rng, 0.17, 0.22), draw(rng, 0.4, 0.52), draw(rng, 0.28, 0.36)
@@ -227,7 +227,7 @@ def _tub_size(rng: np.random.Generator) -> tuple[float, float, float]:
 
 @family("bathtub", "built in")
 def _built_in(rng: np.random.Generator) -> Piece:
-    (wide, long, high), look = _tub_size(rng), _china(rng)
+    (wide, long, high), look = _tub_size(rng), china(rng)
     skirt = look if chance(rng, 0.5) else pictured(pick(rng, ("tile", "tile", "wood", "marble")), rng, "ceramic")
     wall, metal = draw(rng, 0.04, 0.11), chrome(rng)
     parts = _tub(
@@ -245,7 +245,7 @@ def _built_in(rng: np.random.Generator) -> Piece:
 
 @family("bathtub", "with glass screen")
 def _screened(rng: np.random.Generator) -> Piece:
-    (wide, long, high), look, metal = _tub_size(rng), _china(rng), chrome(rng)
+    (wide, long, high), look, metal = _tub_size(rng), china(rng), chrome(rng)
     parts = _tub((0.0, -long / 2, 0.0), (wide, long / 2, high), 5.0, 0.06, look, look, 0.4)
     pane, tall = draw(rng, 0.35, 0.55) * long, draw(rng, 1.3, 1.5)
     parts += [box((wide - 0.04, long / 2 - pane, high), (wide - 0.032, long / 2, high + tall), material("glass", rng)),
@@ -259,7 +259,7 @@ def _screened(rng: np.random.Generator) -> Piece:
 
 @family("bathtub", "with shower curtain")
 def _curtained_tub(rng: np.random.Generator) -> Piece:
-    (wide, long, high), look, metal = _tub_size(rng), _china(rng), chrome(rng)
+    (wide, long, high), look, metal = _tub_size(rng), china(rng), chrome(rng)
     parts = _tub((0.0, -long / 2, 0.0), (wide, long / 2, high), 4.0, 0.06, look, look, 0.4)
     rail, share = draw(rng, 1.9, 2.05), draw(rng, 0.25, 1.0)
     parts.append(tube([(wide - 0.03, -long / 2, rail), (wide - 0.03, long / 2, rail)], 0.012, metal, 6))
@@ -297,7 +297,7 @@ def _free_tub(rng: np.random.Generator, wide: float, long: float, z: tuple[float
 
 @family("bathtub", "freestanding oval")
 def _freestanding(rng: np.random.Generator) -> Piece:
-    wide, long, high, look = draw(rng, 0.68, 0.88), draw(rng, 1.45, 1.85), draw(rng, 0.52, 0.66), _china(rng)
+    wide, long, high, look = draw(rng, 0.68, 0.88), draw(rng, 1.45, 1.85), draw(rng, 0.52, 0.66), china(rng)
     outside = look if chance(rng, 0.65) else material(pick(rng, ("painted", "stone", "metal")), rng)
     parts = _free_tub(
         rng, wide, long, (0.0, high), draw(rng, 0.6, 0.92), pick(rng, (2.0, 2.3, 3.0, 5.0)), outside, look
@@ -311,7 +311,7 @@ def _freestanding(rng: np.random.Generator) -> Piece:
 
 @family("bathtub", "clawfoot", held_out=True)
 def _clawfoot(rng: np.random.Generator) -> Piece:
-    wide, long, high, look = draw(rng, 0.68, 0.8), draw(rng, 1.4, 1.75), draw(rng, 0.56, 0.66), _china(rng)
+    wide, long, high, look = draw(rng, 0.68, 0.8), draw(rng, 1.4, 1.75), draw(rng, 0.56, 0.66), china(rng)
     metal, lift = chrome(rng), draw(rng, 0.1, 0.16)
     outside = look if chance(rng, 0.5) else material("painted", rng)
     parts = _free_tub(rng, wide, long, (lift, high), draw(rng, 0.5, 0.7), 2.4, outside, look)
@@ -325,7 +325,7 @@ def _clawfoot(rng: np.random.Generator) -> Piece:
 
 @family("bathtub", "corner")
 def _corner_tub(rng: np.random.Generator) -> Piece:
-    side, high, look = draw(rng, 1.2, 1.55), draw(rng, 0.5, 0.62), _china(rng)
+    side, high, look = draw(rng, 1.2, 1.55), draw(rng, 0.5, 0.62), china(rng)
     n, bow = 28, draw(rng, 0.05, 0.35)
     arc = np.linspace(0.0, np.pi / 2, n - 5)
     short = draw(rng, 0.25, 0.45) * side
@@ -438,7 +438,7 @@ def _corner_cabin(rng: np.random.Generator) -> Piece:
     side = pick(rng, (-1.0, 1.0)) * wide / 2
     cut = draw(rng, -0.1, 0.2) * wide * np.sign(side)
     frame = metal if chance(rng, 0.7) else None
-    parts = [*_tray(rng, wide, deep, _china(rng)), *_pane((0.01, side), (deep, side), (z, tall), glass, frame),
+    parts = [*_tray(rng, wide, deep, china(rng)), *_pane((0.01, side), (deep, side), (z, tall), glass, frame),
              *_pane((deep, side), (deep, float(cut)), (z, tall), glass, frame)]  # fmt: skip
     if chance(rng, 0.7):  # the door: shut or half open
         swing = draw(rng, 0.0, 0.7) if chance(rng, 0.3) else 0.0
@@ -470,7 +470,7 @@ def _corner_cabin(rng: np.random.Generator) -> Piece:
 @family("shower", "quarter round")
 def _quarter_round(rng: np.random.Generator) -> Piece:
     size, tall = draw(rng, 0.8, 1.05), draw(rng, 1.85, 2.1)
-    look, metal, glass = _china(rng), chrome(rng), material("glass", rng)
+    look, metal, glass = china(rng), chrome(rng), material("glass", rng)
     cut = draw(rng, 0.3, 0.5) * size
     arc = np.linspace(0.0, np.pi / 2, 9)
     curve = np.column_stack([cut + (size - cut) * np.cos(arc), cut + (size - cut) * np.sin(arc)])
@@ -528,7 +528,7 @@ def _walk_in(rng: np.random.Generator) -> Piece:
 def _curtained_shower(rng: np.random.Generator) -> Piece:
     wide, deep, tall = _shower_size(rng)
     metal, rail, n = chrome(rng), draw(rng, 1.9, 2.05), 40
-    parts = [*_tray(rng, wide, deep, _china(rng)), *_rail(rng, 0.0, 0.0, tall, metal)]
+    parts = [*_tray(rng, wide, deep, china(rng)), *_rail(rng, 0.0, 0.0, tall, metal)]
     bend = 0.15
     path = [
         (0.0, wide / 2),
@@ -554,7 +554,7 @@ def _five_sided(rng: np.random.Generator) -> Piece:
     size, tall, high = draw(rng, 0.85, 1.1), draw(rng, 1.85, 2.05), draw(rng, 0.05, 0.15)
     cut, metal, glass = draw(rng, 0.35, 0.55) * size, chrome(rng), material("glass", rng)
     floor = np.array([(0.0, 0.0), (size, 0.0), (size, cut), (cut, size), (0.0, size)])
-    parts = [shell([(floor, 0.0), (floor, high)], _china(rng))]
+    parts = [shell([(floor, 0.0), (floor, high)], china(rng))]
     for a, b in zip(floor[1:-1], floor[2:], strict=True):
         parts += _pane((float(a[0]), float(a[1])), (float(b[0]), float(b[1])), (high, tall), glass, metal)
     return finished([joined(parts).moved(y=-size / 2), *_rail(rng, 0.0, -0.1 * size, tall, metal)])
