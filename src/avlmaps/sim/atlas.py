@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Float32, Int, Int64, UInt8
+from jaxtyping import Float, Float32, Int, Int64, UInt8, UInt32
 
 from avlmaps.sim.mesh import Material, Mesh
 
@@ -16,15 +16,15 @@ class Atlas:
     """Pictures by material.
 
     Attributes:
-        texel: all pictures, row by row, red green blue.
-        table: (m, levels, 4) by material and level: first value in ``texel``, width, height, and in level 0 how
+        texel: all pictures, row by row, red in the lowest byte, then green and blue.
+        table: (m, levels, 4) by material and level: first texel in ``texel``, width, height, and in level 0 how
             many levels there are (0: no picture).
         mean: (m, 3) mean colour with the material's own, linear.
         colour: (m, 3) the material's own colour, linear.
         per_unit: (m, 2) repeats of the picture per unit of (u, v).
     """
 
-    texel: UInt8[np.ndarray, " n"]
+    texel: UInt32[np.ndarray, " n"]
     table: Int64[np.ndarray, "m levels 4"]
     mean: Float32[np.ndarray, "m 3"]
     colour: Float32[np.ndarray, "m 3"]
@@ -58,13 +58,13 @@ def atlas_of(materials: tuple[Material, ...]) -> Atlas:
             levels = _halvings(material.texture)
             for level, picture in enumerate(levels):
                 rows[level] = (start, picture.shape[1], picture.shape[0], len(levels))
-                texels.append(picture.reshape(-1))
-                start += picture.size
+                texels.append(picture.reshape(-1, 3).astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], np.uint32))
+                start += picture.shape[0] * picture.shape[1]
             kept[id(material.texture)] = (rows, np.square(levels[-1].reshape(-1, 3) / 255.0).mean(axis=0))
         table[index], average = kept[id(material.texture)]
         mean[index] *= average
     size = np.array([m.texture_size_m for m in materials], np.float64).reshape(-1, 2)
-    texel = np.concatenate(texels) if texels else np.zeros(3, np.uint8)
+    texel = np.concatenate(texels) if texels else np.zeros(1, np.uint32)
     return Atlas(texel, table, mean, colour, 1.0 / np.maximum(size, 1e-6))
 
 

@@ -60,6 +60,23 @@ class _Groups:
     clear: Bool[np.ndarray, " g"]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Layer:
+    """Working memory for one surface by pixel: inverse z-depth, triangle, place, side that is seen, linear colour."""
+
+    inverse: Float32[np.ndarray, " n"]
+    shown: Int32[np.ndarray, " n"]
+    place: Float32[np.ndarray, "n 3"]
+    side: Float32[np.ndarray, " n"]
+    colour: Float32[np.ndarray, "n 3"]
+
+    @classmethod
+    def empty(cls, pixels: int) -> "_Layer":
+        """Return memory for a picture of so many pixels."""
+        return cls(np.zeros(pixels, np.float32), np.zeros(pixels, np.int32), np.zeros((pixels, 3), np.float32),
+                   np.zeros(pixels, np.float32), np.zeros((pixels, 3), np.float32))  # fmt: skip
+
+
 def _grouped(mesh: Mesh) -> _Groups:
     """Sort triangles into groups that lie close together, the large ones and those one sees through apart."""
     corners = mesh.corners().astype(np.float64)
@@ -125,63 +142,75 @@ class Renderer:
         self._returns = _returns(mesh, atlas)
         self._lit = lit and len(order) > 0
         self._lights = _tables(light_map(scene, atlas.mean) if self._lit else None, order)
-        self._category = np.append(scene.category_of_instance, NOTHING).astype(np.int32)
+        self._category = scene.category_of_instance.astype(np.int32)
         self._curve = _curve(shoulder=self._lit)
+        self._any_clear = bool(self._groups.clear.any())
+        self._layers: tuple[_Layer, _Layer] | None = None
 
     def render(self, camera: Pinhole, world_from_camera: Float[np.ndarray, "4 4"]) -> View:
         """Return what the camera sees from a pose."""
-        height, width = camera.height, camera.width
         rotation = np.ascontiguousarray(world_from_camera[:3, :3].T, np.float64)
         origin = np.asarray(world_from_camera[:3, 3], np.float64)
         lens = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
-        front, behind = self._drawn(rotation, origin, lens, width, height)
-        eye = (lens.astype(np.float32), rotation.astype(np.float32), origin.astype(np.float32), width)
-        colour, side = self._coloured(*front, eye)
-        if self._groups.clear.any():
+        front, behind = self._layers_for(camera.height * camera.width)
+        self._draw(front, behind, (rotation, -rotation @ origin, lens, camera.width, camera.height))
+        eye = (lens.astype(np.float32), rotation.astype(np.float32), origin.astype(np.float32), camera.width)
+        self._shade(front, eye)
+        if self._any_clear:
+            shade_kernels.hide_equal(front.shown, behind.shown)
+            self._shade(behind, eye)
             sky = np.square(np.array(SKY, np.float32) / 255.0)
-            hidden = behind[0], np.where(behind[1] == front[1], NOTHING, behind[1])  # what needs no second look
-            shade_kernels.blend_fragments(front[1], behind[1], self._opacity, self._material, sky,
-                                          self._coloured(*hidden, eye)[0], colour)  # fmt: skip
+            shade_kernels.blend_fragments(front.shown, behind.shown, self._opacity, self._material, sky,
+                                          behind.colour, front.colour)  # fmt: skip
         gain = 1.0
         if self._lit:
-            mean = shade_kernels.mean_log_light(front[1], colour, _METER_STEP)
+            mean = shade_kernels.mean_log_light(front.shown, front.colour, _METER_STEP)
             gain = float(np.clip(_MIDDLE_GREY / np.exp(mean), *_GAINS))
-        rgb = np.empty((height, width, 3), np.uint8)
-        depth_m = np.empty((height, width), np.float32)
-        instance = np.empty((height, width), np.int32)
-        strength = np.empty((height, width), np.uint8)
-        shade_kernels.finish(*front, side, self._instance, self._material, self._returns, colour, np.float32(gain), self._curve, np.array(SKY, np.uint8),
-                             rgb.reshape(-1, 3), depth_m.reshape(-1), instance.reshape(-1),
-                             strength.reshape(-1))  # fmt: skip
-        return View(rgb, depth_m, instance, self._category[instance], strength)
+        return self._finished(front, gain, camera.height, camera.width)
 
-    def _coloured(self, inverse: np.ndarray, shown: np.ndarray, eye: tuple) -> tuple[np.ndarray, np.ndarray]:
-        """Return the linear light that comes from what each pixel shows, and how far that faces the camera."""
-        place, side = np.empty((len(shown), 3), np.float32), np.empty(len(shown), np.float32)
-        colour = np.ones((len(shown), 3), np.float32)
+    def _layers_for(self, pixels: int) -> tuple[_Layer, _Layer]:
+        """Return the working memory for pictures of a size, kept from the view before."""
+        if self._layers is None or len(self._layers[0].shown) != pixels:
+            front, behind = _Layer.empty(pixels), _Layer.empty(pixels)
+            self._layers = (front, behind)
+        return self._layers
+
+    def _draw(self, front: _Layer, behind: _Layer, eye: tuple) -> None:
+        """Find what each pixel shows first, and what it shows first that nothing shines through."""
+        groups = self._groups
+        front.inverse.fill(0.0)
+        front.shown.fill(NOTHING)
+        middle = self._middle @ eye[0].T + eye[1]
+        order = np.argsort(np.einsum("gi,gi->g", middle, middle) - 1e6 * groups.large)
+        solid = order[~groups.clear[order]] if self._any_clear else order
+        raster_kernels.draw(self._corner, groups.first, groups.box, solid, *eye, front.inverse, front.shown)
+        if self._any_clear:
+            np.copyto(behind.inverse, front.inverse)
+            np.copyto(behind.shown, front.shown)
+            clear = order[groups.clear[order]]
+            raster_kernels.draw(self._corner, groups.first, groups.box, clear, *eye, front.inverse, front.shown)
+
+    def _shade(self, layer: _Layer, eye: tuple) -> None:
+        """Work out the linear light that comes from what each pixel shows."""
+        inverse, shown, place, side = layer.inverse, layer.shown, layer.place, layer.side
         shade_kernels.place_fragments(inverse, shown, *eye, self._normal, place, side)
         if self._lit:
-            shade_kernels.light_fragments(shown, place, side, self._fraction, *self._lights, colour)
+            shade_kernels.light_fragments(shown, place, side, self._fraction, *self._lights, layer.colour)
+        else:
+            layer.colour.fill(1.0)
         shade_kernels.paint_fragments(inverse, shown, place, side, np.float32(1 / eye[0][0]), self._picture,
-                                      self._density, self._material, *self._colours, colour)  # fmt: skip
-        return colour, side
+                                      self._density, self._material, *self._colours, layer.colour)  # fmt: skip
 
-    def _drawn(
-        self, rotation: np.ndarray, origin: np.ndarray, lens: np.ndarray, width: int, height: int
-    ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """Return inverse depth and triangle of the foremost surface, and of the foremost that hides what is behind."""
-        inverse = np.zeros(height * width, np.float32)
-        shown = np.full(height * width, NOTHING, np.int32)
-        groups = self._groups
-        away = np.linalg.norm(self._middle - origin, axis=1) - 1e6 * groups.large
-        order = np.argsort(away)
-        rest = (rotation, -rotation @ origin, lens, width, height)
-        raster_kernels.draw(self._corner, groups.first, groups.box, order[~groups.clear[order]], *rest, inverse, shown)
-        if not groups.clear.any():
-            return (inverse, shown), (inverse, shown)
-        front = inverse.copy(), shown.copy()
-        raster_kernels.draw(self._corner, groups.first, groups.box, order[groups.clear[order]], *rest, *front)
-        return front, (inverse, shown)
+    def _finished(self, layer: _Layer, gain: float, height: int, width: int) -> View:
+        """Return the images of a view."""
+        images = (np.empty((height * width, 3), np.uint8), np.empty(height * width, np.float32),
+                  np.empty(height * width, np.int32), np.empty(height * width, np.int32),
+                  np.empty(height * width, np.uint8))  # fmt: skip
+        shade_kernels.finish(layer.inverse, layer.shown, layer.side, self._instance, self._category, self._material,
+                             self._returns, layer.colour, np.float32(gain), self._curve, np.array(SKY, np.uint8),
+                             *images)  # fmt: skip
+        rgb, *others = images
+        return View(rgb.reshape(height, width, 3), *(image.reshape(height, width) for image in others))
 
 
 def _tables(light: LightMap | None, order: Int[np.ndarray, " t"]) -> tuple[np.ndarray, ...]:
