@@ -17,8 +17,11 @@ STRUCTURE = frozenset({"wall", "floor", "ceiling", "column", "stairs", "railing"
 _STEP_M = 0.1  # what is lower than this can be driven over
 _THRESHOLD_M = 0.3  # gaps in the floor up to this wide (door sills, seams of a scan) count as floor
 _FLAT = 0.8  # the upward part of the normal of what can be stood on
+_SLAB_M = 0.45  # a floor is at most this thick, from its underside
 _STOREY_M = 1.5  # floors closer together than this are steps of one floor
-_NEIGHBOURS = ((1, 0), (0, 1), (1, 1), (1, -1))
+_POCKET_M2 = 0.6  # free parts smaller than this lie within something hollow
+_NARROW_M = 0.2  # where there is less room than this beside the robot, a metre costs double
+_STEPS = ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -183,28 +186,54 @@ def _one_floor(scene: Scene, floor_m: float, radius_m: float, height_m: float, c
     apart = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     # Anything in a cell may lie in its nearest corner, and the robot's middle in its own.
     clearance = np.maximum(apart - np.sqrt(2.0), 0.0) * cell_m
-    return FreeSpace(ground & (clearance >= radius_m), clearance, origin, cell_m, floor_m)
+    free = _without_pockets(ground & (clearance >= radius_m), cell_m)
+    return FreeSpace(free, clearance, origin, cell_m, floor_m)
+
+
+def _without_pockets(free: Bool[np.ndarray, "nx ny"], cell_m: float) -> Bool[np.ndarray, "nx ny"]:
+    """Leave out parts too small for a room, such as the inside of a wardrobe; the largest part stays."""
+    label, count = _labelled(free)
+    size = np.bincount(label.ravel(), minlength=count + 1)
+    size[0] = 0
+    return ((size * cell_m**2 >= _POCKET_M2) | (size == size.max(initial=0)))[label] & free
 
 
 def _graph(number: np.ndarray, clearance_m: np.ndarray | None, cell_m: float) -> sparse.csr_matrix:
-    """Join every free cell with its eight neighbours; metres cost up to double near obstacles where they are given."""
-    nx, ny = number.shape
+    """Join every free cell with sixteen neighbours; metres cost up to double near obstacles where they are given."""
     rows, columns, weights = [], [], []
-    dear = None if clearance_m is None else 1.0 + np.exp(-((np.maximum(clearance_m - 0.2, 0) / 0.2) ** 2))
-    for di, dj in _NEIGHBOURS:
-        a = (slice(0, nx - di), slice(max(0, -dj), ny - max(0, dj)))
-        b = (slice(di, nx), slice(max(0, dj), ny - max(0, -dj)))
-        both = (number[a] >= 0) & (number[b] >= 0)
-        if di and dj:  # no cutting of corners
-            both &= (number[di:nx, a[1]] >= 0) & (number[0 : nx - di, b[1]] >= 0)
-        rows.append(number[a][both])
-        columns.append(number[b][both])
-        length = cell_m * float(np.hypot(di, dj))
-        weights.append(np.full(len(rows[-1]), length) if dear is None else length * 0.5 * (dear[a] + dear[b])[both])
+    cost = np.ones(number.shape)
+    if clearance_m is not None:
+        cost += np.exp(-((np.maximum(clearance_m - _NARROW_M, 0.0) / _NARROW_M) ** 2))
+    for step in _STEPS:
+        near, far = _shifted(number, (0, 0), step), _shifted(number, step, step)
+        both = (near >= 0) & (far >= 0)
+        for between in _passed(step):  # no cutting of corners
+            both &= _shifted(number, between, step) >= 0
+        rows.append(near[both])
+        columns.append(far[both])
+        mean = 0.5 * (_shifted(cost, (0, 0), step) + _shifted(cost, step, step))[both]
+        weights.append(cell_m * float(np.hypot(*step)) * mean)
     row, column, weight = np.concatenate(rows), np.concatenate(columns), np.concatenate(weights)
-    count = int(number.max()) + 1
+    count = int(number.max(initial=-1)) + 1
     both_ways = (np.concatenate([weight, weight]), (np.concatenate([row, column]), np.concatenate([column, row])))
     return sparse.csr_matrix(both_ways, shape=(count, count))
+
+
+def _shifted(grid: np.ndarray, by: tuple[int, int], step: tuple[int, int]) -> np.ndarray:
+    """Return the part of a grid that lies ``by`` cells on from every cell from which ``step`` stays on the grid."""
+    nx, ny = grid.shape
+    first_j = max(0, -step[1])
+    last_j = ny - max(0, step[1])
+    return grid[by[0] : nx - step[0] + by[0], first_j + by[1] : last_j + by[1]]
+
+
+def _passed(step: tuple[int, int]) -> list[tuple[int, int]]:
+    """Return the cells that a step to a neighbour passes over."""
+    i, j = step
+    side = 1 if j > 0 else -1
+    if abs(i) == abs(j):
+        return [(1, 0), (0, j)]
+    return [(1, 0), (1, side)] if i == 2 else [(0, side), (1, side)] if abs(j) == 2 else []
 
 
 def _has_floor(scene: Scene) -> bool:
@@ -222,7 +251,7 @@ def _flat_triangles(scene: Scene, only_named: bool) -> tuple[np.ndarray, np.ndar
 
 
 def _levels(height: np.ndarray, weight: np.ndarray, share: float = 0.0) -> tuple[float, ...]:
-    """Return the heavy heights, lowest first: the weighted median of each group of heights within one storey."""
+    """Return the heavy heights, lowest first; within a storey the lowest, or the top of its slab."""
     edge = np.floor(height / 0.1).astype(np.int64)
     first = int(edge.min())
     total = np.bincount(edge - first, weights=weight)
@@ -233,12 +262,14 @@ def _levels(height: np.ndarray, weight: np.ndarray, share: float = 0.0) -> tuple
         level = float(np.average(height[near], weights=weight[near]))
         if not levels or level - levels[-1] > _STOREY_M:
             levels.append(level)
+        elif level - levels[-1] < _SLAB_M:
+            levels[-1] = level
     return tuple(levels)
 
 
 def reaching_part(scene: Scene, space: FreeSpace) -> FreeSpace:
     """Return the connected part that reaches most areas, and among those the largest."""
-    label, count = cast("tuple[np.ndarray, int]", ndimage.label(space.free))
+    label, count = _labelled(space.free)
     if count <= 1:
         return space
     size = np.bincount(label.ravel())[1:]
@@ -250,3 +281,8 @@ def reaching_part(scene: Scene, space: FreeSpace) -> FreeSpace:
             reached[np.unique(parts[area.contains(xy)])] += 1
     best = int(np.lexsort((size, reached))[-1])
     return space._kept(label == best + 1)
+
+
+def _labelled(free: Bool[np.ndarray, "nx ny"]) -> tuple[np.ndarray, int]:
+    """Number the connected parts from 1."""
+    return cast("tuple[np.ndarray, int]", ndimage.label(free))

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
-from avlmaps.sim.free_space import STRUCTURE, FreeSpace, occupied
+from avlmaps.sim.free_space import STRUCTURE, FreeSpace
 from avlmaps.sim.grid_kernels import sees
 from avlmaps.sim.scene import Scene
 
@@ -13,44 +13,82 @@ _CANDIDATE_M = 0.5  # places to stand are tried on a grid this wide
 _FLOOR_M = 0.8  # and floor to be seen on this one
 _OBJECT_M = 0.25  # things smaller than this are not gone to by themselves
 _BOX_GROWN_M = 0.05  # a ray that comes this near to a thing's box shows it
-_AREA, _OBJECT, _FLOOR = 3.0, 1.0, 0.3  # what entering an area, an object and a piece of floor are worth
+_TWICE_M = 1.2  # a thing is seen from two places at least this far apart, where that can be
+_LOWEST_RAD = np.deg2rad(30.0)  # how far below the horizon the camera sees
+_NEAREST_M = 0.5  # from nearer than this nothing is seen as a whole
+_AREA, _OBJECT, _FLOOR = 3.0, 1.0, 0.25  # what entering an area, an object and a piece of floor are worth
+_LEAST_GAIN = 0.9  # a place that adds less is not gone to
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Targets:
+    """What is to be seen on a floor: things, and pieces of the floor.
+
+    Attributes:
+        low: (t, 2) lowest xy of the box round each.
+        high: (t, 2) highest xy.
+        nearest_m: (t,) from nearer than this the camera looks over it.
+        worth: (t,) of seeing it.
+    """
+
+    low: Float[np.ndarray, "t 2"]
+    high: Float[np.ndarray, "t 2"]
+    nearest_m: Float[np.ndarray, " t"]
+    worth: Float[np.ndarray, " t"]
+
+    @property
+    def middle(self) -> Float[np.ndarray, "t 2"]:
+        """Middle of each."""
+        return (self.low + self.high) / 2
+
+    def in_sight(
+        self, places: Float[np.ndarray, "e 2"], reach_m: float, opaque: np.ndarray, space: FreeSpace
+    ) -> Bool[np.ndarray, "e t"]:
+        """Tell which targets are within reach of which places with nothing opaque between."""
+        seen = sees(np.ascontiguousarray(places), self.low, self.high, reach_m, opaque, space.origin, space.cell_m)
+        far = np.linalg.norm(places[:, None] - self.middle, axis=2) > self.nearest_m
+        # What can only be seen from nearby, in a narrow room, is seen from there.
+        return seen & (far | ~np.any(seen & far, axis=0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Viewpoints:
-    """Places to stand, and in which directions there is what is seen from there and was not seen before.
+    """Places to stand, and which targets each is for.
 
     Attributes:
         place: (k, 2) xy, metres.
-        headings_rad: for each place the directions of what it is for.
+        purpose: for each place the targets, by index.
     """
 
     place: Float[np.ndarray, "k 2"]
-    headings_rad: tuple[Float[np.ndarray, " m"], ...]
+    purpose: tuple[Int[np.ndarray, " m"], ...]
 
 
-def viewpoints(scene: Scene, space: FreeSpace, reach_m: float, eye_m: float) -> Viewpoints:
-    """Choose places greedily until all is seen that can be seen from within reach.
+def viewpoints(
+    scene: Scene, space: FreeSpace, targets: Targets, opaque: Bool[np.ndarray, "nx ny"], reach_m: float
+) -> Viewpoints:
+    """Choose places greedily until all is seen that can be seen from within reach; things from two places.
 
     Args:
-        scene: what there is to see.
+        scene: whose areas are to be entered.
         space: where the robot can stand; one connected part.
+        targets: what there is to see.
+        opaque: the cells that a look does not pass.
         reach_m: from how far a thing counts as seen.
-        eye_m: height of the camera above the floor.
     """
     candidates = _candidates(space)
-    low, high, worth = _targets(scene, space)
-    opaque = occupied(scene, space, eye_m - 0.15, eye_m + 0.15)
-    seen = sees(candidates, low, high, reach_m, opaque, space.origin, space.cell_m)
     entered = [area.contains(candidates) for area in scene.areas if abs(area.floor_m - space.floor_m) < 1.0]
-    covers = np.column_stack([seen, *entered]) if entered else seen
-    chosen, news = _greedy(covers, np.append(worth, np.full(len(entered), _AREA)), _comfort(space, candidates))
-    middle = (low + high) / 2
-    headings = []
-    for place, new in zip(candidates[chosen], news, strict=True):
-        offset = middle[new[: len(low)]] - place
-        headings.append(np.arctan2(offset[:, 1], offset[:, 0]))
-    return Viewpoints(candidates[chosen], tuple(headings))
+    covers = np.column_stack([targets.in_sight(candidates, reach_m, opaque, space), *entered])
+    wanted = np.concatenate([np.where(targets.worth >= _OBJECT, 2, 1), np.ones(len(entered), int)])
+    worth = np.append(targets.worth, np.full(len(entered), _AREA))
+    chosen, news = _greedy(candidates, covers, wanted, worth, _comfort(space, candidates))
+    return Viewpoints(candidates[chosen], tuple(_turned_to(new[: len(targets.low)], targets) for new in news))
+
+
+def _turned_to(new: Bool[np.ndarray, " t"], targets: Targets) -> Int[np.ndarray, " m"]:
+    """Return what to turn to: the things that a place shows; bare floor only where it shows no thing."""
+    things = np.flatnonzero(new & (targets.worth >= _OBJECT))
+    return things if len(things) else np.flatnonzero(new)
 
 
 def _candidates(space: FreeSpace) -> Float[np.ndarray, "c 2"]:
@@ -62,8 +100,8 @@ def _candidates(space: FreeSpace) -> Float[np.ndarray, "c 2"]:
     return space.middle_of(cells[order[first]])
 
 
-def _targets(scene: Scene, space: FreeSpace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the boxes (lowest and highest xy corners) of what is to be seen, and what each is worth."""
+def targets_of(scene: Scene, space: FreeSpace, eye_m: float) -> Targets:
+    """Return what is to be seen on a floor by a camera at a height above it."""
     things = [
         thing for thing in scene.objects
         if thing.category not in STRUCTURE and max(thing.size) >= _OBJECT_M
@@ -71,12 +109,14 @@ def _targets(scene: Scene, space: FreeSpace) -> tuple[np.ndarray, np.ndarray, np
     ]  # fmt: skip
     low = np.array([thing.low[:2] for thing in things]).reshape(-1, 2) - _BOX_GROWN_M
     high = np.array([thing.high[:2] for thing in things]).reshape(-1, 2) + _BOX_GROWN_M
+    below_eye = space.floor_m + eye_m - np.array([thing.centre[2] for thing in things])
     stride = max(round(_FLOOR_M / space.cell_m), 1)
     piece = np.zeros_like(space.free)
     piece[::stride, ::stride] = True
     floor = space.middle_of(np.argwhere(space.free & piece))
+    nearest_m = np.maximum(np.append(below_eye / np.tan(_LOWEST_RAD), np.zeros(len(floor))), _NEAREST_M)
     worth = np.concatenate([np.full(len(low), _OBJECT), np.full(len(floor), _FLOOR)])
-    return np.concatenate([low, floor - 0.1]), np.concatenate([high, floor + 0.1]), worth
+    return Targets(np.concatenate([low, floor - 0.1]), np.concatenate([high, floor + 0.1]), nearest_m, worth)
 
 
 def _comfort(space: FreeSpace, candidates: np.ndarray) -> np.ndarray:
@@ -86,17 +126,33 @@ def _comfort(space: FreeSpace, candidates: np.ndarray) -> np.ndarray:
 
 
 def _greedy(
-    covers: Bool[np.ndarray, "c t"], worth: Float[np.ndarray, " t"], comfort: Float[np.ndarray, " c"]
+    places: Float[np.ndarray, "c 2"],
+    covers: Bool[np.ndarray, "c t"],
+    wanted: Int[np.ndarray, " t"],
+    worth: Float[np.ndarray, " t"],
+    comfort: Float[np.ndarray, " c"],
 ) -> tuple[list[int], list[np.ndarray]]:
-    """Take the place that adds most until none adds an object or three pieces of floor; say what each added."""
-    left = np.any(covers, axis=0)
+    """Take the place that adds most, again and again; say what each added.
+
+    Args:
+        places: where one may stand.
+        covers: which targets each place shows.
+        wanted: from how many places each target should be seen.
+        worth: of each target.
+        comfort: of each place.
+    """
+    covers = covers.copy()
+    left = wanted * np.any(covers, axis=0)
     chosen, news = [], []
     while True:
-        gain = (covers[:, left] @ worth[left]) * comfort
+        gain = (covers @ (worth * (left > 0))) * comfort
         best = int(np.argmax(gain))
-        if gain[best] < 0.85:
+        if gain[best] < _LEAST_GAIN and chosen:
             return chosen, news
-        new = covers[best] & left
+        new = covers[best] & (left > 0)
         chosen.append(best)
         news.append(new)
-        left &= ~new
+        left[new] -= 1
+        # What is seen from here adds nothing from close by.
+        close = np.linalg.norm(places - places[best], axis=1) < _TWICE_M
+        covers[np.ix_(close, new)] = False

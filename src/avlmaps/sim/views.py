@@ -97,7 +97,7 @@ def _aimed(
     # Large things are aimed at more often, but not as much more as they are larger.
     weight = np.sqrt(np.max(high - low, axis=1))
     pick = rng.choice(len(things), _TRIES * n, p=weight / weight.sum())
-    place = rng.permutation(space.middles())[rng.integers(np.count_nonzero(space.free), size=_TRIES * n)]
+    place = space.middles()[rng.integers(np.count_nonzero(space.free), size=_TRIES * n)]
     grown = 0.05
     low_xy, high_xy = low[pick, :2] - grown, high[pick, :2] + grown
     apart = np.linalg.norm(np.maximum(np.maximum(low_xy - place, place - high_xy), 0), axis=1)
