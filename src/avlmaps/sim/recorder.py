@@ -17,7 +17,7 @@ from avlmaps.core.progress import progress, say
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.layout import DESCRIPTION
 from avlmaps.recordings.writer import RecordingWriter
-from avlmaps.sim.hearing import Recorded, ScheduleRule, Sounding, Synthesised, place_sources, schedule
+from avlmaps.sim.hearing import Recorded, ScheduleRule, Sounding, Synthesised, candidates, schedule
 from avlmaps.sim.render import Renderer
 from avlmaps.sim.scene import Scene
 from avlmaps.sim.sensor import PRESETS, OdometryFaults, Sensor, SensorName, Shift, drifted
@@ -185,12 +185,10 @@ def _soundings(scene: Scene, settings: RecordSettings, trip: _Trip, rng: np.rand
     bank = Synthesised() if settings.sounds is None else Recorded(settings.sounds, settings.rate_hz)
     count = max(1, round(trip.duration_s / _SECONDS_A_SOUND)) if settings.sources is None else settings.sources
     robot = trip.world_from_camera[:, :3, 3]
-    # More are drawn than are heard: not every place has its moment in the walk.
-    pairs = settings.ambiguous
-    sources = place_sources(scene, rng, 2 * (count + pairs), settings.categories, 2 * pairs, bank=bank, walk=robot)
-    pause_s = -settings.overlap_s if settings.overlap_s > 0.0 else ScheduleRule().pause_s
-    rule = ScheduleRule(pause_s=pause_s)
-    soundings = schedule(scene, sources, trip.stamps_s, robot, rule, most=count, pairs=pairs)
+    pairs = settings.ambiguous  # more kinds are drawn than are heard: not every place has its moment in the walk
+    drawn = candidates(scene, rng, 2 * (count + pairs), settings.categories, bank=bank, walk=robot)
+    rule = ScheduleRule(pause_s=-settings.overlap_s if settings.overlap_s > 0.0 else ScheduleRule().pause_s)
+    soundings = schedule(scene, drawn, trip.stamps_s, robot, rule, most=count, pairs=pairs)
     if len(soundings) < count and settings.sources is not None:
         say(f"note: {len(soundings)} of {count} sounds are heard: the walk has no room for more.")
     return soundings

@@ -5,7 +5,7 @@ from avlmaps.sim.hearing.banks import Bank, Recorded, Synthesised
 from avlmaps.sim.hearing.kinds import KINDS, SoundKind, kind_of
 from avlmaps.sim.hearing.overlay import overlay
 from avlmaps.sim.hearing.schedule import ScheduleRule, Sounding, schedule
-from avlmaps.sim.hearing.sources import Source, place_sources
+from avlmaps.sim.hearing.sources import Source, candidates, place_sources
 
 __all__ = [
     "KINDS",
@@ -18,6 +18,7 @@ __all__ = [
     "Source",
     "Synthesised",
     "acoustic",
+    "candidates",
     "kind_of",
     "overlay",
     "place_sources",

@@ -55,9 +55,6 @@ def acoustic(
         duration_s: of the track.
         rng: draws the late reverberation and the noise of the room.
         settings: how.
-
-    Raises:
-        BackendError: pyroomacoustics is not installed.
     """
     settings = settings or AcousticSettings()
     building = Acoustics(scene, settings.rate_hz)

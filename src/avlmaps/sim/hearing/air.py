@@ -101,9 +101,16 @@ class Air:
         return self.origin + (best + 0.5) * self.cell_m
 
     def room_at(self, xy: Float[np.ndarray, "2"]) -> int:
-        """Return the room of a place, −1 for none."""
+        """Return the room of a place, −1 for outdoors; what lies in an outer wall belongs to the room behind it."""
         i, j = self.cell(xy)
-        return int(self.room[i, j])
+        if self.room[i, j] >= 0 or not self.solid[i, j]:
+            return int(self.room[i, j])
+        cells = np.argwhere(self.room >= 0)
+        if not len(cells):
+            return -1
+        away = ((cells - (i, j)) ** 2).sum(axis=1)
+        nearest = int(away.argmin())
+        return int(self.room[tuple(cells[nearest])]) if away[nearest] <= _BETWEEN_ROOMS**2 else -1
 
     def ways(self, source: Float[np.ndarray, "3"], ears: Float[np.ndarray, "n 3"]) -> list[Way]:
         """Return how sound gets from a source to each of several places."""

@@ -12,12 +12,10 @@ shift, other floors than by their slab, the directivity of sources and microphon
 """
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from avlmaps.core.errors import BackendError
 from avlmaps.sim.hearing.air import Air, Way
 from avlmaps.sim.hearing.filters import shaped_impulse, split
 from avlmaps.sim.hearing.rooms import BANDS_HZ, SPEED_M_S, WALL_DB, Rooms
@@ -68,16 +66,15 @@ class Acoustics:
             rng: draws the noise of the late field, the same for all places.
         """
         air, rooms = self.floor_at(float(ears[:, 2].mean()))
-        if not air.floor_m - 0.3 <= source[2] < air.floor_m + 4.0 and self.floor_at(float(source[2]))[0] is not air:
+        if self.floor_at(float(source[2]))[0] is not air:
             return [self._through_slab(source, ear) for ear in ears]
         own = air.room_at(source[:2])
         source = np.array([*air.out_of_walls(source[:2], own), source[2]])
         late = self._late(rooms, own, rng)
-        here = [air.room_at(ear[:2]) for ear in ears]
-        early = self._images(rooms, own, source, ears[[room == own for room in here]])
+        early = self._images(rooms, own, source, ears)
         found = []
-        for room, way in zip(here, air.ways(source, ears), strict=True):
-            images = early.pop(0) if room == own and early else None
+        for ear, images, way in zip(ears, early, air.ways(source, ears), strict=True):
+            room = air.room_at(ear[:2])
             found.append(self._response(way, images, late[room] if late is not None and room >= 0 else None))
         return found
 
@@ -121,30 +118,34 @@ class Acoustics:
 
     def _images(
         self, rooms: Rooms, own: int, source: Float[np.ndarray, "3"], ears: Float[np.ndarray, "n 3"]
-    ) -> list[Float[np.ndarray, "i 2"]]:
-        """Return distance and gain of the reflections in the source's own room, without the direct sound."""
-        if own < 0 or not len(ears):
-            return []
+    ) -> list[Float[np.ndarray, "i 2"] | None]:
+        """Return distance and gain of the reflections at each place in the source's own room, elsewhere None.
+
+        The direct sound is not among them.
+        """
+        found: list[Float[np.ndarray, "i 2"] | None] = [None] * len(ears)
+        if own < 0:
+            return found
         area = rooms.areas[own]
-        inside = _inside(area, np.concatenate([source[None], ears]))
-        if not inside.all():
-            return [np.zeros((0, 2)) for _ in ears]
-        pra = _library()
+        inside = _inside(area, ears)
+        if not inside.any() or not _inside(area, source[None]).all():
+            return found
+        import pyroomacoustics as pra
+
         absorbing = pra.Material(rooms.mean_absorption(own))
         order = _ORDER_OF_FEW_WALLS if len(area.polygon) <= 8 else _ORDER
         box = pra.Room.from_corners(_counter_clockwise(area).T, fs=self.rate_hz, max_order=order, materials=absorbing)
         box.extrude(area.ceiling_m - area.floor_m, materials=absorbing)
         down = np.array([0.0, 0.0, area.floor_m])
         box.add_source(source - down)
-        box.add_microphone_array((ears - down).T)
+        box.add_microphone_array((ears[inside] - down).T)
         box.image_source_model()
         made = box.sources[0]
         places, gains, orders = made.images.T + down, made.damping[0], made.orders
-        found = []
-        for ear, seen in zip(ears, box.visibility[0], strict=True):
+        for index, seen in zip(np.flatnonzero(inside), box.visibility[0], strict=True):
             kept = np.asarray(seen, bool) & (orders > 0)
-            distance_m = np.linalg.norm(places[kept] - ear, axis=1)
-            found.append(np.column_stack([np.maximum(distance_m, _NEAREST_M), gains[kept]]))
+            distance_m = np.linalg.norm(places[kept] - ears[index], axis=1)
+            found[index] = np.column_stack([np.maximum(distance_m, _NEAREST_M), gains[kept]])
         return found
 
     def _through_slab(self, source: Float[np.ndarray, "3"], ear: Float[np.ndarray, "3"]) -> Float[np.ndarray, " t"]:
@@ -199,14 +200,3 @@ def _counter_clockwise(area: Area) -> Float[np.ndarray, "k 2"]:
     here, there = area.polygon, np.roll(area.polygon, -1, axis=0)
     signed = float((here[:, 0] * there[:, 1] - there[:, 0] * here[:, 1]).sum())
     return np.asarray(area.polygon if signed > 0 else area.polygon[::-1], np.float64)
-
-
-def _library() -> Any:
-    try:
-        import pyroomacoustics
-    except ImportError:
-        raise BackendError(
-            "Hearing by geometry needs pyroomacoustics; pip install 'avlmaps[acoustics]', or record with "
-            "--hearing overlay."
-        ) from None
-    return pyroomacoustics

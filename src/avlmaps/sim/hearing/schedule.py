@@ -21,12 +21,15 @@ class ScheduleRule:
 
     Attributes:
         pause_s: least silence between two; negative lets them overlap by as much.
-        distance_m: least distance between any two places at which the robot hears different sounds, as in the paper.
+        distance_m: least distance between any two places at which the robot hears different sounds, as in the paper,
+            and between any two sources.
+        twins_m: least distance between two sources of one kind.
         reach_m: a source that the robot passes at no less than this (mean over the sound) is not heard at all.
     """
 
     pause_s: float = 1.0
     distance_m: float = 2.0
+    twins_m: float = 4.0
     reach_m: float = 4.0
 
 
@@ -54,11 +57,12 @@ def schedule(
     robot: Float[np.ndarray, "n 3"],
     rule: ScheduleRule | None = None,
     most: int | None = None,
-    pairs: int | None = None,
+    pairs: int = 0,
 ) -> list[Sounding]:
     """Let sources sound when the robot is nearest to them, as far as the rule allows; what finds no room is left out.
 
-    Kinds that have two sources come first, and are heard twice or count as one source.
+    Each kind is heard once, from the first of its sources for which there is room; ``pairs`` of the kinds are heard
+    twice, from sources that are far apart, and these come first.
 
     Args:
         scene: its rooms; a source in another room than the robot counts as farther away.
@@ -67,7 +71,7 @@ def schedule(
         robot: its places.
         rule: what keeps sounds apart.
         most: how many are heard at most.
-        pairs: how many kinds are heard twice at most.
+        pairs: how many kinds are heard twice, as far as there is room.
 
     Returns:
         In the order of their onsets.
@@ -77,12 +81,11 @@ def schedule(
     kinds: dict[str, list[Source]] = {}
     for source in sources:
         kinds.setdefault(source.category, []).append(source)
-    single = list(kinds.values())
-    twice = [own for own in single if len(own) > 1]
-    for own in twice:
-        if len(planner.found) + 2 <= most and (pairs is None or planner.pairs < pairs) and planner.take_both(own[:2]):
-            single.remove(own)
-    for own in single:
+    for name, own in list(kinds.items()):
+        if pairs > 0 and len(planner.found) + 2 <= most and planner.take_two_of(own):
+            pairs -= 1
+            del kinds[name]
+    for own in kinds.values():
         if len(planner.found) < most:
             planner.take_one_of(own)
     return sorted(planner.found, key=lambda sounding: sounding.onset_s)
@@ -96,21 +99,24 @@ class _Planner:
     walk: Walk
     rule: ScheduleRule
     found: list[Sounding] = field(default_factory=list)
-    pairs: int = 0
     _areas: np.ndarray | None = None
 
-    def take_both(self, sources: Sequence[Source]) -> bool:
-        """Let all of these be heard, or none."""
-        before = len(self.found)
-        if all(self.take_one_of([source]) for source in sources):
-            self.pairs += 1
-            return True
-        del self.found[before:]
+    def take_two_of(self, sources: Sequence[Source]) -> bool:
+        """Let two of these be heard that are far apart, or none."""
+        for i, one in enumerate(sources):
+            far = [other for other in sources[i + 1 :] if _distance_m(one, other) >= self.rule.twins_m]
+            if not far or not self.take_one_of([one]):
+                continue
+            if self.take_one_of(far):
+                return True
+            self.found.pop()
         return False
 
     def take_one_of(self, sources: Sequence[Source]) -> bool:
         """Let the first of these be heard for which there is room."""
         for source in sources:
+            if any(_distance_m(source, other.source) < self.rule.distance_m for other in self.found):
+                continue
             cost = self._mean_distance_m(source)
             free = _free_onsets(self.walk, self.found, _steps(source), self.rule) & (cost < self.rule.reach_m)
             if free.any():
@@ -136,6 +142,10 @@ class _Planner:
         steps = _steps(source)
         total = np.concatenate([[0.0], np.cumsum(distance_m)])
         return (total[steps:] - total[:-steps]) / steps if steps <= len(distance_m) else np.zeros(0)
+
+
+def _distance_m(a: Source, b: Source) -> float:
+    return float(np.linalg.norm(np.subtract(a.position, b.position)))
 
 
 def _steps(source: Source) -> int:

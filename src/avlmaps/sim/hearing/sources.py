@@ -1,7 +1,7 @@
 """Placing sounds in a scene: at the things that make them, or on the floor of the rooms where they are heard."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -92,6 +92,38 @@ def place_sources(
         free = [place for place in places[name] if _clear(place, taken, apart_m)]
         taken += [(name, free[0])] if free else []
     return [_source(name, place, bank, rng) for name, place in taken]
+
+
+def candidates(
+    scene: Scene,
+    rng: np.random.Generator,
+    kinds: int,
+    categories: Sequence[str] | None = None,
+    *,
+    bank: Bank | None = None,
+    walk: Float[np.ndarray, "n 3"] | None = None,
+) -> list[Source]:
+    """Return several places for each of several kinds of sound, to choose from (see ``schedule``).
+
+    Args:
+        scene: the building.
+        rng: draws kinds, places and clips.
+        kinds: how many at most.
+        categories: only these; all that homes make if None.
+        bank: where the clips come from; made by rule if None.
+        walk: where the robot will be: only places that it comes near to are taken.
+    """
+    bank = bank or Synthesised()
+    names = chosen_categories(bank, tuple(categories) if categories else None)
+    found: list[Source] = []
+    for index in rng.permutation(len(names)):
+        name = names[index]
+        places = _places(scene, kind_of(name), rng, walk)[:_FLOOR_PLACES]
+        if places and kinds > 0:
+            kinds -= 1
+            clips = [_source(name, place, bank, rng) for place in places[:2]]
+            found += [replace(clips[i % 2], position=p.position, instance=p.instance) for i, p in enumerate(places)]
+    return found
 
 
 def _twins(taken: Sequence[tuple[str, _Place]]) -> set[str]:
