@@ -18,9 +18,10 @@ from avlmaps.maps.keyframes import (
     see_keyframe,
     select_keyframes,
 )
-from avlmaps.maps.lifting import depth_in_colour, lifted, middle_of_view
+from avlmaps.maps.lifting import lifted, middle_of_view
 from avlmaps.perception.profiles import Profile, profile
 from avlmaps.perception.protocols import ModelCard
+from avlmaps.recordings.registration import depth_in_colour
 from avlmaps.recordings.types import Frame
 from helpers.picture_room import CAMERA, RoomWalk, distance_to_surface_m, looking
 

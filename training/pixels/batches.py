@@ -138,6 +138,6 @@ def _other_light(rgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         x = x[..., rng.permutation(3)]
     grey = x.mean(axis=2, keepdims=True)
     x = grey + (x - grey) * rng.uniform(0.0, 1.4)
-    x = x ** np.exp(rng.normal(0, 0.25)) * rng.uniform(0.6, 1.4) * np.exp(rng.normal(0, 0.08, 3))
+    x = np.clip(x, 0.0, None) ** np.exp(rng.normal(0, 0.25)) * rng.uniform(0.6, 1.4) * np.exp(rng.normal(0, 0.08, 3))
     x = x + rng.normal(0, rng.uniform(0.0, 0.06), x.shape)
     return np.clip(x, 0.0, 1.2).astype(np.float32).transpose(2, 0, 1) * 2.0 - 1.0

@@ -39,7 +39,7 @@ class Options:
     """How many shards are kept; then the oldest is replaced."""
     homes_per_shard: int = 8
     """Homes in a shard."""
-    frames_per_home: int = 48
+    frames_per_home: int = 64
     """Views of each home."""
     first_seed: int = 0
     """Seed of the first home."""
@@ -47,7 +47,7 @@ class Options:
     """Distance of the seeds, for several processes side by side."""
     which: Families = "training"
     """Families of shapes."""
-    lit: float = 0.5
+    lit: float = 0.35
     """Share of homes rendered in colour; of the others only shape is learnt."""
     once: bool = False
     """Stop when there are enough shards instead of replacing old ones."""
@@ -130,10 +130,13 @@ def add_home(shard: Shard, seed: int, options: Options) -> None:
     renderer = Renderer(scene, lit=lit)
     names = scene.categories
     number = np.array([_NAME.get(name, UNLABELLED) for name in names] + [UNLABELLED], np.uint8)
+    dull = np.isin(names + ("",), ("wall", "floor", "ceiling", ""))
     views = random_views(scene, rng, options.frames_per_home, camera_of(rng))
     for pose in views:
         camera = camera_of(rng)
         view = renderer.render(camera, pose)
+        if dull[view.category].mean() > 0.97 and rng.random() < 0.9:  # a bare wall teaches little
+            continue
         rgb, depth_m = _sensor(rng).spoil(view, camera, rng)
         row = -1
         if lit:

@@ -4,8 +4,8 @@ import numpy as np
 from jaxtyping import Float, Float32
 from numpy.lib.stride_tricks import sliding_window_view
 
-from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.poses import apply, inverse
+from avlmaps.recordings.registration import depth_in_colour
 from avlmaps.recordings.types import Frame
 
 PATCH_PX = 5
@@ -42,31 +42,6 @@ def lifted(
     points[:, 2] = z_m
     world_from_colour = frame.world_from_camera @ inverse(frame.rig.rgb_from_depth)
     return apply(world_from_colour, points).astype(np.float32)
-
-
-def depth_in_colour(depth_m: Float32[np.ndarray, "hd wd"], rig: Rig) -> tuple[Pinhole, Float32[np.ndarray, "h w"]]:
-    """Return the depth picture as the colour camera would see it, and that camera at the depth's resolution.
-
-    Where depth is registered to colour it is the depth picture itself. Otherwise every depth pixel is thrown into
-    the colour camera and the nearest wins. The picture is made no finer than the depth is, so that it has no holes.
-    """
-    if rig.registered:
-        return rig.rgb.resized(depth_m.shape[1], depth_m.shape[0]), depth_m
-    shrink = min(1.0, rig.depth.fx / rig.rgb.fx, rig.depth.fy / rig.rgb.fy)
-    camera = rig.rgb.resized(max(1, round(rig.rgb.width * shrink)), max(1, round(rig.rgb.height * shrink)))
-    row, column = np.nonzero(depth_m > 0.0)
-    z = depth_m[row, column].astype(np.float64)
-    x = (column + 0.5 - rig.depth.cx) / rig.depth.fx * z
-    y = (row + 0.5 - rig.depth.cy) / rig.depth.fy * z
-    points = apply(rig.rgb_from_depth, np.stack([x, y, z], axis=1))
-    points = points[points[:, 2] > 0.0]
-    target = np.floor(camera.project(points)).astype(np.int64)
-    inside = ((target >= 0) & (target < (camera.width, camera.height))).all(axis=1)
-    seen = np.full(camera.height * camera.width, np.inf, np.float32)
-    cell = target[inside, 1] * camera.width + target[inside, 0]
-    np.minimum.at(seen, cell, points[inside, 2].astype(np.float32))
-    seen[np.isinf(seen)] = 0.0
-    return camera, seen.reshape(camera.height, camera.width)
 
 
 def middle_of_view(frame: Frame, stride_px: int = 8) -> Float32[np.ndarray, "3"]:

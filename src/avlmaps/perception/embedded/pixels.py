@@ -1,0 +1,76 @@
+"""The embedded pixel encoder: probabilities of categories for each pixel, in the space of words (see ``codes``)."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import cast
+
+import numpy as np
+from jaxtyping import Float32
+
+from avlmaps.core.registry import Kind, load
+from avlmaps.perception.embedded.codes import Lexicon, features_of, word_codes
+from avlmaps.perception.embedded.scene_network import SceneNetwork, load_network
+from avlmaps.perception.protocols import ModelCard, WordEncoder
+from avlmaps.recordings.types import Frame
+
+
+class EmbeddedPixels:
+    """Tells some hundred things of homes and offices apart by their shape, helped a little by colour.
+
+    Args:
+        network: which; the one that ships if None.
+        words: the word encoder whose space the features live in; the embedded one if None.
+    """
+
+    def __init__(self, network: SceneNetwork | None = None, words: WordEncoder | None = None) -> None:
+        self._network = load_network() if network is None else network
+        self._words = cast(WordEncoder, load(Kind.WORDS, "embedded")) if words is None else words
+        notes = self._network.notes
+        self.names = notes.categories
+        self.codes = word_codes(self.names, self._words)
+        self.card = ModelCard(
+            id=notes.id, dim=self.codes.shape[1], licence="MIT", checksum=self._network.checksum, note=notes.note
+        )
+
+    @property
+    def vocabulary(self) -> tuple[str, ...]:
+        """The categories that compete for a voxel, without ``other``."""
+        return tuple(name for name in self.names if name != "other")
+
+    @cached_property
+    def lexicon(self) -> Lexicon:
+        """Which categories a phrase means."""
+        notes = self._network.notes
+        called = tuple((name, *notes.called.get(name, ())) for name in self.names)
+        return Lexicon(self.names, called, notes.kinds, self._words)
+
+    def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
+        """Return features on a grid of about 160x120; zero where there is no depth."""
+        seen = self._network.see(frame)
+        return np.where(seen.known[..., None], features_of(seen.category, self.codes), np.float32(0.0))
+
+    def meant(self, word: str) -> Float32[np.ndarray, " k"]:
+        """Return for each of ``names`` how much a phrase means it, 1 for the most meant; zero where it means none."""
+        return self.lexicon.meant(word)
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase; zero for one that means none of the categories."""
+        vectors = np.zeros((len(words), self.card.dim), np.float32)
+        for row, word in enumerate(words):
+            meant = self.meant(word)
+            if meant.any():
+                vectors[row] = features_of(meant / meant.sum(), self.codes)
+        return vectors
+
+    def understood(self, word: str) -> str:
+        """Return the categories that a phrase is taken for, the most meant first, or ``""``."""
+        meant = self.meant(word)
+        best = [self.names[i] for i in np.argsort(-meant, kind="stable") if meant[i] > 0.0]
+        clean = " ".join(word.lower().split())
+        return clean if clean in best else " or ".join(best[:4])
+
+    def probabilities(self, feature: Float32[np.ndarray, "n d"]) -> Float32[np.ndarray, "n k"]:
+        """Return the probability of each of ``names`` from fused features; zero where there is no feature."""
+        share = np.square(np.maximum(np.asarray(feature, np.float32) @ self.codes.T, 0.0))
+        total = share.sum(axis=1, keepdims=True)
+        return share / np.maximum(total, 1e-9)

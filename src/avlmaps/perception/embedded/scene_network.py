@@ -1,0 +1,154 @@
+"""The network behind the embedded pixel and view encoders: what each pixel shows, and what kind of room it is.
+
+It looks at geometry in the frame of gravity, and at colour through a small late branch. It runs in onnxruntime at
+about 320x240, whatever the recording's size; ``training/pixels`` makes its weights.
+"""
+
+import json
+import os
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from importlib.resources import files
+from typing import Any
+
+import cv2
+import msgspec
+import numpy as np
+from jaxtyping import Float, Float32, UInt8
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.core.errors import BackendError
+from avlmaps.perception.embedded.geometry import channels
+from avlmaps.recordings.registration import depth_in_colour
+from avlmaps.recordings.types import Frame
+
+# The network was trained on pictures whose focal length is up to so many pixels; a longer one is looked at smaller.
+_LONGEST_FOCAL_PX = 300.0
+_WIDTH = 320
+_MULTIPLE = 16
+# Without ground a camera is taken to be upright and as high as people and robots mostly hold it.
+_USUAL_HEIGHT_M = 1.3
+
+
+class Notes(msgspec.Struct, frozen=True):
+    """What is known of the weights beside them.
+
+    Attributes:
+        id: the model's name and version.
+        note: its limits, one sentence.
+        categories: what pixels are told apart into, ``other`` last.
+        rooms: kinds of room.
+        bias: added to the categories' scores: undoes the weights of training and calibrates.
+        temperature: divides the categories' scores before the softmax.
+        room_temperature: divides the rooms' scores.
+        called: for a category other phrases for it.
+        kinds: wider words and the categories that they take in.
+    """
+
+    id: str
+    note: str
+    categories: tuple[str, ...]
+    rooms: tuple[str, ...]
+    bias: tuple[float, ...]
+    temperature: float
+    room_temperature: float
+    called: dict[str, tuple[str, ...]]
+    kinds: dict[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What the network makes of a frame.
+
+    Attributes:
+        category: probability of each category on a grid that covers the colour picture evenly.
+        known: which cells have a depth.
+        room: probability of each kind of room.
+    """
+
+    category: Float32[np.ndarray, "h w c"]
+    known: np.ndarray
+    room: Float32[np.ndarray, " r"]
+
+
+class SceneNetwork:
+    """The network, loaded."""
+
+    def __init__(self, weights: bytes, notes: Notes, checksum: str) -> None:
+        """Start a session on some weights."""
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = min(4, os.cpu_count() or 1)
+        options.inter_op_num_threads = 1
+        self._session = onnxruntime.InferenceSession(weights, options, providers=["CPUExecutionProvider"])
+        self.notes = notes
+        self.checksum = checksum
+        self._bias = np.array(notes.bias, np.float32)
+
+    def see(self, frame: Frame) -> Seen:
+        """Look at a frame; its ``ground`` says which way is up, where it is known."""
+        camera, depth_m, rgb = at_working_size(frame)
+        up, height_m = _ground_of(frame)
+        geometry = _padded(channels(depth_m, camera, up, height_m))
+        colour = _padded(rgb.astype(np.float32).transpose(2, 0, 1) / 127.5 - 1.0)
+        score, room = (
+            np.asarray(output)
+            for output in self._session.run(None, {"geometry": geometry[None], "colour": colour[None]})
+        )
+        h, w = (depth_m.shape[0] + 1) // 2, (depth_m.shape[1] + 1) // 2
+        category = score[0, :, :h, :w].transpose(1, 2, 0) + self._bias
+        known = cv2.resize((depth_m > 0.0).astype(np.uint8), (w, h), interpolation=cv2.INTER_AREA) > 0
+        return Seen(_softmax(category / self.notes.temperature), known, _softmax(room[0] / self.notes.room_temperature))
+
+
+@cache
+def load_network() -> SceneNetwork:
+    """Return the network that ships with the package.
+
+    Raises:
+        BackendError: its files are missing or damaged.
+    """
+    folder = files("avlmaps.perception.embedded") / "weights"
+    try:
+        weights, about = ((folder / f"rooms.{end}").read_bytes() for end in ("onnx", "json"))
+        notes = msgspec.json.decode(about, type=Notes)
+    except (FileNotFoundError, msgspec.MsgspecError, json.JSONDecodeError) as fault:
+        raise BackendError(
+            f"The embedded pixel encoder's weights cannot be read ({fault}); install the package again, or make them "
+            "with 'python -m training.pixels'."
+        ) from fault
+    return SceneNetwork(weights, notes, sha256(weights + about).hexdigest())
+
+
+def at_working_size(
+    frame: Frame,
+) -> tuple[Pinhole, Float32[np.ndarray, "h w"], UInt8[np.ndarray, "h w 3"]]:
+    """Return the colour camera, the depth as it sees it, and its picture, at the size that the network looks at."""
+    camera, depth_m = depth_in_colour(frame.depth_m, frame.rig)
+    width = min(_WIDTH, round(_LONGEST_FOCAL_PX / camera.fx * camera.width))
+    height = max(1, round(width * camera.height / camera.width))
+    small = camera.resized(width, height)
+    # Nearest: a mean over an edge would be a place where nothing is.
+    row = ((np.arange(height) + 0.5) * depth_m.shape[0] / height).astype(int)
+    column = ((np.arange(width) + 0.5) * depth_m.shape[1] / width).astype(int)
+    rgb = cv2.resize(frame.rgb, (width, height), interpolation=cv2.INTER_AREA)
+    return small, np.ascontiguousarray(depth_m[row[:, None], column], np.float32), np.asarray(rgb, np.uint8)
+
+
+def _ground_of(frame: Frame) -> tuple[Float[np.ndarray, "3"], float]:
+    if frame.ground is None:
+        return np.array([0.0, -1.0, 0.0]), _USUAL_HEIGHT_M
+    rotation = frame.world_from_camera[:3, :3] @ frame.rig.rgb_from_depth[:3, :3].T
+    return rotation.T @ frame.ground.up_in_world, frame.ground.camera_height_m(frame.world_from_camera)
+
+
+def _padded(picture: Float32[np.ndarray, "c h w"]) -> Float32[np.ndarray, "c hp wp"]:
+    h, w = picture.shape[1:]
+    return np.pad(picture, ((0, 0), (0, -h % _MULTIPLE), (0, -w % _MULTIPLE)))
+
+
+def _softmax(score: Any) -> Float32[np.ndarray, "..."]:
+    e = np.exp(score - score.max(axis=-1, keepdims=True))
+    return (e / e.sum(axis=-1, keepdims=True)).astype(np.float32)

@@ -1,0 +1,63 @@
+"""The embedded view encoder: what kind of room a picture shows, in the space of words (see ``codes``)."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import cast
+
+import numpy as np
+from jaxtyping import Float32
+
+from avlmaps.core.registry import Kind, load
+from avlmaps.perception.embedded.codes import Lexicon, features_of, word_codes
+from avlmaps.perception.embedded.scene_network import SceneNetwork, load_network
+from avlmaps.perception.protocols import ModelCard, WordEncoder
+from avlmaps.recordings.types import Frame
+
+
+class EmbeddedViews:
+    """Tells kinds of room apart by what stands in them.
+
+    Args:
+        network: which; the one that ships if None.
+        words: the word encoder whose space the features live in; the embedded one if None.
+    """
+
+    def __init__(self, network: SceneNetwork | None = None, words: WordEncoder | None = None) -> None:
+        self._network = load_network() if network is None else network
+        self._words = cast(WordEncoder, load(Kind.WORDS, "embedded")) if words is None else words
+        notes = self._network.notes
+        self.names = notes.rooms
+        self.codes = word_codes(self.names, self._words)
+        self.card = ModelCard(
+            id=notes.id.replace("pixels", "views"),
+            dim=self.codes.shape[1],
+            licence="MIT",
+            checksum=self._network.checksum,
+            note=f"Knows these kinds of room: {', '.join(self.names)}.",
+        )
+
+    @cached_property
+    def lexicon(self) -> Lexicon:
+        """Which kinds of room a phrase means."""
+        notes = self._network.notes
+        called = tuple((name, *notes.called.get(name, ())) for name in self.names)
+        return Lexicon(self.names, called, notes.kinds, self._words)
+
+    def encode(self, frames: Sequence[Frame]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each frame."""
+        rooms = [self._network.see(frame).room for frame in frames]
+        return features_of(np.stack(rooms), self.codes) if rooms else np.zeros((0, self.card.dim), np.float32)
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase; one that means no kind of room lies across all of them."""
+        vectors = np.zeros((len(words), self.card.dim), np.float32)
+        for row, word in enumerate(words):
+            meant = self.lexicon.meant(word)
+            vector = features_of(meant / meant.sum(), self.codes) if meant.any() else self._across(word)
+            vectors[row] = vector / np.linalg.norm(vector)
+        return vectors
+
+    def _across(self, word: str) -> Float32[np.ndarray, " d"]:
+        vector = self._words.encode([word])[0]
+        rest = vector - self.codes.T @ (self.codes @ vector)
+        return rest if np.linalg.norm(rest) > 1e-3 else vector

@@ -1,0 +1,47 @@
+"""Writing the network for onnxruntime: the running mean of the weights, batch norms folded, half precision in the file."""
+
+from pathlib import Path
+
+import numpy as np
+import onnx
+import torch
+from onnx import numpy_helper
+
+from training.pixels.network import COLOUR, GEOMETRY, RoomNetwork
+
+
+def load_network(checkpoint: Path) -> RoomNetwork:
+    """Return the network with the running mean of its weights."""
+    state = torch.load(checkpoint, map_location="cpu", weights_only=True)
+    network = RoomNetwork(len(state["categories"]), len(state["rooms"]), tuple(state["widths"]))
+    network.load_state_dict(state["mean"])
+    return network.eval()
+
+
+def write_onnx(network: RoomNetwork, path: Path) -> None:
+    """Write the network; its pictures may have any size that is a multiple of 16."""
+    inputs = (torch.zeros(1, GEOMETRY, 64, 80), torch.zeros(1, COLOUR, 64, 80))
+    size = {2: "height", 3: "width"}
+    torch.onnx.export(
+        network, inputs, str(path), input_names=["geometry", "colour"], output_names=["category", "room"],
+        dynamic_axes={"geometry": size, "colour": size, "category": {2: "rows", 3: "columns"}},
+        opset_version=17, do_constant_folding=True, dynamo=False,
+    )  # fmt: skip
+    _halve(path)
+
+
+def _halve(path: Path) -> None:
+    """Keep large weights in half precision; a cast widens them when the file is loaded."""
+    model = onnx.load(path)
+    graph, casts = model.graph, []
+    for weight in list(graph.initializer):
+        if weight.data_type != onnx.TensorProto.FLOAT or int(np.prod(weight.dims)) < 256:
+            continue
+        values = numpy_helper.to_array(weight).astype(np.float16)
+        graph.initializer.remove(weight)
+        graph.initializer.append(numpy_helper.from_array(values, f"{weight.name}_half"))
+        casts.append(onnx.helper.make_node("Cast", [f"{weight.name}_half"], [weight.name], to=onnx.TensorProto.FLOAT))
+    for node in reversed(casts):
+        graph.node.insert(0, node)
+    onnx.checker.check_model(model)
+    onnx.save(model, path)
