@@ -9,7 +9,7 @@ from the probes that it sees, darkened where corners are narrow.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int, Int32
+from jaxtyping import Bool, Float, Float32, Int, Int32, UInt8
 
 from avlmaps.sim import lighting_kernels, sampling_kernels
 from avlmaps.sim.mesh import Mesh
@@ -22,7 +22,8 @@ _PATCH_M = 0.25  # triangles longer than this carry texels if they are flat
 _LONG_M = 1.2  # triangles longer than this do so in any case
 _PROBE_M = 0.45
 _SEND_CELLS = 5  # solid cells along a side of a coarse cell, in which sent light is summed
-_REACH_M = 9.0
+_ROOM = 12  # cells to the nearest solid one are counted up to here
+_ONE_LAMP_M = 0.7  # lamps that are nearer to each other shine as one
 _BOUNCE = 1.7  # light that has bounced more than once, as a factor of that which has once
 _GLOW = 2.5  # linear radiance of a surface of emission 1
 _SKY = (1.15, 1.25, 1.4)  # linear, what shines in where there is no wall
@@ -87,9 +88,9 @@ def default_lights(scene: Scene) -> tuple[Light, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Solid:
-    """Cells that no light passes."""
+    """Cells that no light passes: by cell, how many cells away the nearest of them is, 0 in it."""
 
-    cells: np.ndarray
+    empty: UInt8[np.ndarray, "x y z"]
     low: Float[np.ndarray, "3"]
     cell_m: float
 
@@ -98,17 +99,47 @@ def _solid(scene: Scene, lights: tuple[Light, ...]) -> _Solid:
     """Mark the cells that hold a surface; panes of glass and the lamps themselves cast no shadow."""
     mesh = scene.mesh
     clear = np.array([m.opacity < 0.6 for m in mesh.materials], bool)
+    place = np.array([lamp.position for lamp in lights]).reshape(-1, 3)
     holds_lamp = np.zeros(len(scene.objects), bool)
     for index, thing in enumerate(scene.objects):
         if thing.category not in _STRUCTURE:
             low, high = np.array(thing.low) - 0.05, np.array(thing.high) + 0.05
-            holds_lamp[index] = any(((low <= lamp.position) & (lamp.position <= high)).all() for lamp in lights)
+            holds_lamp[index] = ((low <= place) & (place <= high)).all(axis=1).any()
     kept = ~clear[mesh.material] & ~holds_lamp[scene.instance]
     low, high = mesh.low.astype(float) - 0.3, mesh.high.astype(float) + 0.3
     cell_m = max(_CELL_M, float((np.prod(high - low) / _MOST_CELLS) ** (1 / 3)))
     cells = np.zeros(np.ceil((high - low) / cell_m).astype(int), np.uint8)
     lighting_kernels.mark_solid(mesh.corners()[kept], low, cell_m, cells)
-    return _Solid(cells, low, cell_m)
+    return _Solid(_room(cells), low, cell_m)
+
+
+def _room(solid: UInt8[np.ndarray, "x y z"]) -> UInt8[np.ndarray, "x y z"]:
+    """Return for each cell how many cells away, along any axis, the nearest solid one is, up to a limit."""
+    room = np.where(solid, 0, _ROOM).astype(np.uint8)
+    lighting_kernels.spread_along_columns(room)
+    for axis in (1, 0):
+        before = np.moveaxis(room.copy(), axis, 0)
+        after = np.moveaxis(room, axis, 0)
+        for k in range(1, _ROOM):
+            np.minimum(after[k:], np.maximum(before[:-k], k), out=after[k:])
+            np.minimum(after[:-k], np.maximum(before[k:], k), out=after[:-k])
+    return room
+
+
+def _merged(lights: tuple[Light, ...]) -> tuple[Light, ...]:
+    """Return lamps of which those close together are one, for a chandelier has many bulbs."""
+    place = np.array([lamp.position for lamp in lights]).reshape(-1, 3)
+    power = np.array([lamp.colour for lamp in lights]).reshape(-1, 3)
+    left = np.ones(len(lights), bool)
+    merged = []
+    while left.any():
+        one = left & (np.linalg.norm(place - place[left.argmax()], axis=1) < _ONE_LAMP_M)
+        left &= ~one
+        weight = power[one].sum(axis=1) + 1e-9
+        x, y, z = (weight @ place[one] / weight.sum()).tolist()
+        red, green, blue = power[one].sum(axis=0).tolist()
+        merged.append(Light((x, y, z), (red, green, blue)))
+    return tuple(merged)
 
 
 def _smooth_corners(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -218,13 +249,13 @@ def _lit(samples: _Samples, lights: tuple[Light, ...], solid: _Solid, albedo: np
     light, free = np.zeros((n, 2, 3), np.float32), np.zeros((n, 2), bool)
     lamp = np.array([lamp.position for lamp in lights]).reshape(-1, 3)
     power = np.array([lamp.colour for lamp in lights]).reshape(-1, 3)
-    space = (solid.cells, solid.low, solid.cell_m)
-    lighting_kernels.direct(samples.place, samples.normal, lamp, power, _REACH_M, *space, light, free)
-    coarse = np.array(solid.cells.shape) // _SEND_CELLS + 1
+    space = (solid.empty, solid.low, solid.cell_m)
+    lighting_kernels.direct(samples.place, samples.normal, lamp, power, *space, light, free)
+    coarse = np.array(solid.empty.shape) // _SEND_CELLS + 1
     sent = np.zeros((*coarse, 6, 4), np.float32)
     lighting_kernels.splat(samples.place, samples.normal, albedo, glow, samples.area_m2, light, free, solid.low,
                            solid.cell_m * _SEND_CELLS, sent)  # fmt: skip
-    extent = np.array(solid.cells.shape) * solid.cell_m
+    extent = np.array(solid.empty.shape) * solid.cell_m
     count = np.ceil(extent / _PROBE_M).astype(np.int64)
     index = np.stack(np.meshgrid(*(np.arange(c) for c in count), indexing="ij"), axis=-1).reshape(-1, 3)
     cube, seen = np.zeros((len(index), 6, 3), np.float32), np.zeros(len(index), bool)
@@ -243,7 +274,7 @@ def light_map(scene: Scene, albedo: Float[np.ndarray, "m 3"]) -> LightMap:
         albedo: mean linear colour of each material.
     """
     mesh = scene.mesh
-    lights = scene.lights or default_lights(scene)
+    lights = _merged(scene.lights or default_lights(scene))
     smooth, first, incident = _smooth_corners(mesh)
     corners = mesh.corners()
     longest = (corners.max(axis=1) - corners.min(axis=1)).max(axis=1)
@@ -259,7 +290,7 @@ def light_map(scene: Scene, albedo: Float[np.ndarray, "m 3"]) -> LightMap:
     free = np.zeros((len(samples.place), 2), bool)
     needed = samples.needed
     wanted = _Samples(*(getattr(samples, name)[needed] for name in _Samples.__slots__))
-    light[needed], free[needed] = _lit(wanted, lights, _solid(scene, lights), albedo[material[needed]],
+    light[needed], free[needed] = _lit(wanted, lights, _solid(scene, scene.lights or lights), albedo[material[needed]],
                                        glow[material[needed]])  # fmt: skip
     begin = len(at_corner.place)
     filled = light.copy()

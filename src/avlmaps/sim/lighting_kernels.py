@@ -7,72 +7,84 @@ RAYS_LEFT = -2.0  # the ray left the grid
 RAYS_CLEAR = -1.0  # nothing on the way
 _STEPS_A_CELL = 2.2  # points laid on a triangle per side of a cell, so that no cell on it is missed
 _OCCLUSION_M = 0.5  # how far away something still darkens a corner
+_LEAST = 0.01  # light weaker than this is not looked for
+_STRIDE = 0.75  # cells walked where something solid is next to the way
 
 
 @njit(cache=True)
 def mark_solid(corner, low, cell_m, solid):  # pragma: no cover - compiled
     """Mark the cells that hold a part of a triangle; ``corner`` is (t, 3, 3), ``solid`` is changed."""
     nx, ny, nz = solid.shape
+    spacing = cell_m / _STEPS_A_CELL
+    side = np.zeros(3)
     for t in range(len(corner)):
-        a, b, c = corner[t, 0], corner[t, 1], corner[t, 2]
-        longest = 0.0
-        for p, q in ((a, b), (b, c), (c, a)):
-            longest = max(longest, (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2)
-        along = np.sqrt(longest)
-        steps = int(along / cell_m * _STEPS_A_CELL) + 1
-        for i in range(steps + 1):
-            s = i / steps
-            for j in range(steps + 1 - i):
-                r = j / steps
-                x = int((a[0] + s * (b[0] - a[0]) + r * (c[0] - a[0]) - low[0]) / cell_m)
-                y = int((a[1] + s * (b[1] - a[1]) + r * (c[1] - a[1]) - low[1]) / cell_m)
-                z = int((a[2] + s * (b[2] - a[2]) + r * (c[2] - a[2]) - low[2]) / cell_m)
+        for k in range(3):  # side k lies opposite corner k
+            d = corner[t, (k + 1) % 3] - corner[t, (k + 2) % 3]
+            side[k] = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+        k = int(np.argmin(side))
+        a, b, c = corner[t, k], corner[t, (k + 1) % 3], corner[t, (k + 2) % 3]
+        rows = int(max(side[(k + 1) % 3], side[(k + 2) % 3]) / spacing) + 1
+        for i in range(rows + 1):  # rows run across from side a-b to side a-c
+            s = i / rows
+            columns = int(s * side[k] / spacing) + 1
+            for j in range(columns + 1):
+                r = s * j / columns
+                x = int((a[0] + (s - r) * (b[0] - a[0]) + r * (c[0] - a[0]) - low[0]) / cell_m)
+                y = int((a[1] + (s - r) * (b[1] - a[1]) + r * (c[1] - a[1]) - low[1]) / cell_m)
+                z = int((a[2] + (s - r) * (b[2] - a[2]) + r * (c[2] - a[2]) - low[2]) / cell_m)
                 if 0 <= x < nx and 0 <= y < ny and 0 <= z < nz:
                     solid[x, y, z] = 1
 
 
 @njit(cache=True)
-def march(solid, px, py, pz, dx, dy, dz, farthest):  # pragma: no cover - compiled
-    """Walk from a place along a unit direction, in cells; return the distance to the first solid cell, or why none."""
-    x, y, z = int(np.floor(px)), int(np.floor(py)), int(np.floor(pz))
-    nx, ny, nz = solid.shape
-    sx, sy, sz = (1 if dx > 0 else -1), (1 if dy > 0 else -1), (1 if dz > 0 else -1)
-    ax, ay, az = 1.0 / max(abs(dx), 1e-12), 1.0 / max(abs(dy), 1e-12), 1.0 / max(abs(dz), 1e-12)
-    tx = ((x + 1 - px) if dx > 0 else (px - x)) * ax
-    ty = ((y + 1 - py) if dy > 0 else (py - y)) * ay
-    tz = ((z + 1 - pz) if dz > 0 else (pz - z)) * az
+def spread_along_columns(room):  # pragma: no cover - compiled
+    """Let distances grow by one from cell to cell along the last axis; ``room`` (x, y, z) is changed."""
+    nx, ny, nz = room.shape
+    for x in range(nx):
+        for y in range(ny):
+            for z in range(1, nz):
+                room[x, y, z] = min(room[x, y, z], room[x, y, z - 1] + 1)
+            for z in range(nz - 2, -1, -1):
+                room[x, y, z] = min(room[x, y, z], room[x, y, z + 1] + 1)
+
+
+@njit(cache=True)
+def march(empty, px, py, pz, dx, dy, dz, farthest):  # pragma: no cover - compiled
+    """Walk from a place along a unit direction, in cells; return the distance to the first solid cell, or why none.
+
+    ``empty`` tells for each cell how many cells away, along any axis, the nearest solid one is: 0 in it.
+    """
+    nx, ny, nz = empty.shape
+    along = 1.0 / max(abs(dx), abs(dy), abs(dz))
     t = 0.0
     while t < farthest:
+        x, y, z = int(np.floor(px + t * dx)), int(np.floor(py + t * dy)), int(np.floor(pz + t * dz))
         if x < 0 or y < 0 or z < 0 or x >= nx or y >= ny or z >= nz:
             return RAYS_LEFT
-        if solid[x, y, z]:
+        room = empty[x, y, z]
+        if room == 0:
             return t
-        if tx < ty and tx < tz:
-            t, x, tx = tx, x + sx, tx + ax
-        elif ty < tz:
-            t, y, ty = ty, y + sy, ty + ay
-        else:
-            t, z, tz = tz, z + sz, tz + az
+        t += along * max(room - 1.0, _STRIDE)
     return RAYS_CLEAR
 
 
 @njit(cache=True)
-def _start(solid, place, nx, ny, nz, low, cell_m, out):  # pragma: no cover - compiled
+def _start(empty, place, nx, ny, nz, low, cell_m, out):  # pragma: no cover - compiled
     """Lift a place off its surface until it is free; tell whether it is."""
     for lift in (1.6, 0.9):
         out[0] = (place[0] - low[0]) / cell_m + lift * nx
         out[1] = (place[1] - low[1]) / cell_m + lift * ny
         out[2] = (place[2] - low[2]) / cell_m + lift * nz
         x, y, z = int(np.floor(out[0])), int(np.floor(out[1])), int(np.floor(out[2]))
-        if x < 0 or y < 0 or z < 0 or x >= solid.shape[0] or y >= solid.shape[1] or z >= solid.shape[2]:
+        if x < 0 or y < 0 or z < 0 or x >= empty.shape[0] or y >= empty.shape[1] or z >= empty.shape[2]:
             return True
-        if not solid[x, y, z]:
+        if empty[x, y, z]:
             return True
     return False
 
 
 @njit(cache=True)
-def direct(place, normal, lamp, power, reach_m, solid, low, cell_m, light, free):  # pragma: no cover - compiled
+def direct(place, normal, lamp, power, empty, low, cell_m, light, free):  # pragma: no cover - compiled
     """Add the light that comes straight from the lamps to both sides of each sample.
 
     Args:
@@ -80,8 +92,7 @@ def direct(place, normal, lamp, power, reach_m, solid, low, cell_m, light, free)
         normal: (s, 3) of side 0; side 1 looks the other way.
         lamp: (l, 3) places of lamps.
         power: (l, 3) linear RGB.
-        reach_m: lamps farther than this are left out.
-        solid: cells.
+        empty: cells, as in `march`.
         low: corner of the cells.
         cell_m: their size.
         light: (s, 2, 3) float32, changed.
@@ -92,21 +103,21 @@ def direct(place, normal, lamp, power, reach_m, solid, low, cell_m, light, free)
         for side in range(2):
             sign = 1.0 - 2.0 * side
             nx, ny, nz = sign * normal[s, 0], sign * normal[s, 1], sign * normal[s, 2]
-            free[s, side] = _start(solid, place[s], nx, ny, nz, low, cell_m, p)
+            free[s, side] = _start(empty, place[s], nx, ny, nz, low, cell_m, p)
             if not free[s, side]:
                 continue
             for k in range(len(lamp)):
                 dx, dy, dz = lamp[k, 0] - place[s, 0], lamp[k, 1] - place[s, 1], lamp[k, 2] - place[s, 2]
                 d2 = dx * dx + dy * dy + dz * dz
                 lambert = dx * nx + dy * ny + dz * nz
-                if lambert <= 0 or d2 > reach_m * reach_m:
+                e = 2.0 * lambert / np.sqrt(d2 + 1e-9) / (d2 + 0.3)
+                if lambert <= 0 or e * power[k, 1] < _LEAST:
                     continue
                 qx, qy, qz = ((lamp[k, 0] - low[0]) / cell_m - p[0], (lamp[k, 1] - low[1]) / cell_m - p[1],
                               (lamp[k, 2] - low[2]) / cell_m - p[2])  # fmt: skip
                 far = np.sqrt(qx * qx + qy * qy + qz * qz) + 1e-9
-                if march(solid, p[0], p[1], p[2], qx / far, qy / far, qz / far, far - 2.0) >= 0.0:
+                if march(empty, p[0], p[1], p[2], qx / far, qy / far, qz / far, far - 2.0) >= 0.0:
                     continue
-                e = 2.0 * lambert / np.sqrt(d2 + 1e-9) / (d2 + 0.3)
                 e /= 1.0 + 0.35 * e  # a lamp has a size: what is close to it is not lit without end
                 for c in range(3):
                     light[s, side, c] += e * power[k, c]
@@ -167,13 +178,13 @@ def _received(sent, x, y, z, dx, dy, dz, out):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def gather(probe, ray, solid, low, cell_m, sent, coarse, sky, cube, free):  # pragma: no cover - compiled
+def gather(probe, ray, empty, low, cell_m, sent, coarse, sky, cube, free):  # pragma: no cover - compiled
     """Look round from each probe and keep what comes from each of the six sides.
 
     Args:
         probe: (p, 3) places, metres.
         ray: (r, 3) unit directions.
-        solid: cells.
+        empty: cells, as in `march`.
         low: corner of the cells and of the coarse cells.
         cell_m: size of the cells.
         sent: (x, y, z, 6, 4) what surfaces send out, by coarse cell.
@@ -186,13 +197,13 @@ def gather(probe, ray, solid, low, cell_m, sent, coarse, sky, cube, free):  # pr
     weight = np.zeros(6)
     for k in range(len(probe)):
         px, py, pz = ((probe[k, 0] - low[0]) / cell_m, (probe[k, 1] - low[1]) / cell_m, (probe[k, 2] - low[2]) / cell_m)
-        free[k] = march(solid, px, py, pz, 1.0, 0.0, 0.0, 0.5) < 0.0
+        free[k] = march(empty, px, py, pz, 1.0, 0.0, 0.0, 0.5) < 0.0
         if not free[k]:
             continue
         weight[:] = 0.0
         for r in range(len(ray)):
             dx, dy, dz = ray[r, 0], ray[r, 1], ray[r, 2]
-            t = march(solid, px, py, pz, dx, dy, dz, 1e9)
+            t = march(empty, px, py, pz, dx, dy, dz, 1e9)
             seen[:] = sky
             if t >= 0.0:
                 seen[:] = 0.0
@@ -212,7 +223,7 @@ def gather(probe, ray, solid, low, cell_m, sent, coarse, sky, cube, free):  # pr
 
 
 @njit(cache=True)
-def _occlusion(solid, p, nx, ny, nz, ring, cell_m):  # pragma: no cover - compiled
+def _occlusion(empty, p, nx, ny, nz, ring, cell_m):  # pragma: no cover - compiled
     """Return how much of the nearby half space over a surface is open, 0 to 1."""
     # two directions across the normal (Duff et al. 2017)
     sign = 1.0 if nz >= 0 else -1.0
@@ -226,7 +237,7 @@ def _occlusion(solid, p, nx, ny, nz, ring, cell_m):  # pragma: no cover - compil
         dx = ring[k, 0] * ux + ring[k, 1] * vx + ring[k, 2] * nx
         dy = ring[k, 0] * uy + ring[k, 1] * vy + ring[k, 2] * ny
         dz = ring[k, 0] * uz + ring[k, 1] * vz + ring[k, 2] * nz
-        t = march(solid, p[0], p[1], p[2], dx, dy, dz, reach)
+        t = march(empty, p[0], p[1], p[2], dx, dy, dz, reach)
         if t >= 0.0:
             closed += 1.0 - t / reach
     return 1.0 - closed / len(ring)
@@ -234,7 +245,7 @@ def _occlusion(solid, p, nx, ny, nz, ring, cell_m):  # pragma: no cover - compil
 
 @njit(cache=True)
 def ambient(
-    place, normal, ring, solid, low, cell_m, cube, probe_free, count, probe_m, bounce, light, free
+    place, normal, ring, empty, low, cell_m, cube, probe_free, count, probe_m, bounce, light, free
 ):  # pragma: no cover - compiled
     """Add the light that comes back from everything, from the probes that each sample sees.
 
@@ -242,7 +253,7 @@ def ambient(
         place: (s, 3) samples.
         normal: (s, 3).
         ring: (r, 3) directions round +z, for the darkness of corners.
-        solid: cells.
+        empty: cells, as in `march`.
         low: corner of the cells.
         cell_m: their size.
         cube: (p, 6, 3) light from the six sides at each probe.
@@ -261,7 +272,7 @@ def ambient(
                 continue
             sign = 1.0 - 2.0 * side
             n = (sign * normal[s, 0], sign * normal[s, 1], sign * normal[s, 2])
-            _start(solid, place[s], n[0], n[1], n[2], low, cell_m, p)
+            _start(empty, place[s], n[0], n[1], n[2], low, cell_m, p)
             weight = 0.0
             total[:] = 0.0
             bounce_here = bounce
@@ -280,7 +291,7 @@ def ambient(
                     qx, qy, qz = ((ix + 0.5) * probe_m / cell_m - p[0], (iy + 0.5) * probe_m / cell_m - p[1],
                                   (iz + 0.5) * probe_m / cell_m - p[2])  # fmt: skip
                     far = np.sqrt(qx * qx + qy * qy + qz * qz) + 1e-9
-                    if demand == 0 and march(solid, p[0], p[1], p[2], qx / far, qy / far, qz / far, far) >= 0.0:
+                    if demand == 0 and march(empty, p[0], p[1], p[2], qx / far, qy / far, qz / far, far) >= 0.0:
                         continue
                     weight += w
                     for axis in range(3):
@@ -291,6 +302,6 @@ def ambient(
                     break
                 bounce_here = 0.1 * bounce
             if weight > 0.0:
-                open_part = _occlusion(solid, p, n[0], n[1], n[2], ring, cell_m)
+                open_part = _occlusion(empty, p, n[0], n[1], n[2], ring, cell_m)
                 for c in range(3):
                     light[s, side, c] += bounce_here * (0.15 + 0.85 * open_part) * total[c] / weight
