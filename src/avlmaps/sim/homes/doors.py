@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from avlmaps.sim.furniture.joinery import chance, draw, pick
-from avlmaps.sim.homes.plan import OUTSIDE, Hole, Room, Wall
+from avlmaps.sim.homes.plan import OUTSIDE, Hole, HoleKind, Room, Wall
 
 HUBS = ("hallway", "corridor", "entrance hall", "open-plan office", "reception")
 SOCIAL = ("living room", "kitchen", "dining room")
@@ -55,7 +55,7 @@ def joined_up(
             if a in _OPEN_KINDS and b in _OPEN_KINDS and chance(rng, 0.3 + 0.3 * open_plan):
                 out[index] = _opened(rng, wall, rooms)
             else:
-                out[index] = wall.with_hole(_door(rng, wall, rooms))
+                out[index] = wall.with_hole(_door(rng, wall, rooms, index in wanted))
     return out
 
 
@@ -92,19 +92,24 @@ def _opened(rng: np.random.Generator, wall: Wall, rooms: list[Room]) -> Wall:
     return wall.with_hole(Hole("gap", at, width, 0.0, head))
 
 
-def _door(rng: np.random.Generator, wall: Wall, rooms: list[Room]) -> Hole:
+def _door(rng: np.random.Generator, wall: Wall, rooms: list[Room], needed: bool) -> Hole:
+    """Draw a door; one that is needed to reach a room stands open or has no leaf."""
     ceiling = min(rooms[wall.left].height_m, rooms[wall.right].height_m)
-    width = min(draw(rng, 0.9, 1.05), wall.length_m - 0.22)
+    width = min(draw(rng, 0.95, 1.1), wall.length_m - 0.2)
     if wall.length_m > 3.0 and chance(rng, 0.12):
-        width = draw(rng, 1.5, 1.9)
-    kind = pick(rng, ("door", "door", "door", "door", "doorless"))
-    ends = (0.12 + width / 2, wall.length_m - 0.12 - width / 2)
+        width = draw(rng, 1.9, 2.1)
+    kind: HoleKind = pick(rng, ("door", "door", "door", "door", "doorless"))
+    ends = (0.1 + width / 2, wall.length_m - 0.1 - width / 2)
     at = draw(rng, *ends) if chance(rng, 0.4) else pick(rng, ends)
-    if kind == "door" and chance(rng, 0.05) and width > 1.4:
-        kind = "folding door"
-    smaller_left = rooms[wall.left].kind not in HUBS and (rooms[wall.right].kind in HUBS or chance(rng, 0.5))
+    to_corner = 1 if at > wall.length_m / 2 else -1
+    open_rad = draw(rng, 1.5, 1.6) if min(at - ends[0], ends[1] - at) < 0.5 else draw(rng, 1.5, 2.5)
+    if not needed and chance(rng, 0.6):
+        kind = pick(rng, ("closed door", "door", "folding door") if width > 1.2 else ("closed door", "door"))
+        open_rad = draw(rng, 0.1, 1.3)
+    left_kind, right_kind = rooms[wall.left].kind, rooms[wall.right].kind
+    into_left = left_kind not in HUBS and (right_kind in HUBS or chance(rng, 0.5))
     head = min(draw(rng, 2.0, 2.2), ceiling - 0.12)
-    return Hole(kind, at, width, 0.0, head, draw(rng, 1.35, 1.75), smaller_left)
+    return Hole(kind, at, width, 0.0, head, open_rad, into_left, to_corner)
 
 
 def lit_by_day(rng: np.random.Generator, rooms: list[Room], walls: list[Wall]) -> list[Wall]:

@@ -15,7 +15,7 @@ from avlmaps.sim.homes.on_walls import adorn, dress_windows, light_up
 from avlmaps.sim.homes.placing import Footprint, ground_of
 from avlmaps.sim.homes.plan import Plan, Room, walls_between
 from avlmaps.sim.homes.programme import home_programme, office_programme
-from avlmaps.sim.homes.walls import Leaf, build_shell, looks_of
+from avlmaps.sim.homes.walls import build_shell, looks_of
 from avlmaps.sim.scene import Area, Scene, SceneBuilder
 
 _TRIES = 40
@@ -46,14 +46,6 @@ def _plan(rng: np.random.Generator, programme: Programme, corridor: str) -> Plan
     return Plan(tuple(laid), tuple(walls), draw(rng, 0.09, 0.2), draw(rng, 0.22, 0.4), not chance(rng, 0.06))
 
 
-def _leaf_box(leaf: Leaf) -> tuple[Footprint, np.ndarray, float]:
-    low, high = np.array(leaf.low), np.array(leaf.high)
-    c, s = np.cos(leaf.heading_rad), np.sin(leaf.heading_rad)
-    x, y = (low + high) / 2
-    middle = leaf.origin + np.array([c * x - s * y, s * x + c * y])
-    return Footprint(np.zeros(2), (high - low) / 2, 0.0, 2.0), middle, leaf.heading_rad
-
-
 def _furnished(rng: np.random.Generator, builder: SceneBuilder, plan: Plan, which: Families) -> None:
     """Build a floor and furnish its rooms."""
     home = looks_of(rng, plan.rooms[0], None)
@@ -71,7 +63,8 @@ def _furnished(rng: np.random.Generator, builder: SceneBuilder, plan: Plan, whic
         ground = ground_of(plan, index)
         for leaf in leaves:
             if leaf.room == index:
-                ground.take(*_leaf_box(leaf))
+                foot = Footprint(np.zeros(2), leaf.half_m, 0.0, 2.0)
+                ground.take(foot, leaf.centre, leaf.heading_rad)
         f = Furnisher(rng, builder, ground, first + index, room.kind, room.floor_m, room.height_m, which, plan.ceiling,
                       fill * (0.3 if chance(rng, 0.04) else 1.0), float(np.clip(mess * draw(rng, 0.5, 1.6), 0, 1)))  # fmt: skip
         dress_windows(f, cloth, None)

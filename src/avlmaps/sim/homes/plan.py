@@ -23,6 +23,7 @@ class Hole:
         head_m: its upper edge above the floor.
         open_rad: how far a leaf stands open.
         to_left: a leaf opens (a window looks) into the room on the wall's left.
+        hinge: the leaf hangs on the side towards the wall's end (1) or its beginning (-1).
     """
 
     kind: HoleKind
@@ -32,6 +33,7 @@ class Hole:
     head_m: float = 2.1
     open_rad: float = 0.0
     to_left: bool = True
+    hinge: int = 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -143,7 +143,7 @@ def bedroom(f: Furnisher) -> None:
     bed = f.new("bed")
     stood = None
     if bed is not None:
-        stood = f.along(bed, front_m=0.35, corner=0.12, at_middle=0.65)
+        stood = f.along(bed, front_m=0.0, corner=0.12, at_middle=0.65)
     if stood is not None:
         _bedside(f, stood)
     several(f, {"wardrobe": 0.9, "chest of drawers": 0.55}, 0.6)
@@ -176,7 +176,7 @@ def childrens_room(f: Furnisher) -> None:
         f.stand("crib", 1.0)
     for _ in range(count(rng, 1, 2)):
         if (bed := f.new(pick(rng, ("bed", "bunk bed", "crib", "bed")))) is not None:
-            f.along(bed, front_m=0.35, corner=0.7)
+            f.along(bed, front_m=0.0, corner=0.7)
     if chance(rng, 0.5):
         desk_place(f)
     if chance(rng, 0.6):

@@ -183,19 +183,17 @@ def hole_filling(rng: np.random.Generator, hole: Hole, wall_m: float, which: Fam
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leaf:
-    """What a door puts into a room: the box of its leaf, seen from above.
+    """What a door puts into a room: an oriented box round its leaf, seen from above.
 
     Attributes:
-        low: least x and y in the frame of the hole, whose +x looks into the room.
-        high: greatest x and y.
-        origin: the hole's place in the world.
-        heading_rad: where the hole's +x looks.
+        centre: its middle.
+        half_m: its half extents, along its heading and across.
+        heading_rad: of the leaf, from its hinge.
         room: the room.
     """
 
-    low: tuple[float, float]
-    high: tuple[float, float]
-    origin: Float[np.ndarray, "2"]
+    centre: Float[np.ndarray, "2"]
+    half_m: Float[np.ndarray, "2"]
     heading_rad: float
     room: int
 
@@ -214,8 +212,7 @@ def build_shell(
             continue
         builder.add("wall", wall_mesh(plan, wall, looks, edge, outer, skirting), heading_of(wall.to_left))
         for hole in wall.holes:
-            filled = _fill(rng, builder, plan, wall, hole, first_area, style, which)
-            leaves += [filled] if filled is not None else []
+            leaves += _fill(rng, builder, plan, wall, hole, first_area, style, which)
     for index, room in enumerate(plan.rooms):
         for category, z, look in (("floor", 0.0, looks[index].floor), ("ceiling", room.height_m, looks[index].ceiling)):
             if category == "floor" or plan.ceiling:
@@ -225,25 +222,49 @@ def build_shell(
 
 
 def _fill(rng: np.random.Generator, builder: SceneBuilder, plan: Plan, wall: Wall, hole: Hole, first_area: int,
-          style: int, which: Families) -> Leaf | None:  # fmt: skip
+          style: int, which: Families) -> list[Leaf]:  # fmt: skip
     outer = wall.right == OUTSIDE
     thick = plan.outer_m if outer else plan.wall_m
     # Most doors and windows of a home are alike, some are not.
     own = np.random.default_rng([style, len(hole.kind)]) if chance(rng, 0.8) else rng
     piece = hole_filling(own, hole, thick, which)
     if piece is None:
-        return None
+        return []
     towards = wall.to_left if hole.to_left else -wall.to_left
     origin = wall.at(hole.at_m) + (wall.to_left * (plan.wall_m - plan.outer_m) / 2 if outer else 0.0)
     room = wall.left if hole.to_left else wall.right
     floor = plan.rooms[wall.left].floor_m
     heading = heading_of(towards)
-    builder.add(piece.category, placed(piece.mesh, origin, heading, floor + hole.sill_m), heading, piece.family,
+    mesh = _hinged(piece.mesh, hole, thick) if hole.kind == "door" else piece.mesh
+    builder.add(piece.category, placed(mesh, origin, heading, floor + hole.sill_m), heading, piece.family,
                 area=first_area + room)  # fmt: skip
-    if hole.kind not in ("door", "folding door"):
-        return None
-    inside = piece.mesh.vertex[piece.mesh.vertex[:, 0] > thick / 2 + 0.03][:, :2]
-    if not len(inside):
-        return None
-    (x0, y0), (x1, y1) = inside.min(axis=0).tolist(), inside.max(axis=0).tolist()
-    return Leaf((thick / 2, y0), (x1, y1), origin, heading, room)
+    return _leaves(mesh, thick, hole, origin, heading, room)
+
+
+def _hinged(mesh: Mesh, hole: Hole, thick: float) -> Mesh:
+    """Return a door with its leaf on the side that its hole wants."""
+    out = mesh.vertex[mesh.vertex[:, 0] > thick / 2 + 0.1]
+    if hole.width_m > 1.2 or not len(out):
+        return mesh
+    near = out[out[:, 0] < out[:, 0].min() + 0.15]
+    wanted = -hole.hinge if hole.to_left else hole.hinge  # the hole's +y runs against the wall where it looks left
+    return mesh if float(near[:, 1].mean()) * wanted > 0 else mesh.scaled(1.0, -1.0, 1.0)
+
+
+def _leaves(mesh: Mesh, thick: float, hole: Hole, origin: np.ndarray, heading: float, room: int) -> list[Leaf]:
+    """Return the boxes round what stands out of the wall: by halves, since a wide door has two leaves."""
+    out = []
+    stands_out = mesh.vertex[mesh.vertex[:, 0] > thick / 2 + 0.03][:, :2].astype(np.float64)
+    for part in (stands_out[stands_out[:, 1] < 0], stands_out[stands_out[:, 1] >= 0]):
+        if not len(part):
+            continue
+        tip = part[np.argmax(part[:, 0])]
+        hinge = np.array([thick / 2, np.sign(part[np.argmin(part[:, 0]), 1]) * (hole.width_m / 2 - 0.03)])
+        turn = float(np.arctan2(*(tip - hinge)[::-1]))
+        c, s = np.cos(turn), np.sin(turn)
+        box = part @ np.array([[c, -s], [s, c]])
+        low, high = box.min(axis=0), box.max(axis=0)
+        middle = np.array([[c, -s], [s, c]]) @ ((low + high) / 2)
+        c, s = np.cos(heading), np.sin(heading)
+        out.append(Leaf(origin + np.array([[c, -s], [s, c]]) @ middle, (high - low) / 2, heading + turn, room))
+    return out
