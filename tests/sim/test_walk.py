@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole
+from avlmaps.sim.files.labels import with_areas
 from avlmaps.sim.free_space import floor_heights, free_space, reaching_part
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.scene import Area, Scene, SceneBuilder
@@ -58,7 +59,7 @@ def two_rooms() -> Scene:
     parts.append(("wall", box((3.95, 1.5, 2.05), (4.05, 2.5, 2.6), PLAIN)))
     parts += [(category, box(low, high, PLAIN)) for category, low, high in THINGS]
     areas = (Area("living room", rectangle(0, 0, 4, 4), name="a"), Area("bedroom", rectangle(4, 0, 8, 4), name="b"))
-    return building(parts, areas)
+    return with_areas(building(parts), areas)
 
 
 SCENE = two_rooms()
@@ -192,7 +193,8 @@ def test_the_walk_holds_its_camera_like_a_robot() -> None:
 def test_every_area_is_entered_and_every_thing_is_seen() -> None:
     place = POSES[:, :2, 3]
     for area in SCENE.areas:
-        assert area.contains(place).sum() > 20
+        assert area.contains(place).sum() > 50
+        assert np.linalg.norm(place - area.polygon.mean(axis=0), axis=1).min() < 1.0
     for category, low, high in THINGS:
         middle = (np.array(low) + high) / 2
         if category == "chandelier":

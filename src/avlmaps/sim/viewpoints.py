@@ -16,6 +16,7 @@ _BOX_GROWN_M = 0.05  # a ray that comes this near to a thing's box shows it
 _TWICE_M = 1.2  # a thing is seen from two places at least this far apart, where that can be
 _LOWEST_RAD = np.deg2rad(30.0)  # how far below the horizon the camera sees
 _NEAREST_M = 0.5  # from nearer than this nothing is seen as a whole
+_MIDST_M = 0.5  # so much farther than the free place nearest to its middle one is still in the midst of an area
 _AREA, _OBJECT, _FLOOR = 3.0, 1.0, 0.25  # what entering an area, an object and a piece of floor are worth
 _LEAST_GAIN = 0.9  # a place that adds less is not gone to
 
@@ -29,12 +30,14 @@ class Targets:
         high: (t, 2) highest xy.
         nearest_m: (t,) from nearer than this the camera looks over it.
         worth: (t,) of seeing it.
+        area: (t,) which area it is in, −1 for none: from another area it is not seen well enough.
     """
 
     low: Float[np.ndarray, "t 2"]
     high: Float[np.ndarray, "t 2"]
     nearest_m: Float[np.ndarray, " t"]
     worth: Float[np.ndarray, " t"]
+    area: Int[np.ndarray, " t"]
 
     @property
     def middle(self) -> Float[np.ndarray, "t 2"]:
@@ -77,8 +80,11 @@ def viewpoints(
         reach_m: from how far a thing counts as seen.
     """
     candidates = _candidates(space)
-    entered = [area.contains(candidates) for area in scene.areas if abs(area.floor_m - space.floor_m) < 1.0]
-    covers = np.column_stack([targets.in_sight(candidates, reach_m, opaque, space), *entered])
+    seen = targets.in_sight(candidates, reach_m, opaque, space)
+    same = (targets.area < 0) | (targets.area == areas_at(scene, space, candidates)[:, None])
+    seen &= same | ~np.any(seen & same, axis=0)
+    entered = _entered(scene, space, candidates)
+    covers = np.column_stack([seen, *entered])
     wanted = np.concatenate([np.where(targets.worth >= _OBJECT, 2, 1), np.ones(len(entered), int)])
     worth = np.append(targets.worth, np.full(len(entered), _AREA))
     chosen, news = _greedy(candidates, covers, wanted, worth, _comfort(space, candidates))
@@ -100,6 +106,27 @@ def _candidates(space: FreeSpace) -> Float[np.ndarray, "c 2"]:
     return space.middle_of(cells[order[first]])
 
 
+def areas_at(scene: Scene, space: FreeSpace, xy: Float[np.ndarray, "n 2"]) -> Int[np.ndarray, " n"]:
+    """Return which area of a floor holds each place, −1 for none."""
+    found = np.full(len(xy), -1, np.int64)
+    for index, area in enumerate(scene.areas):
+        if abs(area.floor_m - space.floor_m) < 1.0:
+            found[(found < 0) & area.contains(xy)] = index
+    return found
+
+
+def _entered(scene: Scene, space: FreeSpace, candidates: Float[np.ndarray, "c 2"]) -> list[np.ndarray]:
+    """Tell for each area that can be entered which candidates are in the midst of its free floor."""
+    free = space.middles()
+    owner, of_candidate = areas_at(scene, space, free), areas_at(scene, space, candidates)
+    entered = []
+    for index in np.unique(of_candidate[of_candidate >= 0]):
+        away = np.linalg.norm(candidates - free[owner == index].mean(axis=0), axis=1)
+        away[of_candidate != index] = np.inf
+        entered.append(away <= away.min() + _MIDST_M)
+    return entered
+
+
 def targets_of(scene: Scene, space: FreeSpace, eye_m: float) -> Targets:
     """Return what is to be seen on a floor by a camera at a height above it."""
     things = [
@@ -116,7 +143,8 @@ def targets_of(scene: Scene, space: FreeSpace, eye_m: float) -> Targets:
     floor = space.middle_of(np.argwhere(space.free & piece))
     nearest_m = np.maximum(np.append(below_eye / np.tan(_LOWEST_RAD), np.zeros(len(floor))), _NEAREST_M)
     worth = np.concatenate([np.full(len(low), _OBJECT), np.full(len(floor), _FLOOR)])
-    return Targets(np.concatenate([low, floor - 0.1]), np.concatenate([high, floor + 0.1]), nearest_m, worth)
+    area = np.concatenate([np.array([thing.area for thing in things], np.int64), areas_at(scene, space, floor)])
+    return Targets(np.concatenate([low, floor - 0.1]), np.concatenate([high, floor + 0.1]), nearest_m, worth, area)
 
 
 def _comfort(space: FreeSpace, candidates: np.ndarray) -> np.ndarray:
