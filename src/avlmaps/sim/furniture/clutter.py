@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, pictured
+from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, circle, cylinder, ellipsoid, lathe, loft, rounded_box, sheet, slab, tube
@@ -56,7 +56,7 @@ def _book_row(rng: np.random.Generator) -> Piece:
 @family("book", "open", held_out=True)
 def _open_book(rng: np.random.Generator) -> Piece:
     tall, deep, rise = draw(rng, 0.18, 0.32), draw(rng, 0.13, 0.22), draw(rng, 0.01, 0.03)
-    paper, cover = pictured(pick(rng, ("paper", "poster")), rng, "paper"), material("painted", rng)
+    paper, cover = material(pick(rng, ("paper", "poster")), rng), material("painted", rng)
     parts = [slab(0.0, 0.0, 0.0, tall, 2 * deep + 0.01, 0.003, cover)]
     for s in (-1, 1):
         line = [(0.0, rise * 0.4), (0.15, rise), (0.6, rise * 0.8), (1.0, 0.004)]
@@ -84,7 +84,7 @@ def _bottle(rng: np.random.Generator) -> Piece:
     cap, parts = material("plastic", rng), [lathe([(r * wide, h * tall) for r, h in rows], glass, sides=10)]
     if chance(rng, 0.6):
         parts.append(
-            lathe([(wide * 1.02, tall * 0.15), (wide * 1.02, tall * 0.45)], pictured("poster", rng, "paper"), sides=10)
+            lathe([(wide * 1.02, tall * 0.15), (wide * 1.02, tall * 0.45)], material("poster", rng), sides=10)
         )
     if kind == "spray":
         parts += [
@@ -453,7 +453,7 @@ def _setting(rng: np.random.Generator) -> Piece:
         parts.append(lathe([(radius * 0.4, 0.012), (radius * 0.72, 0.03), (radius * 0.45, 0.02)], look, sides=14))
     parts += [_cutlery(rng, s * (radius + 0.025), metal) for s in (-1, 1)]
     if chance(rng, 0.5):
-        parts.append(slab(0.0, 0.0, 0.0, 0.3, 0.44, 0.003, pictured(pick(rng, ("fabric", "rug")), rng, "fabric")))
+        parts.append(slab(0.0, 0.0, 0.0, 0.3, 0.44, 0.003, material(pick(rng, ("fabric", "rug")), rng)))
     return finished(parts)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, pictured, strut
+from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, strut
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import (
@@ -145,7 +145,7 @@ def _chest(rng: np.random.Generator) -> Piece:
 
 
 def _woven(rng: np.random.Generator) -> Material:
-    return pictured("wicker", rng, "wood")
+    return material("wicker", rng)
 
 
 @family("basket", "round")
@@ -470,7 +470,7 @@ def _hamper(rng: np.random.Generator) -> Piece:
     radius, tall, look = (
         draw(rng, 0.17, 0.26),
         draw(rng, 0.48, 0.7),
-        pictured(pick(rng, ("wicker", "fabric")), rng, "fabric"),
+        material(pick(rng, ("wicker", "fabric")), rng),
     )
     if chance(rng, 0.5):
         body = lathe(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Families, Piece, family
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, pictured, rim
+from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, rim
 from avlmaps.sim.furniture.lighting import shining
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined, triangles_of
@@ -16,7 +16,7 @@ CARPET_SHAPES: dict[Families, tuple[str, ...]] = {
 
 
 def _art(rng: np.random.Generator) -> Material:
-    return pictured(pick(rng, ("painting", "painting", "poster")), rng, "fabric")
+    return material(pick(rng, ("painting", "painting", "poster")), rng)
 
 
 def _format(rng: np.random.Generator, low: float, high: float) -> tuple[float, float]:
@@ -90,7 +90,7 @@ def _wall_poster(rng: np.random.Generator) -> Piece:
         np.stack([np.array([0.002 + curl * (2 * v - 1) ** 4, (u - 0.5) * width, v * height]) for v in rows])
         for u in (0.0, 1.0)
     ])  # fmt: skip
-    parts = [cloth(points, pictured("poster", rng, "paper"), fill=True)]
+    parts = [cloth(points, material("poster", rng), fill=True)]
     if chance(rng, 0.35):  # hangs between two bars
         bar = material(pick(rng, ("wood", "black")), rng)
         parts += [slab(0.009, 0.0, z, 0.018, width + 0.01, 0.022, bar) for z in (-0.01, height - 0.012)]
@@ -134,7 +134,7 @@ def _wall_oval(rng: np.random.Generator) -> Piece:
 @family("picture", "wall hanging")
 def _wall_hanging(rng: np.random.Generator) -> Piece:
     width, height = draw(rng, 0.3, 1.3), draw(rng, 0.5, 1.6)
-    rod, look = material(pick(rng, ("wood", "metal")), rng), pictured(pick(rng, ("rug", "painting")), rng, "fabric")
+    rod, look = material(pick(rng, ("wood", "metal")), rng), material(pick(rng, ("rug", "painting")), rng)
     wave, phase = draw(rng, 0.003, 0.02), draw(rng, 0.0, 6.0)
     pointed = draw(rng, 0.1, 0.35) * height if chance(rng, 0.4) else 0.0
     points = np.array([
@@ -196,7 +196,7 @@ def carpet(rng: np.random.Generator, length_m: float, width_m: float, shape: str
         The carpet.
     """
     thick = draw(rng, 0.005, 0.015)
-    look = pictured("rug" if chance(rng, 0.75) else "carpet", rng, "fabric")
+    look = material("rug" if chance(rng, 0.75) else "carpet", rng)
     if shape in ("round", "oval"):
         return Piece(joined(_pile(rng, circle(length_m / 2, 32, width_m / 2), thick, look)))
     if shape == "hide":
@@ -338,7 +338,7 @@ def _pillow(
 
 @family("cushion", "square")
 def _square_cushion(rng: np.random.Generator) -> Piece:
-    side, look = draw(rng, 0.35, 0.65), pictured(pick(rng, ("fabric", "fabric", "rug", "leather")), rng, "fabric")
+    side, look = draw(rng, 0.35, 0.65), material(pick(rng, ("fabric", "fabric", "rug", "leather")), rng)
     other = side * pick(rng, (1.0, 1.0, draw(rng, 0.55, 0.8)))
     one = _pillow(other, side, draw(rng, 0.09, 0.2), look, draw(rng, 3.0, 7.0), draw(rng, 0.0, 0.5))
     lean = draw(rng, 0.9, 1.4) if chance(rng, 0.5) else 0.0  # upright against a back, or lying

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.sim.furniture.catalogue import Families, Piece, family
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, pictured
+from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, ellipsoid, rounded_box, sheet, slab, tube
@@ -64,7 +64,7 @@ def _rod(rng: np.random.Generator, width: float, z: float, x: float) -> list[Mes
 
 
 def _textile(rng: np.random.Generator) -> Material:
-    return pictured("curtain", rng, "fabric")
+    return material("curtain", rng)
 
 
 def _sheer(rng: np.random.Generator) -> Material:
@@ -185,7 +185,7 @@ def _venetian(rng: np.random.Generator) -> Piece:
 @family("blinds", "wall roller")
 def _roller(rng: np.random.Generator) -> Piece:
     width, height = _measures(rng)
-    look = pictured(pick(rng, ("fabric", "curtain", "paper", "white")), rng, "fabric")
+    look = material(pick(rng, ("fabric", "curtain", "paper", "white")), rng)
     radius, shut = draw(rng, 0.018, 0.035), draw(rng, 0.25, 1.0)
     hung = height * shut
     x = radius + 0.01
@@ -236,7 +236,7 @@ def _vertical(rng: np.random.Generator) -> Piece:
 @family("blinds", "wall pleated")
 def _pleated(rng: np.random.Generator) -> Piece:
     width, height = _measures(rng)
-    look, folds = pictured("fabric", rng, "fabric"), count(rng, 14, 40)
+    look, folds = material("fabric", rng), count(rng, 14, 40)
     hung = height * draw(rng, 0.3, 1.0)
     rows = [(0.015 + 0.018 * (i % 2), hung * i / folds) for i in range(folds + 1)]
     points = np.array([[(x, y, z) for x, z in rows] for y in (-width / 2, width / 2)])

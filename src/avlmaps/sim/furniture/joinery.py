@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.sim.furniture.catalogue import Piece, Support
-from avlmaps.sim.materials import material
+from avlmaps.sim.materials import KINDS, material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined, triangles_of
-from avlmaps.sim.shapes import box, loft
+from avlmaps.sim.shapes import box, circle, loft
 
 T = TypeVar("T")
 
@@ -101,9 +101,13 @@ def finished(meshes: Sequence[Mesh], light: Sequence[Triple] = (), supports: Seq
     return Piece(whole.moved(-x, -y, -z), tops, tuple((a - x, b - y, c - z) for a, b, c in light))
 
 
+def turned_ring(
+    profile: Sequence[tuple[float, float]], look: Material, x: float = 0.0, y: float = 0.0, sides: int = 18
+) -> Mesh:
+    """Return what a profile of (radius, z) makes round an upright axis at (x, y), open at both ends."""
+    return loft([np.column_stack([circle(r, sides) + (x, y), np.full(sides, z)]) for r, z in profile], look, capped=False)
+
+
 def pictured(kind: str, rng: np.random.Generator, plain: str) -> Material:
     """Draw a material of a kind that carries a picture, or a plain one where there is no such kind."""
-    try:
-        return material(kind, rng)
-    except KeyError:
-        return material(plain, rng)
+    return material(kind if kind in KINDS else plain, rng)

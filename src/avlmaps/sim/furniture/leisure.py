@@ -5,7 +5,7 @@ import numpy as np
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.containers import tub
 from avlmaps.sim.furniture.fitness import hoop, wheel
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, pictured, strut
+from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.plants import frond
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
@@ -583,7 +583,7 @@ def _cushion_bed(rng: np.random.Generator) -> Piece:
 
 @family("pet bed", "cave")
 def _cave_bed(rng: np.random.Generator) -> Piece:
-    radius, look = draw(rng, 0.2, 0.32), pictured(pick(rng, ("fabric", "wicker")), rng, "fabric")
+    radius, look = draw(rng, 0.2, 0.32), material(pick(rng, ("fabric", "wicker")), rng)
     tall = radius * draw(rng, 1.1, 1.6)
     dome = lathe(
         [(radius * 0.9, 0.0), (radius, tall * 0.35), (radius * 0.8, tall * 0.75), (radius * 0.3, tall)], look, sides=18

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
-from avlmaps.sim.furniture.joinery import blade, chance, count, draw, finished, pick, pictured
+from avlmaps.sim.furniture.joinery import blade, chance, count, draw, finished, pick
 from avlmaps.sim.furniture.decor import flowers
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh
@@ -32,7 +32,7 @@ def pot(rng: np.random.Generator, radius: float, tall: float) -> list[Mesh]:
         "basket": [(0.75, 0.0), (1.0, 0.3), (1.02, 0.7), (0.9, 1.0), (0.85, 1.0), (0.88, 0.86)],
     }[kind]
     if kind == "basket":
-        look = pictured("wicker", rng, "wood")
+        look = material("wicker", rng)
     parts = [lathe([(r * radius, h * tall) for r, h in rows], look, sides=14), soil]
     if kind == "legs":
         wood, feet = material("wood", rng), circle(radius * 0.95, 4).tolist()
