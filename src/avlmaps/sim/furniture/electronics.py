@@ -8,7 +8,7 @@ from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.fittings import Pair, body, face, feet, slope, spindle
 from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, pictured, rim, strut
 from avlmaps.sim.materials import material
-from avlmaps.sim.mesh import Material, Mesh, joined
+from avlmaps.sim.mesh import Material, Mesh, joined, triangles_of
 from avlmaps.sim.shapes import box, cylinder, loft, prism, rounded_box, rounded_rectangle, slab, tube
 
 
@@ -30,7 +30,9 @@ def _panel(rng: np.random.Generator, wide: float, high: float, z: float, thick: 
            glow: Material) -> list[Mesh]:  # fmt: skip
     """Return a flat display whose back is at x = 0: casing, bezel and picture, a fatter middle behind at times."""
     bezel, chin = draw(rng, 0.004, 0.03), draw(rng, 0.0, 0.04)
-    parts = [body(rng, (0.0, -wide / 2, z), (thick, wide / 2, z + high), look, min(0.4 * thick, draw(rng, 0.003, 0.012)))]
+    parts = [
+        body(rng, (0.0, -wide / 2, z), (thick, wide / 2, z + high), look, min(0.4 * thick, draw(rng, 0.003, 0.012)))
+    ]
     low, top = (-wide / 2 + bezel, z + bezel + chin), (wide / 2 - bezel, z + high - bezel)
     parts.append(face(thick + 0.0015, low, top, glow, fill=True))
     if bezel > 0.012:
@@ -56,7 +58,9 @@ def _on_foot(rng: np.random.Generator) -> Piece:
     parts += [prism([(float(x), float(y)) for x, y in shape], 0.0, draw(rng, 0.008, 0.025), foot),
               slab(thick * 0.4, 0.0, 0.0, 0.04, draw(rng, 0.04, 0.3) * wide, lift + 0.1, foot)]  # fmt: skip
     if chance(rng, 0.5):
-        parts.append(body(rng, (-draw(rng, 0.02, 0.06), -wide * 0.3, lift + 0.03), (0.005, wide * 0.3, lift + 0.6 * high), look))
+        parts.append(
+            body(rng, (-draw(rng, 0.02, 0.06), -wide * 0.3, lift + 0.03), (0.005, wide * 0.3, lift + 0.6 * high), look)
+        )
     return finished(parts)
 
 
@@ -69,7 +73,9 @@ def _on_two_feet(rng: np.random.Generator) -> Piece:
     splay = draw(rng, -0.05, 0.08)
     for side in (-1, 1):
         for x in (thick / 2 + reach, thick / 2 - reach):
-            parts.append(strut((thick / 2, side * apart, lift + 0.02), (x, side * (apart + splay), bar / 2), bar, bar, look))
+            parts.append(
+                strut((thick / 2, side * apart, lift + 0.02), (x, side * (apart + splay), bar / 2), bar, bar, look)
+            )
     return finished(parts)
 
 
@@ -146,10 +152,12 @@ def _rolling(rng: np.random.Generator) -> Piece:
     look, lift, thick, metal = _casing(rng), draw(rng, 0.8, 1.2), draw(rng, 0.03, 0.06), material("black", rng)
     parts = [joined(_panel(rng, wide, high, lift, thick, look, screen(rng))).moved(x=0.06)]
     apart, reach = draw(rng, 0.0, 0.25), draw(rng, 0.25, 0.35)
-    for side in ((-1, 1) if apart > 0.06 else (0,)):
+    for side in (-1, 1) if apart > 0.06 else (0,):
         parts.append(slab(0.03, side * apart, 0.06, 0.05, 0.07, lift + 0.6 * high, metal))
     for side in (-1, 1):
-        parts.append(strut((-reach, side * (apart + 0.2), 0.05), (reach, side * (apart + 0.2), 0.05), 0.05, 0.04, metal))
+        parts.append(
+            strut((-reach, side * (apart + 0.2), 0.05), (reach, side * (apart + 0.2), 0.05), 0.05, 0.04, metal)
+        )
     parts += [slab(0.03, 0.0, 0.04, 0.06, 2 * apart + 0.45, 0.04, metal), slab(0.1, 0.0, 0.55, 0.3, 0.45, 0.02, metal)]
     return finished(parts, supports=[Support((-0.05, -0.22), (0.25, 0.22), 0.57, 0.25)])
 
@@ -158,11 +166,16 @@ def _rolling(rng: np.random.Generator) -> Piece:
 def _monitor_foot(rng: np.random.Generator) -> Piece:
     wide, high = _width(rng, 17, 32, pick(rng, (16 / 9, 16 / 10, 4 / 3, 5 / 4)))
     look, lift = _casing(rng), draw(rng, 0.06, 0.18)
-    panel = joined(_panel(rng, wide, high, 0.0, draw(rng, 0.018, 0.05), look, screen(rng))).tilted("y", -draw(rng, 0.0, 0.2))
+    panel = joined(_panel(rng, wide, high, 0.0, draw(rng, 0.018, 0.05), look, screen(rng))).tilted(
+        "y", -draw(rng, 0.0, 0.2)
+    )
     foot = material("metal", rng) if chance(rng, 0.35) else look
     deep, across = draw(rng, 0.16, 0.26), draw(rng, 0.18, 0.34)
     shape = rounded_rectangle(deep, across, pick(rng, (0.005, 0.04, 0.49 * min(deep, across))))
-    parts = [panel.moved(x=0.02, z=lift), prism([(float(a), float(b)) for a, b in shape], 0.0, draw(rng, 0.006, 0.02), foot)]
+    parts = [
+        panel.moved(x=0.02, z=lift),
+        prism([(float(a), float(b)) for a, b in shape], 0.0, draw(rng, 0.006, 0.02), foot),
+    ]
     wide_post = draw(rng, 0.03, 0.12)
     parts.append(strut((-0.02, 0.0, 0.005), (0.0, 0.0, lift + 0.45 * high), wide_post, 0.03, foot))
     return finished(parts)
@@ -174,7 +187,9 @@ def _monitor_v(rng: np.random.Generator) -> Piece:
     look, lift = _casing(rng), draw(rng, 0.08, 0.18)
     parts = [joined(_panel(rng, wide, high, lift, draw(rng, 0.02, 0.05), look, screen(rng))).moved(x=0.02)]
     for side in (-1, 1):
-        parts.append(strut((-0.06, 0.0, 0.012), (draw(rng, 0.1, 0.2), side * draw(rng, 0.14, 0.26), 0.01), 0.03, 0.02, look))
+        parts.append(
+            strut((-0.06, 0.0, 0.012), (draw(rng, 0.1, 0.2), side * draw(rng, 0.14, 0.26), 0.01), 0.03, 0.02, look)
+        )
     parts.append(cylinder(-0.045, 0.0, 0.0, 0.022, lift + 0.5 * high, look, 10))
     return finished(parts)
 
@@ -191,7 +206,11 @@ def _monitor_curved(rng: np.random.Generator) -> Piece:
              for a, b in zip(x, y, strict=True)]  # fmt: skip
     glow = np.stack([np.stack([x + 0.002, y * 0.985, np.full(11, z)], axis=-1) for z in (lift + 0.012, lift + high - 0.012)],
                     axis=1)  # fmt: skip
-    parts = [loft(rings, look), cloth(glow, screen(rng), fill=True), cylinder(-0.06, 0.0, 0.0, 0.03, lift + 0.5 * high, look, 10)]
+    parts = [
+        loft(rings, look),
+        cloth(glow, screen(rng), fill=True),
+        cylinder(-0.06, 0.0, 0.0, 0.03, lift + 0.5 * high, look, 10),
+    ]
     parts += [strut((-0.06, 0.0, 0.012), (0.16, side * 0.22, 0.01), 0.035, 0.02, look) for side in (-1, 1)]
     return finished(parts)
 
@@ -244,18 +263,42 @@ def _all_in_one(rng: np.random.Generator) -> Piece:
     return finished(parts)
 
 
-def _keys(rng: np.random.Generator, low: Pair, high: Pair, z: float, rows: int, columns: int, look: Material,
-          rise: float = 0.002) -> list[Mesh]:  # fmt: skip
-    """Return a field of keys between two corners (x, y); the lowest row holds a wide space bar."""
+def key_field(rng: np.random.Generator, low: Pair, high: Pair, z: float, rows: int, columns: int, look: Material,
+              rise: float = 0.002, bar: bool = True) -> list[Mesh]:  # fmt: skip
+    """Return a field of keys between two corners (x, y) on a plane at ``z``.
+
+    Args:
+        rng: draws the gaps.
+        low: corner of least (x, y), metres.
+        high: corner of greatest (x, y).
+        z: of what they stand on.
+        rows: along x.
+        columns: along y.
+        look: of the keys.
+        rise: how far they stand up.
+        bar: whether the nearest row holds a wide space bar.
+    """
     deep, wide = (high[0] - low[0]) / rows, (high[1] - low[1]) / columns
-    parts: list[Mesh] = []
+    gap = draw(rng, 0.06, 0.13)
+    quads: list[np.ndarray] = []
     for r in range(rows):
         x = high[0] - (r + 0.5) * deep
-        spans = [(c, c + 1) for c in range(columns)] if r else [(0, 2), (2, columns - 3), (columns - 3, columns - 1), (columns - 1, columns)]
+        spans = [(c, c + 1) for c in range(columns)]
+        if r == 0 and bar and columns > 6:
+            spans = [(0, 1), (1, 3), (3, columns - 4), (columns - 4, columns - 2), (columns - 2, columns)]
         for a, b in spans:
-            y0, y1 = low[1] + a * wide + 0.1 * wide, low[1] + b * wide - 0.1 * wide
-            parts.append(face_up((x - 0.42 * deep, y0), (x + 0.42 * deep, y1), z + rise, look))
-    return parts
+            y0, y1 = low[1] + a * wide + gap * wide, low[1] + b * wide - gap * wide
+            x0, x1 = x - (0.5 - gap) * deep, x + (0.5 - gap) * deep
+            quads.append(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]))
+    if rise < 0.003:  # flat keys: their tops only
+        tops = np.array([[(*p, z + rise) for p in quad] for quad in quads]).reshape(-1, 3)
+        at = np.arange(len(tops)).reshape(-1, 4)
+        return [triangles_of(tops, np.concatenate([at[:, [0, 1, 2]], at[:, [0, 2, 3]]]), look)]
+    shrunk = [quad + 0.12 * (quad.mean(axis=0) - quad) for quad in quads]
+    corner = np.array([[*((*p, z) for p in q), *((*p, z + rise) for p in s)] for q, s in zip(quads, shrunk, strict=True)])
+    faces = np.array([(0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7), (4, 5, 6, 7)])
+    at = (np.arange(len(quads))[:, None, None] * 8 + faces).reshape(-1, 4)
+    return [triangles_of(corner.reshape(-1, 3), np.concatenate([at[:, [0, 1, 2]], at[:, [0, 2, 3]]]), look)]
 
 
 def face_up(low: Pair, high: Pair, z: float, look: Material) -> Mesh:
@@ -271,7 +314,7 @@ def _laptop(rng: np.random.Generator, wide: float, deep: float, thick: float, an
     parts = [body(rng, (0.0, -wide / 2, 0.0), (deep, wide / 2, thick), look, min(0.3 * thick, 0.006))]
     key_look = dark if chance(rng, 0.8) else look
     parts += [face_up((0.14 * deep, -0.46 * wide), (0.6 * deep, 0.46 * wide), thick + 0.0006, dark)]
-    parts += _keys(rng, (0.15 * deep, -0.45 * wide), (0.59 * deep, 0.45 * wide), thick, 5, 12, key_look)
+    parts += key_field(rng, (0.15 * deep, -0.45 * wide), (0.59 * deep, 0.45 * wide), thick + 0.0006, 5, 13, key_look)
     pad = draw(rng, 0.15, 0.24) * wide
     parts.append(face_up((0.66 * deep, -pad), (0.96 * deep, pad), thick + 0.001, material("metal", rng)))
     bezel = draw(rng, 0.005, 0.02)
@@ -286,20 +329,35 @@ def _laptop(rng: np.random.Generator, wide: float, deep: float, thick: float, an
 def _laptop_open(rng: np.random.Generator) -> Piece:
     wide = draw(rng, 0.28, 0.39)
     look = material(pick(rng, ("metal", "metal", "white", "black", "painted")), rng)
-    return _laptop(rng, wide, wide * draw(rng, 0.64, 0.74), draw(rng, 0.01, 0.02), draw(rng, 0.05, 0.6), look, look, screen(rng, 0.75))
+    return _laptop(
+        rng,
+        wide,
+        wide * draw(rng, 0.64, 0.74),
+        draw(rng, 0.01, 0.02),
+        draw(rng, 0.05, 0.6),
+        look,
+        look,
+        screen(rng, 0.75),
+    )
 
 
 @family("laptop", "open thick")
 def _laptop_thick(rng: np.random.Generator) -> Piece:
     wide = draw(rng, 0.33, 0.43)
     look, lid = material("black", rng), material(pick(rng, ("black", "plastic", "metal")), rng)
-    return _laptop(rng, wide, wide * draw(rng, 0.68, 0.8), draw(rng, 0.022, 0.04), draw(rng, 0.1, 0.5), look, lid, screen(rng, 0.7))
+    return _laptop(
+        rng, wide, wide * draw(rng, 0.68, 0.8), draw(rng, 0.022, 0.04), draw(rng, 0.1, 0.5), look, lid, screen(rng, 0.7)
+    )
 
 
 @family("laptop", "closed")
 def _laptop_closed(rng: np.random.Generator) -> Piece:
     wide = draw(rng, 0.28, 0.4)
-    deep, thick, look = wide * draw(rng, 0.64, 0.76), draw(rng, 0.014, 0.035), material(pick(rng, ("metal", "black", "white", "plastic")), rng)
+    deep, thick, look = (
+        wide * draw(rng, 0.64, 0.76),
+        draw(rng, 0.014, 0.035),
+        material(pick(rng, ("metal", "black", "white", "plastic")), rng),
+    )
     parts = [body(rng, (0.0, -wide / 2, 0.0), (deep, wide / 2, 0.52 * thick), look, 0.003),
              body(rng, (0.003, -wide / 2, 0.56 * thick), (deep, wide / 2, thick), look, 0.004),
              slab(deep / 2, 0.0, 0.4 * thick, deep * 0.97, wide * 0.97, 0.25 * thick, material("black", rng)),
@@ -323,7 +381,13 @@ def _case_front(rng: np.random.Generator, deep: float, wide: float, high: float,
     dark = material("black", rng)
     for i in range(count(rng, 0, 3)):
         z = high * (0.9 - 0.11 * i)
-        parts.append(box((deep - 0.001, -wide * 0.42, z - 0.035), (deep + 0.004, wide * 0.42, z), look if chance(rng, 0.5) else dark))
+        parts.append(
+            box(
+                (deep - 0.001, -wide * 0.42, z - 0.035),
+                (deep + 0.004, wide * 0.42, z),
+                look if chance(rng, 0.5) else dark,
+            )
+        )
     parts += [spindle([(0.011, deep), (0.009, deep + 0.006)], material("metal", rng), 0.0, high * 0.55, 9)]
     n = count(rng, 0, 8)
     parts += [face(deep + 0.0012, (-wide * 0.35, 0.06 * high + 0.035 * i * high), (wide * 0.35, (0.078 + 0.035 * i) * high), dark)
@@ -368,7 +432,9 @@ def _glass_side(rng: np.random.Generator) -> Piece:
     parts += [box((0.0, y0, 0.03), (deep, y1, high - 0.01), material("glass", rng)),
               slab(deep * 0.5, 0.0, high * 0.4, 0.28, wide * 0.3, 0.045, glow), slab(deep * 0.35, 0.0, high * 0.65, 0.1, wide * 0.4, 0.1, material("metal", rng))]  # fmt: skip
     for z in np.linspace(0.14, high - 0.12, 3):
-        parts.append(spindle([(0.055, deep + 0.001), (0.045, deep + 0.006), (0.01, deep + 0.004)], glow, 0.0, float(z), 14))
+        parts.append(
+            spindle([(0.055, deep + 0.001), (0.045, deep + 0.006), (0.01, deep + 0.004)], glow, 0.0, float(z), 14)
+        )
     parts += feet((0.0, -wide / 2), (deep, wide / 2), 0.02, look)
     return finished(parts)
 
