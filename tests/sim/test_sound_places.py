@@ -71,7 +71,7 @@ def test_sources_stand_at_the_things_that_make_them() -> None:
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_ambiguous_kinds_sound_in_two_far_places_and_no_two_sources_are_close(seed: int) -> None:
     found = place_sources(flat(), np.random.default_rng(seed), 6, ambiguous=1, bank=Beeps())
     names = [source.category for source in found]

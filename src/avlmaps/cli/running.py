@@ -41,6 +41,7 @@ def record(verb: "Record") -> dict[str, Any]:
         drift=OdometryFaults() if verb.drift else None,
         max_frames=verb.max_frames,
         semantic=verb.semantic,
+        colour=verb.colour,
         workers=verb.workers,
     )
     scene = open_scene(verb.scene)

@@ -77,6 +77,8 @@ class Record(Verb):
     """Keep so many frames of a longer walk, evenly."""
     semantic: bool = False
     """Write which object each pixel shows into semantic/ as well (16-bit PNG: instance + 1, 0 for nothing)."""
+    colour: Literal["png", "jpg"] = "png"
+    """File type of the colour pictures; jpg takes a tenth of the space."""
     workers: int = 0
     """Processes that draw. Default: as many as there are cores."""
 

@@ -27,6 +27,7 @@ from avlmaps.sim.walk import WalkSettings, walk_through
 Hearing = Literal["overlay", "acoustic", "none"]
 _SECONDS_A_SOUND = 12.0
 _FEWEST_FOR_PROCESSES = 60  # starting a process takes as long as drawing some tens of frames
+_DEPTH = "depth"
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -170,6 +171,8 @@ def _trip(scene: Scene, settings: RecordSettings, rng: np.random.Generator) -> _
         poses = walk_through(scene, rng, replace(settings.walk, rate_hz=settings.fps, max_frames=None))
     except ValueError as error:
         raise RecordingError(f"{scene.name} cannot be driven through: {error}.") from None
+    if len(poses) < 2:
+        raise RecordingError(f"{scene.name} cannot be driven through: the robot has no room to move.")
     stamps_s = np.arange(len(poses)) / settings.fps
     duration_s = len(poses) / settings.fps
     if settings.max_frames is not None and len(poses) > settings.max_frames:
@@ -224,6 +227,8 @@ def _write_frames(
     if settings.semantic:
         (writer.path / SEMANTIC).mkdir(exist_ok=True)
     with TemporaryDirectory(prefix=".recording-", dir=writer.path.parent) as scratch:
+        for folder in (_DEPTH, SEMANTIC):
+            (Path(scratch) / folder).mkdir()
         artist = _Artist(Renderer(scene), settings, Path(scratch), seed)
         shifts = artist.sensor.shifts(count, rng)
         jobs = [(index, names[index], trip.world_from_camera[index], shifts[index]) for index in range(count)]
@@ -249,11 +254,8 @@ class _Artist:
 
     def files(self, name: str) -> tuple[Path, Path, Path]:
         """Return where a frame's colour, depth and instances are."""
-        return (
-            self._folder / f"{name}.{self._settings.colour}",
-            self._folder / f"{name}.depth.png",
-            self._folder / f"{name}.png" if self._settings.colour == "jpg" else self._folder / f"{name}.semantic.png",
-        )
+        colour = self._folder / f"{name}.{self._settings.colour}"
+        return colour, self._folder / _DEPTH / f"{name}.png", self._folder / SEMANTIC / f"{name}.png"
 
     def draw(self, job: _Job) -> int:
         """Draw one frame and return its index."""

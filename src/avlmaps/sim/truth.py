@@ -15,18 +15,16 @@ from jaxtyping import Float
 from avlmaps.core import poses
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import write_bytes_atomically
+from avlmaps.recordings.add_sounds import EVENTS
+from avlmaps.recordings.add_sounds import EVENTS_HEADER as COMMON_HEADER
 from avlmaps.recordings.layout import DESCRIPTION, POSES_HEADER, UNFINISHED
 from avlmaps.sim.hearing import Sounding
 from avlmaps.sim.mesh import Triple
 from avlmaps.sim.scene import Area, Scene, SceneObject
 
-EVENTS, OBJECTS, AREAS = "events.csv", "objects.json", "areas.json"
+OBJECTS, AREAS = "objects.json", "areas.json"
 TRUE_POSES, SIMULATION, SEMANTIC = "true_poses.csv", "simulation.json", "semantic"
-# The first eight columns are those that putting sounds into a track writes; readers of those read these as well.
-EVENTS_HEADER = (
-    "onset_s", "offset_s", "category", "clip", "x", "y", "z", "gain_db",
-    "source_x", "source_y", "source_z", "instance",
-)  # fmt: skip
+EVENTS_HEADER = (*COMMON_HEADER, "source_x", "source_y", "source_z", "instance")
 
 
 @dataclass(frozen=True, slots=True)
