@@ -47,7 +47,7 @@ def test_the_margin_is_that_over_the_best_rival(seed, words, other, few) -> None
     rivals = Rivals.of(feature, encoder, encoder.vocabulary)
     silent = np.append(rng.uniform(0, 1, words) < 0.5, [False] * other).astype(bool)
     asked = encoder.table["asked"]
-    margin = object_margins(feature, rivals, asked, silent, 0.3)
+    margin, _ = object_margins(feature, rivals, asked[None], silent, 0.3)
     wide = feature.astype(np.float32)
     competing = rivals.word_feature[~silent]
     best = (wide @ competing.T).max(axis=1, initial=-np.inf) if len(competing) else np.full(len(wide), -np.inf)

@@ -74,6 +74,40 @@ class PixelEncoder(Protocol):
 
 
 @runtime_checkable
+class NamedPixelEncoder(PixelEncoder, Protocol):
+    """A pixel encoder that tells a closed set of names apart and can say how likely each of them is.
+
+    Its features lie in the span of orthonormal codes, one for each name: Σ √p·code. A phrase may mean several names.
+    """
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What it tells apart."""
+        ...
+
+    @property
+    def codes(self) -> Float32[np.ndarray, "k d"]:
+        """The code of each name."""
+        ...
+
+    def meant(self, word: str) -> Float32[np.ndarray, " k"]:
+        """Return for each name how much a phrase means it, in [0, 1]; all zero where it means none."""
+        ...
+
+    def instance_probability(
+        self, name: str, mean_probability: Float[np.ndarray, " i"], area_m2: Float[np.ndarray, " i"]
+    ) -> Float[np.ndarray, " i"]:
+        """Return how likely connected voxels are a true instance of a name.
+
+        Args:
+            name: one of ``names``.
+            mean_probability: of the name, over the voxels of each instance.
+            area_m2: surface of each instance: a voxel's face for each of its voxels.
+        """
+        ...
+
+
+@runtime_checkable
 class ViewEncoder(Protocol):
     """Gives a whole picture one feature that the name of an area can be compared with."""
 

@@ -11,12 +11,14 @@ import numpy as np
 from jaxtyping import Bool, Float, Float16, Float32, Int
 
 from avlmaps.core.errors import QueryError
-from avlmaps.perception.protocols import PixelEncoder
+from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.heatmap import HeatSettings, NearThings
 from avlmaps.query.level import Space
 from avlmaps.query.question import Part
 
 _CHUNK = 16_384
+# A name that a phrase means at least so much is the thing itself and does not compete with it.
+CLEARLY_MEANT = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,36 @@ class ObjectSettings:
     """Voxels of an object no farther apart than this along every axis belong to one instance."""
     join_m: float = 0.3
     """Pieces over one another with no larger gap in height are one thing (the legs and the back of a chair)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A word as an encoder takes it.
+
+    Attributes:
+        rows: what a voxel's feature is compared with: its score is the length of their products with it. One unit
+            vector for most encoders; for one that tells names apart, the code of each name that is meant.
+        span: unit vectors of what is clearly meant; words that lie among them do not compete.
+        understood: what of the word the encoder can act on.
+        meant: for an encoder of names, how much each is meant; empty for others.
+    """
+
+    rows: Float32[np.ndarray, "m d"]
+    span: Float32[np.ndarray, "s d"]
+    understood: str
+    meant: Float32[np.ndarray, " k"]
+
+    @classmethod
+    def of(cls, encoder: PixelEncoder, word: str) -> "Asked":
+        """Ask an encoder for a word; there are no rows where it understands nothing of it."""
+        if isinstance(encoder, NamedPixelEncoder):
+            meant = encoder.meant(word)
+            some, clear = meant > 0.0, meant >= CLEARLY_MEANT
+            rows = np.sqrt(meant[some])[:, None] * encoder.codes[some]
+            return cls(np.ascontiguousarray(rows), encoder.codes[clear], encoder.understood(word), meant)
+        row = np.asarray(encoder.encode_words([word]), np.float32)
+        row = row[np.any(row != 0.0, axis=1)]
+        return cls(row, row, encoder.understood(word), np.zeros(0, np.float32))
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,11 +104,10 @@ class Rivals:
         words = tuple(word for word, is_known in zip(names, known, strict=True) if is_known)
         return cls(words, encoded[known], bool(known[-1]), *_two_closest(feature, encoded[known]))
 
-    def silent_for(self, encoder: PixelEncoder, asked: str, asked_feature: Float32[np.ndarray, " d"], cosine: float):
+    def silent_for(self, encoder: PixelEncoder, asked: "Asked", cosine: float) -> Bool[np.ndarray, " v"]:
         """Return which words do not compete because they name what is asked for; ``other`` always competes."""
-        meaning = encoder.understood(asked)
-        close = self.word_feature @ asked_feature >= cosine
-        same = [bool(meaning) and encoder.understood(word) == meaning for word in self.words]
+        close = np.linalg.norm(self.word_feature @ asked.span.T, axis=1) >= cosine
+        same = [bool(asked.understood) and encoder.understood(word) == asked.understood for word in self.words]
         silent = close | np.array(same, bool)
         if self.has_other:
             silent[-1] = False
@@ -106,22 +137,29 @@ def _two_closest(feature: Float16[np.ndarray, "n d"], words: Float32[np.ndarray,
 def object_margins(
     feature: Float16[np.ndarray, "n d"],
     rivals: Rivals,
-    asked: Float32[np.ndarray, " d"],
+    asked: Float32[np.ndarray, "m d"],
     silent: Bool[np.ndarray, " v"],
     least_score: float,
-) -> Float32[np.ndarray, " n"]:
-    """Return by how much the asked word beats its best rival at each voxel; positive where the voxel is the object.
+) -> tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
+    """Return by how much the asked word beats its best rival at each voxel, and its score there.
+
+    The margin is positive where the voxel is the object.
 
     Args:
         feature: of the voxels, zero where there is none.
         rivals: what competes.
-        asked: unit vector.
+        asked: rows of ``Asked``.
         silent: which of the rivals' words do not compete.
         least_score: what the word must beat besides where ``other`` has no feature.
     """
     from avlmaps.query.kernels import feature_scores, margins, share
 
-    score = feature_scores(feature, asked)
+    score = feature_scores(feature, asked[0])
+    if len(asked) > 1:
+        total = np.square(score)
+        for row in asked[1:]:
+            total += np.square(feature_scores(feature, row))
+        score = np.sqrt(total)
     floor = np.float32(-np.inf if rivals.has_other else least_score)
     out, unsure = np.empty(len(score), np.float32), np.empty(len(score), np.bool_)
     mute = np.append(silent, True)
@@ -139,7 +177,7 @@ def object_margins(
             some = rows[a : a + _CHUNK]
             best = (np.asarray(feature[some], np.float32) @ others).max(axis=1)
             out[some] = score[some] - np.maximum(best, floor)
-    return out
+    return out, score
 
 
 def instances_of(space: Space, mask: Bool[np.ndarray, " n"], link_m: float) -> Int[np.ndarray, " a"]:
@@ -164,6 +202,31 @@ def instance_confidence(
     return (clear * large).astype(np.float32)
 
 
+def named_confidence(
+    encoder: NamedPixelEncoder,
+    asked: Asked,
+    score: Float[np.ndarray, " a"],
+    instance: Int[np.ndarray, " a"],
+    voxel_size_m: float,
+) -> Float32[np.ndarray, " i"]:
+    """Return how sure it is that each instance is what was asked for, as the encoder was calibrated.
+
+    A phrase that means several names is as sure as the most meant of them would be with all their probability.
+
+    Args:
+        encoder: of names.
+        asked: the word.
+        score: of each voxel, √p.
+        instance: which each belongs to.
+        voxel_size_m: edge of a voxel.
+    """
+    count = np.bincount(instance)
+    mean = np.bincount(instance, weights=np.square(score)) / np.maximum(count, 1)
+    names = [encoder.names[index] for index in np.flatnonzero(asked.meant >= CLEARLY_MEANT)]
+    sure = [encoder.instance_probability(name, mean, count * voxel_size_m**2) for name in names]
+    return np.max(sure, axis=0).astype(np.float32)
+
+
 def object_factor(
     space: Space,
     feature: Float16[np.ndarray, "n d"],
@@ -178,19 +241,25 @@ def object_factor(
     Raises:
         QueryError: the encoder understands nothing of the word.
     """
-    asked = np.asarray(encoder.encode_words([part.query]), np.float32)[0]
-    understood = encoder.understood(part.query)
-    if not asked.any():
+    asked = Asked.of(encoder, part.query)
+    understood = asked.understood
+    if not len(asked.rows):
         known = ", ".join(encoder.vocabulary[:20]) or "nothing that it could list"
         raise QueryError(
             f"The pixel encoder {encoder.card.id} understands nothing of {part.query!r}; it knows: {known}."
             + (f" ({encoder.card.note})" if encoder.card.note else "")
         )
-    silent = rivals.silent_for(encoder, part.query, asked, settings.same_word_cosine)
-    margin = object_margins(feature, rivals, asked, silent, settings.least_score)
+    silent = rivals.silent_for(encoder, asked, settings.same_word_cosine)
+    margin, score = object_margins(feature, rivals, asked.rows, silent, settings.least_score)
     mask = margin > 0.0
     instance = instances_of(space, mask, settings.link_m)
-    confidence = instance_confidence(margin[mask], instance, space.grid.voxel_size_m, settings)
+
+    def confidence_of(mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"]) -> Float32[np.ndarray, " i"]:
+        if isinstance(encoder, NamedPixelEncoder):
+            return named_confidence(encoder, asked, score[mask], instance, space.grid.voxel_size_m)
+        return instance_confidence(margin[mask], instance, space.grid.voxel_size_m, settings)
+
+    confidence = confidence_of(mask, instance)
     best = float(confidence.max(initial=0.0))
     note = "" if best >= 0.5 else _absence(part.query, len(mask), int(mask.sum()), best)
     if understood and understood != part.query.strip().lower():
@@ -199,7 +268,7 @@ def object_factor(
     joined = joined_pieces(space.level(space.centres[mask]), instance, settings.link_m, settings.join_m)
     if len(confidence) > joined.max(initial=-1) + 1:
         instance = joined[instance]
-        confidence = instance_confidence(margin[mask], instance, space.grid.voxel_size_m, settings)
+        confidence = confidence_of(mask, instance)
     falloff = heat.falloff_per_m(part.role)
     return NearThings(space, part, falloff, mask, instance, confidence, best >= 0.5, understood, note)
 
