@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from avlmaps.sim.furniture.joinery import chance, draw, pick
+from avlmaps.sim.homes.polygons import inside
 from avlmaps.sim.homes.plan import OUTSIDE, Hole, HoleKind, Room, Wall
 
 HUBS = ("hallway", "corridor", "entrance hall", "open-plan office", "reception")
@@ -56,7 +57,7 @@ def joined_up(
                 out[index] = _opened(rng, wall, rooms)
             else:
                 out[index] = wall.with_hole(_door(rng, wall, rooms, index in wanted))
-    return out
+    return [_swung_free(rooms, out, index) for index in range(len(out))]
 
 
 def _tree(rooms: list[Room], walls: list[Wall], start: int, patience: float) -> set[int] | None:
@@ -110,6 +111,46 @@ def _door(rng: np.random.Generator, wall: Wall, rooms: list[Room], needed: bool)
     into_left = left_kind not in HUBS and (right_kind in HUBS or chance(rng, 0.5))
     head = min(draw(rng, 2.0, 2.2), ceiling - 0.12)
     return Hole(kind, at, width, 0.0, head, open_rad, into_left, to_corner)
+
+
+def _swung_free(rooms: list[Room], walls: list[Wall], index: int) -> Wall:
+    """Return a wall whose open doors swing to where they stand in no other door's way; where none can, leafless."""
+    wall = walls[index]
+    holes = []
+    for hole in wall.holes:
+        if hole.kind == "door":
+            sides = (hole.to_left, not hole.to_left)
+            swings = [replace(hole, to_left=side, hinge=h) for side in sides for h in (hole.hinge, -hole.hinge)]
+            free = [swing for swing in swings if _leaf_is_free(rooms, walls, index, swing)]
+            hole = free[0] if free else replace(hole, kind="doorless")
+        holes.append(hole)
+    return replace(wall, holes=tuple(holes))
+
+
+def _leaf_is_free(rooms: list[Room], walls: list[Wall], index: int, hole: Hole) -> bool:
+    wall = walls[index]
+    room = wall.left if hole.to_left else wall.right
+    into = wall.to_left if hole.to_left else -wall.to_left
+    leaf = []
+    for hinge in (hole.hinge,) if hole.width_m <= 1.2 else (1, -1):
+        foot = wall.at(hole.at_m + hinge * hole.width_m / 2)
+        reach = hole.width_m if hole.width_m <= 1.2 else hole.width_m / 2
+        way = -hinge * np.cos(hole.open_rad) * wall.along + np.sin(hole.open_rad) * into
+        leaf += [foot + share * reach * way for share in (0.25, 0.5, 0.75, 1.0)]
+    places = np.array(leaf)
+    if not inside(rooms[room].polygon, places[-1:], -0.08).all() or not inside(rooms[room].polygon, places, -0.03).all():
+        return False
+    for number, other in enumerate(walls):
+        if number == index or room not in (other.left, other.right):
+            continue
+        spans = [(h.at_m, h.width_m / 2) for h in other.holes if h.kind not in ("window", "closed door")]
+        spans += [] if other.built else [(other.length_m / 2, 0.5)]
+        for at, half in spans:
+            away = np.abs((places - other.at(at)) @ other.to_left)
+            along = np.abs((places - other.at(at)) @ other.along)
+            if np.any((away < 0.85) & (along < half + 0.1)):
+                return False
+    return True
 
 
 def lit_by_day(rng: np.random.Generator, rooms: list[Room], walls: list[Wall]) -> list[Wall]:

@@ -13,6 +13,7 @@ from avlmaps.sim.homes.polygons import middle
 from avlmaps.sim.mesh import Mesh
 from avlmaps.sim.scene import Light, SceneBuilder
 
+_UNDER_LAMPS = ("dining table", "kitchen island", "coffee table", "bed")
 _TOUCH_M = 0.006  # pieces stand so far from the wall behind them
 
 
@@ -238,10 +239,14 @@ class Furnisher:
         return self.along(piece, sides, front_m=0.0, gap_m=-_TOUCH_M + 0.001, z=z, near=near, tries=tries, corner=0.0)
 
     def from_ceiling(self, piece: Piece, centre: Float[np.ndarray, "2"]) -> Stood | None:
-        """Hang a lamp from the ceiling over a place."""
+        """Hang a lamp from the ceiling over a place, where a head passes under it or a table keeps heads away."""
         foot = footprint(piece.mesh)
         z = self.height_m - foot.high_m - 0.001
-        if z + foot.low_m < 1.2:
+        over_table = any(
+            stood.piece.category in _UNDER_LAMPS and np.all(np.abs(stood.centre - centre) < stood.foot.half.min())
+            for stood in self.stood
+        )
+        if z + foot.low_m < (1.2 if over_table else 1.9):
             return None
         heading = float(self.rng.uniform(-np.pi, np.pi))
         if not self.ground.fits(foot, centre[None], np.array([heading]), z, zones=False)[0]:
@@ -254,6 +259,21 @@ class Furnisher:
         """Stand a piece of a category against a wall in a share of the cases, or hang it if it is made to hang."""
         if self.rng.random() > share * self.fill or (piece := self.new(category)) is None:
             return None
+        return self._stand(piece, front_m, corner, near, sides, at_middle)
+
+    def insist(self, category: str, front_m: float = 0.45, corner: float = 0.3, at_middle: float = 0.0,
+               tries: int = 3) -> Stood | None:  # fmt: skip
+        """Stand what a room cannot do without, trying several shapes until one finds a place."""
+        for _ in range(tries if self.fill > 0.5 or self.rng.random() < 0.6 else 0):
+            if (piece := self.new(category)) is None:
+                return None
+            if (stood := self._stand(piece, front_m, corner, None, None, at_middle)) is not None:
+                return stood
+        return None
+
+    def _stand(self, piece: Piece, front_m: float, corner: float, near: Float[np.ndarray, "2"] | None,
+               sides: Sequence[Side] | None, at_middle: float) -> Stood | None:  # fmt: skip
+        category = piece.category
         if hangs(piece):
             return self.hang(piece, HANGING_M.get(category, (1.2, 1.7)), sides, near=near)
         return self.along(piece, sides, front_m, corner=corner, near=near, at_middle=at_middle)

@@ -41,7 +41,7 @@ def living_room(f: Furnisher) -> None:
     stood = None
     if sofa is not None:
         stood = _facing(f, sofa, screen) if screen is not None and chance(rng, 0.75) else None
-        stood = stood or f.along(sofa, front_m=0.35, corner=0.15, at_middle=0.5)
+        stood = stood or f.along(sofa, front_m=0.35, corner=0.15, at_middle=0.5) or f.insist("sofa", 0.3)
     if stood is not None:
         _sofa_corner(f, stood)
     for _ in range(count(rng, 0, 2)):
@@ -122,10 +122,14 @@ def dining_room(f: Furnisher) -> None:
 def dining_place(f: Furnisher, share: float, free_standing: float = 0.85) -> Stood | None:
     """Stand a dining table with chairs round it, in a share of the cases."""
     rng = f.rng
-    if not chance(rng, share) or (table := f.new("dining table")) is None:
-        return None
-    stood = f.in_middle(table, 0.14) if chance(rng, free_standing) else None
-    stood = stood or f.along(table, front_m=0.0, gap_m=0.0 if chance(rng, 0.5) else draw(rng, 0.5, 0.8), corner=0.5)
+    stood = None
+    for _ in range(3 if chance(rng, share) else 0):
+        if (table := f.new("dining table")) is None:
+            return None
+        stood = f.in_middle(table, 0.14) if chance(rng, free_standing) else None
+        stood = stood or f.along(table, front_m=0.0, gap_m=0.0 if chance(rng, 0.5) else draw(rng, 0.5, 0.8), corner=0.5)
+        if stood is not None:
+            break
     if stood is None:
         return None
     if chance(rng, 0.4):
@@ -140,10 +144,7 @@ def dining_place(f: Furnisher, share: float, free_standing: float = 0.85) -> Sto
 def bedroom(f: Furnisher) -> None:
     """Furnish a bedroom: head of the bed to the wall, a nightstand on either side."""
     rng = f.rng
-    bed = f.new("bed")
-    stood = None
-    if bed is not None:
-        stood = f.along(bed, front_m=0.0, corner=0.12, at_middle=0.65)
+    stood = f.insist("bed", 0.0, 0.12, 0.65)
     if stood is not None:
         _bedside(f, stood)
     several(f, {"wardrobe": 0.9, "chest of drawers": 0.55}, 0.6)
@@ -175,8 +176,7 @@ def childrens_room(f: Furnisher) -> None:
     if chance(rng, 0.12):
         f.stand("crib", 1.0)
     for _ in range(count(rng, 1, 2)):
-        if (bed := f.new(pick(rng, ("bed", "bunk bed", "crib", "bed")))) is not None:
-            f.along(bed, front_m=0.0, corner=0.7)
+        f.insist(pick(rng, ("bed", "bunk bed", "crib", "bed")), 0.0, 0.7, tries=2)
     if chance(rng, 0.5):
         desk_place(f)
     if chance(rng, 0.6):
@@ -194,9 +194,7 @@ def childrens_room(f: Furnisher) -> None:
 def desk_place(f: Furnisher, computer: float = 0.75, front_m: float = 0.75) -> Stood | None:
     """Stand a desk against a wall, with a chair before it and what one works with on it."""
     rng = f.rng
-    if (desk := f.new("desk")) is None:
-        return None
-    stood = f.along(desk, front_m=front_m, corner=0.35)
+    stood = f.insist("desk", front_m, 0.35, tries=2)
     if stood is not None:
         equip(f, stood, computer)
         seat = f.new("office chair" if chance(rng, 0.7) else "chair")

@@ -21,7 +21,7 @@ def kitchen(f: Furnisher) -> None:
     fitted = f.row(base, front_m=0.6)
     for needed in ("stove", "refrigerator", "kitchen counter"):
         if not any(stood.piece.category == needed for stood in f.stood):
-            f.stand(needed, 1.0, 0.55, corner=0.6)
+            f.insist(needed, 0.5, corner=0.6)
     _above(f, fitted)
     _sink(f)
     if chance(rng, 0.3) and (island := f.new("kitchen island")) is not None:
@@ -80,8 +80,8 @@ def _clear_of_holes(f: Furnisher, centre: np.ndarray, half_m: float, low: float,
 
 def _sink(f: Furnisher) -> None:
     """Stand a sink where there is room for one of its own; counters mostly have theirs set in."""
-    if chance(f.rng, 0.5) and (sink := f.new("sink")) is not None and not hangs(sink):
-        f.along(sink, front_m=0.5, corner=0.3)
+    if not any(stood.piece.category == "sink" for stood in f.stood) and chance(f.rng, 0.6):
+        f.insist("sink", 0.45, tries=2)
 
 
 def bathroom(f: Furnisher) -> None:
@@ -95,10 +95,11 @@ def bathroom(f: Furnisher) -> None:
     ]
     if not large:
         order = ["toilet", "sink"]
-    rng.shuffle(order)
+    if chance(rng, 0.5):
+        order.reverse()
     basin = None
     for category in order:
-        stood = f.stand(category, 1.0, 0.4, corner=0.8 if category in ("bathtub", "shower") else 0.3)
+        stood = f.insist(category, 0.35, corner=0.8 if category in ("bathtub", "shower") else 0.4)
         basin = stood if category == "sink" else basin
     if basin is not None and (mirror := f.new("mirror")) is not None and hangs(mirror):
         _over(f, mirror, basin, draw(rng, 1.15, 1.35))
