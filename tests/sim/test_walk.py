@@ -154,9 +154,23 @@ def test_a_place_that_cannot_be_reached_is_infinitely_far() -> None:
 def test_without_names_the_lowest_large_level_surface_is_the_floor() -> None:
     parts = [("thing", mesh) for _, mesh in room(5.0, 4.0, z=1.0)] + [("thing", box((1, 1, 1), (2, 2, 1.7), PLAIN))]
     scene = building(parts)
-    assert floor_heights(scene)[0] == pytest.approx(1.0, abs=0.11)
-    assert free_space(scene, floor=0).is_free(np.array([3.5, 3.0]))
-    assert not free_space(scene, floor=0).is_free(np.array([1.5, 1.5]))
+    assert floor_heights(scene) == pytest.approx((1.0,))
+    assert free_space(scene).is_free(np.array([3.5, 3.0]))
+    assert not free_space(scene).is_free(np.array([1.5, 1.5]))
+
+
+@pytest.mark.parametrize("named", [False, True])
+@pytest.mark.parametrize("slab_m", [0.02, 0.3])
+def test_two_storeys_without_areas_are_two_floors_and_the_roof_is_none(named: bool, slab_m: float) -> None:
+    parts = [*room(5.0, 4.0, height=2.7 - slab_m), *room(5.0, 4.0, z=2.7)]
+    parts += [("floor", box((0, 0, z - slab_m), (5, 4, z), PLAIN)) for z in (0.0, 2.7)]
+    scene = building([(category if named else "thing", mesh) for category, mesh in parts])
+    assert floor_heights(scene) == pytest.approx((0.0, 2.7), abs=0.03)
+
+
+def test_the_floor_of_an_area_is_where_its_surface_is_not_where_its_box_begins() -> None:
+    scene = building(room(5.0, 4.0), (Area("bedroom", rectangle(0, 0, 5, 4), floor_m=-0.17),))
+    assert floor_heights(scene) == pytest.approx((0.0,), abs=1e-6)
 
 
 # --- the walk

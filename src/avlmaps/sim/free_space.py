@@ -17,6 +17,9 @@ STRUCTURE = frozenset({"wall", "floor", "ceiling", "column", "stairs", "railing"
 _STEP_M = 0.1  # what is lower than this can be driven over
 _THRESHOLD_M = 0.3  # gaps in the floor up to this wide (door sills, seams of a scan) count as floor
 _FLAT = 0.8  # the upward part of the normal of what can be stood on
+_LARGE = 0.34  # a floor without a name has at least this share of the largest level surface
+_FINE_M = 0.02  # surfaces this near in height are one
+_ROUGH_M = 0.3  # the floors of areas are said as roughly as this
 _SLAB_M = 0.45  # a floor is at most this thick, from its underside
 _STOREY_M = 1.5  # floors closer together than this are steps of one floor
 _POCKET_M2 = 0.6  # free parts smaller than this lie within something hollow
@@ -134,14 +137,34 @@ class FreeSpace:
 def floor_heights(scene: Scene) -> tuple[float, ...]:
     """Return the height of every floor of a building, lowest first.
 
-    From its areas where it has any; else from what is called floor; else from the level surfaces that are at least
-    a third as large as the largest and have nothing as large within a storey under them.
+    Where it has areas, they tell the floors; else every level surface does that is called floor, or where nothing
+    is, that is at least a third as large as the largest and a storey above the one below. The height is that of the
+    highest large surface there: the top of a slab, not its underside.
     """
-    if scene.areas:
-        heights = np.array([area.floor_m for area in scene.areas])
-        return _levels(heights, np.ones(len(heights)))
     flat, height, area = _flat_triangles(scene, only_named=_has_floor(scene))
-    return _levels(height[flat], area[flat], share=0.34) if flat.any() else (0.0,)
+    steep = np.abs(scene.mesh.normals()[:, 2]) < 1 - _FLAT
+    wall, wall_m2 = scene.mesh.corners()[steep, :, 2], area[steep]
+    height, area = height[flat], area[flat]
+    if scene.areas:
+        storeys = _apart(np.array([room.floor_m for room in scene.areas]))
+        return tuple(_top(height, area, storey - _ROUGH_M, storey + _ROUGH_M, storey) for storey in storeys)
+    if not len(height):
+        return (0.0,)
+    edge = np.floor(height / 0.1).astype(np.int64)
+    total = np.bincount(edge - edge.min(), weights=area)
+    large = 0.1 * (np.flatnonzero(total >= _LARGE * total.max()) + edge.min())
+    levels: list[float] = []
+    for low in large:
+        if not levels or low - levels[-1] > _STOREY_M:
+            levels.append(_top(height, area, low - 0.05, low + _SLAB_M, low))
+    # A ceiling is level and large as well, but has no walls on it.
+    standing = [_standing_m2(wall, wall_m2, level) for level in levels]
+    return tuple(level for level, m2 in zip(levels, standing, strict=True) if m2 >= _LARGE * max(standing))
+
+
+def _standing_m2(wall: Float[np.ndarray, "w 3"], wall_m2: Float[np.ndarray, " w"], level_m: float) -> float:
+    """Return how much wall stands on a level."""
+    return float(wall_m2[(wall.max(axis=1) > level_m + 0.5) & (wall.min(axis=1) < level_m + 1.5)].sum())
 
 
 def free_space(
@@ -250,21 +273,25 @@ def _flat_triangles(scene: Scene, only_named: bool) -> tuple[np.ndarray, np.ndar
     return flat, mesh.corners()[:, :, 2].mean(axis=1), mesh.areas_m2()
 
 
-def _levels(height: np.ndarray, weight: np.ndarray, share: float = 0.0) -> tuple[float, ...]:
-    """Return the heavy heights, lowest first; within a storey the lowest, or the top of its slab."""
-    edge = np.floor(height / 0.1).astype(np.int64)
-    first = int(edge.min())
-    total = np.bincount(edge - first, weights=weight)
-    heavy = np.flatnonzero(total >= max(share * total.max(), 1e-12)) + first
-    levels: list[float] = []
-    for bin_number in heavy:
-        near = (edge >= bin_number - 1) & (edge <= bin_number + 1)
-        level = float(np.average(height[near], weights=weight[near]))
-        if not levels or level - levels[-1] > _STOREY_M:
-            levels.append(level)
-        elif level - levels[-1] < _SLAB_M:
-            levels[-1] = level
-    return tuple(levels)
+def _apart(height: Float[np.ndarray, " n"]) -> list[float]:
+    """Return the median of each group of heights, where groups are more than a step of one floor apart."""
+    height = np.sort(height)
+    groups = np.split(height, np.flatnonzero(np.diff(height) > _STOREY_M) + 1)
+    return [float(np.median(group)) for group in groups]
+
+
+def _top(height: np.ndarray, area: np.ndarray, low: float, high: float, otherwise: float) -> float:
+    """Return the highest level within a range whose surface is at least half as large as the largest there."""
+    near = (height >= low) & (height <= high)
+    if not near.any():
+        return otherwise
+    height, area = height[near], area[near]
+    fine = np.floor((height - height.min()) / _FINE_M).astype(np.int64)
+    # Scanned floors are rough: what lies within two steps counts as one surface.
+    around = np.convolve(np.bincount(fine, weights=area, minlength=5), np.ones(5), "same")
+    best = int(np.flatnonzero(around >= 0.5 * around.max())[-1])
+    same = np.abs(fine - best) <= 2
+    return float(np.average(height[same], weights=area[same]))
 
 
 def reaching_part(scene: Scene, space: FreeSpace) -> FreeSpace:
