@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
-
 from training.pixels import fit, worlds
 
 

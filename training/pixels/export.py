@@ -6,7 +6,6 @@ import numpy as np
 import onnx
 import torch
 from onnx import numpy_helper
-
 from training.pixels.network import COLOUR, GEOMETRY, RoomNetwork
 
 

@@ -63,6 +63,8 @@ _EMBEDDED = "avlmaps.perception.embedded"
 _BUILT_IN = (
     Backend(Kind.WORDS, "embedded", f"{_EMBEDDED}.words:EmbeddedWords"),
     Backend(Kind.PIXELS, "colours", f"{_EMBEDDED}.colours:ColourWords"),
+    Backend(Kind.PIXELS, "embedded", f"{_EMBEDDED}.pixels:EmbeddedPixels"),
+    Backend(Kind.VIEWS, "embedded", f"{_EMBEDDED}.views:EmbeddedViews"),
     Backend(Kind.SOUNDS, "embedded", f"{_EMBEDDED}.sounds:EmbeddedSounds"),
     Backend(Kind.LOCAL, "rootsift", f"{_EMBEDDED}.rootsift:RootSift"),
     Backend(Kind.PLACE, "vlad", f"{_EMBEDDED}.vlad:Vlad"),

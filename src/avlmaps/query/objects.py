@@ -249,28 +249,65 @@ def object_factor(
             f"The pixel encoder {encoder.card.id} understands nothing of {part.query!r}; it knows: {known}."
             + (f" ({encoder.card.note})" if encoder.card.note else "")
         )
+    pieces = object_pieces(space, feature, encoder, rivals, asked, settings)
+    best = float(pieces.confidence.max(initial=0.0))
+    note = "" if best >= 0.5 else _absence(part.query, len(pieces.mask), pieces.won, best)
+    if understood and understood != part.query.strip().lower():
+        note = f"understood only {understood!r} of {part.query!r}" + ("; " + note if note else "")
+    falloff = heat.falloff_per_m(part.role)
+    return NearThings(
+        space, part, falloff, pieces.mask, pieces.instance, pieces.confidence, best >= 0.5, understood, note
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """The voxels that an asked word won, and the things that they make up.
+
+    Attributes:
+        mask: which voxels they are.
+        instance: which thing each of them belongs to.
+        mean_probability: of each thing: the mean of its voxels' squared scores (for an encoder of names: p).
+        confidence: how sure it is that each is what was asked for.
+        won: how many voxels the word won before specks were left out.
+    """
+
+    mask: Bool[np.ndarray, " n"]
+    instance: Int[np.ndarray, " a"]
+    mean_probability: Float32[np.ndarray, " i"]
+    confidence: Float32[np.ndarray, " i"]
+    won: int
+
+
+def object_pieces(
+    space: Space,
+    feature: Float16[np.ndarray, "n d"],
+    encoder: PixelEncoder,
+    rivals: Rivals,
+    asked: Asked,
+    settings: ObjectSettings,
+) -> Pieces:
+    """Return the things that a word names: connected voxels that it wins, specks left out, thin parts joined."""
     silent = rivals.silent_for(encoder, asked, settings.same_word_cosine)
     margin, score = object_margins(feature, rivals, asked.rows, silent, settings.least_score)
-    mask = margin > 0.0
-    instance = instances_of(space, mask, settings.link_m)
 
     def confidence_of(mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"]) -> Float32[np.ndarray, " i"]:
         if isinstance(encoder, NamedPixelEncoder):
             return named_confidence(encoder, asked, score[mask], instance, space.grid.voxel_size_m)
         return instance_confidence(margin[mask], instance, space.grid.voxel_size_m, settings)
 
+    mask = margin > 0.0
+    won = int(mask.sum())
+    instance = instances_of(space, mask, settings.link_m)
     confidence = confidence_of(mask, instance)
-    best = float(confidence.max(initial=0.0))
-    note = "" if best >= 0.5 else _absence(part.query, len(mask), int(mask.sum()), best)
-    if understood and understood != part.query.strip().lower():
-        note = f"understood only {understood!r} of {part.query!r}" + ("; " + note if note else "")
     mask, instance, confidence = _without_specks(mask, instance, confidence, settings.least_confidence)
     joined = joined_pieces(space.level(space.centres[mask]), instance, settings.link_m, settings.join_m)
     if len(confidence) > joined.max(initial=-1) + 1:
         instance = joined[instance]
         confidence = confidence_of(mask, instance)
-    falloff = heat.falloff_per_m(part.role)
-    return NearThings(space, part, falloff, mask, instance, confidence, best >= 0.5, understood, note)
+    mean = np.bincount(instance, weights=np.square(score[mask]), minlength=len(confidence))
+    mean /= np.maximum(np.bincount(instance, minlength=len(confidence)), 1)
+    return Pieces(mask, instance, mean.astype(np.float32), confidence, won)
 
 
 def _without_specks(

@@ -5,13 +5,16 @@ from functools import cached_property
 from typing import cast
 
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Float, Float32
 
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.embedded.codes import Lexicon, features_of, word_codes
 from avlmaps.perception.embedded.scene_network import SceneNetwork, load_network
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.types import Frame
+
+# Beyond these an instance's size says no more for or against it.
+SMALLEST_LOG_AREA, LARGEST_LOG_AREA = -4.0, 0.7
 
 
 class EmbeddedPixels:
@@ -69,8 +72,21 @@ class EmbeddedPixels:
         clean = " ".join(word.lower().split())
         return clean if clean in best else " or ".join(best[:4])
 
-    def probabilities(self, feature: Float32[np.ndarray, "n d"]) -> Float32[np.ndarray, "n k"]:
-        """Return the probability of each of ``names`` from fused features; zero where there is no feature."""
-        share = np.square(np.maximum(np.asarray(feature, np.float32) @ self.codes.T, 0.0))
-        total = share.sum(axis=1, keepdims=True)
-        return share / np.maximum(total, 1e-9)
+    def instance_probability(
+        self, name: str, mean_probability: Float[np.ndarray, " i"], area_m2: Float[np.ndarray, " i"]
+    ) -> Float[np.ndarray, " i"]:
+        """Return how likely connected voxels are a true instance of a name; see ``InstanceNotes``.
+
+        Args:
+            name: one of ``names``.
+            mean_probability: of the name, over the voxels of each instance.
+            area_m2: surface of each instance.
+        """
+        notes = self._network.notes.instances
+        p = np.clip(np.asarray(mean_probability, np.float64), 1e-4, 1.0 - 1e-4)
+        usual_m2 = notes.area_m2.get(name, notes.default_area_m2)
+        size = np.clip(np.log(np.maximum(area_m2, 1e-6) / usual_m2), SMALLEST_LOG_AREA, LARGEST_LOG_AREA)
+        odds = (
+            notes.bias.get(name, notes.default_bias) + notes.slopes[0] * np.log(p / (1.0 - p)) + notes.slopes[1] * size
+        )
+        return 1.0 / (1.0 + np.exp(-odds))

@@ -31,6 +31,26 @@ _MULTIPLE = 16
 _USUAL_HEIGHT_M = 1.3
 
 
+class InstanceNotes(msgspec.Struct, frozen=True):
+    """How connected voxels are told from noise, fitted on maps of held-out homes (``training/pixels/instances.py``).
+
+    The log-odds that they are a true instance are ``bias + slopes[0]·log-odds(p) + slopes[1]·log(area / usual area)``.
+
+    Attributes:
+        slopes: of the log-odds of their mean probability, and of the logarithm of their area beside the usual one.
+        bias: of each category; of all others ``default_bias``.
+        area_m2: the usual surface of a true instance of each category; of all others ``default_area_m2``.
+        default_bias: see above.
+        default_area_m2: see above.
+    """
+
+    slopes: tuple[float, float] = (1.0, 0.8)
+    bias: dict[str, float] = {}
+    area_m2: dict[str, float] = {}
+    default_bias: float = 0.0
+    default_area_m2: float = 0.3
+
+
 class Notes(msgspec.Struct, frozen=True):
     """What is known of the weights beside them.
 
@@ -44,6 +64,7 @@ class Notes(msgspec.Struct, frozen=True):
         room_temperature: divides the rooms' scores.
         called: for a category other phrases for it.
         kinds: wider words and the categories that they take in.
+        instances: how instances are told from noise.
     """
 
     id: str
@@ -55,6 +76,7 @@ class Notes(msgspec.Struct, frozen=True):
     room_temperature: float
     called: dict[str, tuple[str, ...]]
     kinds: dict[str, tuple[str, ...]]
+    instances: InstanceNotes = InstanceNotes()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,164 @@
+"""The object benchmark: are the things of a building where the map says, are they things at all, is absence told.
+
+Three figures for each scene. *First goal*: of the categories that stand there, how many have the first answer
+within half a metre of a true one. *Instances*: of the instances that the map is sure of (0.5 or more) how many are
+true, and of the true ones how many are found. *Found*: how well the best confidence tells categories that are there
+from those that are not (area under the ROC curve). Truth: boxes of things, of which the walk saw at least some.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from avlmaps.bench.intervals import wilson
+from avlmaps.sim.scene import SceneObject
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
+
+STRUCTURE = ("wall", "floor", "ceiling", "column", "stairs", "railing")
+# A box is grown by so much: voxels and poses are that coarse.
+GROWN_M = 0.1
+REACH_M = 0.5
+FEWEST_VOXELS = 15
+SMALLEST_M = 0.3
+_MOSTLY, _A_QUARTER = 0.5, 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class Instances:
+    """What the map says of one category.
+
+    Attributes:
+        category: what was asked.
+        confidence: of each instance.
+        is_true: whether most of its voxels lie in boxes of true ones.
+    """
+
+    category: str
+    confidence: Float[np.ndarray, " i"]
+    is_true: Bool[np.ndarray, " i"]
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectFigures:
+    """What one scene gave.
+
+    Attributes:
+        scene: its name.
+        reached: for each category that is there the distance of the first goal to a true one, metres; inf for none.
+        said: the instances of every category of the vocabulary.
+        true_count: how many true things of some size the walk saw.
+        found_count: how many of them the sure instances hold.
+        best: for every asked category the highest confidence, and whether it is there.
+    """
+
+    scene: str
+    reached: dict[str, float]
+    said: list[Instances]
+    true_count: int
+    found_count: int
+    best: dict[str, tuple[float, bool]] = field(default_factory=dict)
+
+    @property
+    def within(self) -> tuple[int, int]:
+        """How many categories were reached within half a metre, of how many."""
+        return sum(distance <= REACH_M for distance in self.reached.values()), len(self.reached)
+
+    @property
+    def precise(self) -> tuple[int, int]:
+        """How many of the sure instances are true, of how many."""
+        sure = [one.is_true[one.confidence >= 0.5] for one in self.said]
+        return sum(int(a.sum()) for a in sure), sum(len(a) for a in sure)
+
+
+def measure(asked: "AVLMap", things: Sequence[SceneObject], same: Mapping[str, str], scene: str) -> ObjectFigures:
+    """Ask a map for everything that it could hold and compare with what is there.
+
+    Args:
+        asked: the map.
+        things: what is truly there.
+        same: category to the one that it counts as (``picture frame`` to ``picture``); others count as themselves.
+        scene: its name, for the tables.
+    """
+    centres = asked.space.centres
+    inside = [_inside(centres, thing) for thing in things]
+    name = [same.get(thing.category, thing.category) for thing in things]
+    seen = [number for number, rows in enumerate(inside) if len(rows) >= FEWEST_VOXELS]
+    present = {name[number] for number in seen}
+    vocabulary = [word for word in asked.stored.profile.pixel_encoder().vocabulary if word not in STRUCTURE]
+    words = sorted({same.get(word, word) for word in vocabulary} | (present - set(STRUCTURE)))
+    said, held, best, reached = [], np.zeros(len(centres), bool), {}, {}
+    covered: dict[str, np.ndarray] = {}
+    for word in words:
+        heat = asked.object(word, primary=True)
+        factor = heat.factors[0]
+        rows = np.flatnonzero(getattr(factor, "mask", np.zeros(len(centres), bool)))
+        of_word = [number for number in seen if name[number] == word]
+        held[:] = False
+        for number in of_word:
+            held[inside[number]] = True
+        count = np.maximum(np.bincount(factor.instance, minlength=len(factor.confidence)), 1)
+        true_share = np.bincount(factor.instance, weights=held[rows], minlength=len(factor.confidence)) / count
+        one = Instances(word, np.asarray(factor.confidence, np.float64), true_share >= _MOSTLY)
+        said.append(one)
+        good = (one.confidence >= 0.5) & one.is_true
+        covered[word] = rows[good[factor.instance]]
+        best[word] = (float(one.confidence.max(initial=0.0)), bool(of_word))
+        if of_word:
+            goals = heat.goals(1)
+            reached[word] = _distance(goals[0].position, [things[n] for n in of_word]) if goals else np.inf
+    large = [n for n in seen if name[n] not in STRUCTURE and max(things[n].size) >= SMALLEST_M]
+    found = sum(np.isin(inside[n], covered.get(name[n], [])).mean() >= _A_QUARTER for n in large)
+    return ObjectFigures(scene, reached, said, len(large), int(found), best)
+
+
+def _inside(centres: Float[np.ndarray, "n 3"], thing: SceneObject) -> Int[np.ndarray, " m"]:
+    low, high = np.array(thing.low) - GROWN_M, np.array(thing.high) + GROWN_M
+    return np.flatnonzero(((centres >= low) & (centres <= high)).all(axis=1))
+
+
+def _distance(position: Sequence[float], things: Sequence[SceneObject]) -> float:
+    """Return the distance of a place to the nearest point of the nearest box."""
+    place = np.array(position)
+    gaps = [np.maximum(np.array(t.low) - place, 0) + np.maximum(place - np.array(t.high), 0) for t in things]
+    return float(min(np.linalg.norm(gap) for gap in gaps))
+
+
+def auroc(score: Float[np.ndarray, " n"], is_there: Bool[np.ndarray, " n"]) -> float:
+    """Return how likely one that is there scores above one that is not; ties count half, NaN where a side is empty."""
+    there, absent = score[is_there], score[~is_there]
+    if not len(there) or not len(absent):
+        return float("nan")
+    above = (there[:, None] > absent).mean() + 0.5 * (there[:, None] == absent).mean()
+    return float(above)
+
+
+def table_of(scenes: Sequence[ObjectFigures]) -> dict[str, list]:
+    """Return the figures of scenes, and of all together, as a table."""
+    columns = ["scene", "first goal within 0.5 m", "instances true", "true things found", "found or not: AUROC"]
+    rows = [_row(scene.scene, [scene]) for scene in scenes]
+    if len(scenes) > 1:
+        rows.append(_row(f"all {len(scenes)}", scenes))
+    return {"columns": columns, "rows": rows}
+
+
+def _row(name: str, scenes: Sequence[ObjectFigures]) -> list[str]:
+    pairs = [
+        tuple(map(sum, zip(*(s.within for s in scenes), strict=True))),
+        tuple(map(sum, zip(*(s.precise for s in scenes), strict=True))),
+        (sum(s.found_count for s in scenes), sum(s.true_count for s in scenes)),
+    ]
+    best = [entry for s in scenes for entry in s.best.values()]
+    score = auroc(np.array([b[0] for b in best]), np.array([b[1] for b in best], bool))
+    return [name, *(_share(int(a), int(n)) for a, n in pairs), f"{score:.3f} of {len(best)}"]
+
+
+def _share(count: int, of: int) -> str:
+    if not of:
+        return "none"
+    low, high = wilson(count, of)
+    return f"{count / of:.1%} of {of} ({100 * low:.1f}-{100 * high:.1f})"
