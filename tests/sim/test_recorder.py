@@ -7,7 +7,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hearing_scenes import flat
 
 from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.recordings.add_sounds import read_events
@@ -22,6 +21,7 @@ from avlmaps.sim.sensor import OdometryFaults
 from avlmaps.sim.shapes import box
 from avlmaps.sim.truth import read_truth
 from avlmaps.sim.walk import WalkSettings
+from helpers.hearing_scenes import flat
 
 SMALL = RecordSettings(size=(64, 48), max_frames=12, workers=1, sources=2, walk=WalkSettings(look_around=0.0))
 

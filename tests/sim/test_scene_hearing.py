@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hearing_scenes import HEIGHT_M, area, open_air, shoebox, two_rooms
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import butter, fftconvolve, sosfilt
@@ -16,6 +15,7 @@ from avlmaps.sim.hearing.filters import shaped_impulse, split
 from avlmaps.sim.hearing.impulse import Acoustics, _direct
 from avlmaps.sim.hearing.rooms import BANDS_HZ, SPEED_M_S, WALL_DB, Rooms
 from avlmaps.sim.scene import Scene
+from helpers.hearing_scenes import HEIGHT_M, area, open_air, shoebox, two_rooms
 
 RATE_HZ = 16_000
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from hearing_scenes import flat
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -11,6 +10,7 @@ from avlmaps.recordings.audio import Sound
 from avlmaps.sim.furniture.catalogue import categories
 from avlmaps.sim.hearing import KINDS, Recorded, ScheduleRule, Source, Synthesised, kind_of, place_sources, schedule
 from avlmaps.sim.synthesis import MAKERS
+from helpers.hearing_scenes import flat
 
 RATE_HZ = 16_000
 

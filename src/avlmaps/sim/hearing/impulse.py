@@ -142,7 +142,8 @@ class Acoustics:
         box.image_source_model()
         made = box.sources[0]
         places, gains, orders = made.images.T + down, made.damping[0], made.orders
-        for index, seen in zip(np.flatnonzero(inside), box.visibility[0], strict=True):
+        visible = box.visibility or []
+        for index, seen in zip(np.flatnonzero(inside), visible[0], strict=True):
             kept = np.asarray(seen, bool) & (orders > 0)
             distance_m = np.linalg.norm(places[kept] - ears[index], axis=1)
             found[index] = np.column_stack([np.maximum(distance_m, _NEAREST_M), gains[kept]])
