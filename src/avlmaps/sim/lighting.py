@@ -17,7 +17,7 @@ from avlmaps.sim.scene import Light, Scene
 
 _MOST_CELLS = 12_000_000  # solid cells
 _CELL_M = 0.05
-_TEXEL_M = 0.1  # step of the lattice of texels
+_TEXEL_M = 0.12  # step of the lattice of texels
 _PATCH_M = 0.25  # triangles longer than this carry texels if they are flat
 _LONG_M = 1.2  # triangles longer than this do so in any case
 _PROBE_M = 0.45
@@ -110,7 +110,17 @@ def _solid(scene: Scene, lights: tuple[Light, ...]) -> _Solid:
     cell_m = max(_CELL_M, float((np.prod(high - low) / _MOST_CELLS) ** (1 / 3)))
     cells = np.zeros(np.ceil((high - low) / cell_m).astype(int), np.uint8)
     lighting_kernels.mark_solid(mesh.corners()[kept], low, cell_m, cells)
+    _close(cells, scene, float(low[2]), cell_m)
     return _Solid(_room(cells), low, cell_m)
+
+
+def _close(cells: UInt8[np.ndarray, "x y z"], scene: Scene, low_m: float, cell_m: float) -> None:
+    """Make all solid below the lowest floor and above the highest ceiling, which may be as thin as paper."""
+    known = {thing.category for thing in scene.objects}
+    if scene.areas and "floor" in known:
+        cells[:, :, : max(0, int((min(area.floor_m for area in scene.areas) - low_m) / cell_m))] = 1
+    if scene.areas and "ceiling" in known:
+        cells[:, :, int((max(area.ceiling_m for area in scene.areas) - low_m) / cell_m) + 1 :] = 1
 
 
 def _room(solid: UInt8[np.ndarray, "x y z"]) -> UInt8[np.ndarray, "x y z"]:
@@ -246,11 +256,11 @@ def _lit(samples: _Samples, lights: tuple[Light, ...], solid: _Solid, albedo: np
          ) -> tuple[Float32[np.ndarray, "s 2 3"], Bool[np.ndarray, "s 2"]]:  # fmt: skip
     """Return the light on both sides of each sample, and which sides look into free space."""
     n = len(samples.place)
-    light, free = np.zeros((n, 2, 3), np.float32), np.zeros((n, 2), bool)
+    light, start, free = np.zeros((n, 2, 3), np.float32), np.zeros((n, 2, 3), np.float32), np.zeros((n, 2), bool)
     lamp = np.array([lamp.position for lamp in lights]).reshape(-1, 3)
     power = np.array([lamp.colour for lamp in lights]).reshape(-1, 3)
     space = (solid.empty, solid.low, solid.cell_m)
-    lighting_kernels.direct(samples.place, samples.normal, lamp, power, *space, light, free)
+    lighting_kernels.direct(samples.place, samples.normal, lamp, power, *space, light, start, free)
     coarse = np.array(solid.empty.shape) // _SEND_CELLS + 1
     sent = np.zeros((*coarse, 6, 4), np.float32)
     lighting_kernels.splat(samples.place, samples.normal, albedo, glow, samples.area_m2, light, free, solid.low,
@@ -261,8 +271,8 @@ def _lit(samples: _Samples, lights: tuple[Light, ...], solid: _Solid, albedo: np
     cube, seen = np.zeros((len(index), 6, 3), np.float32), np.zeros(len(index), bool)
     lighting_kernels.gather(solid.low + (index + 0.5) * _PROBE_M, _directions(96), *space, sent, float(_SEND_CELLS),
                             np.array(_SKY), cube, seen)  # fmt: skip
-    lighting_kernels.ambient(samples.place, samples.normal, _directions(10, half=True), *space, cube, seen, count,
-                             _PROBE_M, _BOUNCE, light, free)  # fmt: skip
+    lighting_kernels.ambient(samples.place, samples.normal, _directions(8, half=True), *space, cube, seen, count,
+                             _PROBE_M, _BOUNCE, light, start, free)  # fmt: skip
     return light, free
 
 

@@ -8,6 +8,7 @@ RAYS_CLEAR = -1.0  # nothing on the way
 _STEPS_A_CELL = 2.2  # points laid on a triangle per side of a cell, so that no cell on it is missed
 _OCCLUSION_M = 0.5  # how far away something still darkens a corner
 _LEAST = 0.01  # light weaker than this is not looked for
+_ASIDE = 1.1  # cells that a sample may be moved along its surface to be free; less than any wall is thick
 _STRIDE = 0.75  # cells walked where something solid is next to the way
 
 
@@ -70,21 +71,35 @@ def march(empty, px, py, pz, dx, dy, dz, farthest):  # pragma: no cover - compil
 
 @njit(cache=True)
 def _start(empty, place, nx, ny, nz, low, cell_m, out):  # pragma: no cover - compiled
-    """Lift a place off its surface until it is free; tell whether it is."""
-    for lift in (1.6, 0.9):
-        out[0] = (place[0] - low[0]) / cell_m + lift * nx
-        out[1] = (place[1] - low[1]) / cell_m + lift * ny
-        out[2] = (place[2] - low[2]) / cell_m + lift * nz
-        x, y, z = int(np.floor(out[0])), int(np.floor(out[1])), int(np.floor(out[2]))
-        if x < 0 or y < 0 or z < 0 or x >= empty.shape[0] or y >= empty.shape[1] or z >= empty.shape[2]:
-            return True
-        if empty[x, y, z]:
-            return True
-    return False
+    """Lift a place off its surface to where there is room, sidewards too if need be; tell whether there is any."""
+    # two directions along the surface (Duff et al. 2017)
+    sign = 1.0 if nz >= 0 else -1.0
+    a = -1.0 / (sign + nz)
+    b = nx * ny * a
+    most = 0
+    x, y, z = 0.0, 0.0, 0.0
+    for way in range(5):
+        u, v = (0.0, 0.0) if way == 0 else ((_ASIDE * (3 - 2 * way), 0.0) if way < 3 else (0.0, _ASIDE * (7 - 2 * way)))
+        tx = u * (1.0 + sign * nx * nx * a) + v * b
+        ty = u * sign * b + v * (sign + ny * ny * a)
+        tz = -u * sign * nx - v * ny
+        for lift in (1.6, 0.9):
+            px = (place[0] - low[0]) / cell_m + lift * nx + tx
+            py = (place[1] - low[1]) / cell_m + lift * ny + ty
+            pz = (place[2] - low[2]) / cell_m + lift * nz + tz
+            i, j, k = int(np.floor(px)), int(np.floor(py)), int(np.floor(pz))
+            if i < 0 or j < 0 or k < 0 or i >= empty.shape[0] or j >= empty.shape[1] or k >= empty.shape[2]:
+                continue
+            if empty[i, j, k] > most:
+                most, x, y, z = empty[i, j, k], px, py, pz
+        if way == 0 and most > 0:
+            break
+    out[0], out[1], out[2] = x, y, z
+    return most > 0
 
 
 @njit(cache=True)
-def direct(place, normal, lamp, power, empty, low, cell_m, light, free):  # pragma: no cover - compiled
+def direct(place, normal, lamp, power, empty, low, cell_m, light, start, free):  # pragma: no cover - compiled
     """Add the light that comes straight from the lamps to both sides of each sample.
 
     Args:
@@ -96,11 +111,12 @@ def direct(place, normal, lamp, power, empty, low, cell_m, light, free):  # prag
         low: corner of the cells.
         cell_m: their size.
         light: (s, 2, 3) float32, changed.
+        start: (s, 2, 3) float32, where in the cells rays from the side begin; changed.
         free: (s, 2) bool, whether the side looks into free space; changed.
     """
-    p = np.zeros(3)
     for s in range(len(place)):
         for side in range(2):
+            p = start[s, side]
             sign = 1.0 - 2.0 * side
             nx, ny, nz = sign * normal[s, 0], sign * normal[s, 1], sign * normal[s, 2]
             free[s, side] = _start(empty, place[s], nx, ny, nz, low, cell_m, p)
@@ -245,7 +261,7 @@ def _occlusion(empty, p, nx, ny, nz, ring, cell_m):  # pragma: no cover - compil
 
 @njit(cache=True)
 def ambient(
-    place, normal, ring, empty, low, cell_m, cube, probe_free, count, probe_m, bounce, light, free
+    place, normal, ring, empty, low, cell_m, cube, probe_free, count, probe_m, bounce, light, start, free
 ):  # pragma: no cover - compiled
     """Add the light that comes back from everything, from the probes that each sample sees.
 
@@ -262,9 +278,9 @@ def ambient(
         probe_m: step between probes.
         bounce: factor for the bounces that are not followed.
         light: (s, 2, 3), changed.
+        start: (s, 2, 3), as `direct` found it.
         free: (s, 2).
     """
-    p = np.zeros(3)
     total = np.zeros(3)
     for s in range(len(place)):
         for side in range(2):
@@ -272,7 +288,7 @@ def ambient(
                 continue
             sign = 1.0 - 2.0 * side
             n = (sign * normal[s, 0], sign * normal[s, 1], sign * normal[s, 2])
-            _start(empty, place[s], n[0], n[1], n[2], low, cell_m, p)
+            p = start[s, side]
             weight = 0.0
             total[:] = 0.0
             bounce_here = bounce

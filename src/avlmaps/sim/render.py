@@ -25,7 +25,8 @@ _GROUP = 96  # triangles in a group at most
 _LARGE_M = 1.6  # triangles longer than this are drawn first: they hide others
 _GLOW = 2.5  # linear light of a surface of emission 1 and of colour 1
 _MIDDLE_GREY = 0.24  # linear: to this the mean of a view is brought, as a camera's exposure does
-_GAINS = (0.45, 3.5)  # as far as the exposure goes
+_BRIGHT = 0.85  # linear: the brighter tenth of a view stays about below this
+_GAINS = (0.12, 4.0)  # as far as the exposure goes
 _METER_STEP = 61  # every so manieth pixel decides on the exposure
 
 
@@ -164,8 +165,7 @@ class Renderer:
                                           behind.colour, front.colour)  # fmt: skip
         gain = 1.0
         if self._lit:
-            mean = shade_kernels.mean_log_light(front.shown, front.colour, _METER_STEP)
-            gain = float(np.clip(_MIDDLE_GREY / np.exp(mean), *_GAINS))
+            gain = _exposure(front)
         return self._finished(front, gain, camera.height, camera.width)
 
     def _layers_for(self, pixels: int) -> tuple[_Layer, _Layer]:
@@ -211,6 +211,15 @@ class Renderer:
                              *images)  # fmt: skip
         rgb, *others = images
         return View(rgb.reshape(height, width, 3), *(image.reshape(height, width) for image in others))
+
+
+def _exposure(layer: _Layer) -> float:
+    """Return the gain that a camera would choose: middling places become grey, and few places white."""
+    light = layer.colour[::_METER_STEP][layer.shown[::_METER_STEP] >= 0] @ np.array([0.3, 0.6, 0.1], np.float32)
+    if not len(light):
+        return 1.0
+    gain = min(_MIDDLE_GREY / np.exp(np.log(light + 0.01).mean()), _BRIGHT / np.quantile(light, 0.9))
+    return float(np.clip(gain, *_GAINS))
 
 
 def _tables(light: LightMap | None, order: Int[np.ndarray, " t"]) -> tuple[np.ndarray, ...]:

@@ -176,18 +176,24 @@ def blend_fragments(shown, behind, opacity, material, sky, under, out):  # pragm
 
 
 @njit(cache=True)
-def mean_log_light(shown, colour, stride):  # pragma: no cover - compiled
-    """Return the mean logarithm of the brightness of every ``stride``-th fragment."""
-    total, count = 0.0, 0
-    for at in range(0, len(shown), stride):
-        if shown[at] >= 0:
-            total += np.log(0.01 + 0.3 * colour[at, 0] + 0.6 * colour[at, 1] + 0.1 * colour[at, 2])
-            count += 1
-    return total / max(count, 1)
-
-
-@njit(cache=True)
-def finish(inverse, shown, side, owner, kind, material, returns, colour, gain, curve, sky, rgb, depth, instance, category, strength):  # pragma: no cover - compiled
+def finish(
+    inverse,
+    shown,
+    side,
+    owner,
+    kind,
+    material,
+    returns,
+    colour,
+    gain,
+    curve,
+    sky,
+    rgb,
+    depth,
+    instance,
+    category,
+    strength,
+):  # pragma: no cover - compiled
     """Write the images: ``rgb`` (n, 3), ``depth``, ``instance``, ``category`` and ``strength`` (n,)."""
     top, most = np.float32(LEVELS / 2), LEVELS - 1
     for at in range(len(shown)):
