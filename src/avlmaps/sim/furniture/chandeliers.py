@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut
+from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut, turned_ring
 from avlmaps.sim.furniture.lighting import shade, shining
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined
@@ -35,7 +35,9 @@ def _cap(rng: np.random.Generator, kind: str, at: Triple, radius: float, look: M
     }
     if kind == "globe":
         return ellipsoid((x, y, z - radius), (radius, radius, radius), look, 14, 9)
-    return lathe([(r * radius, z + h * radius) for r, h in rows[kind]], look, x, y, 16)
+    profile = [(r * radius, z + h * radius) for r, h in rows[kind]]
+    closed = kind == "drop" or look.emission > 0.1  # what shines is shut by a diffuser
+    return lathe(profile, look, x, y, 16) if closed else turned_ring(profile, look, x, y, 16)
 
 
 _CAPS = ("cone", "dome", "bell", "tube", "plate", "drop", "globe")
@@ -113,7 +115,7 @@ def _cluster(rng: np.random.Generator) -> Piece:
     for x, y in places:
         z = -drop * (1.0 if even else draw(rng, 0.45, 1.0))
         parts += [_cap(rng, kind, (x, y, z), radius, look), tube([(x * 0.7, y, -0.02), (x, y, z)], 0.004, rod, 4)]
-        light.append((x, y, z - radius))
+        light.append((x, y, z - radius * 0.35))
     return finished(parts, light)
 
 
@@ -132,7 +134,7 @@ def _disc(rng: np.random.Generator) -> Piece:
         parts = [cylinder(0.0, 0.0, 0.0, radius, tall, look, 24)]
         if kind == "rimmed":
             rings = [(radius * 1.02, tall * draw(rng, 0.0, 0.6)), (radius * 1.08, tall)]
-            parts.append(lathe(rings, edge, sides=24))
+            parts.append(turned_ring(rings, edge, sides=24))
     return finished(parts, [(0.0, 0.0, -0.02)])
 
 
@@ -209,7 +211,7 @@ def _rings(rng: np.random.Generator) -> Piece:
     parts: list[Mesh] = []
     top = number * 0.2 + draw(rng, 0.3, 0.8)
     for _ in range(number):
-        hoop = lathe([(radius, z), (radius, z + 0.04), (radius * 0.93, z + 0.04), (radius * 0.93, z), (radius, z)],
+        hoop = turned_ring([(radius, z), (radius, z + 0.04), (radius * 0.93, z + 0.04), (radius * 0.93, z), (radius, z)],
                      glow, sides=28)  # fmt: skip
         parts += [
             hoop,
@@ -245,6 +247,6 @@ def _crystal(rng: np.random.Generator) -> Piece:
         beads = int(10 + 26 * wide)
         for x, y in circle(wide, beads).tolist():
             parts.append(lathe([(0.003, z), (0.012, z + 0.025), (0.004, z + tall)], glass, x, y, 4))
-        parts.append(lathe([(wide, z + tall), (wide, z + tall + 0.02)], look, sides=18))
+        parts.append(turned_ring([(wide, z + tall), (wide, z + tall + 0.02)], look))
         z += tall * draw(rng, 0.85, 1.1)
     return finished([*parts, *_hung(rng, z, z + draw(rng, 0.15, 0.6), look)], [(0.0, 0.0, z * 0.5)])

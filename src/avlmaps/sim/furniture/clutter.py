@@ -56,7 +56,7 @@ def _book_row(rng: np.random.Generator) -> Piece:
 @family("book", "open", held_out=True)
 def _open_book(rng: np.random.Generator) -> Piece:
     tall, deep, rise = draw(rng, 0.18, 0.32), draw(rng, 0.13, 0.22), draw(rng, 0.01, 0.03)
-    paper, cover = material(pick(rng, ("paper", "poster")), rng), material("painted", rng)
+    paper, cover = material("paper", rng), material("painted", rng)
     parts = [slab(0.0, 0.0, 0.0, tall, 2 * deep + 0.01, 0.003, cover)]
     for s in (-1, 1):
         line = [(0.0, rise * 0.4), (0.15, rise), (0.6, rise * 0.8), (1.0, 0.004)]
@@ -84,7 +84,11 @@ def _bottle(rng: np.random.Generator) -> Piece:
     cap, parts = material("plastic", rng), [lathe([(r * wide, h * tall) for r, h in rows], glass, sides=10)]
     if chance(rng, 0.6):
         parts.append(
-            lathe([(wide * 1.02, tall * 0.15), (wide * 1.02, tall * 0.45)], material("poster", rng), sides=10)
+            lathe(
+                [(wide * 1.02, tall * 0.15), (wide * 1.02, tall * 0.45)],
+                material("paper", rng, tuple(rng.uniform(0.2, 1.0, 3).tolist())),
+                sides=10,
+            )
         )
     if kind == "spray":
         parts += [
@@ -310,17 +314,16 @@ def _blocks(rng: np.random.Generator) -> Piece:
 
 @family("toy", "bear")
 def _bear(rng: np.random.Generator) -> Piece:
-    s, fur, dark = draw(rng, 0.1, 0.35), material("fabric", rng), material("black", rng)
-    s *= 0.5
+    s, fur, dark = draw(rng, 0.05, 0.17), material("fabric", rng), material("black", rng)
     parts = [
-        ellipsoid((0.0, 0.0, s * 0.9), (s * 0.6, s * 0.65, s * 0.85), fur, 9, 6),
-        ellipsoid((0.05 * s, 0.0, s * 2.0), (s * 0.55, s * 0.6, s * 0.55), fur, 9, 6),
+        ellipsoid((0.0, 0.0, s * 0.9), (s * 0.6, s * 0.65, s * 0.85), fur, 7, 5),
+        ellipsoid((0.05 * s, 0.0, s * 2.0), (s * 0.55, s * 0.6, s * 0.55), fur, 7, 5),
     ]
     for side in (-1, 1):
-        parts.append(ellipsoid((0.0, side * s * 0.45, s * 2.5), (s * 0.12, s * 0.2, s * 0.2), fur, 6, 4))
-        parts.append(ellipsoid((s * 0.2, side * s * 0.7, s * 1.1), (s * 0.25, s * 0.25, s * 0.5), fur, 6, 4))
-        parts.append(ellipsoid((s * 0.7, side * s * 0.45, s * 0.25), (s * 0.55, s * 0.25, s * 0.25), fur, 6, 4))
-        parts.append(ellipsoid((s * 0.55, side * s * 0.2, s * 2.1), (s * 0.05, s * 0.06, s * 0.06), dark, 5, 3))
+        parts.append(ellipsoid((0.0, side * s * 0.45, s * 2.5), (s * 0.12, s * 0.2, s * 0.2), fur, 5, 3))
+        parts.append(ellipsoid((s * 0.2, side * s * 0.7, s * 1.1), (s * 0.25, s * 0.25, s * 0.5), fur, 5, 3))
+        parts.append(ellipsoid((s * 0.7, side * s * 0.45, s * 0.25), (s * 0.55, s * 0.25, s * 0.25), fur, 5, 3))
+        parts.append(ellipsoid((s * 0.55, side * s * 0.2, s * 2.1), (s * 0.05, s * 0.06, s * 0.06), dark, 4, 2))
     return finished([*parts, ellipsoid((s * 0.6, 0.0, s * 1.9), (s * 0.15, s * 0.2, s * 0.15), dark, 6, 4)])
 
 
@@ -453,7 +456,7 @@ def _setting(rng: np.random.Generator) -> Piece:
         parts.append(lathe([(radius * 0.4, 0.012), (radius * 0.72, 0.03), (radius * 0.45, 0.02)], look, sides=14))
     parts += [_cutlery(rng, s * (radius + 0.025), metal) for s in (-1, 1)]
     if chance(rng, 0.5):
-        parts.append(slab(0.0, 0.0, 0.0, 0.3, 0.44, 0.003, material(pick(rng, ("fabric", "rug")), rng)))
+        parts.append(slab(0.0, 0.0, 0.0, 0.3, 0.44, 0.003, material("fabric", rng)))
     return finished(parts)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, strut
+from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, strut, turned_ring
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import (
@@ -212,7 +212,7 @@ def _open_bin(rng: np.random.Generator) -> Piece:
     if chance(rng, 0.4):  # its bag hangs over the rim
         bag = material(pick(rng, ("white", "black", "plastic")), rng)
         parts.append(
-            lathe(
+            turned_ring(
                 [(radius * 1.04, tall * draw(rng, 0.72, 0.9)), (radius * 1.03, tall + 0.01), (radius * 0.9, tall)],
                 bag,
                 sides=14,
@@ -288,7 +288,7 @@ def _mesh_bin(rng: np.random.Generator) -> Piece:
     parts = [strut((x * low, y * low, 0.0), (x, y, tall), 0.008, 0.003, look) for x, y in circle(radius, rods).tolist()]
     for z in (0.0, tall * 0.5, tall):
         size = radius * (low + (1 - low) * z / tall)
-        parts.append(lathe([(size, z), (size, z + 0.015)], look, sides=18))
+        parts.append(turned_ring([(size, z), (size, z + 0.015)], look))
     paper = material("paper", rng)
     for _ in range(count(rng, 0, 4)):
         x, y = (rng.uniform(-0.5, 0.5, 2) * radius).tolist()

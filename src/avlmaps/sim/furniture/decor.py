@@ -172,7 +172,7 @@ def _photo_frame(rng: np.random.Generator) -> Piece:
     return finished([front.moved(z=-float(front.low[2])), prop.moved(-float(np.sin(lean)) * height * 1.55)])
 
 
-def _pile(rng: np.random.Generator, outline: np.ndarray, thick: float, look: Material) -> list[Mesh]:
+def _pile(outline: np.ndarray, thick: float, look: Material) -> list[Mesh]:
     """Return a carpet over an outline: its rim, and a top that shows the picture once."""
     side = prism(outline.tolist(), 0.0, thick, look)
     k = len(outline)
@@ -198,16 +198,17 @@ def carpet(rng: np.random.Generator, length_m: float, width_m: float, shape: str
     thick = draw(rng, 0.005, 0.015)
     look = material("rug" if chance(rng, 0.75) else "carpet", rng)
     if shape in ("round", "oval"):
-        return Piece(joined(_pile(rng, circle(length_m / 2, 32, width_m / 2), thick, look)))
+        return Piece(joined(_pile(circle(length_m / 2, 32, width_m / 2), thick, look)))
     if shape == "hide":
-        hide = material(pick(rng, ("leather", "fabric", "white")), rng)
+        tan = draw(rng, 0.25, 0.75)
+        hide = material("fabric", rng, pick(rng, ((tan, tan * 0.75, tan * 0.55), (0.9, 0.88, 0.84), (0.12, 0.1, 0.1))))
         angle = np.linspace(0.0, 2 * np.pi, 40, endpoint=False)
         radius = 0.78 + 0.22 * np.cos(4 * angle + np.pi) + rng.uniform(-0.05, 0.05, 40)
-        radius /= max(np.abs(radius * np.cos(angle)).max(), np.abs(radius * np.sin(angle)).max())
-        outline = np.column_stack([radius * np.cos(angle) * length_m / 2, radius * np.sin(angle) * width_m / 2])
-        return Piece(joined(_pile(rng, outline, thick, hide)))
+        outline = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+        outline = (outline - (outline.min(0) + outline.max(0)) / 2) * (length_m, width_m) / np.ptp(outline, axis=0)
+        return Piece(joined(_pile(outline, thick, hide)))
     corner = draw(rng, 0.005, 0.06)
-    parts = _pile(rng, rounded_rectangle(length_m, width_m, corner, 3), thick, look)
+    parts = _pile(rounded_rectangle(length_m, width_m, corner, 3), thick, look)
     if shape == "fringed":
         yarn, long = material("fabric", rng, (0.85, 0.8, 0.7)), draw(rng, 0.03, 0.08)
         for y in np.linspace(-width_m * 0.48, width_m * 0.48, 24).tolist():
@@ -257,13 +258,15 @@ _FORMS = ("belly", "bottle", "trumpet", "tube", "tulip", "stepped")
 
 
 def _clay(rng: np.random.Generator) -> Material:
-    return material(pick(rng, ("ceramic", "ceramic", "glass", "painted", "metal", "stone", "wood")), rng)
+    return material(
+        pick(rng, ("ceramic", "ceramic", "ceramic", "glass", "painted", "painted", "metal", "stone", "wood")), rng
+    )
 
 
 @family("vase", "turned")
 def _vase(rng: np.random.Generator) -> Piece:
     tall = draw(rng, 0.12, 0.5) if chance(rng, 0.8) else draw(rng, 0.5, 0.9)
-    return finished([_vessel(rng, tall, tall * draw(rng, 0.17, 0.36), pick(rng, _FORMS), _clay(rng))])
+    return finished([_vessel(rng, tall, min(tall * draw(rng, 0.17, 0.36), 0.17), pick(rng, _FORMS), _clay(rng))])
 
 
 def flowers(rng: np.random.Generator, z: float, spread: float, rise: float) -> list[Mesh]:
@@ -317,8 +320,9 @@ def _amphora(rng: np.random.Generator) -> Piece:
 
 
 def _pillow(
-    length: float, width: float, thick: float, look: Material, corner: float = 4.0, button: float = 0.0
-) -> Mesh:
+    length: float, width: float, thick: float, look: Material, corner: float = 4.0, button: float = 0.0,
+    fill: bool = False,
+) -> Mesh:  # fmt: skip
     """Return a stuffed bag lying on z = 0, length along x; ``corner`` near 2 makes it round."""
     n = 7
     axis = np.sin(np.linspace(-np.pi / 2, np.pi / 2, n))
@@ -333,14 +337,15 @@ def _pillow(
     bulge = bulge * (1 - button * np.exp(-12 * (u**2 + v**2)))
     flat = np.stack([u * length / 2, v * width / 2], axis=-1)
     top, low = (np.concatenate([flat, (thick / 2 * (1 + s * bulge))[..., None]], axis=-1) for s in (1, -1))
-    return joined([cloth(top, look), cloth(low, look)])
+    return joined([cloth(top, look, fill), cloth(low, look, fill)])
 
 
 @family("cushion", "square")
 def _square_cushion(rng: np.random.Generator) -> Piece:
-    side, look = draw(rng, 0.35, 0.65), material(pick(rng, ("fabric", "fabric", "rug", "leather")), rng)
+    side, kind = draw(rng, 0.35, 0.65), pick(rng, ("fabric", "fabric", "fabric", "rug", "leather"))
     other = side * pick(rng, (1.0, 1.0, draw(rng, 0.55, 0.8)))
-    one = _pillow(other, side, draw(rng, 0.09, 0.2), look, draw(rng, 3.0, 7.0), draw(rng, 0.0, 0.5))
+    look, corner = material(kind, rng), draw(rng, 3.0, 7.0)
+    one = _pillow(other, side, draw(rng, 0.09, 0.2), look, corner, draw(rng, 0.0, 0.5), fill=kind == "rug")
     lean = draw(rng, 0.9, 1.4) if chance(rng, 0.5) else 0.0  # upright against a back, or lying
     return finished([one.tilted("y", lean)])
 

@@ -97,7 +97,7 @@ def _panels(rng: np.random.Generator, y: float, top: float, x: float, style: str
         return [*parts, _drape(rng, y - 2 * y * share, y, top, look, x * 1.2)]
     if style == "wall cafe":
         low = _drape(rng, -y, y, top * draw(rng, 0.45, 0.6), _sheer(rng) if chance(rng, 0.5) else look, x)
-        return [low, _drape(rng, -y, y, top, look, x, hem=top * draw(rng, 0.72, 0.85))] if chance(rng, 0.6) else [low]
+        return [low, _drape(rng, -y, y, top, look, x, hem=top * draw(rng, 0.72, 0.85))]
     if style == "wall tied back":
         waist = draw(rng, 0.25, 0.45)
         pinch = np.interp(np.linspace(0.0, 1.0, 8), [0.0, 0.3, 0.38, 0.6, 1.0], [waist * 1.5, waist, waist, 0.8, 1.0])

@@ -105,7 +105,9 @@ def turned_ring(
     profile: Sequence[tuple[float, float]], look: Material, x: float = 0.0, y: float = 0.0, sides: int = 18
 ) -> Mesh:
     """Return what a profile of (radius, z) makes round an upright axis at (x, y), open at both ends."""
-    return loft([np.column_stack([circle(r, sides) + (x, y), np.full(sides, z)]) for r, z in profile], look, capped=False)
+    return loft(
+        [np.column_stack([circle(r, sides) + (x, y), np.full(sides, z)]) for r, z in profile], look, capped=False
+    )
 
 
 def pictured(kind: str, rng: np.random.Generator, plain: str) -> Material:

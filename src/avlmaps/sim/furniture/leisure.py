@@ -5,7 +5,7 @@ import numpy as np
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.containers import tub
 from avlmaps.sim.furniture.fitness import hoop, wheel
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, strut
+from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, strut, turned_ring
 from avlmaps.sim.furniture.plants import frond
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
@@ -551,7 +551,7 @@ def _fish_bowl(rng: np.random.Generator) -> Piece:
     ]
     inside = [part for part in _water(rng, radius, radius, radius * 1.3, radius * 0.1)[1:-1]]
     gravel = cylinder(0.0, 0.0, 0.01, radius * 0.65, radius * 0.2, material("stone", rng), 12)
-    return finished([lathe(rows, glass, sides=16), gravel, *inside])
+    return finished([turned_ring(rows, glass, sides=16), gravel, *inside])
 
 
 @family("pet bed", "ring")

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut
+from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut, turned_ring
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined
 from avlmaps.sim.shapes import circle, cylinder, ellipsoid, lathe, loft, rounded_box, slab, tube
@@ -196,7 +196,8 @@ def _desk_arm(rng: np.random.Generator) -> Piece:
         bar = rounded_box((-0.03, -0.22, -0.012), (0.06, 0.22, 0.012), 0.01, look)
         parts.append(bar.moved(*(float(c) for c in head)))
     else:
-        hood = lathe([(radius, -radius * 1.3), (radius * 0.8, -radius * 0.5), (radius * 0.35, 0.02)], look, sides=14)
+        profile = [(radius, -radius * 1.3), (radius * 0.8, -radius * 0.5), (radius * 0.35, 0.0), (0.01, 0.02)]
+        hood = turned_ring(profile, look, sides=14)
         parts.append(hood.tilted("y", -draw(rng, 0.1, 0.7)).moved(*(float(c) for c in head)))
     return finished(parts, [(float(head[0]) + 0.02, 0.0, float(head[2]) - radius * 1.3)])
 

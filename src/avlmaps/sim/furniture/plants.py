@@ -212,17 +212,17 @@ def _small_pot(rng: np.random.Generator) -> Piece:
 def _tree(rng: np.random.Generator) -> Piece:
     height = draw(rng, 0.9, 1.9)
     parts, radius, earth = _pot_for(rng, height * 0.9)
-    green, bark = _greens(rng), material("wood", rng)
+    green, bark = _greens(rng), material("wood", rng, (draw(rng, 0.25, 0.5), draw(rng, 0.2, 0.35), 0.18))
     fork, thick = earth + height * draw(rng, 0.35, 0.6), draw(rng, 0.01, 0.025)
     bend = rng.uniform(-0.05, 0.05, 2).tolist()
     parts.append(tube([(0.0, 0.0, earth), (*bend, (earth + fork) / 2), (0.0, 0.0, fork)], thick, bark, 6))
-    crown, size = height - fork + earth, draw(rng, 0.08, 0.15)
+    crown, size = height - fork + earth, draw(rng, 0.09, 0.18)
     for number in range(count(rng, 4, 7)):
         turn, out = number * 2.4, crown * draw(rng, 0.25, 0.6)
         tip = np.array([out * np.cos(turn), out * np.sin(turn), fork + crown * draw(rng, 0.35, 1.0)])
         start = np.array([0.0, 0.0, fork])
         parts.append(tube([tuple(start), tuple((start + tip) / 2 + (0, 0, 0.03)), tuple(tip)], thick * 0.4, bark, 4))
-        for _ in range(count(rng, 14, 20)):
+        for _ in range(count(rng, 16, 24)):
             at = start + (tip - start) * draw(rng, 0.35, 1.05) + rng.uniform(-0.09, 0.09, 3) * crown
             place = (float(at[0]), float(at[1]), float(at[2]))
             leaf = frond(rng, place, draw(rng, 0, 6.28), size, size * 0.2, size * 0.6, size * 0.5, pick(rng, green), 2)
