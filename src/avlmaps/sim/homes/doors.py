@@ -46,7 +46,7 @@ def joined_up(
         return None
     out = list(walls)
     for index, wall in enumerate(walls):
-        if wall.right == OUTSIDE or wall.length_m < _LEAST_DOOR_M:
+        if wall.right == OUTSIDE or wall.length_m < _LEAST_DOOR_M or not _spots(wall, rooms, 0.95):
             continue
         a, b = rooms[wall.left].kind, rooms[wall.right].kind
         both_social = a in SOCIAL and b in SOCIAL
@@ -73,13 +73,28 @@ def _tree(rooms: list[Room], walls: list[Wall], start: int, patience: float) -> 
             if room not in (wall.left, wall.right) or OUTSIDE in (wall.left, wall.right):
                 continue
             other = wall.right if wall.left == room else wall.left
-            if wall.length_m < _LEAST_DOOR_M:
+            if wall.length_m < _LEAST_DOOR_M or not _spots(wall, rooms, 0.95):
                 continue
             price = cost + _price(rooms[room].kind, rooms[other].kind)
             if price < best.get(other, np.inf):
                 best[other], through[other] = price, index
                 heapq.heappush(queue, (price, other))
     return set(through.values()) if len(best) == len(rooms) and max(best.values()) <= patience else None
+
+
+def _spots(wall: Wall, rooms: list[Room], width_m: float) -> list[float]:
+    """Return where the middle of a door can lie, so that one can stand before it on either side."""
+    ends = (0.1 + width_m / 2, wall.length_m - 0.1 - width_m / 2)
+    if ends[1] < ends[0]:
+        return []
+    along = np.linspace(*ends, 9)
+    middles = wall.a + along[:, None] * wall.along
+    good = np.ones(len(along), bool)
+    for room, sign in ((wall.left, 1.0), (wall.right, -1.0)):
+        for away in (0.3, 0.55, 0.8):
+            slack = -0.42 if away > 0.5 else -0.28  # half a wall and a robot
+            good &= inside(rooms[room].polygon, middles + sign * away * wall.to_left, slack)
+    return along[good].tolist()
 
 
 def _opened(rng: np.random.Generator, wall: Wall, rooms: list[Room]) -> Wall:
@@ -97,11 +112,15 @@ def _door(rng: np.random.Generator, wall: Wall, rooms: list[Room], needed: bool)
     """Draw a door; one that is needed to reach a room stands open or has no leaf."""
     ceiling = min(rooms[wall.left].height_m, rooms[wall.right].height_m)
     width = min(draw(rng, 0.95, 1.1), wall.length_m - 0.2)
-    if wall.length_m > 3.0 and chance(rng, 0.12):
-        width = draw(rng, 1.9, 2.1)
+    wide = draw(rng, 1.9, 2.1)
+    if chance(rng, 0.12) and _spots(wall, rooms, wide):
+        width = wide
+    if not _spots(wall, rooms, width):
+        width = 0.95
     kind: HoleKind = pick(rng, ("door", "door", "door", "door", "doorless"))
-    ends = (0.1 + width / 2, wall.length_m - 0.1 - width / 2)
-    at = draw(rng, *ends) if chance(rng, 0.4) else pick(rng, ends)
+    spots = _spots(wall, rooms, width)
+    ends = (spots[0], spots[-1])
+    at = pick(rng, spots) if chance(rng, 0.4) else pick(rng, ends)
     to_corner = 1 if at > wall.length_m / 2 else -1
     open_rad = draw(rng, 1.5, 1.6) if min(at - ends[0], ends[1] - at) < 0.5 else draw(rng, 1.5, 2.5)
     if not needed and chance(rng, 0.6):

@@ -9,7 +9,7 @@ from scipy import ndimage
 from avlmaps.sim.homes.plan import OUTSIDE, Hole, Plan
 from avlmaps.sim.homes.polygons import corners_of, inside, overlapping, shrunk
 
-_WAY_M = 0.35  # a robot of 0.25 m and the coarseness of the grids that look for its way
+_WAY_M = 0.38  # a robot of 0.25 m and the coarseness of the grids that look for its way
 _CELL_M = 0.1
 _OVERHEAD_M = 1.75  # what hangs higher leaves the way free
 _UNDERFOOT_M = 0.08

@@ -44,6 +44,8 @@ def living_room(f: Furnisher) -> None:
         stood = stood or f.along(sofa, front_m=0.35, corner=0.15, at_middle=0.5) or f.insist("sofa", 0.3)
     if stood is not None:
         _sofa_corner(f, stood)
+    if chance(rng, 0.3):
+        dining_place(f, 1.0, 0.4)
     for _ in range(count(rng, 0, 2)):
         f.stand("armchair", 0.7, 0.35)
     if chance(rng, 0.25 * f.fill) and (second := f.new("sofa")) is not None:
