@@ -73,8 +73,7 @@ class _Robot:
         self.heading_rad = self.way_rad()
         self.places: list[np.ndarray] = []
         self.headings: list[float] = []
-        self.ever = np.zeros(len(tour.target), np.int64)  # ticks that each target was in the picture
-        self.lately = np.zeros(len(tour.target), np.int64)  # the same since the last stop
+        self.shown = np.zeros(len(tour.target), np.int64)  # ticks that each target was in the picture
         self.note()
 
     def at(self, metres: float) -> Float[np.ndarray, "2"]:
@@ -96,9 +95,7 @@ class _Robot:
         x, y = (self.tour.target - place).T
         beside = np.abs(_wrapped(np.arctan2(y, x) - self.heading_rad))
         point = min(int(np.searchsorted(self.along, self.along_m)), len(self.along) - 1)
-        shown = self.tour.in_sight[point] & (beside < _HALF_FIELD_RAD)
-        self.ever += shown
-        self.lately += shown
+        self.shown += self.tour.in_sight[point] & (beside < _HALF_FIELD_RAD)
 
     def turn(self, goal_rad: float) -> float:
         """Turn for one tick towards a heading that need not be within a half turn; return what is left."""
@@ -124,15 +121,14 @@ class _Robot:
             self.note()
 
     def look_at(self, targets: Int[np.ndarray, " m"]) -> None:
-        """Turn to those of a stop's targets that were not in the picture on the way to it."""
+        """Turn to those of a stop's targets that were not in the picture before."""
         enough = max(round(_LOOK_S * self.settings.rate_hz), 1)
-        missing = targets[np.minimum(self.lately, self.ever)[targets] < enough]
+        missing = targets[self.shown[targets] < enough]
         x, y = (self.tour.target[missing] - self.at(self.along_m)).T
         for goal in sweep(np.arctan2(y, x), self.heading_rad, _HALF_FIELD_RAD):
             while self.turn(goal) > np.deg2rad(2) or abs(self.turn_rad_s) > np.deg2rad(20):
                 self.note()
             self.note()
-        self.lately[:] = 0
 
 
 def drive(

@@ -18,6 +18,7 @@ _LOWEST_RAD = np.deg2rad(30.0)  # how far below the horizon the camera sees
 _NEAREST_M = 0.5  # from nearer than this nothing is seen as a whole
 _MIDST_M = 0.5  # so much farther than the free place nearest to its middle one is still in the midst of an area
 _AREA, _OBJECT, _FLOOR = 3.0, 1.0, 0.25  # what entering an area, an object and a piece of floor are worth
+_AGAIN = 0.3  # what seeing a thing from a second place is worth, of the first
 _LEAST_GAIN = 0.9  # a place that adds less is not gone to
 
 
@@ -173,8 +174,8 @@ def _greedy(
     left = wanted * np.any(covers, axis=0)
     chosen, news = [], []
     while True:
-        gain = (covers @ (worth * (left > 0))) * comfort
-        best = int(np.argmax(gain))
+        gain = (covers @ (worth * np.where(left == wanted, 1.0, _AGAIN) * (left > 0))) * comfort
+        best = int(np.argmax(gain.round(9)))  # a matrix product may round otherwise the next time, and ties are many
         if gain[best] < _LEAST_GAIN and chosen:
             return chosen, news
         new = covers[best] & (left > 0)

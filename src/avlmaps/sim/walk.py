@@ -64,7 +64,7 @@ def _order(cost: Float[np.ndarray, "k k"], rng: np.random.Generator) -> list[int
     count = len(cost)
     starts = rng.permutation(count)[:8]
     tours = [_improved(_nearest_neighbour(cost, int(start)), cost) for start in starts]
-    return min(tours, key=lambda tour: float(cost[tour[:-1], tour[1:]].sum()))
+    return min(tours, key=lambda tour: round(float(cost[tour[:-1], tour[1:]].sum()), 9))
 
 
 def _nearest_neighbour(cost: np.ndarray, start: int) -> list[int]:
