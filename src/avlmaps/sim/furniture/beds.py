@@ -92,7 +92,15 @@ def _runner(rng: np.random.Generator, plan: BedPlan, hang: float) -> Mesh:
     """Return a folded spread across the foot of the bed."""
     x = plan.length * draw(rng, 0.68, 0.8)
     y, z = plan.width / 2 + 0.045, plan.top + 0.055
-    profile = [(-y - 0.01, z - hang), (-y, z - 0.02), (-y * 0.9, z), (0.0, z + 0.01), (y * 0.9, z), (y, z - 0.02), (y + 0.01, z - hang)]
+    profile = [
+        (-y - 0.01, z - hang),
+        (-y, z - 0.02),
+        (-y * 0.9, z),
+        (0.0, z + 0.01),
+        (y * 0.9, z),
+        (y, z - 0.02),
+        (y + 0.01, z - hang),
+    ]
     mesh = throw(rng, profile, 0.0, draw(rng, 0.3, 0.6), material("fabric", rng))
     return mesh.turned(np.pi / 2).moved(x=x)
 
@@ -101,7 +109,9 @@ def _rails(plan: BedPlan, look: Material, tall: float, thick: float = 0.025) -> 
     """Return the boards along the sides and the slatted ground, seen as one board."""
     y, z = plan.width / 2, plan.base + 0.03
     low = max(z - tall, 0.02)
-    sides = [box((0.0, s * y + min(s, 0) * thick, low), (plan.length, s * y + max(s, 0) * thick, z), look) for s in (1, -1)]
+    sides = [
+        box((0.0, s * y + min(s, 0) * thick, low), (plan.length, s * y + max(s, 0) * thick, z), look) for s in (1, -1)
+    ]
     return [*sides, box((0.0, -y, plan.base - 0.025), (plan.length, y, plan.base), look)]
 
 
@@ -156,7 +166,13 @@ def bedstead(rng: np.random.Generator) -> Piece:
     else:
         legs = four_legs(plan.length, plan.width + 0.04, plan.base, leg_style(rng, 0.05, 0.07, True), look)
         parts.append(legs.moved(x=plan.length / 2))
-        parts.append(box((plan.length, -plan.width / 2 - 0.02, plan.base - 0.1), (plan.length + 0.025, plan.width / 2 + 0.02, plan.base + 0.03), look))
+        parts.append(
+            box(
+                (plan.length, -plan.width / 2 - 0.02, plan.base - 0.1),
+                (plan.length + 0.025, plan.width / 2 + 0.02, plan.base + 0.03),
+                look,
+            )
+        )
     return finished(parts)
 
 
@@ -171,7 +187,10 @@ def metal_bed(rng: np.random.Generator) -> Piece:
         y, low = plan.width / 2 + 0.02, plan.base + 0.02
         curve = [(x, y * float(np.cos(a)), top - 0.22 + 0.22 * float(np.sin(a))) for a in np.linspace(0.0, np.pi, 9)]
         path = [(x, y, 0.0), *(curve if bend else [(x, y, top), (x, -y, top)]), (x, -y, 0.0)]
-        parts += [tube(path, draw(rng, 0.014, 0.022), look, 6), box((x - 0.01, -y, low), (x + 0.01, y, low + 0.02), look)]
+        parts += [
+            tube(path, draw(rng, 0.014, 0.022), look, 6),
+            box((x - 0.01, -y, low), (x + 0.01, y, low + 0.02), look),
+        ]
         for t in np.linspace(-0.85, 0.85, count(rng, 4, 9)).tolist():
             z = top - 0.22 + 0.22 * float(np.sqrt(1 - t * t)) if bend else top
             parts.append(cylinder(x, t * y, low, 0.007, z - low, look, 5))
@@ -184,7 +203,10 @@ def upholstered_bed(rng: np.random.Generator) -> Piece:
     plan, look = bed_plan(rng, (0.22, 0.34), 0.75), covering(rng, 0.3)
     y, thick, head = plan.width / 2 + 0.03, draw(rng, 0.06, 0.14), plan.top + draw(rng, 0.4, 0.8)
     low = pick(rng, (0.0, 0.04, 0.12))
-    parts = [*bedclothes(rng, plan), rounded_box((-0.02, -y, low), (plan.length + 0.03, y, plan.base + 0.04), 0.02, look, 2)]
+    parts = [
+        *bedclothes(rng, plan),
+        rounded_box((-0.02, -y, low), (plan.length + 0.03, y, plan.base + 0.04), 0.02, look, 2),
+    ]
     style = pick(rng, ("plain", "columns", "squares", "wings"))
     if style in ("plain", "wings"):
         parts.append(rounded_box((-thick, -y, 0.0), (0.0, y, head), 0.03, look, 3))
@@ -195,9 +217,16 @@ def upholstered_bed(rng: np.random.Generator) -> Piece:
             for z0, z1 in split(plan.base, head, [1.0] * rows):
                 parts.append(rounded_box((-thick / 2 - 0.01, y0, z0), (0.0, y1, z1), 0.025, look, 2))
     if style == "wings":
-        parts += [box((-thick, min(s * y, s * (y + 0.05)), 0.0), (0.18, max(s * y, s * (y + 0.05)), head), look) for s in (1, -1)]
+        parts += [
+            box((-thick, min(s * y, s * (y + 0.05)), 0.0), (0.18, max(s * y, s * (y + 0.05)), head), look)
+            for s in (1, -1)
+        ]
     if low > 0:
-        parts.append(four_legs(plan.length - 0.1, 2 * y - 0.1, low + 0.01, named_leg("tapered", 8, 0.06), bed_look(rng)).moved(x=plan.length / 2))
+        parts.append(
+            four_legs(plan.length - 0.1, 2 * y - 0.1, low + 0.01, named_leg("tapered", 8, 0.06), bed_look(rng)).moved(
+                x=plan.length / 2
+            )
+        )
     return finished(parts)
 
 
@@ -207,7 +236,10 @@ def platform_bed(rng: np.random.Generator) -> Piece:
     plan, look = bed_plan(rng, (0.12, 0.28)), bed_look(rng)
     rim_m = draw(rng, 0.03, 0.2)
     y = plan.width / 2 + rim_m
-    parts = [*bedclothes(rng, plan), box((-0.03, -y, plan.base - draw(rng, 0.03, 0.09)), (plan.length + rim_m, y, plan.base), look)]
+    parts = [
+        *bedclothes(rng, plan),
+        box((-0.03, -y, plan.base - draw(rng, 0.03, 0.09)), (plan.length + rim_m, y, plan.base), look),
+    ]
     inset = draw(rng, 0.05, 0.3)
     parts.append(box((inset, -y + inset, 0.0), (plan.length - inset, y - inset, plan.base - 0.02), look))
     if chance(rng, 0.6):
@@ -227,7 +259,11 @@ def box_spring(rng: np.random.Generator) -> Piece:
     feet = four_legs(plan.length - 0.1, plan.width - 0.1, low + 0.01, named_leg("straight", 8, 0.06), bed_look(rng))
     parts = [*bedclothes(rng, plan), base, feet.moved(x=plan.length / 2)]
     if chance(rng, 0.3):
-        parts.append(rounded_box((-0.09, -plan.width / 2, 0.1), (0.0, plan.width / 2, plan.top + draw(rng, 0.25, 0.6)), 0.03, look, 3))
+        parts.append(
+            rounded_box(
+                (-0.09, -plan.width / 2, 0.1), (0.0, plan.width / 2, plan.top + draw(rng, 0.25, 0.6)), 0.03, look, 3
+            )
+        )
     return finished(parts)
 
 
@@ -295,5 +331,15 @@ def sleigh_bed(rng: np.random.Generator) -> Piece:
             rings.append(np.array([(px, -y, pz), (px, y, pz), (px + end * thick, y, pz), (px + end * thick, -y, pz)]))
         parts.append(loft(rings, look))
         last = face[-1]
-        parts.append(tube([(float(last[0]) + end * 0.02, -y - 0.01, float(last[1])), (float(last[0]) + end * 0.02, y + 0.01, float(last[1]))], 0.04, look, 8))
+        parts.append(
+            tube(
+                [
+                    (float(last[0]) + end * 0.02, -y - 0.01, float(last[1])),
+                    (float(last[0]) + end * 0.02, y + 0.01, float(last[1])),
+                ],
+                0.04,
+                look,
+                8,
+            )
+        )
     return finished(parts)

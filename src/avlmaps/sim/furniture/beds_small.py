@@ -9,7 +9,7 @@ from avlmaps.sim.furniture.carcass import Room, board_look, carcass, doors, draw
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
 from avlmaps.sim.furniture.legs import cabinet_base, four_legs, leg_style, named_leg
-from avlmaps.sim.furniture.upholstery import Bedding, blanket, heap, mattress
+from avlmaps.sim.furniture.upholstery import Bedding, heap, mattress
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh
 from avlmaps.sim.shapes import box, cylinder, lathe, prism, rounded_rectangle, slab, tube
@@ -46,7 +46,9 @@ def barred_crib(rng: np.random.Generator) -> Piece:
     parts.append(slab(0.0, 0.0, low - 0.02, length, width, 0.02, look))
     for s in (1, -1):
         side_top = top - (draw(rng, 0.0, 0.15) if s > 0 else 0.0)
-        parts += [m.turned(np.pi / 2).moved(y=s * width / 2) for m in _barred(length, low - 0.08, side_top, bar, look, rods)]
+        parts += [
+            m.turned(np.pi / 2).moved(y=s * width / 2) for m in _barred(length, low - 0.08, side_top, bar, look, rods)
+        ]
     solid = chance(rng, 0.5)
     for s in (1, -1):
         high = top + draw(rng, 0.0, 0.12)
@@ -56,8 +58,15 @@ def barred_crib(rng: np.random.Generator) -> Piece:
             parts += [m.moved(x=s * length / 2) for m in _barred(width, low - 0.08, high, bar, look, rods)]
     parts.append(four_legs(length + 0.03, width + 0.03, top, named_leg("straight", 4, 0.045), look))
     if chance(rng, 0.25):
-        parts.append(tube([(-length / 2, 0.0, top), (-length / 2, 0.0, top + 0.5), (-length / 4, 0.0, top + 0.55)], 0.01, look, 5))
-        parts += [cylinder(-length / 4 + dx, dy, top + 0.3, 0.03, 0.05, material("fabric", rng), 6) for dx, dy in ((0.08, 0), (-0.08, 0.05), (0, -0.08))]
+        parts.append(
+            tube(
+                [(-length / 2, 0.0, top), (-length / 2, 0.0, top + 0.5), (-length / 4, 0.0, top + 0.55)], 0.01, look, 5
+            )
+        )
+        parts += [
+            cylinder(-length / 4 + dx, dy, top + 0.3, 0.03, 0.05, material("fabric", rng), 6)
+            for dx, dy in ((0.08, 0), (-0.08, 0.05), (0, -0.08))
+        ]
     return finished(parts)
 
 
@@ -70,17 +79,34 @@ def bassinet(rng: np.random.Generator) -> Piece:
     inner = material("white", rng)
     squash = width / length
     profile = [(length * 0.4, low), (length * 0.5, low + deep), (length * 0.47, low + deep), (length * 0.4, low + 0.08)]
-    parts = [lathe(profile, look, sides=16, squash=squash), lathe([(length * 0.38, low + 0.05), (length * 0.4, low + 0.12)], inner, sides=16, squash=squash)]
+    parts = [
+        lathe(profile, look, sides=16, squash=squash),
+        lathe([(length * 0.38, low + 0.05), (length * 0.4, low + 0.12)], inner, sides=16, squash=squash),
+    ]
     stand = material(pick(rng, ("wood", "white", "metal")), rng)
-    parts.append(four_legs(length * 0.6, width * 0.7, low + 0.02, leg_style(rng, 0.03, 0.04, True), stand, draw(rng, 0.0, 0.1)))
+    parts.append(
+        four_legs(length * 0.6, width * 0.7, low + 0.02, leg_style(rng, 0.03, 0.04, True), stand, draw(rng, 0.0, 0.1))
+    )
     if chance(rng, 0.5):
         rise = draw(rng, 0.2, 0.35)
-        hood = [(-length * 0.5 * float(np.cos(a)), 0.0, low + deep + rise * float(np.sin(a))) for a in np.linspace(0.0, 1.5, 5)]
+        hood = [
+            (-length * 0.5 * float(np.cos(a)), 0.0, low + deep + rise * float(np.sin(a)))
+            for a in np.linspace(0.0, 1.5, 5)
+        ]
         for i in range(len(hood) - 1):
             (xa, _, za), (xb, _, zb) = hood[i], hood[i + 1]
             half = width * 0.5
-            ring = [np.array([(x, half * float(np.sin(t)) , low + deep + (z - low - deep) * max(float(np.cos(t)), 0.0)) for t in np.linspace(-np.pi / 2, np.pi / 2, 7)]) for x, z in ((xa, za), (xb, zb))]
+            ring = [
+                np.array(
+                    [
+                        (x, half * float(np.sin(t)), low + deep + (z - low - deep) * max(float(np.cos(t)), 0.0))
+                        for t in np.linspace(-np.pi / 2, np.pi / 2, 7)
+                    ]
+                )
+                for x, z in ((xa, za), (xb, zb))
+            ]
             from avlmaps.sim.furniture.joinery import cloth
+
             parts.append(cloth(np.stack(ring), look))
     return finished(parts)
 
@@ -94,10 +120,17 @@ def travel_cot(rng: np.random.Generator) -> Piece:
     parts = _cot_bedding(rng, length - 0.08, width - 0.08, draw(rng, 0.1, 0.3))
     ring = [(float(x), float(y), top) for x, y in flat]
     parts.append(tube([*ring, ring[0]], draw(rng, 0.02, 0.035), look, 6))
-    parts += [box((-length / 2, s * width / 2 - 0.004, 0.08), (length / 2, s * width / 2 + 0.004, top), net) for s in (1, -1)]
-    parts += [box((s * length / 2 - 0.004, -width / 2, 0.08), (s * length / 2 + 0.004, width / 2, top), look) for s in (1, -1)]
+    parts += [
+        box((-length / 2, s * width / 2 - 0.004, 0.08), (length / 2, s * width / 2 + 0.004, top), net) for s in (1, -1)
+    ]
+    parts += [
+        box((s * length / 2 - 0.004, -width / 2, 0.08), (s * length / 2 + 0.004, width / 2, top), look) for s in (1, -1)
+    ]
     band = draw(rng, 0.1, 0.25)
-    parts += [box((-length / 2, s * width / 2 - 0.008, 0.06), (length / 2, s * width / 2 + 0.008, 0.06 + band), look) for s in (1, -1)]
+    parts += [
+        box((-length / 2, s * width / 2 - 0.008, 0.06), (length / 2, s * width / 2 + 0.008, 0.06 + band), look)
+        for s in (1, -1)
+    ]
     parts.append(four_legs(length + 0.05, width + 0.05, top, named_leg("straight", 4, 0.05), frame))
     return finished(parts)
 
@@ -124,7 +157,10 @@ def _bunk(rng: np.random.Generator, lower: bool) -> Piece:
         parts += [mesh.moved(x=-half) for mesh in bedclothes(rng, replace(plan, top=plan.top))]
         y = width / 2
         parts += [box((-half, s * y - 0.012, base - 0.08), (half, s * y + 0.012, base + 0.05), look) for s in (1, -1)]
-        parts += [box((s * half - 0.012, -y, base - 0.1), (s * half + 0.012, y, base + draw(rng, 0.1, 0.45)), look) for s in (1, -1)]
+        parts += [
+            box((s * half - 0.012, -y, base - 0.1), (s * half + 0.012, y, base + draw(rng, 0.1, 0.45)), look)
+            for s in (1, -1)
+        ]
     guard = draw(rng, 0.45, 0.75)
     for z in np.linspace(upper + 0.22, top - 0.05, count(rng, 1, 3)).tolist():
         parts.append(box((-half, width / 2 - 0.012, z), (half - (1 - guard), width / 2 + 0.012, z + 0.06), look))
@@ -162,7 +198,9 @@ def drawer_nightstand(rng: np.random.Generator) -> Piece:
     parts = [base, carcass(room, 0.016, look)]
     parts += drawers(rng, front_style(rng, look), room, [1.0] * count(rng, 1, 3))
     out = draw(rng, 0.0, 0.025)
-    parts.append(box((-depth / 2, -width / 2 - out, height - 0.02), (depth / 2 + 0.02 + out, width / 2 + out, height), look))
+    parts.append(
+        box((-depth / 2, -width / 2 - out, height - 0.02), (depth / 2 + 0.02 + out, width / 2 + out, height), look)
+    )
     return finished(parts, supports=[Support((-depth / 2, -width / 2), (depth / 2, width / 2), height)])
 
 
@@ -192,7 +230,11 @@ def door_nightstand(rng: np.random.Generator) -> Piece:
     (a, b, c), (d, e, f) = (-depth / 2, -width / 2, lift), (depth / 2, width / 2, height - 0.02)
     cut = f - (draw(rng, 0.1, 0.16) if chance(rng, 0.5) else 0.0)
     style = front_style(rng, look)
-    parts = [base, carcass(Room((a, b, c), (d, e, f)), 0.016, look), *doors(rng, style, Room((a, b, c), (d, e, cut)), 1, 0.1)]
+    parts = [
+        base,
+        carcass(Room((a, b, c), (d, e, f)), 0.016, look),
+        *doors(rng, style, Room((a, b, c), (d, e, cut)), 1, 0.1),
+    ]
     if cut < f:
         parts += drawers(rng, style, Room((a, b, cut), (d, e, f)), [1.0])
     parts.append(box((a, b - 0.01, f), (d + 0.03, e + 0.01, f + 0.02), look))
@@ -208,7 +250,10 @@ def legged_nightstand(rng: np.random.Generator) -> Piece:
     style = front_style(rng, look)
     (a, b), (d, e) = (-depth / 2, -width / 2), (depth / 2, width / 2)
     low = height - 0.018 - tall
-    parts = [box((a, b, low), (d, e, height - 0.018), look), *drawers(rng, style, Room((a, b, low), (d, e, height - 0.018)), [1.0])]
+    parts = [
+        box((a, b, low), (d, e, height - 0.018), look),
+        *drawers(rng, style, Room((a, b, low), (d, e, height - 0.018)), [1.0]),
+    ]
     parts.append(box((a - 0.01, b - 0.015, height - 0.018), (d + 0.025, e + 0.015, height), look))
     parts.append(four_legs(depth, width, low + 0.01, leg_style(rng, 0.025, 0.045), look, draw(rng, 0.0, 0.04)))
     supports = [Support((a, b), (d, e), height)]
@@ -231,7 +276,11 @@ def drum_nightstand(rng: np.random.Generator) -> Piece:
         wall = [(x, y) for x, y in flat]
         for (x0, y0), (x1, y1) in zip(wall, wall[1:] + wall[:1], strict=True):
             if x0 + x1 < r * 0.9:
-                parts.append(box((0, 0, 0), (0.012, float(np.hypot(x1 - x0, y1 - y0)), height - 0.05), look).turned(float(np.arctan2(y1 - y0, x1 - x0)) - np.pi / 2).moved(x0, y0, 0.03))
+                parts.append(
+                    box((0, 0, 0), (0.012, float(np.hypot(x1 - x0, y1 - y0)), height - 0.05), look)
+                    .turned(float(np.arctan2(y1 - y0, x1 - x0)) - np.pi / 2)
+                    .moved(x0, y0, 0.03)
+                )
     else:
         parts += [cylinder(0.85 * x, 0.85 * y, 0.0, 0.012, height - 0.01, look, 6) for x, y in flat[2::5]]
     parts += [cylinder(0.7 * x, 0.7 * y, 0.0, 0.02, 0.04, look, 6) for x, y in flat[::4]]

@@ -97,7 +97,11 @@ def grip(style: FrontStyle, x: float, y: float, z: float, upright: bool, length:
     ends = [(y - along[1], z - along[2]), (y + along[1], z + along[2])]
     (y0, z0), (y1, z1) = ends
     if style.grip == "bar":
-        bar = box((x + 0.022, min(y0, y1) - 0.005, min(z0, z1) - 0.005), (x + 0.034, max(y0, y1) + 0.005, max(z0, z1) + 0.005), style.metal)
+        bar = box(
+            (x + 0.022, min(y0, y1) - 0.005, min(z0, z1) - 0.005),
+            (x + 0.034, max(y0, y1) + 0.005, max(z0, z1) + 0.005),
+            style.metal,
+        )
         inner = 0.8
         feet = [
             box((x, y + s * inner * along[1] - 0.004, z + s * inner * along[2] - 0.004),
@@ -210,7 +214,9 @@ def doors(
     (_, b, c), (d, e, f) = room.low, room.high
     parts = []
     for index, (y0, y1) in enumerate(split(b, e, [1.0] * number)):
-        leaf = Room((d, y0 + style.gap / 2, c + style.gap / 2), (d + style.thick, y1 - style.gap / 2, f - style.gap / 2))
+        leaf = Room(
+            (d, y0 + style.gap / 2, c + style.gap / 2), (d + style.thick, y1 - style.gap / 2, f - style.gap / 2)
+        )
         hinge = -1 if index % 2 == 0 and index < number - 1 else 1
         opened = draw(rng, 0.2, 1.7) if chance(rng, ajar) else 0.0
         parts.append(door(rng, style, leaf, hinge, opened, panel))
@@ -219,7 +225,9 @@ def doors(
     return parts
 
 
-def drawers(rng: np.random.Generator, style: FrontStyle, room: Room, shares: list[float], ajar: float = 0.06) -> list[Mesh]:
+def drawers(
+    rng: np.random.Generator, style: FrontStyle, room: Room, shares: list[float], ajar: float = 0.06
+) -> list[Mesh]:
     """Return drawers one above the other before a room, from below by their shares of its height."""
     (_, b, c), (d, e, f) = room.low, room.high
     parts = []
@@ -238,5 +246,7 @@ def shelf_boards(room: Room, number: int, board: float, look: Material) -> tuple
     (a, b, c), (d, e, f) = room.low, room.high
     bays = split(c, f, [1.0] * (number + 1))
     boards = [box((a, b, top - board / 2), (d - 0.005, e, top + board / 2), look) for _, top in bays[:-1]]
-    free = [(lo + (board / 2 if i else 0.0), hi - (board / 2 if i < number else 0.0)) for i, (lo, hi) in enumerate(bays)]
+    free = [
+        (lo + (board / 2 if i else 0.0), hi - (board / 2 if i < number else 0.0)) for i, (lo, hi) in enumerate(bays)
+    ]
     return boards, free

@@ -17,11 +17,11 @@ from avlmaps.sim.mesh import Mesh, Triple
 Families = Literal["training", "held-out", "all"]
 
 # Modules with recipes, imported at the first question.
-_MODULES = ("seating", "seating_sofas", "seating_chairs", "seating_small", "tables", "tables_low", "beds", "beds_small",
-            "storage", "storage_shelves", "storage_small", "kitchen", "cold", "cooking", "countertop",
+_MODULES = ("seating", "seating_sofas", "seating_chairs", "seating_armchairs", "seating_office", "seating_small", "tables", "tables_low", "beds", "beds_small",
+            "storage", "storage_shelves", "storage_cabinets", "storage_small", "kitchen", "cold", "cooking", "countertop",
             "bathroom", "washbasins", "toiletries", "appliances", "climate", "electronics", "devices", "decor",
-            "lighting", "chandeliers", "plants", "drapes", "openings", "clutter", "containers", "leisure", "fitness",
-            "office")  # fmt: skip
+            "vases", "lighting", "chandeliers", "plants", "drapes", "openings", "clutter", "crockery", "containers",
+            "bags", "leisure", "nursery", "fitness", "sports", "office")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """Parts of chairs with a frame: seats, raked posts, rails, slats, splats, arms."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,10 +78,7 @@ def seat_board(rng: np.random.Generator, frame: ChairFrame, look: Material, styl
     if style == "slats":
         edges = np.linspace(-x, x, count(rng, 4, 7) + 1)
         gap = draw(rng, 0.006, 0.02)
-        boards = [
-            box((float(a), -y, z - 0.018), (float(b) - gap, y, z), look)
-            for a, b in zip(edges[:-1], edges[1:], strict=True)
-        ]
+        boards = [box((float(a), -y, z - 0.018), (float(b) - gap, y, z), look) for a, b in itertools.pairwise(edges)]
         return narrowed(joined(boards), frame)
     thick = draw(rng, 0.015, 0.04)
     lift = draw(rng, 0.02, 0.05) if style == "cushion" else 0.0
@@ -126,12 +124,7 @@ def front_legs(frame: ChairFrame, style: LegStyle, look: Material, splay: float 
     """Return the two front legs, their tops ``drop`` under the top of the seat."""
     half = style.thickness_m / 2 + 0.005
     x, y = frame.depth / 2 - half, frame.front / 2 - half
-    return joined(
-        [
-            leg((x + splay, s * (y + splay), 0.0), (x, s * y, frame.seat - drop), style, look)
-            for s in (1, -1)
-        ]
-    )
+    return joined([leg((x + splay, s * (y + splay), 0.0), (x, s * y, frame.seat - drop), style, look) for s in (1, -1)])
 
 
 def side_rails(

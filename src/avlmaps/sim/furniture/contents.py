@@ -54,7 +54,9 @@ def books(rng: np.random.Generator, room: Room, looks: list[Material], fill: flo
             high = draw(rng, 0.015, 0.04)
             if z + high > f - 0.02:
                 break
-            parts.append(box((front - deep, e - 0.22, z), (front - draw(rng, 0.0, 0.03), e - 0.02, z + high), pick(rng, looks)))
+            parts.append(
+                box((front - deep, e - 0.22, z), (front - draw(rng, 0.0, 0.03), e - 0.02, z + high), pick(rng, looks))
+            )
             z += high
     return parts
 
@@ -69,10 +71,16 @@ def ornament(rng: np.random.Generator, x: float, y: float, z: float, tall: float
         return lathe([(radius, z + up) for radius, up in shape], material("ceramic", rng), x, y, 8)
     if kind == "bowl":
         r, h = draw(rng, 0.06, 0.11), min(draw(rng, 0.04, 0.08), tall)
-        return lathe([(0.4 * r, z), (r, z + h), (0.85 * r, z + h), (0.3 * r, z + 0.3 * h)], material("ceramic", rng), x, y, 8)
+        return lathe(
+            [(0.4 * r, z), (r, z + h), (0.85 * r, z + h), (0.3 * r, z + 0.3 * h)], material("ceramic", rng), x, y, 8
+        )
     if kind == "frame":
         wide, h = draw(rng, 0.1, 0.2), tall * draw(rng, 0.5, 0.9)
-        return box((x - 0.01, y - wide / 2, z), (x + 0.01, y + wide / 2, z + h), material(pick(rng, ("wood", "black", "painting")), rng))
+        return box(
+            (x - 0.01, y - wide / 2, z),
+            (x + 0.01, y + wide / 2, z + h),
+            material(pick(rng, ("wood", "black", "painting")), rng),
+        )
     look = material("wicker" if kind == "basket" else pick(rng, ("paper", "plastic", "wood")), rng)
     wide, deep, h = draw(rng, 0.14, 0.3), draw(rng, 0.14, 0.22), tall * draw(rng, 0.4, 0.85)
     return box((x - deep / 2, y - wide / 2, z), (x + deep / 2, y + wide / 2, z + h), look)
@@ -95,7 +103,9 @@ def shelf_things(rng: np.random.Generator, room: Room, looks: list[Material], fu
     parts = []
     for y in np.arange(b + 0.12, e - 0.1, draw(rng, 0.24, 0.4)).tolist():
         if chance(rng, full):
-            parts.append(ornament(rng, (a + d) / 2 + draw(rng, -0.02, 0.03), y + draw(rng, -0.02, 0.02), c, (f - c) * 0.9))
+            parts.append(
+                ornament(rng, (a + d) / 2 + draw(rng, -0.02, 0.03), y + draw(rng, -0.02, 0.02), c, (f - c) * 0.9)
+            )
     return parts
 
 
@@ -110,8 +120,10 @@ def folded(rng: np.random.Generator, room: Room, looks: list[Material]) -> list[
             if z + high > f - 0.03:
                 break
             deep, wide = min(0.32, (d - a) * 0.8), draw(rng, 0.24, 0.32)
-            flat = rounded_rectangle(deep, wide, 0.04, 2) + ((a + d) / 2, y + draw(rng, -0.015, 0.015))
-            parts.append(loft([np.column_stack([flat, np.full(len(flat), h)]) for h in (z, z + high)], pick(rng, looks)))
+            flat = (*rounded_rectangle(deep, wide, 0.04, 2), (a + d) / 2, y + draw(rng, -0.015, 0.015))
+            parts.append(
+                loft([np.column_stack([flat, np.full(len(flat), h)]) for h in (z, z + high)], pick(rng, looks))
+            )
             z += high
     return parts
 
@@ -129,7 +141,9 @@ def hanging(rng: np.random.Generator, room: Room, looks: list[Material], full: f
             rings = []
             for dz, share in ((-0.03, 0.2), (-0.1, 1.0), (-long, draw(rng, 0.75, 1.1))):
                 w = half * share
-                rings.append(np.array([(x - w, y, z + dz), (x, y - thick, z + dz), (x + w, y, z + dz), (x, y + thick, z + dz)]))
+                rings.append(
+                    np.array([(x - w, y, z + dz), (x, y - thick, z + dz), (x + w, y, z + dz), (x, y + thick, z + dz)])
+                )
             parts.append(loft(rings, pick(rng, looks)))
         y += draw(rng, 0.035, 0.09)
     return parts

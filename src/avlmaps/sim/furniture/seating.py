@@ -20,7 +20,7 @@ from avlmaps.sim.furniture.chair_parts import (
 )
 from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.legs import LegStyle, leg, leg_style, named_leg, stretchers
-from avlmaps.sim.furniture.upholstery import covering, cushion
+from avlmaps.sim.furniture.upholstery import covering
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import cylinder, prism, rounded_box, tube
@@ -142,7 +142,9 @@ def windsor(rng: np.random.Generator) -> Piece:
         shares, ends = np.linspace(-0.95, 0.95, number), [frame.top - crest + 0.01] * number
     for share, end in zip(shares.tolist(), ends, strict=True):
         side = share * frame.rear * 0.46
-        parts.append(tube([(frame.back_x(0.0), side * 0.85, frame.seat - 0.01), (frame.back_x(end), side, end)], 0.007, look, 4))
+        parts.append(
+            tube([(frame.back_x(0.0), side * 0.85, frame.seat - 0.01), (frame.back_x(end), side, end)], 0.007, look, 4)
+        )
     return finished(parts)
 
 
@@ -162,7 +164,9 @@ def cross_back(rng: np.random.Generator) -> Piece:
 def bentwood(rng: np.random.Generator) -> Piece:
     """Return a café chair: round seat, legs of bent rods, a hoop for a back with another inside it."""
     wide = draw(rng, 0.38, 0.44)
-    frame = ChairFrame(wide, wide, wide * 0.9, draw(rng, 0.44, 0.48), draw(rng, 0.83, 0.95), draw(rng, 0.06, 0.13), 0.05)
+    frame = ChairFrame(
+        wide, wide, wide * 0.9, draw(rng, 0.44, 0.48), draw(rng, 0.83, 0.95), draw(rng, 0.06, 0.13), 0.05
+    )
     look = material(pick(rng, ("wood", "wood", "black", "painted")), rng)
     rod = draw(rng, 0.011, 0.016)
     z = frame.seat - 0.03
@@ -211,5 +215,9 @@ def scandinavian(rng: np.random.Generator) -> Piece:
     path = [ends[0], *path, ends[1]] if arms else path
     flat = tube([(p[0], p[1], 0.0) for p in path], 0.016, look, 6)
     parts.append(flat.scaled(1.0, 1.0, tall / 0.032).moved(z=frame.top - tall / 2))
-    parts.append(cushion((-0.02, -0.05, frame.seat - 0.03), (0.02, 0.05, frame.seat - 0.01), look))
+    z = frame.seat - 0.045
+    for s in (1, -1):
+        parts.append(strut((x_back - 0.02, s * (y - 0.035), z), (x_front, s * (y - 0.035), z), 0.02, 0.04, look))
+    for x in (x_back, x_front - 0.01):
+        parts.append(strut((x, -y + 0.04, z), (x, y - 0.04, z), 0.02, 0.04, look))
     return finished(parts)

@@ -1,26 +1,15 @@
 """Chairs of shells, tubes and cushions, and armchairs."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.chair_parts import bent_rail, chair_frame
 from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.legs import four_legs, leg, leg_style, named_leg, sled, star_base
-from avlmaps.sim.furniture.sofa_parts import (
-    SofaPlan,
-    couch,
-    frame_arms,
-    loose_back,
-    seat_cushions,
-    sofa_plan,
-    strewn,
-)
-from avlmaps.sim.furniture.upholstery import back_cushions, covering, cushion, scattered_pillows
+from avlmaps.sim.furniture.upholstery import covering, cushion
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
-from avlmaps.sim.shapes import box, cylinder, loft, rounded_box, tube
+from avlmaps.sim.shapes import box, rounded_box, tube
 
 
 def shell(
@@ -40,7 +29,17 @@ def shell(
     """
     lean = draw(rng, 0.06, 0.2)
     line = np.array(
-        [(0.5, -0.03), (0.42, 0.0), (0.1, -0.01), (-0.25, -0.015), (-0.42, 0.02), (-0.5, 0.12), (-0.53, 0.4), (-0.56, 0.75), (-0.58, 1.0)]
+        [
+            (0.5, -0.03),
+            (0.42, 0.0),
+            (0.1, -0.01),
+            (-0.25, -0.015),
+            (-0.42, 0.02),
+            (-0.5, 0.12),
+            (-0.53, 0.4),
+            (-0.56, 0.75),
+            (-0.58, 1.0),
+        ]
     )
     x = line[:, 0] * depth - lean * np.maximum(line[:, 1], 0.0) * 0.6
     z = seat + np.where(line[:, 1] > 0.03, line[:, 1] * rise, line[:, 1])
@@ -66,16 +65,34 @@ def shell(
     return joined([cloth(faces[0], look), cloth(faces[1], look), cloth(np.stack([edge, edge_low]), look)])
 
 
-def _shell_base(rng: np.random.Generator, width: float, depth: float, seat: float, style: str) -> list[Mesh]:
+def shell_base(rng: np.random.Generator, width: float, depth: float, seat: float, style: str) -> list[Mesh]:
     """Return what carries a shell: dowels, wire, four tubes, runners, a star, a tulip foot."""
     metal = material(pick(rng, ("metal", "black", "white")), rng)
     if style == "dowels":
         wood = material("wood", rng)
-        legs = four_legs(depth * 0.6, width * 0.6, seat - 0.02, named_leg("tapered", 8, draw(rng, 0.026, 0.036)), wood, draw(rng, 0.06, 0.1))
-        bars = [tube([(sx * 0.12, -0.12, seat - 0.08), (-sx * 0.12, 0.12, seat - 0.16)], 0.005, metal, 4) for sx in (1, -1)]
+        legs = four_legs(
+            depth * 0.6,
+            width * 0.6,
+            seat - 0.02,
+            named_leg("tapered", 8, draw(rng, 0.026, 0.036)),
+            wood,
+            draw(rng, 0.06, 0.1),
+        )
+        bars = [
+            tube([(sx * 0.12, -0.12, seat - 0.08), (-sx * 0.12, 0.12, seat - 0.16)], 0.005, metal, 4) for sx in (1, -1)
+        ]
         return [legs, *bars]
     if style == "tubes":
-        return [four_legs(depth * 0.75, width * 0.78, seat - 0.01, named_leg("straight", 8, draw(rng, 0.018, 0.028)), metal, draw(rng, 0.0, 0.05))]
+        return [
+            four_legs(
+                depth * 0.75,
+                width * 0.78,
+                seat - 0.01,
+                named_leg("straight", 8, draw(rng, 0.018, 0.028)),
+                metal,
+                draw(rng, 0.0, 0.05),
+            )
+        ]
     if style == "sled":
         return [sled(depth * 0.95, width * 0.85, seat, draw(rng, 0.008, 0.012), metal)]
     if style == "star":
@@ -94,10 +111,16 @@ def shell_chair(rng: np.random.Generator) -> Piece:
     look = material(pick(rng, ("plastic", "plastic", "white", "black", "fabric", "wood")), rng)
     wrap = draw(rng, 0.02, 0.14)
     parts = [shell(rng, width, depth, seat, draw(rng, 0.33, 0.44), look, wrap, draw(rng, 0.008, 0.03))]
-    parts += _shell_base(rng, width, depth, seat, pick(rng, ("dowels", "dowels", "tubes", "tubes", "sled", "star", "tulip")))
+    parts += shell_base(
+        rng, width, depth, seat, pick(rng, ("dowels", "dowels", "tubes", "tubes", "sled", "star", "tulip"))
+    )
     if chance(rng, 0.3):
         cover = material(pick(rng, ("fabric", "leather")), rng)
-        parts.append(cushion((-depth * 0.35, -width * 0.38, seat - 0.01), (depth * 0.4, width * 0.38, seat + 0.03), cover, 0.02, 0.01))
+        parts.append(
+            cushion(
+                (-depth * 0.35, -width * 0.38, seat - 0.01), (depth * 0.4, width * 0.38, seat + 0.03), cover, 0.02, 0.01
+            )
+        )
     return finished(parts)
 
 
@@ -117,7 +140,11 @@ def parsons_chair(rng: np.random.Generator) -> Piece:
     parts.append(back.moved(x=-x + 0.02, z=low))
     legs = material(pick(rng, ("wood", "wood", "black")), rng)
     style = leg_style(rng, 0.032, 0.048)
-    parts.append(four_legs(frame.depth + thick - 0.03, frame.front - 0.02, low + 0.01, style, legs, 0.0, draw(rng, 0.0, 0.05)).moved(x=-thick / 2))
+    parts.append(
+        four_legs(
+            frame.depth + thick - 0.03, frame.front - 0.02, low + 0.01, style, legs, 0.0, draw(rng, 0.0, 0.05)
+        ).moved(x=-thick / 2)
+    )
     return finished(parts)
 
 
@@ -133,10 +160,25 @@ def tube_chair(rng: np.random.Generator) -> Piece:
         foot = draw(rng, 0.0, 0.03)
         parts.append(tube([(frame.depth / 2 + foot, s * y, 0.0), (frame.depth / 2 - 0.03, s * y, frame.seat - 0.03),
                            (-frame.depth / 2 + 0.04, s * y, frame.seat - 0.04), (frame.back_x(frame.top), s * y, frame.top)], r, metal, 6))  # fmt: skip
-        parts.append(tube([(-frame.depth / 2 + 0.05, s * y, frame.seat - 0.04), (-frame.depth / 2 - frame.kick, s * y, 0.0)], r, metal, 6))
+        parts.append(
+            tube(
+                [(-frame.depth / 2 + 0.05, s * y, frame.seat - 0.04), (-frame.depth / 2 - frame.kick, s * y, 0.0)],
+                r,
+                metal,
+                6,
+            )
+        )
     parts.append(tube([(0.0, -y, frame.seat - 0.04), (0.0, y, frame.seat - 0.04)], r, metal, 5))
     thick = draw(rng, 0.012, 0.05)
-    parts.append(cushion((-frame.depth / 2, -y + 0.01, frame.seat - 0.025), (frame.depth / 2, y - 0.01, frame.seat - 0.025 + thick), look, 0.02, 0.008))
+    parts.append(
+        cushion(
+            (-frame.depth / 2, -y + 0.01, frame.seat - 0.025),
+            (frame.depth / 2, y - 0.01, frame.seat - 0.025 + thick),
+            look,
+            0.02,
+            0.008,
+        )
+    )
     tall = draw(rng, 0.12, 0.28)
     z = frame.top - tall
     x = frame.back_x(z + tall / 2)
@@ -144,7 +186,18 @@ def tube_chair(rng: np.random.Generator) -> Piece:
     if chance(rng, 0.25):
         for s in (1, -1):
             arm = frame.seat + 0.2
-            parts.append(tube([(frame.back_x(arm), s * y, arm), (frame.depth / 2 - 0.05, s * (y + 0.03), arm), (frame.depth / 2, s * y, 0.0)], r, metal, 6))
+            parts.append(
+                tube(
+                    [
+                        (frame.back_x(arm), s * y, arm),
+                        (frame.depth / 2 - 0.05, s * (y + 0.03), arm),
+                        (frame.depth / 2, s * y, 0.0),
+                    ],
+                    r,
+                    metal,
+                    6,
+                )
+            )
     return finished(parts)
 
 
@@ -161,12 +214,23 @@ def folding_chair(rng: np.random.Generator) -> Piece:
         y, inner = s * (width / 2), s * (width / 2 - 2.5 * r)
         parts.append(tube([(front, y, 0.0), (high, y, top)], r, frame, 6))
         parts.append(tube([(-rear, inner, 0.0), (front * 0.6, inner, seat)], r, frame, 6))
-    parts += [tube([(front, -width / 2, 0.05), (front, width / 2, 0.05)], r * 0.7, frame, 4), tube([(-rear * 0.9, -width / 2, 0.04), (-rear * 0.9, width / 2, 0.04)], r * 0.7, frame, 4)]
+    parts += [
+        tube([(front, -width / 2, 0.05), (front, width / 2, 0.05)], r * 0.7, frame, 4),
+        tube([(-rear * 0.9, -width / 2, 0.04), (-rear * 0.9, width / 2, 0.04)], r * 0.7, frame, 4),
+    ]
     if chance(rng, 0.5):
         for x in np.linspace(-0.17, 0.15, 5).tolist():
             parts.append(box((x, -width / 2 + 0.02, seat), (x + 0.05, width / 2 - 0.02, seat + 0.015), look))
     else:
-        parts.append(cushion((-0.19, -width / 2 + 0.02, seat - 0.01), (0.21, width / 2 - 0.02, seat + draw(rng, 0.015, 0.04)), look, 0.02, 0.008))
+        parts.append(
+            cushion(
+                (-0.19, -width / 2 + 0.02, seat - 0.01),
+                (0.21, width / 2 - 0.02, seat + draw(rng, 0.015, 0.04)),
+                look,
+                0.02,
+                0.008,
+            )
+        )
     slope = (high - front) / top
     for z in np.linspace(top - draw(rng, 0.06, 0.18), top - 0.22, count(rng, 1, 2)).tolist():
         parts.append(bent_rail((front + slope * z, 0.0, z), width, draw(rng, 0.06, 0.16), 0.014, 0.02, look))
@@ -188,11 +252,21 @@ def monobloc(rng: np.random.Generator) -> Piece:
         parts.append(leg((depth / 2 + 0.05, out, 0.0), front_top, style, look))
         parts.append(leg((-depth / 2 - 0.06, out, 0.0), (-depth / 2 + 0.02, y * 0.92, seat), style, look))
         if arms:
-            parts.append(strut((depth / 2 + 0.02, out, arm), (-depth / 2 - 0.08, y * 0.9, arm + 0.06), 0.055, 0.025, look))
+            parts.append(
+                strut((depth / 2 + 0.02, out, arm), (-depth / 2 - 0.08, y * 0.9, arm + 0.06), 0.055, 0.025, look)
+            )
     slots = count(rng, 4, 7)
     lean = 0.28 * (top - seat)
     for y in np.linspace(-0.42, 0.42, slots).tolist():
-        parts.append(strut((-depth / 2 + 0.02, y * width, seat - 0.01), (-depth / 2 - lean, y * width, top - 0.05), 0.012, 0.75 * width / slots, look))
+        parts.append(
+            strut(
+                (-depth / 2 + 0.02, y * width, seat - 0.01),
+                (-depth / 2 - lean, y * width, top - 0.05),
+                0.012,
+                0.75 * width / slots,
+                look,
+            )
+        )
     parts.append(bent_rail((-depth / 2 - lean, 0.0, top - 0.09), width, 0.06, 0.025, 0.02, look, 0.03))
     return finished(parts)
 
@@ -204,202 +278,33 @@ def cantilever(rng: np.random.Generator) -> Piece:
     metal = material(pick(rng, ("metal", "metal", "black")), rng)
     look, r, y = material(pick(rng, ("leather", "fabric", "wicker", "wood")), rng), draw(rng, 0.01, 0.014), width / 2
     front, back = depth / 2, -depth / 2
-    side = [(back - 0.02, r), (front - 0.04, r), (front, 0.05), (front, seat - 0.06), (front - 0.05, seat), (back, seat - 0.02), (back - 0.1, top)]
+    side = [
+        (back - 0.02, r),
+        (front - 0.04, r),
+        (front, 0.05),
+        (front, seat - 0.06),
+        (front - 0.05, seat),
+        (back, seat - 0.02),
+        (back - 0.1, top),
+    ]
     parts = [tube([(x, s * y, z) for x, z in side], r, metal, 7) for s in (1, -1)]
-    parts += [tube([(back - 0.02, -y, r), (back - 0.02, y, r)], r, metal, 6), tube([(back - 0.1, -y, top), (back - 0.1, y, top)], r, metal, 6)]
+    parts += [
+        tube([(back - 0.02, -y, r), (back - 0.02, y, r)], r, metal, 6),
+        tube([(back - 0.1, -y, top), (back - 0.1, y, top)], r, metal, 6),
+    ]
     thick = draw(rng, 0.015, 0.05)
-    parts.append(cushion((back + 0.02, -y + 0.01, seat - 0.01), (front - 0.03, y - 0.01, seat + thick), look, 0.015, 0.008))
+    parts.append(
+        cushion((back + 0.02, -y + 0.01, seat - 0.01), (front - 0.03, y - 0.01, seat + thick), look, 0.015, 0.008)
+    )
     low = seat + draw(rng, 0.08, 0.2)
     lean = float(np.arctan2(0.1, top - seat))
-    board = rounded_box((0.0, -y + 0.01, 0.0), (max(thick, 0.02), y - 0.01, top - low - 0.01), 0.01, look, 2).tilted("y", -lean)
+    board = rounded_box((0.0, -y + 0.01, 0.0), (max(thick, 0.02), y - 0.01, top - low - 0.01), 0.01, look, 2).tilted(
+        "y", -lean
+    )
     parts.append(board.moved(x=back - 0.1 * (low - seat) / (top - seat), z=low))
     if chance(rng, 0.35):
         arm = seat + 0.22
-        parts += [box((back - 0.06, s * y - 0.02, arm), (front - 0.08, s * y + 0.02, arm + 0.025), metal) for s in (1, -1)]
-    return finished(parts)
-
-
-@family("armchair", "block")
-def block_armchair(rng: np.random.Generator) -> Piece:
-    """Return an upholstered chair with square, soft or sloping arms."""
-    return finished(couch(rng, sofa_plan(rng, 1), 1, pick(rng, ("square", "soft", "slope", "pad"))))
-
-
-@family("armchair", "rolled arms")
-def rolled_armchair(rng: np.random.Generator) -> Piece:
-    """Return an old-fashioned upholstered chair whose arms roll outwards."""
-    return finished(couch(rng, sofa_plan(rng, 1, (0.14, 0.22)), 1, "rolled"))
-
-
-@family("armchair", "wing")
-def wing_chair(rng: np.random.Generator) -> Piece:
-    """Return a high-backed chair with wings beside the head."""
-    plan = replace(sofa_plan(rng, 1, (0.08, 0.16)), top=draw(rng, 1.0, 1.18), clear=draw(rng, 0.1, 0.2), back=draw(rng, 0.1, 0.16))
-    look = covering(rng, 0.35)
-    parts = [*couch(rng, replace(plan, lean=draw(rng, 0.08, 0.18)), 1, pick(rng, ("rolled", "slope", "soft")), look)]
-    reach, low = draw(rng, 0.14, 0.26), plan.arm_top - 0.05
-    slope = float(np.tan(0.12)) * (plan.top - plan.seat)
-    for s in (1, -1):
-        y0, y1 = sorted((s * (plan.width / 2 - 0.03), s * (plan.width / 2 + 0.06)))
-        rings = []
-        for z, front in ((low, reach * 1.3), ((low + plan.top) / 2, reach * 0.8), (plan.top - 0.04, reach), (plan.top, reach * 0.5)):
-            shift = -slope * (z - plan.seat) / (plan.top - plan.seat)
-            rings.append(np.array([(shift - plan.back, y0, z), (shift + front, y0, z), (shift + front, y1, z), (shift - plan.back, y1, z)]))
-        parts.append(loft(rings, look))
-    return finished(parts)
-
-
-def _round_wall(
-    radius: float, squash: float, opening: float, bottom: float, tops: tuple[float, float], thick: float, look: Material
-) -> Mesh:  # fmt: skip
-    """Return a wall round a seat, open to the front; its top goes from ``tops[0]`` at its ends to ``tops[1]`` behind."""
-    angle = np.linspace(opening, 2 * np.pi - opening, 15)
-    rings = []
-    for a in angle.tolist():
-        c, s = float(np.cos(a)), float(np.sin(a))
-        share = 0.5 - 0.5 * float(np.cos((a - opening) / (np.pi - opening) * np.pi))
-        top = tops[0] + (tops[1] - tops[0]) * min(1.0, share * 1.1)
-        inner, outer = radius - thick, radius
-        rings.append(
-            np.array([(outer * c, outer * s * squash, bottom), (outer * c, outer * s * squash, top - 0.02),
-                      ((outer - thick / 2) * c, (outer - thick / 2) * s * squash, top),
-                      (inner * c, inner * s * squash, top - 0.02), (inner * c, inner * s * squash, bottom)])
-        )  # fmt: skip
-    return loft(rings, look)
-
-
-@family("armchair", "tub")
-def tub_chair(rng: np.random.Generator) -> Piece:
-    """Return a low round chair: back and arms are one wall, level or rising to the back, on legs or a turning foot."""
-    radius, seat = draw(rng, 0.34, 0.43), draw(rng, 0.38, 0.45)
-    look = covering(rng, 0.35)
-    back = draw(rng, 0.68, 0.86)
-    arm = back if chance(rng, 0.3) else draw(rng, 0.55, 0.66)
-    low = pick(rng, (0.02, draw(rng, 0.12, 0.2)))
-    thick = draw(rng, 0.06, 0.12)
-    squash = draw(rng, 0.92, 1.05)
-    parts = [_round_wall(radius, squash, draw(rng, 0.55, 0.9), low, (arm, back), thick, look)]
-    r = radius - thick * 0.6
-    parts.append(cylinder(0.0, 0.0, low, r, seat - 0.1 - low, look, 18).moved(x=0.02).scaled(1.0, squash, 1.0))
-    parts.append(rounded_box((-r * 0.85, -r * 0.85, seat - 0.11), (r * 0.98, r * 0.85, seat), 0.05, look, 3, 0.02))
-    if low > 0.05:
-        if chance(rng, 0.3):
-            parts.append(star_base(4, radius * 0.8, low + 0.02, material("metal", rng)))
-        else:
-            wood = material(pick(rng, ("wood", "black", "metal")), rng)
-            parts.append(four_legs(radius * 1.2, radius * 1.2, low + 0.01, leg_style(rng, 0.03, 0.045), wood, draw(rng, 0.0, 0.04)))
-    if chance(rng, 0.3):
-        parts += scattered_pillows(rng, -radius * 0.55, seat, (-0.2, 0.2), 1, 0.3)
-    return finished(parts)
-
-
-@family("armchair", "wooden frame")
-def framed_armchair(rng: np.random.Generator) -> Piece:
-    """Return two cushions in an open wooden frame."""
-    plan = replace(sofa_plan(rng, 1, (0.05, 0.09)), back=0.06, lean=draw(rng, 0.12, 0.32), top=draw(rng, 0.75, 0.98))
-    wood, look, half = material("wood", rng), covering(rng, 0.25), plan.width / 2
-    thick = draw(rng, 0.08, 0.13)
-    parts = [*frame_arms(rng, plan, wood), *seat_cushions(rng, plan, 1, thick, look)]
-    parts.append(box((-0.04, -half, plan.seat - thick - 0.02), (plan.depth - 0.02, half, plan.seat - thick), wood))
-    low, high = (0.0, -half, plan.seat), (draw(rng, 0.08, 0.13), half, plan.top)
-    parts += back_cushions(low, high, 1, look, plan.lean, 0.03, 0.03)
-    slope = float(np.tan(plan.lean))
-    parts += [strut((-0.01, s * (half - 0.03), plan.seat - 0.1), (-0.02 - slope * (plan.top - plan.seat), s * (half - 0.03), plan.top + 0.02), 0.03, 0.03, wood) for s in (1, -1)]
-    parts += [box((-0.04 - slope * (z - plan.seat), -half, z), (-0.015 - slope * (z - plan.seat), half, z + 0.04), wood) for z in np.linspace(plan.seat + 0.1, plan.top - 0.05, 4).tolist()]
-    return finished([*parts, *strewn(rng, plan, 1)])
-
-
-@family("armchair", "slipper")
-def slipper_chair(rng: np.random.Generator) -> Piece:
-    """Return a low easy chair without arms on slender legs."""
-    plan = replace(sofa_plan(rng, 1, (0.0, 0.0)), clear=draw(rng, 0.1, 0.2), top=draw(rng, 0.68, 0.9))
-    return finished(couch(rng, replace(plan, width=draw(rng, 0.55, 0.75)), 1))
-
-
-@family("armchair", "shell lounge")
-def lounge_shell(rng: np.random.Generator) -> Piece:
-    """Return a wide moulded shell with a cushion on a star foot or wooden legs, often with a high back."""
-    width, depth, seat = draw(rng, 0.62, 0.78), draw(rng, 0.52, 0.62), draw(rng, 0.34, 0.42)
-    look = covering(rng, 0.5) if chance(rng, 0.7) else material("plastic", rng)
-    parts = [shell(rng, width, depth, seat, draw(rng, 0.42, 0.75), look, draw(rng, 0.12, 0.26), draw(rng, 0.03, 0.07))]
-    parts += _shell_base(rng, width * 0.8, depth, seat, pick(rng, ("star", "star", "dowels", "sled", "tulip")))
-    cover = look if chance(rng, 0.5) else covering(rng)
-    parts.append(cushion((-depth * 0.42, -width * 0.36, seat - 0.01), (depth * 0.45, width * 0.36, seat + 0.09), cover, 0.04, 0.02))
-    if chance(rng, 0.4):
-        parts += scattered_pillows(rng, -depth * 0.3, seat + 0.09, (-0.15, 0.15), 1, 0.35)
-    return finished(parts)
-
-
-@family("armchair", "recliner", held_out=True)
-def recliner(rng: np.random.Generator) -> Piece:
-    """Return a thickly padded chair with its foot rest up, or folded away."""
-    plan = replace(sofa_plan(rng, 1, (0.16, 0.25)), clear=0.03, top=draw(rng, 0.98, 1.12), lean=draw(rng, 0.1, 0.2))
-    look = covering(rng, 0.65)
-    laid = chance(rng, 0.5)
-    lean = draw(rng, 0.4, 0.7) if laid else plan.lean
-    half = plan.width / 2
-    parts = [rounded_box((-plan.back, -half, 0.03), (plan.depth - 0.02, half, plan.seat - 0.12), 0.02, look, 2)]
-    for s in (1, -1):
-        y0, y1 = sorted((s * half, s * (half + plan.arm)))
-        parts.append(rounded_box((-plan.back, y0, 0.03), (plan.depth, y1, plan.arm_top), 0.07, look, 3, 0.02))
-    parts += seat_cushions(rng, plan, 1, 0.14, look)
-    rise = plan.top - plan.seat
-    for i, share in enumerate((0.38, 0.34, 0.28)):
-        start = (0.0, 0.38, 0.72)[i] * rise
-        pad = cushion((-start - share * rise, -half, 0.0), (-start, half, 0.2 - 0.02 * i), look, 0.06, 0.03)
-        parts.append(pad.tilted("y", np.pi / 2 - lean).moved(x=0.0, z=plan.seat - 0.02))
-    if laid:
-        rest = cushion((0.0, -half, -0.06), (draw(rng, 0.4, 0.5), half, 0.06), look, 0.04, 0.02).tilted("y", draw(rng, 0.0, 0.35))
-        parts.append(rest.moved(x=plan.depth + 0.04, z=plan.seat - 0.06))
-    else:
-        parts.append(rounded_box((plan.depth - 0.03, -half, 0.08), (plan.depth + 0.05, half, plan.seat - 0.1), 0.03, look, 3))
-    return finished(parts)
-
-
-@family("armchair", "bent ply", held_out=True)
-def bent_ply(rng: np.random.Generator) -> Piece:
-    """Return an easy chair on two springy hoops of bent wood with one long cushion."""
-    width, y = draw(rng, 0.58, 0.68), draw(rng, 0.29, 0.34)
-    wood, look = material("wood", rng), covering(rng, 0.25)
-    wide = draw(rng, 0.05, 0.065)
-    hoops = []
-    for s in (1, -1):
-        side = [(-0.32, 0.02), (0.28, 0.02), (0.36, 0.09), (0.33, 0.42), (0.25, 0.54), (0.1, 0.55), (-0.3, 0.48)]
-        flat = [tuple(np.array([x, s * y, z])) for x, z in side]
-        hoops.append(joined([strut(flat[i], flat[i + 1], wide, 0.022, wood) for i in range(len(flat) - 1)]))
-    lean = draw(rng, 0.3, 0.42)
-    seat, high = draw(rng, 0.38, 0.43), draw(rng, 0.62, 0.78)
-    thick = draw(rng, 0.06, 0.1)
-    half = width / 2 - 0.05
-    base = cushion((-0.25, -half, 0.0), (0.3, half, thick), look, 0.03, 0.015).tilted("y", -0.14).moved(z=seat - 0.02)
-    back = back_cushions((-0.22, -half, seat - 0.06), (-0.22 + thick, half, seat - 0.06 + high), 1, look, lean, 0.03, 0.02)
-    bars = [box((x, -y, z), (x + 0.05, y, z + 0.02), wood) for x, z in ((0.22, 0.4), (-0.28, 0.33), (-0.1, 0.01))]
-    frame = [strut((-0.24, s * (half - 0.02), seat - 0.08), (-0.26 - high * float(np.sin(lean)), s * (half - 0.02), seat - 0.08 + high * float(np.cos(lean))), 0.025, 0.03, wood) for s in (1, -1)]
-    frame += [strut((-0.24, s * (half - 0.02), seat - 0.07), (0.3, s * (half - 0.02), seat), 0.025, 0.03, wood) for s in (1, -1)]
-    return finished([*hoops, base, *back, *bars, *frame])
-
-
-@family("armchair", "rocker")
-def rocker(rng: np.random.Generator) -> Piece:
-    """Return a rocking chair: a wooden chair with arms and slats on two curved runners."""
-    width, seat, top = draw(rng, 0.46, 0.56), draw(rng, 0.4, 0.45), draw(rng, 0.95, 1.15)
-    look, y, depth = material(pick(rng, ("wood", "wood", "white", "black")), rng), draw(rng, 0.22, 0.27), draw(rng, 0.44, 0.5)
-    front, back, rake = depth / 2, -depth / 2, draw(rng, 0.14, 0.24)
-    parts = [box((back, -width / 2, seat - 0.03), (front, width / 2, seat), look)]
-    for s in (1, -1):
-        curve = [(x, s * y, 0.02 + 0.35 * (x + 0.05) ** 2) for x in np.linspace(-0.55, 0.4, 7).tolist()]
-        parts += [strut(curve[i], curve[i + 1], 0.035, 0.035, look) for i in range(6)]
-        arm = seat + draw(rng, 0.2, 0.24)
-        parts += [strut((front - 0.04, s * y, 0.05), (front - 0.05, s * y, arm), 0.035, 0.035, look),
-                  strut((back + 0.03, s * y, 0.05), (back + 0.02, s * y, seat), 0.035, 0.035, look),
-                  strut((back + 0.02, s * y, seat), (back - rake, s * y, top), 0.035, 0.035, look),
-                  strut((back - 0.06, s * y, arm + 0.01), (front, s * (y + 0.02), arm), 0.07, 0.022, look)]  # fmt: skip
-    parts.append(bent_rail((back - rake, 0.0, top - 0.09), 2 * y + 0.04, 0.09, 0.025, 0.02, look, 0.02))
-    for t in np.linspace(-0.8, 0.8, count(rng, 4, 8)).tolist():
-        parts.append(strut((back + 0.02, t * y, seat - 0.01), (back - rake * 0.93, t * y, top - 0.07), 0.012, draw(rng, 0.014, 0.03), look))
-    if chance(rng, 0.5):
-        parts.append(cushion((back + 0.03, -width / 2 + 0.03, seat), (front, width / 2 - 0.03, seat + 0.05), material("fabric", rng), 0.03, 0.015))
-    plan = SofaPlan(depth, width - 0.1, seat + 0.02, 0.0, 0.0, top, 0.0, 0.0, 0.2)
-    if chance(rng, 0.3):
-        parts += [m.moved(x=back - 0.02) for m in loose_back(rng, plan, 1, material("fabric", rng), -0.2, 0.08)]
+        parts += [
+            box((back - 0.06, s * y - 0.02, arm), (front - 0.08, s * y + 0.02, arm + 0.025), metal) for s in (1, -1)
+        ]
     return finished(parts)

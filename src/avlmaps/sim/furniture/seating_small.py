@@ -1,136 +1,19 @@
 """Office chairs, stools, benches and ottomans."""
 
+import itertools
+
 import numpy as np
 
 from avlmaps.sim.furniture.carcass import board_look
 from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.chair_parts import bent_rail
 from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut
-from avlmaps.sim.furniture.legs import four_legs, leg, leg_style, named_leg, star_base, stretchers
+from avlmaps.sim.furniture.legs import four_legs, leg, leg_style, named_leg, stretchers
 from avlmaps.sim.furniture.table_parts import hairpins, trestles
 from avlmaps.sim.furniture.upholstery import covering, cushion, throw
 from avlmaps.sim.materials import material
-from avlmaps.sim.mesh import Material, Mesh
-from avlmaps.sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, slab, tube
-
-
-def _swivel(rng: np.random.Generator, seat: float, arms: int = 5) -> list[Mesh]:
-    """Return a foot on castors with a gas lift up to the seat."""
-    look = material(pick(rng, ("black", "black", "metal", "white")), rng)
-    return [star_base(arms, draw(rng, 0.27, 0.34), seat - 0.08, look, draw(rng, 0.022, 0.032), True),
-            slab(0.0, 0.0, seat - 0.1, 0.2, 0.16, 0.05, material("black", rng))]  # fmt: skip
-
-
-def _arm_rests(rng: np.random.Generator, half: float, seat: float, x: float) -> list[Mesh]:
-    """Return two arm rests: T-shaped, or loops."""
-    look, high = material("black", rng), seat + draw(rng, 0.17, 0.26)
-    style, parts = pick(rng, ("T", "loop")), []
-    for s in (1, -1):
-        y = s * (half + draw(rng, 0.01, 0.05))
-        if style == "T":
-            parts += [strut((x, s * half * 0.7, seat - 0.06), (x, y, seat - 0.03), 0.04, 0.02, look), box((x - 0.025, y - 0.012, seat - 0.05), (x + 0.025, y + 0.012, high - 0.02), look)]
-            parts.append(rounded_box((x - 0.12, y - 0.04, high - 0.025), (x + 0.13, y + 0.04, high), 0.015, look, 2))
-        else:
-            path = [(x + 0.12, y, seat - 0.06), (x + 0.15, y, high - 0.03), (x + 0.1, y, high), (x - 0.15, y, high), (x - 0.22, y, seat + 0.05)]
-            parts.append(tube(path, 0.016, look, 6))
-    return parts
-
-
-def _curved_back(
-    width: float, low: float, high: float, x: float, lean: float, bow: float, thick: float, look: Material, lumbar: float
-) -> Mesh:  # fmt: skip
-    """Return a back that bends round the sitter and swells at the loins."""
-    share, up = np.linspace(-1.0, 1.0, 6), np.linspace(0.0, 1.0, 6)
-    swell = lumbar * np.exp(-(((up - 0.25) / 0.22) ** 2))
-    wide = width / 2 * (1 - 0.22 * np.abs(up - 0.4) ** 1.5)
-    faces = []
-    for offset in (0.0, -thick):
-        grid = np.stack(
-            [
-                x + offset + swell[:, None] + bow * share[None, :] ** 2 - lean * (up * (high - low))[:, None],
-                wide[:, None] * share[None, :],
-                np.broadcast_to((low + up * (high - low))[:, None], (6, 6)),
-            ],
-            axis=-1,
-        )
-        faces.append(grid)
-    rings = [np.concatenate([face[i] for face in (faces[0], faces[1][:, ::-1])]) for i in range(6)]
-    return loft(rings, look)
-
-
-@family("office chair", "task")
-def task_chair(rng: np.random.Generator) -> Piece:
-    """Return a desk chair: padded seat and a low or middling back on a bar, with or without arms."""
-    seat, width, depth = draw(rng, 0.42, 0.55), draw(rng, 0.44, 0.52), draw(rng, 0.42, 0.5)
-    look = material(pick(rng, ("fabric", "fabric", "black", "leather", "plastic")), rng)
-    parts = [*_swivel(rng, seat), cushion((-depth / 2, -width / 2, seat - 0.07), (depth / 2, width / 2, seat), look, 0.035, 0.012)]
-    low, high = seat + draw(rng, 0.1, 0.2), seat + draw(rng, 0.4, 0.62)
-    back = -depth / 2 - draw(rng, 0.0, 0.05)
-    lean = draw(rng, 0.05, 0.22)
-    parts.append(_curved_back(width * draw(rng, 0.8, 1.0), low, high, back, lean, draw(rng, 0.02, 0.07), draw(rng, 0.03, 0.07), look, 0.03))
-    parts.append(strut((-0.05, 0.0, seat - 0.08), (back - 0.07, 0.0, seat - 0.06), 0.07, 0.02, material("black", rng)))
-    parts.append(strut((back - 0.06, 0.0, seat - 0.07), (back - 0.06, 0.0, low + 0.15), 0.07, 0.02, material("black", rng)))
-    if chance(rng, 0.6):
-        parts += _arm_rests(rng, width / 2, seat, draw(rng, -0.05, 0.05))
-    return finished(parts)
-
-
-@family("office chair", "executive")
-def executive_chair(rng: np.random.Generator) -> Piece:
-    """Return a high thick back in padded rolls with closed arms, mostly of leather."""
-    seat, width, depth = draw(rng, 0.45, 0.54), draw(rng, 0.5, 0.58), draw(rng, 0.48, 0.54)
-    look = covering(rng, 0.8)
-    parts = [*_swivel(rng, seat), cushion((-depth / 2, -width / 2, seat - 0.12), (depth / 2, width / 2, seat), look, 0.05, 0.025)]
-    top, rolls, lean = seat + draw(rng, 0.6, 0.8), count(rng, 1, 4), draw(rng, 0.1, 0.22)
-    rise = (top - seat) / rolls
-    for i in range(rolls):
-        wide = width * (1.0 - 0.06 * i)
-        pad = cushion((-rise * (i + 1) + 0.005, -wide / 2, 0.0), (-rise * i, wide / 2, draw(rng, 0.1, 0.14)), look, 0.05, 0.03)
-        parts.append(pad.tilted("y", np.pi / 2 - lean).moved(x=-depth / 2 - 0.03, z=seat - 0.03))
-    parts += _arm_rests(rng, width / 2, seat, 0.0)
-    return finished(parts)
-
-
-@family("office chair", "mesh")
-def mesh_chair(rng: np.random.Generator) -> Piece:
-    """Return a frame with netting for a back, perhaps with a head rest, and adjustable arms."""
-    seat, width, depth = draw(rng, 0.43, 0.54), draw(rng, 0.46, 0.53), draw(rng, 0.43, 0.5)
-    net, frame = material("fabric", rng, (0.12, 0.12, 0.13)), material(pick(rng, ("black", "white", "metal")), rng)
-    if chance(rng, 0.3):
-        net = material("fabric", rng)
-    parts = [*_swivel(rng, seat), cushion((-depth / 2, -width / 2, seat - 0.06), (depth / 2, width / 2, seat), net, 0.03, 0.01)]
-    low, high, x, lean = seat + 0.06, seat + draw(rng, 0.48, 0.62), -depth / 2 - 0.03, draw(rng, 0.08, 0.2)
-    bow = draw(rng, 0.03, 0.07)
-    parts.append(_curved_back(width * 0.96, low, high, x, lean, bow, 0.008, net, 0.04))
-    half = width * 0.46
-    rim = [(x - lean * (z - low) + bow, s * half, z) for s, z in ((1, low), (1, (low + high) / 2), (0.85, high), (-0.85, high), (-1, (low + high) / 2), (-1, low))]
-    parts.append(tube([*rim, rim[0]], 0.013, frame, 5))
-    parts.append(tube([(-0.05, 0.0, seat - 0.08), (x - 0.1, 0.0, seat - 0.02), (x - 0.07 - lean * 0.25, 0.0, low + 0.25)], 0.022, frame, 6))
-    if chance(rng, 0.5):
-        z = high + draw(rng, 0.03, 0.08)
-        at = x - lean * (z - low)
-        parts += [_curved_back(width * 0.55, z, z + draw(rng, 0.1, 0.16), at + 0.03, 0.0, 0.03, 0.03, net, 0.0), tube([(at, 0.0, high - 0.1), (at, 0.0, z + 0.05)], 0.014, frame, 5)]
-    parts += _arm_rests(rng, width / 2, seat, draw(rng, -0.05, 0.05))
-    return finished(parts)
-
-
-@family("office chair", "gaming", held_out=True)
-def gaming_chair(rng: np.random.Generator) -> Piece:
-    """Return a racing seat: raised bolsters at the seat and the back, shoulders, a cushion at the neck."""
-    seat, width, depth = draw(rng, 0.44, 0.52), draw(rng, 0.5, 0.56), draw(rng, 0.48, 0.54)
-    dark, accent = material("leather", rng, (0.08, 0.08, 0.09)), material("plastic", rng)
-    parts = [*_swivel(rng, seat), cushion((-depth / 2, -width * 0.36, seat - 0.1), (depth / 2, width * 0.36, seat), dark, 0.03, 0.01)]
-    lean, top = draw(rng, 0.12, 0.3), draw(rng, 0.72, 0.84)
-    back = []
-    for s in (1, -1):
-        y0, y1 = sorted((s * width * 0.34, s * width * 0.5))
-        parts.append(rounded_box((-depth / 2, y0, seat - 0.09), (depth / 2 - 0.03, y1, seat + 0.05), 0.03, accent if chance(rng, 0.5) else dark, 3))
-        back.append(rounded_box((-top * 0.45, y0, 0.0), (0.0, y1, 0.15), 0.03, accent, 3))
-        back.append(rounded_box((-top * 0.9, min(y0, y1 * 1.08), 0.0), (-top * 0.62, max(y0, y1 * 1.08), 0.13), 0.04, accent, 3))
-    back.append(rounded_box((-top, -width * 0.36, 0.0), (0.0, width * 0.36, 0.09), 0.03, dark, 3))
-    back.append(cushion((-top * 0.93, -0.13, 0.08), (-top * 0.76, 0.13, 0.15), dark, 0.03, 0.01))
-    parts += [m.tilted("y", np.pi / 2 - lean).moved(x=-depth / 2, z=seat - 0.02) for m in back]
-    return finished([*parts, *_arm_rests(rng, width / 2, seat, 0.0)])
+from avlmaps.sim.mesh import Mesh
+from avlmaps.sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, slab, tube
 
 
 @family("stool", "wooden legs")
@@ -144,7 +27,13 @@ def wooden_stool(rng: np.random.Generator) -> Piece:
     round_seat = legs == 3 or chance(rng, 0.6)
     thick = draw(rng, 0.025, 0.07)
     if round_seat:
-        parts = [lathe([(size / 2 * 0.96, seat - thick), (size / 2, seat - thick * 0.5), (size / 2 * 0.97, seat)], cover, sides=18)]
+        parts = [
+            lathe(
+                [(size / 2 * 0.96, seat - thick), (size / 2, seat - thick * 0.5), (size / 2 * 0.97, seat)],
+                cover,
+                sides=18,
+            )
+        ]
     else:
         parts = [cushion((-size * 0.42, -size / 2, seat - thick), (size * 0.42, size / 2, seat), cover, 0.02, 0.01)]
     style, out = leg_style(rng, 0.026, 0.042), draw(rng, 0.0, 0.13) * seat / 0.6
@@ -153,7 +42,14 @@ def wooden_stool(rng: np.random.Generator) -> Piece:
     for a in (np.linspace(0.0, 2 * np.pi, legs, endpoint=False) + np.pi / 4).tolist():
         c, s = float(np.cos(a)), float(np.sin(a))
         k = 1.0 if round_seat else 1.2
-        parts.append(leg((k * (reach + out) * c, k * (reach + out) * s, 0.0), (k * reach * c, k * reach * s, seat - thick * 0.8), style, look))
+        parts.append(
+            leg(
+                (k * (reach + out) * c, k * (reach + out) * s, 0.0),
+                (k * reach * c, k * reach * s, seat - thick * 0.8),
+                style,
+                look,
+            )
+        )
         low = seat * 0.32
         ring.append((k * (reach + out * (1 - low / seat)) * c, k * (reach + out * (1 - low / seat)) * s, low))
     if seat > 0.55 or chance(rng, 0.4):
@@ -165,10 +61,25 @@ def wooden_stool(rng: np.random.Generator) -> Piece:
 def pedestal_stool(rng: np.random.Generator) -> Piece:
     """Return a bar stool on one foot with a foot rest: round pad, low back or a shell."""
     seat, size = draw(rng, 0.58, 0.82), draw(rng, 0.32, 0.44)
-    metal, look = material(pick(rng, ("metal", "metal", "black")), rng), material(pick(rng, ("leather", "plastic", "fabric", "wood")), rng)
+    metal, look = (
+        material(pick(rng, ("metal", "metal", "black")), rng),
+        material(pick(rng, ("leather", "plastic", "fabric", "wood")), rng),
+    )
     r = draw(rng, 0.18, 0.23)
-    parts = [lathe([(r, 0.0), (r * 0.95, 0.015), (0.04, 0.04), (0.025, 0.08), (0.025, seat - 0.06), (0.08, seat - 0.04)], metal, sides=18)]
-    rest = [(0.02, -0.02, seat * 0.4), (0.17, -0.12, seat * 0.38), (0.2, 0.0, seat * 0.38), (0.17, 0.12, seat * 0.38), (0.02, 0.02, seat * 0.4)]
+    parts = [
+        lathe(
+            [(r, 0.0), (r * 0.95, 0.015), (0.04, 0.04), (0.025, 0.08), (0.025, seat - 0.06), (0.08, seat - 0.04)],
+            metal,
+            sides=18,
+        )
+    ]
+    rest = [
+        (0.02, -0.02, seat * 0.4),
+        (0.17, -0.12, seat * 0.38),
+        (0.2, 0.0, seat * 0.38),
+        (0.17, 0.12, seat * 0.38),
+        (0.02, 0.02, seat * 0.4),
+    ]
     parts.append(tube(rest, 0.009, metal, 5))
     kind = pick(rng, ("pad", "low back", "square"))
     if kind == "square":
@@ -176,7 +87,17 @@ def pedestal_stool(rng: np.random.Generator) -> Piece:
     else:
         parts.append(lathe([(size * 0.48, seat - 0.06), (size / 2, seat - 0.03), (size * 0.46, seat)], look, sides=18))
     if kind != "pad":
-        parts.append(bent_rail((-size / 2 + 0.07, 0.0, seat - 0.04), size * 0.9, draw(rng, 0.14, 0.36), 0.025, 0.07, look, draw(rng, 0.0, 0.05)))
+        parts.append(
+            bent_rail(
+                (-size / 2 + 0.07, 0.0, seat - 0.04),
+                size * 0.9,
+                draw(rng, 0.14, 0.36),
+                0.025,
+                0.07,
+                look,
+                draw(rng, 0.0, 0.05),
+            )
+        )
     return finished(parts)
 
 
@@ -188,13 +109,34 @@ def metal_stool(rng: np.random.Generator) -> Piece:
     top = look if chance(rng, 0.5) else material(pick(rng, ("wood", "leather")), rng)
     out = draw(rng, 0.03, 0.07)
     parts = [rounded_box((-size / 2, -size / 2, seat - 0.03), (size / 2, size / 2, seat), 0.012, top, 3)]
-    parts.append(four_legs(size - 0.02, size - 0.02, seat - 0.02, named_leg(pick(rng, ("straight", "tapered")), 4, draw(rng, 0.02, 0.045)), look, out))
+    parts.append(
+        four_legs(
+            size - 0.02,
+            size - 0.02,
+            seat - 0.02,
+            named_leg(pick(rng, ("straight", "tapered")), 4, draw(rng, 0.02, 0.045)),
+            look,
+            out,
+        )
+    )
     low, half = seat * draw(rng, 0.25, 0.4), size / 2 + out * 0.6 - 0.02
     parts += [slab(0.0, s * half, low, 2 * half, 0.015, 0.02, look) for s in (1, -1)]
     parts += [slab(s * half, 0.0, low, 0.015, 2 * half, 0.02, look) for s in (1, -1)]
     if chance(rng, 0.3):
         x, high = -size / 2 + 0.01, seat + draw(rng, 0.15, 0.35)
-        parts.append(tube([(x, -size * 0.4, seat - 0.02), (x - 0.04, -size * 0.38, high), (x - 0.04, size * 0.38, high), (x, size * 0.4, seat - 0.02)], 0.01, look, 5))
+        parts.append(
+            tube(
+                [
+                    (x, -size * 0.4, seat - 0.02),
+                    (x - 0.04, -size * 0.38, high),
+                    (x - 0.04, size * 0.38, high),
+                    (x, size * 0.4, seat - 0.02),
+                ],
+                0.01,
+                look,
+                5,
+            )
+        )
         parts.append(bent_rail((x - 0.04, 0.0, high - 0.09), size * 0.76, 0.08, 0.01, 0.0, top))
     return finished(parts)
 
@@ -208,7 +150,10 @@ def step_stool(rng: np.random.Generator) -> Piece:
     for i in range(steps + (steps == 1)):
         x0, z = -i * tread, (i + 1) * rise
         parts.append(box((x0 - tread, -width / 2, z - 0.025), (x0 + 0.02, width / 2, z), look))
-        parts += [box((x0 - tread, s * (width / 2 - 0.04) - 0.012, 0.0), (x0, s * (width / 2 - 0.04) + 0.012, z - 0.02), look) for s in (1, -1)]
+        parts += [
+            box((x0 - tread, s * (width / 2 - 0.04) - 0.012, 0.0), (x0, s * (width / 2 - 0.04) + 0.012, z - 0.02), look)
+            for s in (1, -1)
+        ]
     return finished(parts)
 
 
@@ -225,12 +170,19 @@ def board_bench(rng: np.random.Generator) -> Piece:
     thick = draw(rng, 0.025, 0.06)
     if chance(rng, 0.3):
         n = count(rng, 3, 6)
-        parts = [slab((i + 0.5) / n * depth - depth / 2, 0.0, high - thick, depth / n - 0.01, width, thick, look) for i in range(n)]
+        parts = [
+            slab(0.0, (i + 0.5) / n * depth - depth / 2, high - thick, width, depth / n - 0.01, thick, look).turned(
+                np.pi / 2
+            )
+            for i in range(n)
+        ]
     else:
-        parts = [slab(0.0, 0.0, high - thick, depth, width, thick, look)]
+        parts = [slab(0.0, 0.0, high - thick, width, depth, thick, look).turned(np.pi / 2)]
     base = pick(rng, ("legs", "slabs", "trestles", "wires"))
     if base == "legs":
-        parts.append(four_legs(depth - 0.02, width * 0.92, high - thick, leg_style(rng, 0.035, 0.06), look, draw(rng, 0.0, 0.03)))
+        parts.append(
+            four_legs(depth - 0.02, width * 0.92, high - thick, leg_style(rng, 0.035, 0.06), look, draw(rng, 0.0, 0.03))
+        )
         if chance(rng, 0.4):
             parts.append(stretchers(rng, depth - 0.06, width * 0.9, 0.12, 0.03, look))
     elif base == "slabs":
@@ -239,9 +191,19 @@ def board_bench(rng: np.random.Generator) -> Piece:
     elif base == "wires":
         parts += hairpins(depth * 0.9, width * 0.88, high - thick, material("black", rng))
     else:
-        parts += trestles(rng, depth * 0.95, width * 0.75, high - thick, look if chance(rng, 0.6) else material("black", rng))
+        parts += trestles(
+            rng, depth * 0.95, width * 0.75, high - thick, look if chance(rng, 0.6) else material("black", rng)
+        )
     if chance(rng, 0.25):
-        parts.append(cushion((-depth * 0.47, -width * 0.47, high), (depth * 0.47, width * 0.47, high + 0.05), material("fabric", rng), 0.03, 0.012))
+        parts.append(
+            cushion(
+                (-depth * 0.47, -width * 0.47, high),
+                (depth * 0.47, width * 0.47, high + 0.05),
+                material("fabric", rng),
+                0.03,
+                0.012,
+            )
+        )
     return finished(parts)
 
 
@@ -252,12 +214,22 @@ def padded_bench(rng: np.random.Generator) -> Piece:
     look, legs = covering(rng, 0.3), material(pick(rng, ("wood", "wood", "black", "metal")), rng)
     thick = draw(rng, 0.08, 0.2)
     parts = [cushion((-depth / 2, -width / 2, high - thick), (depth / 2, width / 2, high), look, 0.03, 0.02)]
-    parts.append(four_legs(depth - 0.03, width - 0.06, high - thick + 0.01, leg_style(rng, 0.03, 0.055), legs, draw(rng, 0.0, 0.03)))
+    parts.append(
+        four_legs(
+            depth - 0.03, width - 0.06, high - thick + 0.01, leg_style(rng, 0.03, 0.055), legs, draw(rng, 0.0, 0.03)
+        )
+    )
     if chance(rng, 0.3):
         for s in (1, -1):
             roll = cylinder(0.0, 0.0, -depth / 2, 0.07, depth, look, 10).tilted("y", np.pi / 2)
             parts.append(roll.moved(0.0, s * (width / 2 - 0.05), high + 0.1))
-            parts.append(box((-depth / 2, s * (width / 2 - 0.04) - 0.03, high - 0.05), (depth / 2, s * (width / 2 - 0.04) + 0.03, high + 0.1), look))
+            parts.append(
+                box(
+                    (-depth / 2, s * (width / 2 - 0.04) - 0.03, high - 0.05),
+                    (depth / 2, s * (width / 2 - 0.04) + 0.03, high + 0.1),
+                    look,
+                )
+            )
     elif chance(rng, 0.3):
         x = depth / 2 + 0.02
         profile = [(x, high - 0.15), (x, high + 0.01), (0.0, high + 0.03), (-x, high + 0.01), (-x, high - 0.12)]
@@ -272,18 +244,33 @@ def backed_bench(rng: np.random.Generator) -> Piece:
     look, top = material(pick(rng, ("wood", "wood", "white", "painted", "black")), rng), draw(rng, 0.78, 0.98)
     y, x, rake = width / 2 - 0.03, depth / 2, draw(rng, 0.04, 0.14)
     style, arm = named_leg("straight", 4, draw(rng, 0.04, 0.06)), high + 0.2
-    parts = [slab((i + 0.5) / 5 * depth - x, 0.0, high - 0.025, depth / 5 - 0.012, width, 0.025, look) for i in range(5)]
+    parts = [
+        slab((i + 0.5) / 5 * depth - x, 0.0, high - 0.025, depth / 5 - 0.012, width, 0.025, look) for i in range(5)
+    ]
     for s in (1, -1):
-        parts += [leg((x - 0.03, s * y, 0.0), (x - 0.03, s * y, arm), style, look), leg((-x - 0.04, s * y, 0.0), (-x + 0.02, s * y, high), style, look)]
-        parts += [leg((-x + 0.02, s * y, high), (-x - rake, s * y, top), style, look), strut((-x - 0.04, s * y, arm + 0.01), (x + 0.02, s * y, arm + 0.01), 0.06, 0.025, look)]
+        parts += [
+            leg((x - 0.03, s * y, 0.0), (x - 0.03, s * y, arm), style, look),
+            leg((-x - 0.04, s * y, 0.0), (-x + 0.02, s * y, high), style, look),
+        ]
+        parts += [
+            leg((-x + 0.02, s * y, high), (-x - rake, s * y, top), style, look),
+            strut((-x - 0.04, s * y, arm + 0.01), (x + 0.02, s * y, arm + 0.01), 0.06, 0.025, look),
+        ]
     kind = pick(rng, ("upright", "level", "board"))
     if kind == "upright":
-        parts += [slab(-x + 0.01, 0.0, high + 0.06, 0.03, width, 0.04, look), slab(-x - rake + 0.005, 0.0, top - 0.06, 0.03, width, 0.06, look)]
+        parts += [
+            slab(-x + 0.01, 0.0, high + 0.06, 0.03, width, 0.04, look),
+            slab(-x - rake + 0.005, 0.0, top - 0.06, 0.03, width, 0.06, look),
+        ]
         for t in np.linspace(-y, y, count(rng, 9, 17))[1:-1].tolist():
             parts.append(strut((-x + 0.01, t, high + 0.08), (-x - rake + 0.01, t, top - 0.05), 0.012, 0.035, look))
     else:
         n = count(rng, 2, 4) if kind == "level" else 1
-        for z0, z1 in zip(np.linspace(high + 0.1, top, n + 1)[:-1].tolist(), np.linspace(high + 0.1, top, n + 1)[1:].tolist(), strict=True):
+        for z0, z1 in zip(
+            np.linspace(high + 0.1, top, n + 1)[:-1].tolist(),
+            np.linspace(high + 0.1, top, n + 1)[1:].tolist(),
+            strict=True,
+        ):
             at = -x + 0.02 - rake * ((z0 + z1) / 2 - high) / (top - high)
             parts.append(slab(at, 0.0, z0, 0.02, 2 * y, (z1 - z0) * (0.75 if n > 1 else 1.0), look))
     return finished(parts)
@@ -307,7 +294,10 @@ def storage_bench(rng: np.random.Generator) -> Piece:
         parts += [box((-x, -y, 0.0), (-x + 0.01, y, high), look), box((-x, -y, 0.02), (x, y, 0.04), look)]
         edges = np.linspace(-y, y, bays + 1).tolist()
         parts += [slab(0.0, min(max(edge, 0.01 - y), y - 0.01), 0.0, depth, 0.02, high - 0.03, look) for edge in edges]
-        parts += [box((-x + 0.03, a + 0.025, 0.04), (x - 0.02, b - 0.025, high - 0.09), bins) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        parts += [
+            box((-x + 0.03, a + 0.025, 0.04), (x - 0.02, b - 0.025, high - 0.09), bins)
+            for a, b in itertools.pairwise(edges)
+        ]
     if chance(rng, 0.5):
         parts.append(cushion((-x, -y, high), (x, y, high + 0.06), material("fabric", rng), 0.03, 0.015))
     return finished(parts)
@@ -320,7 +310,11 @@ def square_ottoman(rng: np.random.Generator) -> Piece:
     width = depth * draw(rng, 1.0, 1.7)
     look = covering(rng, 0.35)
     low = pick(rng, (0.02, draw(rng, 0.08, 0.2)))
-    parts = [rounded_box((-depth / 2, -width / 2, low), (depth / 2, width / 2, high - 0.02), draw(rng, 0.015, 0.06), look, 3, 0.02)]
+    parts = [
+        rounded_box(
+            (-depth / 2, -width / 2, low), (depth / 2, width / 2, high - 0.02), draw(rng, 0.015, 0.06), look, 3, 0.02
+        )
+    ]
     legs = material(pick(rng, ("wood", "black", "metal")), rng)
     parts.append(four_legs(depth - 0.06, width - 0.06, low + 0.01, leg_style(rng, 0.03, 0.055), legs))
     return finished(parts)
@@ -332,7 +326,14 @@ def pouf(rng: np.random.Generator) -> Piece:
     r, high = draw(rng, 0.2, 0.36), draw(rng, 0.28, 0.45)
     look = pick(rng, (covering(rng, 0.3), material("wicker", rng), material("fabric", rng)))
     belly = draw(rng, 1.0, 1.25)
-    profile = [(r * 0.8, 0.0), (r * (1 + belly) / 2, high * 0.12), (r * belly, high * 0.45), (r * (1 + belly) / 2, high * 0.85), (r * 0.75, high * 0.97), (0.02, high)]
+    profile = [
+        (r * 0.8, 0.0),
+        (r * (1 + belly) / 2, high * 0.12),
+        (r * belly, high * 0.45),
+        (r * (1 + belly) / 2, high * 0.85),
+        (r * 0.75, high * 0.97),
+        (0.02, high),
+    ]
     body = lathe(profile, look, sides=20)
     if chance(rng, 0.4):
         vertex = body.vertex.copy()
@@ -347,11 +348,19 @@ def round_ottoman(rng: np.random.Generator) -> Piece:
     """Return a round pad on three or four short legs."""
     r, high, thick = draw(rng, 0.2, 0.42), draw(rng, 0.38, 0.47), draw(rng, 0.1, 0.24)
     look, legs = covering(rng, 0.3), material(pick(rng, ("wood", "metal", "black")), rng)
-    parts = [lathe([(r * 0.97, high - thick), (r, high - thick * 0.6), (r, high - 0.05), (r * 0.8, high - 0.01), (0.02, high)], look, sides=20)]
+    parts = [
+        lathe(
+            [(r * 0.97, high - thick), (r, high - thick * 0.6), (r, high - 0.05), (r * 0.8, high - 0.01), (0.02, high)],
+            look,
+            sides=20,
+        )
+    ]
     style, number = leg_style(rng, 0.028, 0.05), count(rng, 3, 4)
     for a in np.linspace(0.0, 2 * np.pi, number, endpoint=False).tolist():
         c, s = float(np.cos(a)), float(np.sin(a))
-        parts.append(leg((0.85 * r * c, 0.85 * r * s, 0.0), (0.7 * r * c, 0.7 * r * s, high - thick + 0.01), style, legs))
+        parts.append(
+            leg((0.85 * r * c, 0.85 * r * s, 0.0), (0.7 * r * c, 0.7 * r * s, high - thick + 0.01), style, legs)
+        )
     return finished(parts)
 
 
@@ -368,5 +377,3 @@ def bean_bag(rng: np.random.Generator) -> Piece:
     hollow = np.exp(-((vertex[:, 0] - 0.35 * r) ** 2 + vertex[:, 1] ** 2) / (0.3 * r * r)) * (vertex[:, 2] > high * 0.3)
     vertex[:, 2] -= draw(rng, 0.15, 0.45) * high * hollow
     return finished([Mesh(vertex.astype(np.float32), body.triangle, body.uv, body.material, body.materials)])
-
-

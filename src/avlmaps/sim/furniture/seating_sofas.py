@@ -119,7 +119,9 @@ def chaise_sofa(rng: np.random.Generator) -> Piece:
     parts = [lower_body(plan, look, thick), body_back(rng, rest, look, True), *box_arms(rng, plan, look)]
     parts.append(rounded_box((0.0, edge, plan.clear), (reach, plan.width / 2, plan.seat - thick), 0.015, look, 2))
     parts += cushion_row((-0.02, edge, plan.seat - thick), (reach, plan.width / 2, plan.seat), 1, look)
-    parts += cushion_row((-0.02, -plan.width / 2, plan.seat - thick), (plan.depth, edge, plan.seat), max(1, seats - 1), look)
+    parts += cushion_row(
+        (-0.02, -plan.width / 2, plan.seat - thick), (plan.depth, edge, plan.seat), max(1, seats - 1), look
+    )
     parts += loose_back(rng, plan, seats, look, draw(rng, -0.1, 0.06), draw(rng, 0.1, 0.18))
     body = joined([*parts, *sofa_feet(rng, plan), *strewn(rng, plan, seats)])
     return finished([body if chance(rng, 0.5) else mirrored(body)])
@@ -193,7 +195,14 @@ def camel_back(rng: np.random.Generator) -> Piece:
     for share in np.linspace(-1.0, 1.0, 15):
         top = base + rise * (np.cos(np.pi * share * humps + (0 if humps == 1 else np.pi)) * 0.5 + 0.5) ** 0.8
         y = share * plan.outer / 2
-        rings.append(np.array([(0.0, y, plan.clear), (-0.03, y, top), (-plan.back - 0.02, y, top), (-plan.back, y, plan.clear)]))
-    parts = [lower_body(plan, look, 0.1), loft(rings, look), *box_arms(rng, plan, look, "rolled"), *sofa_feet(rng, plan)]
+        rings.append(
+            np.array([(0.0, y, plan.clear), (-0.03, y, top), (-plan.back - 0.02, y, top), (-plan.back, y, plan.clear)])
+        )
+    parts = [
+        lower_body(plan, look, 0.1),
+        loft(rings, look),
+        *box_arms(rng, plan, look, "rolled"),
+        *sofa_feet(rng, plan),
+    ]
     parts += seat_cushions(rng, plan, pick(rng, (1, seats)), 0.1, look)
     return finished([*parts, *strewn(rng, plan, seats)])

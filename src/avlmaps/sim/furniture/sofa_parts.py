@@ -9,7 +9,7 @@ from avlmaps.sim.furniture.legs import LegStyle, four_legs, named_leg
 from avlmaps.sim.furniture.upholstery import back_cushions, covering, cushion_row, scattered_pillows, throw
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
-from avlmaps.sim.shapes import box, loft, rounded_box, slab
+from avlmaps.sim.shapes import box, loft, rounded_box, rounded_rectangle, slab
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +43,14 @@ class SofaPlan:
         """Width over all."""
         return self.width + 2 * self.arm
 
+    def back_face(self, z: float) -> float:
+        """Return where the front of the back lies at a height: it leans from the seat upwards."""
+        return -float(np.tan(self.lean)) * max(z - self.seat, 0.0)
+
 
 def sofa_plan(rng: np.random.Generator, seats: int, arm: tuple[float, float] = (0.08, 0.26)) -> SofaPlan:
     """Draw the measures of a sofa for so many people, or of an armchair for one."""
-    each = draw(rng, 0.5, 0.62) if seats == 1 else draw(rng, 0.52, 0.76)
+    each = draw(rng, 0.5, 0.62) if seats in (1, 4) else draw(rng, 0.52, 0.76)
     seat = draw(rng, 0.37, 0.48)
     clear = pick(rng, (0.0, draw(rng, 0.02, 0.06), draw(rng, 0.08, 0.17)))
     arm_top = seat + draw(rng, 0.08, 0.28)
@@ -121,13 +125,24 @@ def mirrored(mesh: Mesh) -> Mesh:
 
 def body_back(rng: np.random.Generator, plan: SofaPlan, look: Material, full: bool) -> Mesh:
     """Return the back's body, over the full width or only between the arms."""
-    half = plan.outer / 2 if full else plan.width / 2
-    slope = float(np.tan(plan.lean)) * (plan.top - plan.seat)
+    half = (plan.outer if full else plan.width) / 2
     radius = pick(rng, (0.012, 0.03, 0.06))
-    mesh = rounded_box((-plan.back, -half, plan.clear), (0.0, half, plan.top), radius, look, 2 if radius < 0.02 else 3)
-    vertex = mesh.vertex.copy()
-    vertex[:, 0] -= slope * np.clip((vertex[:, 2] - plan.seat) / (plan.top - plan.seat), 0.0, 1.0)
-    return Mesh(vertex, mesh.triangle, mesh.uv, mesh.material, mesh.materials)
+    steps = 2 if radius < 0.02 else 3
+    levels = [
+        (plan.clear, 0.2),
+        (plan.seat + 0.02, 0.0),
+        (plan.top - radius, 0.0),
+        (plan.top - 0.3 * radius, 0.3),
+        (plan.top, 1.0),
+    ]
+    rings = []
+    for z, inset in levels:
+        shrink = 2 * inset * radius
+        flat = rounded_rectangle(plan.back - min(shrink, 0.7 * plan.back), 2 * half - shrink, radius, steps)
+        rings.append(
+            np.column_stack([flat[:, 0] + plan.back_face(z) - plan.back / 2, flat[:, 1], np.full(len(flat), z)])
+        )
+    return loft(rings, look)
 
 
 def seat_cushions(rng: np.random.Generator, plan: SofaPlan, number: int, thick: float, look: Material) -> list[Mesh]:
@@ -154,12 +169,15 @@ def strewn(rng: np.random.Generator, plan: SofaPlan, seats: int) -> list[Mesh]:
     if chance(rng, 0.5):
         half = plan.width / 2
         number = count(rng, 1, max(1, min(4, seats + 1)))
-        parts += scattered_pillows(rng, draw(rng, 0.12, 0.24), plan.seat + 0.02, (-half, half), number, plan.lean + 0.25)
+        parts += scattered_pillows(
+            rng, draw(rng, 0.12, 0.24), plan.seat + 0.02, (-half, half), number, plan.lean + 0.25
+        )
     if chance(rng, 0.2):
-        front = plan.depth + 0.02
-        profile = [(front + 0.01, plan.seat - 0.2), (front, plan.seat + 0.03), (plan.depth * 0.5, plan.seat + 0.05),
-                   (0.13, plan.seat + 0.06), (0.08, (plan.seat + plan.top) / 2), (0.0, plan.top + 0.03),
-                   (-plan.back - 0.03, plan.top + 0.03), (-plan.back - 0.06, plan.top - draw(rng, 0.15, 0.4))]  # fmt: skip
+        front, high = plan.depth + 0.02, plan.top + 0.03
+        middle, rear = (plan.seat + plan.top) / 2, plan.back_face(plan.top) - plan.back
+        profile = [(front + 0.01, plan.seat - 0.2), (front, plan.seat + 0.03), (plan.depth * 0.5, plan.seat + 0.05)]
+        profile += [(0.13, plan.seat + 0.06), (plan.back_face(middle) + 0.08, middle), (rear + plan.back + 0.03, high)]
+        profile += [(rear - 0.03, high), (rear - 0.06, plan.top - draw(rng, 0.15, 0.4))]
         wide = min(draw(rng, 0.4, 0.8), plan.width * 0.8)
         side = draw(rng, -0.5, 0.5) * (plan.width - wide)
         parts.append(throw(rng, profile, side, wide, material("fabric", rng)))
@@ -175,13 +193,20 @@ def frame_arms(rng: np.random.Generator, plan: SofaPlan, look: Material) -> list
     length = front - rear + 2 * tilt
     legs = four_legs(length - 2 * tilt, 2 * y, plan.arm_top, style, look, tilt).moved(x=(front + rear) / 2)
     wide, thick = draw(rng, 0.05, 0.1), draw(rng, 0.02, 0.035)
-    rests = [slab((front + rear) / 2, s * (y - 0.02), plan.arm_top - 0.005, length + 0.05, wide, thick, look) for s in (1, -1)]
+    rests = [
+        slab((front + rear) / 2, s * (y - 0.02), plan.arm_top - 0.005, length + 0.05, wide, thick, look)
+        for s in (1, -1)
+    ]
     rails = [slab((front + rear) / 2, s * (y - 0.02), plan.seat - 0.2, length, 0.025, 0.05, look) for s in (1, -1)]
-    cross = [box((x - 0.02, -y, plan.seat - 0.2), (x + 0.02, y, plan.seat - 0.15), look) for x in (front - 0.03, rear + 0.03)]
+    cross = [
+        box((x - 0.02, -y, plan.seat - 0.2), (x + 0.02, y, plan.seat - 0.15), look) for x in (front - 0.03, rear + 0.03)
+    ]
     return [legs, *rests, *rails, *cross]
 
 
-def couch(rng: np.random.Generator, plan: SofaPlan, seats: int, arms: str = "", look: Material | None = None) -> list[Mesh]:
+def couch(
+    rng: np.random.Generator, plan: SofaPlan, seats: int, arms: str = "", look: Material | None = None
+) -> list[Mesh]:
     """Return an upholstered sofa or armchair with arms of a style and loose or fixed cushions."""
     look = look or covering(rng)
     thick = draw(rng, 0.1, 0.2)

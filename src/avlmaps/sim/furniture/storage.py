@@ -107,7 +107,9 @@ def sliding_wardrobe(rng: np.random.Generator) -> Piece:
         fill = fronts if kinds[index] == "banded" else fill
         parts.append(box((x, y0, 0.06), (x + 0.02, y1, top), fronts if kinds[index] == "mirror" else fill))
         if kinds[index] == "mirror":
-            parts.append(sheet((x + 0.021, y0 + 0.02, 0.08), (0.0, y1 - y0 - 0.04, 0.0), (0.0, 0.0, top - 0.1), fill, True))
+            parts.append(
+                sheet((x + 0.021, y0 + 0.02, 0.08), (0.0, y1 - y0 - 0.04, 0.0), (0.0, 0.0, top - 0.1), fill, True)
+            )
         for edge in (y0, y1 - 0.02):
             parts.append(box((x + 0.015, edge, 0.06), (x + 0.028, edge + 0.02, top), metal))
         if kinds[index] == "banded":
@@ -149,7 +151,12 @@ def open_wardrobe(rng: np.random.Generator) -> Piece:
         cut = c + draw(rng, 0.35, 0.7) if chance(rng, 0.6) else c + 0.02
         if cut > c + 0.1:
             parts.append(box((a, y0 + 0.01, cut - 0.02), (d, y1 - 0.01, cut), look))
-            parts += drawers(rng, style, Room((a, y0 + 0.012, c + 0.02), (d - 0.02, y1 - 0.012, cut - 0.02)), [1.0] * count(rng, 1, 3))
+            parts += drawers(
+                rng,
+                style,
+                Room((a, y0 + 0.012, c + 0.02), (d - 0.02, y1 - 0.012, cut - 0.02)),
+                [1.0] * count(rng, 1, 3),
+            )
         upper = Room((bay.low[0], bay.low[1], cut), bay.high)
         if index == 0 or chance(rng, 0.5):
             parts += hanging(rng, upper, looks, 0.7)
@@ -173,7 +180,10 @@ def garment_rack(rng: np.random.Generator) -> Piece:
         if chance(rng, 0.5):
             parts.append(tube([(t, y, 0.02), (0.0, y, height), (-t, y, 0.02)], r, look, 6))
         else:
-            parts += [tube([(t, y, 0.02), (-t, y, 0.02)], r, look, 6), tube([(0.0, y, 0.02), (0.0, y, height)], r, look, 6)]
+            parts += [
+                tube([(t, y, 0.02), (-t, y, 0.02)], r, look, 6),
+                tube([(0.0, y, 0.02), (0.0, y, height)], r, look, 6),
+            ]
     shelf = draw(rng, 0.1, 0.25)
     parts.append(box((-t * 0.8, -half, shelf), (t * 0.8, half, shelf + 0.02), look))
     looks = cloth_looks(rng)
@@ -204,7 +214,9 @@ def armoire(rng: np.random.Generator) -> Piece:
     return finished(parts)
 
 
-def _chest(rng: np.random.Generator, size: tuple[float, float, float], columns: list[list[float]], top: float = 0.0) -> Piece:
+def _chest(
+    rng: np.random.Generator, size: tuple[float, float, float], columns: list[list[float]], top: float = 0.0
+) -> Piece:
     """Return a chest with columns of drawers.
 
     Args:
@@ -234,7 +246,9 @@ def low_chest(rng: np.random.Generator) -> Piece:
     columns = count(rng, 2, 3)
     rows = count(rng, 2, 4)
     size = (draw(rng, 0.38, 0.55), draw(rng, 0.48, 0.62) * columns, draw(rng, 0.2, 0.25) * rows + draw(rng, 0.1, 0.2))
-    return _chest(rng, size, [[draw(rng, 0.9, 1.1)] + [1.0] * (rows - 1)] * columns, pick(rng, (0.0, draw(rng, 0.0, 0.03))))
+    return _chest(
+        rng, size, [[draw(rng, 0.9, 1.1)] + [1.0] * (rows - 1)] * columns, pick(rng, (0.0, draw(rng, 0.0, 0.03)))
+    )
 
 
 @family("chest of drawers", "high")
@@ -256,7 +270,11 @@ def mixed_chest(rng: np.random.Generator) -> Piece:
     height = lift + draw(rng, 0.65, 1.05)
     (a, b, c), (d, e, f) = room = ((-depth / 2, -width / 2, lift), (depth / 2, width / 2, height))
     cut = f - draw(rng, 0.13, 0.2)
-    parts = [base, carcass(Room(*room), 0.02, look), *drawers(rng, style, Room((a, b, c), (d, e, cut)), [1.0] * count(rng, 2, 4))]
+    parts = [
+        base,
+        carcass(Room(*room), 0.02, look),
+        *drawers(rng, style, Room((a, b, c), (d, e, cut)), [1.0] * count(rng, 2, 4)),
+    ]
     for y0, y1 in split(b, e, [1.0] * count(rng, 2, 3)):
         parts += drawers(rng, style, Room((a, y0, cut), (d, y1, f)), [1.0])
     out = draw(rng, 0.01, 0.04)

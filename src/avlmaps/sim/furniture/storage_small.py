@@ -17,9 +17,16 @@ def shoe(rng: np.random.Generator, look: Material) -> Mesh:
     long, wide = draw(rng, 0.22, 0.3), draw(rng, 0.08, 0.1)
     heel = draw(rng, 0.06, 0.12)
     rings = []
-    for z, back, front, share in ((0.0, 0.0, 1.0, 1.0), (0.03, 0.0, 0.99, 1.0), (0.05, 0.02, 0.72, 0.9), (heel, 0.05, 0.42, 0.7)):
+    for z, back, front, share in (
+        (0.0, 0.0, 1.0, 1.0),
+        (0.03, 0.0, 0.99, 1.0),
+        (0.05, 0.02, 0.72, 0.9),
+        (heel, 0.05, 0.42, 0.7),
+    ):
         flat = rounded_rectangle(long * (front - back), wide * share, wide * 0.4, 2)
-        rings.append(np.column_stack([flat[:, 0] + long * ((front + back) / 2 - 0.5), flat[:, 1], np.full(len(flat), z)]))
+        rings.append(
+            np.column_stack([flat[:, 0] + long * ((front + back) / 2 - 0.5), flat[:, 1], np.full(len(flat), z)])
+        )
     return loft(rings, look)
 
 
@@ -44,7 +51,10 @@ def shoe_tiers(rng: np.random.Generator) -> Piece:
     parts = [four_legs(depth, width, high, leg_style(rng, 0.015, 0.03, True), frame)]
     for z in np.linspace(0.08, high - 0.02, tiers).tolist():
         if rods:
-            parts += [tube([(x, -width / 2, z), (x, width / 2, z)], 0.007, frame, 4) for x in np.linspace(-0.42, 0.42, 4) * depth]
+            parts += [
+                tube([(x, -width / 2, z), (x, width / 2, z)], 0.007, frame, 4)
+                for x in np.linspace(-0.42, 0.42, 4) * depth
+            ]
         else:
             parts.append(slab(0.0, 0.0, z - 0.015, depth, width, 0.018, look))
         parts += _shoes(rng, (-width / 2, width / 2), 0.0, z + 0.005, full)
@@ -65,7 +75,9 @@ def shoe_cabinet(rng: np.random.Generator) -> Piece:
         flap = drawers(rng, style, Room((-depth / 2, -width / 2, z0), (depth / 2, width / 2, z1)), [1.0], 0.0)
         lean = draw(rng, 0.2, 0.5) if chance(rng, 0.15) else 0.0
         parts += [m.moved(-depth / 2, 0.0, -z0).tilted("y", lean).moved(depth / 2, 0.0, z0) for m in flap]
-    parts.append(box((-depth / 2, -width / 2 - 0.01, height), (depth / 2 + 0.03, width / 2 + 0.01, height + 0.02), look))
+    parts.append(
+        box((-depth / 2, -width / 2 - 0.01, height), (depth / 2 + 0.03, width / 2 + 0.01, height + 0.02), look)
+    )
     return finished(parts, supports=[Support((-depth / 2, -width / 2), (depth / 2, width / 2), height + 0.02)])
 
 
@@ -81,8 +93,17 @@ def shoe_bench(rng: np.random.Generator) -> Piece:
     parts.append(box((free.low[0], free.low[1], mid - 0.009), (free.high[0], free.high[1], mid + 0.009), look))
     for z in (free.low[2], mid + 0.009):
         parts += _shoes(rng, (free.low[1], free.high[1]), 0.0, z, 0.5)
-    top = rounded_box((-depth / 2, -width / 2, height - 0.05), (depth / 2, width / 2, height), 0.02, material("fabric", rng), 2)
-    return finished([*parts, top if chance(rng, 0.6) else box((-depth / 2, -width / 2, height - 0.05), (depth / 2, width / 2, height), look)])
+    top = rounded_box(
+        (-depth / 2, -width / 2, height - 0.05), (depth / 2, width / 2, height), 0.02, material("fabric", rng), 2
+    )
+    return finished(
+        [
+            *parts,
+            top
+            if chance(rng, 0.6)
+            else box((-depth / 2, -width / 2, height - 0.05), (depth / 2, width / 2, height), look),
+        ]
+    )
 
 
 def _hung(meshes: list[Mesh], depth: float, supports: list[Support]) -> Piece:
@@ -108,7 +129,9 @@ def wall_boards(rng: np.random.Generator) -> Piece:
             for y in (y0 + 0.12 * width, y1 - 0.12 * width):
                 parts += [box((-depth / 2, y - 0.012, z - 0.14), (-depth / 2 + 0.006, y + 0.012, z), metal),
                           strut((-depth / 2, y, z - 0.13), (depth / 2 - 0.03, y, z), 0.012, 0.012, metal)]  # fmt: skip
-        parts += shelf_things(rng, Room((-depth / 2, y0 + 0.02, top), (depth / 2, y1 - 0.02, top + step - 0.04)), books, full)
+        parts += shelf_things(
+            rng, Room((-depth / 2, y0 + 0.02, top), (depth / 2, y1 - 0.02, top + step - 0.04)), books, full
+        )
         supports.append(Support((-depth / 2, y0), (depth / 2, y1), top, step - 0.05))
     return finished(parts, supports=supports if not full else [])
 
@@ -172,7 +195,9 @@ def lateral_file(rng: np.random.Generator) -> Piece:
         parts += drawers(rng, style, room, [1.0] * rows, 0.06)
     else:
         for y0, y1 in split(-width / 2 + 0.02, width / 2 - 0.02, [1.0] * 18):
-            parts.append(box((depth / 2 - 0.015, y0, 0.07), (depth / 2 + 0.004 * (y0 > 0), y1 - 0.004, height - 0.02), look))
+            parts.append(
+                box((depth / 2 - 0.015, y0, 0.07), (depth / 2 + 0.004 * (y0 > 0), y1 - 0.004, height - 0.02), look)
+            )
         parts += [grip(style, depth / 2, s * 0.04, height / 2, True, 0.15) for s in (1, -1)]
     return finished(parts, supports=[Support((-depth / 2, -width / 2), (depth / 2, width / 2), height)])
 
@@ -217,7 +242,14 @@ def coat_tree(rng: np.random.Generator) -> Piece:
     for i, a in enumerate(np.linspace(0.0, 2 * np.pi, count(rng, 4, 8), endpoint=False).tolist()):
         z = height - (0.08 if i % 2 else draw(rng, 0.1, 0.35))
         c, s = float(np.cos(a)), float(np.sin(a))
-        parts.append(tube([(0.02 * c, 0.02 * s, z - 0.03), (0.1 * c, 0.1 * s, z - 0.02), (0.15 * c, 0.15 * s, z + 0.06)], 0.009, look, 5))
+        parts.append(
+            tube(
+                [(0.02 * c, 0.02 * s, z - 0.03), (0.1 * c, 0.1 * s, z - 0.02), (0.15 * c, 0.15 * s, z + 0.06)],
+                0.009,
+                look,
+                5,
+            )
+        )
         if chance(rng, full):
             parts.append(_coat(rng, 0.1 * c, 0.1 * s, z, pick(rng, looks), a))
     return finished(parts)
@@ -231,7 +263,9 @@ def coat_board(rng: np.random.Generator) -> Piece:
     tall = draw(rng, 0.08, 0.25)
     parts = [box((0.0, -width / 2, 0.0), (0.02, width / 2, tall), look)]
     for y in np.linspace(-width * 0.42, width * 0.42, count(rng, 3, 7)).tolist():
-        parts.append(tube([(0.02, y, tall * 0.4), (0.07, y, tall * 0.35), (0.08, y, tall * 0.5 + 0.03)], 0.006, metal, 5))
+        parts.append(
+            tube([(0.02, y, tall * 0.4), (0.07, y, tall * 0.35), (0.08, y, tall * 0.5 + 0.03)], 0.006, metal, 5)
+        )
         if chance(rng, full):
             parts.append(_coat(rng, 0.03, y, tall * 0.5, pick(rng, looks), 0.0))
     if chance(rng, 0.5):
@@ -250,14 +284,25 @@ def hall_stand(rng: np.random.Generator) -> Piece:
     room = Room((a, -width / 2, 0.0), (depth / 2, width / 2, seat))
     parts = [carcass(room, 0.022, look), box((a, -width / 2, seat), (a + 0.02, width / 2, height), look)]
     parts.append(box((a, -width / 2, height - 0.02), (a + depth * 0.75, width / 2, height), look))
-    parts += [box((a, y, seat), (a + depth * 0.5, y + 0.02, height), look) for y in (-width / 2, width / 2 - 0.02) if chance(rng, 0.5)]
+    parts += [
+        box((a, y, seat), (a + depth * 0.5, y + 0.02, height), look)
+        for y in (-width / 2, width / 2 - 0.02)
+        if chance(rng, 0.5)
+    ]
     if chance(rng, 0.5):
         parts += doors(rng, front_style(rng, look), room, 2, 0.0)
     else:
         parts += _shoes(rng, (-width / 2, width / 2), 0.0, 0.022, 0.6)
     metal = material("metal", rng)
     for y in np.linspace(-width * 0.36, width * 0.36, count(rng, 3, 5)).tolist():
-        parts.append(tube([(a + 0.02, y, height - 0.25), (a + 0.1, y, height - 0.24), (a + 0.11, y, height - 0.18)], 0.007, metal, 5))
+        parts.append(
+            tube(
+                [(a + 0.02, y, height - 0.25), (a + 0.1, y, height - 0.24), (a + 0.11, y, height - 0.18)],
+                0.007,
+                metal,
+                5,
+            )
+        )
         if chance(rng, 0.4):
             parts.append(_coat(rng, a + 0.04, y, height - 0.22, pick(rng, looks), 0.0))
     return finished([joined(parts)])

@@ -26,7 +26,9 @@ def outline(kind: Outline, depth: float, width: float) -> list[tuple[float, floa
     elif kind == "stadium":
         flat = rounded_rectangle(depth, width, min(depth, width) * 0.49, 6)
     elif kind == "octagon":
-        flat = circle(1.0, 8) @ np.array([[np.cos(np.pi / 8), np.sin(np.pi / 8)], [-np.sin(np.pi / 8), np.cos(np.pi / 8)]])
+        flat = circle(1.0, 8) @ np.array(
+            [[np.cos(np.pi / 8), np.sin(np.pi / 8)], [-np.sin(np.pi / 8), np.cos(np.pi / 8)]]
+        )
         flat = flat / np.abs(flat).max(axis=0) * (depth / 2, width / 2)
     else:
         y = np.linspace(-1.0, 1.0, 8)
@@ -75,7 +77,14 @@ def pedestal(rng: np.random.Generator, high: float, reach: float, look: Material
         return joined(parts)
     if style == "tulip":
         r = draw(rng, 0.03, 0.06)
-        profile = [(reach, 0.0), (0.9 * reach, 0.02), (0.4 * reach, 0.06), (r, 0.3 * high), (r, 0.7 * high), (3 * r, high)]
+        profile = [
+            (reach, 0.0),
+            (0.9 * reach, 0.02),
+            (0.4 * reach, 0.06),
+            (r, 0.3 * high),
+            (r, 0.7 * high),
+            (3 * r, high),
+        ]
         return lathe(profile, look, sides=16)
     if style == "drum":
         return lathe([(reach * 0.75, 0.0), (reach * draw(rng, 0.45, 0.75), high)], look, sides=16)
@@ -83,10 +92,21 @@ def pedestal(rng: np.random.Generator, high: float, reach: float, look: Material
         return star_base(count(rng, 3, 5), reach, high, look, draw(rng, 0.03, 0.06))
     pole = cylinder(0.0, 0.0, 0.01, draw(rng, 0.03, 0.06), high - 0.01, look, 10)
     if style == "plate":
-        foot = cylinder(0.0, 0.0, 0.0, reach * 0.8, 0.02, look, 20) if chance(rng, 0.6) else slab(0, 0, 0, 1.3 * reach, 1.3 * reach, 0.02, look)
+        foot = (
+            cylinder(0.0, 0.0, 0.0, reach * 0.8, 0.02, look, 20)
+            if chance(rng, 0.6)
+            else slab(0, 0, 0, 1.3 * reach, 1.3 * reach, 0.02, look)
+        )
         return joined([pole, foot])
     low = [slab(0.0, 0.0, 0.0, 2 * reach, 0.08, 0.06, look), slab(0.0, 0.0, 0.0, 0.08, 2 * reach, 0.06, look)]
-    return joined([pole, *low, slab(0.0, 0.0, high - 0.04, reach, 0.06, 0.04, look), slab(0.0, 0.0, high - 0.04, 0.06, reach, 0.04, look)])
+    return joined(
+        [
+            pole,
+            *low,
+            slab(0.0, 0.0, high - 0.04, reach, 0.06, 0.04, look),
+            slab(0.0, 0.0, high - 0.04, 0.06, reach, 0.04, look),
+        ]
+    )
 
 
 def trestles(rng: np.random.Generator, depth: float, span: float, high: float, look: Material) -> list[Mesh]:
@@ -100,7 +120,10 @@ def trestles(rng: np.random.Generator, depth: float, span: float, high: float, l
             parts += [strut((e * half, y, 0.0), (e * half * 0.25, y, high), t, t, look) for e in (1, -1)]
             parts.append(strut((-half * 0.75, y, high * 0.3), (half * 0.75, y, high * 0.3), t * 0.7, t * 0.7, look))
         elif style == "H":
-            parts += [slab(0.0, y, 0.0, depth, t * 1.2, 0.06, look), slab(0.0, y, high - 0.05, depth * 0.85, t, 0.05, look)]
+            parts += [
+                slab(0.0, y, 0.0, depth, t * 1.2, 0.06, look),
+                slab(0.0, y, high - 0.05, depth * 0.85, t, 0.05, look),
+            ]
             parts += [slab(e, y, 0.05, t * 1.4, t, high - 0.09, look) for e in pick(rng, ((0.0,), (-0.1, 0.1)))]
         elif style == "X":
             parts += [strut((e * half, y, 0.02), (-e * half * 0.85, y, high - 0.02), t, t, look) for e in (1, -1)]
@@ -126,7 +149,9 @@ def hairpins(depth: float, width: float, high: float, look: Material) -> list[Me
         for sy in (1, -1):
             x, y = sx * depth / 2, sy * width / 2
             for dx, dy in ((-0.11, 0.0), (0.0, -0.11)):
-                parts.append(tube([(x, y, 0.0), (x - 0.07 * sx + sx * dx, y - 0.07 * sy + sy * dy, high)], 0.006, look, 4))
+                parts.append(
+                    tube([(x, y, 0.0), (x - 0.07 * sx + sx * dx, y - 0.07 * sy + sy * dy, high)], 0.006, look, 4)
+                )
     return parts
 
 
@@ -155,9 +180,23 @@ def tablecloth(rng: np.random.Generator, depth: float, width: float, high: float
         rim_xy = flat * (depth / 2 + 0.008, width / 2 + 0.008)
         rings = [(rim_xy * 0.98, high + 0.004), (rim_xy, high - 0.005), (rim_xy * (1.01 * fold)[:, None], high - hang)]
         skin = [np.column_stack([ring, np.full(len(ring), z)]) for ring, z in rings]
-        return joined([loft(skin, look, capped=False), prism([(float(x), float(y)) for x, y in rings[0][0]], high, 0.004, look)])
-    x = [-depth / 2 - 0.03, -depth / 2 - 0.006, *np.linspace(-depth / 2, depth / 2, 5), depth / 2 + 0.006, depth / 2 + 0.03]
-    y = [-width / 2 - 0.03, -width / 2 - 0.006, *np.linspace(-width / 2, width / 2, 5), width / 2 + 0.006, width / 2 + 0.03]
+        return joined(
+            [loft(skin, look, capped=False), prism([(float(x), float(y)) for x, y in rings[0][0]], high, 0.004, look)]
+        )
+    x = [
+        -depth / 2 - 0.03,
+        -depth / 2 - 0.006,
+        *np.linspace(-depth / 2, depth / 2, 5),
+        depth / 2 + 0.006,
+        depth / 2 + 0.03,
+    ]
+    y = [
+        -width / 2 - 0.03,
+        -width / 2 - 0.006,
+        *np.linspace(-width / 2, width / 2, 5),
+        width / 2 + 0.006,
+        width / 2 + 0.03,
+    ]
     drop = np.array([hang, 0.01, 0, 0, 0, 0, 0, 0.01, hang])
     z = high + 0.006 - np.maximum(drop[:, None], drop[None, :]) * rng.uniform(0.93, 1.0, (9, 9))
     return cloth(np.stack(np.broadcast_arrays(np.asarray(x)[:, None], np.asarray(y)[None, :], z), axis=-1), look)
@@ -171,6 +210,12 @@ def metal_frame(rng: np.random.Generator, depth: float, width: float, high: floa
              for sx in (1, -1) for sy in (1, -1)]  # fmt: skip
     levels = [high - t] + ([draw(rng, 0.0, 0.08)] if chance(rng, 0.5) else [])
     for z in levels:
-        parts += [box((-depth / 2, s * (width - t) / 2 - t / 2, z), (depth / 2, s * (width - t) / 2 + t / 2, z + t), look) for s in (1, -1)]
-        parts += [box((s * (depth - t) / 2 - t / 2, -width / 2, z), (s * (depth - t) / 2 + t / 2, width / 2, z + t), look) for s in (1, -1)]
+        parts += [
+            box((-depth / 2, s * (width - t) / 2 - t / 2, z), (depth / 2, s * (width - t) / 2 + t / 2, z + t), look)
+            for s in (1, -1)
+        ]
+        parts += [
+            box((s * (depth - t) / 2 - t / 2, -width / 2, z), (s * (depth - t) / 2 + t / 2, width / 2, z + t), look)
+            for s in (1, -1)
+        ]
     return parts

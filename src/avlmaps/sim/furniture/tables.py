@@ -47,7 +47,9 @@ def legged_table(rng: np.random.Generator) -> Piece:
     frame = (depth - 2 * inset - 0.02, width - 2 * inset - 0.02)
     parts = [table_top(kind, depth, width, high, thick, look), four_legs(*frame, high - thick, style, legs)]
     side = style.thickness_m * 0.5
-    parts.append(apron(frame[0] - side, frame[1] - side, high - thick - draw(rng, 0.06, 0.12), high - thick, 0.02, legs))
+    parts.append(
+        apron(frame[0] - side, frame[1] - side, high - thick - draw(rng, 0.06, 0.12), high - thick, 0.02, legs)
+    )
     if chance(rng, 0.15):
         parts.append(stretchers(rng, frame[0] - side, frame[1] - side, draw(rng, 0.1, 0.2), 0.04, legs))
     if chance(rng, 0.18):
@@ -67,7 +69,7 @@ def pedestal_table(rng: np.random.Generator) -> Piece:
     parts = [table_top(kind, depth, width, high, thick, look, pick(rng, (0.0, 0.03)))]
     parts.append(pedestal(rng, high - thick, depth * draw(rng, 0.26, 0.38), foot))
     if chance(rng, 0.2):
-        parts.append(tablecloth(rng, depth, width, high, True))
+        parts.append(tablecloth(rng, depth, width, high, kind in ("oval", "octagon", "stadium")))
     return finished(parts, supports=[top_support(kind, depth, width, high)])
 
 
@@ -88,7 +90,7 @@ def round_table(rng: np.random.Generator) -> Piece:
         parts.append(four_legs(*frame, high - thick, leg_style(rng, 0.045, 0.075), legs))
         parts.append(apron(frame[0] - 0.03, frame[1] - 0.03, high - thick - 0.08, high - thick, 0.02, legs))
     if chance(rng, 0.15):
-        parts.append(tablecloth(rng, depth, width, high, True))
+        parts.append(tablecloth(rng, depth, width, high, kind in ("oval", "octagon", "stadium")))
     return finished(parts, supports=[top_support(kind, depth, width, high)])
 
 
@@ -150,10 +152,22 @@ def drop_leaf(rng: np.random.Generator) -> Piece:
     for index, s in enumerate((1, -1)):
         edge = s * core / 2
         if down[index]:
-            parts.append(box((-depth / 2, edge + min(s, 0) * 0.024, high - leaf), (depth / 2, edge + max(s, 0) * 0.024, high - 0.01), look))
+            parts.append(
+                box(
+                    (-depth / 2, edge + min(s, 0) * 0.024, high - leaf),
+                    (depth / 2, edge + max(s, 0) * 0.024, high - 0.01),
+                    look,
+                )
+            )
         else:
             reach[index] += leaf
-            parts.append(box((-depth / 2, min(edge, edge + s * leaf), high - 0.025), (depth / 2, max(edge, edge + s * leaf), high), look))
+            parts.append(
+                box(
+                    (-depth / 2, min(edge, edge + s * leaf), high - 0.025),
+                    (depth / 2, max(edge, edge + s * leaf), high),
+                    look,
+                )
+            )
     parts.append(four_legs(depth * 0.85, core * 0.92, high - 0.02, leg_style(rng, 0.045, 0.07), look))
     parts.append(apron(depth * 0.8, core * 0.85, high - 0.13, high - 0.02, 0.02, look))
     return finished(parts, supports=[Support((-depth * 0.46, -reach[1] + 0.03), (depth * 0.46, reach[0] - 0.03), high)])
@@ -204,8 +218,13 @@ def writing_desk(rng: np.random.Generator) -> Piece:
     parts.append(four_legs(depth - 2 * splay, width - 2 * splay, under, style, look, splay))
     if chance(rng, 0.75):
         fronts = front_style(rng, look)
-        parts.append(box((0.03 - depth / 2, 0.04 - width / 2, under - tall), (depth / 2 - 0.03, width / 2 - 0.04, under), look))
-        for y0, y1 in [(-width / 2 + 0.06 + i * (width - 0.12) / 2, -width / 2 + 0.06 + (i + 1) * (width - 0.12) / 2) for i in range(2)]:
+        parts.append(
+            box((0.03 - depth / 2, 0.04 - width / 2, under - tall), (depth / 2 - 0.03, width / 2 - 0.04, under), look)
+        )
+        for y0, y1 in [
+            (-width / 2 + 0.06 + i * (width - 0.12) / 2, -width / 2 + 0.06 + (i + 1) * (width - 0.12) / 2)
+            for i in range(2)
+        ]:
             parts += drawers(rng, fronts, Room((0.0, y0, under - tall), (depth / 2 - 0.03, y1, under)), [1.0])
     else:
         parts.append(apron(depth - 0.06, width - 0.06, under - 0.07, under, 0.02, look))
@@ -225,14 +244,18 @@ def block_desk(rng: np.random.Generator) -> Piece:
     parts = [table_top("rectangle", depth, width, high, thick, look if chance(rng, 0.7) else table_look(rng, 0.0))]
     parts += _drawer_stack(rng, depth - 0.06, (y[0], y[1]), (low, under), depth / 2 - 0.02, (look, style))
     rest = look if chance(rng, 0.5) else _metal(rng)
-    legs = four_legs(depth - 0.04, width - 0.02, under, named_leg("straight", pick(rng, (4, 8)), draw(rng, 0.025, 0.05)), rest)
+    legs = four_legs(
+        depth - 0.04, width - 0.02, under, named_leg("straight", pick(rng, (4, 8)), draw(rng, 0.025, 0.05)), rest
+    )
     if low > 0 or chance(rng, 0.4):
         parts.append(legs)
     else:
         edge = -side * (width / 2 - 0.012)
         parts.append(slab(0.0, edge, 0.0, depth - 0.04, 0.022, under, look))
     if chance(rng, 0.5):
-        parts.append(box((0.04 - depth / 2, -width / 2 + 0.02, under - 0.35), (0.06 - depth / 2, width / 2 - 0.02, under), look))
+        parts.append(
+            box((0.04 - depth / 2, -width / 2 + 0.02, under - 0.35), (0.06 - depth / 2, width / 2 - 0.02, under), look)
+        )
     return finished(parts, supports=[top_support("rectangle", depth, width, high)])
 
 
@@ -249,7 +272,9 @@ def executive_desk(rng: np.random.Generator) -> Piece:
         parts += _drawer_stack(rng, depth - 0.06, (y[0], y[1]), (low, under), depth / 2 - 0.02, (look, style))
         if low > 0.02:
             parts.append(slab(0.0, s * (width / 2 - wide / 2 - 0.015), 0.0, depth - 0.12, wide - 0.08, low, look))
-    parts += drawers(rng, style, Room((0.0, wide - width / 2, under - 0.1), (depth / 2 - 0.02, width / 2 - wide, under)), [1.0])
+    parts += drawers(
+        rng, style, Room((0.0, wide - width / 2, under - 0.1), (depth / 2 - 0.02, width / 2 - wide, under)), [1.0]
+    )
     parts.append(box((0.05 - depth / 2, wide - width / 2, 0.15), (0.07 - depth / 2, width / 2 - wide, under), look))
     return finished(parts, supports=[top_support("rectangle", depth, width, high)])
 
@@ -268,7 +293,10 @@ def trestle_desk(rng: np.random.Generator) -> Piece:
         parts += metal_frame(rng, depth * 0.94, width * 0.96, high - thick, frame)
     if chance(rng, 0.3):
         x, y = -depth / 2 + 0.12, width * draw(rng, 0.25, 0.46)
-        parts += [slab(x, 0.0, high + 0.1, 0.22, 2 * y, 0.018, look), *(slab(x, s * (y - 0.01), high, 0.2, 0.018, 0.1, look) for s in (1, -1))]
+        parts += [
+            slab(x, 0.0, high + 0.1, 0.22, 2 * y, 0.018, look),
+            *(slab(x, s * (y - 0.01), high, 0.2, 0.018, 0.1, look) for s in (1, -1)),
+        ]
     return finished(parts, supports=[Support((-depth * 0.1, -width * 0.46), (depth * 0.46, width * 0.46), high)])
 
 
@@ -284,7 +312,10 @@ def standing_desk(rng: np.random.Generator) -> Piece:
     for s in (1, -1):
         y = s * width * draw(rng, 0.33, 0.42)
         parts += [slab(0.0, y, 0.0, depth * 0.92, 0.07, 0.03, frame), slab(x, y, 0.03, t, t * 1.3, under * 0.6, frame)]
-        parts += [slab(x, y, under * 0.5, t * 0.75, t, under * 0.5, frame), slab(0.0, y, under - 0.03, depth * 0.8, 0.05, 0.03, frame)]
+        parts += [
+            slab(x, y, under * 0.5, t * 0.75, t, under * 0.5, frame),
+            slab(0.0, y, under - 0.03, depth * 0.8, 0.05, 0.03, frame),
+        ]
     parts.append(slab(x, 0.0, under - 0.06, 0.04, width * 0.7, 0.04, frame))
     return finished(parts, supports=[top_support("rectangle", depth, width, high)])
 
@@ -300,11 +331,20 @@ def hutch_desk(rng: np.random.Generator) -> Piece:
     parts += [slab(0.0, s * (width / 2 - 0.012), 0.0, depth, 0.024, under, look) for s in (1, -1)]
     parts.append(box((0.02 - depth / 2, -width / 2, draw(rng, 0.15, 0.4)), (0.035 - depth / 2, width / 2, under), look))
     if chance(rng, 0.6):
-        parts += _drawer_stack(rng, depth * 0.9, (width / 2 - 0.42, width / 2 - 0.025), (under - draw(rng, 0.15, 0.6), under), depth / 2 - 0.02, (look, style))
+        parts += _drawer_stack(
+            rng,
+            depth * 0.9,
+            (width / 2 - 0.42, width / 2 - 0.025),
+            (under - draw(rng, 0.15, 0.6), under),
+            depth / 2 - 0.02,
+            (look, style),
+        )
     top, back = high + draw(rng, 0.35, 0.8), -depth / 2
     room = Room((back, -width / 2, high + draw(rng, 0.0, 0.3)), (back + draw(rng, 0.2, 0.3), width / 2, top))
     parts += [carcass(room, 0.018, look)]
-    parts += [slab(back + 0.12, s * (width / 2 - 0.009), high, 0.22, 0.018, room.low[2] - high + 0.01, look) for s in (1, -1)]
+    parts += [
+        slab(back + 0.12, s * (width / 2 - 0.009), high, 0.22, 0.018, room.low[2] - high + 0.01, look) for s in (1, -1)
+    ]
     free = inside(room, 0.018)
     middle = (free.low[1] + free.high[1]) / 2
     parts.append(box((back, middle - 0.009, free.low[2]), (free.high[0], middle + 0.009, free.high[2]), look))
@@ -328,7 +368,9 @@ def corner_desk(rng: np.random.Generator) -> Piece:
     style = named_leg("straight", pick(rng, (4, 8)), draw(rng, 0.03, 0.06))
     legs = [(-depth / 2 + 0.05, s * (width / 2 - 0.05)) for s in (1, -1)]
     legs += [(x1 - 0.05, y[0] + 0.05), (x1 - 0.05, y[1] - 0.05), (depth / 2 - 0.05, -side * (width / 2 - 0.05))]
-    parts += [four_legs(0.001, 0.001, high - thick, style, frame, inset=-style.thickness_m / 2).moved(a, b) for a, b in legs]
+    parts += [
+        four_legs(0.001, 0.001, high - thick, style, frame, inset=-style.thickness_m / 2).moved(a, b) for a, b in legs
+    ]
     parts.append(box((-depth / 2 + 0.02, -width / 2, high - 0.4), (-depth / 2 + 0.035, width / 2, high - thick), look))
     return finished(parts, supports=[Support((-depth * 0.46, -width * 0.46), (depth * 0.46, width * 0.46), high)])
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from avlmaps.sim.furniture.carcass import Room, board_look, carcass, doors, drawers, front_style, split
+from avlmaps.sim.furniture.carcass import Room, board_look, drawers, front_style, split
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.legs import apron, cabinet_base, four_legs, leg_style, sled
@@ -10,7 +10,6 @@ from avlmaps.sim.furniture.table_parts import (
     Outline,
     hairpins,
     metal_frame,
-    outline,
     pedestal,
     splayed_legs,
     table_look,
@@ -50,7 +49,9 @@ def legged_coffee(rng: np.random.Generator) -> Piece:
     if not splay and chance(rng, 0.45):
         z = draw(rng, 0.08, high * 0.45)
         parts.append(slab(0.0, 0.0, z, depth - 0.06, width - 0.06, 0.018, look))
-        supports.append(Support((-depth * 0.36, -width * 0.4), (depth * 0.36, width * 0.4), z + 0.018, high - thick - z - 0.1))
+        supports.append(
+            Support((-depth * 0.36, -width * 0.4), (depth * 0.36, width * 0.4), z + 0.018, high - thick - z - 0.1)
+        )
     return finished(parts, supports=supports)
 
 
@@ -69,10 +70,17 @@ def round_coffee(rng: np.random.Generator) -> Piece:
         parts += splayed_legs(rng, depth, width, high - thick, legs, pick(rng, (3, 4)))
     elif base == "rods":
         for z in (0.008, high - thick - 0.008):
-            ring = [(0.42 * depth * float(np.cos(a)), 0.42 * width * float(np.sin(a)), z) for a in np.linspace(0, 2 * np.pi, 15)]
+            ring = [
+                (0.42 * depth * float(np.cos(a)), 0.42 * width * float(np.sin(a)), z)
+                for a in np.linspace(0, 2 * np.pi, 15)
+            ]
             parts.append(tube(ring, 0.008, legs, 4))
         for a in np.linspace(0, 2 * np.pi, count(rng, 4, 10), endpoint=False).tolist():
-            parts.append(cylinder(0.42 * depth * float(np.cos(a)), 0.42 * width * float(np.sin(a)), 0.0, 0.008, high - thick, legs, 5))
+            parts.append(
+                cylinder(
+                    0.42 * depth * float(np.cos(a)), 0.42 * width * float(np.sin(a)), 0.0, 0.008, high - thick, legs, 5
+                )
+            )
     else:
         parts.append(pedestal(rng, high - thick, depth * 0.34, legs))
     return finished(parts, supports=[top_support(kind, depth, width, high)])
@@ -147,10 +155,16 @@ def runner_coffee(rng: np.random.Generator) -> Piece:
 def trunk(rng: np.random.Generator) -> Piece:
     """Return a chest with a lid, bands and a lock, used as a table."""
     depth, width, high = draw(rng, 0.42, 0.6), draw(rng, 0.8, 1.15), draw(rng, 0.4, 0.5)
-    look, band = material(pick(rng, ("wood", "leather", "wicker", "painted")), rng), material(pick(rng, ("metal", "leather", "black")), rng)
+    look, band = (
+        material(pick(rng, ("wood", "leather", "wicker", "painted")), rng),
+        material(pick(rng, ("metal", "leather", "black")), rng),
+    )
     lid = high - draw(rng, 0.06, 0.12)
     (x, y) = (depth / 2, width / 2)
-    parts = [box((-x, -y, 0.0), (x, y, lid - 0.006), look), box((-x - 0.006, -y - 0.006, lid), (x + 0.006, y + 0.006, high), look)]
+    parts = [
+        box((-x, -y, 0.0), (x, y, lid - 0.006), look),
+        box((-x - 0.006, -y - 0.006, lid), (x + 0.006, y + 0.006, high), look),
+    ]
     for at in np.linspace(-y * 0.72, y * 0.72, count(rng, 2, 4)).tolist():
         parts.append(box((-x - 0.01, at - 0.025, 0.0), (x + 0.01, at + 0.025, high + 0.003), band))
     parts.append(slab(x, 0.0, lid - 0.06, 0.03, 0.06, 0.09, band))
@@ -165,7 +179,10 @@ def nested_tables(rng: np.random.Generator) -> Piece:
     depth, width, high = draw(rng, 0.5, 0.7), draw(rng, 0.6, 0.9), draw(rng, 0.42, 0.52)
     parts, supports, x, y = [], [], 0.0, 0.0
     for _ in range(count(rng, 2, 3)):
-        own = [table_top(kind, depth, width, high, 0.02, look), four_legs(depth * 0.7, width * 0.7, high - 0.02, leg_style(rng, 0.02, 0.035, True), legs)]
+        own = [
+            table_top(kind, depth, width, high, 0.02, look),
+            four_legs(depth * 0.7, width * 0.7, high - 0.02, leg_style(rng, 0.02, 0.035, True), legs),
+        ]
         parts += [mesh.moved(x, y) for mesh in own]
         top = top_support(kind, depth, width, high)
         supports.append(Support((top.low[0] + x, top.low[1] + y), (top.high[0] + x, top.high[1] + y), high))
@@ -180,7 +197,13 @@ def drum_table(rng: np.random.Generator) -> Piece:
     r, high = draw(rng, 0.28, 0.48), draw(rng, 0.3, 0.46)
     look = material(pick(rng, ("wood", "metal", "stone", "painted", "wicker")), rng)
     waist = pick(rng, (1.0, 0.6, 0.75, 1.12))
-    profile = [(r * 0.95, 0.0), (r * (1 + waist) / 2, high * 0.25), (r * waist, high * 0.5), (r * (1 + waist) / 2, high * 0.75), (r, high - 0.02)]
+    profile = [
+        (r * 0.95, 0.0),
+        (r * (1 + waist) / 2, high * 0.25),
+        (r * waist, high * 0.5),
+        (r * (1 + waist) / 2, high * 0.75),
+        (r, high - 0.02),
+    ]
     parts = [lathe(profile, look, sides=20), cylinder(0.0, 0.0, high - 0.02, r * 1.03, 0.02, table_look(rng, 0.2), 20)]
     return finished(parts, supports=[Support((-0.65 * r, -0.65 * r), (0.65 * r, 0.65 * r), high)])
 
@@ -214,7 +237,9 @@ def legged_side(rng: np.random.Generator) -> Piece:
     if chance(rng, 0.5):
         z = high * draw(rng, 0.2, 0.45)
         parts.append(slab(0.0, 0.0, z, depth - 0.04, width - 0.04, 0.015, look))
-        supports.append(Support((-depth * 0.35, -width * 0.35), (depth * 0.35, width * 0.35), z + 0.015, high - z - 0.13))
+        supports.append(
+            Support((-depth * 0.35, -width * 0.35), (depth * 0.35, width * 0.35), z + 0.015, high - z - 0.13)
+        )
     return finished(parts, supports=supports)
 
 
@@ -226,7 +251,12 @@ def c_table(rng: np.random.Generator) -> Piece:
     parts = [table_top("rectangle", depth, width, high, 0.02, look)]
     for s in (1, -1):
         y = s * (width / 2 - t)
-        path = [(depth / 2, y, t / 2), (-depth / 2 + t / 2, y, t / 2), (-depth / 2 + t / 2, y, high - 0.02), (depth / 2, y, high - 0.02)]
+        path = [
+            (depth / 2, y, t / 2),
+            (-depth / 2 + t / 2, y, t / 2),
+            (-depth / 2 + t / 2, y, high - 0.02),
+            (depth / 2, y, high - 0.02),
+        ]
         parts += [strut(path[i], path[i + 1], t, t, frame) for i in range(3)]
     parts.append(slab(-depth / 2 + t / 2, 0.0, 0.0, t, width - t, t, frame))
     return finished(parts, supports=[top_support("rectangle", depth, width, high)])
@@ -237,7 +267,13 @@ def tray_table(rng: np.random.Generator) -> Piece:
     """Return a tray with a rim on crossed or bent legs."""
     r, high = draw(rng, 0.2, 0.3), draw(rng, 0.45, 0.6)
     look, frame = material(pick(rng, ("metal", "wood", "black", "white")), rng), _metal(rng)
-    parts = [lathe([(r, high - 0.03), (r * 1.02, high + 0.02), (r * 0.98, high + 0.02), (r * 0.96, high - 0.02)], look, sides=20)]
+    parts = [
+        lathe(
+            [(r, high - 0.03), (r * 1.02, high + 0.02), (r * 0.98, high + 0.02), (r * 0.96, high - 0.02)],
+            look,
+            sides=20,
+        )
+    ]
     for a in np.linspace(0.0, np.pi, count(rng, 2, 3), endpoint=False).tolist():
         c, s = r * 0.85 * float(np.cos(a)), r * 0.85 * float(np.sin(a))
         parts.append(tube([(c, s, 0.0), (-c, -s, high - 0.03)], 0.009, frame, 5))
@@ -258,7 +294,10 @@ def drawer_console(rng: np.random.Generator) -> Piece:
     tall = draw(rng, 0.1, 0.18)
     (a, b), (d, e) = (-depth / 2, -width / 2), (depth / 2, width / 2)
     under = high - 0.022
-    parts = [box((a, b - 0.015, under), (d + 0.03, e + 0.015, high), look), box((a, b, under - tall), (d, e, under), look)]
+    parts = [
+        box((a, b - 0.015, under), (d + 0.03, e + 0.015, high), look),
+        box((a, b, under - tall), (d, e, under), look),
+    ]
     style = front_style(rng, look)
     for y0, y1 in split(b + 0.03, e - 0.03, [1.0] * count(rng, 1, 3)):
         parts += drawers(rng, style, Room((a, y0, under - tall), (d, y1, under)), [1.0])
@@ -277,7 +316,10 @@ def framed_console(rng: np.random.Generator) -> Piece:
     depth, width, high = _console(rng)
     look = material("glass", rng) if chance(rng, 0.25) else table_look(rng, 0.12)
     frame = _metal(rng)
-    parts = [slab(0.0, 0.0, high - 0.025, depth, width, 0.025, look), *metal_frame(rng, depth, width, high - 0.025, frame)]
+    parts = [
+        slab(0.0, 0.0, high - 0.025, depth, width, 0.025, look),
+        *metal_frame(rng, depth, width, high - 0.025, frame),
+    ]
     for z in np.linspace(0.12, high * 0.55, count(rng, 1, 2)).tolist():
         if chance(rng, 0.7):
             parts.append(slab(0.0, 0.0, z, depth - 0.03, width - 0.03, 0.02, look))
@@ -307,7 +349,12 @@ def half_moon(rng: np.random.Generator) -> Piece:
     for_z = [(flat, high - 0.022), (flat, high)]
     parts = [loft([np.column_stack([ring, np.full(len(ring), z)]) for ring, z in for_z], look)]
     inner = flat * 0.88
-    parts.append(loft([np.column_stack([inner, np.full(len(inner), z)]) for z in (high - draw(rng, 0.09, 0.14), high - 0.02)], look))
+    parts.append(
+        loft(
+            [np.column_stack([inner, np.full(len(inner), z)]) for z in (high - draw(rng, 0.09, 0.14), high - 0.02)],
+            look,
+        )
+    )
     style = leg_style(rng, 0.03, 0.05)
     for a in np.linspace(-1.35, 1.35, count(rng, 3, 4)).tolist():
         x, y = depth * 0.82 * float(np.cos(a)), width * 0.42 * float(np.sin(a))

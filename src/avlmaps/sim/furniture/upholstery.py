@@ -1,5 +1,6 @@
 """Soft parts: seat and back cushions, loose pillows, mattresses, blankets and throws."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,7 +71,7 @@ def cushion_row(
     gap = 0.004
     return [
         cushion((a, float(s) + gap, c), (d, float(t) - gap, f), look, radius, crown)
-        for s, t in zip(edge[:-1], edge[1:], strict=True)
+        for s, t in itertools.pairwise(edge)
     ]
 
 
@@ -81,7 +82,7 @@ def back_cushions(
     (a, b, c), (d, e, f) = low, high
     edge = np.linspace(b, e, number + 1)
     out = []
-    for s, t in zip(edge[:-1], edge[1:], strict=True):
+    for s, t in itertools.pairwise(edge):
         # Made lying, its crowned face up, then set up so that the face looks along +x.
         flat = cushion((c - f, float(s) + 0.004, 0.0), (0.0, float(t) - 0.004, d - a), look, radius, crown)
         out.append(flat.tilted("y", np.pi / 2 - lean).moved(x=a, z=c))
@@ -150,16 +151,16 @@ def blanket(
 
 
 def heap(rng: np.random.Generator, place: Triple, size: float, look: Material) -> Mesh:
-    """Return a cover thrown on a heap: hills over a round patch, lowest at its rim."""
-    n, m = 7, 12
-    radius = np.linspace(0.0, 1.0, n)[:, None]
-    angle = np.linspace(0.0, 2 * np.pi, m)[None, :]
-    noise = _smooth_noise(rng, n, m)
-    noise[:, -1] = noise[:, 0]
-    reach = size * radius * (1 + 0.18 * np.sin(angle * 3 + draw(rng, 0.0, 6.0)) * radius)
-    z = (1 - radius**2) * size * 0.35 * (1 + 0.4 * noise)
-    grid = np.stack([reach * np.cos(angle), reach * np.sin(angle) * 0.8, np.maximum(z, 0.0)], axis=-1) + place
-    return cloth(grid, look)
+    """Return a cover thrown on a heap: hills over a patch with a wavy rim, lowest there."""
+    n = 11
+    u, v = np.meshgrid(np.linspace(-1.0, 1.0, n), np.linspace(-1.0, 1.0, n), indexing="ij")
+    fall = (1 - np.abs(u) ** 2.5) * (1 - np.abs(v) ** 2.5)
+    noise, stretch = _smooth_noise(rng, n, n), draw(rng, 0.7, 1.1)
+    x = u * size * (0.85 + 0.15 * np.cos(2 * v + draw(rng, 0.0, 6.0)))
+    y = v * size * stretch * (0.85 + 0.15 * np.cos(2 * u + draw(rng, 0.0, 6.0)))
+    z = size * fall * (draw(rng, 0.12, 0.3) + 0.14 * noise) + 0.012
+    grid = np.stack([x, y, np.maximum(z, 0.004)], axis=-1)
+    return cloth(grid, look).turned(draw(rng, 0.0, 6.28)).moved(*place)
 
 
 def throw(rng: np.random.Generator, profile: list[tuple[float, float]], y: float, width: float, look: Material) -> Mesh:
