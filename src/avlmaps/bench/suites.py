@@ -4,10 +4,13 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.core.files import write_bytes_atomically
+
+if TYPE_CHECKING:
+    from avlmaps.bench.indexing import IndexingSettings
 
 Table = Mapping[str, Any]  # {"columns": [...], "rows": [[...]]}
 
@@ -25,25 +28,31 @@ class Asked:
         scenes: recordings with poses, for ``locate``.
         profile: which models are measured.
         seed: of what is drawn at random.
+        indexing: what the suite ``indexing`` is run on; its own defaults if None.
     """
 
     sounds: Path | None = None
     scenes: tuple[Path, ...] = ()
     profile: str = "embedded"
     seed: int = 0
+    indexing: "IndexingSettings | None" = None
 
 
 def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
     """Run a suite and write SUITE.json, SUITE.md and SUITE.png into ``out``.
 
     Args:
-        suite: ``words``, ``sounds``, ``segmentation`` or ``locate``.
+        suite: ``words``, ``sounds``, ``segmentation``, ``locate`` or ``indexing``.
         asked: what it measures on.
         out: folder to write into.
 
     Raises:
         BenchError: the folder or recording that the suite needs was not given, or the profile cannot be measured.
     """
+    if suite == "indexing":
+        from avlmaps.bench.indexing.suite import run_indexing
+
+        return run_indexing(asked.indexing, out)
     tables = _SUITES[suite](asked)
     scenes = [source.resolve().name for source in (asked.sounds, *asked.scenes) if source is not None]
     answer = {

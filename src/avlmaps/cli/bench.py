@@ -1,15 +1,38 @@
 """`avlmaps bench`: the quality figures, as JSON, Markdown and a picture."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from tyro.conf import Positional
+from tyro.conf import OmitArgPrefixes, Positional
 
 from avlmaps.cli.output import emit, table_lines
 from avlmaps.cli.verbs import Verb
 
-Suite = Literal["words", "sounds", "segmentation", "locate"]
+if TYPE_CHECKING:
+    from avlmaps.bench.indexing import IndexingSettings
+
+Suite = Literal["words", "sounds", "segmentation", "locate", "indexing"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Indexing:
+    """How the suite indexing makes, records and asks its scenes."""
+
+    hearing: Literal["overlay", "acoustic"] = "overlay"
+    """How sounds reach the microphone: mixed in as the paper did, or through rooms and doorways."""
+    sensor: Literal["clean", "kinect", "realsense"] = "clean"
+    """Whose faults colour and depth have."""
+    frames: int = 600
+    """At most so many frames a scene."""
+    tasks_a_scene: int = 12
+    """At most so many tasks a scene and table."""
+    jobs: int = 0
+    """Scenes side by side; 0 takes as many as there are cores."""
+    tasks: Path | None = None
+    """Ask the tasks of this file instead of making some."""
+    save_tasks: Path | None = None
+    """Write the tasks and their truth into this file."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,28 +42,52 @@ class Bench(Verb):
     words: household phrases kept out of training; needs nothing.
     sounds, segmentation: need --sounds, a folder of clips with an index.csv.
     locate: needs --scenes, recordings with poses; half of the frames become the map, the others are asked.
+    indexing: objects told apart by sounds, photos and areas, in twelve held-out homes or in --scenes by name.
     """
 
     suite: Positional[Suite]
     """What to measure."""
     sounds: Path | None = None
     """Folder of sound clips with an index.csv (path, category, fold)."""
-    scenes: tuple[Path, ...] = ()
-    """Recordings with poses."""
+    scenes: tuple[str, ...] = ()
+    """Recordings with poses (locate); names of scenes such as house:1000000:held-out (indexing)."""
     profile: str = "embedded"
     """Which models are measured."""
     out: Path = Path("bench_out")
     """Folder for SUITE.json, SUITE.md and SUITE.png."""
     seed: int = 0
     """Seed of what is drawn at random."""
+    indexing: Annotated[Indexing, OmitArgPrefixes] = field(default_factory=Indexing)
+    """Of the suite indexing alone."""
 
     def run(self) -> None:
         """Measure, write the tables, print them."""
         from avlmaps.bench.suites import Asked, run_suite
 
-        asked = Asked(sounds=self.sounds, scenes=self.scenes, profile=self.profile, seed=self.seed)
+        indexing = self.indexing_settings() if self.suite == "indexing" else None
+        scenes = () if indexing else tuple(map(Path, self.scenes))
+        asked = Asked(self.sounds, scenes, self.profile, self.seed, indexing)
         answer = run_suite(self.suite, asked, self.out)
         lines: list[str] = []
         for name, table in answer["tables"].items():
             lines += [name, *["  " + line for line in table_lines(table["columns"], table["rows"])]]
         emit(answer, [*lines, f"wrote {self.out}"], self.json)
+
+    def indexing_settings(self) -> "IndexingSettings":
+        """Return what the suite indexing is run on."""
+        from avlmaps.bench.indexing import DEFAULT_SCENES, IndexingSettings
+
+        chosen = self.indexing
+        return IndexingSettings(
+            scenes=self.scenes or DEFAULT_SCENES,
+            profile=self.profile,
+            hearing=chosen.hearing,
+            sounds=self.sounds,
+            sensor=chosen.sensor,
+            frames=chosen.frames,
+            tasks_a_scene=chosen.tasks_a_scene,
+            jobs=chosen.jobs,
+            seed=self.seed,
+            load=chosen.tasks,
+            save=chosen.save_tasks,
+        )

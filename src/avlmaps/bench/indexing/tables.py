@@ -1,0 +1,103 @@
+"""Tables III, IV and V from answers, with the paper's own figures beside them."""
+
+import json
+from collections.abc import Sequence
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from avlmaps.bench.indexing.configurations import OURS, configurations
+from avlmaps.bench.indexing.metrics import LIMITS_M, Score, scored
+from avlmaps.bench.indexing.prepared import kinds_of
+from avlmaps.bench.indexing.runs import Outcome
+from avlmaps.bench.indexing.tasks import TaskKind
+
+NUMBER = {TaskKind.AREA: "Table III", TaskKind.SOUND: "Table IV", TaskKind.PHOTO: "Table V"}
+_PAPER = "paper (Matterport3D, other data)"
+_FIGURES_TO_REACH = {TaskKind.AREA: 60.0, TaskKind.SOUND: 75.0, TaskKind.PHOTO: 85.0}
+
+
+def columns() -> list[str]:
+    """Return what the columns of a table are called."""
+    recalls = [title for limit in LIMITS_M for title in (f"R@1 < {limit:g} m %", "95 %")]
+    return ["configuration", "tasks", *recalls, "mean m", "95 %", "answered %"]
+
+
+def tables(outcome: Outcome) -> dict[str, dict[str, Any]]:
+    """Return every table, ``{name: {"columns", "rows"}}``."""
+    made = {f"{NUMBER[kind]}: {kind}": _table(outcome, kind) for kind in TaskKind}
+    return {**made, "Figures to reach": _figures(outcome), "Scenes": _scenes(outcome)}
+
+
+def _table(outcome: Outcome, kind: TaskKind) -> dict[str, Any]:
+    rows: list[list[Any]] = []
+    for one in configurations(kind):
+        answers = outcome.answers(kind, one.name)
+        if answers:
+            rows.append(_row(one.name, scored(answers, outcome.settings.seed)))
+        else:
+            rows.append([one.name, 0, *[""] * (len(columns()) - 2)])
+    return {"columns": columns(), "rows": [*rows, *_paper_rows(kind)]}
+
+
+def _row(name: str, score: Score) -> list[Any]:
+    recalls: list[Any] = []
+    for limit in LIMITS_M:
+        low, high = score.recall_interval(limit)
+        recalls += [_percent(score.recall(limit)), f"{100 * low:.1f} to {100 * high:.1f}"]
+    mean = [round(score.mean_m, 2), "{:.2f} to {:.2f}".format(*score.mean_interval_m)]
+    return [name, score.count, *recalls, *mean, _percent(score.answered / score.count)]
+
+
+@cache
+def paper_figures() -> dict[str, Any]:
+    """Return the paper's own figures, and where they are from."""
+    text = (files("avlmaps.bench") / "data" / "paper_indexing.json").read_text(encoding="utf-8")
+    return json.loads(text)
+
+
+def _paper_rows(kind: TaskKind) -> list[list[Any]]:
+    rows: list[list[Any]] = []
+    for row in paper_figures()["tables"][str(kind)]:
+        recalls = [cell for figure in row["recall_percent"] for cell in ("" if figure is None else figure, "")]
+        mean = "" if row["mean_m"] is None else row["mean_m"]
+        rows.append([f"{row['name']}, {_PAPER}", row["tasks"] or "", *recalls, mean, "", ""])
+    return rows
+
+
+def _figures(outcome: Outcome) -> dict[str, Any]:
+    """Return how ours stands to what the issue asks for, to the best single modality and to the ceiling."""
+    rows: list[list[Any]] = []
+    for kind in TaskKind:
+        by_role: dict[str, list[float]] = {}
+        for one in configurations(kind):
+            answers = outcome.answers(kind, one.name)
+            if answers:
+                by_role.setdefault(one.role, []).append(100 * scored(answers).recall(LIMITS_M[0]))
+        ours, ceiling = (by_role.get(role, [None])[0] for role in (OURS, "ceiling"))
+        best = max(by_role.get("baseline", []), default=None)
+        lead = None if ours is None or best is None else ours - best
+        share = None if ours is None or not ceiling else 100 * ours / ceiling
+        rows.append([str(kind), _FIGURES_TO_REACH[kind], *[_shown(v) for v in (ours, best, lead, ceiling, share)]])
+    titles = ["table", "asked for %", "ours %", "best single modality %", "lead, points", "ceiling %", "of it %"]
+    return {"columns": titles, "rows": rows}
+
+
+def _scenes(outcome: Outcome) -> dict[str, Any]:
+    rows = [
+        [one.scene, one.frames, one.voxels, f"{one.sounds[0]} of {one.sounds[1]}", *kinds_of(one.tasks).values()]
+        for one in outcome.scenes
+    ]
+    total: Sequence[int] = list(kinds_of(outcome.tasks.tasks).values())
+    return {
+        "columns": ["scene", "frames", "voxels", "sounds found", *map(str, TaskKind)],
+        "rows": [*rows, ["in all", sum(row[1] for row in rows), sum(row[2] for row in rows), "", *total]],
+    }
+
+
+def _percent(share: float) -> float:
+    return round(100.0 * share, 1)
+
+
+def _shown(value: float | None) -> object:
+    return "" if value is None else round(value, 1)
