@@ -180,8 +180,7 @@ def _linear(rng: np.random.Generator) -> Piece:
         slab(0.0, 0.0, 0.006, wide, long, tall, look),
         slab(0.0, 0.0, 0.0, wide * 0.8, long * 0.97, 0.01, shining(rng)),
     ]
-    for side in (-1, 1):
-        parts.append(strut((0.0, side * long * 0.35, tall), (0.0, side * long * 0.2, top), 0.006, 0.006, look))
+    parts += [strut((0.0, s * long * 0.35, tall), (0.0, s * long * 0.2, top), 0.006, 0.006, look) for s in (-1, 1)]
     parts.append(slab(0.0, 0.0, top - 0.02, 0.07, long * 0.45, 0.025, look))
     return finished(parts, [(0.0, side * long * 0.3, 0.0) for side in (-1, 0, 1)])
 
@@ -211,8 +210,9 @@ def _rings(rng: np.random.Generator) -> Piece:
     parts: list[Mesh] = []
     top = number * 0.2 + draw(rng, 0.3, 0.8)
     for _ in range(number):
-        hoop = turned_ring([(radius, z), (radius, z + 0.04), (radius * 0.93, z + 0.04), (radius * 0.93, z), (radius, z)],
-                     glow, sides=28)  # fmt: skip
+        inner = radius * 0.93
+        profile = [(radius, z), (radius, z + 0.04), (inner, z + 0.04), (inner, z), (radius, z)]
+        hoop = turned_ring(profile, glow, sides=28)
         parts += [
             hoop,
             *(tube([(x, y, z + 0.04), (0.0, 0.0, top)], 0.002, rod, 4) for x, y in circle(radius, 3).tolist()),
@@ -231,7 +231,7 @@ def _sputnik(rng: np.random.Generator) -> Piece:
     for number in range(rods):
         z = 1 - 2 * (number + 0.5) / rods
         flat, turn = np.sqrt(1 - z * z), golden * number
-        end = tuple(float(reach * c) for c in (flat * np.cos(turn), flat * np.sin(turn), z))
+        end = (float(reach * flat * np.cos(turn)), float(reach * flat * np.sin(turn)), float(reach * z))
         parts.append(tube([(0.0, 0.0, 0.0), end], 0.005, look, 4))
         parts.append(ellipsoid(end, (0.028, 0.028, 0.028), bulb, 7, 5))
         light.append(end)

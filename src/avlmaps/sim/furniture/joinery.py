@@ -106,7 +106,9 @@ def turned_ring(
 ) -> Mesh:
     """Return what a profile of (radius, z) makes round an upright axis at (x, y), open at both ends."""
     return loft(
-        [np.column_stack([circle(r, sides) + (x, y), np.full(sides, z)]) for r, z in profile], look, capped=False
+        [np.column_stack([circle(r, sides) + np.array([x, y]), np.full(sides, z)]) for r, z in profile],
+        look,
+        capped=False,
     )
 
 

@@ -54,7 +54,9 @@ def _dome(x: float, y: float, z: float, radius: float, look: Material, deep: flo
     """Return a dome open downwards, its rim at z."""
     angle = np.linspace(0.0, np.pi / 2 - 0.12, 6)
     rings = [
-        np.column_stack([circle(radius * float(np.cos(a)), 18) + (x, y), np.full(18, z + deep * radius * np.sin(a))])
+        np.column_stack(
+            [circle(radius * float(np.cos(a)), 18) + np.array([x, y]), np.full(18, z + deep * radius * np.sin(a))]
+        )
         for a in angle
     ]
     return loft(rings, look, capped=False)

@@ -99,10 +99,10 @@ def _screen(rng: np.random.Generator) -> Piece:
         turn = bend if panel % 2 else -bend
         body = [rim((0.0, 0.0), (each, tall), 0.035, (-0.012, 0.012), frame)]
         body.append(box((-0.004, 0.035, 0.1), (0.004, each - 0.035, tall - 0.035), look))
-        for y in np.linspace(0.035, each - 0.035, columns + 1)[1:-1].tolist():
-            body.append(box((-0.01, y - 0.007, 0.035), (0.01, y + 0.007, tall - 0.035), frame))
-        for z in np.linspace(0.1, tall - 0.035, rows + 1)[:-1].tolist():
-            body.append(box((-0.01, 0.035, z - 0.007), (0.01, each - 0.035, z + 0.007), frame))
+        uprights = np.linspace(0.035, each - 0.035, columns + 1)[1:-1].tolist()
+        bars = np.linspace(0.1, tall - 0.035, rows + 1)[:-1].tolist()
+        body += [box((-0.01, y - 0.007, 0.035), (0.01, y + 0.007, tall - 0.035), frame) for y in uprights]
+        body += [box((-0.01, 0.035, z - 0.007), (0.01, each - 0.035, z + 0.007), frame) for z in bars]
         parts.append(joined(body).turned(turn).moved(x, panel * each * float(np.cos(bend))))
         x += each * float(np.sin(bend)) * (1 if panel % 2 == 0 else -1)
     return finished(parts)

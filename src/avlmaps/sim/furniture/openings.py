@@ -4,15 +4,16 @@
 origin, the wall reaches from -wall_m / 2 to wall_m / 2 along x, the room is at +x (doors open to it).
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Families, Piece, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, rim, strut
+from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, rim
+from avlmaps.sim.furniture.leaves import door_leaf, opaque
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
-from avlmaps.sim.shapes import box, ellipsoid, sheet, tube
-
-Rows = list[tuple[float, int, str]]
+from avlmaps.sim.shapes import box, sheet
 
 DOOR_STYLES: dict[Families, tuple[str, ...]] = {
     "training": ("panel", "flush", "glazed", "half-glazed", "grooved"),
@@ -30,151 +31,6 @@ FOLDING_STYLES: dict[Families, tuple[str, ...]] = {
 
 def _styles(known: dict[Families, tuple[str, ...]], which: Families) -> tuple[str, ...]:
     return known["training"] + known["held-out"] if which == "all" else known[which]
-
-
-def _opaque(rng: np.random.Generator) -> Material:
-    """Draw what a door or a frame is made of: mostly white or wood."""
-    kind = pick(rng, ("white", "wood", "wood", "painted", "white"))
-    return material(kind, rng)
-
-
-def _rows(rng: np.random.Generator, style: str) -> Rows:
-    """Draw rows of fields from the bottom up: share of the height, number of columns, what fills them."""
-    columns = count(rng, 1, 3)
-    if style == "glazed":
-        if chance(rng, 0.3):
-            return [(1.0, 1, "glass")]
-        rows: Rows = [(1.0, columns, "glass") for _ in range(count(rng, 2, 5))]
-        return [(draw(rng, 0.5, 1.5), 1, "panel"), *rows] if chance(rng, 0.4) else rows
-    if style == "half-glazed":
-        lower, upper = draw(rng, 0.4, 0.7), count(rng, 1, 3)
-        return [(lower, count(rng, 1, 2), "panel"), *[((1 - lower) / upper, columns, "glass")] * upper]
-    if style == "louvre":
-        return [(1.0, 1, "louvre")] * count(rng, 1, 3)
-    layouts: tuple[Rows, ...] = (
-        [(0.42, 2, "panel"), (0.42, 2, "panel"), (0.16, 2, "panel")],
-        [(0.42, 1, "panel"), (0.58, 1, "panel")],
-        [(0.35, 2, "panel"), (0.65, 2, "panel")],
-        [(0.2, 1, "panel")] * 5,
-        [(0.4, 1, "panel"), (0.15, 1, "panel"), (0.45, 1, "panel")],
-    )
-    return pick(rng, layouts)
-
-
-def _field(rng: np.random.Generator, low: tuple[float, float], high: tuple[float, float], thick: float, fill: str,
-           look: Material, glass: Material, raised: float) -> Mesh:  # fmt: skip
-    (a, b), (c, d) = low, high
-    if fill == "glass":
-        return sheet((0.0, a, b), (0.0, c - a, 0.0), (0.0, 0.0, d - b), glass, fill=True)
-    if fill == "louvre":
-        slats = max(int((d - b) / 0.055), 1)
-        height = (d - b) / slats
-        return joined(
-            [
-                sheet((-thick * 0.35, a, b + i * height), (0.0, c - a, 0.0), (thick * 0.7, 0.0, height * 1.1), look)
-                for i in range(slats)
-            ]
-        )
-    parts = [box((-thick * 0.22, a, b), (thick * 0.22, c, d), look)]
-    inset = min(0.04, (c - a) * 0.2, (d - b) * 0.2)
-    if raised:
-        parts.append(box((-raised, a + inset, b + inset), (raised, c - inset, d - inset), look))
-    return joined(parts)
-
-
-def _gridded(rng: np.random.Generator, width: float, height: float, thick: float, rows: Rows, look: Material) -> Mesh:
-    """Return a leaf of stiles and rails with fields between; hinge edge at y = 0, middle of its thickness at x = 0."""
-    stile, bar = min(draw(rng, 0.07, 0.13), width * 0.22), draw(rng, 0.025, 0.1)
-    if rows[0][2] == "glass" or rows[-1][2] == "glass":
-        bar = draw(rng, 0.018, 0.045)
-    glass = material("glass", rng)
-    raised = thick * draw(rng, 0.3, 0.42) if chance(rng, 0.6) else 0.0
-    foot = stile * draw(rng, 1.0, 2.2)
-    parts = [
-        box((-thick / 2, 0.0, 0.0), (thick / 2, stile, height), look),
-        box((-thick / 2, width - stile, 0.0), (thick / 2, width, height), look),
-        box((-thick / 2, stile, 0.0), (thick / 2, width - stile, foot), look),
-        box((-thick / 2, stile, height - stile), (thick / 2, width - stile, height), look),
-    ]
-    total, z = sum(row[0] for row in rows), foot
-    free = height - foot - stile - bar * (len(rows) - 1)
-    for number, (share, columns, fill) in enumerate(rows):
-        top = z + free * share / total
-        if number < len(rows) - 1:
-            parts.append(box((-thick / 2, stile, top), (thick / 2, width - stile, top + bar), look))
-        field = (width - 2 * stile - bar * (columns - 1)) / columns
-        for column in range(columns):
-            y = stile + column * (field + bar)
-            parts.append(_field(rng, (y, z), (y + field, top), thick, fill, look, glass, raised))
-            if column:
-                parts.append(box((-thick / 2, y - bar, z), (thick / 2, y, top), look))
-        z = top + bar
-    return joined(parts)
-
-
-def _flat(rng: np.random.Generator, width: float, height: float, thick: float, look: Material, style: str) -> Mesh:
-    """Return a flush leaf, one with grooves, or one of planks, placed as `_gridded` does."""
-    if style == "plank":
-        boards = max(int(width / draw(rng, 0.09, 0.16)), 2)
-        each = width / boards
-        parts = [
-            box((-thick / 2, i * each + 0.003, 0.0), (thick / 2 - 0.004, (i + 1) * each - 0.003, height), look)
-            for i in range(boards)
-        ]
-        levels = [0.12 * height, 0.85 * height] + ([0.48 * height] if chance(rng, 0.6) else [])
-        parts += [box((0.0, 0.03, z), (thick / 2 + 0.02, width - 0.03, z + 0.11), look) for z in levels]
-        if chance(rng, 0.6):
-            low, high = (thick / 2 + 0.008, 0.08, 0.16 * height), (thick / 2 + 0.008, width - 0.08, 0.86 * height)
-            parts.append(strut(low, high, 0.022, 0.1, look))
-        return joined(parts)
-    parts = [box((-thick / 2, 0.0, 0.0), (thick / 2, width, height), look)]
-    if style == "grooved":
-        line = material(pick(rng, ("metal", "black", "wood")), rng)
-        deep, upright = thick / 2 + 0.002, chance(rng, 0.3)
-        for at in np.linspace(0.0, 1.0, count(rng, 2, 6) + 2)[1:-1].tolist():
-            low = (at * width, 0.0) if upright else (0.0, at * height)
-            high = (low[0] + 0.012, height) if upright else (width, low[1] + 0.012)
-            parts.append(box((-deep, *low), (deep, *high), line))
-    elif chance(rng, 0.25):  # a small window or a letter plate
-        z = height * draw(rng, 0.62, 0.7)
-        y, tall = width * draw(rng, 0.35, 0.65), height * draw(rng, 0.05, 0.25)
-        glass = material("glass", rng)
-        parts.append(box((-thick / 2 - 0.002, y - 0.07, z), (thick / 2 + 0.002, y + 0.07, z + tall), glass))
-    return joined(parts)
-
-
-def _handle(rng: np.random.Generator, y: float, z: float, thick: float, towards: float) -> Mesh:
-    """Return handles on both sides at (y, z); ``towards`` is the side (+1 or -1 along y) that a lever points to."""
-    metal, kind = material("metal", rng), pick(rng, ("lever", "knob", "bar", "plate"))
-    parts = []
-    for side in (-1.0, 1.0):
-        face, out = side * thick / 2, side * (thick / 2 + 0.05)
-        near, far = min(face, face + side * 0.008), max(face, face + side * 0.008)
-        if kind == "bar":
-            reach = draw(rng, 0.1, 0.3)
-            path = [(face, y, z - reach), (out, y, z - reach), (out, y, z + reach), (face, y, z + reach)]
-            parts.append(tube(path, 0.009, metal, sides=6))
-            continue
-        tall = 0.1 if kind == "plate" else 0.026
-        parts.append(box((near, y - 0.024, z - tall), (far, y + 0.024, z + tall), metal))
-        parts.append(tube([(face, y, z), (out, y, z)], 0.009, metal, sides=6))
-        if kind == "knob":
-            parts.append(ellipsoid((out, y, z), (0.022, 0.028, 0.028), metal, 8, 5))
-        else:
-            parts.append(strut((out, y - towards * 0.01, z), (out, y + towards * 0.11, z), 0.014, 0.02, metal))
-    return joined(parts)
-
-
-def _leaf(rng: np.random.Generator, width: float, height: float, style: str, look: Material, handle: bool) -> Mesh:
-    """Return a leaf whose hinge is the z axis and which reaches to y = ``width``."""
-    thick = draw(rng, 0.032, 0.05)
-    if style in ("plank", "flush", "grooved"):
-        body = _flat(rng, width, height, thick, look, style)
-    else:
-        body = _gridded(rng, width, height, thick, _rows(rng, style), look)
-    if not handle:
-        return body
-    return joined([body, _handle(rng, width - min(0.06, width * 0.15), draw(rng, 0.46, 0.52) * height, thick, -1.0)])
 
 
 def _casing(rng: np.random.Generator, width: float, height: float, wall: float, look: Material) -> tuple[Mesh, float]:
@@ -213,20 +69,20 @@ def door(rng: np.random.Generator, width_m: float, height_m: float, wall_m: floa
         The door, the middle of the hole's lower edge at the origin.
     """
     style = pick(rng, _styles(DOOR_STYLES, which)) if style is None else style
-    look = _opaque(rng)
-    frame, lining = _casing(rng, width_m, height_m, wall_m, look if chance(rng, 0.7) else _opaque(rng))
+    look = opaque(rng)
+    frame, lining = _casing(rng, width_m, height_m, wall_m, look if chance(rng, 0.7) else opaque(rng))
     gap = 0.003
     room, tall = width_m - 2 * lining - 2 * gap, height_m - lining - gap - 0.008
     hinge = wall_m / 2 - 0.028
     if width_m > 1.2:
         state = rng.bit_generator.state
-        left = _leaf(rng, room / 2 - gap, tall, style, look, handle=True)
+        left = door_leaf(rng, room / 2 - gap, tall, style, look, handle=True)
         rng.bit_generator.state = state  # the same draws again: both leaves look alike
-        right = _leaf(rng, room / 2 - gap, tall, style, look, handle=True).scaled(1.0, -1.0, 1.0)
+        right = door_leaf(rng, room / 2 - gap, tall, style, look, handle=True).scaled(1.0, -1.0, 1.0)
         leaves = [left.turned(-open_rad).moved(hinge, -room / 2, 0.008)]
         leaves.append(right.turned(open_rad * draw(rng, 0.0, 1.0)).moved(hinge, room / 2, 0.008))
     else:
-        leaf = _leaf(rng, room, tall, style, look, handle=True).turned(-open_rad).moved(hinge, -room / 2, 0.008)
+        leaf = door_leaf(rng, room, tall, style, look, handle=True).turned(-open_rad).moved(hinge, -room / 2, 0.008)
         leaves = [leaf.scaled(1.0, -1.0, 1.0) if chance(rng, 0.5) else leaf]
     return Piece(joined([frame, *leaves]), category="door", family=style)
 
@@ -237,11 +93,10 @@ def _panes(rng: np.random.Generator, low: tuple[float, float], high: tuple[float
     bar, thin = draw(rng, 0.035, 0.07), draw(rng, 0.016, 0.03)
     (a, b), (c, d) = low, high
     parts = [rim(low, high, bar, x, look)]
-    for y in np.linspace(a + bar, c - bar, columns + 1)[1:-1].tolist():
-        parts.append(box((x[0], y - thin / 2, b + bar), (x[1], y + thin / 2, d - bar), look))
-    for z in np.linspace(b + bar, d - bar, rows + 1)[1:-1].tolist():
-        parts.append(box((x[0], a + bar, z - thin / 2), (x[1], c - bar, z + thin / 2), look))
-    return parts
+    uprights = np.linspace(a + bar, c - bar, columns + 1)[1:-1].tolist()
+    levels = np.linspace(b + bar, d - bar, rows + 1)[1:-1].tolist()
+    parts += [box((x[0], y - thin / 2, b + bar), (x[1], y + thin / 2, d - bar), look) for y in uprights]
+    return parts + [box((x[0], a + bar, z - thin / 2), (x[1], c - bar, z + thin / 2), look) for z in levels]
 
 
 def _sashes(rng: np.random.Generator, width: float, height: float, x: float, style: str, look: Material) -> list[Mesh]:
@@ -267,7 +122,7 @@ def _sashes(rng: np.random.Generator, width: float, height: float, x: float, sty
     leaves = max(2 if style == "french" else 1, round(width / draw(rng, 0.5, 0.8)))
     rows = count(rng, 2, 4) if style == "french" and chance(rng, 0.6) else count(rng, 1, 2)
     parts, edges, metal = [], np.linspace(-y, y, leaves + 1).tolist(), material("metal", rng)
-    for a, c in zip(edges, edges[1:], strict=False):
+    for a, c in pairwise(edges):
         parts += _panes(rng, (a, foot), (c, top), thin, 1, rows, look)
         parts.append(box((x + 0.025, c - 0.035, top * 0.45), (x + 0.045, c - 0.015, top * 0.45 + 0.12), metal))
         if style == "transom":
@@ -346,8 +201,8 @@ def folding_door(rng: np.random.Generator, width_m: float, height_m: float, wall
         The door, the middle of the hole's lower edge at the origin.
     """
     style = pick(rng, _styles(FOLDING_STYLES, which)) if style is None else style
-    look = _opaque(rng)
-    frame, lining = _casing(rng, width_m, height_m, wall_m, look if chance(rng, 0.6) else _opaque(rng))
+    look = opaque(rng)
+    frame, lining = _casing(rng, width_m, height_m, wall_m, look if chance(rng, 0.6) else opaque(rng))
     room, tall = width_m - 2 * lining, height_m - lining - 0.03
     if style == "accordion":
         leaves = max(round(room / draw(rng, 0.09, 0.16)), 4)
@@ -361,7 +216,7 @@ def folding_door(rng: np.random.Generator, width_m: float, height_m: float, wall
         each = room / pairs / leaves - 0.002
         bend = draw(rng, 0.08, 1.3)
         kind = {"bifold panel": pick(rng, ("panel", "flush")), "bifold glazed": "glazed"}.get(style, "louvre")
-        stack = _folded(_leaf(rng, each, tall, kind, look, handle=False), each, leaves, bend)
+        stack = _folded(door_leaf(rng, each, tall, kind, look, handle=False), each, leaves, bend)
     shift = draw(rng, -0.3, 0.2) * wall_m
     hung = [stack.moved(shift, -room / 2, 0.012)]
     if pairs == 2:

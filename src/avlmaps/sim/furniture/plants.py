@@ -4,7 +4,7 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.joinery import blade, chance, count, draw, finished, pick
-from avlmaps.sim.furniture.decor import flowers
+from avlmaps.sim.furniture.vases import flowers
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh
 from avlmaps.sim.shapes import box, circle, cylinder, ellipsoid, lathe, loft, rounded_rectangle, slab, tube
@@ -87,12 +87,13 @@ def _palm(rng: np.random.Generator) -> Piece:
 @family("plant", "feather palm")
 def _feather_palm(rng: np.random.Generator) -> Piece:
     height = draw(rng, 0.9, 2.0)
-    parts, radius, earth = _pot_for(rng, height)
+    parts, _, earth = _pot_for(rng, height)
     green, stems = _greens(rng), count(rng, 5, 8)
     for number in range(stems):
         turn, out = number * 2.4, height * draw(rng, 0.15, 0.35)
         rise = height * draw(rng, 0.7, 1.0)
-        path = [(out * s * s * float(np.cos(turn)), out * s * s * float(np.sin(turn)), earth + (rise - 0.25 * rise * s) * s)
+        c, d = out * float(np.cos(turn)), out * float(np.sin(turn))
+        path = [(c * s * s, d * s * s, earth + rise * (1 - 0.25 * s) * s)
                 for s in (0.0, 0.3, 0.55, 0.75, 0.9, 1.0)]  # fmt: skip
         look = pick(rng, green)
         parts.append(tube(path, 0.006, look, 3))
@@ -107,7 +108,7 @@ def _feather_palm(rng: np.random.Generator) -> Piece:
 @family("plant", "bush")
 def _bush(rng: np.random.Generator) -> Piece:
     height = draw(rng, 0.25, 0.9)
-    parts, radius, earth = _pot_for(rng, height * 1.4)
+    parts, _, earth = _pot_for(rng, height * 1.4)
     green, leaves = _greens(rng), count(rng, 40, 80)
     size = height * draw(rng, 0.14, 0.24)
     spread = height * draw(rng, 0.35, 0.55)
@@ -126,7 +127,7 @@ def _bush(rng: np.random.Generator) -> Piece:
 @family("plant", "fern")
 def _fern(rng: np.random.Generator) -> Piece:
     height = draw(rng, 0.2, 0.7)
-    parts, radius, earth = _pot_for(rng, height * 1.3)
+    parts, _, earth = _pot_for(rng, height * 1.3)
     green, fronds, wide = _greens(rng), count(rng, 18, 34), draw(rng, 0.012, 0.06)
     for number in range(fronds):
         out, rise = height * draw(rng, 0.4, 0.95), height * draw(rng, 0.7, 1.9)
@@ -211,7 +212,7 @@ def _small_pot(rng: np.random.Generator) -> Piece:
 @family("plant", "tree")
 def _tree(rng: np.random.Generator) -> Piece:
     height = draw(rng, 0.9, 1.9)
-    parts, radius, earth = _pot_for(rng, height * 0.9)
+    parts, _, earth = _pot_for(rng, height * 0.9)
     green, bark = _greens(rng), material("wood", rng, (draw(rng, 0.25, 0.5), draw(rng, 0.2, 0.35), 0.18))
     fork, thick = earth + height * draw(rng, 0.35, 0.6), draw(rng, 0.01, 0.025)
     bend = rng.uniform(-0.05, 0.05, 2).tolist()
@@ -233,7 +234,7 @@ def _tree(rng: np.random.Generator) -> Piece:
 @family("plant", "big leaves", held_out=True)
 def _big_leaves(rng: np.random.Generator) -> Piece:
     height = draw(rng, 0.5, 1.7)
-    parts, radius, earth = _pot_for(rng, height)
+    parts, _, earth = _pot_for(rng, height)
     green, size = _greens(rng), height * draw(rng, 0.22, 0.36)
     for number in range(count(rng, 7, 15)):
         turn, out = number * 2.4, height * draw(rng, 0.08, 0.3)
@@ -292,7 +293,8 @@ def _wall_trailing(rng: np.random.Generator) -> Piece:
     parts = [*pot(rng, radius, tall), *_vines(rng, radius, tall * 0.95, room)]
     inside = [part.moved(x=x) for part in parts]
     reach = x + radius
-    return finished([*(m for m in inside if float(m.low[0]) > 0.0), box((0.0, -0.012, -0.02), (reach, 0.012, 0.0), look),
+    return finished([*(m for m in inside if float(m.low[0]) > 0.0),
+                     box((0.0, -0.012, -0.02), (reach, 0.012, 0.0), look),
                      box((0.0, -0.015, -0.12), (0.01, 0.015, 0.04), look)])  # fmt: skip
 
 
