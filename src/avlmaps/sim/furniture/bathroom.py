@@ -4,20 +4,20 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.fittings import (
-    body, chrome, face, knob, outline, shell, spindle, tap,
+    Level, chrome, outline, shell, tap,
 )  # fmt: skip
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, pictured
+from avlmaps.sim.furniture.joinery import chance, cloth, draw, finished, pick, pictured
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined
-from avlmaps.sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, slab, tube
+from avlmaps.sim.shapes import box, cylinder, ellipsoid, loft, polygon, rounded_box, slab, tube
 
 
 def china(rng: np.random.Generator) -> Material:
     """Draw sanitary ware: white mostly, an old pastel or black at times."""
     if chance(rng, 0.82):
-        return material("ceramic", rng, (w := draw(rng, 0.86, 0.97), w, w * draw(rng, 0.95, 1.0)))
+        return material(pick(rng, ("white", "white", "white", "ceramic")), rng, (w := draw(rng, 0.86, 0.97), w, w * draw(rng, 0.95, 1.0)))
     old = ((0.72, 0.82, 0.75), (0.85, 0.72, 0.7), (0.9, 0.85, 0.7), (0.6, 0.72, 0.82), (0.12, 0.12, 0.13))
-    return material("ceramic", rng, pick(rng, old))
+    return material("white", rng, pick(rng, old))
 
 
 def _seat(rng: np.random.Generator, length: float, wide: float, power: float, z: float, x: float,
@@ -168,7 +168,6 @@ def _one_piece(rng: np.random.Generator) -> Piece:
 def _washing_seat(rng: np.random.Generator) -> Piece:
     (length, wide, rim_z, _), look = _sizes(rng), china(rng)
     total, power = length + draw(rng, 0.12, 0.2), draw(rng, 3.0, 5.0)
-    middle = (total / 2, 0.0)
     levels = [(outline(total * a, wide * b, power, 22, 0.07, (total / 2 - total * (1 - a) / 2, 0.0)), z)
               for a, b, z in ((0.86, 0.8, 0.0), (0.9, 0.82, 0.3 * rim_z), (1.0, 0.98, 0.8 * rim_z), (1.0, 1.0, rim_z))]  # fmt: skip
     back = draw(rng, 0.12, 0.2)
@@ -176,7 +175,6 @@ def _washing_seat(rng: np.random.Generator) -> Piece:
              *_seat(rng, total - back - 0.01, wide, power, rim_z + 0.003, back, look)]  # fmt: skip
     if chance(rng, 0.5):
         parts.append(slab(back + 0.16, wide / 2 + 0.03, rim_z - 0.01, 0.22, 0.06, 0.05, look))
-    del middle
     return finished(parts)
 
 
@@ -198,6 +196,12 @@ def _high_tank(rng: np.random.Generator) -> Piece:
     return finished(parts)
 
 
+def open_bowl(levels: list[Level], look: Material) -> list[Mesh]:
+    """Return a hollow that is open above: the skin through its levels, from the rim inwards, and its floor."""
+    flat, z = levels[-1]
+    return [shell(levels, look, capped=False), polygon(np.column_stack([flat, np.full(len(flat), z)]), look)]
+
+
 def _tub(low: Triple, high: Triple, power: float, wall: float, look: Material, skirt: Material, deep: float,
          tilt: float = 0.12) -> list[Mesh]:  # fmt: skip
     """Return a tub with a hollow between two corners; ``power`` squares the hollow, ``tilt`` slants its low-y end."""
@@ -206,12 +210,13 @@ def _tub(low: Triple, high: Triple, power: float, wall: float, look: Material, s
     outer = outline(wide, long, 30.0, 28, middle=middle)
     inner = (wide - 2 * wall, long - 2 * wall)
     shift = tilt * long / 4
-    rim_part = shell([(outer, f - 0.03), (outer, f), (outline(*inner, power, 28, middle=middle), f),
-                      (outline(inner[0] * 0.93, inner[1] * (0.96 - tilt / 2), power, 28, middle=(middle[0], middle[1] + shift / 2)), f - deep * 0.5),
-                      (outline(inner[0] * 0.8, inner[1] * (0.86 - tilt), power, 28, middle=(middle[0], middle[1] + shift)), f - deep)], look)  # fmt: skip
+    foot = outline(inner[0] * 0.8, inner[1] * (0.86 - tilt), power, 28, middle=(middle[0], middle[1] + shift))
+    half = outline(inner[0] * 0.93, inner[1] * (0.96 - tilt / 2), power, 28, middle=(middle[0], middle[1] + shift / 2))
+    rim_part = open_bowl([(outer, f - 0.03), (outer, f), (outline(*inner, power, 28, middle=middle), f),
+                          (half, f - deep * 0.5), (foot, f - deep)], look)  # fmt: skip
     sides = [box((a, b, c), (a + 0.02, e, f - 0.03), skirt), box((d - 0.02, b, c), (d, e, f - 0.03), skirt),
              box((a, b, c), (d, b + 0.02, f - 0.03), skirt), box((a, e - 0.02, c), (d, e, f - 0.03), skirt)]  # fmt: skip
-    return [rim_part, *sides]
+    return [*rim_part, *sides]
 
 
 def _tub_tap(rng: np.random.Generator, x: float, y: float, z: float, metal: Material) -> list[Mesh]:
@@ -281,7 +286,6 @@ def _free_tub(rng: np.random.Generator, wide: float, long: float, z: tuple[float
         flat = outline(wide * scale, long * (0.3 + 0.7 * scale) if scale < 1 else long * scale, power, 28)
         return np.column_stack([flat, z_at + swing * (2 * flat[:, 1] / long) ** 2])
 
-    from avlmaps.sim.shapes import loft
 
     mid = low + 0.5 * (high - low)
     outer = [
@@ -290,7 +294,9 @@ def _free_tub(rng: np.random.Generator, wide: float, long: float, z: tuple[float
         ring(1.0, high - 0.02, lift),
         ring(1.02, high, lift),
     ]
-    hollow = [ring(0.92, high, lift), ring(0.86, high - 0.05, lift), ring(0.74, low + 0.12, 0.0)]
+    floor = low + 0.1
+    narrow = foot + (1 - foot) * 0.5 * (floor - low) / (mid - low) - 0.07
+    hollow = [ring(0.92, high, lift), ring(0.44 + foot / 2, mid, 0.3 * lift), ring(narrow, floor, 0.0)]
     return [loft(outer, look, capped=False), loft([outer[0], outer[0] * (1e-3, 1e-3, 1.0)], look, capped=False),
             loft([outer[-1], *hollow, hollow[-1] * (1e-3, 1e-3, 1.0)], inside, capped=False)]  # fmt: skip
 
@@ -326,27 +332,18 @@ def _clawfoot(rng: np.random.Generator) -> Piece:
 @family("bathtub", "corner")
 def _corner_tub(rng: np.random.Generator) -> Piece:
     side, high, look = draw(rng, 1.2, 1.55), draw(rng, 0.5, 0.62), china(rng)
-    n, bow = 28, draw(rng, 0.05, 0.35)
-    arc = np.linspace(0.0, np.pi / 2, n - 5)
-    short = draw(rng, 0.25, 0.45) * side
-    start, end = np.array([side, short]), np.array([short, side])
-    flat = (
-        start
-        + (end - start) * (arc / (np.pi / 2))[:, None]
-        + bow * np.sin(2 * arc)[:, None] * 0.5 * np.array([0.707, 0.707])
-    )
-    corner = np.array([(0.0, side), (0.0, side / 2), (0.0, 0.0), (side / 2, 0.0), (side, 0.0)])
-    outer = np.concatenate([flat, corner])
+    short, bow = draw(rng, 0.3, 0.55) * side, draw(rng, 0.0, 0.3) * side
+    along = np.linspace(0.0, 1.0, 20)[:, None]
+    front = (1 - along) * (side, short) + along * (short, side) + bow * np.sin(np.pi * along) * 0.35
+    outer = np.concatenate([front, [(0.0, side), (0.0, side / 2), (0.0, 0.0), (side / 2, 0.0), (side, 0.0)]])
     middle = outer.mean(axis=0)
-    hollow = outline(side * 0.72, side * 0.72, 2.0, n, middle=(0.0, 0.0))
-    hollow = hollow @ np.array([[0.707, 0.707], [-0.707, 0.707]]) * (1.15, 1.0) if chance(rng, 0.4) else hollow
-    order = np.argsort(np.arctan2(*(outer - middle).T[::-1]))
-    outer = outer[order]
-    hollow = hollow[np.argsort(np.arctan2(hollow[:, 1], hollow[:, 0]))] + middle
+    toward = outer - middle
+    reach = np.linalg.norm(toward, axis=1, keepdims=True)
+    hollow = middle + toward / reach * np.minimum(0.82 * reach, draw(rng, 0.36, 0.44) * side)
     skirt = look if chance(rng, 0.6) else pictured("tile", rng, "ceramic")
     parts = [shell([(outer, 0.0), (outer, high - 0.03)], skirt, capped=False),
-             shell([(outer, high - 0.03), (outer, high), (hollow, high), (middle + (hollow - middle) * 0.9, high - 0.2),
-                    (middle + (hollow - middle) * 0.72, high - 0.38)], look)]  # fmt: skip
+             *open_bowl([(outer, high - 0.03), (outer, high), (hollow, high), (middle + (hollow - middle) * 0.92, high - 0.2),
+                         (middle + (hollow - middle) * 0.74, high - 0.38)], look)]  # fmt: skip
     return finished([joined(parts).moved(y=-side / 2)])
 
 
@@ -566,5 +563,3 @@ def _wall_rail(rng: np.random.Generator) -> Piece:
     rail = joined(_rail(rng, 0.0, 0.0, draw(rng, 1.9, 2.1), metal))
     return finished([rail])
 
-
-_ = (body, face, knob, spindle, lathe, count)

@@ -128,6 +128,7 @@ def _vanity(rng: np.random.Generator) -> Piece:
     bowl = (deep - draw(rng, 0.14, 0.18), draw(rng, 0.36, min(0.6, 0.85 * wide / len(bowls))))
     parts = _plate_with_bowls(deep, wide, z, 0.03, bowls, bowl, pick(rng, (2.2, 4.0, 8.0)), draw(rng, 0.1, 0.15), plate, look, 0.04)
     parts += _cabinet(rng, deep - 0.02, wide - 0.02, (lift, z - 0.17))
+    parts.append(box((0.0, -wide / 2 + 0.01, z - 0.17), (0.01, wide / 2 - 0.01, z - 0.03), plate))
     parts += [box((0.0, -wide / 2 + 0.01, z - 0.17), (deep - 0.02, wide / 2 - 0.01, z - 0.165), plate),
               box((deep - 0.035, -wide / 2 + 0.01, z - 0.17), (deep - 0.02, wide / 2 - 0.01, z - 0.03), plate)]  # fmt: skip
     parts += [box((0.0, s * (wide / 2 - 0.02) - 0.01, z - 0.17), (deep - 0.02, s * (wide / 2 - 0.02) + 0.01, z - 0.03), plate) for s in (-1, 1)]
@@ -244,6 +245,7 @@ def _sink_cabinet(rng: np.random.Generator) -> Piece:
     half, columns = wide / 2, max(1, round(wide / 0.5))
     parts += [box((0.0, -half, 0.1), (deep - 0.03, -half + 0.018, z - 0.035), style.look), box((0.0, half - 0.018, 0.1), (deep - 0.03, half, z - 0.035), style.look),
               box((0.0, -half, 0.0), (deep - 0.08, half, 0.1), material("black", rng)), box((0.0, -half, 0.1), (deep - 0.03, half, 0.12), style.look)]  # fmt: skip
+    parts.append(box((0.0, -half, 0.1), (0.008, half, z - 0.035), style.look))
     cuts = np.linspace(-half, half, columns + 1)
     for i in range(columns):
         parts += front(style, deep - 0.03, (float(cuts[i]), 0.1), (float(cuts[i + 1]), z - 0.035), "left" if i % 2 == 0 else "right", "top")
