@@ -10,7 +10,16 @@ from hypothesis import strategies as st
 from avlmaps.core.camera import Pinhole
 from avlmaps.sim.render import View
 from avlmaps.sim.sensor import (
-    CLEAN, KINECT, PRESETS, ColourFaults, DepthFaults, OdometryFaults, Sensor, SensorError, SensorSettings, Shift,
+    CLEAN,
+    KINECT,
+    PRESETS,
+    ColourFaults,
+    DepthFaults,
+    OdometryFaults,
+    Sensor,
+    SensorError,
+    SensorSettings,
+    Shift,
     drifted,
 )  # fmt: skip
 
@@ -90,7 +99,9 @@ def test_edges_lose_pixels_and_flat_places_none():
     assert not lost[:, 162:].any()
 
 
-@pytest.mark.parametrize(("strength", "distance", "seen"), [(255, 2.0, True), (20, 2.0, False), (20, 0.6, True), (255, 6.5, False)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("strength", "distance", "seen"), [(255, 2.0, True), (20, 2.0, False), (20, 0.6, True), (255, 6.5, False)]
+)
 def test_dark_slanted_or_far_surfaces_send_too_little_back(strength, distance, seen):
     depth = depth_with(flat(distance, strength), weakest=0.04)
     assert (depth > 0).all() == seen
