@@ -58,7 +58,7 @@ class Tour:
 
     path: Float[np.ndarray, "n 2"]
     stop: Int[np.ndarray, " k"]
-    purpose: tuple[Int[np.ndarray, " m"], ...]
+    purpose: tuple[Int[np.ndarray, " _"], ...]
     target: Float[np.ndarray, "t 2"]
     in_sight: Bool[np.ndarray, "n t"]
 
@@ -172,4 +172,4 @@ def sweep(headings: Float[np.ndarray, " m"], heading: float, seen_rad: float) ->
 
 def _wrapped(angle_rad: np.ndarray | float) -> np.ndarray:
     """Return angles within a half turn of 0."""
-    return (np.asarray(angle_rad) + np.pi) % (2 * np.pi) - np.pi
+    return np.asarray((np.asarray(angle_rad) + np.pi) % (2 * np.pi) - np.pi)

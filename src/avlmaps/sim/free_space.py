@@ -75,7 +75,7 @@ class FreeSpace:
         cell = self.cell_of(xy)
         inside = np.all((cell >= 0) & (cell < self.free.shape), axis=-1)
         i, j = np.moveaxis(np.where(inside[..., None], cell, 0), -1, 0)
-        return inside & self.free[i, j]
+        return np.asarray(inside & self.free[i, j])
 
     def nearest(self, xy: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
         """Return the free place nearest to a place as the crow flies: the place itself where it is free.

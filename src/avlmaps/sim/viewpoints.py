@@ -65,7 +65,7 @@ class Viewpoints:
     """
 
     place: Float[np.ndarray, "k 2"]
-    purpose: tuple[Int[np.ndarray, " m"], ...]
+    purpose: tuple[Int[np.ndarray, " _"], ...]
 
 
 def viewpoints(
