@@ -31,9 +31,9 @@ def _shell(builder: SceneBuilder, x: float, y: float) -> None:
 
 
 def open_air() -> Scene:
-    """Return a lawn of 40 m with nothing on it."""
+    """Return a lawn of 26 m with nothing on it."""
     builder = SceneBuilder("lawn")
-    builder.add("floor", sheet((-20.0, -20.0, 0.0), (40.0, 0.0, 0.0), (0.0, 40.0, 0.0), _PAINT))
+    builder.add("floor", sheet((-13.0, -13.0, 0.0), (26.0, 0.0, 0.0), (0.0, 26.0, 0.0), _PAINT))
     return builder.build()
 
 

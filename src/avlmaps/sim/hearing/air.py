@@ -18,6 +18,7 @@ _BAND_M = (1.0, 1.7)  # above the floor: over tables, under the heads of doors
 _TALL_M = 1.5
 _BETWEEN_ROOMS = 4  # cells: the polygons of two rooms are no more than twice this apart
 _MARGIN = 8
+_THICKEST_M = 0.35  # two faces that are closer together are one wall's
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +72,7 @@ class Air:
         room = np.full(shape, -1, np.int64)
         for index, area in enumerate(areas):
             room[area.contains(middle)] = index
+        solid = _filled(solid, room >= 0)
         if (room >= 0).any():  # doorways lie between rooms, and belong to the nearer one
             indoors = ndimage.binary_closing(room >= 0, iterations=_BETWEEN_ROOMS)
             nearest: Any = ndimage.distance_transform_edt(room < 0, return_distances=False, return_indices=True)
@@ -103,14 +105,14 @@ class Air:
     def room_at(self, xy: Float[np.ndarray, "2"]) -> int:
         """Return the room of a place, −1 for outdoors; what lies in an outer wall belongs to the room behind it."""
         i, j = self.cell(xy)
-        if self.room[i, j] >= 0 or not self.solid[i, j]:
+        reach = _BETWEEN_ROOMS
+        i_low, j_low = max(i - reach, 0), max(j - reach, 0)
+        near = self.room[i_low : i + reach + 1, j_low : j + reach + 1]
+        cells = np.argwhere(near >= 0)
+        if self.room[i, j] >= 0 or not len(cells):
             return int(self.room[i, j])
-        cells = np.argwhere(self.room >= 0)
-        if not len(cells):
-            return -1
-        away = ((cells - (i, j)) ** 2).sum(axis=1)
-        nearest = int(away.argmin())
-        return int(self.room[tuple(cells[nearest])]) if away[nearest] <= _BETWEEN_ROOMS**2 else -1
+        nearest = ((cells - (i - i_low, j - j_low)) ** 2).sum(axis=1).argmin()
+        return int(near[tuple(cells[nearest])])
 
     def ways(self, source: Float[np.ndarray, "3"], ears: Float[np.ndarray, "n 3"]) -> list[Way]:
         """Return how sound gets from a source to each of several places."""
@@ -129,11 +131,12 @@ class Air:
 
     def _walls_between(self, a: Float[np.ndarray, "2"], b: Float[np.ndarray, "2"]) -> int:
         """Count the walls that a straight line crosses."""
-        steps = max(2, int(np.linalg.norm(b - a) / (0.4 * self.cell_m)))
-        line = a + np.linspace(0.0, 1.0, steps)[:, None] * (b - a)
-        i, j = self.cell(line).T
-        hit = self.solid[i, j]
-        return int(hit[0]) + int(np.count_nonzero(hit[1:] & ~hit[:-1]))
+        length_m = float(np.linalg.norm(b - a))
+        steps = max(2, int(length_m / (0.4 * self.cell_m)))
+        i, j = self.cell(a + np.linspace(0.0, 1.0, steps)[:, None] * (b - a)).T
+        hit = np.flatnonzero(self.solid[i, j])
+        thick = max(1, round(_THICKEST_M / length_m * steps)) if length_m > 0.0 else 1
+        return int(len(hit) > 0) + int(np.count_nonzero(np.diff(hit) > thick))
 
     def _length_round(self, before: np.ndarray, a: Float[np.ndarray, "2"], b: Float[np.ndarray, "2"]) -> float:
         """Return the length of the shortest way round the walls: that of the grid, pulled tight."""
@@ -169,6 +172,15 @@ class Air:
             np.add.at(open_, (a[free], b[free]), self.cell_m)
         every, open_ = every + every.T, open_ + open_.T
         return open_, every - open_
+
+
+def _filled(solid: Bool[np.ndarray, "nx ny"], indoors: Bool[np.ndarray, "nx ny"]) -> Bool[np.ndarray, "nx ny"]:
+    """Fill what is hollow: walls made of two sheets, pockets between a door and its frame."""
+    closed: Any = ndimage.binary_closing(np.pad(solid, 1), np.ones((3, 3)))
+    solid = closed[1:-1, 1:-1]
+    pockets: Any = ndimage.label(~solid)[0]
+    rim = np.concatenate([pockets[0], pockets[-1], pockets[:, 0], pockets[:, -1]])
+    return ~np.isin(pockets, np.union1d(rim, pockets[indoors & ~solid])) | solid
 
 
 def _walls(scene: Scene) -> Bool[np.ndarray, " t"]:

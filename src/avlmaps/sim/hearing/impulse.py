@@ -7,8 +7,9 @@ What is modelled, in units of the direct sound at 1 m:
 - early reflections in the source's own room, where the microphone is in it too: image sources of the room's polygon, by
   pyroomacoustics, with the room's mean absorption;
 - the late field in every room: noise that decays as the coupled rooms do (``rooms``), band by band.
-What is not: furniture in the way of sound, reflections that reach the next room, scattering, moving doors, Doppler
-shift, other floors than by their slab, the directivity of sources and microphone.
+Doors that stand closed stop sound as walls do. What is not modelled: furniture in the way of sound, reflections that
+reach the next room, scattering, moving doors, Doppler shift, stairwells (another floor is heard through its slab
+alone), the directivity of sources and microphone.
 """
 
 from dataclasses import dataclass, field
