@@ -307,10 +307,10 @@ def four_poster(rng: np.random.Generator) -> Piece:
     if chance(rng, 0.4):
         parts.append(sheet((x0, -y, high), (x1 - x0, 0.0, 0.0), (0.0, 2 * y, 0.0), veil))
     if chance(rng, 0.5):
-        for x in (x0, x1):
-            for s in (1, -1):
-                parts.append(loft([np.array([(x + dx, s * y + dy, z) for dx, dy in ((0.07, 0.0), (0.0, 0.05), (-0.07, 0.0), (0.0, -0.05))])
-                                   for z in (0.05, high - 0.05)], veil))  # fmt: skip
+        across = np.array([(0.07, 0.0), (0.0, 0.05), (-0.07, 0.0), (0.0, -0.05)])
+        for corner in [(x, s * y) for x in (x0, x1) for s in (1, -1)]:
+            rings = [np.column_stack([across + corner, np.full(4, z)]) for z in (0.05, high - 0.05)]
+            parts.append(loft(rings, veil))
     return finished(parts)
 
 

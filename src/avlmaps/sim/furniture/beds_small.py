@@ -7,7 +7,7 @@ import numpy as np
 from avlmaps.sim.furniture.beds import BedPlan, bed_look, bedclothes
 from avlmaps.sim.furniture.carcass import Room, board_look, carcass, doors, drawers, front_style
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
+from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick
 from avlmaps.sim.furniture.legs import cabinet_base, four_legs, leg_style, named_leg
 from avlmaps.sim.furniture.upholstery import Bedding, heap, mattress
 from avlmaps.sim.materials import material
@@ -105,8 +105,6 @@ def bassinet(rng: np.random.Generator) -> Piece:
                 )
                 for x, z in ((xa, za), (xb, zb))
             ]
-            from avlmaps.sim.furniture.joinery import cloth
-
             parts.append(cloth(np.stack(ring), look))
     return finished(parts)
 
@@ -136,11 +134,11 @@ def travel_cot(rng: np.random.Generator) -> Piece:
 
 
 def _ladder(rng: np.random.Generator, x: float, y: float, top: float, look: Material, wide: float = 0.36) -> list[Mesh]:
+    """Return a ladder with flat steps at (x, y), its foot standing out along y."""
     lean = draw(rng, 0.0, 0.25)
     parts = [tube([(x + s * wide / 2, y + lean, 0.0), (x + s * wide / 2, y, top)], 0.018, look, 4) for s in (1, -1)]
-    for z in np.arange(0.25, top - 0.05, 0.27).tolist():
-        parts.append(slab(x, y + lean * (1 - z / top), z, wide, 0.05, 0.025, look))
-    return parts
+    steps = np.arange(0.25, top - 0.05, 0.27).tolist()
+    return [*parts, *(slab(x, y + lean * (1 - z / top), z, wide, 0.05, 0.025, look) for z in steps)]
 
 
 def _bunk(rng: np.random.Generator, lower: bool) -> Piece:

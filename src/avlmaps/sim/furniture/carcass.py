@@ -136,8 +136,10 @@ def _panel(style: FrontStyle, room: Room, panel: Panel, glass: Material) -> Mesh
         )  # fmt: skip
     elif panel == "slatted":
         number = max(int((inner_high[0] - inner_low[0]) / 0.09), 2)
-        for y in np.linspace(inner_low[0], inner_high[0], number + 1)[1:-1].tolist():
-            parts.append(box((d - 0.009, y - 0.008, inner_low[1]), (d - 0.001, y + 0.008, inner_high[1]), style.look))
+        parts += [
+            box((d - 0.009, y - 0.008, inner_low[1]), (d - 0.001, y + 0.008, inner_high[1]), style.look)
+            for y in np.linspace(inner_low[0], inner_high[0], number + 1)[1:-1].tolist()
+        ]
     return joined(parts)
 
 
@@ -147,7 +149,8 @@ def glazing(rng: np.random.Generator, panel: Panel) -> Material:
 
 
 def door(
-    rng: np.random.Generator, style: FrontStyle, room: Room, hinge: int, open_rad: float = 0.0, panel: Panel | None = None
+    rng: np.random.Generator, style: FrontStyle, room: Room, hinge: int, open_rad: float = 0.0,
+    panel: Panel | None = None,
 ) -> Mesh:  # fmt: skip
     """Return a door with its handle.
 
@@ -183,9 +186,9 @@ def drawer(rng: np.random.Generator, style: FrontStyle, room: Room, pulled: floa
     wide, tall = e - b, f - c
     pair = wide > 0.65 and style.grip in ("knob", "cup", "bow")
     z = c + tall * (0.5 if tall < 0.3 else 0.72)
-    for y in (b + wide * 0.22, e - wide * 0.22) if pair else ((b + e) / 2,):
-        if style.grip not in ("groove", "none"):
-            parts.append(grip(style, d, y, z, False, min(0.14 if pair else 0.2, wide * 0.5)))
+    places = (b + wide * 0.22, e - wide * 0.22) if pair else ((b + e) / 2,)
+    if style.grip not in ("groove", "none"):
+        parts += [grip(style, d, y, z, False, min(0.14 if pair else 0.2, wide * 0.5)) for y in places]
     if style.grip == "groove":
         parts.append(box((d, b, f - 0.012), (d + 0.012, e, f), style.look))
     if pulled:

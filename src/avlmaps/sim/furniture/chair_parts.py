@@ -172,19 +172,18 @@ def upright_slats(rng: np.random.Generator, frame: ChairFrame, look: Material, n
         bent_rail((frame.back_x(low), 0.0, low - 0.03), width, 0.035, 0.02, 0.0, look),
     ]
     ys = np.linspace(-0.5, 0.5, number + 2)[1:-1] * (width - 0.02) if number > 1 else np.zeros(1)
-    for y in ys.tolist():
-        parts.append(strut((frame.back_x(low), y, low), (frame.back_x(top), y, top + 0.01), 0.012, wide, look))
-    return joined(parts)
+    ends = (frame.back_x(low), frame.back_x(top))
+    return joined(
+        [*parts, *(strut((ends[0], y, low), (ends[1], y, top + 0.01), 0.012, wide, look) for y in ys.tolist())]
+    )
 
 
 def splat(frame: ChairFrame, low: float, top: float, widths: list[float], look: Material) -> Mesh:
     """Return a shaped upright board in the middle of the back, as wide as is said from below to above."""
     rings = []
     for z, wide in zip(np.linspace(low, top, len(widths)).tolist(), widths, strict=True):
-        x = frame.back_x(z)
-        rings.append(
-            np.array([(x + 0.008, -wide / 2, z), (x + 0.008, wide / 2, z), (x - 0.008, wide / 2, z), (x - 0.008, -wide / 2, z)])
-        )  # fmt: skip
+        corner = np.array([(1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)]) * (0.008, wide / 2)
+        rings.append(np.column_stack([corner[:, 0] + frame.back_x(z), corner[:, 1], np.full(4, z)]))
     return loft(rings, look)
 
 
@@ -203,10 +202,9 @@ def chair_arms(rng: np.random.Generator, frame: ChairFrame, look: Material, styl
     height = frame.seat + draw(rng, 0.18, 0.26)
     front = frame.depth / 2 - draw(rng, 0.02, 0.12)
     wide, thick = draw(rng, 0.035, 0.065), draw(rng, 0.018, 0.035)
-    parts = []
+    dip, parts = draw(rng, 0.0, 0.03), []
     for s in (1, -1):
         yf, yb = s * (frame.front / 2 + 0.005), s * (frame.rear / 2 - 0.01)
-        dip = draw(rng, 0.0, 0.03)
         parts.append(leg((front, yf * 0.97, frame.seat - 0.05), (front, yf, height), style, look))
         rear = (frame.back_x(height + dip), yb, height + dip)
         parts.append(strut(rear, (front + 0.04, yf, height + thick / 2), wide, thick, look))

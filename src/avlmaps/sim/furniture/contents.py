@@ -100,13 +100,9 @@ def shelf_things(rng: np.random.Generator, room: Room, looks: list[Material], fu
         return []
     if chance(rng, 0.65):
         return books(rng, room, looks, min(1.0, full * draw(rng, 0.5, 1.4)))
-    parts = []
-    for y in np.arange(b + 0.12, e - 0.1, draw(rng, 0.24, 0.4)).tolist():
-        if chance(rng, full):
-            parts.append(
-                ornament(rng, (a + d) / 2 + draw(rng, -0.02, 0.03), y + draw(rng, -0.02, 0.02), c, (f - c) * 0.9)
-            )
-    return parts
+    x, tall = (a + d) / 2, (f - c) * 0.9
+    places = [y for y in np.arange(b + 0.12, e - 0.1, draw(rng, 0.24, 0.4)).tolist() if chance(rng, full)]
+    return [ornament(rng, x + draw(rng, -0.02, 0.03), y + draw(rng, -0.02, 0.02), c, tall) for y in places]
 
 
 def folded(rng: np.random.Generator, room: Room, looks: list[Material]) -> list[Mesh]:
@@ -120,7 +116,8 @@ def folded(rng: np.random.Generator, room: Room, looks: list[Material]) -> list[
             if z + high > f - 0.03:
                 break
             deep, wide = min(0.32, (d - a) * 0.8), draw(rng, 0.24, 0.32)
-            flat = (*rounded_rectangle(deep, wide, 0.04, 2), (a + d) / 2, y + draw(rng, -0.015, 0.015))
+            middle = np.array([(a + d) / 2, y + draw(rng, -0.015, 0.015)])
+            flat = middle + rounded_rectangle(deep, wide, 0.04, 2)
             parts.append(
                 loft([np.column_stack([flat, np.full(len(flat), h)]) for h in (z, z + high)], pick(rng, looks))
             )

@@ -121,10 +121,9 @@ def windsor(rng: np.random.Generator) -> Piece:
     seat = prism(seat_outline(frame, draw(rng, 0.1, 0.2)), frame.seat - thick, thick, look)
     under = frame.seat - thick
     x, y = frame.depth / 2 - 0.06, frame.rear / 2 - 0.06
-    parts = [seat]
-    for sx in (1, -1):
-        for sy in (1, -1):
-            parts.append(leg((sx * (x + splay), sy * (y + splay), 0.0), (sx * x, sy * y, under), style, look))
+    corners = [(sx, sy) for sx in (1, -1) for sy in (1, -1)]
+    feet = [((sx * (x + splay), sy * (y + splay), 0.0), (sx * x, sy * y, under)) for sx, sy in corners]
+    parts = [seat, *(leg(foot, top, style, look) for foot, top in feet)]
     low = draw(rng, 0.14, 0.2)
     out = splay * (1 - low / under)
     parts.append(stretchers(rng, 2 * (x + out), 2 * (y + out), low, 0.018, look))
@@ -177,8 +176,9 @@ def bentwood(rng: np.random.Generator) -> Piece:
         hoop(frame, z, frame.rear, rod, look, draw(rng, 1.9, 2.6)),
     ]
     inner = draw(rng, 0.45, 0.75)
-    parts.append(hoop(ChairFrame(wide, wide, wide, frame.seat, frame.seat + (frame.top - frame.seat) * draw(rng, 0.7, 0.9),
-                                 frame.rake * 0.8, 0.0), z, frame.rear * inner, rod * 0.8, look))  # fmt: skip
+    low_top = frame.seat + (frame.top - frame.seat) * draw(rng, 0.7, 0.9)
+    within = ChairFrame(wide, wide, wide, frame.seat, low_top, frame.rake * 0.8, 0.0)
+    parts.append(hoop(within, z, frame.rear * inner, rod * 0.8, look))
     splay = draw(rng, 0.02, 0.05)
     style = named_leg(pick(rng, ("slim", "tapered")), 8, rod * 2.4)
     for sx in (1, -1):
@@ -216,8 +216,6 @@ def scandinavian(rng: np.random.Generator) -> Piece:
     flat = tube([(p[0], p[1], 0.0) for p in path], 0.016, look, 6)
     parts.append(flat.scaled(1.0, 1.0, tall / 0.032).moved(z=frame.top - tall / 2))
     z = frame.seat - 0.045
-    for s in (1, -1):
-        parts.append(strut((x_back - 0.02, s * (y - 0.035), z), (x_front, s * (y - 0.035), z), 0.02, 0.04, look))
-    for x in (x_back, x_front - 0.01):
-        parts.append(strut((x, -y + 0.04, z), (x, y - 0.04, z), 0.02, 0.04, look))
-    return finished(parts)
+    sides = [((x_back - 0.02, s * (y - 0.035), z), (x_front, s * (y - 0.035), z)) for s in (1, -1)]
+    ends = [((x, -y + 0.04, z), (x, y - 0.04, z)) for x in (x_back, x_front - 0.01)]
+    return finished([*parts, *(strut(start, end, 0.02, 0.04, look) for start, end in (*sides, *ends))])

@@ -73,7 +73,7 @@ def wing_chair(rng: np.random.Generator) -> Piece:
 def _round_wall(
     radius: float, squash: float, opening: float, bottom: float, tops: tuple[float, float], thick: float, look: Material
 ) -> Mesh:  # fmt: skip
-    """Return a wall round a seat, open to the front; its top goes from ``tops[0]`` at its ends to ``tops[1]`` behind."""
+    """Return a wall round a seat, open to the front; its top rises from ``tops[0]`` at its ends to ``tops[1]``."""
     angle = np.linspace(opening, 2 * np.pi - opening, 15)
     rings = []
     for a in angle.tolist():
@@ -244,42 +244,25 @@ def bent_ply(rng: np.random.Generator) -> Piece:
 def rocker(rng: np.random.Generator) -> Piece:
     """Return a rocking chair: a wooden chair with arms and slats on two curved runners."""
     width, seat, top = draw(rng, 0.46, 0.56), draw(rng, 0.4, 0.45), draw(rng, 0.95, 1.15)
-    look, y, depth = (
-        material(pick(rng, ("wood", "wood", "white", "black")), rng),
-        draw(rng, 0.22, 0.27),
-        draw(rng, 0.44, 0.5),
-    )
+    look = material(pick(rng, ("wood", "wood", "white", "black")), rng)
+    y, depth = draw(rng, 0.22, 0.27), draw(rng, 0.44, 0.5)
     front, back, rake = depth / 2, -depth / 2, draw(rng, 0.14, 0.24)
+    arm, bend = seat + draw(rng, 0.2, 0.24), draw(rng, 0.28, 0.45)
     parts = [box((back, -width / 2, seat - 0.03), (front, width / 2, seat), look)]
     for s in (1, -1):
-        curve = [(x, s * y, 0.02 + 0.35 * (x + 0.05) ** 2) for x in np.linspace(-0.55, 0.4, 7).tolist()]
+        curve = [(x, s * y, 0.02 + bend * (x + 0.05) ** 2) for x in np.linspace(-0.55, 0.4, 7).tolist()]
         parts += [strut(curve[i], curve[i + 1], 0.035, 0.035, look) for i in range(6)]
-        arm = seat + draw(rng, 0.2, 0.24)
         parts += [strut((front - 0.04, s * y, 0.05), (front - 0.05, s * y, arm), 0.035, 0.035, look),
                   strut((back + 0.03, s * y, 0.05), (back + 0.02, s * y, seat), 0.035, 0.035, look),
                   strut((back + 0.02, s * y, seat), (back - rake, s * y, top), 0.035, 0.035, look),
                   strut((back - 0.06, s * y, arm + 0.01), (front, s * (y + 0.02), arm), 0.07, 0.022, look)]  # fmt: skip
     parts.append(bent_rail((back - rake, 0.0, top - 0.09), 2 * y + 0.04, 0.09, 0.025, 0.02, look, 0.02))
-    for t in np.linspace(-0.8, 0.8, count(rng, 4, 8)).tolist():
-        parts.append(
-            strut(
-                (back + 0.02, t * y, seat - 0.01),
-                (back - rake * 0.93, t * y, top - 0.07),
-                0.012,
-                draw(rng, 0.014, 0.03),
-                look,
-            )
-        )
+    wide, ends = draw(rng, 0.014, 0.03), ((back + 0.02, seat - 0.01), (back - rake * 0.93, top - 0.07))
+    for t in (np.linspace(-0.8, 0.8, count(rng, 4, 8)) * y).tolist():
+        parts += [strut((ends[0][0], t, ends[0][1]), (ends[1][0], t, ends[1][1]), 0.012, wide, look)]
     if chance(rng, 0.5):
-        parts.append(
-            cushion(
-                (back + 0.03, -width / 2 + 0.03, seat),
-                (front, width / 2 - 0.03, seat + 0.05),
-                material("fabric", rng),
-                0.03,
-                0.015,
-            )
-        )
+        low, high = (back + 0.03, 0.03 - width / 2, seat), (front, width / 2 - 0.03, seat + 0.05)
+        parts.append(cushion(low, high, material("fabric", rng), 0.03, 0.015))
     plan = SofaPlan(depth, width - 0.1, seat + 0.02, 0.0, 0.0, top, 0.0, 0.0, 0.2)
     if chance(rng, 0.3):
         parts += [m.moved(x=back - 0.02) for m in loose_back(rng, plan, 1, material("fabric", rng), -0.2, 0.08)]

@@ -9,11 +9,18 @@ from avlmaps.sim.furniture.legs import four_legs, leg, leg_style, named_leg, sle
 from avlmaps.sim.furniture.upholstery import covering, cushion
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
-from avlmaps.sim.shapes import box, rounded_box, tube
+from avlmaps.sim.shapes import box, lathe, rounded_box, tube
+
+# Side view of a moulded seat from its front edge to the top of its back: share of the depth, share of the rise.
+_SHELL = np.array(
+    [(0.5, -0.03), (0.42, 0.0), (0.1, -0.01), (-0.25, -0.015), (-0.42, 0.02), (-0.5, 0.12), (-0.53, 0.4), (-0.56, 0.75),
+     (-0.58, 1.0)]
+)  # fmt: skip
 
 
 def shell(
-    rng: np.random.Generator, width: float, depth: float, seat: float, rise: float, look: Material, wrap: float, thick: float
+    rng: np.random.Generator, width: float, depth: float, seat: float, rise: float, look: Material, wrap: float,
+    thick: float,
 ) -> Mesh:  # fmt: skip
     """Return a seat and a back moulded in one piece.
 
@@ -28,19 +35,7 @@ def shell(
         thick: of the skin, metres.
     """
     lean = draw(rng, 0.06, 0.2)
-    line = np.array(
-        [
-            (0.5, -0.03),
-            (0.42, 0.0),
-            (0.1, -0.01),
-            (-0.25, -0.015),
-            (-0.42, 0.02),
-            (-0.5, 0.12),
-            (-0.53, 0.4),
-            (-0.56, 0.75),
-            (-0.58, 1.0),
-        ]
-    )
+    line = _SHELL
     x = line[:, 0] * depth - lean * np.maximum(line[:, 1], 0.0) * 0.6
     z = seat + np.where(line[:, 1] > 0.03, line[:, 1] * rise, line[:, 1])
     share = np.linspace(-1.0, 1.0, 7)
@@ -60,9 +55,8 @@ def shell(
             axis=-1,
         )
         faces.append(grid)
-    edge = np.concatenate([faces[0][:, 0], faces[0][-1, 1:], faces[0][::-1, -1][1:], faces[0][0, ::-1][1:]])
-    edge_low = np.concatenate([faces[1][:, 0], faces[1][-1, 1:], faces[1][::-1, -1][1:], faces[1][0, ::-1][1:]])
-    return joined([cloth(faces[0], look), cloth(faces[1], look), cloth(np.stack([edge, edge_low]), look)])
+    edges = [np.concatenate([f[:, 0], f[-1, 1:], f[::-1, -1][1:], f[0, ::-1][1:]]) for f in faces]
+    return joined([cloth(faces[0], look), cloth(faces[1], look), cloth(np.stack(edges), look)])
 
 
 def shell_base(rng: np.random.Generator, width: float, depth: float, seat: float, style: str) -> list[Mesh]:
@@ -99,8 +93,6 @@ def shell_base(rng: np.random.Generator, width: float, depth: float, seat: float
         return [star_base(count(rng, 4, 5), draw(rng, 0.25, 0.31), seat - 0.01, metal, 0.02, chance(rng, 0.4))]
     r = draw(rng, 0.22, 0.29)
     rings = [(r, 0.0), (0.9 * r, 0.015), (0.3 * r, 0.05), (0.03, 0.15), (0.035, seat * 0.7), (0.12, seat - 0.01)]
-    from avlmaps.sim.shapes import lathe
-
     return [lathe(rings, metal, sides=14)]
 
 
@@ -155,49 +147,23 @@ def tube_chair(rng: np.random.Generator) -> Piece:
     metal = material(pick(rng, ("metal", "black", "painted")), rng)
     look = material(pick(rng, ("fabric", "wood", "plastic", "leather")), rng)
     r, y = draw(rng, 0.009, 0.014), frame.rear / 2
-    parts = []
+    half, foot, under, parts = frame.depth / 2, draw(rng, 0.0, 0.03), frame.seat - 0.04, []
+    arms, arm = chance(rng, 0.25), frame.seat + 0.2
     for s in (1, -1):
-        foot = draw(rng, 0.0, 0.03)
-        parts.append(tube([(frame.depth / 2 + foot, s * y, 0.0), (frame.depth / 2 - 0.03, s * y, frame.seat - 0.03),
-                           (-frame.depth / 2 + 0.04, s * y, frame.seat - 0.04), (frame.back_x(frame.top), s * y, frame.top)], r, metal, 6))  # fmt: skip
-        parts.append(
-            tube(
-                [(-frame.depth / 2 + 0.05, s * y, frame.seat - 0.04), (-frame.depth / 2 - frame.kick, s * y, 0.0)],
-                r,
-                metal,
-                6,
-            )
-        )
-    parts.append(tube([(0.0, -y, frame.seat - 0.04), (0.0, y, frame.seat - 0.04)], r, metal, 5))
-    thick = draw(rng, 0.012, 0.05)
-    parts.append(
-        cushion(
-            (-frame.depth / 2, -y + 0.01, frame.seat - 0.025),
-            (frame.depth / 2, y - 0.01, frame.seat - 0.025 + thick),
-            look,
-            0.02,
-            0.008,
-        )
-    )
+        side = s * y
+        post = [(half + foot, side, 0.0), (half - 0.03, side, under), (0.04 - half, side, under)]
+        parts.append(tube([*post, (frame.back_x(frame.top), side, frame.top)], r, metal, 6))
+        parts.append(tube([(0.05 - half, side, under), (-half - frame.kick, side, 0.0)], r, metal, 6))
+        if arms:
+            rest = [(frame.back_x(arm), side, arm), (half - 0.05, s * (y + 0.03), arm), (half, side, 0.0)]
+            parts.append(tube(rest, r, metal, 6))
+    parts.append(tube([(0.0, -y, under), (0.0, y, under)], r, metal, 5))
+    thick, low = draw(rng, 0.012, 0.05), frame.seat - 0.025
+    parts.append(cushion((-half, -y + 0.01, low), (half, y - 0.01, low + thick), look, 0.02, 0.008))
     tall = draw(rng, 0.12, 0.28)
     z = frame.top - tall
     x = frame.back_x(z + tall / 2)
     parts.append(bent_rail((x + 0.01, 0.0, z), 2 * y + 0.01, tall, max(0.012, thick * 0.7), draw(rng, 0.0, 0.05), look))
-    if chance(rng, 0.25):
-        for s in (1, -1):
-            arm = frame.seat + 0.2
-            parts.append(
-                tube(
-                    [
-                        (frame.back_x(arm), s * y, arm),
-                        (frame.depth / 2 - 0.05, s * (y + 0.03), arm),
-                        (frame.depth / 2, s * y, 0.0),
-                    ],
-                    r,
-                    metal,
-                    6,
-                )
-            )
     return finished(parts)
 
 
@@ -257,16 +223,9 @@ def monobloc(rng: np.random.Generator) -> Piece:
             )
     slots = count(rng, 4, 7)
     lean = 0.28 * (top - seat)
-    for y in np.linspace(-0.42, 0.42, slots).tolist():
-        parts.append(
-            strut(
-                (-depth / 2 + 0.02, y * width, seat - 0.01),
-                (-depth / 2 - lean, y * width, top - 0.05),
-                0.012,
-                0.75 * width / slots,
-                look,
-            )
-        )
+    low, high, wide = (0.02 - depth / 2, seat - 0.01), (-depth / 2 - lean, top - 0.05), 0.75 * width / slots
+    for y in (np.linspace(-0.42, 0.42, slots) * width).tolist():
+        parts += [strut((low[0], y, low[1]), (high[0], y, high[1]), 0.012, wide, look)]
     parts.append(bent_rail((-depth / 2 - lean, 0.0, top - 0.09), width, 0.06, 0.025, 0.02, look, 0.03))
     return finished(parts)
 

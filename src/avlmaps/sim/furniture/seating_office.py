@@ -21,9 +21,9 @@ def _swivel(rng: np.random.Generator, seat: float, arms: int = 5) -> list[Mesh]:
 def _arm_rests(rng: np.random.Generator, half: float, seat: float, x: float) -> list[Mesh]:
     """Return two arm rests: T-shaped, or loops."""
     look, high = material("black", rng), seat + draw(rng, 0.17, 0.26)
-    style, parts = pick(rng, ("T", "loop")), []
+    style, apart, parts = pick(rng, ("T", "loop")), half + draw(rng, 0.01, 0.05), []
     for s in (1, -1):
-        y = s * (half + draw(rng, 0.01, 0.05))
+        y = s * apart
         if style == "T":
             parts += [
                 strut((x, s * half * 0.7, seat - 0.06), (x, y, seat - 0.03), 0.04, 0.02, look),
@@ -43,7 +43,8 @@ def _arm_rests(rng: np.random.Generator, half: float, seat: float, x: float) -> 
 
 
 def _curved_back(
-    width: float, low: float, high: float, x: float, lean: float, bow: float, thick: float, look: Material, lumbar: float
+    width: float, low: float, high: float, x: float, lean: float, bow: float, thick: float, look: Material,
+    lumbar: float,
 ) -> Mesh:  # fmt: skip
     """Return a back that bends round the sitter and swells at the loins."""
     share, up = np.linspace(-1.0, 1.0, 6), np.linspace(0.0, 1.0, 6)

@@ -61,43 +61,20 @@ def wooden_stool(rng: np.random.Generator) -> Piece:
 def pedestal_stool(rng: np.random.Generator) -> Piece:
     """Return a bar stool on one foot with a foot rest: round pad, low back or a shell."""
     seat, size = draw(rng, 0.58, 0.82), draw(rng, 0.32, 0.44)
-    metal, look = (
-        material(pick(rng, ("metal", "metal", "black")), rng),
-        material(pick(rng, ("leather", "plastic", "fabric", "wood")), rng),
-    )
-    r = draw(rng, 0.18, 0.23)
-    parts = [
-        lathe(
-            [(r, 0.0), (r * 0.95, 0.015), (0.04, 0.04), (0.025, 0.08), (0.025, seat - 0.06), (0.08, seat - 0.04)],
-            metal,
-            sides=18,
-        )
-    ]
-    rest = [
-        (0.02, -0.02, seat * 0.4),
-        (0.17, -0.12, seat * 0.38),
-        (0.2, 0.0, seat * 0.38),
-        (0.17, 0.12, seat * 0.38),
-        (0.02, 0.02, seat * 0.4),
-    ]
-    parts.append(tube(rest, 0.009, metal, 5))
+    metal = material(pick(rng, ("metal", "metal", "black")), rng)
+    look = material(pick(rng, ("leather", "plastic", "fabric", "wood")), rng)
+    r, rest = draw(rng, 0.18, 0.23), seat * 0.38
+    foot = [(r, 0.0), (r * 0.95, 0.015), (0.04, 0.04), (0.025, 0.08), (0.025, seat - 0.06), (0.08, seat - 0.04)]
+    ring = [(0.02, -0.02), (0.17, -0.12), (0.2, 0.0), (0.17, 0.12), (0.02, 0.02)]
+    parts = [lathe(foot, metal, sides=18), tube([(x, y, rest) for x, y in ring], 0.009, metal, 5)]
     kind = pick(rng, ("pad", "low back", "square"))
     if kind == "square":
         parts.append(cushion((-size / 2, -size / 2, seat - 0.06), (size / 2, size / 2, seat), look, 0.03, 0.012))
     else:
         parts.append(lathe([(size * 0.48, seat - 0.06), (size / 2, seat - 0.03), (size * 0.46, seat)], look, sides=18))
     if kind != "pad":
-        parts.append(
-            bent_rail(
-                (-size / 2 + 0.07, 0.0, seat - 0.04),
-                size * 0.9,
-                draw(rng, 0.14, 0.36),
-                0.025,
-                0.07,
-                look,
-                draw(rng, 0.0, 0.05),
-            )
-        )
+        place, tall = (0.07 - size / 2, 0.0, seat - 0.04), draw(rng, 0.14, 0.36)
+        parts.append(bent_rail(place, size * 0.9, tall, 0.025, 0.07, look, draw(rng, 0.0, 0.05)))
     return finished(parts)
 
 
@@ -168,42 +145,29 @@ def board_bench(rng: np.random.Generator) -> Piece:
     depth, width, high = _bench(rng)
     look = material(pick(rng, ("wood", "wood", "wood", "painted", "white")), rng)
     thick = draw(rng, 0.025, 0.06)
-    if chance(rng, 0.3):
-        n = count(rng, 3, 6)
-        parts = [
-            slab(0.0, (i + 0.5) / n * depth - depth / 2, high - thick, width, depth / n - 0.01, thick, look).turned(
-                np.pi / 2
-            )
-            for i in range(n)
-        ]
-    else:
-        parts = [slab(0.0, 0.0, high - thick, width, depth, thick, look).turned(np.pi / 2)]
-    base = pick(rng, ("legs", "slabs", "trestles", "wires"))
+    boards = count(rng, 3, 6) if chance(rng, 0.3) else 1
+    wide = depth / boards
+    gap = 0.01 if boards > 1 else 0.0
+    parts = [
+        slab((i + 0.5) * wide - depth / 2, 0.0, high - thick, wide - gap, width, thick, look) for i in range(boards)
+    ]
+    base, under = pick(rng, ("legs", "slabs", "trestles", "wires")), high - thick
     if base == "legs":
-        parts.append(
-            four_legs(depth - 0.02, width * 0.92, high - thick, leg_style(rng, 0.035, 0.06), look, draw(rng, 0.0, 0.03))
-        )
+        style = leg_style(rng, 0.035, 0.06)
+        parts.append(four_legs(depth - 0.02, width * 0.92, under, style, look, draw(rng, 0.0, 0.03)))
         if chance(rng, 0.4):
             parts.append(stretchers(rng, depth - 0.06, width * 0.9, 0.12, 0.03, look))
     elif base == "slabs":
-        parts += [slab(0.0, s * width * 0.42, 0.0, depth * 0.9, 0.035, high - thick, look) for s in (1, -1)]
+        parts += [slab(0.0, s * width * 0.42, 0.0, depth * 0.9, 0.035, under, look) for s in (1, -1)]
         parts.append(slab(0.0, 0.0, high * 0.45, 0.025, width * 0.82, 0.08, look))
     elif base == "wires":
-        parts += hairpins(depth * 0.9, width * 0.88, high - thick, material("black", rng))
+        parts += hairpins(depth * 0.9, width * 0.88, under, material("black", rng))
     else:
-        parts += trestles(
-            rng, depth * 0.95, width * 0.75, high - thick, look if chance(rng, 0.6) else material("black", rng)
-        )
+        stand = look if chance(rng, 0.6) else material("black", rng)
+        parts += trestles(rng, depth * 0.95, width * 0.75, under, stand)
     if chance(rng, 0.25):
-        parts.append(
-            cushion(
-                (-depth * 0.47, -width * 0.47, high),
-                (depth * 0.47, width * 0.47, high + 0.05),
-                material("fabric", rng),
-                0.03,
-                0.012,
-            )
-        )
+        low, top = (-depth * 0.47, -width * 0.47, high), (depth * 0.47, width * 0.47, high + 0.05)
+        parts.append(cushion(low, top, material("fabric", rng), 0.03, 0.012))
     return finished(parts)
 
 
@@ -285,8 +249,10 @@ def storage_bench(rng: np.random.Generator) -> Piece:
     parts = [box((-x, -y, high - 0.03), (x + 0.015, y, high), look)]
     if chance(rng, 0.5):
         parts.append(box((-x, -y, 0.03), (x - 0.012, y, high - 0.036), look))
-        for edge in np.linspace(-y, y, count(rng, 2, 4) + 1).tolist():
-            parts.append(box((x - 0.014, max(edge - 0.035, -y), 0.0), (x, min(edge + 0.035, y), high - 0.036), look))
+        parts += [
+            box((x - 0.014, max(edge - 0.035, -y), 0.0), (x, min(edge + 0.035, y), high - 0.036), look)
+            for edge in np.linspace(-y, y, count(rng, 2, 4) + 1).tolist()
+        ]
         parts += [box((x - 0.014, -y, z), (x, y, z + 0.06), look) for z in (0.03, high - 0.1)]
     else:
         bays = count(rng, 2, 3)

@@ -110,8 +110,7 @@ def sliding_wardrobe(rng: np.random.Generator) -> Piece:
             parts.append(
                 sheet((x + 0.021, y0 + 0.02, 0.08), (0.0, y1 - y0 - 0.04, 0.0), (0.0, 0.0, top - 0.1), fill, True)
             )
-        for edge in (y0, y1 - 0.02):
-            parts.append(box((x + 0.015, edge, 0.06), (x + 0.028, edge + 0.02, top), metal))
+        parts += [box((x + 0.015, y, 0.06), (x + 0.028, y + 0.02, top), metal) for y in (y0, y1 - 0.02)]
         if kinds[index] == "banded":
             bands = np.linspace(0.06, top, count(rng, 3, 5))[1:-1].tolist()
             parts += [box((x + 0.015, y0, z), (x + 0.026, y1, z + 0.02), metal) for z in bands]

@@ -20,7 +20,7 @@ from avlmaps.sim.furniture.legs import cabinet_base, four_legs, leg_style
 from avlmaps.sim.furniture.storage_shelves import filled
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh
-from avlmaps.sim.shapes import box, slab
+from avlmaps.sim.shapes import box, prism, slab
 
 
 def _body(
@@ -195,19 +195,9 @@ def tv_tiers(rng: np.random.Generator) -> Piece:
         )
     )
     box_look = material("black", rng)
-    for z in levels[:-1]:
-        if chance(rng, 0.6):
-            parts.append(
-                slab(
-                    0.0,
-                    draw(rng, -0.2, 0.2) * width,
-                    z + 0.02,
-                    0.25,
-                    draw(rng, 0.25, 0.42),
-                    draw(rng, 0.04, 0.08),
-                    box_look,
-                )
-            )
+    for z in [level for level in levels[:-1] if chance(rng, 0.6)]:
+        size = (0.25, draw(rng, 0.25, 0.42), draw(rng, 0.04, 0.08))
+        parts += [slab(0.0, draw(rng, -0.2, 0.2) * width, z + 0.02, *size, box_look)]
     return finished(parts, supports=[Support((-depth * 0.48, -width * 0.48), (depth * 0.48, width * 0.48), height)])
 
 
@@ -257,7 +247,6 @@ def corner_stand(rng: np.random.Generator) -> Piece:
     """Return a stand for the corner of a room: its sides draw in towards the back."""
     width, back, depth = draw(rng, 0.9, 1.25), draw(rng, 0.35, 0.55), draw(rng, 0.45, 0.55)
     height, look = draw(rng, 0.45, 0.6), board_look(rng)
-    from avlmaps.sim.shapes import prism
 
     flat = [
         (depth / 2, -width / 2),

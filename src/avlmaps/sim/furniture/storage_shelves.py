@@ -122,13 +122,8 @@ def cube_shelf(rng: np.random.Generator) -> Piece:
             if kind < 0.12:
                 parts += doors(rng, style, Room(bay.low, (x - style.thick, *bay.high[1:])), 1, 0.0)
             elif kind < 0.28 and full:
-                parts.append(
-                    box(
-                        (-x + 0.02, y + 0.015, z),
-                        (x - 0.02, y + cell - board - 0.015, z + (cell - board) * draw(rng, 0.6, 0.9)),
-                        bins,
-                    )
-                )
+                high = (x - 0.02, y + cell - board - 0.015, z + (cell - board) * draw(rng, 0.6, 0.9))
+                parts.append(box((-x + 0.02, y + 0.015, z), high, bins))
             else:
                 parts += shelf_things(rng, bay, books, full)
     return finished(parts, supports=[Support((-x, -width / 2), (x, width / 2), height)])
@@ -195,8 +190,7 @@ def staggered_shelf(rng: np.random.Generator) -> Piece:
     cut = draw(rng, 0.25, 0.5) * y
     for i in range(rows):
         s = 1 if i % 2 else -1
-        for place in (s * (y - t / 2), -s * cut):
-            parts.append(slab(0.0, place, i * cell + t, depth, t, cell - t, look))
+        parts += [slab(0.0, place, i * cell + t, depth, t, cell - t, look) for place in (s * (y - t / 2), -s * cut)]
         lo, hi = sorted((s * (y - t), -s * (cut - t)))
         parts += shelf_things(rng, Room((-x, lo, i * cell + t), (x, hi, (i + 1) * cell)), books, full)
     return finished(parts)

@@ -106,11 +106,6 @@ def shoe_bench(rng: np.random.Generator) -> Piece:
     )
 
 
-def _hung(meshes: list[Mesh], depth: float, supports: list[Support]) -> Piece:
-    """Return what hangs on a wall: lowered to z = 0, its middle at the origin."""
-    return finished(meshes, supports=supports)
-
-
 @family("wall shelf", "boards")
 def wall_boards(rng: np.random.Generator) -> Piece:
     """Return one to three boards on brackets or without, with books and things on them."""
@@ -284,11 +279,8 @@ def hall_stand(rng: np.random.Generator) -> Piece:
     room = Room((a, -width / 2, 0.0), (depth / 2, width / 2, seat))
     parts = [carcass(room, 0.022, look), box((a, -width / 2, seat), (a + 0.02, width / 2, height), look)]
     parts.append(box((a, -width / 2, height - 0.02), (a + depth * 0.75, width / 2, height), look))
-    parts += [
-        box((a, y, seat), (a + depth * 0.5, y + 0.02, height), look)
-        for y in (-width / 2, width / 2 - 0.02)
-        if chance(rng, 0.5)
-    ]
+    if chance(rng, 0.5):
+        parts += [box((a, y, seat), (0.0, y + 0.02, height), look) for y in (-width / 2, width / 2 - 0.02)]
     if chance(rng, 0.5):
         parts += doors(rng, front_style(rng, look), room, 2, 0.0)
     else:

@@ -6,7 +6,7 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Support
 from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, pick, rim, strut
-from avlmaps.sim.furniture.legs import leg, leg_style, named_leg, star_base
+from avlmaps.sim.furniture.legs import four_legs, leg, leg_style, named_leg, star_base
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, circle, cylinder, lathe, loft, prism, rounded_rectangle, slab, tube
@@ -62,30 +62,31 @@ def table_look(rng: np.random.Generator, stone: float = 0.06) -> Material:
     return material(pick(rng, ("wood", "wood", "wood", "wood", "white", "painted", "black")), rng)
 
 
+def _clawed(rng: np.random.Generator, high: float, reach: float, look: Material) -> Mesh:
+    """Return a turned column on three or four curved feet."""
+    r = draw(rng, 0.035, 0.08)
+    profile = [(r, 0.2), (0.7 * r, 0.35), (1.3 * r, 0.5), (0.7 * r, 0.7), (1.1 * r, 1.0)]
+    parts = [lathe([(radius, share * high) for radius, share in profile], look, sides=10)]
+    for a in np.linspace(0.0, 2 * np.pi, count(rng, 3, 4), endpoint=False) + 0.4:
+        c, s = float(np.cos(a)), float(np.sin(a))
+        path = [
+            (0.0, 0.0, 0.38 * high),
+            (0.45 * reach * c, 0.45 * reach * s, 0.23 * high),
+            (reach * c, reach * s, 0.03),
+        ]
+        parts += [strut(path[i], path[i + 1], 0.045, 0.06, look) for i in range(2)]
+    return joined(parts)
+
+
 def pedestal(rng: np.random.Generator, high: float, reach: float, look: Material) -> Mesh:
     """Return one foot in the middle up to a height: a turned column on claws, a cone, a tulip, a plate with a pole."""
     style = pick(rng, ("claws", "claws", "tulip", "plate", "cross", "drum", "star"))
     if style == "claws":
-        r = draw(rng, 0.035, 0.08)
-        profile = [(r, 0.15), (0.7 * r, 0.3 * high), (1.3 * r, 0.45 * high), (0.7 * r, 0.7 * high), (1.1 * r, high)]
-        parts = [lathe(profile, look, sides=10)]
-        arms = count(rng, 3, 4)
-        for a in np.linspace(0.0, 2 * np.pi, arms, endpoint=False) + 0.4:
-            c, s = float(np.cos(a)), float(np.sin(a))
-            path = [(0.0, 0.0, 0.28), (0.45 * reach * c, 0.45 * reach * s, 0.17), (reach * c, reach * s, 0.03)]
-            parts += [strut(path[i], path[i + 1], 0.045, 0.06, look) for i in range(2)]
-        return joined(parts)
+        return _clawed(rng, high, reach, look)
     if style == "tulip":
         r = draw(rng, 0.03, 0.06)
-        profile = [
-            (reach, 0.0),
-            (0.9 * reach, 0.02),
-            (0.4 * reach, 0.06),
-            (r, 0.3 * high),
-            (r, 0.7 * high),
-            (3 * r, high),
-        ]
-        return lathe(profile, look, sides=16)
+        flare = [(reach, 0.0), (0.9 * reach, 0.02), (0.4 * reach, 0.06)]
+        return lathe([*flare, (r, 0.3 * high), (r, 0.7 * high), (3 * r, high)], look, sides=16)
     if style == "drum":
         return lathe([(reach * 0.75, 0.0), (reach * draw(rng, 0.45, 0.75), high)], look, sides=16)
     if style == "star":
@@ -98,15 +99,8 @@ def pedestal(rng: np.random.Generator, high: float, reach: float, look: Material
             else slab(0, 0, 0, 1.3 * reach, 1.3 * reach, 0.02, look)
         )
         return joined([pole, foot])
-    low = [slab(0.0, 0.0, 0.0, 2 * reach, 0.08, 0.06, look), slab(0.0, 0.0, 0.0, 0.08, 2 * reach, 0.06, look)]
-    return joined(
-        [
-            pole,
-            *low,
-            slab(0.0, 0.0, high - 0.04, reach, 0.06, 0.04, look),
-            slab(0.0, 0.0, high - 0.04, 0.06, reach, 0.04, look),
-        ]
-    )
+    cross = [slab(0.0, 0.0, 0.0, 2 * reach, 0.08, 0.06, look), slab(0.0, 0.0, high - 0.04, reach, 0.06, 0.04, look)]
+    return joined([pole, *cross, *(bar.turned(np.pi / 2) for bar in cross)])
 
 
 def trestles(rng: np.random.Generator, depth: float, span: float, high: float, look: Material) -> list[Mesh]:
@@ -159,11 +153,10 @@ def splayed_legs(
     rng: np.random.Generator, depth: float, width: float, high: float, look: Material, number: int = 4
 ) -> list[Mesh]:
     """Return legs that stand apart towards the floor, round an oval or under corners."""
-    style = leg_style(rng, 0.03, 0.065)
+    style, spread = leg_style(rng, 0.03, 0.065), draw(rng, 0.7, 0.95)
     parts = []
     for a in np.linspace(0.0, 2 * np.pi, number, endpoint=False) + np.pi / number:
         c, s = float(np.cos(a)), float(np.sin(a))
-        spread = draw(rng, 0.75, 0.95) if not parts else 0.85
         foot, head = (depth / 2 * spread * c, width / 2 * spread * s, 0.0), (depth * 0.29 * c, width * 0.29 * s, high)
         parts.append(leg(foot, head, style, look))
     return parts
@@ -206,8 +199,7 @@ def metal_frame(rng: np.random.Generator, depth: float, width: float, high: floa
     """Return a frame of square bars: four uprights joined above, some below too."""
     t = draw(rng, 0.015, 0.04)
     style = named_leg("straight", 4, t)
-    parts = [leg((sx * (depth - t) / 2, sy * (width - t) / 2, 0.0), (sx * (depth - t) / 2, sy * (width - t) / 2, high), style, look)
-             for sx in (1, -1) for sy in (1, -1)]  # fmt: skip
+    parts = [four_legs(depth, width, high, style, look)]
     levels = [high - t] + ([draw(rng, 0.0, 0.08)] if chance(rng, 0.5) else [])
     for z in levels:
         parts += [

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from avlmaps.sim.furniture.carcass import Room, board_look, carcass, doors, drawers, front_style, inside
+from avlmaps.sim.furniture.carcass import FrontStyle, Room, board_look, carcass, doors, drawers, front_style, inside
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.contents import book_looks, shelf_things
 from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
@@ -191,7 +191,8 @@ def _desk(rng: np.random.Generator) -> tuple[float, float, float, float]:
 
 
 def _drawer_stack(
-    rng: np.random.Generator, depth: float, y: tuple[float, float], z: tuple[float, float], front_x: float, look_style: tuple
+    rng: np.random.Generator, depth: float, y: tuple[float, float], z: tuple[float, float], front_x: float,
+    look_style: tuple[Material, FrontStyle],
 ) -> list[Mesh]:  # fmt: skip
     """Return a block of drawers, or one with a door, under a desk's top."""
     look, style = look_style
@@ -308,9 +309,9 @@ def standing_desk(rng: np.random.Generator) -> Piece:
     look, frame = table_look(rng, 0.0), _metal(rng)
     parts = [table_top(pick(rng, ("rectangle", "rounded")), depth, width, high, thick, look)]
     under, t = high - thick, draw(rng, 0.05, 0.08)
-    x = draw(rng, -0.15, 0.0) * depth
+    x, apart = draw(rng, -0.15, 0.0) * depth, width * draw(rng, 0.33, 0.42)
     for s in (1, -1):
-        y = s * width * draw(rng, 0.33, 0.42)
+        y = s * apart
         parts += [slab(0.0, y, 0.0, depth * 0.92, 0.07, 0.03, frame), slab(x, y, 0.03, t, t * 1.3, under * 0.6, frame)]
         parts += [
             slab(x, y, under * 0.5, t * 0.75, t, under * 0.5, frame),

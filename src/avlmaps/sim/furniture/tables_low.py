@@ -165,8 +165,8 @@ def trunk(rng: np.random.Generator) -> Piece:
         box((-x, -y, 0.0), (x, y, lid - 0.006), look),
         box((-x - 0.006, -y - 0.006, lid), (x + 0.006, y + 0.006, high), look),
     ]
-    for at in np.linspace(-y * 0.72, y * 0.72, count(rng, 2, 4)).tolist():
-        parts.append(box((-x - 0.01, at - 0.025, 0.0), (x + 0.01, at + 0.025, high + 0.003), band))
+    bands = np.linspace(-y * 0.72, y * 0.72, count(rng, 2, 4)).tolist()
+    parts += [box((-x - 0.01, at - 0.025, 0.0), (x + 0.01, at + 0.025, high + 0.003), band) for at in bands]
     parts.append(slab(x, 0.0, lid - 0.06, 0.03, 0.06, 0.09, band))
     return finished(parts, supports=[top_support("rectangle", depth, width, high)])
 
@@ -320,9 +320,8 @@ def framed_console(rng: np.random.Generator) -> Piece:
         slab(0.0, 0.0, high - 0.025, depth, width, 0.025, look),
         *metal_frame(rng, depth, width, high - 0.025, frame),
     ]
-    for z in np.linspace(0.12, high * 0.55, count(rng, 1, 2)).tolist():
-        if chance(rng, 0.7):
-            parts.append(slab(0.0, 0.0, z, depth - 0.03, width - 0.03, 0.02, look))
+    levels = [z for z in np.linspace(0.12, high * 0.55, count(rng, 1, 2)).tolist() if chance(rng, 0.7)]
+    parts += [slab(0.0, 0.0, z, depth - 0.03, width - 0.03, 0.02, look) for z in levels]
     return finished(parts, supports=[top_support("rectangle", depth, width, high)])
 
 

@@ -17,7 +17,7 @@ def covering(rng: np.random.Generator, leather: float = 0.25) -> Material:
 
 
 def pillow(rng: np.random.Generator, width: float, height: float, thickness: float, look: Material) -> Mesh:
-    """Return a loose pillow lying flat about the origin: ``height`` along x, ``width`` along y, pinched to its seams."""
+    """Return a loose pillow lying flat about the origin, ``height`` along x, ``width`` along y, thin at its seams."""
     n = 6
     u, v = np.meshgrid(np.linspace(-1.0, 1.0, n), np.linspace(-1.0, 1.0, n), indexing="ij")
     swell = (1 - np.abs(u) ** 3) * (1 - np.abs(v) ** 3)
