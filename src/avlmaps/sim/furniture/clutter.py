@@ -1,5 +1,6 @@
 """Small things in real size: books, bottles, toys and shoes."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -71,8 +72,11 @@ def _open_book(rng: np.random.Generator) -> Piece:
 def _bottle(rng: np.random.Generator) -> Piece:
     kind = pick(rng, ("wine", "beer", "water", "spray", "jar", "oil"))
     tint = pick(rng, ((0.1, 0.25, 0.12), (0.3, 0.15, 0.05), (0.75, 0.85, 0.88), (0.85, 0.9, 0.92)))
+    dark = sum(tint) < 1.5  # green and brown glass lets little through
     glass = (
-        material("glass", rng, tint) if chance(rng, 0.6) else material(pick(rng, ("plastic", "ceramic", "metal")), rng)
+        replace(material("glass", rng, tint), opacity=0.8 if dark else 0.45)
+        if chance(rng, 0.6)
+        else material(pick(rng, ("plastic", "ceramic", "metal")), rng)
     )
     rows, tall, wide = {
         "wine": ([(1.0, 0.0), (1.0, 0.58), (0.36, 0.72), (0.34, 0.98), (0.4, 1.0)], draw(rng, 0.27, 0.33), 0.038),
@@ -137,7 +141,7 @@ def _blocks(rng: np.random.Generator) -> Piece:
     size, parts = draw(rng, 0.03, 0.06), []
     for level in range(count(rng, 1, 4)):
         for _ in range(max(3 - level, 1)):
-            x, y = (rng.uniform(-1, 1, 2) * size * (2.5 - 0.6 * level)).tolist()
+            x, y = (rng.uniform(-1, 1, 2) * size * (2.5 if level == 0 else 0.3)).tolist()
             block = slab(0.0, 0.0, 0.0, size, size * pick(rng, (1.0, 1.0, 2.0)), size, material("plastic", rng))
             parts.append(block.turned(draw(rng, 0.0, 1.5)).moved(x, y, level * size))
     return finished(parts)

@@ -170,60 +170,63 @@ def _guitar_hung(rng: np.random.Generator) -> Piece:
     return finished([mesh.moved(0.05), hook])
 
 
-@family("pool table", "slate")
-def _pool_table(rng: np.random.Generator) -> Piece:
-    long, tall = draw(rng, 1.9, 2.8), draw(rng, 0.75, 0.86)
-    wide, rail = long * draw(rng, 0.52, 0.56), draw(rng, 0.1, 0.15)
-    wood = material(pick(rng, ("wood", "wood", "black", "painted")), rng)
-    baize = material(
-        "fabric", rng, pick(rng, ((0.05, 0.4, 0.2), (0.1, 0.3, 0.55), (0.5, 0.08, 0.12), (0.1, 0.45, 0.3)))
-    )
-    parts = [
-        slab(0.0, 0.0, tall - 0.22, wide, long, 0.16, wood),
-        slab(0.0, 0.0, tall - 0.06, wide - rail, long - rail, 0.015, baize),
-    ]
+def _pool_top(rng: np.random.Generator, wide: float, long: float, tall: float, wood: Material) -> list[Mesh]:
+    """Return a pool table's bed, rails, pockets, balls and perhaps a cue."""
+    rail, hole = draw(rng, 0.1, 0.15), material("black", rng)
+    green, blue, red = (0.05, 0.4, 0.2), (0.1, 0.3, 0.55), (0.5, 0.08, 0.12)
+    baize = material("fabric", rng, pick(rng, (green, green, blue, red, (0.1, 0.45, 0.3))))
+    parts = [slab(0.0, 0.0, tall - 0.22, wide, long, 0.16, wood)]
+    parts.append(slab(0.0, 0.0, tall - 0.06, wide - rail, long - rail, 0.015, baize))
     parts += [slab(s * (wide - rail) / 2, 0.0, tall - 0.06, rail, long, 0.06, wood) for s in (-1, 1)]
     parts += [slab(0.0, s * (long - rail) / 2, tall - 0.06, wide - 2 * rail, rail, 0.06, wood) for s in (-1, 1)]
-    hole = material("black", rng)
-    for x in (-1, 1):
-        parts += [
-            cylinder(x * (wide / 2 - rail * 0.85), y * (long / 2 - rail * 0.85), tall - 0.058, 0.06, 0.062, hole, 10)
-            for y in (-1, 0, 1)
-        ]
-    foot = draw(rng, 0.06, 0.11)
-    places = [
-        (x * (wide / 2 - 0.18), y * (long / 2 - 0.22))
-        for x in (-1, 1)
-        for y in ((-1, 1) if chance(rng, 0.7) else (-1, 0, 1))
-    ]
-    if chance(rng, 0.5):
-        parts += [
-            lathe([(foot * 0.6, 0.0), (foot, 0.1), (foot * 0.6, 0.3), (foot * 1.1, tall - 0.2)], wood, x, y, 8)
-            for x, y in places
-        ]
-    else:
-        parts += [slab(x, y, 0.0, 1.6 * foot, 1.6 * foot, tall - 0.2, wood) for x, y in places]
+    x, y = wide / 2 - rail * 0.85, long / 2 - rail * 0.85
+    parts += [cylinder(a * x, b * y, tall - 0.058, 0.06, 0.062, hole, 10) for a in (-1, 1) for b in (-1, 0, 1)]
     for _ in range(count(rng, 0, 10)):
-        x, y = (rng.uniform(-0.36, 0.36, 2) * (wide, long)).tolist()
-        parts.append(ellipsoid((x, y, tall - 0.018), (0.028, 0.028, 0.028), material("plastic", rng), 6, 4))
+        a, b = (rng.uniform(-0.36, 0.36, 2) * (wide, long)).tolist()
+        parts.append(ellipsoid((a, b, tall - 0.018), (0.028, 0.028, 0.028), material("plastic", rng), 6, 4))
     if chance(rng, 0.6):
-        parts.append(
-            tube(
-                [(-wide * 0.2, -long * 0.3, tall + 0.01), (wide * 0.1, long * 0.2, tall - 0.02)],
-                0.011,
-                material("wood", rng),
-                5,
-            )
-        )
-    return finished(parts)
+        cue = [(-wide * 0.2, -long * 0.3, tall + 0.01), (wide * 0.1, long * 0.2, tall - 0.02)]
+        parts.append(tube(cue, 0.011, material("wood", rng), 5))
+    return parts
+
+
+def _pool_size(rng: np.random.Generator) -> tuple[float, float, float, Material]:
+    long = draw(rng, 1.9, 2.8)
+    wood = material(pick(rng, ("wood", "wood", "black", "painted")), rng)
+    return long * draw(rng, 0.52, 0.56), long, draw(rng, 0.75, 0.86), wood
+
+
+@family("pool table", "on legs")
+def _pool_on_legs(rng: np.random.Generator) -> Piece:
+    wide, long, tall, wood = _pool_size(rng)
+    foot, rows = draw(rng, 0.06, 0.11), (-1, 1) if chance(rng, 0.7) else (-1, 0, 1)
+    places = [(a * (wide / 2 - 0.18), b * (long / 2 - 0.22)) for a in (-1, 1) for b in rows]
+    turned = [(foot * 0.6, 0.0), (foot, 0.1), (foot * 0.6, 0.3), (foot * 1.1, tall - 0.2)]
+    if chance(rng, 0.5):
+        legs = [lathe(turned, wood, x, y, 8) for x, y in places]
+    else:
+        legs = [slab(x, y, 0.0, 1.6 * foot, 1.6 * foot, tall - 0.2, wood) for x, y in places]
+    return finished([*_pool_top(rng, wide, long, tall, wood), *legs])
+
+
+@family("pool table", "pedestals")
+def _pool_on_pedestals(rng: np.random.Generator) -> Piece:
+    wide, long, tall, wood = _pool_size(rng)
+    deep = draw(rng, 0.25, 0.45)
+    legs = [slab(0.0, s * long * 0.3, 0.0, wide * 0.75, deep, tall - 0.2, wood) for s in (-1, 1)]
+    legs += [slab(0.0, s * long * 0.3, 0.0, wide * 0.85, deep + 0.08, 0.06, wood) for s in (-1, 1)]
+    legs.append(slab(0.0, 0.0, draw(rng, 0.1, 0.3), 0.12, long * 0.6, 0.1, wood))
+    return finished([*_pool_top(rng, wide, long, tall, wood), *legs])
 
 
 @family("pool table", "cabinet", held_out=True)
 def _cabinet_pool(rng: np.random.Generator) -> Piece:
-    piece = _pool_table(rng).mesh
-    wide, long = float(piece.size[0]) - 0.3, float(piece.size[1]) - 0.4
-    skirt = [slab(0.0, s * long * 0.32, 0.0, wide * 0.8, 0.25, 0.6, material("wood", rng)) for s in (-1, 1)]
-    return finished([piece, *skirt, slab(0.0, 0.0, 0.15, 0.1, long * 0.6, 0.08, material("wood", rng))])
+    wide, long, tall, wood = _pool_size(rng)
+    rings = []
+    for size, z in ((draw(rng, 0.7, 0.85), 0.0), (0.97, tall - 0.2)):
+        flat = rounded_rectangle(wide * size, long * size, 0.02, 2)
+        rings.append(np.column_stack([flat, np.full(len(flat), z)]))
+    return finished([*_pool_top(rng, wide, long, tall, wood), loft(rings, wood)])
 
 
 def _water(rng: np.random.Generator, long: float, wide: float, tall: float, z: float) -> list[Mesh]:

@@ -11,7 +11,7 @@ from avlmaps.sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, she
 
 def _board(rng: np.random.Generator, width: float, height: float) -> list[Mesh]:
     """Return a board with frame, tray and writing, its back at x = 0 and its lower edge at z = 0."""
-    face = pick(rng, ("white", "white", "white", "glass", "black"))
+    face = pick(rng, ("white", "white", "white", "white", "glass", "black"))
     look = material(face, rng, (0.16, 0.28, 0.22) if face == "black" and chance(rng, 0.5) else None)
     frame, y = material(pick(rng, ("metal", "wood", "white", "black")), rng), width / 2
     parts = [box((0.0, -y, 0.0), (0.015, y, height), look), rim((-y, 0.0), (y, height), 0.02, (0.0, 0.02), frame)]
@@ -58,9 +58,10 @@ def _flip_chart(rng: np.random.Generator) -> Piece:
             box((0.016, -width * 0.48, 0.08), (0.03, width * 0.48, height), material("paper", rng)),
         ]
     )
-    parts = [board.tilted("y", -lean).moved(-(top - height) * -0.05, 0.0, top - height)]
-    for y, x in ((-0.45, 0.3), (0.45, 0.3), (0.0, -0.5)):
-        parts.append(strut((x, y, 0.0), (-0.04, y * 0.4, top - 0.1), 0.025, 0.025, metal))
+    parts = [board.tilted("y", -lean).moved(0.0, 0.0, top - height)]
+    low, high = lean * (top - height) - 0.03, -lean * height - 0.03  # the front legs follow the board's back
+    for y, x in ((-0.4, low), (0.4, low), (0.0, -0.65)):
+        parts.append(strut((x, y, 0.0), (high, y * 0.5, top - 0.03), 0.025, 0.025, metal))
     return finished(parts)
 
 
@@ -231,7 +232,8 @@ def _tower_dispenser(rng: np.random.Generator) -> Piece:
         box((-x, -wide / 2, 0.0), (x, wide / 2, z), look),
         box((-x, -wide / 2, z + hollow), (x, wide / 2, tall), look),
     ]
-    parts.append(box((-x, -wide / 2, z), (x - deep_in, wide / 2, z + hollow), dark))
+    parts.append(box((-x, -wide / 2, z), (x - deep_in, wide / 2, z + hollow), look))
+    parts.append(box((x - deep_in, -wide * 0.46, z), (x - deep_in + 0.003, wide * 0.46, z + hollow), dark))
     parts += [
         box((x - deep_in, s * wide / 2 - 0.02 * (s > 0), z), (x, s * wide / 2 + 0.02 * (s < 0), z + hollow), look)
         for s in (-1, 1)
