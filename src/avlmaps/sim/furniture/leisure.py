@@ -17,6 +17,7 @@ from avlmaps.sim.shapes import (
     polygon,
     prism,
     rounded_box,
+    rounded_rectangle,
     sheet,
     slab,
     tube,
