@@ -7,7 +7,7 @@ import numpy as np
 
 from avlmaps.sim.furniture.joinery import chance, draw, pick
 from avlmaps.sim.homes.polygons import inside
-from avlmaps.sim.homes.plan import OUTSIDE, Hole, HoleKind, Room, Wall
+from avlmaps.sim.homes.plan import OUTSIDE, WELL, Hole, HoleKind, Room, Wall
 
 HUBS = ("hallway", "corridor", "entrance hall", "open-plan office", "reception")
 SOCIAL = ("living room", "kitchen", "dining room")
@@ -17,6 +17,8 @@ _OPEN_KINDS = (*SOCIAL, "hallway", "entrance hall", "kitchenette", "open-plan of
 
 def _price(a: str, b: str) -> float:
     """Return how little a door between two kinds of room is wanted."""
+    if WELL in (a, b):
+        return 0.5 if "hallway" in (a, b) else np.inf
     if a in HUBS or b in HUBS:
         return 1.0
     if a in SOCIAL and b in SOCIAL:
@@ -46,9 +48,14 @@ def joined_up(
         return None
     out = list(walls)
     for index, wall in enumerate(walls):
-        if wall.right == OUTSIDE or wall.length_m < _LEAST_DOOR_M or not _spots(wall, rooms, 0.95):
+        if wall.right == OUTSIDE:
             continue
         a, b = rooms[wall.left].kind, rooms[wall.right].kind
+        if WELL in (a, b):
+            out[index] = replace(wall, built="hallway" not in (a, b))
+            continue
+        if wall.length_m < _LEAST_DOOR_M or not _spots(wall, rooms, 0.95):
+            continue
         both_social = a in SOCIAL and b in SOCIAL
         if both_social and chance(rng, open_plan):
             out[index] = _opened(rng, wall, rooms)
@@ -73,9 +80,10 @@ def _tree(rooms: list[Room], walls: list[Wall], start: int, patience: float) -> 
             if room not in (wall.left, wall.right) or OUTSIDE in (wall.left, wall.right):
                 continue
             other = wall.right if wall.left == room else wall.left
-            if wall.length_m < _LEAST_DOOR_M or not _spots(wall, rooms, 0.95):
+            kinds = rooms[room].kind, rooms[other].kind
+            if WELL not in kinds and (wall.length_m < _LEAST_DOOR_M or not _spots(wall, rooms, 0.95)):
                 continue
-            price = cost + _price(rooms[room].kind, rooms[other].kind)
+            price = cost + _price(*kinds)
             if price < best.get(other, np.inf):
                 best[other], through[other] = price, index
                 heapq.heappush(queue, (price, other))
@@ -172,9 +180,11 @@ def _leaf_is_free(rooms: list[Room], walls: list[Wall], index: int, hole: Hole) 
     return True
 
 
-def lit_by_day(rng: np.random.Generator, rooms: list[Room], walls: list[Wall]) -> list[Wall]:
-    """Put windows into outer walls and one closed door to the outside."""
-    entrance = _entrance(rng, rooms, walls)
+def lit_by_day(
+    rng: np.random.Generator, rooms: list[Room], walls: list[Wall], has_entrance: bool = True
+) -> list[Wall]:
+    """Put windows into outer walls, and one closed door to the outside where the floor has the entrance."""
+    entrance = _entrance(rng, rooms, walls) if has_entrance else -1
     style = draw(rng, 0.0, 0.9), draw(rng, 0.7, 1.1), pick(rng, (0.5, 0.7, 0.9))
     out = []
     for index, wall in enumerate(walls):
@@ -200,7 +210,7 @@ def _entrance(rng: np.random.Generator, rooms: list[Room], walls: list[Wall]) ->
 
 def _with_windows(rng: np.random.Generator, wall: Wall, room: Room, style: tuple[float, float, float]) -> Wall:
     low_sill, sill, share = style
-    if room.kind in ("storage",) or not chance(rng, 0.35 if room.kind in HUBS else share):
+    if room.kind in ("storage", WELL) or not chance(rng, 0.35 if room.kind in HUBS else share):
         return wall
     if room.kind in ("bathroom", "toilet", "laundry room"):
         sizes = (0.5, 0.9, draw(rng, 1.1, 1.5))

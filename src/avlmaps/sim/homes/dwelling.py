@@ -1,6 +1,7 @@
 """From a seed to a scene: programme, plan, walls, furniture, lights."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,16 +10,18 @@ from avlmaps.sim.furniture.joinery import chance, draw
 from avlmaps.sim.homes import offices, rooms, service
 from avlmaps.sim.homes.clutter import dress, litter
 from avlmaps.sim.homes.doors import joined_up, lit_by_day
+from avlmaps.sim.homes.fixtures import fit_out
 from avlmaps.sim.homes.furnish import Furnisher
 from avlmaps.sim.homes.layout import Programme, floor_of
 from avlmaps.sim.homes.on_walls import adorn, dress_windows, light_up
 from avlmaps.sim.homes.placing import Footprint, ground_of
-from avlmaps.sim.homes.plan import Plan, Room, walls_between
-from avlmaps.sim.homes.programme import home_programme, office_programme
+from avlmaps.sim.homes.plan import WELL, Plan, Room, walls_between
+from avlmaps.sim.homes.programme import home_programme, office_programme, upstairs
+from avlmaps.sim.homes.stairs import build_stairs
 from avlmaps.sim.homes.walls import build_shell, looks_of
-from avlmaps.sim.scene import Area, Scene, SceneBuilder
+from avlmaps.sim.scene import Area, Light, Scene, SceneBuilder
 
-_TRIES = 40
+TWO_STOREYS = 0.12  # share of homes with an upper floor
 
 RULES: dict[str, Callable[[Furnisher], None]] = {
     "living room": rooms.living_room, "dining room": rooms.dining_room, "bedroom": rooms.bedroom,
@@ -31,19 +34,33 @@ RULES: dict[str, Callable[[Furnisher], None]] = {
 }  # fmt: skip
 
 
-def _plan(rng: np.random.Generator, programme: Programme, corridor: str) -> Plan:
+def _plan(rng: np.random.Generator, programme: Programme, corridor: str, stairs: bool = False) -> Plan:
     """Draw plans until every room can be reached, and no more through other rooms than can be helped."""
     height = draw(rng, 2.3, 3.4) if chance(rng, 0.4) else draw(rng, 2.45, 2.75)
     open_plan = 0.85 if chance(rng, 0.5) else 0.1
     patience = 7.0
     while True:
-        laid = [Room(kind, polygon, 0.0, height) for kind, polygon in floor_of(rng, programme, corridor)]
+        laid = [Room(kind, polygon, 0.0, height) for kind, polygon in floor_of(rng, programme, corridor, stairs=stairs)]
+        laid.sort(key=lambda room: room.kind == WELL)  # it is no area: the others keep their numbers
         walls = joined_up(rng, laid, walls_between([room.polygon for room in laid]), open_plan, patience)
         patience *= 1.15
         if walls is not None:
             break
     walls = lit_by_day(rng, laid, walls)
-    return Plan(tuple(laid), tuple(walls), draw(rng, 0.09, 0.2), draw(rng, 0.22, 0.4), not chance(rng, 0.06))
+    ceiling = laid[-1].kind == WELL or not chance(rng, 0.06)
+    return Plan(tuple(laid), tuple(walls), draw(rng, 0.09, 0.2), draw(rng, 0.22, 0.4), ceiling)
+
+
+def _upper(rng: np.random.Generator, ground: Plan) -> Plan | None:
+    """Draw the floor above a floor with stairs; None where no doors reach all of it."""
+    floor_m = ground.rooms[0].floor_m + ground.rooms[0].height_m + ground.slab_m
+    for _ in range(4):
+        rooms = upstairs(rng, ground.rooms, floor_m, draw(rng, 2.3, 2.8))
+        walls = joined_up(rng, rooms, walls_between([room.polygon for room in rooms]), 0.0)
+        if walls is not None:
+            lit = lit_by_day(rng, rooms, walls, has_entrance=False)
+            return Plan(tuple(rooms), tuple(lit), ground.wall_m, ground.outer_m, ceiling=not chance(rng, 0.06))
+    return None
 
 
 def _furnished(rng: np.random.Generator, builder: SceneBuilder, plan: Plan, which: Families) -> None:
@@ -52,6 +69,8 @@ def _furnished(rng: np.random.Generator, builder: SceneBuilder, plan: Plan, whic
     looks = [looks_of(rng, room, home) for room in plan.rooms]
     first = len(builder.areas)
     for room in plan.rooms:
+        if room.kind == WELL:
+            continue
         number = 1 + sum(area.kind == room.kind for area in builder.areas)
         top = room.floor_m + room.height_m
         builder.areas.append(Area(room.kind, room.polygon, room.floor_m, top, f"{room.kind} {number}"))
@@ -60,6 +79,10 @@ def _furnished(rng: np.random.Generator, builder: SceneBuilder, plan: Plan, whic
     fill = 0.35 if chance(rng, 0.08) else draw(rng, 0.75, 1.2)
     day = draw(rng, 0.3, 1.1) if chance(rng, 0.5) else 0.0
     for index, room in enumerate(plan.rooms):
+        if room.kind == WELL:
+            x, y = room.polygon.mean(axis=0).tolist()
+            builder.lights.append(Light((x, y, room.floor_m + room.height_m - 0.2), (0.5, 0.48, 0.42)))
+            continue
         ground = ground_of(plan, index)
         for leaf in leaves:
             if leaf.room == index:
@@ -67,6 +90,7 @@ def _furnished(rng: np.random.Generator, builder: SceneBuilder, plan: Plan, whic
                 ground.take(foot, leaf.centre, leaf.heading_rad)
         f = Furnisher(rng, builder, ground, first + index, room.kind, room.floor_m, room.height_m, which, plan.ceiling,
                       fill * (0.3 if chance(rng, 0.04) else 1.0), float(np.clip(mess * draw(rng, 0.5, 1.6), 0, 1)))  # fmt: skip
+        fit_out(f, looks[index].wall)
         dress_windows(f, cloth, None)
         RULES[room.kind](f)
         adorn(f)
@@ -84,7 +108,18 @@ def make_home(seed: int, which: Families = "all") -> Scene:
     """
     rng = np.random.default_rng([seed, 0x40E])
     builder = SceneBuilder(f"house:{seed}")
-    _furnished(rng, builder, _plan(rng, home_programme(rng), "hallway"), which)
+    upper = None
+    if chance(rng, TWO_STOREYS):
+        ground = _plan(rng, home_programme(rng, 105.0), "hallway", stairs=True)
+        ground = replace(ground, slab_m=draw(rng, 0.2, 0.35))
+        upper = _upper(rng, ground) if ground.rooms[-1].kind == WELL else None
+    else:
+        ground = _plan(rng, home_programme(rng), "hallway")
+    _furnished(rng, builder, ground, which)
+    if upper is not None:
+        hall = next(i for i, room in enumerate(ground.rooms) if room.kind == "hallway")
+        build_stairs(rng, builder, ground, upper, hall)
+        _furnished(rng, builder, upper, which)
     return builder.build()
 
 

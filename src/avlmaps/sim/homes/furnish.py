@@ -128,7 +128,7 @@ class Furnisher:
     ) -> Stood | None:  # fmt: skip
         """Put a piece at the first of several places that is free and leaves the ways free."""
         foot = footprint(piece.mesh)
-        if z + foot.high_m > self.height_m - 0.02:
+        if z + foot.high_m > self.height_m - 0.02 and piece.category not in ("wall", "column"):
             return None
         good = self.ground.fits(foot, centre, heading_rad, z, zones, except_for)
         for index in np.flatnonzero(good)[:5].tolist():

@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.sim.furniture.joinery import chance, count, draw, pick
+from avlmaps.sim.homes.plan import WELL, WELL_LENGTH_M
 from avlmaps.sim.homes.polygons import area_m2, half, middle, rectangle, widths_m
 
 Polygon = Float[np.ndarray, "k 2"]
@@ -11,7 +12,7 @@ Programme = list[tuple[str, float]]  # kinds of room and the area each should ha
 
 LEAST_WIDTH_M = {"hallway": 1.15, "entrance hall": 1.3, "storage": 1.3, "toilet": 1.2, "bathroom": 1.6,
                  "laundry room": 1.6, "copy room": 1.6, "corridor": 1.4, "kitchen": 2.0, "bedroom": 2.4,
-                 "living room": 2.8, "dining room": 2.4, "kitchenette": 1.8}  # fmt: skip
+                 "living room": 2.8, WELL: 2.1, "dining room": 2.4, "kitchenette": 1.8}  # fmt: skip
 _PASSAGES = ("hallway", "corridor", "entrance hall")
 
 
@@ -75,7 +76,7 @@ def divided(
 
 
 def along_corridor(
-    rng: np.random.Generator, polygon: Polygon, programme: Programme, slant: float, corridor: str
+    rng: np.random.Generator, polygon: Polygon, programme: Programme, slant: float, corridor: str, stairs: bool = False
 ) -> list[tuple[str, Polygon]]:
     """Divide a polygon by a corridor along its middle, with rooms on both sides and sometimes one at its end."""
     way = _long_way(polygon)
@@ -85,17 +86,23 @@ def along_corridor(
     rooms = list(programme)
     total = sum(size for _, size in rooms)
     out: list[tuple[str, Polygon]] = []
-    if chance(rng, 0.55) and len(rooms) > 3:  # the largest neighbours take one end, from wall to wall
+    if chance(rng, 0.55) and len(rooms) > 3 + 2 * stairs:  # the largest neighbours take one end, from wall to wall
         group = 1 if chance(rng, 0.5) else 2
         end, rooms = rooms[:group], rooms[group:]
         taken = sum(size for _, size in end) / total
         head, polygon = cut(polygon, min(taken, 0.6), way)
         out += divided(rng, head, end, slant)
     depth = float(np.ptp(polygon @ side))
-    width = draw(rng, 1.25, 2.0) if corridor == "hallway" else draw(rng, 1.5, 2.6)
+    width = draw(rng, 2.2, 2.5) if stairs else draw(rng, 1.25, 2.0) if corridor == "hallway" else draw(rng, 1.5, 2.6)
     first_share = draw(rng, 0.38, 0.62) * (1 - width / depth)
     lower, rest = cut(polygon, first_share, side)
     middle_part, upper = cut(rest, width / depth / (1 - first_share), side)
+    if stairs:
+        share = 1 - WELL_LENGTH_M / float(np.ptp(middle_part @ way))
+        if share < 0.3:
+            return []
+        middle_part, well = cut(middle_part, share, way)
+        out.append((WELL, well))
     out.append((corridor, middle_part))
     split = _index_of_share(rooms, first_share / (1 - width / depth))
     for part, some in ((lower, rooms[:split]), (upper, rooms[split:])):
@@ -156,7 +163,8 @@ def sound(rooms: list[tuple[str, Polygon]]) -> bool:
 
 
 def floor_of(
-    rng: np.random.Generator, programme: Programme, corridor: str = "hallway", slanted: float = 0.12
+    rng: np.random.Generator, programme: Programme, corridor: str = "hallway", slanted: float = 0.12,
+    stairs: bool = False,
 ) -> list[tuple[str, Polygon]]:
     """Lay out a floor: draw an outline and divide it, again until every room is sound.
 
@@ -165,14 +173,15 @@ def floor_of(
         programme: rooms and their areas, m²; a passage among them is a room like others where no corridor is cut.
         corridor: what the room of a corridor is called.
         slanted: share of cuts that are not at right angles.
+        stairs: cut a stairwell off the corridor.
     """
-    slant = slanted if chance(rng, 0.4) else 0.0
+    slant = slanted if chance(rng, 0.4) and not stairs else 0.0
     size = sum(area for _, area in programme)
     inner = [room for room in programme if room[0] not in _PASSAGES]
     for attempt in range(200):
-        shape = pick(rng, ("rectangle", "rectangle", "L", "T")) if size > 60 else "rectangle"
+        shape = pick(rng, ("rectangle", "rectangle", "L", "T")) if size > 60 and not stairs else "rectangle"
         parts = outlines(rng, size, shape)
-        use_corridor = len(inner) >= 4 and chance(rng, 0.6 if attempt < 100 else 0.3)
+        use_corridor = stairs or len(inner) >= 4 and chance(rng, 0.6 if attempt < 100 else 0.3)
         rooms: list[tuple[str, Polygon]] = []
         left = inner if use_corridor else list(programme)
         for number, part in enumerate(parts):
@@ -182,11 +191,15 @@ def floor_of(
             if not mine:
                 break
             if use_corridor and len(mine) >= 3:
-                rooms += along_corridor(rng, part, mine, slant, corridor)
+                rooms += along_corridor(rng, part, mine, slant, corridor, stairs)
             else:
                 rooms += divided(rng, part, mine, slant)
+        if stairs and (not any(kind == WELL and len(p) == 4 for kind, p in rooms)):
+            continue
         if sound(rooms) and any(kind in _PASSAGES or len(rooms) < 6 for kind, _ in rooms):
             return rooms
+    if stairs:
+        return floor_of(rng, programme, corridor, slanted)
     return divided(rng, rectangle(0.0, 0.0, np.sqrt(size) * 1.2, np.sqrt(size) / 1.2), programme, 0.0)
 
 

@@ -1,12 +1,14 @@
 """What a floor plan is: rooms, the walls between them, and the holes in the walls. Metres, seen from above."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
 OUTSIDE = -1  # the room beyond an outer wall
+WELL = "stairwell"  # the room of the stairs; it is no area, since nobody stays there
+WELL_LENGTH_M = 3.4
 
 HoleKind = Literal["door", "closed door", "doorless", "folding door", "gap", "window"]
 
@@ -107,13 +109,16 @@ class Plan:
         walls: its walls.
         wall_m: thickness of the walls between rooms; outer walls reach as far inwards from their middle line.
         outer_m: thickness of the outer walls.
+        ceiling: its rooms have ceilings.
+        slab_m: what lies between its ceilings and the floor above; its walls reach up through it.
     """
 
     rooms: tuple[Room, ...]
     walls: tuple[Wall, ...]
     wall_m: float
     outer_m: float
-    ceiling: bool = field(default=True)
+    ceiling: bool = True
+    slab_m: float = 0.0
 
     def walls_of(self, room: int) -> list[tuple[Wall, bool]]:
         """Return the walls of a room, each with whether the room lies on its left."""

@@ -1,9 +1,13 @@
 """Which rooms a home or an office has, and how large each is."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from avlmaps.sim.furniture.joinery import chance, draw, pick
 from avlmaps.sim.homes.layout import Programme
+from avlmaps.sim.homes.plan import WELL, Room
+from avlmaps.sim.homes.polygons import area_m2
 
 # Kind of room: least and greatest area, m².
 _SIZE_M2 = {"living room": (16, 34), "kitchen": (8, 15), "dining room": (9, 18), "bedroom": (10, 19), "bathroom": (4.5, 9),
@@ -18,9 +22,9 @@ _ORDER = ("kitchen", "dining room", "living room", "entrance hall", "hallway", "
 _MOST = {"dining room": 1, "gym": 1, "storage": 2, "laundry room": 1, "entrance hall": 1}
 
 
-def home_programme(rng: np.random.Generator) -> Programme:
-    """Draw the rooms of a home of 40 to 220 m² and their areas."""
-    wanted = draw(rng, 42, 120) if chance(rng, 0.7) else draw(rng, 110, 215)
+def home_programme(rng: np.random.Generator, most_m2: float = 215.0) -> Programme:
+    """Draw the rooms of a home of 40 to 220 m² (or as large as is said) and their areas."""
+    wanted = min(draw(rng, 42, 120) if chance(rng, 0.7) else draw(rng, 110, 215), most_m2)
     stretch = draw(rng, 0.85, 1.25)
     kinds = ["living room", "kitchen", "bathroom", "bedroom", "hallway"]
     rooms = [(kind, draw(rng, *_SIZE_M2[kind]) * stretch) for kind in kinds]
@@ -35,6 +39,24 @@ def home_programme(rng: np.random.Generator) -> Programme:
     rooms.sort(key=lambda room: order[room[0]])
     total = sum(area for _, area in rooms)
     return rooms if total > 40 else [(kind, area * 41 / total) for kind, area in rooms]
+
+
+def upstairs(rng: np.random.Generator, rooms: Sequence[Room], floor_m: float, height_m: float) -> list[Room]:
+    """Return the rooms of an upper floor: over each room one of the same outline, the hall and the stairs above theirs."""
+    out = []
+    free = [room for room in rooms if room.kind not in ("hallway", WELL)]
+    smallest = min(free, key=lambda room: area_m2(room.polygon))
+    for room in rooms:
+        size = area_m2(room.polygon)
+        kind = room.kind
+        if room is smallest:
+            kind = "bathroom"
+        elif kind not in ("hallway", WELL) and size < 8:
+            kind = pick(rng, ("bathroom", "storage", "laundry room", "office"))
+        elif kind not in ("hallway", WELL):
+            kind = pick(rng, ("bedroom", "bedroom", "children's room", "office", "gym" if size > 12 else "bedroom"))
+        out.append(Room(kind, room.polygon, floor_m, height_m))
+    return out
 
 
 def office_programme(rng: np.random.Generator) -> Programme:

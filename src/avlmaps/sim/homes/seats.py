@@ -68,7 +68,7 @@ def seat_round(f: Furnisher, table: Stood, piece: Piece, number: int, all_sides:
         if done >= number:
             break
         deepest = push_in_m(piece.mesh, table.piece.mesh)
-        outs = [draw(f.rng, -deepest, 0.02) if tidy or chance(f.rng, 0.6) else draw(f.rng, 0.02, 0.4), 0.02]
+        outs = [draw(f.rng, -deepest, 0.02) if tidy or chance(f.rng, 0.6) else draw(f.rng, 0.02, 0.4), 0.02, 0.2]
         done += any(_sit(f, table, piece, foot, (x, y, heading), out, tidy) for out in outs)
     return done
 

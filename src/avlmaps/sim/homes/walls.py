@@ -9,7 +9,7 @@ from jaxtyping import Float
 from avlmaps.sim.furniture import Families, Piece
 from avlmaps.sim.furniture.joinery import chance, draw, pick
 from avlmaps.sim.furniture.openings import door, folding_door, window
-from avlmaps.sim.homes.plan import OUTSIDE, Hole, Plan, Room, Wall
+from avlmaps.sim.homes.plan import OUTSIDE, WELL, Hole, Plan, Room, Wall
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined
 from avlmaps.sim.scene import SceneBuilder
@@ -140,7 +140,7 @@ def wall_mesh(plan: Plan, wall: Wall, looks: list[Looks], edge: Material, outer:
     """Return a wall in the world, with its holes and its skirting."""
     inner = plan.wall_m / 2
     rooms = [plan.rooms[i] for i in (wall.left, wall.right) if i != OUTSIDE]
-    height = max(room.height_m for room in rooms) + 0.02
+    height = max(room.height_m for room in rooms) + max(plan.slab_m, 0.02)
     floor = rooms[0].floor_m
     far = inner - plan.outer_m if wall.right == OUTSIDE else -inner
     ends = [_extension(plan, wall, end) for end in (wall.a, wall.b)]
@@ -198,6 +198,11 @@ class Leaf:
     room: int
 
 
+def area_of(plan: Plan, room: int, first_area: int) -> int:
+    """Return the index of a room's area in the scene, −1 for a stairwell."""
+    return -1 if plan.rooms[room].kind == WELL else first_area + room
+
+
 def build_shell(
     rng: np.random.Generator, builder: SceneBuilder, plan: Plan, looks: list[Looks], first_area: int, which: Families
 ) -> list[Leaf]:
@@ -215,9 +220,11 @@ def build_shell(
             leaves += _fill(rng, builder, plan, wall, hole, first_area, style, which)
     for index, room in enumerate(plan.rooms):
         for category, z, look in (("floor", 0.0, looks[index].floor), ("ceiling", room.height_m, looks[index].ceiling)):
+            if room.kind == WELL and (category == "floor") == (room.floor_m > 0):
+                continue  # open between the floors
             if category == "floor" or plan.ceiling:
                 corners = np.column_stack([room.polygon, np.full(len(room.polygon), room.floor_m + z)])
-                builder.add(category, flat_polygon(corners, look), area=first_area + index)
+                builder.add(category, flat_polygon(corners, look), area=area_of(plan, index, first_area))
     return leaves
 
 
@@ -237,7 +244,7 @@ def _fill(rng: np.random.Generator, builder: SceneBuilder, plan: Plan, wall: Wal
     heading = heading_of(towards)
     mesh = _hinged(piece.mesh, hole, thick) if hole.kind == "door" else piece.mesh
     builder.add(piece.category, placed(mesh, origin, heading, floor + hole.sill_m), heading, piece.family,
-                area=first_area + room)  # fmt: skip
+                area=area_of(plan, room, first_area))  # fmt: skip
     return _leaves(mesh, thick, hole, origin, heading, room)
 
 
