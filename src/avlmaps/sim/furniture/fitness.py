@@ -222,6 +222,20 @@ def _power_rack(rng: np.random.Generator) -> Piece:
     return finished(parts)
 
 
+def _pulls(rng: np.random.Generator, back: float, tall: float, frame: Material, steel: Material) -> list[Mesh]:
+    """Return a multi-gym's press arms and the bar that hangs from its cable."""
+    parts, reach = [], back + 0.85
+    for s in (-1, 1):
+        y = s * draw(rng, 0.3, 0.45)
+        arm = [(back + 0.45, s * 0.06, tall * 0.8), (back + 0.55, y, tall * 0.78)]
+        arm += [(back + 0.6, y, tall * 0.5), (reach, y, tall * 0.48)]
+        parts.append(tube(arm, 0.022, frame, 6))
+    low, high = tall - 0.25, tall - 0.2
+    bar = [(reach, -0.5, low), (reach, -0.25, high), (reach, 0.25, high), (reach, 0.5, low)]
+    parts.append(tube(bar, 0.014, steel, 6))
+    return [*parts, tube([(reach, 0.0, tall - 0.06), (reach, 0.0, high)], 0.004, steel, 4)]
+
+
 @family("fitness equipment", "multi-gym")
 def _multi_gym(rng: np.random.Generator) -> Piece:
     frame, pad, steel = _looks(rng)
@@ -242,35 +256,7 @@ def _multi_gym(rng: np.random.Generator) -> Piece:
         rounded_box((back + 0.48, -0.14, seat + 0.12), (back + 0.55, 0.14, seat + 0.75), 0.03, pad),
     ]
     parts.append(slab(x + 0.3, 0.0, 0.0, 0.06, 0.06, seat, frame))
-    for s in (-1, 1):  # press arms
-        y = s * draw(rng, 0.3, 0.45)
-        parts.append(
-            tube(
-                [
-                    (back + 0.45, s * 0.06, tall * 0.8),
-                    (back + 0.55, y, tall * 0.78),
-                    (back + 0.6, y, tall * 0.5),
-                    (back + 0.85, y, tall * 0.48),
-                ],
-                0.022,
-                frame,
-                6,
-            )
-        )
-    parts.append(
-        tube(
-            [
-                (back + 0.85, -0.5, tall - 0.25),
-                (back + 0.85, -0.25, tall - 0.2),
-                (back + 0.85, 0.25, tall - 0.2),
-                (back + 0.85, 0.5, tall - 0.25),
-            ],
-            0.014,
-            steel,
-            6,
-        )
-    )
-    parts.append(tube([(back + 0.85, 0.0, tall - 0.06), (back + 0.85, 0.0, tall - 0.2)], 0.004, steel, 4))
+    parts += _pulls(rng, back, tall, frame, steel)
     parts += [tube([(x + 0.45, -0.22, z), (x + 0.45, 0.22, z)], 0.05, pad, 8) for z in (0.18, seat - 0.05)]
     return finished(parts)
 

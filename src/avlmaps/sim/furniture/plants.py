@@ -79,7 +79,7 @@ def _palm(rng: np.random.Generator) -> Piece:
             turn, out = start + number * 2.4, height * draw(rng, 0.2, 0.42)
             rise = height * draw(rng, 0.2, 0.5)
             droop = rise * draw(rng, 0.5, 1.3)
-            wide = draw(rng, 0.02, 0.05) if trunks > 1 else draw(rng, 0.05, 0.12)
+            wide = draw(rng, 0.03, 0.06) if trunks > 1 else draw(rng, 0.05, 0.12)
             parts.append(frond(rng, (x * 1.4, y * 1.4, top), turn, out, rise, droop, wide, pick(rng, green), 5))
     return finished(parts)
 
@@ -109,8 +109,8 @@ def _feather_palm(rng: np.random.Generator) -> Piece:
 def _bush(rng: np.random.Generator) -> Piece:
     height = draw(rng, 0.25, 0.9)
     parts, _, earth = _pot_for(rng, height * 1.4)
-    green, leaves = _greens(rng), count(rng, 40, 80)
-    size = height * draw(rng, 0.14, 0.24)
+    green, leaves = _greens(rng), count(rng, 55, 90)
+    size = height * draw(rng, 0.16, 0.27)
     spread = height * draw(rng, 0.35, 0.55)
     for _ in range(leaves):
         turn, up = draw(rng, 0, 6.28), draw(rng, 0.05, 1.0)

@@ -125,18 +125,27 @@ def wheel(x: float, y: float, radius: float, spokes: int, tyre: Material, metal:
     return parts
 
 
+def _handlebar(rng: np.random.Generator, x: float, z: float, drop: bool, look: Material) -> list[Mesh]:
+    """Return the two halves of a handlebar, flat or dropped, from its clamp at (x, z)."""
+    parts, bar = [], draw(rng, 0.2, 0.32)
+    for s in (-1, 1):
+        path = [(x, 0.0, z), (x + 0.03, s * bar * 0.7, z + 0.02), (x - draw(rng, 0.02, 0.18), s * bar, z + 0.02)]
+        if drop:
+            path = [(x, 0.0, z), (x + 0.02, s * 0.2, z), (x + 0.13, s * 0.21, z - 0.03), (x + 0.06, s * 0.21, z - 0.13)]
+        parts.append(tube(path, 0.012, look, 5))
+    return parts
+
+
 def _cycle(rng: np.random.Generator, radius: float, step_through: bool, drop: bool) -> list[Mesh]:
-    look, metal, black = (
-        material(pick(rng, ("painted", "plastic", "metal", "black")), rng),
-        material("metal", rng),
-        material("black", rng),
-    )
+    """Return a bicycle along x with wheels of a radius, metres."""
+    look = material(pick(rng, ("painted", "plastic", "metal", "black")), rng)
+    metal, black = material("metal", rng), material("black", rng)
     base = radius * draw(rng, 3.0, 3.3)
-    rear, front = (-base / 2, 0.0, radius), (base / 2, 0.0, radius)
+    rear, front = (-base / 2, 0.0), (base / 2, 0.0)
     axle, seat = (-base * 0.08, 0.0, radius * 0.85), (-base * 0.24, 0.0, radius * 2.55)
     head, thick = (base * 0.34, 0.0, radius * 2.45), draw(rng, 0.014, 0.022)
     neck = (base * 0.37, 0.0, radius * 2.05)
-    parts = [*wheel(rear[0], 0.0, radius, 10, black, metal), *wheel(front[0], 0.0, radius, 10, black, metal)]
+    parts = [*wheel(*rear, radius, 10, black, metal), *wheel(*front, radius, 10, black, metal)]
     top = (seat[0] * 0.75, 0.0, radius * (1.3 if step_through else 2.2))
     for a, b in ((axle, seat), (axle, neck), (top, head), (seat, (seat[0] * 0.97, 0.0, seat[2] + 0.08))):
         parts.append(tube([a, b], thick, look, 6))
@@ -147,21 +156,7 @@ def _cycle(rng: np.random.Generator, radius: float, step_through: bool, drop: bo
         ]
         parts.append(tube([(front[0], s, radius), (neck[0], s, neck[2])], 0.011, look, 5))
     parts.append(tube([neck, (head[0] - 0.02, 0.0, radius * 2.75)], thick, look, 6))
-    grip, bar = (head[0] - 0.02, radius * 2.8), draw(rng, 0.2, 0.32)
-    for s in (-1, 1):
-        path = [
-            (grip[0], 0.0, grip[1]),
-            (grip[0] + 0.03, s * bar * 0.7, grip[1] + 0.02),
-            (grip[0] - draw(rng, 0.02, 0.18), s * bar, grip[1] + 0.02),
-        ]
-        if drop:
-            path = [
-                (grip[0], 0.0, grip[1]),
-                (grip[0] + 0.02, s * 0.2, grip[1]),
-                (grip[0] + 0.13, s * 0.21, grip[1] - 0.03),
-                (grip[0] + 0.06, s * 0.21, grip[1] - 0.13),
-            ]
-        parts.append(tube(path, 0.012, black, 5))
+    parts += _handlebar(rng, head[0] - 0.02, radius * 2.8, drop, black)
     parts += crank(axle[0], axle[2], 0.17 * radius / 0.34, draw(rng, 0.0, 6.28), 0.06, metal, black)
     parts.append(hoop((axle[0], 0.045, axle[2]), 0.09 * radius / 0.34, 0.008, metal, 14))
     saddle = ellipsoid((0.0, 0.0, 0.0), (0.13, 0.07, 0.03), black, 9, 5).moved(seat[0], 0.0, seat[2] + 0.1)
