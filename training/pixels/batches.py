@@ -4,12 +4,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from training.pixels.labels import UNLABELLED
+from training.pixels.labels import CATEGORIES, UNLABELLED
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.perception.embedded.geometry import channels
 
 WIDTH, HEIGHT = 160, 128
+# A frame shows a category with at least so many of its 320x240 pixels.
+FEWEST_PIXELS = 160
+# How evenly categories are drawn: 0 each as often as any other, 1 as often as frames show it.
+EVENNESS = 0.45
+# Share of windows that are drawn from anywhere.
+ANY_FRAME = 0.1
 
 
 @dataclass(frozen=True)
@@ -56,6 +62,7 @@ class Shards:
         """Open the shards that are there."""
         self.folder = folder
         self._open: dict[str, tuple[int, Frames]] = {}
+        self._showing: dict[int, list[tuple[str, int]]] = {}
         self.refresh()
 
     def refresh(self) -> int:
@@ -68,6 +75,8 @@ class Shards:
                 found[folder.name] = old if old and old[0] == stamp else (stamp, Frames.open(folder))
             except OSError:  # it is being replaced at this moment
                 continue
+        if found.keys() != self._open.keys() or any(found[n] is not self._open[n] for n in found):
+            self._showing = _index(found)
         self._open = found
         return sum(len(frames.depth) for _, frames in found.values())
 
@@ -76,19 +85,52 @@ class Shards:
         _, frames = list(self._open.values())[int(rng.integers(len(self._open)))]
         return frames, int(rng.integers(len(frames.depth)))
 
+    def draw_category(self, rng: np.random.Generator) -> tuple[Frames, int, int]:
+        """Return a frame that shows a category drawn almost evenly, and that category; −1 for any frame.
+
+        Three quarters of what a camera sees is walls and floors; a network that sees the world as it is learns those.
+        """
+        if not self._showing or rng.random() < ANY_FRAME:
+            return *self.draw(rng), -1
+        names = list(self._showing)
+        share = np.array([len(self._showing[name]) for name in names]) ** EVENNESS
+        category = names[int(rng.choice(len(names), p=share / share.sum()))]
+        shard, index = self._showing[category][int(rng.integers(len(self._showing[category])))]
+        return self._open[shard][1], index, category
+
+
+def _index(shards: dict[str, tuple[int, Frames]]) -> dict[int, list[tuple[str, int]]]:
+    """Return for each category but walls, floors and ceilings the frames that show enough of it."""
+    showing: dict[int, list[tuple[str, int]]] = {}
+    for name, (_, frames) in shards.items():
+        for index, label in enumerate(frames.label):
+            count = np.bincount(label[::2, ::2].reshape(-1), minlength=256)
+            for category in np.flatnonzero(count[: len(CATEGORIES)] >= FEWEST_PIXELS // 4):
+                if CATEGORIES[category] not in ("wall", "floor", "ceiling"):
+                    showing.setdefault(int(category), []).append((name, index))
+    return showing
+
 
 def draw_batch(shards: Shards, size: int, rng: np.random.Generator, colour_kept: float) -> Batch:
     """Draw a batch; ``colour_kept`` is the share of pictures with colour that keep it."""
-    items = [_sample(*shards.draw(rng), rng, colour_kept) for _ in range(size)]
+    items = [_sample(*shards.draw_category(rng), rng, colour_kept) for _ in range(size)]
     return Batch(*(np.stack([item[i] for item in items]) for i in range(5)))
 
 
-def _sample(frames: Frames, index: int, rng: np.random.Generator, colour_kept: float) -> tuple[np.ndarray, ...]:
+def _sample(
+    frames: Frames, index: int, category: int, rng: np.random.Generator, colour_kept: float
+) -> tuple[np.ndarray, ...]:
     h, w = frames.depth.shape[1:]
     wide = rng.uniform(WIDTH, w * 0.9999) if rng.random() < 0.8 else WIDTH * rng.uniform(0.75, 1.0)
     wide = min(wide, h * WIDTH / HEIGHT)
     tall = wide * HEIGHT / WIDTH
     left, top = rng.uniform(0, w - wide), rng.uniform(0, h - tall)
+    if category >= 0:  # a window with some of it inside
+        rows, columns = np.nonzero(frames.label[index][::4, ::4] == category)
+        if len(rows):
+            at = int(rng.integers(len(rows)))
+            left = np.clip(4 * columns[at] - wide * rng.uniform(0.2, 0.8), 0, w - wide)
+            top = np.clip(4 * rows[at] - tall * rng.uniform(0.2, 0.8), 0, h - tall)
     column = np.clip((left + (np.arange(WIDTH) + 0.5) * wide / WIDTH).astype(int), 0, w - 1)
     row = np.clip((top + (np.arange(HEIGHT) + 0.5) * tall / HEIGHT).astype(int), 0, h - 1)
     depth = frames.depth[index][row[:, None], column].astype(np.float32) / 1000.0

@@ -35,6 +35,8 @@ class Options:
     """Frames to look at."""
     seed: int = 0
     """Draws them."""
+    weights: str = "mean"
+    """``mean``: of the training's last stretch, or the ``last`` ones."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,7 @@ def figures(scores: Scores, bias: np.ndarray, temperature: float) -> dict[str, f
 
 def calibrate(options: Options) -> dict[str, float]:
     """Write rooms.onnx and rooms.json, return the figures on the held-out frames."""
-    network = load_network(options.network)
+    network = load_network(options.network, options.weights)
     scores = scores_of(network, options)
     bias, temperature = fit_scores(scores)
     told = figures(scores, bias, temperature)

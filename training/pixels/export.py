@@ -9,11 +9,11 @@ from onnx import numpy_helper
 from training.pixels.network import COLOUR, GEOMETRY, RoomNetwork
 
 
-def load_network(checkpoint: Path) -> RoomNetwork:
-    """Return the network with the running mean of its weights."""
+def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
+    """Return the network, with the running ``mean`` of its weights or the ``last`` ones."""
     state = torch.load(checkpoint, map_location="cpu", weights_only=True)
     network = RoomNetwork(len(state["categories"]), len(state["rooms"]), tuple(state["widths"]))
-    network.load_state_dict(state["mean"])
+    network.load_state_dict(state[weights])
     return network.eval()
 
 

@@ -93,8 +93,9 @@ class AVLMap:
         if self._rivals is None or self._rivals[0] != names:
             self._rivals = names, Rivals.of(feature, encoder, names)
         settings = self.settings
+        rgb = self.stored.voxels.rgb
         return Heatmap.of(
-            object_factor(self.space, feature, encoder, self._rivals[1], part, settings.objects, settings.heat)
+            object_factor(self.space, feature, encoder, self._rivals[1], part, settings.objects, settings.heat, rgb)
         )
 
     def sound(self, text: str, primary: bool = False) -> Heatmap:

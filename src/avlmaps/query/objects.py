@@ -5,16 +5,17 @@ is the closest. The margin by which it wins is kept: instances are ranked and ab
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Float16, Float32, Int
+from jaxtyping import Bool, Float, Float16, Float32, Int, UInt8
 
 from avlmaps.core.errors import QueryError
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.heatmap import HeatSettings, NearThings
 from avlmaps.query.level import Space
 from avlmaps.query.question import Part
+from avlmaps.query.tints import Tint, is_tinted, tint_of, tinted_share
 
 _CHUNK = 16_384
 # A name that a phrase means at least so much is the thing itself and does not compete with it.
@@ -235,14 +236,24 @@ def object_factor(
     part: Part,
     settings: ObjectSettings,
     heat: HeatSettings,
+    rgb: UInt8[np.ndarray, "n 3"] | None = None,
 ) -> NearThings:
     """Return the heat of the object that a word asks for.
+
+    With the voxels' colours, an encoder that knows things but no colours is helped out with those.
 
     Raises:
         QueryError: the encoder understands nothing of the word.
     """
-    asked = Asked.of(encoder, part.query)
-    understood = asked.understood
+    tint = tint_of(part.query) if rgb is not None and isinstance(encoder, NamedPixelEncoder) else None
+    asked = Asked.of(encoder, tint.thing if tint else part.query)
+    understood = f"{tint.text} {asked.understood}" if tint and asked.understood else asked.understood
+    if tint and rgb is not None and not tint.thing:
+        return colour_factor(space, rgb, tint, part, settings, heat)
+    if not len(asked.rows) and isinstance(encoder, NamedPixelEncoder):
+        note = f"the pixel encoder knows nothing like {part.query!r}"
+        nothing = np.zeros(0, np.int64), np.zeros(0, np.float32), False, "", note
+        return NearThings(space, part, heat.falloff_per_m(part.role), np.zeros(len(feature), bool), *nothing)
     if not len(asked.rows):
         known = ", ".join(encoder.vocabulary[:20]) or "nothing that it could list"
         raise QueryError(
@@ -250,6 +261,8 @@ def object_factor(
             + (f" ({encoder.card.note})" if encoder.card.note else "")
         )
     pieces = object_pieces(space, feature, encoder, rivals, asked, settings)
+    if tint is not None and rgb is not None:
+        pieces = replace(pieces, confidence=pieces.confidence * tinted_share(rgb, pieces.mask, pieces.instance, tint))
     best = float(pieces.confidence.max(initial=0.0))
     note = "" if best >= 0.5 else _absence(part.query, len(pieces.mask), pieces.won, best)
     if understood and understood != part.query.strip().lower():
@@ -258,6 +271,25 @@ def object_factor(
     return NearThings(
         space, part, falloff, pieces.mask, pieces.instance, pieces.confidence, best >= 0.5, understood, note
     )
+
+
+def colour_factor(
+    space: Space,
+    rgb: UInt8[np.ndarray, "n 3"],
+    tint: Tint,
+    part: Part,
+    settings: ObjectSettings,
+    heat: HeatSettings,
+) -> NearThings:
+    """Return the heat of whatever has a colour."""
+    mask = is_tinted(np.asarray(rgb), tint)
+    instance = instances_of(space, mask, settings.link_m)
+    confidence = instance_confidence(np.ones(len(instance)), instance, space.grid.voxel_size_m, settings)
+    mask, instance, confidence = _without_specks(mask, instance, confidence, settings.least_confidence)
+    best = float(confidence.max(initial=0.0))
+    note = "" if best >= 0.5 else f"nothing of some size is {tint.text}"
+    falloff = heat.falloff_per_m(part.role)
+    return NearThings(space, part, falloff, mask, instance, confidence, best >= 0.5, tint.text, note)
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,7 +337,7 @@ def object_pieces(
     if len(confidence) > joined.max(initial=-1) + 1:
         instance = joined[instance]
         confidence = confidence_of(mask, instance)
-    mean = np.bincount(instance, weights=np.square(score[mask]), minlength=len(confidence))
+    mean = np.bincount(instance, weights=np.square(score[mask]), minlength=len(confidence)).astype(np.float64)
     mean /= np.maximum(np.bincount(instance, minlength=len(confidence)), 1)
     return Pieces(mask, instance, mean.astype(np.float32), confidence, won)
 

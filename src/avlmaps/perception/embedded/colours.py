@@ -172,6 +172,19 @@ class ColourWords:
         """Return a feature for each four by four pixels' mean colour."""
         return self._table[_codes(frame.rgb)]
 
+    def encode_colours(self, rgb: UInt8[np.ndarray, "n 3"]) -> Float32[np.ndarray, "n 16"]:
+        """Return a feature for each colour."""
+        level = rgb.astype(np.int32) >> 3
+        return self._table[(level[:, 0] << 10) | (level[:, 1] << 5) | level[:, 2]]
+
+    def without_colours(self, phrase: str) -> str:
+        """Return what is left of a phrase when its words of colour are taken out."""
+        left = f" {phrase.lower()} "
+        for text, _, _ in _colours_in(phrase):
+            for form in (text, text.replace("-", " ")):
+                left = left.replace(f" {form} ", " ", 1)
+        return " ".join(left.split())
+
     def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n 16"]:
         """Return unit vectors of the phrases' colours, the sum where there are several; zero for none."""
         features = np.zeros((len(words), self.card.dim), np.float32)

@@ -102,7 +102,7 @@ class SceneNetwork:
         import onnxruntime
 
         options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = min(4, os.cpu_count() or 1)
+        options.intra_op_num_threads = min(4, _cores())
         options.inter_op_num_threads = 1
         self._session = onnxruntime.InferenceSession(weights, options, providers=["CPUExecutionProvider"])
         self.notes = notes
@@ -164,6 +164,11 @@ def _ground_of(frame: Frame) -> tuple[Float[np.ndarray, "3"], float]:
         return np.array([0.0, -1.0, 0.0]), _USUAL_HEIGHT_M
     rotation = frame.world_from_camera[:3, :3] @ frame.rig.rgb_from_depth[:3, :3].T
     return rotation.T @ frame.ground.up_in_world, frame.ground.camera_height_m(frame.world_from_camera)
+
+
+def _cores() -> int:
+    """Return how many cores this process may use; more threads than that wait for one another."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _padded(picture: Float32[np.ndarray, "c h w"]) -> Float32[np.ndarray, "c hp wp"]:

@@ -1,0 +1,65 @@
+"""Colours in a question to a map whose encoder knows things: "red cabinet" is a cabinet whose voxels are mostly red."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from jaxtyping import Bool, Float32, Int, UInt8
+
+from avlmaps.perception.embedded.colours import COLOURS, ColourWords
+
+# An instance is of a colour where so many of its voxels are; handles, shade and edges are of others.
+FULL_SHARE = 0.4
+# Words that name no thing of their own: "something red".
+NOTHING = frozenset({"", "thing", "things", "something", "object", "objects", "anything", "stuff", "the", "a", "one"})
+
+
+@dataclass(frozen=True, slots=True)
+class Tint:
+    """The colour in a phrase, and the phrase without it.
+
+    Attributes:
+        text: the words of colour.
+        feature: of the colour.
+        thing: what is left, ``""`` where only a colour was asked for.
+    """
+
+    text: str
+    feature: Float32[np.ndarray, " d"]
+    thing: str
+
+
+@cache
+def colour_words() -> ColourWords:
+    """Return the encoder of colours, made once."""
+    return ColourWords()
+
+
+def tint_of(phrase: str) -> Tint | None:
+    """Return the colour in a phrase, None where there is none."""
+    words = colour_words()
+    text = words.understood(phrase)
+    if not text:
+        return None
+    thing = words.without_colours(phrase)
+    return Tint(text, words.encode_words([phrase])[0], "" if set(thing.split()) <= NOTHING else thing)
+
+
+def is_tinted(rgb: UInt8[np.ndarray, "n 3"], tint: Tint) -> Bool[np.ndarray, " n"]:
+    """Return which voxels' colours are closer to the asked one than to any other term."""
+    words = colour_words()
+    colour = words.encode_colours(rgb)
+    terms = words.encode_words(COLOURS)
+    own = terms @ tint.feature >= 0.5
+    return (colour @ tint.feature) > np.where(own, -1.0, colour @ terms.T).max(axis=1)
+
+
+def tinted_share(
+    rgb: UInt8[np.ndarray, "n 3"], mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"], tint: Tint
+) -> Float32[np.ndarray, " i"]:
+    """Return for each instance how far its voxels are of the asked colour: 1 from four in ten on."""
+    if not len(instance):
+        return np.zeros(0, np.float32)
+    hits = is_tinted(np.asarray(rgb)[mask], tint)
+    share = np.bincount(instance, weights=hits) / np.maximum(np.bincount(instance), 1)
+    return np.minimum(share / FULL_SHARE, 1.0).astype(np.float32)
