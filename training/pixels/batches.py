@@ -62,7 +62,8 @@ class Shards:
         """Open the shards that are there."""
         self.folder = folder
         self._open: dict[str, tuple[int, Frames]] = {}
-        self._showing: dict[int, list[tuple[str, int]]] = {}
+        self._shown: dict[str, tuple[int, dict[int, list[int]]]] = {}
+        self._showing: dict[int, list[tuple[Frames, int]]] = {}
         self.refresh()
 
     def refresh(self) -> int:
@@ -75,9 +76,14 @@ class Shards:
                 found[folder.name] = old if old and old[0] == stamp else (stamp, Frames.open(folder))
             except OSError:  # it is being replaced at this moment
                 continue
-        if found.keys() != self._open.keys() or any(found[n] is not self._open[n] for n in found):
-            self._showing = _index(found)
-        self._open = found
+        for name, (stamp, frames) in found.items():
+            if self._shown.get(name, (0, {}))[0] != stamp:
+                self._shown[name] = (stamp, _shown(frames))
+        showing: dict[int, list[tuple[Frames, int]]] = {}
+        for name, (_, frames) in found.items():
+            for category, indices in self._shown[name][1].items():
+                showing.setdefault(category, []).extend((frames, index) for index in indices)
+        self._open, self._showing = found, showing
         return sum(len(frames.depth) for _, frames in found.values())
 
     def draw(self, rng: np.random.Generator) -> tuple[Frames, int]:
@@ -90,24 +96,23 @@ class Shards:
 
         Three quarters of what a camera sees is walls and floors; a network that sees the world as it is learns those.
         """
-        if not self._showing or rng.random() < ANY_FRAME:
+        showing = self._showing
+        if not showing or rng.random() < ANY_FRAME:
             return *self.draw(rng), -1
-        names = list(self._showing)
-        share = np.array([len(self._showing[name]) for name in names]) ** EVENNESS
+        names = list(showing)
+        share = np.array([len(showing[name]) for name in names]) ** EVENNESS
         category = names[int(rng.choice(len(names), p=share / share.sum()))]
-        shard, index = self._showing[category][int(rng.integers(len(self._showing[category])))]
-        return self._open[shard][1], index, category
+        return *showing[category][int(rng.integers(len(showing[category])))], category
 
 
-def _index(shards: dict[str, tuple[int, Frames]]) -> dict[int, list[tuple[str, int]]]:
-    """Return for each category but walls, floors and ceilings the frames that show enough of it."""
-    showing: dict[int, list[tuple[str, int]]] = {}
-    for name, (_, frames) in shards.items():
-        for index, label in enumerate(frames.label):
-            count = np.bincount(label[::2, ::2].reshape(-1), minlength=256)
-            for category in np.flatnonzero(count[: len(CATEGORIES)] >= FEWEST_PIXELS // 4):
-                if CATEGORIES[category] not in ("wall", "floor", "ceiling"):
-                    showing.setdefault(int(category), []).append((name, index))
+def _shown(frames: Frames) -> dict[int, list[int]]:
+    """Return for each category but walls, floors and ceilings the frames of a shard that show enough of it."""
+    showing: dict[int, list[int]] = {}
+    for index, label in enumerate(frames.label):
+        count = np.bincount(label[::2, ::2].reshape(-1), minlength=256)
+        for category in np.flatnonzero(count[: len(CATEGORIES)] >= FEWEST_PIXELS // 4):
+            if CATEGORIES[category] not in ("wall", "floor", "ceiling"):
+                showing.setdefault(int(category), []).append(index)
     return showing
 
 

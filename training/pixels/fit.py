@@ -5,6 +5,7 @@ any length ends well; a checkpoint is written every few minutes, and ``--resume`
 """
 
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter
@@ -103,14 +104,17 @@ def fit(options: Options) -> None:
         network.load_state_dict(torch.load(options.out, map_location=device, weights_only=True)["last"])
     weight = torch.from_numpy(class_weights(shards, rng)).float().to(device)
     optimiser = torch.optim.AdamW(network.parameters(), lr=options.rate, weight_decay=0.02)
+    if options.resume and (moments := torch.load(options.out, map_location=device, weights_only=True).get("moments")):
+        optimiser.load_state_dict(moments)
     average, begin, step, shown, saved = Average(network), perf_counter(), 0, perf_counter(), perf_counter()
+    ahead = ThreadPoolExecutor(1)  # the next batch is drawn while the network learns from this one
+    coming = ahead.submit(draw_batch, shards, options.batch, rng, options.colour_kept)
     running = np.zeros(3)
     while (done := (perf_counter() - begin) / 60.0 / options.minutes) < 1.0:
         for group in optimiser.param_groups:
-            group["lr"] = options.rate * min(1.0, (step + 1) / 200) * (0.5 + 0.5 * np.cos(np.pi * done)) + 1e-6
-        pixels, views, right = losses(
-            network, draw_batch(shards, options.batch, rng, options.colour_kept), weight, device
-        )
+            group["lr"] = options.rate * min(1.0, (step + 1) / 100) * (0.5 + 0.5 * np.cos(np.pi * done)) + 1e-6
+        batch, coming = coming.result(), ahead.submit(draw_batch, shards, options.batch, rng, options.colour_kept)
+        pixels, views, right = losses(network, batch, weight, device)
         optimiser.zero_grad(set_to_none=True)
         (pixels + 0.15 * views).backward()
         nn.utils.clip_grad_norm_(network.parameters(), 2.0)
@@ -127,17 +131,19 @@ def fit(options: Options) -> None:
             )  # fmt: skip
             shown = now
         if now - saved > 240:
-            save(options, network, average, step)
+            save(options, network, average, optimiser, step)
             saved = now
-    save(options, network, average, step)
+    ahead.shutdown(cancel_futures=True)
+    save(options, network, average, optimiser, step)
 
 
-def save(options: Options, network: nn.Module, average: Average, step: int) -> None:
+def save(options: Options, network: nn.Module, average: Average, optimiser: torch.optim.Optimizer, step: int) -> None:
     """Write the checkpoint so that a reader never meets half of one."""
     options.out.parent.mkdir(parents=True, exist_ok=True)
     about = {key: str(value) for key, value in asdict(options).items()}
     scratch = options.out.with_suffix(".part")
     state = {"last": network.state_dict(), "mean": average.state, "widths": list(options.widths), "step": step}
+    state["moments"] = optimiser.state_dict()
     torch.save({**state, "categories": list(CATEGORIES), "rooms": list(ROOMS), "options": about}, scratch)
     scratch.rename(options.out)
 

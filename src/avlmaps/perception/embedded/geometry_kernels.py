@@ -20,7 +20,7 @@ def _neighbour(depth, row, column, dr, dc, far):
     return 0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def geometry_into(depth, fx, fy, cx, cy, up, right, forward, camera_height, far, out):
     """Fill ``out`` (8, h, w); see ``geometry.channels`` for what each channel is."""
     h, w = depth.shape
