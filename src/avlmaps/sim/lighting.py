@@ -25,6 +25,8 @@ _SEND_CELLS = 5  # solid cells along a side of a coarse cell, in which sent ligh
 _ROOM = 12  # cells to the nearest solid one are counted up to here
 _ONE_LAMP_M = 0.7  # lamps that are nearer to each other shine as one
 _BOUNCE = 1.7  # light that has bounced more than once, as a factor of that which has once
+_NEARBY_M = 0.3  # crevices take their light from as far away
+_CREVICE = 0.4  # the share of it that they take
 _GLOW = 2.5  # linear radiance of a surface of emission 1
 _SKY = (1.15, 1.25, 1.4)  # linear, what shines in where there is no wall
 _DEFAULT_LAMP_M = 3.0  # lamps put by default stand so far apart
@@ -271,9 +273,24 @@ def _lit(samples: _Samples, lights: tuple[Light, ...], solid: _Solid, albedo: np
     cube, seen = np.zeros((len(index), 6, 3), np.float32), np.zeros(len(index), bool)
     lighting_kernels.gather(solid.low + (index + 0.5) * _PROBE_M, _directions(96), *space, sent, float(_SEND_CELLS),
                             np.array(_SKY), cube, seen)  # fmt: skip
-    lighting_kernels.ambient(samples.place, samples.normal, _directions(8, half=True), *space, cube, seen, count,
-                             _PROBE_M, _BOUNCE, light, start, free)  # fmt: skip
+    probes = (cube, seen, count, _PROBE_M)
+    lighting_kernels.ambient(samples.normal, _directions(8, half=True), solid.empty, solid.cell_m, probes, _BOUNCE,
+                             light, start, free)  # fmt: skip
     return light, free
+
+
+def _around(
+    place: Float[np.ndarray, "s 3"], light: Float32[np.ndarray, "s 2 3"], free: Bool[np.ndarray, "s 2"]
+) -> Float32[np.ndarray, "s 3"]:
+    """Return for each sample a part of the mean light of the free samples near it: what a crevice gets."""
+    low = place.min(axis=0)
+    cell = np.floor((place - low) / _NEARBY_M).astype(np.int64)
+    count = cell.max(axis=0) + 1
+    key = (cell[:, 0] * count[1] + cell[:, 1]) * count[2] + cell[:, 2]
+    number = np.bincount(key, free.sum(axis=1), int(np.prod(count)))
+    total = np.where(free[..., None], light, 0).sum(axis=1)
+    mean = [np.bincount(key, total[:, c], len(number)) / np.maximum(number, 1) for c in range(3)]
+    return (_CREVICE * np.stack(mean, axis=1)[key]).astype(np.float32)
 
 
 def light_map(scene: Scene, albedo: Float[np.ndarray, "m 3"]) -> LightMap:
@@ -303,8 +320,7 @@ def light_map(scene: Scene, albedo: Float[np.ndarray, "m 3"]) -> LightMap:
     light[needed], free[needed] = _lit(wanted, lights, _solid(scene, scene.lights or lights), albedo[material[needed]],
                                        glow[material[needed]])  # fmt: skip
     begin = len(at_corner.place)
-    filled = light.copy()
-    filled[:begin][~free[:begin]] = 0.1 * np.median(light[free], axis=0) if free.any() else 0.0
+    filled = np.where(free[..., None], light, _around(samples.place, light, free)[:, None])
     sampling_kernels.fill_texels(begin + patches.first, patches.rows, patches.columns, light, free, filled)
     turned = np.zeros(len(mesh.triangle), bool)
     turned[chosen], sample[chosen, 1] = patches.turned, patches.group

@@ -7,6 +7,8 @@ RAYS_LEFT = -2.0  # the ray left the grid
 RAYS_CLEAR = -1.0  # nothing on the way
 _STEPS_A_CELL = 2.2  # points laid on a triangle per side of a cell, so that no cell on it is missed
 _OCCLUSION_M = 0.5  # how far away something still darkens a corner
+_CLOSED = 0.85  # share of the bounced light that the closest corner keeps away
+_UNSEEN = 0.1  # share of the light of probes behind something that still arrives
 _LEAST = 0.01  # light weaker than this is not looked for
 _ASIDE = 1.1  # cells that a sample may be moved along its surface to be free; less than any wall is thick
 _STRIDE = 0.75  # cells walked where something solid is next to the way
@@ -152,7 +154,7 @@ def _face(nx, ny, nz):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def splat(place, normal, albedo, glow, area, light, free, low, cell_m, sent):  # pragma: no cover - compiled
-    """Sum what the surfaces send out, by coarse cell and by the side they face; ``sent`` is (x, y, z, 6, 4), changed."""
+    """Sum what surfaces send out, by coarse cell and by the side they face; ``sent`` is (x, y, z, 6, 4), changed."""
     nx, ny, nz = sent.shape[:3]
     for s in range(len(place)):
         for side in range(2):
@@ -194,6 +196,21 @@ def _received(sent, x, y, z, dx, dy, dz, out):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
+def _seen(empty, sent, coarse, sky, px, py, pz, dx, dy, dz, out):  # pragma: no cover - compiled
+    """Set ``out`` to the light that comes to a place, in cells, from a direction."""
+    t = march(empty, px, py, pz, dx, dy, dz, 1e9)
+    if t < 0.0:
+        out[:] = sky
+        return
+    for back in (1.0, -0.5, 3.0):  # the surface lies in the cell that was hit, or in one beside it
+        s = t - back
+        x, y, z = int((px + s * dx) / coarse), int((py + s * dy) / coarse), int((pz + s * dz) / coarse)
+        if _received(sent, x, y, z, dx, dy, dz, out):
+            return
+    out[:] = 0.0
+
+
+@njit(cache=True)
 def gather(probe, ray, empty, low, cell_m, sent, coarse, sky, cube, free):  # pragma: no cover - compiled
     """Look round from each probe and keep what comes from each of the six sides.
 
@@ -219,15 +236,7 @@ def gather(probe, ray, empty, low, cell_m, sent, coarse, sky, cube, free):  # pr
         weight[:] = 0.0
         for r in range(len(ray)):
             dx, dy, dz = ray[r, 0], ray[r, 1], ray[r, 2]
-            t = march(empty, px, py, pz, dx, dy, dz, 1e9)
-            seen[:] = sky
-            if t >= 0.0:
-                seen[:] = 0.0
-                for back in (1.0, -0.5, 3.0):
-                    s = t - back
-                    x, y, z = (int((px + s * dx) / coarse), int((py + s * dy) / coarse), int((pz + s * dz) / coarse))
-                    if _received(sent, x, y, z, dx, dy, dz, seen):
-                        break
+            _seen(empty, sent, coarse, sky, px, py, pz, dx, dy, dz, seen)
             for axis in range(3):
                 f = 2 * axis + (0 if ray[r, axis] > 0 else 1)
                 weight[f] += abs(ray[r, axis])
@@ -239,7 +248,7 @@ def gather(probe, ray, empty, low, cell_m, sent, coarse, sky, cube, free):  # pr
 
 
 @njit(cache=True)
-def _occlusion(empty, p, nx, ny, nz, ring, cell_m):  # pragma: no cover - compiled
+def _openness(empty, p, nx, ny, nz, ring, cell_m):  # pragma: no cover - compiled
     """Return how much of the nearby half space over a surface is open, 0 to 1."""
     # two directions across the normal (Duff et al. 2017)
     sign = 1.0 if nz >= 0 else -1.0
@@ -260,64 +269,65 @@ def _occlusion(empty, p, nx, ny, nz, ring, cell_m):  # pragma: no cover - compil
 
 
 @njit(cache=True)
-def ambient(
-    place, normal, ring, empty, low, cell_m, cube, probe_free, count, probe_m, bounce, light, start, free
-):  # pragma: no cover - compiled
+def _from_probes(p, n, empty, step, cube, probe_free, count, see, total):  # pragma: no cover - compiled
+    """Sum in ``total`` the light from the probes round a place, in cells, on a surface; return their weight.
+
+    ``step`` is the way between probes, in cells; ``see`` counts only those with nothing between.
+    """
+    weight = 0.0
+    total[:] = 0.0
+    gx, gy, gz = p[0] / step - 0.5, p[1] / step - 0.5, p[2] / step - 0.5
+    bx, by, bz = int(np.floor(gx)), int(np.floor(gy)), int(np.floor(gz))
+    for corner in range(8):
+        ix, iy, iz = bx + (corner & 1), by + ((corner >> 1) & 1), bz + (corner >> 2)
+        if min(ix, iy, iz) < 0 or ix >= count[0] or iy >= count[1] or iz >= count[2]:
+            continue
+        at = (ix * count[1] + iy) * count[2] + iz
+        if not probe_free[at]:
+            continue
+        w = (1.001 - abs(gx - ix)) * (1.001 - abs(gy - iy)) * (1.001 - abs(gz - iz))
+        qx, qy, qz = (ix + 0.5) * step - p[0], (iy + 0.5) * step - p[1], (iz + 0.5) * step - p[2]
+        far = np.sqrt(qx * qx + qy * qy + qz * qz) + 1e-9
+        if see and march(empty, p[0], p[1], p[2], qx / far, qy / far, qz / far, far) >= 0.0:
+            continue
+        weight += w
+        for axis in range(3):
+            f = 2 * axis + (0 if n[axis] > 0 else 1)
+            for c in range(3):
+                total[c] += w * n[axis] * n[axis] * cube[at, f, c]
+    return weight
+
+
+@njit(cache=True)
+def ambient(normal, ring, empty, cell_m, probes, bounce, light, start, free):  # pragma: no cover - compiled
     """Add the light that comes back from everything, from the probes that each sample sees.
 
     Args:
-        place: (s, 3) samples.
-        normal: (s, 3).
+        normal: (s, 3) of the samples.
         ring: (r, 3) directions round +z, for the darkness of corners.
         empty: cells, as in `march`.
-        low: corner of the cells.
         cell_m: their size.
-        cube: (p, 6, 3) light from the six sides at each probe.
-        probe_free: (p,) which probes count.
-        count: probes along x, y and z; the first lies half a step from ``low``.
-        probe_m: step between probes.
+        probes: (p, 6, 3) light from the six sides at each probe; (p,) which of them count; how many there are along
+            x, y and z; the way between them in metres. The first lies half a step from the corner of the cells.
         bounce: factor for the bounces that are not followed.
         light: (s, 2, 3), changed.
         start: (s, 2, 3), as `direct` found it.
         free: (s, 2).
     """
-    total = np.zeros(3)
-    for s in range(len(place)):
+    cube, probe_free, count, probe_m = probes
+    total, n = np.zeros(3), np.zeros(3)
+    for s in range(len(normal)):
         for side in range(2):
             if not free[s, side]:
                 continue
-            sign = 1.0 - 2.0 * side
-            n = (sign * normal[s, 0], sign * normal[s, 1], sign * normal[s, 2])
-            p = start[s, side]
-            weight = 0.0
-            total[:] = 0.0
-            bounce_here = bounce
-            for demand in range(2):  # where no probe is seen, any free one is better than none
-                gx, gy, gz = (p[0] * cell_m / probe_m - 0.5, p[1] * cell_m / probe_m - 0.5,
-                              p[2] * cell_m / probe_m - 0.5)  # fmt: skip
-                bx, by, bz = int(np.floor(gx)), int(np.floor(gy)), int(np.floor(gz))
-                for corner in range(8):
-                    ix, iy, iz = bx + (corner & 1), by + ((corner >> 1) & 1), bz + (corner >> 2)
-                    if ix < 0 or iy < 0 or iz < 0 or ix >= count[0] or iy >= count[1] or iz >= count[2]:
-                        continue
-                    at = (ix * count[1] + iy) * count[2] + iz
-                    if not probe_free[at]:
-                        continue
-                    w = (1.001 - abs(gx - ix)) * (1.001 - abs(gy - iy)) * (1.001 - abs(gz - iz))
-                    qx, qy, qz = ((ix + 0.5) * probe_m / cell_m - p[0], (iy + 0.5) * probe_m / cell_m - p[1],
-                                  (iz + 0.5) * probe_m / cell_m - p[2])  # fmt: skip
-                    far = np.sqrt(qx * qx + qy * qy + qz * qz) + 1e-9
-                    if demand == 0 and march(empty, p[0], p[1], p[2], qx / far, qy / far, qz / far, far) >= 0.0:
-                        continue
-                    weight += w
-                    for axis in range(3):
-                        f = 2 * axis + (0 if n[axis] > 0 else 1)
-                        for c in range(3):
-                            total[c] += w * n[axis] * n[axis] * cube[at, f, c]
-                if weight > 0.0:
-                    break
-                bounce_here = 0.1 * bounce
+            for axis in range(3):
+                n[axis] = (1.0 - 2.0 * side) * normal[s, axis]
+            p, share = start[s, side], bounce
+            weight = _from_probes(p, n, empty, probe_m / cell_m, cube, probe_free, count, True, total)
+            if weight == 0.0:  # where no probe is seen, a little of what any has
+                share = _UNSEEN * bounce
+                weight = _from_probes(p, n, empty, probe_m / cell_m, cube, probe_free, count, False, total)
             if weight > 0.0:
-                open_part = _occlusion(empty, p, n[0], n[1], n[2], ring, cell_m)
+                share *= 1.0 - _CLOSED + _CLOSED * _openness(empty, p, n[0], n[1], n[2], ring, cell_m)
                 for c in range(3):
-                    light[s, side, c] += bounce_here * (0.15 + 0.85 * open_part) * total[c] / weight
+                    light[s, side, c] += share * total[c] / weight

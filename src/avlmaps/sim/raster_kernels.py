@@ -82,7 +82,7 @@ def _span(e, step, first, last):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def _fill(x0, y0, x1, y1, x2, y2, plane, limits, number, width, height, inverse, shown):  # pragma: no cover - compiled
-    """Draw one snapped triangle; ``plane`` gives the inverse depth at (column, row), ``limits`` its least and greatest."""
+    """Draw one snapped triangle; ``plane`` gives the inverse depth by column and row, ``limits`` its range."""
     area = (x1 - x0) * (y2 - y0) - (y1 - y0) * (x2 - x0)
     if area == 0:
         return

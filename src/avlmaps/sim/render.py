@@ -6,7 +6,7 @@ Triangles are sorted once into groups that lie close together; a view draws the 
 near to far, and leaves out those that lie behind what is drawn. Only pixels that are seen are shaded.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Int32, UInt8
@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Float32, Int, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.sim import raster_kernels, shade_kernels
 from avlmaps.sim.atlas import Atlas, atlas_of, picture_maps
-from avlmaps.sim.lighting import LightMap, light_map
+from avlmaps.sim.lighting import light_map
 from avlmaps.sim.mesh import Mesh
 from avlmaps.sim.scene import NOTHING, Scene
 
@@ -59,6 +59,17 @@ class _Groups:
     box: Float[np.ndarray, "g 6"]
     large: Bool[np.ndarray, " g"]
     clear: Bool[np.ndarray, " g"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Eye:
+    """A camera and its pose: fx, fy, cx, cy; the rotation and shift of camera from world; columns and rows."""
+
+    lens: Float[np.ndarray, "4"]
+    rotation: Float[np.ndarray, "3 3"]
+    shift: Float[np.ndarray, "3"]
+    width: int
+    height: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,20 +142,17 @@ class Renderer:
         self._corner = mesh.corners()[order].reshape(-1, 9)
         self._middle = (self._groups.box[:, :3] + self._groups.box[:, 3:]) / 2
         atlas = atlas_of(mesh.materials)
-        self._normal, self._material, self._instance = (
-            mesh.normals()[order],
-            mesh.material[order],
-            scene.instance[order],
-        )
+        self._normal, self._material = mesh.normals()[order], mesh.material[order]
+        self._instance = scene.instance[order]
         self._picture, self._fraction, self._density = picture_maps(mesh, order, atlas)
-        glow = (_GLOW if lit else 0.0) * np.array([m.emission for m in mesh.materials], np.float32)
-        self._colours = (atlas.colour, glow, atlas.texel, atlas.table)
+        self._atlas = atlas
+        self._glow = (_GLOW if lit else 0.0) * np.array([m.emission for m in mesh.materials], np.float32)
         self._opacity = np.array([m.opacity for m in mesh.materials], np.float32)
         self._returns = _returns(mesh, atlas)
-        self._lit = lit and len(order) > 0
-        self._lights = _tables(light_map(scene, atlas.mean) if self._lit else None, order)
+        light = light_map(scene, atlas.mean) if lit and len(order) else None
+        self._light = light and replace(light, sample=light.sample[order], turned=light.turned[order])
         self._category = scene.category_of_instance.astype(np.int32)
-        self._curve = _curve(shoulder=self._lit)
+        self._curve = _curve(shoulder=light is not None)
         self._any_clear = bool(self._groups.clear.any())
         self._layers: tuple[_Layer, _Layer] | None = None
 
@@ -154,8 +162,8 @@ class Renderer:
         origin = np.asarray(world_from_camera[:3, 3], np.float64)
         lens = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
         front, behind = self._layers_for(camera.height * camera.width)
-        self._draw(front, behind, (rotation, -rotation @ origin, lens, camera.width, camera.height))
-        eye = (lens.astype(np.float32), rotation.astype(np.float32), origin.astype(np.float32), camera.width)
+        eye = _Eye(lens, rotation, -rotation @ origin, camera.width, camera.height)
+        self._draw(front, behind, eye)
         self._shade(front, eye)
         if self._any_clear:
             shade_kernels.hide_equal(front.shown, behind.shown)
@@ -163,9 +171,7 @@ class Renderer:
             sky = np.square(np.array(SKY, np.float32) / 255.0)
             shade_kernels.blend_fragments(front.shown, behind.shown, self._opacity, self._material, sky,
                                           behind.colour, front.colour)  # fmt: skip
-        gain = 1.0
-        if self._lit:
-            gain = _exposure(front)
+        gain = _exposure(front) if self._light is not None else 1.0
         return self._finished(front, gain, camera.height, camera.width)
 
     def _layers_for(self, pixels: int) -> tuple[_Layer, _Layer]:
@@ -175,31 +181,40 @@ class Renderer:
             self._layers = (front, behind)
         return self._layers
 
-    def _draw(self, front: _Layer, behind: _Layer, eye: tuple) -> None:
+    def _draw(self, front: _Layer, behind: _Layer, eye: _Eye) -> None:
         """Find what each pixel shows first, and what it shows first that nothing shines through."""
         groups = self._groups
         front.inverse.fill(0.0)
         front.shown.fill(NOTHING)
-        middle = self._middle @ eye[0].T + eye[1]
+        middle = self._middle @ eye.rotation.T + eye.shift
         order = np.argsort(np.einsum("gi,gi->g", middle, middle) - 1e6 * groups.large)
-        solid = order[~groups.clear[order]] if self._any_clear else order
-        raster_kernels.draw(self._corner, groups.first, groups.box, solid, *eye, front.inverse, front.shown)
+        clear = groups.clear[order]
+        self._draw_groups(order[~clear], eye, front)
         if self._any_clear:
             np.copyto(behind.inverse, front.inverse)
             np.copyto(behind.shown, front.shown)
-            clear = order[groups.clear[order]]
-            raster_kernels.draw(self._corner, groups.first, groups.box, clear, *eye, front.inverse, front.shown)
+            self._draw_groups(order[clear], eye, front)
 
-    def _shade(self, layer: _Layer, eye: tuple) -> None:
+    def _draw_groups(self, which: Int[np.ndarray, " k"], eye: _Eye, layer: _Layer) -> None:
+        raster_kernels.draw(self._corner, self._groups.first, self._groups.box, which, eye.rotation, eye.shift,
+                            eye.lens, eye.width, eye.height, layer.inverse, layer.shown)  # fmt: skip
+
+    def _shade(self, layer: _Layer, eye: _Eye) -> None:
         """Work out the linear light that comes from what each pixel shows."""
         inverse, shown, place, side = layer.inverse, layer.shown, layer.place, layer.side
-        shade_kernels.place_fragments(inverse, shown, *eye, self._normal, place, side)
-        if self._lit:
-            shade_kernels.light_fragments(shown, place, side, self._fraction, *self._lights, layer.colour)
+        lens, rotation = eye.lens.astype(np.float32), eye.rotation.astype(np.float32)
+        origin = (-eye.shift @ eye.rotation).astype(np.float32)
+        shade_kernels.place_fragments(inverse, shown, lens, rotation, origin, eye.width, self._normal, place, side)
+        light, atlas = self._light, self._atlas
+        if light is not None:
+            shade_kernels.light_fragments(shown, place, side, self._fraction, light.sample, light.turned, light.first,
+                                          light.axes, light.low, light.columns, light.light,
+                                          np.float32(light.step_m), layer.colour)  # fmt: skip
         else:
             layer.colour.fill(1.0)
-        shade_kernels.paint_fragments(inverse, shown, place, side, np.float32(1 / eye[0][0]), self._picture,
-                                      self._density, self._material, *self._colours, layer.colour)  # fmt: skip
+        shade_kernels.paint_fragments(inverse, shown, place, side, np.float32(1 / lens[0]), self._picture,
+                                      self._density, self._material, atlas.colour, self._glow, atlas.texel,
+                                      atlas.table, layer.colour)  # fmt: skip
 
     def _finished(self, layer: _Layer, gain: float, height: int, width: int) -> View:
         """Return the images of a view."""
@@ -220,13 +235,3 @@ def _exposure(layer: _Layer) -> float:
         return 1.0
     gain = min(_MIDDLE_GREY / np.exp(np.log(light + 0.01).mean()), _BRIGHT / np.quantile(light, 0.9))
     return float(np.clip(gain, *_GAINS))
-
-
-def _tables(light: LightMap | None, order: Int[np.ndarray, " t"]) -> tuple[np.ndarray, ...]:
-    """Return the light map's tables by drawn triangle; empty ones where there is none."""
-    if light is None:
-        none = np.zeros((0, 3), np.int32)
-        one, pair = np.zeros(0, np.int64), np.zeros((0, 2), np.int64)
-        return none, np.zeros(0, bool), one, pair, pair, one, np.zeros((0, 2, 3), np.float32), np.float32(1)
-    return (light.sample[order], light.turned[order], light.first, light.axes, light.low, light.columns, light.light,
-            np.float32(light.step_m))  # fmt: skip

@@ -133,22 +133,26 @@ def place_texels(flat, group, first, low, columns, step, reach, place, distance,
 
 
 @njit(cache=True)
+def _neighbours(first, rows, columns, r, c, side, light, free, out):  # pragma: no cover - compiled
+    """Set ``out`` (3,) to the mean light of a texel's free neighbours; leave it where it has none."""
+    n = 0
+    x, y, z = 0.0, 0.0, 0.0
+    for i in range(max(0, r - 1), min(rows, r + 2)):
+        for j in range(max(0, c - 1), min(columns, c + 2)):
+            at = first + i * columns + j
+            if free[at, side]:
+                n += 1
+                x, y, z = x + light[at, side, 0], y + light[at, side, 1], z + light[at, side, 2]
+    if n:
+        out[0], out[1], out[2] = x / n, y / n, z / n
+
+
+@njit(cache=True)
 def fill_texels(first, rows, columns, light, free, out):  # pragma: no cover - compiled
     """Give texels that lie inside something the mean of their free neighbours; ``out`` (s, 2, 3) is changed."""
     for g in range(len(first)):
-        for r in range(rows[g]):
-            for c in range(columns[g]):
-                at = first[g] + r * columns[g] + c
-                for side in range(2):
-                    if free[at, side]:
-                        continue
-                    n = 0
-                    for i in range(max(0, r - 1), min(rows[g], r + 2)):
-                        for j in range(max(0, c - 1), min(columns[g], c + 2)):
-                            other = first[g] + i * columns[g] + j
-                            if free[other, side]:
-                                n += 1
-                                for k in range(3):
-                                    out[at, side, k] += light[other, side, k]
-                    for k in range(3):
-                        out[at, side, k] /= max(n, 1)
+        for at in range(first[g], first[g] + rows[g] * columns[g]):
+            r, c = (at - first[g]) // columns[g], (at - first[g]) % columns[g]
+            for side in range(2):
+                if not free[at, side]:
+                    _neighbours(first[g], rows[g], columns[g], r, c, side, light, free, out[at, side])

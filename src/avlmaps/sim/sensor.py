@@ -11,7 +11,15 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.sim import sensor_kernels
 from avlmaps.sim.render import View
 from avlmaps.sim.sensor_settings import (
-    CLEAN, KINECT, PRESETS, REALSENSE, ColourFaults, DepthFaults, OdometryFaults, SensorError, SensorName,
+    CLEAN,
+    KINECT,
+    PRESETS,
+    REALSENSE,
+    ColourFaults,
+    DepthFaults,
+    OdometryFaults,
+    SensorError,
+    SensorName,
     SensorSettings,
 )  # fmt: skip
 
@@ -103,7 +111,8 @@ class Sensor:
         sensor_kernels.measure_depth(view.depth_m, gauss, np.ascontiguousarray(rows[:, :4]), jitter, shift_px,
                                      faults.noise_px * scale, faults.step_px * scale, depth)  # fmt: skip
         sensor_kernels.lose_depth(depth, view.strength, uniform, np.ascontiguousarray(rows[:, 4]), shift_px,
-                                  faults.edge_ratio, faults.edge_loss, faults.weakest, faults.min_m, faults.max_m)  # fmt: skip
+                                  faults.edge_ratio, faults.edge_loss, faults.weakest, faults.min_m,
+                                  faults.max_m)  # fmt: skip
         count = int(rng.poisson(faults.blobs))
         if count:
             middle = rng.random((count, 2)) * (camera.width, camera.height)
