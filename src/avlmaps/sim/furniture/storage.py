@@ -1,4 +1,4 @@
-"""Wardrobes, chests of drawers and nightly things to keep clothes in."""
+"""Wardrobes of many builds."""
 
 import numpy as np
 
@@ -13,11 +13,10 @@ from avlmaps.sim.furniture.carcass import (
     shelf_boards,
     split,
 )
-from avlmaps.sim.furniture.catalogue import Piece, Support, family
+from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.contents import cloth_looks, folded, hanging
 from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
 from avlmaps.sim.furniture.legs import cabinet_base
-from avlmaps.sim.furniture.upholstery import pillow
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh
 from avlmaps.sim.shapes import box, sheet, slab, tube
@@ -211,73 +210,3 @@ def armoire(rng: np.random.Generator) -> Piece:
         parts.append(box((d - 0.04, y - 0.12 * (e - b) / 2, f), (d + 0.01, y + 0.12 * (e - b) / 2, f + tall), look))
     parts.append(box((a - 0.01, b - 0.04, f), (d + 0.05, e + 0.04, f + 0.05), look))
     return finished(parts)
-
-
-def _chest(
-    rng: np.random.Generator, size: tuple[float, float, float], columns: list[list[float]], top: float = 0.0
-) -> Piece:
-    """Return a chest with columns of drawers.
-
-    Args:
-        rng: draws its looks.
-        size: depth, width and height, metres.
-        columns: from the right to the left, shares of the heights of a column's drawers from below.
-        top: how far its top stands out, metres.
-    """
-    depth, width, height = size
-    look = board_look(rng)
-    style = front_style(rng, look)
-    base, lift = cabinet_base(rng, depth, width, look)
-    room = Room((-depth / 2, -width / 2, lift), (depth / 2, width / 2, height - 0.02))
-    (a, b, c), (d, e, f) = room.low, room.high
-    parts = [base, carcass(room, 0.02, look)]
-    for shares, (y0, y1) in zip(columns, split(b, e, [1.0] * len(columns)), strict=True):
-        parts += drawers(rng, style, Room((a, y0, c), (d, y1, f)), shares)
-    board = look if chance(rng, 0.75) else material(pick(rng, ("wood", "marble", "white")), rng)
-    parts.append(box((a, b - top, f), (d + style.thick + top, e + top, f + draw(rng, 0.018, 0.035)), board))
-    z = float(parts[-1].high[2])
-    return finished(parts, supports=[Support((a, b), (d, e), z)])
-
-
-@family("chest of drawers", "low")
-def low_chest(rng: np.random.Generator) -> Piece:
-    """Return a broad chest with two or three columns of drawers."""
-    columns = count(rng, 2, 3)
-    rows = count(rng, 2, 4)
-    size = (draw(rng, 0.38, 0.55), draw(rng, 0.48, 0.62) * columns, draw(rng, 0.2, 0.25) * rows + draw(rng, 0.1, 0.2))
-    return _chest(
-        rng, size, [[draw(rng, 0.9, 1.1)] + [1.0] * (rows - 1)] * columns, pick(rng, (0.0, draw(rng, 0.0, 0.03)))
-    )
-
-
-@family("chest of drawers", "high")
-def high_chest(rng: np.random.Generator) -> Piece:
-    """Return a chest of one column of drawers that grow taller downwards."""
-    rows = count(rng, 3, 6)
-    size = (draw(rng, 0.36, 0.52), draw(rng, 0.5, 0.95), draw(rng, 0.18, 0.24) * rows + draw(rng, 0.08, 0.18))
-    fall = draw(rng, 0.0, 0.12)
-    return _chest(rng, size, [[1.0 - fall * i for i in range(rows)]], pick(rng, (0.0, draw(rng, 0.01, 0.04))))
-
-
-@family("chest of drawers", "mixed")
-def mixed_chest(rng: np.random.Generator) -> Piece:
-    """Return a chest with broad drawers below two or three small ones side by side."""
-    depth, width = draw(rng, 0.4, 0.52), draw(rng, 0.75, 1.15)
-    look = board_look(rng)
-    style = front_style(rng, look, ("flat", "framed", "raised"))
-    base, lift = cabinet_base(rng, depth, width, look)
-    height = lift + draw(rng, 0.65, 1.05)
-    (a, b, c), (d, e, f) = room = ((-depth / 2, -width / 2, lift), (depth / 2, width / 2, height))
-    cut = f - draw(rng, 0.13, 0.2)
-    parts = [
-        base,
-        carcass(Room(*room), 0.02, look),
-        *drawers(rng, style, Room((a, b, c), (d, e, cut)), [1.0] * count(rng, 2, 4)),
-    ]
-    for y0, y1 in split(b, e, [1.0] * count(rng, 2, 3)):
-        parts += drawers(rng, style, Room((a, y0, cut), (d, y1, f)), [1.0])
-    out = draw(rng, 0.01, 0.04)
-    parts.append(box((a, b - out, f), (d + style.thick + out, e + out, f + 0.028), look))
-    if chance(rng, 0.2):
-        parts.append(pillow(rng, 0.3, 0.3, 0.08, material("fabric", rng)).moved(0.0, draw(rng, -0.2, 0.2), f + 0.068))
-    return finished(parts, supports=[Support((a, b), (d, e), f + 0.028)])
