@@ -5,12 +5,20 @@ import numpy as np
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.electronics import face_up
 from avlmaps.sim.furniture.fittings import (
-    bar_handle, body, chrome, dial, enamel, face, feet, outline, shell, spindle, steel,
+    chrome,
+    dial,
+    enamel,
+    face,
+    feet,
+    outline,
+    shell,
+    spindle,
+    steel,
 )  # fmt: skip
-from avlmaps.sim.furniture.joinery import blade, chance, cloth, count, draw, finished, pick, pictured, strut
+from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, strut
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
-from avlmaps.sim.shapes import box, circle, cylinder, ellipsoid, lathe, loft, polygon, rounded_box, slab, tube
+from avlmaps.sim.shapes import box, circle, cylinder, ellipsoid, lathe, loft, rounded_box, slab, tube
 
 
 def _porthole(rng: np.random.Generator, x: float, y: float, z: float, radius: float, look: Material) -> list[Mesh]:
@@ -121,7 +129,7 @@ def _rotor(rng: np.random.Generator, radius: float, x: float, z: float, look: Ma
     return parts
 
 
-def _cage(radius: float, x: float, z: float, depth: float, wires: int, look: Material, square: bool = False) -> list[Mesh]:
+def _cage(radius: float, x: float, z: float, depth: float, wires: int, look: Material) -> list[Mesh]:
     """Return a fan's wire cage: rings at front and back joined by bent wires."""
     parts: list[Mesh] = []
     for r, at in ((radius, x), (radius * 0.6, x + depth * 0.8), (radius * 0.6, x - depth * 0.8)):
@@ -133,7 +141,6 @@ def _cage(radius: float, x: float, z: float, depth: float, wires: int, look: Mat
         for s in (-1, 1):
             line = [(x, radius * y, z + radius * h), (x + s * depth * 0.7, radius * 0.8 * y, z + radius * 0.8 * h), (x + s * depth, radius * 0.15 * y, z + radius * 0.15 * h)]
             parts.append(tube(line, 0.0022, look, 3))
-    del square
     parts.append(spindle([(radius * 0.17, x + depth - 0.004), (radius * 0.12, x + depth + 0.008)], look, 0.0, z, 12))
     return parts
 
@@ -194,7 +201,7 @@ def _box_fan(rng: np.random.Generator) -> Piece:
     parts += _rotor(rng, size * 0.46, deep / 2, z, material(pick(rng, ("plastic", "white", "metal")), rng))
     for x in (0.004, deep - 0.004):
         for k in range(1, 6):
-            ring = [(x, float(p[0]), float(p[1]) + z) for p in circle(size * 0.08 * k, 4 if chance(rng, 0.01) else 14)]
+            ring = [(x, float(p[0]), float(p[1]) + z) for p in circle(size * 0.08 * k, 14)]
             parts.append(tube(ring, 0.003, metal, 3, closed=True))
         parts += [tube([(x, -size / 2, z), (x, size / 2, z)], 0.003, metal, 3), tube([(x, 0.0, 0.03), (x, 0.0, size + 0.03)], 0.003, metal, 3)]
     return finished(parts)
@@ -346,5 +353,3 @@ def _ironing_table(rng: np.random.Generator) -> Piece:
         parts.append(tube([(-wide * 0.3, y, z - 0.02), (-wide * 0.35, y, 0.008), (wide * 0.35, y, 0.008), (wide * 0.3, y, z - 0.02)], 0.008, metal, 5))
     return finished(parts)
 
-
-_ = (blade, pictured, polygon, bar_handle, body)

@@ -4,7 +4,11 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.fittings import (
-    Level, chrome, outline, shell, tap,
+    Level,
+    chrome,
+    outline,
+    shell,
+    tap,
 )  # fmt: skip
 from avlmaps.sim.furniture.joinery import chance, cloth, draw, finished, pick, pictured
 from avlmaps.sim.materials import material

@@ -51,7 +51,7 @@ def _column_radiator(rng: np.random.Generator) -> Piece:
         y = (i - (n - 1) / 2) * pitch
         for x in np.linspace(thick, deep - thick, columns):
             parts.append(cylinder(float(x) + 0.03, y, lift + 0.03, thick, high - 0.06, look, sides))
-        parts += [rounded_box((0.03, y - 0.46 * pitch, z), (deep + 0.03, y + 0.46 * pitch, z + 0.06), 0.015, look, 2) if n < 13 else box((0.03, y - 0.46 * pitch, z), (deep + 0.03, y + 0.46 * pitch, z + 0.055), look) for z in (lift, lift + high - 0.06)]
+        parts += [rounded_box((0.03, y - 0.46 * pitch, z), (deep + 0.03, y + 0.46 * pitch, z + 0.06), 0.015, look, 2) if n < 9 else box((0.03, y - 0.46 * pitch, z), (deep + 0.03, y + 0.46 * pitch, z + 0.055), look) for z in (lift, lift + high - 0.06)]
     for i in (0, n - 1):
         y = (i - (n - 1) / 2) * pitch
         parts += [slab(x, y, 0.0, 0.03, 0.03, lift + 0.02, look) for x in (0.03 + thick, deep + 0.03 - thick)]

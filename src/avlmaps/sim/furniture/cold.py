@@ -4,7 +4,17 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.fittings import (
-    bar_handle, body, cabinet_box, chrome, enamel, face, feet, front, front_style, outline, shell,
+    bar_handle,
+    body,
+    cabinet_box,
+    chrome,
+    enamel,
+    face,
+    feet,
+    front,
+    front_style,
+    outline,
+    shell,
 )  # fmt: skip
 from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
 from avlmaps.sim.materials import material
@@ -18,7 +28,9 @@ def _leaf(rng: np.random.Generator, x: float, low: tuple[float, float], high: tu
     return rounded_box((x, low[0], low[1]), (x + thick, high[0], high[1]), soft, look, 2 if soft < 0.012 else 3)
 
 
-def _pull(rng: np.random.Generator, kind: str, x: float, y: float, z: tuple[float, float], metal: Material) -> list[Mesh]:
+def _pull(
+    rng: np.random.Generator, kind: str, x: float, y: float, z: tuple[float, float], metal: Material
+) -> list[Mesh]:
     """Return an upright handle between two heights: a bar, a block, a groove's shadow or nothing."""
     if kind == "bar":
         return [bar_handle((x, y, z[0]), z[1] - z[0], True, metal, draw(rng, 0.035, 0.055), draw(rng, 0.007, 0.013))]
@@ -169,8 +181,14 @@ def _retro(rng: np.random.Generator) -> Piece:
         mid = a + (b - a) * (0.55 if len(spans) == 1 or not last else 0.25)
         parts += [rounded_box((deep + 0.08, wide / 2 - 0.09, mid - 0.1), (deep + 0.125, wide / 2 - 0.055, mid + 0.1), 0.015, metal),
                   face(deep + 0.092, (-0.08, b - 0.16), (0.08, b - 0.13), metal)]  # fmt: skip
-    parts += [cylinder(x, y, 0.0, 0.02, 0.06, metal, 8) for x in (0.08, deep - 0.06) for y in (-wide / 2 + 0.1, wide / 2 - 0.1)]
-    return finished(parts, supports=[Support((0.06, -wide / 2 + 0.08), (deep - 0.06, wide / 2 - 0.08), high - 0.02, 0.4)])
+    parts += [
+        cylinder(x, y, 0.0, 0.02, 0.06, metal, 8)
+        for x in (0.08, deep - 0.06)
+        for y in (-wide / 2 + 0.1, wide / 2 - 0.1)
+    ]
+    return finished(
+        parts, supports=[Support((0.06, -wide / 2 + 0.08), (deep - 0.06, wide / 2 - 0.08), high - 0.02, 0.4)]
+    )
 
 
 @family("refrigerator", "behind kitchen fronts", held_out=True)

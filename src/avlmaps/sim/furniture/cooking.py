@@ -6,9 +6,21 @@ Families named "wall ..." hang; those named "counter ..." stand on a worktop, wh
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
-from avlmaps.sim.furniture.electronics import face_up
 from avlmaps.sim.furniture.fittings import (
-    Pair, bar_handle, body, chrome, dial, enamel, face, feet, front, front_style, knob, shell, spindle, steel,
+    Pair,
+    bar_handle,
+    body,
+    chrome,
+    dial,
+    enamel,
+    face,
+    feet,
+    front,
+    front_style,
+    knob,
+    shell,
+    spindle,
+    steel,
 )  # fmt: skip
 from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
 from avlmaps.sim.materials import material
@@ -417,5 +429,3 @@ def _hood_mantle(rng: np.random.Generator) -> Piece:
     parts = [loft(rings, look), box((0.0, -wide / 2 - 0.02, 0.0), (deep + 0.03, wide / 2 + 0.02, beam), wood)]
     return finished(parts)
 
-
-_ = face_up

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from avlmaps.sim.furniture.catalogue import Piece, Support, family
+from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.electronics import face_up, key_field, screen
-from avlmaps.sim.furniture.fittings import body, chrome, face, feet, knob, outline, shell, spindle
+from avlmaps.sim.furniture.fittings import body, chrome, face, feet, outline, shell, spindle
 from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, pictured, rim, strut
 from avlmaps.sim.materials import material
-from avlmaps.sim.mesh import Material, Mesh, joined
+from avlmaps.sim.mesh import Material, Mesh, joined, triangles_of
 from avlmaps.sim.shapes import box, circle, cylinder, ellipsoid, lathe, loft, rounded_box, sheet, slab, tube
 
 
@@ -209,7 +209,12 @@ def _small_keyboard(rng: np.random.Generator) -> Piece:
     wide, deep, thick = draw(rng, 0.27, 0.32), draw(rng, 0.1, 0.13), draw(rng, 0.007, 0.016)
     case = material(pick(rng, ("metal", "white", "black")), rng)
     keys = material(pick(rng, ("white", "black")), rng)
-    parts = [rounded_box((-deep / 2, -wide / 2, 0.0), (deep / 2, wide / 2, thick), 0.003, case, 2), *key_field(rng, (-deep / 2 + 0.005, -wide / 2 + 0.006), (deep / 2 - 0.005, wide / 2 - 0.006), thick, 5, 14, keys, 0.0025)]
+    low, high = (-deep / 2 + 0.005, -wide / 2 + 0.006), (deep / 2 - 0.005, wide / 2 - 0.006)
+    parts = [rounded_box((-deep / 2, -wide / 2, 0.0), (deep / 2, wide / 2, thick), 0.003, case, 2)]
+    if chance(rng, 0.5):
+        parts.append(face_up(low, high, thick + 0.0008, pictured("keyboard", rng, "black"), fill=True))
+    else:
+        parts += key_field(rng, low, high, thick, 5, 14, keys, 0.0025)
     return _slanted(rng, parts)
 
 
@@ -262,7 +267,7 @@ def _cordless(rng: np.random.Generator) -> Piece:
 def _mobile(rng: np.random.Generator) -> Piece:
     high, wide, thick = draw(rng, 0.13, 0.17), draw(rng, 0.063, 0.08), draw(rng, 0.007, 0.011)
     look = material(pick(rng, ("black", "metal", "white", "plastic")), rng)
-    flat = joined([rounded_box((-high / 2, -wide / 2, 0.0), (high / 2, wide / 2, thick), 0.003, look, 2), face_up((-high / 2 + 0.005, -wide / 2 + 0.004), (high / 2 - 0.005, wide / 2 - 0.004), thick + 0.0006, screen(rng, 0.5))])
+    flat = joined([rounded_box((-high / 2, -wide / 2, 0.0), (high / 2, wide / 2, thick), 0.003, look, 2), face_up((-high / 2 + 0.005, -wide / 2 + 0.004), (high / 2 - 0.005, wide / 2 - 0.004), thick + 0.0006, screen(rng, 0.5), fill=True)])
     return finished([flat.turned(draw(rng, 0.0, 6.28))])
 
 
@@ -277,6 +282,13 @@ def _hands(rng: np.random.Generator, x: float, z: float, radius: float, look: Ma
 
 def _dial_face(rng: np.random.Generator, x: float, z: float, radius: float) -> list[Mesh]:
     """Return a clock's face with twelve marks and two hands, or a picture of one."""
+    if chance(rng, 0.4):
+        flat = circle(1.0, 24)
+        ring = np.column_stack([np.full(24, x), radius * flat[:, 0], z + radius * flat[:, 1]])
+        vertex, at = np.concatenate([ring, [(x, 0.0, z)]]), np.arange(24)
+        triangle = np.stack([at, np.roll(at, -1), np.full(24, 24)], axis=1)
+        uv = np.concatenate([0.5 + 0.48 * flat * (1, -1), [(0.5, 0.5)]])[triangle]
+        return [triangles_of(vertex, triangle, pictured("clockface", rng, "white"), uv)]
     ground, marks = pick(rng, (("white", "black"), ("paper", "black"), ("black", "white"), ("wood", "black"), ("metal", "black"), ("painted", "white")))
     look, dark = material(ground, rng), material(marks, rng)
     parts = [spindle([(radius, x)] * 2, look, 0.0, z, 24)]
@@ -368,10 +380,9 @@ def _mantel(rng: np.random.Generator) -> Piece:
     y = np.linspace(-1.0, 1.0, 15)
     bell = draw(rng, 0.25, 0.55)
     crown = np.where(np.abs(y) < bell, np.sqrt(np.maximum(0.0, 1 - (y / bell) ** 2)) * 0.6 + 0.4, 0.4 - 0.25 * (np.abs(y) - bell) / (1 - bell)) * high
-    flat = np.concatenate([np.column_stack([y * wide / 2, crown]), [(wide / 2, 0.02), (-wide / 2, 0.02)]])
     radius = min(0.36 * high, bell * wide / 2 * 0.85)
-    parts = [loft([np.column_stack([np.full(len(flat), x), flat]) for x in (0.0, deep)], look), slab(deep / 2, 0.0, 0.0, deep + 0.02, wide + 0.03, 0.022, look), *_dial_face(rng, deep + 0.001, high * 0.56, radius)]
+    rings = [np.array([(0.0, v * wide / 2, 0.02), (deep, v * wide / 2, 0.02), (deep, v * wide / 2, top), (0.0, v * wide / 2, top)])
+             for v, top in zip(y, crown, strict=True)]  # fmt: skip
+    parts = [loft(rings, look), slab(deep / 2, 0.0, 0.0, deep + 0.02, wide + 0.03, 0.022, look), *_dial_face(rng, deep + 0.001, high * 0.56, radius)]
     return finished(parts)
 
-
-_ = (Support, circle, knob, pictured)

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
-from avlmaps.sim.furniture.fittings import Pair, body, face, feet, slope, spindle
+from avlmaps.sim.furniture.fittings import Pair, body, face, feet, spindle
 from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, pictured, rim, strut
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined, triangles_of
-from avlmaps.sim.shapes import box, cylinder, loft, prism, rounded_box, rounded_rectangle, slab, tube
+from avlmaps.sim.shapes import box, cylinder, loft, prism, rounded_rectangle, sheet, slab, tube
 
 
 def screen(rng: np.random.Generator, on: float = 0.55) -> Material:
@@ -301,10 +301,9 @@ def key_field(rng: np.random.Generator, low: Pair, high: Pair, z: float, rows: i
     return [triangles_of(corner.reshape(-1, 3), np.concatenate([at[:, [0, 1, 2]], at[:, [0, 2, 3]]]), look)]
 
 
-def face_up(low: Pair, high: Pair, z: float, look: Material) -> Mesh:
-    """Return a flat rectangle that looks upwards, between two corners (x, y)."""
-    corners = np.array([(low[0], low[1], z), (high[0], low[1], z), (high[0], high[1], z), (low[0], high[1], z)])
-    return loft([corners[:2], corners[[3, 2]]], look, capped=False)
+def face_up(low: Pair, high: Pair, z: float, look: Material, fill: bool = False) -> Mesh:
+    """Return a flat rectangle that looks upwards, between two corners (x, y); upright for who sits at its +x side."""
+    return sheet((high[0], low[1], z), (0.0, high[1] - low[1], 0.0), (low[0] - high[0], 0.0, 0.0), look, fill)
 
 
 def _laptop(rng: np.random.Generator, wide: float, deep: float, thick: float, angle: float, look: Material,
@@ -314,7 +313,11 @@ def _laptop(rng: np.random.Generator, wide: float, deep: float, thick: float, an
     parts = [body(rng, (0.0, -wide / 2, 0.0), (deep, wide / 2, thick), look, min(0.3 * thick, 0.006))]
     key_look = dark if chance(rng, 0.8) else look
     parts += [face_up((0.14 * deep, -0.46 * wide), (0.6 * deep, 0.46 * wide), thick + 0.0006, dark)]
-    parts += key_field(rng, (0.15 * deep, -0.45 * wide), (0.59 * deep, 0.45 * wide), thick + 0.0006, 5, 13, key_look)
+    low, high = (0.15 * deep, -0.45 * wide), (0.59 * deep, 0.45 * wide)
+    if chance(rng, 0.5):
+        parts.append(face_up(low, high, thick + 0.001, pictured("keyboard", rng, "black"), fill=True))
+    else:
+        parts += key_field(rng, low, high, thick + 0.0006, 5, 13, key_look)
     pad = draw(rng, 0.15, 0.24) * wide
     parts.append(face_up((0.66 * deep, -pad), (0.96 * deep, pad), thick + 0.001, material("metal", rng)))
     bezel = draw(rng, 0.005, 0.02)
@@ -465,5 +468,3 @@ def _server(rng: np.random.Generator) -> Piece:
         z += tall
     return finished(parts, supports=[Support((0.0, -wide / 2), (deep, wide / 2), high, 0.5)])
 
-
-_ = (slope, rounded_box)

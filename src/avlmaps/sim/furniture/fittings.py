@@ -203,7 +203,7 @@ def front(style: FrontStyle, x: float, low: Pair, high: Pair, opens: str = "left
             parts.append(box((x, a + 1.5 * rail, b + 1.5 * rail), (x + 0.85 * t, c - 1.5 * rail, d - 1.5 * rail),
                              style.look))  # fmt: skip
     elif style.profile == "planks":
-        n = max(1, round((c - a) / 0.09))
+        n = max(1, round((c - a) / 0.12))
         step = (c - a) / n
         parts = [box((x, a, b), (x + 0.6 * t, c, d), style.look)]
         parts += [box((x, a + i * step + 0.002, b), (top, a + (i + 1) * step - 0.002, d), style.look) for i in range(n)]

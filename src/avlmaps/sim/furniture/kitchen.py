@@ -58,9 +58,9 @@ def _unit(rng: np.random.Generator, style: FrontStyle, depth: float, y: tuple[fl
 
 
 def run(rng: np.random.Generator, style: FrontStyle, length: float, depth: float, top_z: float, plinth: float,
-        plinth_look: Material) -> list[Mesh]:  # fmt: skip
-    """Return base units in a row along y (middle at 0), their back at x = 0, up to ``top_z``, metres."""
-    cuts = _split(rng, length)
+        plinth_look: Material, unit: tuple[float, float] = (0.4, 0.8)) -> list[Mesh]:  # fmt: skip
+    """Return base units in a row along y (middle at 0), their back at x = 0, up to ``top_z``; about ``unit`` wide."""
+    cuts = _split(rng, length, *unit)
     half = length / 2
     parts = [box((0.0, -half, 0.0), (depth - draw(rng, 0.03, 0.08), half, plinth), plinth_look)]
     for a, b in zip(cuts[:-1], cuts[1:], strict=True):
@@ -117,13 +117,13 @@ def _angled(rng: np.random.Generator, sides: tuple[float, ...]) -> Piece:
     width = depth + 0.03
     length = draw(rng, 1.6, 3.2) if len(sides) == 1 else draw(rng, 2.0, 3.4)
     half = length / 2
-    inner = length - len(sides) * width
-    main = joined(run(rng, style, inner, depth, z - thick, plinth, dark)).moved(y=-sum(sides) * width / 2)
+    inner, unit = length - len(sides) * width, (0.55, 0.95)
+    main = joined(run(rng, style, inner, depth, z - thick, plinth, dark, unit)).moved(y=-sum(sides) * width / 2)
     parts = [main, _top((0.0, -half), (width, half), z, thick, stone)]
     supports = [Support((0.02, -half), (width, half), z, 0.5)]
     for side in sides:
         reach = draw(rng, 0.6, 2.0)
-        leg = joined(run(rng, style, reach, depth, z - thick, plinth, dark)).turned(-side * np.pi / 2)
+        leg = joined(run(rng, style, reach, depth, z - thick, plinth, dark, unit)).turned(-side * np.pi / 2)
         parts.append(leg.moved(x=width + reach / 2, y=side * half))
         low, high = sorted((side * half, side * (half - width)))
         parts += [
@@ -272,7 +272,9 @@ def _wall_open(rng: np.random.Generator) -> Piece:
             if chance(rng, 0.6):
                 tall = draw(rng, 0.05, min(0.2, 0.7 * high / (shelves + 1)))
                 kind = pick(rng, ("ceramic", "ceramic", "glass", "plastic"))
-                parts.append(cylinder(depth / 2, float(y), float(z), draw(rng, 0.03, 0.045), tall, material(kind, rng), 8))
+                parts.append(
+                    cylinder(depth / 2, float(y), float(z), draw(rng, 0.03, 0.045), tall, material(kind, rng), 8)
+                )
     return finished(parts)
 
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from avlmaps.sim.furniture.catalogue import Piece, Support, family
-from avlmaps.sim.furniture.fittings import cabinet_box, chrome, face, front, front_style, knob, outline, spindle
+from avlmaps.sim.furniture.catalogue import Piece, family
+from avlmaps.sim.furniture.fittings import chrome, face, knob, outline, spindle
 from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, rim
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
-from avlmaps.sim.shapes import box, circle, cylinder, lathe, loft, polygon, rounded_box, slab, tube
+from avlmaps.sim.shapes import box, circle, cylinder, loft, polygon, rounded_box, tube
 
 
 def _frame_look(rng: np.random.Generator) -> Material:
@@ -233,5 +233,3 @@ def _on_stand(rng: np.random.Generator) -> Piece:
             parts.append(_draped(rng, 0.0, draw(rng, -0.5, 0.5) * (wide - cover), z, cover, draw(rng, 0.3, 0.6), _towel(rng)))
     return finished(parts)
 
-
-_ = (Support, cabinet_box, front, front_style, lathe, slab)
