@@ -1,0 +1,124 @@
+"""Queries to a map whose encoder tells a closed set of names apart, and colours in them."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from avlmaps.maps.grid import GridSpec
+from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
+from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
+from avlmaps.query.heatmap import HeatSettings
+from avlmaps.query.level import Space
+from avlmaps.query.objects import Asked, ObjectSettings, Rivals, object_factor
+from avlmaps.query.question import Modality, Part, Role
+from avlmaps.query.tints import tint_of
+
+NAMES = ("chair", "dining table", "coffee table", "floor", "other")
+MEANT = {
+    "chair": (1, 0, 0, 0, 0), "floor": (0, 0, 0, 1, 0), "table": (0, 1, 1, 0, 0), "dining table": (0, 1, 0, 0, 0),
+    "coffee table": (0, 0, 1, 0, 0), "other": (0, 0, 0, 0, 1), "seat": (1, 0.1, 0, 0, 0),
+}  # fmt: skip
+
+
+@dataclass
+class Names:
+    """Five names with random codes; an instance is as sure as its mean probability."""
+
+    names: tuple[str, ...] = NAMES
+    codes: np.ndarray = field(
+        default_factory=lambda: orthonormal_codes(np.random.default_rng(0).standard_normal((5, 8)))
+    )
+    card: ModelCard = field(default_factory=lambda: ModelCard("test/names", 8, "MIT", "0" * 64))
+
+    @property
+    def vocabulary(self) -> tuple[str, ...]:
+        return NAMES[:-1]
+
+    def encode(self, frame):
+        raise NotImplementedError
+
+    def meant(self, word: str) -> np.ndarray:
+        return np.array(MEANT.get(word, (0, 0, 0, 0, 0)), np.float32)
+
+    def encode_words(self, words):
+        meant = np.stack([self.meant(word) for word in words])
+        return features_of(meant / np.maximum(meant.sum(axis=1, keepdims=True), 1e-9), self.codes)
+
+    def understood(self, word: str) -> str:
+        return word if word in MEANT else ""
+
+    def instance_probability(self, name, mean_probability, area_m2):
+        return mean_probability
+
+
+ENCODER = Names()
+# Four clumps of eight voxels: a chair, a dining table, a coffee table, and something between chair and table.
+INDEX = np.concatenate([np.argwhere(np.ones((2, 2, 2))) + np.array([20 * clump, 0, 0]) for clump in range(4)])
+P = np.repeat(
+    [(0.9, 0.05, 0, 0, 0.05), (0.1, 0.6, 0.3, 0, 0), (0, 0.4, 0.5, 0, 0.1), (0.45, 0.4, 0, 0, 0.15)], 8, axis=0
+)
+FEATURE = features_of(P, ENCODER.codes).astype(np.float16)
+RGB = np.repeat(np.array([(200, 20, 20), (30, 30, 200), (200, 20, 20), (240, 240, 240)], np.uint8), 8, axis=0)
+SPACE = Space(GridSpec(0.05), INDEX, np.array([0.0, 0.0, 1.0]))
+
+
+def ask(word: str, rgb: np.ndarray | None = None):
+    rivals = Rivals.of(FEATURE, ENCODER, ENCODER.vocabulary)
+    part = Part(Modality.OBJECT, word, Role.PRIMARY)
+    settings = ObjectSettings(least_confidence=0.0)
+    return object_factor(SPACE, FEATURE, ENCODER, rivals, part, settings, HeatSettings(), rgb)
+
+
+def clumps(factor) -> set[int]:
+    return {int(i) for i in np.flatnonzero(factor.mask) // 8}
+
+
+def test_the_fake_keeps_to_the_protocol() -> None:
+    assert isinstance(ENCODER, NamedPixelEncoder)
+
+
+def test_a_name_wins_where_it_is_the_likeliest() -> None:
+    assert clumps(ask("chair")) == {0, 3}
+    assert clumps(ask("dining table")) == {1}
+
+
+def test_a_wider_word_wins_with_the_sum_of_what_it_takes_in() -> None:
+    factor = ask("table")
+    assert clumps(factor) == {1, 2}
+    np.testing.assert_allclose(sorted(factor.confidence), [0.9, 0.9], atol=2e-3)
+
+
+def test_confidence_is_the_mean_probability_that_the_encoder_is_asked_with() -> None:
+    np.testing.assert_allclose(sorted(ask("chair").confidence), [0.45, 0.9], atol=2e-3)
+
+
+def test_a_faintly_meant_name_still_competes() -> None:
+    assert Asked.of(ENCODER, "seat").span.shape == (1, 8)
+
+
+def test_a_word_that_means_nothing_is_not_found_and_says_so() -> None:
+    factor = ask("elephant")
+    assert not factor.found and not factor.mask.any()
+    assert factor.note == "the pixel encoder knows nothing like 'elephant'"
+
+
+@pytest.mark.parametrize(("phrase", "clump"), [("red chair", 0), ("blue dining table", 1), ("white chair", 3)])
+def test_a_colour_says_which(phrase: str, clump: int) -> None:
+    factor = ask(phrase, RGB)
+    best = int(np.flatnonzero(factor.mask)[factor.instance == int(np.argmax(factor.confidence))][0]) // 8
+    assert best == clump
+
+
+def test_a_thing_of_another_colour_is_not_it() -> None:
+    assert ask("green chair", RGB).confidence.max() == 0.0
+
+
+def test_a_colour_alone_is_whatever_has_it() -> None:
+    assert clumps(ask("something red", RGB)) == {0, 2}
+
+
+def test_colours_are_taken_out_of_a_phrase() -> None:
+    tint = tint_of("dark red kitchen cabinet")
+    assert tint is not None and tint.text == "dark red" and tint.thing == "kitchen cabinet"
+    assert tint_of("kitchen cabinet") is None
