@@ -126,7 +126,7 @@ def _returns(mesh: Mesh, atlas: Atlas) -> Float32[np.ndarray, " m"]:
 
 
 class Renderer:
-    """Draws views of one scene."""
+    """Draws views of one scene; not from two threads at once, since it keeps its working memory between views."""
 
     def __init__(self, scene: Scene, lit: bool = True) -> None:
         """Prepare a scene.
