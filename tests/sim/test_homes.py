@@ -104,9 +104,7 @@ def test_what_hangs_on_walls_crosses_no_opening(scene: Scene) -> None:
         if thing.category not in {"picture", "mirror", "clock", "air conditioner"} or thing.low[2] < 0.5:
             continue
         for hole in openings:
-            apart = any(
-                thing.low[k] >= hole.high[k] - 0.02 or hole.low[k] >= thing.high[k] - 0.02 for k in range(3)
-            )
+            apart = any(thing.low[k] >= hole.high[k] - 0.02 or hole.low[k] >= thing.high[k] - 0.02 for k in range(3))
             assert apart or thing.category == hole.category, f"{thing.name} crosses {hole.name} in {scene.name}"
 
 
@@ -124,7 +122,9 @@ def test_homes_have_what_people_need_and_the_same_things_in_several_rooms() -> N
         where: dict[str, set[int]] = {}
         for thing in home(seed).objects:
             where.setdefault(thing.category, set()).add(thing.area)
-        twice = [c for c, areas in where.items() if len(areas - {-1}) > 1 and c not in {"floor", "ceiling", "door", "window"}]
+        twice = [
+            c for c, areas in where.items() if len(areas - {-1}) > 1 and c not in {"floor", "ceiling", "door", "window"}
+        ]
         assert len(twice) >= 3
 
 

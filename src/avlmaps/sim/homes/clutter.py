@@ -30,7 +30,8 @@ ON_TOP: dict[str, tuple[str, ...]] = {
     "refrigerator": ("box", "basket", "plant"),
     "bed": ("cushion", "cushion", "bag", "book", "toy", "laptop"),
     "sofa": ("cushion", "cushion", "book", "bag", "toy"),
-    "armchair": ("cushion",), "bench": ("cushion", "bag", "box"), "piano": ("book", "vase", "picture", "lamp", "candle"),
+    "armchair": ("cushion",), "bench": ("cushion", "bag", "box"), "piano": ("book", "vase", "picture", "lamp",
+    "candle"),
     "sink": ("cup", "bottle"), "shoe rack": ("shoes", "shoes", "bag"), "stove": ("pot", "pot", "kettle"),
     "bathtub": ("bottle",), "ottoman": ("book", "tableware"), "fireplace": ("vase", "candle", "picture", "clock"),
     "wardrobe": ("box", "basket", "bag"), "locker": ("box", "bag"), "microwave": ("bowl", "box"),
@@ -56,7 +57,6 @@ _LYING = (
 
 def things_on(f: Furnisher, anchor: Stood, wanted: Sequence[str], turn_rad: float | None = None) -> int:
     """Stand small things on the tops of a piece, meeting nothing there; return how many found a place."""
-    taken: dict[int, list[np.ndarray]] = {}
     tops = [top for top in anchor.piece.supports if min(np.subtract(top.high, top.low)) > 0.06]
     done = 0
     for category in wanted if tops else ():
@@ -67,7 +67,7 @@ def things_on(f: Furnisher, anchor: Stood, wanted: Sequence[str], turn_rad: floa
         limit = np.pi if turn_rad is None else turn_rad
         heading = f.rng.uniform(-limit, limit, 5) if chance(f.rng, 0.6) else f.rng.normal(0.0, 0.05, 5)
         centre = f.rng.uniform(tops[number].low, tops[number].high, (5, 2))
-        done += _set(f, anchor, tops[number], piece, centre, heading, taken.setdefault(number, []))
+        done += _set(f, anchor, tops[number], piece, centre, heading)
     return done
 
 
@@ -85,17 +85,30 @@ def _small_enough(f: Furnisher, category: str, top: Support) -> Piece | None:
     return None
 
 
-def _set(f: Furnisher, anchor: Stood, top: Support, piece: Piece, centre: np.ndarray, heading: np.ndarray,
-         taken: list[np.ndarray]) -> bool:  # fmt: skip
+def _set(
+    f: Furnisher,
+    anchor: Stood,
+    top: Support,
+    piece: Piece,
+    centre: np.ndarray,
+    heading: np.ndarray,
+    over_m: float = 0.0,
+) -> bool:
+    """Stand a thing at the first of several places on a top where it meets nothing, jutting out no more than told."""
+    taken = f.laid.setdefault((id(anchor), round(100 * top.z)), [])
     foot = footprint(piece.mesh)
     corner = corners_of(centre, np.broadcast_to(foot.half, centre.shape), heading)
-    good = np.all((corner >= top.low) & (corner <= top.high), axis=(1, 2))
+    inside = (corner >= np.array(top.low) - over_m) & (corner <= np.array(top.high) + over_m)
+    good = np.all(inside, axis=(1, 2))
     if taken and good.any():
         good[good] = ~overlapping(corner[good], np.array(taken), 0.002).any(axis=1)
-    for k in np.flatnonzero(good)[:1].tolist():
-        taken.append(corner[k])
+    z = anchor.place.z + top.z + 0.001
+    for k in np.flatnonzero(good)[:2].tolist():
         way = anchor.place.heading_rad + float(heading[k])
-        z = anchor.place.z + top.z + 0.001
+        at = anchor.to_world(centre[k])[None]
+        if not f.ground.fits(foot, at, np.array([way]), z, zones=False, except_for=anchor.number)[0]:
+            continue  # under a cabinet that hangs too low, say
+        taken.append(corner[k])
         f.put(piece, foot.place(anchor.to_world(centre[k]), way, z), solid=False)
         return True
     return False
@@ -116,20 +129,20 @@ def set_at(f: Furnisher, anchor: Stood, category: str, depth: float, across: flo
         return False
     top = max(anchor.piece.supports, key=lambda s: float(np.prod(np.subtract(s.high, s.low))))
     foot = footprint(piece.mesh)
-    low, high = np.array(top.low) + foot.half, np.array(top.high) - foot.half
-    if np.any(low > high + (0.1, 0.3)) or foot.high_m > top.clearance_m:
+    if foot.high_m > top.clearance_m:
         return False
-    at = low + (high - low) * (depth, across)
-    heading = anchor.place.heading_rad + turn_rad
-    f.put(piece, foot.place(anchor.to_world(at), heading, anchor.place.z + top.z + 0.001), solid=False)
-    return True
+    low, high = np.array(top.low) + foot.half, np.array(top.high) - foot.half
+    low, high = np.minimum(low, (low + high) / 2), np.maximum(high, (low + high) / 2)
+    nudge = np.array([(0.0, 0.0), (0.15, 0.0), (-0.1, 0.15), (-0.1, -0.15), (0.3, 0.0)])
+    centre = low + (high - low) * np.clip(np.array([depth, across]) + nudge, 0.0, 1.0)
+    return _set(f, anchor, top, piece, centre, np.full(len(centre), turn_rad), over_m=0.06)
 
 
-def dress(f: Furnisher, occupied: set[int]) -> None:
-    """Put clutter on all that stands in a room, but for pieces (by identity) whose tops are laid already."""
+def dress(f: Furnisher) -> None:
+    """Put clutter on all that stands in a room."""
     for stood in list(f.stood):
         category = stood.piece.category
-        if id(stood) in occupied or category not in ON_TOP or not stood.piece.supports or not ON_TOP[category]:
+        if category not in ON_TOP or not stood.piece.supports or not ON_TOP[category]:
             continue
         size = sum(float(np.prod(np.subtract(s.high, s.low))) for s in stood.piece.supports)
         mean = _DENSITY.get(category, 1.0) * (0.6 + 2.2 * f.mess) * min(1.0 + 2.5 * size, 4.0) * 0.7

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from avlmaps.sim.furniture.joinery import chance, draw, pick
-from avlmaps.sim.homes.polygons import inside
 from avlmaps.sim.homes.plan import OUTSIDE, WELL, Hole, HoleKind, Room, Wall
+from avlmaps.sim.homes.polygons import inside
 
 HUBS = ("hallway", "corridor", "entrance hall", "open-plan office", "reception")
 SOCIAL = ("living room", "kitchen", "dining room")
@@ -165,7 +165,10 @@ def _leaf_is_free(rooms: list[Room], walls: list[Wall], index: int, hole: Hole) 
         way = -hinge * np.cos(hole.open_rad) * wall.along + np.sin(hole.open_rad) * into
         leaf += [foot + share * reach * way for share in (0.25, 0.5, 0.75, 1.0)]
     places = np.array(leaf)
-    if not inside(rooms[room].polygon, places[-1:], -0.08).all() or not inside(rooms[room].polygon, places, -0.03).all():
+    if (
+        not inside(rooms[room].polygon, places[-1:], -0.08).all()
+        or not inside(rooms[room].polygon, places, -0.03).all()
+    ):
         return False
     for number, other in enumerate(walls):
         if number == index or room not in (other.left, other.right):
@@ -180,9 +183,7 @@ def _leaf_is_free(rooms: list[Room], walls: list[Wall], index: int, hole: Hole) 
     return True
 
 
-def lit_by_day(
-    rng: np.random.Generator, rooms: list[Room], walls: list[Wall], has_entrance: bool = True
-) -> list[Wall]:
+def lit_by_day(rng: np.random.Generator, rooms: list[Room], walls: list[Wall], has_entrance: bool = True) -> list[Wall]:
     """Put windows into outer walls, and one closed door to the outside where the floor has the entrance."""
     entrance = _entrance(rng, rooms, walls) if has_entrance else -1
     style = draw(rng, 0.0, 0.9), draw(rng, 0.7, 1.1), pick(rng, (0.5, 0.7, 0.9))

@@ -89,13 +89,14 @@ def _furnished(rng: np.random.Generator, builder: SceneBuilder, plan: Plan, whic
                 foot = Footprint(np.zeros(2), leaf.half_m, 0.0, 2.0)
                 ground.take(foot, leaf.centre, leaf.heading_rad)
         f = Furnisher(rng, builder, ground, first + index, room.kind, room.floor_m, room.height_m, which, plan.ceiling,
-                      fill * (0.3 if chance(rng, 0.04) else 1.0), float(np.clip(mess * draw(rng, 0.5, 1.6), 0, 1)))  # fmt: skip
+                      fill * (0.3 if chance(rng, 0.04) else 1.0), float(np.clip(mess * draw(rng, 0.5, 1.6), 0,
+                                                                                1)))  # fmt: skip
         fit_out(f, looks[index].wall)
         dress_windows(f, cloth, None)
         RULES[room.kind](f)
         adorn(f)
         light_up(f, day)
-        dress(f, set())
+        dress(f)
         litter(f)
 
 

@@ -23,7 +23,8 @@ def try_make(category: str, rng: np.random.Generator, which: Families, name: str
 
 
 # How high the lowest edge of what hangs on a wall is, metres.
-HANGING_M = {"picture": (1.1, 1.6), "mirror": (0.9, 1.3), "clock": (1.5, 2.0), "air conditioner": (1.9, 2.3), "tv": (0.8, 1.3),
+HANGING_M = {"picture": (1.1, 1.6), "mirror": (0.9, 1.3), "clock": (1.5, 2.0), "air conditioner": (1.9, 2.3),
+             "tv": (0.8, 1.3),
              "wall shelf": (1.1, 1.7), "lamp": (1.4, 1.8), "kitchen cabinet": (1.38, 1.55), "range hood": (1.45, 1.7),
              "water heater": (1.3, 1.7), "whiteboard": (0.8, 1.0), "towel": (0.9, 1.3), "radiator": (0.1, 0.15),
              "coat rack": (1.4, 1.6), "plant": (1.4, 1.9), "telephone": (1.1, 1.4), "sink": (0.0, 0.0)}  # fmt: skip
@@ -86,6 +87,7 @@ class Furnisher:
         fill: how much stands in it, 1 for a room that has what it needs.
         mess: how much lies about, from 0 to 1.
         stood: what stands in it so far.
+        laid: rectangles taken on tops, by the piece's identity and the top's height in centimetres.
     """
 
     rng: np.random.Generator
@@ -100,6 +102,7 @@ class Furnisher:
     fill: float = 1.0
     mess: float = 0.3
     stood: list[Stood] = field(default_factory=list)
+    laid: dict[tuple[int, int], list[np.ndarray]] = field(default_factory=dict)
 
     def new(self, category: str, name: str | None = None) -> Piece | None:
         """Make a piece of a category that has recipes."""
@@ -194,7 +197,8 @@ class Furnisher:
         return self.try_at(piece, anchor.to_world(local), np.full(2, anchor.place.heading_rad))
 
     def before(
-        self, piece: Piece, anchor: Stood, gap_m: float, facing: bool = True, aside_m: float = 0.0, turn_rad: float = 0.0,
+        self, piece: Piece, anchor: Stood, gap_m: float, facing: bool = True, aside_m: float = 0.0,
+        turn_rad: float = 0.0,
         front_m: float = 0.0, zones: bool = False, solid: bool = True,
     ) -> Stood | None:  # fmt: skip
         """Stand a piece before the front of another, looking at it or the same way."""

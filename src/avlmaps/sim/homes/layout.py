@@ -1,5 +1,7 @@
 """How a floor is divided into rooms: outlines cut again and again by lines, in the proportions of a programme."""
 
+from itertools import pairwise
+
 import numpy as np
 from jaxtyping import Float
 
@@ -24,7 +26,7 @@ def cut(polygon: Polygon, share: float, direction: Float[np.ndarray, "2"]) -> tu
     goal, done = share * area_m2(polygon), 0.0
     levels = sorted(reach)
     at = levels[-1]
-    for low, high in zip(levels, levels[1:], strict=False):
+    for low, high in pairwise(levels):
         if high - low < 1e-9:
             continue
         # Between two corners the width changes evenly: widths a little inside both ends tell it all.
@@ -41,9 +43,7 @@ def cut(polygon: Polygon, share: float, direction: Float[np.ndarray, "2"]) -> tu
 
 
 def _width_at(sides: list[tuple[float, float, float, float]], level: float) -> float:
-    crossing = [
-        y0 + (level - x0) / (x1 - x0) * (y1 - y0) for x0, y0, x1, y1 in sides if (x0 < level) != (x1 < level)
-    ]
+    crossing = [y0 + (level - x0) / (x1 - x0) * (y1 - y0) for x0, y0, x1, y1 in sides if (x0 < level) != (x1 < level)]
     return max(crossing) - min(crossing) if crossing else 0.0
 
 
@@ -163,7 +163,10 @@ def sound(rooms: list[tuple[str, Polygon]]) -> bool:
 
 
 def floor_of(
-    rng: np.random.Generator, programme: Programme, corridor: str = "hallway", slanted: float = 0.12,
+    rng: np.random.Generator,
+    programme: Programme,
+    corridor: str = "hallway",
+    slanted: float = 0.12,
     stairs: bool = False,
 ) -> list[tuple[str, Polygon]]:
     """Lay out a floor: draw an outline and divide it, again until every room is sound.
@@ -181,7 +184,7 @@ def floor_of(
     for attempt in range(200):
         shape = pick(rng, ("rectangle", "rectangle", "L", "T")) if size > 60 and not stairs else "rectangle"
         parts = outlines(rng, size, shape)
-        use_corridor = stairs or len(inner) >= 4 and chance(rng, 0.6 if attempt < 100 else 0.3)
+        use_corridor = stairs or (len(inner) >= 4 and chance(rng, 0.6 if attempt < 100 else 0.3))
         rooms: list[tuple[str, Polygon]] = []
         left = inner if use_corridor else list(programme)
         for number, part in enumerate(parts):

@@ -40,7 +40,8 @@ def open_plan_office(f: Furnisher) -> None:
                 centre = middle(f.ground.polygon) + at * base.along + row * base.inward
                 f.try_at(partition, centre[None], np.array([base.heading_rad]), zones=False)
     for _ in range(2):
-        several(f, {"filing cabinet": 0.7, "bookshelf": 0.5, "plant": 0.6, "printer": 0.2, "locker": 0.3, "trash can": 0.6,
+        several(f, {"filing cabinet": 0.7, "bookshelf": 0.5, "plant": 0.6, "printer": 0.2, "locker": 0.3,
+                    "trash can": 0.6,
                     "whiteboard": 0.4, "water dispenser": 0.3, "cabinet": 0.4, "partition": 0.2, "coat rack": 0.3,
                     "fan": 0.1, "sofa": 0.1, "lamp": 0.15, "box": 0.3})  # fmt: skip
 
@@ -53,7 +54,8 @@ def meeting_room(f: Furnisher) -> None:
         seat = f.new(pick(rng, ("office chair", "chair", "office chair")))
         if seat is not None:
             seat_round(f, stood, seat, count(rng, 4, 12))
-    several(f, {"whiteboard": 0.9, "tv": 0.6, "plant": 0.6, "cabinet": 0.4, "clock": 0.4, "telephone": 0.1, "chair": 0.3,
+    several(f, {"whiteboard": 0.9, "tv": 0.6, "plant": 0.6, "cabinet": 0.4, "clock": 0.4, "telephone": 0.1,
+                "chair": 0.3,
                 "trash can": 0.3, "water dispenser": 0.15, "air conditioner": 0.4, "loudspeaker": 0.2})  # fmt: skip
 
 
@@ -69,14 +71,16 @@ def reception(f: Furnisher) -> None:
     for _ in range(count(rng, 0, 3)):
         f.stand(pick(rng, ("armchair", "chair")), 0.8, 0.3)
     several(f, {"plant": 0.9, "coat rack": 0.4, "bookshelf": 0.3, "clock": 0.4, "water dispenser": 0.4, "bench": 0.2,
-                "aquarium": 0.1, "console table": 0.2, "trash can": 0.4, "lamp": 0.3, "tv": 0.2, "cabinet": 0.3})  # fmt: skip
+                "aquarium": 0.1, "console table": 0.2, "trash can": 0.4, "lamp": 0.3, "tv": 0.2,
+                "cabinet": 0.3})  # fmt: skip
 
 
 def copy_room(f: Furnisher) -> None:
     """Furnish a copy corner."""
     for _ in range(count(f.rng, 1, 3)):
         f.stand("printer", 0.9, 0.5)
-    several(f, {"filing cabinet": 0.8, "cabinet": 0.6, "bookshelf": 0.6, "trash can": 0.8, "box": 0.8, "side table": 0.4,
+    several(f, {"filing cabinet": 0.8, "cabinet": 0.6, "bookshelf": 0.6, "trash can": 0.8, "box": 0.8,
+                "side table": 0.4,
                 "console table": 0.3, "locker": 0.3, "water dispenser": 0.2, "computer": 0.2})  # fmt: skip
 
 

@@ -46,7 +46,7 @@ def _curtain(
     if width < end - start:
         return
     top = min(head + draw(f.rng, 0.05, 0.3), f.height_m - 0.06)
-    short = warm or sill > 0.5 and chance(f.rng, 0.4)
+    short = warm or (sill > 0.5 and chance(f.rng, 0.4))
     hem = max(sill - draw(f.rng, 0.02, 0.2), 0.01) if short else draw(f.rng, 0.01, 0.06)
     if top - hem < 0.5:
         return

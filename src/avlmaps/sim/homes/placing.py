@@ -180,7 +180,7 @@ class Ground:
         self, foot: Footprint, centre: np.ndarray, heading_rad: float, z: float = 0.0, front_m: float = 0.0
     ) -> int:
         """Keep the place of a piece, and a zone before it clear of others; return the piece's number."""
-        corner = corners_of(centre, foot.half, np.float64(heading_rad))
+        corner = corners_of(centre, foot.half, np.asarray(heading_rad))
         self._corner.append(corner)
         self._height.append((z + foot.low_m, z + foot.high_m))
         if z + foot.low_m <= _OVERHEAD_M and z + foot.high_m >= _UNDERFOOT_M:
@@ -193,7 +193,7 @@ class Ground:
 
     def keep_clear(self, centre: np.ndarray, half_m: np.ndarray, heading_rad: float) -> None:
         """Let nothing stand on an oriented rectangle."""
-        self._zone.append(corners_of(centre, half_m, np.float64(heading_rad)))
+        self._zone.append(corners_of(centre, half_m, np.asarray(heading_rad)))
 
     def free_share(self) -> float:
         """Return which share of the room's floor a robot can stand on."""

@@ -10,12 +10,14 @@ from avlmaps.sim.homes.plan import WELL, Room
 from avlmaps.sim.homes.polygons import area_m2
 
 # Kind of room: least and greatest area, m².
-_SIZE_M2 = {"living room": (16, 34), "kitchen": (8, 15), "dining room": (9, 18), "bedroom": (10, 19), "bathroom": (4.5, 9),
+_SIZE_M2 = {"living room": (16, 34), "kitchen": (8, 15), "dining room": (9, 18), "bedroom": (10, 19),
+            "bathroom": (4.5, 9),
             "hallway": (5, 11), "entrance hall": (4, 9), "office": (8, 14), "laundry room": (4, 8), "storage": (3, 7),
             "children's room": (9, 15), "gym": (10, 20), "open-plan office": (30, 90), "corridor": (8, 16),
             "meeting room": (12, 28), "kitchenette": (7, 12), "toilet": (3, 6), "reception": (10, 22),
             "copy room": (5, 9)}  # fmt: skip
-_EXTRA = ("bedroom", "children's room", "office", "dining room", "storage", "laundry room", "bathroom", "gym", "entrance hall",
+_EXTRA = ("bedroom", "children's room", "office", "dining room", "storage", "laundry room", "bathroom", "gym",
+          "entrance hall",
           "bedroom", "office", "children's room", "dining room", "gym", "storage")  # fmt: skip
 _ORDER = ("kitchen", "dining room", "living room", "entrance hall", "hallway", "office", "storage", "laundry room",
           "bathroom", "bedroom", "children's room", "gym")  # fmt: skip
@@ -42,7 +44,7 @@ def home_programme(rng: np.random.Generator, most_m2: float = 215.0) -> Programm
 
 
 def upstairs(rng: np.random.Generator, rooms: Sequence[Room], floor_m: float, height_m: float) -> list[Room]:
-    """Return the rooms of an upper floor: over each room one of the same outline, the hall and the stairs above theirs."""
+    """Return the rooms of an upper floor, each over one of the same outline; hall and stairs lie above theirs."""
     out = []
     free = [room for room in rooms if room.kind not in ("hallway", WELL)]
     smallest = min(free, key=lambda room: area_m2(room.polygon))

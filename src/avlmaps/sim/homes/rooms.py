@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from avlmaps.sim.furniture import Piece
 from avlmaps.sim.furniture.decor import carpet
 from avlmaps.sim.furniture.joinery import chance, count, draw, pick
 from avlmaps.sim.homes.clutter import set_at
 from avlmaps.sim.homes.furnish import Furnisher, Stood, footprint, hangs
 from avlmaps.sim.homes.polygons import middle
 from avlmaps.sim.homes.seats import seat_round
-from avlmaps.sim.furniture import Piece
 
 
 def several(f: Furnisher, wanted: dict[str, float], front_m: float = 0.4) -> list[Stood]:
@@ -50,7 +50,8 @@ def living_room(f: Furnisher) -> None:
         f.stand("armchair", 0.7, 0.35)
     if chance(rng, 0.25 * f.fill) and (second := f.new("sofa")) is not None:
         f.along(second, front_m=0.35)
-    several(f, {"bookshelf": 0.6, "cabinet": 0.4, "piano": 0.1, "fireplace": 0.12, "plant": 0.7, "lamp": 0.5, "guitar": 0.1,
+    several(f, {"bookshelf": 0.6, "cabinet": 0.4, "piano": 0.1, "fireplace": 0.12, "plant": 0.7, "lamp": 0.5,
+                "guitar": 0.1,
                 "aquarium": 0.07, "chest of drawers": 0.15, "pet bed": 0.08, "fan": 0.08, "ottoman": 0.2,
                 "loudspeaker": 0.15, "side table": 0.3})  # fmt: skip
     if chance(rng, 0.3):
@@ -117,7 +118,8 @@ def _sofa_corner(f: Furnisher, sofa: Stood) -> None:
 def dining_room(f: Furnisher) -> None:
     """Furnish a dining room: a table with chairs, a cabinet for the tableware."""
     dining_place(f, 1.0)
-    several(f, {"cabinet": 0.65, "plant": 0.5, "chest of drawers": 0.2, "lamp": 0.2, "console table": 0.2, "bookshelf": 0.15,
+    several(f, {"cabinet": 0.65, "plant": 0.5, "chest of drawers": 0.2, "lamp": 0.2, "console table": 0.2,
+                "bookshelf": 0.15,
                 "piano": 0.05, "vase": 0.15, "fireplace": 0.05, "clock": 0.15})  # fmt: skip
 
 
@@ -152,7 +154,8 @@ def bedroom(f: Furnisher) -> None:
     several(f, {"wardrobe": 0.9, "chest of drawers": 0.55}, 0.6)
     if chance(rng, 0.3):
         desk_place(f)
-    several(f, {"armchair": 0.25, "mirror": 0.35, "bookshelf": 0.25, "plant": 0.35, "laundry basket": 0.25, "lamp": 0.25,
+    several(f, {"armchair": 0.25, "mirror": 0.35, "bookshelf": 0.25, "plant": 0.35, "laundry basket": 0.25,
+                "lamp": 0.25,
                 "bench": 0.15, "chair": 0.3, "tv cabinet": 0.15, "ottoman": 0.12, "crib": 0.06, "coat rack": 0.08,
                 "tv": 0.15, "fan": 0.06, "wardrobe": 0.15, "ironing board": 0.05, "guitar": 0.06})  # fmt: skip
 
@@ -185,7 +188,8 @@ def childrens_room(f: Furnisher) -> None:
         under(f, middle(f.ground.polygon), f.ground.sides[0].heading_rad, (draw(rng, 1.2, 2.0), draw(rng, 1.4, 2.6)))
     several(f, {"wardrobe": 0.75, "chest of drawers": 0.5, "bookshelf": 0.6, "toy": 0.8, "rocking horse": 0.25,
                 "play tent": 0.25, "baby stroller": 0.12, "basket": 0.4, "ball": 0.4, "mat": 0.2, "stool": 0.2,
-                "armchair": 0.15, "lamp": 0.2, "plant": 0.15, "piano": 0.03, "guitar": 0.08, "box": 0.3, "nightstand": 0.3,
+                "armchair": 0.15, "lamp": 0.2, "plant": 0.15, "piano": 0.03, "guitar": 0.08, "box": 0.3,
+                "nightstand": 0.3,
                 "laundry basket": 0.15, "bicycle": 0.06})  # fmt: skip
     for _ in range(int(rng.poisson(1.0 + 4 * f.mess))):
         toy = f.new(pick(rng, ("toy", "toy", "toy", "ball", "book", "cushion", "box")))
@@ -234,7 +238,8 @@ def study(f: Furnisher) -> None:
     for _ in range(1 if chance(rng, 0.75) else 2):
         desk_place(f, 0.85)
     several(f, {"bookshelf": 0.85, "filing cabinet": 0.4, "cabinet": 0.25, "armchair": 0.3, "sofa": 0.2, "plant": 0.5,
-                "trash can": 0.5, "printer": 0.1, "lamp": 0.3, "whiteboard": 0.12, "guitar": 0.1, "chest of drawers": 0.15,
+                "trash can": 0.5, "printer": 0.1, "lamp": 0.3, "whiteboard": 0.12, "guitar": 0.1,
+                "chest of drawers": 0.15,
                 "piano": 0.05, "fan": 0.08, "chair": 0.2, "box": 0.25, "bag": 0.2})  # fmt: skip
     if chance(rng, 0.6):
         several(f, {"bookshelf": 0.8, "bicycle": 0.05, "locker": 0.03})

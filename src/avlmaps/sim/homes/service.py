@@ -30,7 +30,8 @@ def kitchen(f: Furnisher) -> None:
             seat_round(f, stood, stool, count(rng, 2, 4), all_sides=chance(rng, 0.3))
     elif chance(rng, 0.45):
         dining_place(f, 1.0, 0.6)
-    several(f, {"trash can": 0.7, "kitchen cabinet": 0.4, "microwave": 0.1, "plant": 0.2, "cabinet": 0.2, "water heater": 0.15,
+    several(f, {"trash can": 0.7, "kitchen cabinet": 0.4, "microwave": 0.1, "plant": 0.2, "cabinet": 0.2,
+                "water heater": 0.15,
                 "wall shelf": 0.3, "basket": 0.2, "stool": 0.15, "water dispenser": 0.06, "pet bed": 0.04, "towel": 0.2,
                 "clock": 0.2})  # fmt: skip
 
@@ -51,10 +52,11 @@ def _above(f: Furnisher, fitted: list[Stood]) -> None:
                 _over(f, cabinet, stood, low)
 
 
-def _over(f: Furnisher, piece, stood: Stood, z: float) -> Stood | None:  # noqa: ANN001
+def _over(f: Furnisher, piece, stood: Stood, z: float) -> Stood | None:
     foot = footprint(piece.mesh)
     if z + foot.high_m > f.height_m - 0.03:
-        piece = type(piece)(piece.mesh.scaled(1, 1, max((f.height_m - 0.05 - z) / foot.high_m, 0.4)), (), (), piece.category,
+        piece = type(piece)(piece.mesh.scaled(1, 1, max((f.height_m - 0.05 - z) / foot.high_m, 0.4)), (), (),
+                            piece.category,
                             piece.family)  # fmt: skip
         foot = footprint(piece.mesh)
     room = max(stood.foot.half[1] - foot.half[1], 0.0)
@@ -106,7 +108,8 @@ def bathroom(f: Furnisher) -> None:
     if large and chance(rng, 0.25):
         f.stand("sink", 1.0, 0.4)
     several(f, {"washing machine": 0.3 * large, "towel": 0.8, "radiator": 0.25, "laundry basket": 0.35 * large,
-                "trash can": 0.5, "cabinet": 0.25 * large, "wall shelf": 0.3, "plant": 0.15, "water heater": 0.15, "stool": 0.1,
+                "trash can": 0.5, "cabinet": 0.25 * large, "wall shelf": 0.3, "plant": 0.15, "water heater": 0.15,
+                "stool": 0.1,
                 "mirror": 0.2, "basket": 0.2, "fan": 0.03})  # fmt: skip
     if chance(rng, 0.5) and (mat := f.new(pick(rng, ("carpet", "mat")))) is not None and mat.mesh.size[:2].max() < 1.5:
         f.somewhere(mat, square=1.0, solid=False)
@@ -117,14 +120,17 @@ def bathroom(f: Furnisher) -> None:
 def laundry_room(f: Furnisher) -> None:
     """Furnish a laundry room."""
     f.row(["washing machine", "washing machine", "kitchen counter"][: count(f.rng, 1, 3)], front_m=0.5)
-    several(f, {"laundry basket": 0.9, "ironing board": 0.6, "cabinet": 0.4, "sink": 0.5, "wall shelf": 0.5, "basket": 0.5,
-                "vacuum cleaner": 0.4, "water heater": 0.4, "kitchen cabinet": 0.3, "box": 0.4, "bottle": 0.2, "towel": 0.3,
+    several(f, {"laundry basket": 0.9, "ironing board": 0.6, "cabinet": 0.4, "sink": 0.5, "wall shelf": 0.5,
+                "basket": 0.5,
+                "vacuum cleaner": 0.4, "water heater": 0.4, "kitchen cabinet": 0.3, "box": 0.4, "bottle": 0.2,
+                "towel": 0.3,
                 "trash can": 0.2, "shoe rack": 0.1, "wardrobe": 0.2})  # fmt: skip
 
 
 def storage(f: Furnisher) -> None:
     """Fill a storage room: shelves and boxes, and what has no other place."""
-    several(f, {"bookshelf": 0.8, "cabinet": 0.5, "wardrobe": 0.3, "vacuum cleaner": 0.4, "bicycle": 0.3, "ironing board": 0.2,
+    several(f, {"bookshelf": 0.8, "cabinet": 0.5, "wardrobe": 0.3, "vacuum cleaner": 0.4, "bicycle": 0.3,
+                "ironing board": 0.2,
                 "water heater": 0.25, "box": 0.9, "basket": 0.3, "fan": 0.2, "baby stroller": 0.15, "shoe rack": 0.2,
                 "chair": 0.2, "computer": 0.1, "guitar": 0.1, "bag": 0.4, "pot": 0.1, "locker": 0.1}, 0.2)  # fmt: skip
     for _ in range(count(f.rng, 1, 6)):
@@ -135,7 +141,8 @@ def hallway(f: Furnisher) -> None:
     """Furnish a hall: coats, shoes, a runner, keeping the way free."""
     rng = f.rng
     entrance = 1.6 if f.kind == "entrance hall" else 0.8
-    several(f, {"coat rack": 0.45 * entrance, "shoe rack": 0.45 * entrance, "console table": 0.35, "plant": 0.3, "bench": 0.2,
+    several(f, {"coat rack": 0.45 * entrance, "shoe rack": 0.45 * entrance, "console table": 0.35, "plant": 0.3,
+                "bench": 0.2,
                 "mirror": 0.45 * entrance, "wardrobe": 0.2, "shoes": 0.35 * entrance, "bag": 0.15, "cabinet": 0.15,
                 "chest of drawers": 0.15, "bookshelf": 0.15, "baby stroller": 0.05, "bicycle": 0.05, "chair": 0.1,
                 "clock": 0.15, "vase": 0.1, "lamp": 0.12, "basket": 0.1, "vacuum cleaner": 0.05}, 0.25)  # fmt: skip
@@ -155,8 +162,10 @@ def gym(f: Furnisher) -> None:
     for _ in range(count(rng, 1, 3)):
         if (mat := f.new("mat")) is not None:
             f.somewhere(mat, square=0.7)
-    several(f, {"mirror": 0.8, "bench": 0.5, "ball": 0.7, "bicycle": 0.2, "fan": 0.3, "tv": 0.3, "locker": 0.2, "towel": 0.4,
-                "water dispenser": 0.2, "loudspeaker": 0.3, "plant": 0.3, "clock": 0.3, "stool": 0.2, "cabinet": 0.2})  # fmt: skip
+    several(f, {"mirror": 0.8, "bench": 0.5, "ball": 0.7, "bicycle": 0.2, "fan": 0.3, "tv": 0.3, "locker": 0.2,
+                "towel": 0.4,
+                "water dispenser": 0.2, "loudspeaker": 0.3, "plant": 0.3, "clock": 0.3, "stool": 0.2,
+                "cabinet": 0.2})  # fmt: skip
     for _ in range(count(rng, 1, 5)):
         if (weight := f.new("dumbbell")) is not None:
             f.somewhere(weight, square=0.2, tries=6)

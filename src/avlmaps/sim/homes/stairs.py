@@ -70,8 +70,8 @@ def _railings(rng: np.random.Generator, rise: float, wide: float, run: float) ->
         tube([(up[0], -wide / 2, rise + high), (up[0], 0.0, rise + high)], thick * 1.4, metal),
         tube([(0.0, 0.0, high), (run, 0.0, rise / 2 + high), (0.0, 0.0, rise + high)], thick * 1.2, metal),
     ]
-    for y in np.arange(-wide / 2 + 0.08, 0.01, 0.14):
-        parts.append(cylinder(up[0], float(y), rise, thick * 0.6, high, metal, 6))
+    places = np.arange(-wide / 2 + 0.08, 0.01, 0.14).tolist()
+    parts += [cylinder(up[0], y, rise, thick * 0.6, high, metal, 6) for y in places]
     bars = 9 if chance(rng, 0.6) else 4
     for x in np.linspace(0.05, run - 0.05, bars).tolist():
         low = rise / 2 * x / run

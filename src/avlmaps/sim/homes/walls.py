@@ -60,7 +60,7 @@ def looks_of(rng: np.random.Generator, room: Room, home: Looks | None) -> Looks:
     floor_kind = pick(rng, ("tile", "tile", "stone", "marble") if wet else
                       ("parquet", "parquet", "parquet", "wood", "carpet", "tile", "stone", "concrete"))  # fmt: skip
     wall_kind = pick(rng, ("plaster", "plaster", "painted", "painted", "wallpaper", "brick", "concrete"))
-    if wet and chance(rng, 0.6) or room.kind == "kitchen" and chance(rng, 0.15):
+    if (wet and chance(rng, 0.6)) or (room.kind == "kitchen" and chance(rng, 0.15)):
         wall_kind = "tile"
     elif chance(rng, 0.6):
         wall_kind = "plaster"
@@ -154,7 +154,7 @@ def wall_mesh(plan: Plan, wall: Wall, looks: list[Looks], edge: Material, outer:
         if wall.right != OUTSIDE:
             strips += _skirting(wall, (-inner - 0.012, -inner), inner, wall.length_m - inner, skirting_m)
         if strips:
-            parts.append(blocks(np.array([s[0] for s in strips]), np.array([s[1] for s in strips]), (edge,) * 3))
+            parts.append(blocks(np.array([s[0] for s in strips]), np.array([s[1] for s in strips]), (edge, edge, edge)))
     return placed(joined(parts), wall.a, heading_of(wall.along), floor)
 
 
