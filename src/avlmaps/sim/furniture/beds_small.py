@@ -65,7 +65,7 @@ def barred_crib(rng: np.random.Generator) -> Piece:
         )
         parts += [
             cylinder(-length / 4 + dx, dy, top + 0.3, 0.03, 0.05, material("fabric", rng), 6)
-            for dx, dy in ((0.08, 0), (-0.08, 0.05), (0, -0.08))
+            for dx, dy in ((0.08, 0.0), (-0.08, 0.05), (0.0, -0.08))
         ]
     return finished(parts)
 
@@ -275,7 +275,7 @@ def drum_nightstand(rng: np.random.Generator) -> Piece:
         for (x0, y0), (x1, y1) in zip(wall, wall[1:] + wall[:1], strict=True):
             if x0 + x1 < r * 0.9:
                 parts.append(
-                    box((0, 0, 0), (0.012, float(np.hypot(x1 - x0, y1 - y0)), height - 0.05), look)
+                    box((0.0, 0.0, 0.0), (0.012, float(np.hypot(x1 - x0, y1 - y0)), height - 0.05), look)
                     .turned(float(np.arctan2(y1 - y0, x1 - x0)) - np.pi / 2)
                     .moved(x0, y0, 0.03)
                 )

@@ -96,7 +96,7 @@ def pedestal(rng: np.random.Generator, high: float, reach: float, look: Material
         foot = (
             cylinder(0.0, 0.0, 0.0, reach * 0.8, 0.02, look, 20)
             if chance(rng, 0.6)
-            else slab(0, 0, 0, 1.3 * reach, 1.3 * reach, 0.02, look)
+            else slab(0.0, 0.0, 0.0, 1.3 * reach, 1.3 * reach, 0.02, look)
         )
         return joined([pole, foot])
     cross = [slab(0.0, 0.0, 0.0, 2 * reach, 0.08, 0.06, look), slab(0.0, 0.0, high - 0.04, reach, 0.06, 0.04, look)]

@@ -151,7 +151,7 @@ def runner_coffee(rng: np.random.Generator) -> Piece:
     return finished(parts, supports=[top_support(kind, depth, width, high)])
 
 
-@family("coffee table", "trunk")
+@family("coffee table", "trunk", held_out=True)
 def trunk(rng: np.random.Generator) -> Piece:
     """Return a chest with a lid, bands and a lock, used as a table."""
     depth, width, high = draw(rng, 0.42, 0.6), draw(rng, 0.8, 1.15), draw(rng, 0.4, 0.5)
@@ -191,7 +191,7 @@ def nested_tables(rng: np.random.Generator) -> Piece:
     return finished(parts, supports=supports[:1])
 
 
-@family("coffee table", "drum", held_out=True)
+@family("coffee table", "drum")
 def drum_table(rng: np.random.Generator) -> Piece:
     """Return a round drum: straight, waisted or swelling, or a bowl under a flat top."""
     r, high = draw(rng, 0.28, 0.48), draw(rng, 0.3, 0.46)
