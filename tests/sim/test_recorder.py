@@ -1,6 +1,9 @@
 """A recorded scene opens as any recording does, holds what the camera saw, and its truth is the scene's own."""
 
 import hashlib
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -112,6 +115,27 @@ def test_the_same_seed_gives_the_same_bytes_on_however_many_processes(
     one, two = fingerprint(tmp_path / "one"), fingerprint(tmp_path / "two")
     assert one == two
     assert {"audio.flac", "events.csv", "objects.json", "areas.json", "simulation.json", "true_poses.csv"} <= set(one)
+
+
+_UNGUARDED = """
+from pathlib import Path
+from helpers.hearing_scenes import flat
+from avlmaps.sim import recorder
+recorder._FEWEST_FOR_PROCESSES = 2
+few = recorder.RecordSettings(size=(48, 32), max_frames=4, hearing="none", workers=2)
+recorder.record_scene(flat(), Path("rec"), few)
+"""
+
+
+def test_processes_that_die_are_told_and_never_waited_for(tmp_path: Path) -> None:
+    (tmp_path / "script.py").write_text(_UNGUARDED)
+    tests = str(Path(__file__).parent.parent)
+    done = subprocess.run(
+        [sys.executable, "script.py"], cwd=tmp_path, env={**os.environ, "PYTHONPATH": tests}, timeout=240,
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert "keep a script's own work under if __name__ == '__main__'" in done.stderr
 
 
 def test_another_seed_drives_and_hears_otherwise(recorded: Path, tmp_path: Path) -> None:

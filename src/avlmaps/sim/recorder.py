@@ -2,8 +2,12 @@
 
 import os
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, field, replace
 from multiprocessing import get_context
+from multiprocessing.reduction import ForkingPickler
+from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal
@@ -291,11 +295,15 @@ def _write_png(path: Path, picture: UInt8[np.ndarray, "..."] | np.ndarray) -> No
 _artist: list[_Artist] = []
 
 
-def _take_up(artist: _Artist) -> None:
+def _take_up(name: str, size: int) -> None:
+    """Begin a process: take over what the frames are drawn with."""
     import cv2
 
     cv2.setNumThreads(1)
-    _artist[:] = [artist]
+    shared = SharedMemory(name)
+    assert shared.buf is not None
+    _artist[:] = [ForkingPickler.loads(bytes(shared.buf[:size]))]
+    shared.close()
 
 
 def _draw(job: _Job) -> int:
@@ -307,5 +315,20 @@ def _drawn(artist: _Artist, jobs: list[_Job], workers: int) -> Iterator[int]:
     if workers < 2 or len(jobs) < _FEWEST_FOR_PROCESSES:
         yield from map(artist.draw, jobs)
         return
-    with get_context("spawn").Pool(workers, _take_up, (artist,)) as pool:
-        yield from pool.imap(_draw, jobs, chunksize=4)
+    # Started afresh rather than forked: compiled kernels and OpenCV's threads do not survive a fork. The building goes
+    # by shared memory: sent as an argument it would block for good when a process dies while it starts.
+    packed = bytes(ForkingPickler.dumps(artist))
+    shared = SharedMemory(create=True, size=len(packed))
+    assert shared.buf is not None
+    shared.buf[: len(packed)] = packed
+    try:
+        with ProcessPoolExecutor(workers, get_context("spawn"), _take_up, (shared.name, len(packed))) as pool:
+            yield from pool.map(_draw, jobs, chunksize=4)
+    except BrokenProcessPool:
+        raise RecordingError(
+            "A process that was drawing has died; keep a script's own work under if __name__ == '__main__', free some "
+            "memory, or draw with one process (--workers 1)."
+        ) from None
+    finally:
+        shared.close()
+        shared.unlink()

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -178,7 +178,7 @@ def _filled(solid: Bool[np.ndarray, "nx ny"], indoors: Bool[np.ndarray, "nx ny"]
     """Fill what is hollow: walls made of two sheets, pockets between a door and its frame."""
     closed: Any = ndimage.binary_closing(np.pad(solid, 1), np.ones((3, 3)))
     solid = closed[1:-1, 1:-1]
-    pockets: Any = ndimage.label(~solid)[0]
+    pockets, _ = cast("tuple[np.ndarray, int]", ndimage.label(~solid))
     rim = np.concatenate([pockets[0], pockets[-1], pockets[:, 0], pockets[:, -1]])
     return ~np.isin(pockets, np.union1d(rim, pockets[indoors & ~solid])) | solid
 

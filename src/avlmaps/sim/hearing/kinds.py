@@ -26,9 +26,11 @@ class SoundKind:
     indoors: bool = True
 
 
-_WET = ("bathroom", "kitchen", "laundry", "laundry room")
+_WET = ("bathroom", "kitchen", "kitchenette", "laundry room")
+_DESKS = ("office", "open-plan office", "copy room")
 _CHILD = ("children's room", "bedroom")
 _SCREEN = ("tv", "loudspeaker", "computer", "laptop")
+_CALLS = ("hallway", "reception")
 _OUTSIDE = ("window",)
 
 KINDS: tuple[SoundKind, ...] = (
@@ -36,7 +38,7 @@ KINDS: tuple[SoundKind, ...] = (
     SoundKind(("water drops", "dripping water"), ("sink", "bathtub", "shower"), _WET, 0.9, -6.0),
     SoundKind(("pouring water",), ("sink", "kitchen counter", "dining table"), ("kitchen",), 1.0, -3.0),
     SoundKind(("brushing teeth",), ("sink",), ("bathroom",), 1.3, -4.0),
-    SoundKind(("toilet flush",), ("toilet",), ("bathroom",), 0.7),
+    SoundKind(("toilet flush",), ("toilet",), ("bathroom", "toilet"), 0.7),
     SoundKind(("hair dryer",), ("mirror", "sink"), ("bathroom",), 1.3, 2.0),
     SoundKind(("microwave beep", "microwave"), ("microwave",), ("kitchen",), 1.2),
     SoundKind(("kettle boiling", "kettle", "kettle whistle"), ("kettle", "stove"), ("kitchen",), 1.0),
@@ -45,7 +47,7 @@ KINDS: tuple[SoundKind, ...] = (
     SoundKind(("dishes clattering", "dishes"), ("dishwasher", "kitchen counter", "dining table"), ("kitchen",), 1.0),
     SoundKind(("can opening",), ("refrigerator", "kitchen counter", "dining table"), ("kitchen",), 1.0, -2.0),
     SoundKind(("drinking or sipping", "drinking sipping"), ("dining table", "coffee table"), ("kitchen",), 1.1, -6.0),
-    SoundKind(("washing machine",), ("washing machine",), ("laundry", "laundry room", "bathroom"), 0.5),
+    SoundKind(("washing machine",), ("washing machine",), ("laundry room", "bathroom"), 0.5),
     SoundKind(("vacuum cleaner",), ("vacuum cleaner",), ANYWHERE, 0.3, 4.0),
     SoundKind(("fan or air conditioner", "fan", "air conditioner"), ("fan", "air conditioner"), (), 1.5, -4.0),
     SoundKind(("crackling fire",), ("fireplace",), (), 0.5, -2.0),
@@ -57,9 +59,9 @@ KINDS: tuple[SoundKind, ...] = (
     SoundKind(("clock tick", "ticking clock"), ("clock",), (), 1.6, -8.0),
     SoundKind(("alarm clock", "clock alarm"), ("clock", "nightstand", "bed"), ("bedroom",), 0.6, 2.0),
     SoundKind(("smoke alarm",), (), ("hallway", "kitchen"), 2.3, 4.0),
-    SoundKind(("phone ringing", "telephone", "telephone ring"), ("telephone", "desk", "side table"), ("hallway",), 0.9),
-    SoundKind(("keyboard typing", "typing"), ("keyboard", "computer", "laptop", "desk"), ("office",), 0.8, -5.0),
-    SoundKind(("mouse click", "mouse clicking"), ("computer", "laptop", "desk"), ("office",), 0.8, -8.0),
+    SoundKind(("phone ringing", "telephone", "telephone ring"), ("telephone", "desk", "side table"), _CALLS, 0.9),
+    SoundKind(("keyboard typing", "typing"), ("keyboard", "computer", "laptop", "desk"), _DESKS, 0.8, -5.0),
+    SoundKind(("mouse click", "mouse clicking"), ("computer", "laptop", "desk"), _DESKS, 0.8, -8.0),
     SoundKind(("television or music", "television", "music"), _SCREEN, ("living room",), 1.0),
     SoundKind(("piano",), ("piano",), (), 1.0, 2.0),
     SoundKind(("guitar",), ("guitar",), ("living room",), 0.8),

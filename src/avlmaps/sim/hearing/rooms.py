@@ -29,7 +29,7 @@ _AIR_PER_M = np.array([0.0001, 0.0003, 0.0006, 0.001, 0.002, 0.007, 0.025])  # e
 # What a light inner wall holds back, dB.
 WALL_DB = np.array([20.0, 29.0, 36.0, 41.0, 43.0, 44.0, 46.0])
 
-_WET = frozenset({"bathroom", "kitchen", "laundry", "laundry room", "toilet", "garage"})
+_WET = frozenset({"bathroom", "toilet", "kitchen", "kitchenette", "laundry room", "garage"})
 _SOFT_THINGS = frozenset({
     "sofa", "armchair", "bed", "bunk bed", "crib", "curtain", "cushion", "ottoman", "pet bed", "play tent", "towel",
     "laundry basket", "office chair", "mat",
