@@ -1,9 +1,9 @@
-"""Washing machines, fans, vacuum cleaners and ironing boards."""
+"""Washing machines, vacuum cleaners and ironing boards."""
 
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
-from avlmaps.sim.furniture.electronics import face_up
+from avlmaps.sim.furniture.computers import face_up
 from avlmaps.sim.furniture.fittings import (
     chrome,
     dial,
@@ -15,10 +15,10 @@ from avlmaps.sim.furniture.fittings import (
     spindle,
     steel,
 )  # fmt: skip
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, strut
+from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
-from avlmaps.sim.shapes import box, circle, cylinder, ellipsoid, lathe, loft, rounded_box, slab, tube
+from avlmaps.sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, slab, tube
 
 
 def _porthole(rng: np.random.Generator, x: float, y: float, z: float, radius: float, look: Material) -> list[Mesh]:
@@ -26,10 +26,12 @@ def _porthole(rng: np.random.Generator, x: float, y: float, z: float, radius: fl
     ring = look if chance(rng, 0.4) else material(pick(rng, ("metal", "black", "white")), rng)
     glass, inner = material("black", rng), radius * draw(rng, 0.6, 0.8)
     out = draw(rng, 0.015, 0.05)
-    parts = [spindle([(radius, x), (radius, x + 0.4 * out), (radius * 0.92, x + out), (inner, x + 0.7 * out)], ring, y, z, 22, capped=False),
-             spindle([(inner, x + 0.7 * out), (inner * 0.6, x + 1.1 * out)], glass, y, z, 22)]  # fmt: skip
+    parts = [spindle([(radius, x), (radius, x + 0.4 * out), (radius * 0.92, x + out), (inner, x + 0.7 * out)], ring, y,
+                     z, 22, capped=False), spindle([(inner, x + 0.7 * out), (inner * 0.6, x + 1.1 * out)], glass, y, z,
+                                                   22)]  # fmt: skip
     side = pick(rng, (-1, 1))
-    parts.append(box((x + 0.5 * out, y + side * radius * 0.9 - 0.012, z - 0.04), (x + out + 0.012, y + side * radius * 0.9 + 0.012, z + 0.04), ring))
+    parts.append(box((x + 0.5 * out, y + side * radius * 0.9 - 0.012, z - 0.04),
+                     (x + out + 0.012, y + side * radius * 0.9 + 0.012, z + 0.04), ring))  # fmt: skip
     return parts
 
 
@@ -44,7 +46,8 @@ def _panel(rng: np.random.Generator, x: float, half: float, low: float, high: fl
     if chance(rng, 0.7):
         y = side * half * 0.6
         parts.append(face(x + 0.0135, (y - 0.05, mid - 0.02), (y + 0.05, mid + 0.02), dark))
-    parts += [face(x + 0.0135, (side * half * (0.5 + 0.1 * i) - 0.008, low + 0.015), (side * half * (0.5 + 0.1 * i) + 0.008, low + 0.025), metal) for i in range(4)]
+    parts += [face(x + 0.0135, (side * half * (0.5 + 0.1 * i) - 0.008, low + 0.015),
+                   (side * half * (0.5 + 0.1 * i) + 0.008, low + 0.025), metal) for i in range(4)]  # fmt: skip
     return parts
 
 
@@ -54,8 +57,10 @@ def _front_loader(rng: np.random.Generator, wide: float, deep: float, high: floa
     parts = [rounded_box((0.0, -half, 0.015), (deep, half, high - 0.03), draw(rng, 0.004, 0.03), look, 2),
              rounded_box((0.0, -half, high - 0.03), (deep + 0.01, half, high), 0.008, look, 2),
              *_panel(rng, deep, half, high - 0.035 - strip, high - 0.035, look if chance(rng, 0.65) else enamel(rng)),
-             *_porthole(rng, deep, draw(rng, -0.02, 0.02), plinth + (high - strip - plinth) * 0.5, draw(rng, 0.15, 0.225), look),
-             *feet((0.0, -half), (deep, half), 0.015, material("black", rng)), face(deep + 0.001, (-half + 0.002, plinth), (half - 0.002, plinth + 0.005), material("black", rng))]  # fmt: skip
+             *_porthole(rng, deep, draw(rng, -0.02, 0.02), plinth + (high - strip - plinth) * 0.5,
+                        draw(rng, 0.15, 0.225), look), *feet((0.0, -half), (deep, half), 0.015, material("black", rng)),
+             face(deep + 0.001, (-half + 0.002, plinth), (half - 0.002, plinth + 0.005),
+                  material("black", rng))]  # fmt: skip
     if chance(rng, 0.5):
         parts.append(spindle([(0.03, deep), (0.028, deep + 0.004)], look, half * 0.7, plinth * 0.55 + 0.015, 10))
     return parts
@@ -64,7 +69,8 @@ def _front_loader(rng: np.random.Generator, wide: float, deep: float, high: floa
 @family("washing machine", "front loader")
 def _front(rng: np.random.Generator) -> Piece:
     wide, deep, high, look = draw(rng, 0.58, 0.7), draw(rng, 0.42, 0.68), draw(rng, 0.82, 0.98), enamel(rng)
-    return finished(_front_loader(rng, wide, deep, high, look), supports=[Support((0.0, -wide / 2), (deep, wide / 2), high)])
+    return finished(_front_loader(rng, wide, deep, high, look),
+                    supports=[Support((0.0, -wide / 2), (deep, wide / 2), high)])  # fmt: skip
 
 
 @family("washing machine", "tower with dryer")
@@ -83,7 +89,9 @@ def _pair(rng: np.random.Generator) -> Piece:
         y = side * (wide / 2 + 0.008)
         parts.append(joined(_front_loader(rng, wide, deep, high, look)).moved(y=y, z=lift))
         if lift:
-            parts += [slab(deep / 2, y, 0.0, deep, wide, lift, look), box((deep, y - wide / 2 + 0.02, 0.03), (deep + 0.012, y + wide / 2 - 0.02, lift - 0.02), look)]
+            parts += [slab(deep / 2, y, 0.0, deep, wide, lift, look),
+                      box((deep, y - wide / 2 + 0.02, 0.03), (deep + 0.012, y + wide / 2 - 0.02, lift - 0.02),
+                          look)]  # fmt: skip
     top = high + lift
     return finished(parts, supports=[Support((0.0, -wide), (deep, wide), top)])
 
@@ -92,16 +100,20 @@ def _pair(rng: np.random.Generator) -> Piece:
 def _top_loader(rng: np.random.Generator) -> Piece:
     wide, deep, high, look = draw(rng, 0.4, 0.7), draw(rng, 0.55, 0.68), draw(rng, 0.85, 1.0), enamel(rng)
     half, rise, open_lid = wide / 2, draw(rng, 0.08, 0.2), chance(rng, 0.2)
-    parts = [rounded_box((0.0, -half, 0.02), (deep, half, high), draw(rng, 0.006, 0.04), look, 2), *feet((0.0, -half), (deep, half), 0.02, material("black", rng))]
+    parts = [rounded_box((0.0, -half, 0.02), (deep, half, high), draw(rng, 0.006, 0.04), look, 2),
+             *feet((0.0, -half), (deep, half), 0.02, material("black", rng))]  # fmt: skip
     side = np.array([(0.0, high - 0.01), (0.14, high - 0.01), (draw(rng, 0.05, 0.1), high + rise), (0.0, high + rise)])
-    parts.append(loft([np.column_stack([side[:, 0], np.full(4, y), side[:, 1]]) for y in (-half, half)], look if chance(rng, 0.5) else enamel(rng)))
+    parts.append(loft([np.column_stack([side[:, 0], np.full(4, y), side[:, 1]]) for y in (-half, half)],
+                      look if chance(rng, 0.5) else enamel(rng)))  # fmt: skip
     metal = chrome(rng)
     n = count(rng, 1, 4)
     parts += [dial(0.11, float(y), high + 0.45 * rise, 0.025, metal) for y in np.linspace(-0.3, 0.3, n) * wide]
     lid_look = material(pick(rng, ("black", "white", "glass")), rng) if chance(rng, 0.5) else look
     lid = rounded_box((0.0, -half + 0.03, 0.0), (deep - 0.19, half - 0.03, 0.015), 0.005, lid_look, 2)
     if open_lid:
-        parts += [lid.tilted("y", -1.7).moved(x=0.16, z=high), face_up((0.2, -half + 0.08), (deep - 0.06, half - 0.08), high + 0.002, material("black", rng))]
+        parts += [lid.tilted("y", -1.7).moved(x=0.16, z=high),
+                  face_up((0.2, -half + 0.08), (deep - 0.06, half - 0.08), high + 0.002,
+                          material("black", rng))]  # fmt: skip
     else:
         parts.append(lid.moved(x=0.16, z=high))
     return finished(parts)
@@ -112,111 +124,13 @@ def _twin_tub(rng: np.random.Generator) -> Piece:
     wide, deep, high = draw(rng, 0.68, 0.85), draw(rng, 0.4, 0.5), draw(rng, 0.8, 0.95)
     look, half = material(pick(rng, ("white", "white", "plastic")), rng), wide / 2
     lids = material(pick(rng, ("plastic", "glass", "white")), rng)
-    parts = [rounded_box((0.0, -half, 0.06), (deep, half, high), 0.03, look), *feet((0.0, -half), (deep, half), 0.06, material("black", rng)),
-             rounded_box((0.12, -half + 0.02, high), (deep - 0.02, half * 0.15, high + 0.02), 0.008, lids, 2), cylinder(deep * 0.6, half * 0.58, high, 0.14, 0.025, lids, 18),
-             box((0.0, -half, high), (0.1, half, high + 0.1), material(pick(rng, ("black", "plastic", "white")), rng)), *[dial(0.1, y * wide, high + 0.05, 0.025, chrome(rng)) for y in (-0.3, 0.0, 0.3)],
+    parts = [rounded_box((0.0, -half, 0.06), (deep, half, high), 0.03, look),
+             *feet((0.0, -half), (deep, half), 0.06, material("black", rng)),
+             rounded_box((0.12, -half + 0.02, high), (deep - 0.02, half * 0.15, high + 0.02), 0.008, lids, 2),
+             cylinder(deep * 0.6, half * 0.58, high, 0.14, 0.025, lids, 18),
+             box((0.0, -half, high), (0.1, half, high + 0.1), material(pick(rng, ("black", "plastic", "white")), rng)),
+             *[dial(0.1, y * wide, high + 0.05, 0.025, chrome(rng)) for y in (-0.3, 0.0, 0.3)],
              face(deep + 0.001, (-half + 0.05, 0.1), (half - 0.05, 0.5 * high), lids)]  # fmt: skip
-    return finished(parts)
-
-
-def _rotor(rng: np.random.Generator, radius: float, x: float, z: float, look: Material) -> list[Mesh]:
-    n, twist = count(rng, 3, 6), 0.03
-    parts = [spindle([(radius * 0.2, x - 0.02), (radius * 0.18, x + 0.03)], look, 0.0, z, 10)]
-    for i in range(n):
-        a = 2 * np.pi * i / n + 0.3
-        points = np.array([[(x + twist * s, radius * r * np.cos(a + s * w), z + radius * r * np.sin(a + s * w)) for s, w in ((-1, 0.18), (1, 0.35 + 0.2 * r))] for r in (0.15, 0.5, 0.88)])
-        parts.append(cloth(points, look))
-    return parts
-
-
-def _cage(radius: float, x: float, z: float, depth: float, wires: int, look: Material) -> list[Mesh]:
-    """Return a fan's wire cage: rings at front and back joined by bent wires."""
-    parts: list[Mesh] = []
-    for r, at in ((radius, x), (radius * 0.6, x + depth * 0.8), (radius * 0.6, x - depth * 0.8)):
-        ring = [(at, float(p[0]), float(p[1]) + z) for p in circle(r, 20)]
-        parts.append(tube(ring, 0.005 if r == radius else 0.0025, look, 4, closed=True))
-    for i in range(wires):
-        a = 2 * np.pi * i / wires
-        y, h = float(np.cos(a)), float(np.sin(a))
-        for s in (-1, 1):
-            line = [(x, radius * y, z + radius * h), (x + s * depth * 0.7, radius * 0.8 * y, z + radius * 0.8 * h), (x + s * depth, radius * 0.15 * y, z + radius * 0.15 * h)]
-            parts.append(tube(line, 0.0022, look, 3))
-    parts.append(spindle([(radius * 0.17, x + depth - 0.004), (radius * 0.12, x + depth + 0.008)], look, 0.0, z, 12))
-    return parts
-
-
-def _fan_head(rng: np.random.Generator, radius: float, look: Material, metal: Material) -> Mesh:
-    """Return a fan's head about the origin: cage, rotor and the motor behind."""
-    rotor = material(pick(rng, ("plastic", "white", "black", "metal")), rng)
-    depth = radius * draw(rng, 0.25, 0.4)
-    return joined([*_cage(radius, 0.0, 0.0, depth, count(rng, 14, 22), metal), *_rotor(rng, radius, 0.0, 0.0, rotor),
-                   spindle([(radius * 0.15, -depth - 0.13), (radius * 0.3, -depth - 0.1), (radius * 0.3, -depth)], look, 0.0, 0.0, 12)])  # fmt: skip
-
-
-def _fan_looks(rng: np.random.Generator) -> tuple[Material, Material]:
-    look = material(pick(rng, ("white", "white", "black", "plastic", "metal")), rng)
-    return look, look if chance(rng, 0.5) else chrome(rng)
-
-
-@family("fan", "standing")
-def _standing_fan(rng: np.random.Generator) -> Piece:
-    (look, metal), radius, z = _fan_looks(rng), draw(rng, 0.18, 0.26), draw(rng, 0.9, 1.35)
-    parts = [_fan_head(rng, radius, look, metal).tilted("y", draw(rng, -0.3, 0.15)).moved(x=0.12, z=z), tube([(0.0, 0.0, 0.0), (0.0, 0.0, z)], 0.014, metal, 8), cylinder(0.0, 0.0, 0.0, 0.024, z * 0.55, look, 8)]
-    if chance(rng, 0.6):
-        parts.append(lathe([(draw(rng, 0.17, 0.24), 0.0), (0.17, 0.02), (0.05, 0.04), (0.03, 0.08)], look, sides=20))
-    else:
-        parts += [strut((-0.25 * c, -0.25 * s, 0.015), (0.25 * c, 0.25 * s, 0.015), 0.04, 0.025, look) for c, s in ((0.71, 0.71), (0.71, -0.71))]
-    parts.append(box((-0.03, -0.035, z * 0.55), (0.035, 0.035, z * 0.55 + 0.1), look))
-    return finished(parts)
-
-
-@family("fan", "desk")
-def _desk_fan(rng: np.random.Generator) -> Piece:
-    (look, metal), radius = _fan_looks(rng), draw(rng, 0.09, 0.2)
-    z = radius + draw(rng, 0.05, 0.2)
-    parts = [_fan_head(rng, radius, look, metal).tilted("y", -draw(rng, 0.0, 0.3)).moved(x=0.06, z=z + 0.02), cylinder(0.0, 0.0, 0.0, 0.018, z, look, 8),
-             lathe([(radius * 0.75, 0.0), (radius * 0.7, 0.02), (0.03, 0.04)], look, sides=18)]  # fmt: skip
-    return finished(parts)
-
-
-@family("fan", "tower")
-def _tower_fan(rng: np.random.Generator) -> Piece:
-    radius, high, look = draw(rng, 0.07, 0.13), draw(rng, 0.75, 1.15), material(pick(rng, ("black", "black", "white", "metal")), rng)
-    power, taper = pick(rng, (2.0, 4.0, 6.0)), draw(rng, 0.7, 1.0)
-    flat = outline(2 * radius, 2 * radius, power, 18)
-    parts = [cylinder(0.0, 0.0, 0.0, radius * draw(rng, 1.15, 1.6), 0.025, look, 22), shell([(flat * taper, 0.02), (flat, 0.2), (flat, high - 0.05), (flat * 0.9, high)], look)]
-    dark = material(pick(rng, ("black", "metal", "white")), rng)
-    n = count(rng, 10, 22)
-    parts += [box((radius * 0.7, -radius * 0.6, float(z)), (radius * 1.03, radius * 0.6, float(z) + 0.008), dark) for z in np.linspace(0.22, high - 0.16, n)]
-    return finished(parts)
-
-
-@family("fan", "box", held_out=True)
-def _box_fan(rng: np.random.Generator) -> Piece:
-    size, deep = draw(rng, 0.35, 0.56), draw(rng, 0.1, 0.16)
-    look, metal = material(pick(rng, ("white", "black", "plastic")), rng), material(pick(rng, ("metal", "white", "black")), rng)
-    z = size / 2 + 0.03
-    parts = [box((0.0, s * size / 2 - 0.01, 0.03), (deep, s * size / 2 + 0.01, size + 0.03), look) for s in (-1, 1)]
-    parts += [box((0.0, -size / 2, h), (deep, size / 2, h + 0.02), look) for h in (0.02, size + 0.02)] + feet((0.0, -size / 2), (deep, size / 2), 0.03, look, 0.05, 0.025)
-    parts += _rotor(rng, size * 0.46, deep / 2, z, material(pick(rng, ("plastic", "white", "metal")), rng))
-    for x in (0.004, deep - 0.004):
-        for k in range(1, 6):
-            ring = [(x, float(p[0]), float(p[1]) + z) for p in circle(size * 0.08 * k, 14)]
-            parts.append(tube(ring, 0.003, metal, 3, closed=True))
-        parts += [tube([(x, -size / 2, z), (x, size / 2, z)], 0.003, metal, 3), tube([(x, 0.0, 0.03), (x, 0.0, size + 0.03)], 0.003, metal, 3)]
-    return finished(parts)
-
-
-@family("fan", "without blades")
-def _bladeless(rng: np.random.Generator) -> Piece:
-    wide, high, foot = draw(rng, 0.1, 0.16), draw(rng, 0.16, 0.32), draw(rng, 0.18, 0.4)
-    look, base = material(pick(rng, ("white", "metal", "black")), rng), material(pick(rng, ("white", "metal", "black", "painted")), rng)
-    z = foot + high
-    def ring(x: float, s: float) -> np.ndarray:
-        flat = circle(1.0, 24)
-        return np.column_stack([np.full(24, x), flat[:, 0] * wide * s, z + flat[:, 1] * (high - wide * (1 - s))])
-    hoop = loft([ring(-0.05, 1.0), ring(0.06, 1.06), ring(0.06, 0.86), ring(-0.05, 0.8), ring(-0.05, 1.0)], look, capped=False)
-    parts = [hoop, lathe([(0.085, 0.0), (0.085, foot * 0.3), (0.06, foot * 0.35), (0.06, foot)], base, sides=18)]
     return finished(parts)
 
 
@@ -239,41 +153,58 @@ def _canister(rng: np.random.Generator) -> Piece:
     long, wide, high = draw(rng, 0.36, 0.48), draw(rng, 0.24, 0.3), draw(rng, 0.2, 0.3)
     flat = outline(long, wide, 3.0, 20, 0.1)
     parts = [shell([(flat * 0.9, 0.03), (flat, 0.09), (flat * 0.95, high * 0.7), (flat * 0.6, high)], look)]
-    parts += [spindle([(0.07, -0.02), (0.06, 0.02)], dark, 0.0, 0.0, 14).turned(np.pi / 2).moved(x=-long * 0.28, y=s * wide * 0.48, z=0.07) for s in (-1, 1)]
-    parts.append(tube([(-0.1, 0.0, high * 0.92), (-0.08, 0.0, high + 0.03), (0.08, 0.0, high + 0.03), (0.1, 0.0, high * 0.92)], 0.012, dark, 6))
+    parts += [spindle([(0.07, -0.02), (0.06, 0.02)], dark, 0.0, 0.0,
+                      14).turned(np.pi / 2).moved(x=-long * 0.28, y=s * wide * 0.48, z=0.07)
+              for s in (-1, 1)]  # fmt: skip
+    parts.append(tube([(-0.1, 0.0, high * 0.92), (-0.08, 0.0, high + 0.03), (0.08, 0.0, high + 0.03),
+                       (0.1, 0.0, high * 0.92)], 0.012, dark, 6))  # fmt: skip
     top, away = draw(rng, 0.75, 1.0), draw(rng, 0.15, 0.3)
-    parts += [_nozzle(long * 0.9, away, draw(rng, 0.25, 0.32), dark), tube([(long * 0.85, away, 0.04), (long * 0.25, away * 0.8, top)], 0.017, chrome(rng), 7),
-              _hose([(long * 0.45, 0.0, high * 0.5), (long * 0.75, -0.05, high * 0.9), (long * 0.7, 0.0, top * 0.8), (long * 0.4, away * 0.5, top + 0.08), (long * 0.25, away * 0.8, top)], dark)]  # fmt: skip
+    parts += [_nozzle(long * 0.9, away, draw(rng, 0.25, 0.32), dark),
+              tube([(long * 0.85, away, 0.04), (long * 0.25, away * 0.8, top)], 0.017, chrome(rng), 7),
+              _hose([(long * 0.45, 0.0, high * 0.5), (long * 0.75, -0.05, high * 0.9), (long * 0.7, 0.0, top * 0.8),
+                     (long * 0.4, away * 0.5, top + 0.08), (long * 0.25, away * 0.8, top)], dark)]  # fmt: skip
     return finished(parts)
 
 
 @family("vacuum cleaner", "upright")
 def _upright(rng: np.random.Generator) -> Piece:
-    look, dark, lean = material(pick(rng, ("plastic", "plastic", "painted", "metal")), rng), material("black", rng), draw(rng, 0.1, 0.45)
+    look, dark, lean = material(pick(rng, ("plastic", "plastic", "painted", "metal")),
+                                rng), material("black", rng), draw(rng, 0.1, 0.45)  # fmt: skip
     wide, high = draw(rng, 0.28, 0.36), draw(rng, 1.0, 1.15)
     flat = outline(0.15, 0.17, 2.4, 16)
     mid = draw(rng, 0.55, 0.7)
-    trunk = joined([shell([(flat * 0.7, 0.08), (flat, 0.2), (flat, mid), (flat * 0.5, mid + 0.1)], look), cylinder(0.035, 0.0, 0.25, 0.06, mid - 0.32, material(pick(rng, ("glass", "plastic", "fabric")), rng), 14),
-                    tube([(0.0, 0.0, mid), (0.0, 0.0, high - 0.1), (-0.05, 0.0, high), (-0.1, 0.0, high - 0.05)], 0.014, dark, 6)])  # fmt: skip
-    parts = [rounded_box((0.0, -wide / 2, 0.0), (draw(rng, 0.24, 0.32), wide / 2, draw(rng, 0.07, 0.11)), 0.03, look), trunk.tilted("y", -lean).moved(x=0.08, z=0.02)]
+    trunk = joined([shell([(flat * 0.7, 0.08), (flat, 0.2), (flat, mid), (flat * 0.5, mid + 0.1)], look),
+                    cylinder(0.035, 0.0, 0.25, 0.06, mid - 0.32,
+                             material(pick(rng, ("glass", "plastic", "fabric")), rng), 14),
+                    tube([(0.0, 0.0, mid), (0.0, 0.0, high - 0.1), (-0.05, 0.0, high), (-0.1, 0.0, high - 0.05)], 0.014,
+                         dark, 6)])  # fmt: skip
+    parts = [rounded_box((0.0, -wide / 2, 0.0), (draw(rng, 0.24, 0.32), wide / 2, draw(rng, 0.07, 0.11)), 0.03, look),
+             trunk.tilted("y", -lean).moved(x=0.08, z=0.02)]  # fmt: skip
     return finished(parts)
 
 
 @family("vacuum cleaner", "stick")
 def _stick(rng: np.random.Generator) -> Piece:
-    look, dark, lean, high = material(pick(rng, ("plastic", "metal")), rng), material("black", rng), draw(rng, 0.02, 0.3), draw(rng, 1.0, 1.2)
+    look, dark, lean, high = material(pick(rng, ("plastic", "metal")),
+                                      rng), material("black",
+                                                     rng), draw(rng, 0.02, 0.3), draw(rng, 1.0, 1.2)  # fmt: skip
     bin_z = high - 0.25 if chance(rng, 0.6) else 0.3
-    pole = joined([tube([(0.0, 0.0, 0.03), (0.0, 0.0, high - 0.1)], 0.018, look, 8), cylinder(0.03, 0.0, bin_z, 0.055, 0.2, material(pick(rng, ("glass", "plastic")), rng), 14),
-                   tube([(-0.01, 0.0, high - 0.12), (-0.1, 0.0, high - 0.1), (-0.11, 0.0, high - 0.22), (-0.01, 0.0, high - 0.27)], 0.016, dark, 6), cylinder(0.0, 0.0, high - 0.12, 0.035, 0.08, look, 12)])  # fmt: skip
+    pole = joined([tube([(0.0, 0.0, 0.03), (0.0, 0.0, high - 0.1)], 0.018, look, 8),
+                   cylinder(0.03, 0.0, bin_z, 0.055, 0.2, material(pick(rng, ("glass", "plastic")), rng), 14),
+                   tube([(-0.01, 0.0, high - 0.12), (-0.1, 0.0, high - 0.1), (-0.11, 0.0, high - 0.22),
+                         (-0.01, 0.0, high - 0.27)], 0.016, dark, 6),
+                   cylinder(0.0, 0.0, high - 0.12, 0.035, 0.08, look, 12)])  # fmt: skip
     return finished([pole.tilted("y", -lean).moved(z=0.01), _nozzle(0.02, 0.0, draw(rng, 0.22, 0.28), dark)])
 
 
 @family("vacuum cleaner", "robot", held_out=True)
 def _robot(rng: np.random.Generator) -> Piece:
-    radius, high, look = draw(rng, 0.15, 0.18), draw(rng, 0.07, 0.1), material(pick(rng, ("black", "white", "metal")), rng)
+    radius, high, look = draw(rng, 0.15, 0.18), draw(rng, 0.07, 0.1), material(pick(rng, ("black", "white", "metal")),
+                                                                               rng)  # fmt: skip
     square = pick(rng, (2.0, 2.0, 3.0))
     flat = outline(2 * radius, 2 * radius, square, 28)
-    parts = [shell([(flat * 0.97, 0.012), (flat, 0.025), (flat, high - 0.015), (flat * 0.95, high)], look), cylinder(0.0, 0.0, 0.0, radius * 0.5, 0.014, material("black", rng), 12)]
+    parts = [shell([(flat * 0.97, 0.012), (flat, 0.025), (flat, high - 0.015), (flat * 0.95, high)], look),
+             cylinder(0.0, 0.0, 0.0, radius * 0.5, 0.014, material("black", rng), 12)]  # fmt: skip
     if chance(rng, 0.6):
         parts.append(cylinder(-radius * 0.3, 0.0, high, 0.045, 0.022, material("black", rng), 16))
     parts.append(cylinder(radius * 0.4, 0.0, high, 0.025, 0.004, chrome(rng), 10))
@@ -285,11 +216,18 @@ def _robot(rng: np.random.Generator) -> Piece:
 @family("vacuum cleaner", "workshop drum")
 def _drum(rng: np.random.Generator) -> Piece:
     radius, high, dark = draw(rng, 0.15, 0.2), draw(rng, 0.3, 0.45), material("black", rng)
-    look, lid = steel(rng) if chance(rng, 0.5) else material("plastic", rng), material(pick(rng, ("black", "plastic", "plastic")), rng)
-    parts = [cylinder(0.0, 0.0, 0.06, radius, high, look, 20), lathe([(radius * 1.05, high + 0.06), (radius * 1.02, high + 0.13), (radius * 0.5, high + 0.2)], lid, sides=20)]
-    parts += [ellipsoid((radius * 1.02 * a, radius * 1.02 * b, 0.03), (0.03, 0.03, 0.03), dark, 8, 4) for a, b in ((0.7, 0.7), (0.7, -0.7), (-0.7, 0.7), (-0.7, -0.7))]
-    parts += [_hose([(radius, 0.0, high * 0.75), (radius + 0.15, 0.05, high * 0.7), (radius + 0.2, 0.1, 0.3), (radius + 0.1, 0.25, 0.05), (radius + 0.25, 0.35, 0.03)], dark, 0.021),
-              tube([(0.0, -0.08, high + 0.18), (0.0, -0.08, high + 0.24), (0.0, 0.08, high + 0.24), (0.0, 0.08, high + 0.18)], 0.012, lid, 6)]  # fmt: skip
+    look, lid = steel(rng) if chance(rng, 0.5) else material("plastic",
+                                                             rng), material(pick(rng, ("black", "plastic", "plastic")),
+                                                                            rng)  # fmt: skip
+    parts = [cylinder(0.0, 0.0, 0.06, radius, high, look, 20),
+             lathe([(radius * 1.05, high + 0.06), (radius * 1.02, high + 0.13), (radius * 0.5, high + 0.2)], lid,
+                   sides=20)]  # fmt: skip
+    parts += [ellipsoid((radius * 1.02 * a, radius * 1.02 * b, 0.03), (0.03, 0.03, 0.03), dark, 8, 4) for a,
+              b in ((0.7, 0.7), (0.7, -0.7), (-0.7, 0.7), (-0.7, -0.7))]  # fmt: skip
+    parts += [_hose([(radius, 0.0, high * 0.75), (radius + 0.15, 0.05, high * 0.7), (radius + 0.2, 0.1, 0.3),
+                     (radius + 0.1, 0.25, 0.05), (radius + 0.25, 0.35, 0.03)], dark, 0.021),
+              tube([(0.0, -0.08, high + 0.18), (0.0, -0.08, high + 0.24), (0.0, 0.08, high + 0.24),
+                    (0.0, 0.08, high + 0.18)], 0.012, lid, 6)]  # fmt: skip
     return finished(parts)
 
 
@@ -299,8 +237,10 @@ def _board(rng: np.random.Generator, long: float, wide: float) -> Mesh:
     half = np.array([0.42, 0.5, 0.5, 0.48, 0.38, 0.24, 0.12, 0.03]) * wide
     flat = np.concatenate([np.column_stack([half, y * long]), np.column_stack([-half, y * long])[::-1]])
     cover = material("fabric", rng)
-    rings = [np.column_stack([flat * s, np.full(len(flat), z)]) for s, z in ((0.97, -0.02), (1.0, -0.012), (1.0, 0.0), (0.98, 0.008))]
-    return joined([loft(rings, cover, capped=False), *(_strip(np.column_stack([flat * s, np.full(16, z)]), cover) for s, z in ((0.97, -0.02), (0.98, 0.008)))])
+    rings = [np.column_stack([flat * s, np.full(len(flat), z)]) for s,
+             z in ((0.97, -0.02), (1.0, -0.012), (1.0, 0.0), (0.98, 0.008))]  # fmt: skip
+    return joined([loft(rings, cover, capped=False), *(_strip(np.column_stack([flat * s, np.full(16, z)]), cover) for s,
+                                                       z in ((0.97, -0.02), (0.98, 0.008)))])  # fmt: skip
 
 
 def _strip(ring: np.ndarray, look: Material) -> Mesh:
@@ -312,18 +252,25 @@ def _strip(ring: np.ndarray, look: Material) -> Mesh:
 def _iron(rng: np.random.Generator) -> Mesh:
     look, metal = material("plastic", rng), steel(rng)
     sole = outline(0.24, 0.12, 2.0, 16, 0.5)
-    return joined([shell([(sole, 0.0), (sole, 0.012)], metal), shell([(sole * 0.95, 0.012), (sole * 0.75, 0.06)], look), tube([(-0.09, 0.0, 0.04), (-0.09, 0.0, 0.12), (0.05, 0.0, 0.12), (0.06, 0.0, 0.05)], 0.016, look, 6)])
+    return joined([shell([(sole, 0.0), (sole, 0.012)], metal), shell([(sole * 0.95, 0.012), (sole * 0.75, 0.06)], look),
+                   tube([(-0.09, 0.0, 0.04), (-0.09, 0.0, 0.12), (0.05, 0.0, 0.12), (0.06, 0.0, 0.05)], 0.016, look,
+                        6)])  # fmt: skip
 
 
 @family("ironing board", "open")
 def _ironing_open(rng: np.random.Generator) -> Piece:
-    long, wide, z, metal = draw(rng, 1.05, 1.45), draw(rng, 0.3, 0.45), draw(rng, 0.72, 0.98), material(pick(rng, ("metal", "white", "black")), rng)
+    long, wide, z, metal = draw(rng, 1.05,
+                                1.45), draw(rng, 0.3,
+                                            0.45), draw(rng, 0.72,
+                                                        0.98), material(pick(rng, ("metal", "white", "black")),
+                                                                        rng)  # fmt: skip
     reach, foot = long * draw(rng, 0.28, 0.36), wide * draw(rng, 0.4, 0.6)
     parts = [_board(rng, long, wide).moved(z=z)]
     for k in (-1, 1):
         ends = (reach * k, -reach * k * 0.9)
         if chance(rng, 0.5):
-            parts += [tube([(s * foot * 0.8, ends[0], 0.01), (s * foot * 0.4, ends[1], z - 0.03)], 0.011, metal, 6) for s in (-1, 1)]
+            parts += [tube([(s * foot * 0.8, ends[0], 0.01), (s * foot * 0.4, ends[1], z - 0.03)], 0.011, metal, 6)
+                      for s in (-1, 1)]  # fmt: skip
         else:
             parts.append(tube([(0.0, ends[0], 0.01), (0.0, ends[1], z - 0.03)], 0.013, metal, 6))
         parts.append(tube([(-foot, ends[0], 0.012), (foot, ends[0], 0.012)], 0.012, metal, 6))
@@ -336,9 +283,13 @@ def _ironing_open(rng: np.random.Generator) -> Piece:
 
 @family("ironing board", "folded against the wall")
 def _ironing_folded(rng: np.random.Generator) -> Piece:
-    long, wide, metal = draw(rng, 1.1, 1.45), draw(rng, 0.3, 0.42), material(pick(rng, ("metal", "white", "black")), rng)
-    flat = joined([_board(rng, long, wide), *[tube([(s * wide * 0.25, -long * 0.4, -0.03), (s * wide * 0.15, long * 0.3, -0.03)], 0.011, metal, 6) for s in (-1, 1)],
-                   tube([(-wide * 0.35, -long * 0.42, -0.035), (wide * 0.35, -long * 0.42, -0.035)], 0.012, metal, 6)])  # fmt: skip
+    long, wide, metal = draw(rng, 1.1, 1.45), draw(rng, 0.3, 0.42), material(pick(rng, ("metal", "white", "black")),
+                                                                             rng)  # fmt: skip
+    flat = joined([_board(rng, long, wide),
+                   *[tube([(s * wide * 0.25, -long * 0.4, -0.03), (s * wide * 0.15, long * 0.3, -0.03)], 0.011, metal,
+                          6) for s in (-1, 1)],
+                   tube([(-wide * 0.35, -long * 0.42, -0.035), (wide * 0.35, -long * 0.42, -0.035)], 0.012, metal,
+                        6)])  # fmt: skip
     upright = flat.turned(np.pi / 2).tilted("y", np.pi / 2 if chance(rng, 0.5) else -np.pi / 2)
     lean = draw(rng, 0.08, 0.2)
     return finished([upright.tilted("y", -lean)])
@@ -350,6 +301,6 @@ def _ironing_table(rng: np.random.Generator) -> Piece:
     parts = [_board(rng, long, wide).moved(z=z)]
     for k in (-1, 1):
         y = k * long * 0.3
-        parts.append(tube([(-wide * 0.3, y, z - 0.02), (-wide * 0.35, y, 0.008), (wide * 0.35, y, 0.008), (wide * 0.3, y, z - 0.02)], 0.008, metal, 5))
+        parts.append(tube([(-wide * 0.3, y, z - 0.02), (-wide * 0.35, y, 0.008), (wide * 0.35, y, 0.008),
+                           (wide * 0.3, y, z - 0.02)], 0.008, metal, 5))  # fmt: skip
     return finished(parts)
-

@@ -1,5 +1,7 @@
 """Refrigerators."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
@@ -59,7 +61,7 @@ def _stacked(rng: np.random.Generator, parts_of_height: tuple[float, ...]) -> Pi
     edge = pick(rng, (-1.0, 1.0)) * (wide / 2 - draw(rng, 0.035, 0.06))
     z = draw(rng, 0.05, 0.1)
     cuts = z + np.concatenate([[0.0], np.cumsum(parts_of_height)]) * (high - z)
-    for i, (a, b) in enumerate(zip(cuts[:-1], cuts[1:], strict=True)):
+    for i, (a, b) in enumerate(pairwise(cuts)):
         low, top = float(a) + gap / 2, float(b) - gap / 2
         parts.append(_leaf(rng, deep, (-wide / 2, low), (wide / 2, top), look, thick, soft))
         long = min(draw(rng, 0.2, 0.5), 0.6 * (top - low))
@@ -134,8 +136,8 @@ def _french_door(rng: np.random.Generator) -> Piece:
             long = wide * draw(rng, 0.6, 0.85)
             parts.append(bar_handle((deep + thick, -long / 2, top - 0.06), long, False, metal, 0.045, 0.01))
     if chance(rng, 0.3):
-        parts.append(box((deep + thick - 0.002, -wide * 0.36, cut + 0.35), (deep + thick + 0.004, -wide * 0.16, cut + 0.75),
-                         material("black", rng)))  # fmt: skip
+        parts.append(box((deep + thick - 0.002, -wide * 0.36, cut + 0.35),
+                         (deep + thick + 0.004, -wide * 0.16, cut + 0.75), material("black", rng)))  # fmt: skip
     return finished(parts, supports=[Support((0.0, -wide / 2), (deep, wide / 2), high, 0.4)])
 
 
@@ -179,8 +181,9 @@ def _retro(rng: np.random.Generator) -> Piece:
         last = b == high
         parts.append(_bulged(0.14, wide, (a, b), deep + 0.02, look, 0.06 if last else 0.015))
         mid = a + (b - a) * (0.55 if len(spans) == 1 or not last else 0.25)
-        parts += [rounded_box((deep + 0.08, wide / 2 - 0.09, mid - 0.1), (deep + 0.125, wide / 2 - 0.055, mid + 0.1), 0.015, metal),
-                  face(deep + 0.092, (-0.08, b - 0.16), (0.08, b - 0.13), metal)]  # fmt: skip
+        parts += [rounded_box((deep + 0.08, wide / 2 - 0.09, mid - 0.1), (deep + 0.125, wide / 2 - 0.055, mid + 0.1),
+                              0.015, metal), face(deep + 0.092, (-0.08, b - 0.16), (0.08, b - 0.13),
+                                                  metal)]  # fmt: skip
     parts += [
         cylinder(x, y, 0.0, 0.02, 0.06, metal, 8)
         for x in (0.08, deep - 0.06)
@@ -197,13 +200,13 @@ def _integrated(rng: np.random.Generator) -> Piece:
     high, cut, plinth = draw(rng, 1.75, 2.2), draw(rng, 0.6, 0.95), draw(rng, 0.08, 0.15)
     half = wide / 2
     hinge = pick(rng, ("left", "right"))
-    parts = [box((0.0, -half, plinth), (deep, half, high), style.look), slab(deep / 2 - 0.02, 0.0, 0.0, deep - 0.06, wide,
-             plinth, material("metal", rng))]  # fmt: skip
+    parts = [box((0.0, -half, plinth), (deep, half, high), style.look),
+             slab(deep / 2 - 0.02, 0.0, 0.0, deep - 0.06, wide, plinth, material("metal", rng))]  # fmt: skip
     parts += front(style, deep, (-half, plinth), (half, cut), hinge, "top")
     parts += front(style, deep, (-half, cut), (half, high - 0.05), hinge, "bottom")
     grille = material("metal", rng)
-    parts += [box((deep, -half + 0.05, high - 0.045 + 0.012 * i), (deep + 0.01, half - 0.05, high - 0.04 + 0.012 * i), grille)
-              for i in range(3)]  # fmt: skip
+    parts += [box((deep, -half + 0.05, high - 0.045 + 0.012 * i), (deep + 0.01, half - 0.05, high - 0.04 + 0.012 * i),
+                  grille) for i in range(3)]  # fmt: skip
     return finished(parts, supports=[Support((0.0, -half), (deep, half), high, 0.3)])
 
 
@@ -223,7 +226,8 @@ def _glass_door(rng: np.random.Generator) -> Piece:
     x = (deep, deep + 0.04)
     dark = material(pick(rng, ("black", "metal", "white")), rng)
     for low, top in (((-wide / 2, 0.06), (wide / 2, 0.06 + frame)), ((-wide / 2, high - 2 * frame), (wide / 2, high)),
-                     ((-wide / 2, 0.06), (-wide / 2 + frame, high)), ((wide / 2 - frame, 0.06), (wide / 2, high))):  # fmt: skip
+                     ((-wide / 2, 0.06), (-wide / 2 + frame, high)),
+                     ((wide / 2 - frame, 0.06), (wide / 2, high))):  # fmt: skip
         parts.append(box((x[0], *low), (x[1], *top), dark))
     parts.append(box((deep + 0.015, -wide / 2 + frame, 0.06 + frame), (deep + 0.02, wide / 2 - frame, high - 2 * frame),
                      material("glass", rng)))  # fmt: skip

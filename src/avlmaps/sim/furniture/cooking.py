@@ -1,7 +1,4 @@
-"""Stoves, microwaves, dishwashers and range hoods.
-
-Families named "wall ..." hang; those named "counter ..." stand on a worktop, which is their z = 0.
-"""
+"""Stoves. Families named "counter ..." stand on a worktop, which is their z = 0."""
 
 import numpy as np
 
@@ -19,13 +16,12 @@ from avlmaps.sim.furniture.fittings import (
     front_style,
     knob,
     shell,
-    spindle,
     steel,
 )  # fmt: skip
 from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
 from avlmaps.sim.materials import material
-from avlmaps.sim.mesh import Material, Mesh, joined
-from avlmaps.sim.shapes import box, circle, cylinder, loft, rounded_box, rounded_rectangle, slab, tube
+from avlmaps.sim.mesh import Material, Mesh
+from avlmaps.sim.shapes import box, circle, cylinder, rounded_box, slab, tube
 
 
 def _window(x: float, low: Pair, high: Pair, look: Material, dark: Material, edge: float) -> list[Mesh]:
@@ -42,20 +38,25 @@ def _oven(rng: np.random.Generator, x: float, low: Pair, high: Pair, look: Mater
     parts = _window(x, low, high, dark if full else look, dark, draw(rng, 0.03, 0.09))
     long = (high[0] - low[0]) * draw(rng, 0.6, 0.9)
     middle = (low[0] + high[0]) / 2
-    parts.append(bar_handle((x + 0.03, middle - long / 2, high[1] - draw(rng, 0.03, 0.06)), long, False, metal, 0.045, draw(rng, 0.007, 0.013)))
+    parts.append(bar_handle((x + 0.03, middle - long / 2, high[1] - draw(rng, 0.03, 0.06)), long, False, metal, 0.045,
+                            draw(rng, 0.007, 0.013)))  # fmt: skip
     return parts
 
 
 def _grate(x: float, y: float, z: float, size: float, look: Material) -> list[Mesh]:
     """Return a gas burner: cap, ring and an iron cross over it."""
-    bars = [box((x - size, y - 0.006, z + 0.022), (x + size, y + 0.006, z + 0.034), look), box((x - 0.006, y - size, z + 0.022), (x + 0.006, y + size, z + 0.034), look)]
-    ends = [slab(x + a * size, y + b * size, z, 0.012, 0.012, 0.03, look) for a, b in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-    return [cylinder(x, y, z, 0.45 * size, 0.012, look, 12), cylinder(x, y, z + 0.012, 0.3 * size, 0.008, look, 10), *bars, *ends]
+    bars = [box((x - size, y - 0.006, z + 0.022), (x + size, y + 0.006, z + 0.034), look),
+            box((x - 0.006, y - size, z + 0.022), (x + 0.006, y + size, z + 0.034), look)]  # fmt: skip
+    ends = [slab(x + a * size, y + b * size, z, 0.012, 0.012, 0.03, look) for a,
+            b in ((1, 0), (-1, 0), (0, 1), (0, -1))]  # fmt: skip
+    return [cylinder(x, y, z, 0.45 * size, 0.012, look, 12), cylinder(x, y, z + 0.012, 0.3 * size, 0.008, look, 10),
+            *bars, *ends]  # fmt: skip
 
 
 def _coil(x: float, y: float, z: float, size: float, look: Material, metal: Material) -> list[Mesh]:
     """Return an electric coil in its pan."""
-    rings = [tube([(*(circle(size * s, 14)[k] + (x, y)).tolist(), z + 0.012) for k in range(14)], 0.006, look, 4, closed=True) for s in (0.9, 0.5)]
+    rings = [tube([(*(circle(size * s, 14)[k] + (x, y)).tolist(), z + 0.012) for k in range(14)], 0.006, look, 4,
+                  closed=True) for s in (0.9, 0.5)]  # fmt: skip
     return [cylinder(x, y, z, size * 1.08, 0.006, metal, 14), *rings]
 
 
@@ -66,16 +67,20 @@ def _hob(rng: np.random.Generator, low: Pair, high: Pair, z: float, kind: str) -
     columns = 3 if wide > 0.72 else 2 if wide > 0.4 else 1
     places = [(low[0] + deep * fx, low[1] + wide * (i + 0.5) / columns) for i in range(columns) for fx in (0.29, 0.72)]
     if columns == 3:
-        places = [p for k, p in enumerate(places) if k not in (2, 3)] + [((low[0] + high[0]) / 2, (low[1] + high[1]) / 2)]
+        places = [p for k, p in enumerate(places) if k not in (2, 3)] + [((low[0] + high[0]) / 2,
+                                                                          (low[1] + high[1]) / 2)]  # fmt: skip
     if kind == "glass":
         ring = material(pick(rng, ("metal", "white")), rng, (g := draw(rng, 0.3, 0.6), g, g))
         parts = [box((low[0] + 0.01, low[1] + 0.01, z), (high[0] - 0.01, high[1] - 0.01, z + 0.006), dark)]
         for x, y in places:
             r = draw(rng, 0.07, 0.115)
-            flat = circle(r, 18) + (x, y)
-            parts.append(shell([(flat, z + 0.0068), (circle(r - 0.006, 18) + (x, y), z + 0.0069)], ring, capped=False))
+            flat = circle(r, 18) + np.array((x, y))
+            parts.append(
+                shell([(flat, z + 0.0068), (circle(r - 0.006, 18) + np.array((x, y)), z + 0.0069)], ring, capped=False)
+            )
         return parts
-    parts = [box((low[0] + 0.015, low[1] + 0.015, z), (high[0] - 0.015, high[1] - 0.015, z + 0.004), metal if chance(rng, 0.5) else dark)]
+    parts = [box((low[0] + 0.015, low[1] + 0.015, z), (high[0] - 0.015, high[1] - 0.015, z + 0.004),
+                 metal if chance(rng, 0.5) else dark)]  # fmt: skip
     for x, y in places:
         size = draw(rng, 0.075, 0.115)
         if kind == "gas":
@@ -83,7 +88,8 @@ def _hob(rng: np.random.Generator, low: Pair, high: Pair, z: float, kind: str) -
         elif kind == "coil":
             parts += _coil(x, y, z + 0.004, size * 0.9, dark, metal)
         else:
-            parts += [cylinder(x, y, z + 0.004, size, 0.014, dark, 14), cylinder(x, y, z + 0.018, size * 0.35, 0.002, metal, 8)]
+            parts += [cylinder(x, y, z + 0.004, size, 0.014, dark, 14),
+                      cylinder(x, y, z + 0.018, size * 0.35, 0.002, metal, 8)]  # fmt: skip
     return parts
 
 
@@ -106,13 +112,15 @@ def _range(rng: np.random.Generator, wide: float, kind: str, back: float, drawer
     dark = material("black", rng)
     knobs = material(pick(rng, ("black", "metal", "white")), rng)
     lift = draw(rng, 0.02, 0.08)
-    parts = [box((0.0, -half, lift), (deep, half, z - 0.03), look), rounded_box((-0.003, -half - 0.003, z - 0.03), (deep + 0.03, half + 0.003, z), 0.006, look, 2),
+    parts = [box((0.0, -half, lift), (deep, half, z - 0.03), look),
+             rounded_box((-0.003, -half - 0.003, z - 0.03), (deep + 0.03, half + 0.003, z), 0.006, look, 2),
              box((0.03, -half + 0.02, 0.0), (deep - 0.04, half - 0.02, lift), dark)]  # fmt: skip
     parts += _hob(rng, (0.03, -half + 0.01), (deep + 0.01, half - 0.01), z, kind)
     strip = 0.0
     if back < 0.1 or chance(rng, 0.4):
         strip = draw(rng, 0.08, 0.13)
-        parts += [box((deep, -half, z - 0.03 - strip), (deep + 0.025, half, z - 0.03), look if chance(rng, 0.5) else steel(rng)),
+        parts += [box((deep, -half, z - 0.03 - strip), (deep + 0.025, half, z - 0.03),
+                      look if chance(rng, 0.5) else steel(rng)),
                   *_dials(rng, deep + 0.025, (-half, z - 0.03 - strip), (half, z - 0.03), knobs)]  # fmt: skip
     low = lift + (draw(rng, 0.12, 0.2) if drawer and chance(rng, 0.7) else 0.01)
     if low > lift + 0.05:
@@ -123,7 +131,9 @@ def _range(rng: np.random.Generator, wide: float, kind: str, back: float, drawer
         if not strip:
             parts += _dials(rng, 0.08, (-half, z + 0.3 * back), (half, z + 0.95 * back), knobs)
             parts.append(box((0.0, -half, z + 0.25 * back), (0.08, half, z + back), look))
-    return finished(parts, supports=[Support((0.08, -half + 0.02), (deep, half - 0.02), z + (0.007 if kind == "glass" else 0.02), 0.4)])
+    return finished(parts,
+                    supports=[Support((0.08, -half + 0.02), (deep, half - 0.02),
+                                      z + (0.007 if kind == "glass" else 0.02), 0.4)])  # fmt: skip
 
 
 @family("stove", "gas range")
@@ -147,7 +157,8 @@ def _range_cooker(rng: np.random.Generator) -> Piece:
     wide, deep, z = draw(rng, 0.88, 1.25), draw(rng, 0.58, 0.68), draw(rng, 0.88, 0.94)
     look = material("painted", rng) if chance(rng, 0.6) else enamel(rng)
     half, strip, lift, metal = wide / 2, draw(rng, 0.09, 0.14), draw(rng, 0.06, 0.14), chrome(rng)
-    parts = [box((0.0, -half, lift), (deep, half, z - 0.02), look), rounded_box((0.0, -half, z - 0.03), (deep + 0.035, half, z), 0.008, steel(rng), 2),
+    parts = [box((0.0, -half, lift), (deep, half, z - 0.02), look),
+             rounded_box((0.0, -half, z - 0.03), (deep + 0.035, half, z), 0.008, steel(rng), 2),
              *_hob(rng, (0.03, -half + 0.02), (deep, half - 0.02), z, pick(rng, ("gas", "gas", "glass"))),
              *_dials(rng, deep + 0.004, (-half, z - 0.03 - strip), (half, z - 0.03), metal)]  # fmt: skip
     split = draw(rng, -0.1, 0.12) * wide
@@ -156,7 +167,9 @@ def _range_cooker(rng: np.random.Generator) -> Piece:
     mid = base + (top - base) * draw(rng, 0.35, 0.6)
     for low, high in ((base, mid - 0.008), (mid, top)) if chance(rng, 0.6) else ((base, top),):
         parts += _oven(rng, deep, (split + 0.005, low), (half - 0.01, high), look)
-    parts.append(tube([(deep + 0.03, -half + 0.02, z - 0.05), (deep + 0.07, -half + 0.02, z - 0.05), (deep + 0.07, half - 0.02, z - 0.05), (deep + 0.03, half - 0.02, z - 0.05)], 0.009, metal, 6))
+    parts.append(tube([(deep + 0.03, -half + 0.02, z - 0.05), (deep + 0.07, -half + 0.02, z - 0.05),
+                       (deep + 0.07, half - 0.02, z - 0.05), (deep + 0.03, half - 0.02, z - 0.05)], 0.009, metal,
+                      6))  # fmt: skip
     parts += feet((0.02, -half), (deep, half), lift, material("black", rng), 0.05)
     if chance(rng, 0.5):
         parts.append(box((0.0, -half, z), (0.02, half, z + draw(rng, 0.04, 0.3)), steel(rng)))
@@ -168,11 +181,13 @@ def _tall_oven(rng: np.random.Generator) -> Piece:
     style, wide, deep = front_style(rng), draw(rng, 0.58, 0.68), draw(rng, 0.56, 0.62)
     high, low, plinth = draw(rng, 1.4, 2.25), draw(rng, 0.5, 0.85), 0.1
     look, half = enamel(rng), wide / 2
-    parts = [box((0.0, -half, plinth), (deep, half, high), style.look), slab(deep / 2 - 0.02, 0.0, 0.0, deep - 0.06, wide, plinth, material("black", rng))]
+    parts = [box((0.0, -half, plinth), (deep, half, high), style.look),
+             slab(deep / 2 - 0.02, 0.0, 0.0, deep - 0.06, wide, plinth, material("black", rng))]  # fmt: skip
     parts += front(style, deep, (-half, plinth), (half, low), "drawer")
     z = low
-    for tall in ((0.6,) if high - low < 1.15 or chance(rng, 0.5) else (0.6, 0.45)):
-        parts += [box((deep, -half + 0.01, z + tall - 0.1), (deep + 0.025, half - 0.01, z + tall - 0.008), look), *_dials(rng, deep + 0.025, (-half + 0.1, z + tall - 0.1), (half - 0.1, z + tall), chrome(rng)),
+    for tall in (0.6,) if high - low < 1.15 or chance(rng, 0.5) else (0.6, 0.45):
+        parts += [box((deep, -half + 0.01, z + tall - 0.1), (deep + 0.025, half - 0.01, z + tall - 0.008), look),
+                  *_dials(rng, deep + 0.025, (-half + 0.1, z + tall - 0.1), (half - 0.1, z + tall), chrome(rng)),
                   *_oven(rng, deep, (-half + 0.01, z + 0.006), (half - 0.01, z + tall - 0.106), look)]  # fmt: skip
         z += tall
     if high - z > 0.15:
@@ -184,23 +199,31 @@ def _tall_oven(rng: np.random.Generator) -> Piece:
 def _wood_cooker(rng: np.random.Generator) -> Piece:
     """Return a solid-fuel kitchen stove: enamel body, small doors, lids over the hotplates, a rail, a pipe."""
     wide, deep, z = draw(rng, 0.6, 1.05), draw(rng, 0.5, 0.65), draw(rng, 0.8, 0.92)
-    look = material("painted", rng, pick(rng, ((0.93, 0.9, 0.82), (0.15, 0.15, 0.15), (0.2, 0.3, 0.25), (0.5, 0.12, 0.1), (0.25, 0.3, 0.45))))
+    look = material("painted", rng,
+                    pick(rng, ((0.93, 0.9, 0.82), (0.15, 0.15, 0.15), (0.2, 0.3, 0.25), (0.5, 0.12, 0.1),
+                               (0.25, 0.3, 0.45))))  # fmt: skip
     dark, metal, half = material("black", rng), chrome(rng), wide / 2
-    parts = [rounded_box((0.0, -half, 0.08), (deep, half, z - 0.04), 0.02, look, 2), rounded_box((-0.01, -half - 0.01, z - 0.04), (deep + 0.02, half + 0.01, z), 0.015, dark, 2), slab(deep / 2, 0.0, 0.0, deep - 0.08, wide - 0.08, 0.08, dark)]
+    parts = [rounded_box((0.0, -half, 0.08), (deep, half, z - 0.04), 0.02, look, 2),
+             rounded_box((-0.01, -half - 0.01, z - 0.04), (deep + 0.02, half + 0.01, z), 0.015, dark, 2),
+             slab(deep / 2, 0.0, 0.0, deep - 0.08, wide - 0.08, 0.08, dark)]  # fmt: skip
     columns = 3 if wide > 0.85 else 2
     step = wide / columns
     for i in range(columns):
         a = -half + i * step
         cut = draw(rng, 0.35, 0.55) * z
         for low, high in ((0.12, cut), (cut + 0.02, z - 0.08)):
-            parts += [rounded_box((deep, a + 0.025, low), (deep + 0.025, a + step - 0.025, high), 0.01, look, 2), knob(deep + 0.025, a + step - 0.055, (low + high) / 2, 0.013, metal)]
+            parts += [rounded_box((deep, a + 0.025, low), (deep + 0.025, a + step - 0.025, high), 0.01, look, 2),
+                      knob(deep + 0.025, a + step - 0.055, (low + high) / 2, 0.013, metal)]  # fmt: skip
     for k in (-1, 1):
         y = k * wide * 0.23
         if chance(rng, 0.5):
-            parts.append(shell([(circle(0.16, 16) + (deep / 2, y), z), (circle(0.16, 16) + (deep / 2, y), z + 0.03), (circle(0.11, 16) + (deep / 2, y), z + 0.06)], metal))
+            parts.append(shell([(circle(0.16, 16) + np.array((deep / 2, y)), z),
+                                (circle(0.16, 16) + np.array((deep / 2, y)), z + 0.03),
+                                (circle(0.11, 16) + np.array((deep / 2, y)), z + 0.06)], metal))  # fmt: skip
         else:
             parts.append(cylinder(deep / 2, y, z, 0.13, 0.012, dark, 16))
-    parts.append(tube([(deep + 0.02, -half, z - 0.06), (deep + 0.07, -half, z - 0.06), (deep + 0.07, half, z - 0.06), (deep + 0.02, half, z - 0.06)], 0.01, metal, 6))
+    parts.append(tube([(deep + 0.02, -half, z - 0.06), (deep + 0.07, -half, z - 0.06), (deep + 0.07, half, z - 0.06),
+                       (deep + 0.02, half, z - 0.06)], 0.01, metal, 6))  # fmt: skip
     if chance(rng, 0.5):
         parts.append(cylinder(0.1, half * pick(rng, (-0.6, 0.6)), z, 0.065, draw(rng, 0.6, 1.2), dark, 12))
     return finished(parts, supports=[Support((0.1, -half), (deep, half), z + 0.01, 0.4)])
@@ -211,10 +234,12 @@ def _counter_hob(rng: np.random.Generator) -> Piece:
     wide, deep = draw(rng, 0.3, 0.9), draw(rng, 0.48, 0.54)
     kind = pick(rng, ("gas", "glass", "glass", "plates"))
     look = material("black", rng) if kind == "glass" else steel(rng)
-    parts = [rounded_box((0.0, -wide / 2, 0.0), (deep, wide / 2, 0.012), 0.004, look, 2), *_hob(rng, (0.0, -wide / 2), (deep - 0.06, wide / 2), 0.012, kind)]
+    parts = [rounded_box((0.0, -wide / 2, 0.0), (deep, wide / 2, 0.012), 0.004, look, 2),
+             *_hob(rng, (0.0, -wide / 2), (deep - 0.06, wide / 2), 0.012, kind)]  # fmt: skip
     if kind != "glass":
         n = count(rng, 2, 5)
-        parts += [cylinder(deep - 0.04, float(y), 0.012, 0.016, 0.022, material("black", rng), 9) for y in np.linspace(-0.3, 0.3, n) * wide]
+        parts += [cylinder(deep - 0.04, float(y), 0.012, 0.016, 0.022, material("black", rng), 9)
+                  for y in np.linspace(-0.3, 0.3, n) * wide]  # fmt: skip
     return finished(parts)
 
 
@@ -222,210 +247,10 @@ def _counter_hob(rng: np.random.Generator) -> Piece:
 def _camping(rng: np.random.Generator) -> Piece:
     wide, deep, high = draw(rng, 0.5, 0.72), draw(rng, 0.3, 0.42), draw(rng, 0.08, 0.13)
     look = enamel(rng)
-    parts = [body(rng, (0.0, -wide / 2, 0.015), (deep, wide / 2, high), look), *_hob(rng, (0.02, -wide / 2 + 0.02), (deep - 0.02, wide / 2 - 0.02), high, pick(rng, ("gas", "coil"))),
-             *[dial(deep, y * wide, high * 0.55, 0.02, material("black", rng)) for y in (-0.25, 0.25)], *feet((0.0, -wide / 2), (deep, wide / 2), 0.015, look)]  # fmt: skip
+    parts = [body(rng, (0.0, -wide / 2, 0.015), (deep, wide / 2, high), look),
+             *_hob(rng, (0.02, -wide / 2 + 0.02), (deep - 0.02, wide / 2 - 0.02), high, pick(rng, ("gas", "coil"))),
+             *[dial(deep, y * wide, high * 0.55, 0.02, material("black", rng)) for y in (-0.25, 0.25)],
+             *feet((0.0, -wide / 2), (deep, wide / 2), 0.015, look)]  # fmt: skip
     if chance(rng, 0.4):
         parts.append(box((0.0, -wide / 2, high), (0.015, wide / 2, high + 0.28), look))
     return finished(parts)
-
-
-def _keypad(rng: np.random.Generator, x: float, low: Pair, high: Pair) -> list[Mesh]:
-    """Return a display over a field of keys between two corners (y, z)."""
-    dark, pale = material("black", rng), material(pick(rng, ("metal", "white", "plastic")), rng)
-    (a, b), (c, d) = low, high
-    parts = [face(x + 0.001, (a + 0.1 * (c - a), d - 0.2 * (d - b)), (c - 0.1 * (c - a), d - 0.06 * (d - b)), dark)]
-    rows, columns = count(rng, 3, 5), 3
-    for r in range(rows):
-        for k in range(columns):
-            y, z = a + (c - a) * (0.12 + 0.27 * k), b + (d - b) * (0.08 + 0.62 * r / rows)
-            parts.append(face(x + 0.0015, (y, z), (y + 0.22 * (c - a), z + 0.45 * (d - b) / rows), pale))
-    return parts
-
-
-def _oven_box(rng: np.random.Generator, wide: float, deep: float, high: float, look: Material, panel: float) -> list[Mesh]:
-    """Return a table oven: box, dark window, and a control panel of width ``panel`` at its right."""
-    half, dark = wide / 2, material("black", rng)
-    parts = [body(rng, (0.0, -half, 0.012), (deep, half, high), look, draw(rng, 0.004, 0.02)), *feet((0.0, -half), (deep, half), 0.012, dark)]
-    shut = dark if chance(rng, 0.5) else look
-    edge = half - panel
-    parts += [rounded_box((deep - 0.004, -half + 0.004, 0.016), (deep + 0.018, edge, high - 0.004), 0.004, shut, 2),
-              face(deep + 0.0195, (-half + draw(rng, 0.02, 0.05), 0.016 + draw(rng, 0.02, 0.05)), (edge - draw(rng, 0.02, 0.06), high - draw(rng, 0.025, 0.06)), material("black", rng))]  # fmt: skip
-    return parts
-
-
-@family("microwave", "with keypad")
-def _microwave_keys(rng: np.random.Generator) -> Piece:
-    wide, deep, high, look = draw(rng, 0.43, 0.6), draw(rng, 0.3, 0.44), draw(rng, 0.24, 0.34), enamel(rng)
-    panel = wide * draw(rng, 0.18, 0.28)
-    parts = _oven_box(rng, wide, deep, high, look, panel)
-    parts += [box((deep - 0.004, wide / 2 - panel + 0.004, 0.016), (deep + 0.014, wide / 2 - 0.004, high - 0.004), material(pick(rng, ("black", "metal", "white")), rng)),
-              *_keypad(rng, deep + 0.014, (wide / 2 - panel + 0.01, 0.03), (wide / 2 - 0.01, high - 0.02))]  # fmt: skip
-    if chance(rng, 0.55):
-        parts.append(bar_handle((deep + 0.016, wide / 2 - panel - 0.025, 0.18 * high), 0.64 * high, True, chrome(rng), 0.03, 0.007))
-    return finished(parts, supports=[Support((0.0, -wide / 2), (deep, wide / 2), high, 0.3)])
-
-
-@family("microwave", "with dials")
-def _microwave_dials(rng: np.random.Generator) -> Piece:
-    wide, deep, high = draw(rng, 0.42, 0.52), draw(rng, 0.3, 0.38), draw(rng, 0.23, 0.3)
-    look, panel = enamel(rng), draw(rng, 0.09, 0.13)
-    parts = _oven_box(rng, wide, deep, high, look, panel)
-    knobs, y = material(pick(rng, ("black", "metal", "white", "plastic")), rng), wide / 2 - panel / 2
-    parts += [dial(deep, y, high * h, min(0.027, 0.3 * panel), knobs, 0.018) for h in (0.4, 0.72)]
-    parts.append(box((deep, y - 0.035, 0.03), (deep + 0.012, y + 0.035, 0.06), knobs))
-    return finished(parts, supports=[Support((0.0, -wide / 2), (deep, wide / 2), high, 0.3)])
-
-
-@family("microwave", "wall over the range", held_out=True)
-def _microwave_hung(rng: np.random.Generator) -> Piece:
-    wide, deep, high, look = draw(rng, 0.7, 0.78), draw(rng, 0.36, 0.44), draw(rng, 0.38, 0.45), enamel(rng)
-    panel, half = draw(rng, 0.13, 0.18), wide / 2
-    parts = [box((0.0, -half, 0.0), (deep, half, high), look), face(deep + 0.002, (-half + 0.04, 0.06), (half - panel - 0.07, high - 0.1), material("black", rng)),
-             box((deep, half - panel, 0.02), (deep + 0.006, half - 0.01, high - 0.06), material("black", rng)), *_keypad(rng, deep + 0.006, (half - panel + 0.01, 0.04), (half - 0.02, high - 0.08)),
-             bar_handle((deep, half - panel - 0.03, 0.06), high - 0.18, True, chrome(rng), 0.04, 0.009)]  # fmt: skip
-    parts += [box((deep - 0.01, -half + 0.05, high - 0.04 + 0.013 * i), (deep + 0.004, half - 0.05, high - 0.035 + 0.013 * i), material("black", rng)) for i in range(2)]
-    return finished(parts)
-
-
-def _dish_body(rng: np.random.Generator, wide: float, deep: float, high: float, look: Material) -> list[Mesh]:
-    half = wide / 2
-    return [box((0.0, -half, 0.09), (deep, half, high), look), slab(deep / 2 - 0.02, 0.0, 0.0, deep - 0.06, wide - 0.01, 0.09, material("black", rng))]
-
-
-@family("dishwasher", "with control strip")
-def _dish_strip(rng: np.random.Generator) -> Piece:
-    wide, deep, high, look = pick(rng, (draw(rng, 0.44, 0.46), draw(rng, 0.59, 0.61))), draw(rng, 0.54, 0.6), draw(rng, 0.81, 0.88), enamel(rng)
-    strip, half = draw(rng, 0.08, 0.14), wide / 2
-    other = look if chance(rng, 0.5) else material(pick(rng, ("black", "metal")), rng)
-    parts = [*_dish_body(rng, wide, deep - 0.03, high, look), rounded_box((deep - 0.03, -half + 0.002, 0.1), (deep, half - 0.002, high - strip - 0.004), 0.006, look, 2),
-             rounded_box((deep - 0.03, -half + 0.002, high - strip), (deep + 0.004, half - 0.002, high - 0.002), 0.008, other, 2)]  # fmt: skip
-    if chance(rng, 0.5):
-        parts.append(box((deep - 0.01, -0.1, high - strip + 0.02), (deep + 0.006, 0.1, high - 0.03), material("black", rng)))
-    parts += [spindle([(0.008, deep + 0.004), (0.007, deep + 0.009)], chrome(rng), float(y), high - strip / 2, 7) for y in np.linspace(0.15, 0.4, count(rng, 2, 5)) * wide]
-    if chance(rng, 0.4):
-        parts.append(bar_handle((deep, -half * 0.75, high - strip - 0.05), wide * 0.75, False, chrome(rng)))
-    if chance(rng, 0.5):
-        parts.append(rounded_box((0.0, -half, high), (deep + 0.01, half, high + 0.025), 0.006, material(pick(rng, ("white", "wood", "metal")), rng), 2))
-    return finished(parts)
-
-
-@family("dishwasher", "plain steel")
-def _dish_plain(rng: np.random.Generator) -> Piece:
-    wide, deep, high = draw(rng, 0.59, 0.61), draw(rng, 0.54, 0.6), draw(rng, 0.81, 0.88)
-    look, half = enamel(rng), wide / 2
-    parts = [*_dish_body(rng, wide, deep - 0.03, high, look), rounded_box((deep - 0.03, -half + 0.002, 0.1), (deep, half - 0.002, high - 0.002), 0.008, look, 2)]
-    if chance(rng, 0.6):
-        parts.append(bar_handle((deep, -half * 0.8, high - draw(rng, 0.06, 0.12)), wide * 0.8, False, chrome(rng), 0.045, draw(rng, 0.008, 0.014)))
-    else:
-        parts.append(box((deep - 0.001, -0.12, high - 0.1), (deep + 0.002, 0.12, high - 0.06), material("black", rng)))
-    return finished(parts)
-
-
-@family("dishwasher", "open door")
-def _dish_open(rng: np.random.Generator) -> Piece:
-    wide, deep, high, look = draw(rng, 0.45, 0.61), draw(rng, 0.54, 0.6), draw(rng, 0.81, 0.87), enamel(rng)
-    half, inside, swing = wide / 2, steel(rng), draw(rng, 0.5, 1.55)
-    parts = [box((0.0, -half, 0.0), (0.02, half, high), look), *[box((0.0, s * half - (0.03 if s > 0 else 0.0), 0.0), (deep, s * half + (0.03 if s < 0 else 0.0), high), look) for s in (-1, 1)],
-             box((0.0, -half, high - 0.04), (deep, half, high), look), box((0.0, -half, 0.08), (deep, half, 0.13), inside), slab(0.022, 0.0, 0.1, 0.004, wide - 0.06, high - 0.15, inside)]  # fmt: skip
-    door = joined([rounded_box((0.0, -half, 0.0), (0.05, half, high - 0.12), 0.006, look, 2), face(-0.002, (-half + 0.04, 0.04), (half - 0.04, high - 0.17), inside)])
-    parts.append(door.tilted("y", swing).moved(x=deep - 0.05 * float(np.cos(swing)), z=0.1 + 0.05 * float(np.sin(swing))))
-    wire = material(pick(rng, ("metal", "white", "black")), rng)
-    for z in (0.2, 0.5):
-        out = draw(rng, 0.0, 0.3)
-        parts += [tube([(0.05 + out, y, z), (deep - 0.05 + out, y, z)], 0.004, wire, 4) for y in np.linspace(-half + 0.06, half - 0.06, 6)]
-        parts += [tube([(x + out, -half + 0.05, z + h), (x + out, half - 0.05, z + h)], 0.004, wire, 4) for x in (0.06, deep - 0.06) for h in (0.0, 0.1)]
-        parts += [spindle([(0.11, 0.0), (0.07, 0.012)], material("ceramic", rng), draw(rng, -0.1, 0.1), z + 0.12, 12).moved(x=0.12 + 0.07 * k + out) for k in range(count(rng, 0, 4))]
-    return finished(parts)
-
-
-@family("dishwasher", "table top", held_out=True)
-def _dish_small(rng: np.random.Generator) -> Piece:
-    wide, deep, high, look = draw(rng, 0.42, 0.56), draw(rng, 0.4, 0.5), draw(rng, 0.42, 0.48), enamel(rng)
-    half = wide / 2
-    parts = [body(rng, (0.0, -half, 0.015), (deep, half, high), look), box((deep - 0.002, -half + 0.03, 0.08), (deep + 0.012, half - 0.03, high - 0.09), material(pick(rng, ("black", "white", "metal")), rng)),
-             *feet((0.0, -half), (deep, half), 0.015, look), bar_handle((deep, -0.12, high - 0.08), 0.24, False, chrome(rng), 0.025), dial(deep, half * 0.75, high - 0.045, 0.02, chrome(rng))]  # fmt: skip
-    return finished(parts)
-
-
-def _duct(rng: np.random.Generator, size: Pair, z: float, top: float, look: Material, x0: float = 0.0) -> list[Mesh]:
-    (deep, wide) = size
-    cut = z + (top - z) * draw(rng, 0.4, 0.7)
-    return [box((x0, -wide / 2, z), (x0 + deep, wide / 2, cut), look), box((x0, -wide / 2 + 0.006, cut), (x0 + deep - 0.006, wide / 2 - 0.006, top), look)]
-
-
-def _buttons(rng: np.random.Generator, x: float, z: float) -> list[Mesh]:
-    look = material(pick(rng, ("black", "metal")), rng)
-    return [face(x + 0.0015, (-0.07 + 0.035 * i, z - 0.008), (-0.05 + 0.035 * i, z + 0.008), look) for i in range(4)]
-
-
-@family("range hood", "wall chimney")
-def _hood_chimney(rng: np.random.Generator) -> Piece:
-    wide, deep, rim_high = draw(rng, 0.55, 1.0), draw(rng, 0.42, 0.52), draw(rng, 0.03, 0.09)
-    look, slope, top = enamel(rng), draw(rng, 0.06, 0.28), draw(rng, 0.6, 1.1)
-    duct = (draw(rng, 0.22, 0.3), draw(rng, 0.22, 0.34))
-    rings = [np.column_stack([rounded_rectangle(d, w, 0.005, 2) + (d / 2, 0.0), np.full(8, z)])
-             for d, w, z in ((deep, wide, 0.0), (deep, wide, rim_high), (duct[0], duct[1], rim_high + slope))]  # fmt: skip
-    parts = [loft(rings, look), *_duct(rng, duct, rim_high + slope, max(top, rim_high + slope + 0.2), look), *_buttons(rng, deep, rim_high / 2),
-             slab(deep / 2, 0.0, -0.004, deep - 0.08, wide - 0.1, 0.004, material("metal", rng))]  # fmt: skip
-    return finished(parts)
-
-
-@family("range hood", "wall flat T")
-def _hood_flat(rng: np.random.Generator) -> Piece:
-    wide, deep, thick, look = draw(rng, 0.55, 1.0), draw(rng, 0.42, 0.52), draw(rng, 0.03, 0.08), enamel(rng)
-    duct = (draw(rng, 0.22, 0.32), draw(rng, 0.22, 0.4))
-    parts = [box((0.0, -wide / 2, 0.0), (deep, wide / 2, thick), look), *_duct(rng, duct, thick, draw(rng, 0.55, 1.1), look), *_buttons(rng, deep, thick / 2)]
-    return finished(parts)
-
-
-@family("range hood", "wall slanted glass")
-def _hood_slanted(rng: np.random.Generator) -> Piece:
-    wide, high, deep = draw(rng, 0.55, 0.95), draw(rng, 0.35, 0.6), draw(rng, 0.32, 0.45)
-    look, glass = enamel(rng), material(pick(rng, ("black", "black", "white", "glass")), rng)
-    side = np.array([(0.0, 0.0), (0.12, 0.0), (deep, high * 0.7), (deep - 0.1, high), (0.0, high)])
-    parts = [loft([np.column_stack([side[:, 0], np.full(5, y), side[:, 1]]) for y in (-wide * 0.42, wide * 0.42)], look)]
-    pane = np.array([(0.125, 0.0), (deep + 0.015, high * 0.72), (deep, high * 0.74), (0.11, 0.012)])
-    parts.append(loft([np.column_stack([pane[:, 0], np.full(4, y), pane[:, 1]]) for y in (-wide / 2, wide / 2)], glass))
-    if chance(rng, 0.6):
-        parts += _duct(rng, (0.24, 0.26), high, high + draw(rng, 0.2, 0.6), look)
-    return finished(parts)
-
-
-@family("range hood", "wall slim")
-def _hood_slim(rng: np.random.Generator) -> Piece:
-    """Return a hood that fits under a wall cabinet."""
-    wide, deep, high, look = draw(rng, 0.55, 0.95), draw(rng, 0.28, 0.5), draw(rng, 0.1, 0.2), enamel(rng)
-    nose = draw(rng, 0.25, 0.8) * high
-    side = np.array([(0.0, 0.0), (deep, 0.0), (deep, nose), (deep * draw(rng, 0.6, 0.95), high), (0.0, high)])
-    parts = [loft([np.column_stack([side[:, 0], np.full(5, y), side[:, 1]]) for y in (-wide / 2, wide / 2)], look), *_buttons(rng, deep, nose / 2),
-             slab(deep / 2, 0.0, -0.004, deep - 0.06, wide - 0.06, 0.005, material("metal", rng))]  # fmt: skip
-    return finished(parts)
-
-
-@family("range hood", "wall curved glass")
-def _hood_curved(rng: np.random.Generator) -> Piece:
-    wide, deep, look = draw(rng, 0.58, 0.95), draw(rng, 0.44, 0.52), steel(rng)
-    y = np.linspace(-1.0, 1.0, 11)
-    drop = draw(rng, 0.04, 0.14)
-    rings = []
-    for s in y:
-        z = 0.14 - drop * s * s
-        rings.append(np.array([(0.03, s * wide / 2, z), (deep * (1 - 0.12 * s * s), s * wide / 2, z), (deep * (1 - 0.12 * s * s), s * wide / 2, z + 0.007), (0.03, s * wide / 2, z + 0.007)]))
-    duct = (0.25, draw(rng, 0.22, 0.32))
-    parts = [loft(rings, material("glass", rng)), box((0.0, -0.28, 0.07), (deep * 0.8, 0.28, 0.145), look), *_duct(rng, duct, 0.14, draw(rng, 0.6, 1.05), look), *_buttons(rng, deep * 0.8, 0.1)]
-    return finished(parts)
-
-
-@family("range hood", "wall mantle", held_out=True)
-def _hood_mantle(rng: np.random.Generator) -> Piece:
-    """Return a plastered country hood with a wooden beam."""
-    wide, deep, high = draw(rng, 0.8, 1.3), draw(rng, 0.45, 0.6), draw(rng, 0.7, 1.1)
-    look, wood = material(pick(rng, ("white", "painted", "stone")), rng), material("wood", rng)
-    beam, bend = draw(rng, 0.07, 0.14), pick(rng, (1.0, 0.5, 2.0))
-    rings = []
-    for t in np.linspace(0.0, 1.0, 6):
-        s = 1 - (1 - draw(rng, 0.5, 0.51)) * t**bend
-        rings.append(np.column_stack([rounded_rectangle(deep * s, wide * s, 0.01, 2) + (deep * s / 2, 0.0), np.full(8, beam + (high - beam) * t)]))
-    parts = [loft(rings, look), box((0.0, -wide / 2 - 0.02, 0.0), (deep + 0.03, wide / 2 + 0.02, beam), wood)]
-    return finished(parts)
-

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from avlmaps.sim.furniture.joinery import chance, draw, pick, rim
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined
-from avlmaps.sim.shapes import box, circle, cylinder, ellipsoid, loft, rounded_box, sheet, tube
+from avlmaps.sim.shapes import box, circle, cylinder, ellipsoid, loft, polygon, rounded_box, sheet, tube
 
 Pair = tuple[float, float]
 Level = tuple[Float[np.ndarray, "k 2"], float]
@@ -43,12 +43,18 @@ def shell(levels: Sequence[Level], look: Material, capped: bool = True) -> Mesh:
     return loft([np.column_stack([flat, np.full(len(flat), z)]) for flat, z in levels], look, capped)
 
 
+def open_bowl(levels: Sequence[Level], look: Material) -> list[Mesh]:
+    """Return a hollow that is open above: the skin through its levels, from the rim inwards, and its floor."""
+    flat, z = levels[-1]
+    return [shell(levels, look, capped=False), polygon(np.column_stack([flat, np.full(len(flat), z)]), look)]
+
+
 def spindle(
     profile: Sequence[Pair], look: Material, y: float = 0.0, z: float = 0.0, sides: int = 14, capped: bool = True
 ) -> Mesh:
-    """Return what a profile of (radius, x) makes turned round an axis along x through (y, z): dials, drums, rosettes."""
+    """Return what a profile of (radius, x) makes, turned round an axis along x through (y, z): dials, drums."""
     rings = [
-        np.column_stack([np.full(sides, x), circle(max(r, 1e-4), sides) + (y, z)]) for r, x in profile
+        np.column_stack([np.full(sides, x), circle(max(r, 1e-4), sides) + np.array((y, z))]) for r, x in profile
     ]  # fmt: skip
     return loft(rings, look, capped)
 
@@ -87,6 +93,15 @@ def enamel(rng: np.random.Generator) -> Material:
     if kind < 0.84:
         return material("black", rng)
     return material("painted", rng)
+
+
+def china(rng: np.random.Generator) -> Material:
+    """Draw sanitary ware: white mostly, an old pastel or black at times."""
+    if chance(rng, 0.82):
+        return material(pick(rng, ("white", "white", "white", "ceramic")), rng,
+                        (w := draw(rng, 0.86, 0.97), w, w * draw(rng, 0.95, 1.0)))  # fmt: skip
+    old = ((0.72, 0.82, 0.75), (0.85, 0.72, 0.7), (0.9, 0.85, 0.7), (0.6, 0.72, 0.82), (0.12, 0.12, 0.13))
+    return material("white", rng, pick(rng, old))
 
 
 def bar_handle(start: Triple, length: float, upright: bool, look: Material, out: float = 0.035,
@@ -170,12 +185,12 @@ def _grip(style: FrontStyle, x: float, low: Pair, high: Pair, opens: str, grip: 
         return [knob(x, y, z, 0.014, style.metal)]
     if style.handle == "strip":
         return [box((x, y - 0.004, b + 0.02), (x + 0.024, y + 0.004, d - 0.02), style.metal)]
-    long = min(0.18, 0.5 * (d - b)) if d - b < 1.0 else draw_long(d - b)
+    long = min(0.18, 0.5 * (d - b)) if d - b < 1.0 else _long_bar(d - b)
     z = d - inset - long if grip == "top" else b + inset if grip == "bottom" else (b + d - long) / 2
     return [bar_handle((x, y, z), long, True, style.metal)]
 
 
-def draw_long(height: float) -> float:
+def _long_bar(height: float) -> float:
     """Return how long the bar of a tall door is, metres."""
     return min(0.45, 0.3 * height)
 

@@ -1,6 +1,7 @@
 """Kitchen counters, wall cabinets and islands."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -29,7 +30,7 @@ def _drawers(rng: np.random.Generator, style: FrontStyle, x: float, y: tuple[flo
     n = count(rng, 2, 4)
     heights = np.sort(rng.uniform(0.6, 1.6, n))[::-1]
     cuts = z[0] + np.concatenate([[0.0], np.cumsum(heights) / heights.sum()]) * (z[1] - z[0])
-    return [m for a, b in zip(cuts[:-1], cuts[1:], strict=True)
+    return [m for a, b in pairwise(cuts)
             for m in front(style, x, (y[0], float(a)), (y[1], float(b)), "drawer")]  # fmt: skip
 
 
@@ -63,7 +64,7 @@ def run(rng: np.random.Generator, style: FrontStyle, length: float, depth: float
     cuts = _split(rng, length, *unit)
     half = length / 2
     parts = [box((0.0, -half, 0.0), (depth - draw(rng, 0.03, 0.08), half, plinth), plinth_look)]
-    for a, b in zip(cuts[:-1], cuts[1:], strict=True):
+    for a, b in pairwise(cuts):
         parts += _unit(rng, style, depth, (a - half, b - half), (plinth, top_z))
     return parts
 
@@ -170,9 +171,8 @@ def _steel_on_legs(rng: np.random.Generator) -> Piece:
     depth, z, length = draw(rng, 0.5, 0.75), draw(rng, 0.84, 0.95), draw(rng, 0.9, 2.2)
     look, leg = steel(rng), draw(rng, 0.018, 0.028)
     parts = [_top((0.0, -length / 2), (depth, length / 2), z, draw(rng, 0.03, 0.05), look)]
-    for x in (0.05, depth - 0.05):
-        for y in (-length / 2 + 0.05, length / 2 - 0.05):
-            parts.append(cylinder(x, y, 0.0, leg, z - 0.03, look, 8))
+    corners = [(x, y) for x in (0.05, depth - 0.05) for y in (-length / 2 + 0.05, length / 2 - 0.05)]
+    parts += [cylinder(x, y, 0.0, leg, z - 0.03, look, 8) for x, y in corners]
     levels = [draw(rng, 0.12, 0.3)] + ([draw(rng, 0.45, 0.6)] if chance(rng, 0.4) else [])
     parts += [slab(depth / 2, 0.0, h, depth - 0.06, length - 0.06, 0.025, look) for h in levels]
     if chance(rng, 0.5):
@@ -195,7 +195,8 @@ def _breakfast_bar(rng: np.random.Generator) -> Piece:
         _top((-wall - shelf + 0.05, -length / 2), (0.05, length / 2), z + rise, 0.035, stone),
     ]
     return finished(parts, supports=[Support((0.05, -length / 2), (depth, length / 2), z, 0.5),
-                                     Support((-wall - shelf + 0.05, -length / 2), (0.05, length / 2), z + rise)])  # fmt: skip
+                                     Support((-wall - shelf + 0.05, -length / 2), (0.05, length / 2),
+                                             z + rise)])  # fmt: skip
 
 
 @family("kitchen counter", "waterfall worktop")
@@ -204,7 +205,8 @@ def _waterfall(rng: np.random.Generator) -> Piece:
     length, thick = draw(rng, 1.2, 3.2), draw(rng, 0.03, 0.09)
     parts = run(rng, style, length - 2 * thick, depth, z - thick - 0.025, draw(rng, 0.05, 0.12), material("black", rng))
     parts += [box((0.0, s * (length / 2) - (thick if s > 0 else 0.0), 0.0),
-                  (depth + 0.02, s * (length / 2) + (thick if s < 0 else 0.0), z - thick), stone) for s in (-1, 1)]  # fmt: skip
+                  (depth + 0.02, s * (length / 2) + (thick if s < 0 else 0.0), z - thick), stone)
+              for s in (-1, 1)]  # fmt: skip
     parts.append(box((0.0, -length / 2, z - thick), (depth + 0.02, length / 2, z), stone))
     return finished(parts, supports=[Support((0.02, -length / 2), (depth, length / 2), z, 0.5)])
 
@@ -214,7 +216,7 @@ def _hung(rng: np.random.Generator, style: FrontStyle, length: float, depth: flo
     cuts = _split(rng, length, 0.35, 0.65)
     parts: list[Mesh] = []
     glass = material("glass", rng)
-    for a, b in zip(cuts[:-1], cuts[1:], strict=True):
+    for a, b in pairwise(cuts):
         y = (a - length / 2, b - length / 2)
         if style.profile == "glass":
             parts += cabinet_box((0.0, y[0], 0.0), (depth, y[1], high), style.look, count(rng, 1, 3))
@@ -232,7 +234,8 @@ def _wall_row(rng: np.random.Generator) -> Piece:
     parts = _hung(rng, style, length, depth, high)
     if chance(rng, 0.3):  # a cornice, stepped outwards
         parts += [box((0.0, -length / 2 - 0.02 * i, high + 0.03 * i - 0.03),
-                      (depth + 0.03 + 0.02 * i, length / 2 + 0.02 * i, high + 0.03 * i), style.look) for i in (1, 2)]  # fmt: skip
+                      (depth + 0.03 + 0.02 * i, length / 2 + 0.02 * i, high + 0.03 * i), style.look)
+                  for i in (1, 2)]  # fmt: skip
     return finished(parts)
 
 
@@ -305,7 +308,7 @@ def _tall_larder(rng: np.random.Generator) -> Piece:
 
 @family("kitchen island", "block")
 def _block_island(rng: np.random.Generator) -> Piece:
-    style, (depth, z, thick) = front_style(rng), _measures(rng)
+    style, (_, z, thick) = front_style(rng), _measures(rng)
     length, deep, over = draw(rng, 1.0, 2.6), draw(rng, 0.6, 1.1), draw(rng, 0.02, 0.06)
     plinth, dark = _plinth(rng, style)
     parts = run(rng, style, length, deep, z - thick, plinth, dark)
