@@ -9,6 +9,10 @@ from jaxtyping import Float, Float32, Int, Int32, UInt8
 Triple = tuple[float, float, float]
 
 
+_OTHER_AXES = np.array([[1, 2], [0, 2], [0, 1]])
+_CORNER = np.arange(3)[None, :, None]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Material:
     """What a surface looks like.
@@ -124,7 +128,8 @@ class Mesh:
 
     def standing(self) -> "Mesh":
         """Return it with the middle of its box at x = y = 0 and its lowest point at z = 0."""
-        x, y, z = ((self.low + self.high) / 2)[:2].tolist() + [float(self.low[2])]
+        x, y = ((self.low + self.high) / 2)[:2].tolist()
+        z = float(self.low[2])
         return self.moved(-x, -y, -z)
 
 
@@ -159,8 +164,14 @@ def triangles_of(
     vertex = np.asarray(vertex, np.float32)
     triangle = np.asarray(triangle, np.int32)
     if uv is None:
-        corners = vertex[triangle].astype(np.float64)
-        normal = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-        axes = np.array([[1, 2], [0, 2], [0, 1]])[normal.argmax(axis=1)]
-        uv = np.take_along_axis(corners, axes[:, None, :].repeat(3, axis=1), axis=2)
+        uv = uv_from_sides(vertex[triangle])
     return Mesh(vertex, triangle, np.asarray(uv, np.float32), np.zeros(len(triangle), np.int32), (material,))
+
+
+def uv_from_sides(corners: Float[np.ndarray, "t 3 3"]) -> Float[np.ndarray, "t 3 2"]:
+    """Return the uv of a picture in metres that is laid on each triangle from the side that it faces most."""
+    corners = np.asarray(corners, np.float64)
+    (a, b, c), (d, e, f) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    faced = np.abs(np.stack([b * f - c * e, c * d - a * f, a * e - b * d])).argmax(axis=0)  # written out: it is hot
+    rows = np.arange(len(corners))[:, None, None]
+    return corners[rows, _CORNER, _OTHER_AXES[faced][:, None, :]]

@@ -1,11 +1,12 @@
 """Simple solids to build furniture from. Each stands where it is told to, z up, metres."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.sim.mesh import Material, Mesh, joined, triangles_of
+from avlmaps.sim.mesh import Material, Mesh, triangles_of, uv_from_sides
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
@@ -31,27 +32,42 @@ def slab(x: float, y: float, z: float, width: float, depth: float, height: float
     return box((x - width / 2, y - depth / 2, z), (x + width / 2, y + depth / 2, z + height), material)
 
 
-def loft(rings: Sequence[Float[np.ndarray, "k 3"]], material: Material, capped: bool = True) -> Mesh:
-    """Return the skin over a stack of rings with equally many points; its ends are closed by fans if capped."""
-    ring = np.stack([np.asarray(r, np.float64) for r in rings])
-    n, k = ring.shape[:2]
-    vertex = ring.reshape(-1, 3)
+@lru_cache(maxsize=512)
+def _lattice(n: int, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the triangles of a skin over n rings of k points, where their corners take u and v, and the two fans."""
     at = np.arange(n * k).reshape(n, k)
     after = np.roll(at, -1, axis=1)
     quads = np.stack([at[:-1], after[:-1], after[1:], at[1:]], axis=-1).reshape(-1, 4)
-    around = np.linalg.norm(ring - np.roll(ring, 1, axis=1), axis=2).mean(axis=0)
-    u = np.concatenate([[0.0], np.cumsum(np.roll(around, -1))])
-    v = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=2).mean(axis=1))])
-    column = np.tile(np.arange(k), n - 1)
-    row = np.repeat(np.arange(n - 1), k)
-    flat = np.stack(
-        [np.stack([u[column + i], v[row + j]], axis=-1) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))], axis=1
-    )
-    uv = np.concatenate([flat[:, [0, 1, 2]], flat[:, [0, 2, 3]]])
-    skin = triangles_of(vertex, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]), material, uv)
-    if not capped:
-        return skin
-    return joined([skin, *(polygon(end, material) for end in (ring[0], ring[-1]))])
+    column, row = np.tile(np.arange(k), n - 1), np.repeat(np.arange(n - 1), k)
+    u_at = np.stack([column + i for i in (0, 1, 1, 0)], axis=1)
+    v_at = np.stack([row + j for j in (0, 0, 1, 1)], axis=1)
+    three = [0, 1, 2], [0, 2, 3]
+    fans = [
+        np.stack([at[end], after[end], np.full(k, n * k + number)], axis=1) for number, end in enumerate((0, n - 1))
+    ]
+    return (
+        np.concatenate([quads[:, t] for t in three]).astype(np.int32), np.concatenate([u_at[:, t] for t in three]),
+        np.concatenate([v_at[:, t] for t in three]), np.concatenate(fans).astype(np.int32),
+    )  # fmt: skip
+
+
+def loft(rings: Sequence[Float[np.ndarray, "k 3"]], material: Material, capped: bool = True) -> Mesh:
+    """Return the skin over a stack of rings with equally many points; its ends are closed by fans if capped."""
+    ring = np.array(rings, np.float64)
+    n, k = ring.shape[:2]
+    triangle, u_at, v_at, fans = _lattice(n, k)
+    step = ring - ring[:, [-1, *range(k - 1)]]
+    around = np.sqrt((step * step).sum(axis=2)).mean(axis=0)
+    rise = ring[1:] - ring[:-1]
+    u = np.concatenate([[0.0], np.cumsum(around[[*range(1, k), 0]])])
+    v = np.concatenate([[0.0], np.cumsum(np.sqrt((rise * rise).sum(axis=2)).mean(axis=1))])
+    uv = np.stack([u[u_at], v[v_at]], axis=-1)
+    vertex = ring.reshape(-1, 3)
+    if capped:
+        vertex = np.concatenate([vertex, ring[[0, -1]].mean(axis=1)])
+        triangle = np.concatenate([triangle, fans])
+        uv = np.concatenate([uv, uv_from_sides(vertex.astype(np.float32)[fans])])
+    return triangles_of(vertex, triangle, material, uv)
 
 
 def polygon(corners: Float[np.ndarray, "k 3"], material: Material) -> Mesh:
@@ -69,21 +85,22 @@ def prism(outline: Sequence[Pair], z: float, height: float, material: Material) 
     return loft([np.column_stack([flat, np.full(len(flat), h)]) for h in (z, z + height)], material)
 
 
+@lru_cache(maxsize=64)
+def _unit_circle(sides: int) -> Float[np.ndarray, "k 2"]:
+    angle = np.linspace(0.0, 2 * np.pi, sides, endpoint=False)
+    return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
 def circle(radius: float, sides: int = 16, ry: float | None = None) -> Float[np.ndarray, "k 2"]:
     """Return points on a circle, or on an ellipse with ``ry`` along y."""
-    angle = np.linspace(0.0, 2 * np.pi, sides, endpoint=False)
-    return np.column_stack([radius * np.cos(angle), (radius if ry is None else ry) * np.sin(angle)])
+    return _unit_circle(sides) * (radius, radius if ry is None else ry)
 
 
 def rounded_rectangle(width: float, depth: float, radius: float, steps: int = 4) -> Float[np.ndarray, "k 2"]:
     """Return the outline of a rectangle with round corners, its middle at the origin."""
     radius = min(radius, 0.499 * width, 0.499 * depth)
-    out = []
-    for quarter, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
-        angle = np.linspace(0.0, np.pi / 2, steps) + quarter * np.pi / 2
-        middle = (sx * (width / 2 - radius), sy * (depth / 2 - radius))
-        out.append(np.column_stack([middle[0] + radius * np.cos(angle), middle[1] + radius * np.sin(angle)]))
-    return np.concatenate(out)
+    signs, round_corner = _quarters(steps)
+    return signs * (width / 2 - radius, depth / 2 - radius) + radius * round_corner
 
 
 def lathe(
@@ -94,7 +111,7 @@ def lathe(
     ``squash`` stretches it along y.
     """
     rings = [
-        np.column_stack([circle(max(r, 1e-4), sides, max(r, 1e-4) * squash) + (x, y), np.full(sides, z)])
+        np.column_stack([circle(max(r, 1e-4), sides, max(r, 1e-4) * squash) + np.array((x, y)), np.full(sides, z)])
         for r, z in profile
     ]
     return loft(rings, material)
@@ -122,15 +139,29 @@ def tube(path: Sequence[Triple], radius: float, material: Material, sides: int =
         points = np.concatenate([points, points[:1]])
     along = np.gradient(points, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
-    aside = np.cross(along[0], (0.0, 0.0, 1.0) if abs(along[0][2]) < 0.9 else (1.0, 0.0, 0.0))
+    aside = _crossed(along[0], np.array((0.0, 0.0, 1.0) if abs(along[0][2]) < 0.9 else (1.0, 0.0, 0.0)))
     rings = []
+    ring = circle(radius, sides)
     for place, forward in zip(points, along, strict=True):
         aside = aside - forward * (aside @ forward)
-        aside /= max(np.linalg.norm(aside), 1e-9)
-        up = np.cross(forward, aside)
-        ring = circle(radius, sides)
-        rings.append(place + ring[:, :1] * aside + ring[:, 1:] * up)
+        aside /= max(float(aside @ aside) ** 0.5, 1e-9)
+        rings.append(place + ring[:, :1] * aside + ring[:, 1:] * _crossed(forward, aside))
     return loft(rings, material, capped=not closed)
+
+
+def _crossed(one: Float[np.ndarray, "3"], other: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    """Return the cross product; for single vectors this is much faster than numpy's."""
+    (a, b, c), (d, e, f) = one.tolist(), other.tolist()
+    return np.array([b * f - c * e, c * d - a * f, a * e - b * d])
+
+
+@lru_cache(maxsize=256)
+def _quarters(steps: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return for each point of a rounded rectangle where its corner lies (signs) and its place on the unit circle."""
+    angle = np.linspace(0.0, np.pi / 2, steps)
+    turns = np.concatenate([angle + quarter * np.pi / 2 for quarter in range(4)])
+    signs = np.repeat(np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]), steps, axis=0)
+    return signs, np.column_stack([np.cos(turns), np.sin(turns)])
 
 
 def rounded_box(
