@@ -20,12 +20,12 @@ class VoxelHeat(Factor):
     """Heat given voxel by voxel; only ever context, since it has no instances of its own.
 
     Attributes:
-        values: heat of every voxel, in [0, 1].
+        voxel: heat of every voxel, in [0, 1].
     """
 
     space: Space
     part: Part
-    values: Float32[np.ndarray, " n"]  # pyright: ignore[reportIncompatibleMethodOverride]
+    voxel: Float32[np.ndarray, " n"]
     found: bool = True
     falloff_per_m: float = 0.0
     understood: str = ""
@@ -36,13 +36,18 @@ class VoxelHeat(Factor):
     instance = np.zeros(0, np.int64)
     confidence = np.zeros(0)
 
+    @property
+    def values(self) -> Float32[np.ndarray, " n"]:
+        """Heat of every voxel."""
+        return self.voxel
+
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat of the nearest voxel to each point."""
         from scipy.spatial import KDTree
 
         if not len(self.space):
             return np.zeros(len(points_world))
-        return self.values[KDTree(self.space.centres).query(points_world)[1]].astype(np.float64)
+        return self.voxel[KDTree(self.space.centres).query(points_world)[1]].astype(np.float64)
 
     def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         """Return nothing: heat by voxel has no anchors."""
