@@ -31,9 +31,13 @@ def main(options: Options) -> None:
     """Run all of it."""
     from training.pixels.calibrate import Options as CalibrateOptions
     from training.pixels.calibrate import calibrate
+    from training.pixels.instances import Options as InstanceOptions
+    from training.pixels.instances import calibrate_instances
+    from training.pixels.rooms import Options as RoomOptions
+    from training.pixels.rooms import fit_rooms
 
     held_out = worlds.Options(
-        out=options.work / "held-out", shards=4, first_seed=worlds.FIRST_HELD_OUT_SEED, which="held-out", once=True
+        out=options.work / "held-out", shards=4, first_seed=worlds.FIRST_CALIBRATION_SEED, which="held-out", once=True
     )
     first = worlds.Options(out=options.work / "training", shards=12, once=True)
     for job in (held_out, first):
@@ -46,7 +50,9 @@ def main(options: Options) -> None:
     finally:
         for process in beside:
             process.terminate()
+    fit_rooms(RoomOptions(network=options.work / "network.pt", frames=first.out))
     calibrate(CalibrateOptions(network=options.work / "network.pt", frames=held_out.out, out=options.out))
+    calibrate_instances(InstanceOptions(work=options.work / "homes", out=options.out))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, time
 
 import numpy as np
 import torch
@@ -41,6 +41,8 @@ class Options:
     """Of windows and of the first weights."""
     resume: bool = False
     """Go on from the checkpoint's weights."""
+    peer: Path | None = None
+    """Checkpoint of another process that trains beside this one; both meet in the middle every minute."""
     widths: tuple[int, int, int, int] = (32, 64, 128, 192)
     """Channels at 1/2, 1/4, 1/8 and 1/16 of the picture's size."""
 
@@ -107,12 +109,13 @@ def fit(options: Options) -> None:
     if options.resume and (moments := torch.load(options.out, map_location=device, weights_only=True).get("moments")):
         optimiser.load_state_dict(moments)
     average, begin, step, shown, saved = Average(network), perf_counter(), 0, perf_counter(), perf_counter()
+    met, peer_stamp = perf_counter(), time()
     ahead = ThreadPoolExecutor(1)  # the next batch is drawn while the network learns from this one
     coming = ahead.submit(draw_batch, shards, options.batch, rng, options.colour_kept)
     running = np.zeros(3)
     while (done := (perf_counter() - begin) / 60.0 / options.minutes) < 1.0:
         for group in optimiser.param_groups:
-            group["lr"] = options.rate * min(1.0, (step + 1) / 100) * (0.5 + 0.5 * np.cos(np.pi * done)) + 1e-6
+            group["lr"] = float(options.rate * min(1.0, (step + 1) / 100) * (0.5 + 0.5 * np.cos(np.pi * done)) + 1e-6)
         batch, coming = coming.result(), ahead.submit(draw_batch, shards, options.batch, rng, options.colour_kept)
         pixels, views, right = losses(network, batch, weight, device)
         optimiser.zero_grad(set_to_none=True)
@@ -123,6 +126,12 @@ def fit(options: Options) -> None:
         step += 1
         running += 0.02 * (np.array([float(pixels.detach()), float(views.detach()), right]) - running)
         now = perf_counter()
+        if options.peer is not None and now - met > 60:
+            save(options, network, average, optimiser, step)
+            if options.peer.is_file() and options.peer.stat().st_mtime > peer_stamp:
+                peer_stamp = options.peer.stat().st_mtime
+                meet(network, options.peer)
+            met = saved = now
         if now - shown > 30:
             frames = shards.refresh()
             print(
@@ -135,6 +144,15 @@ def fit(options: Options) -> None:
             saved = now
     ahead.shutdown(cancel_futures=True)
     save(options, network, average, optimiser, step)
+
+
+@torch.no_grad()
+def meet(network: nn.Module, peer: Path) -> None:
+    """Move half the way to the weights of a process that trains beside this one (local SGD)."""
+    others = torch.load(peer, map_location="cpu", weights_only=True)["last"]
+    for name, value in network.state_dict().items():
+        if value.dtype.is_floating_point:
+            value.lerp_(others[name].to(value), 0.5)
 
 
 def save(options: Options, network: nn.Module, average: Average, optimiser: torch.optim.Optimizer, step: int) -> None:

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 import tyro
 from scipy.optimize import minimize
-from training.pixels.worlds import FIRST_HELD_OUT_SEED
+from training.pixels.worlds import FIRST_CALIBRATION_SEED
 
 from avlmaps.bench.objects import FEWEST_VOXELS, GROWN_M, STRUCTURE
 from avlmaps.maps.build import build_map
@@ -108,7 +108,7 @@ def calibrate_instances(options: Options) -> None:
     found = [
         piece
         for number in range(options.homes)
-        for piece in pieces_of(options.work, FIRST_HELD_OUT_SEED + 1000 + number, options.frames)
+        for piece in pieces_of(options.work, FIRST_CALIBRATION_SEED + 1000 + number, options.frames)
         if len(piece.is_true)
     ]
     path = options.out / "rooms.json"
