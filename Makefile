@@ -39,9 +39,10 @@ format: $(READY)  ## Put the code in order.
 bench: $(READY)  ## Measure speed and quality; writes docs/benchmarks.md.
 	$(RUN)/python benchmarks/report.py --out docs/benchmarks.md
 
-train: $(VENV)-training/.ready  ## Train the embedded encoders again (CPU; SOUNDS=folder of clips with an index.csv).
+train: $(VENV)-training/.ready  ## Train the embedded encoders again (CPU, a night; SOUNDS=folder of clips with an index.csv).
 	$(VENV)-training/bin/python -m training.words
 	$(VENV)-training/bin/python -m training.sounds --sounds $(or $(SOUNDS),../shared/data/sounds)
+	$(VENV)-training/bin/python -m training.pixels --minutes $(or $(MINUTES),600)
 
 $(VENV)-training/.ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)-training

@@ -1,4 +1,4 @@
-"""Writing the network for onnxruntime: the running mean of the weights, batch norms folded, half precision in the file."""
+"""Writing the network for onnxruntime, its large weights in half precision."""
 
 from pathlib import Path
 

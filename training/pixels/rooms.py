@@ -12,12 +12,12 @@ import numpy as np
 import torch
 import tyro
 from torch import Tensor, nn
-
-from avlmaps.core.camera import Pinhole
-from avlmaps.perception.embedded.geometry import channels
 from training.pixels.batches import Frames, Shards
 from training.pixels.export import load_network
 from training.pixels.network import RoomNetwork
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.perception.embedded.geometry import channels
 
 
 @dataclass(frozen=True)

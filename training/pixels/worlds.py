@@ -85,7 +85,7 @@ def _oddity(rng: np.random.Generator) -> Mesh:
     size, parts = rng.uniform(0.1, 0.9), []
     for _ in range(rng.integers(1, 6)):
         look = material(str(rng.choice(["wood", "plastic", "fabric", "metal", "painted"])), rng)
-        x, y, z = rng.uniform(-size / 2, size / 2, 3) + (0, 0, size / 2)
+        x, y, z = rng.uniform(-size / 2, size / 2, 3) + np.array([0, 0, size / 2])
         a, b, c = rng.uniform(0.03, 0.6, 3) * size
         kind = rng.integers(4)
         if kind == 0:
@@ -130,7 +130,7 @@ def add_home(shard: Shard, seed: int, options: Options) -> None:
     renderer = Renderer(scene, lit=lit)
     names = scene.categories
     number = np.array([_NAME.get(name, UNLABELLED) for name in names] + [UNLABELLED], np.uint8)
-    dull = np.isin(names + ("",), ("wall", "floor", "ceiling", ""))
+    dull = np.isin((*names, ""), ("wall", "floor", "ceiling", ""))
     views = random_views(scene, rng, options.frames_per_home, camera_of(rng))
     for pose in views:
         camera = camera_of(rng)
