@@ -1,0 +1,98 @@
+"""The object benchmark's arithmetic, on a map whose encoder is always right."""
+
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from avlmaps.bench.objects import auroc, measure, table_of
+from avlmaps.maps.grid import GridSpec
+from avlmaps.query.goals import find_goals
+from avlmaps.query.heatmap import Heatmap, NearThings
+from avlmaps.query.level import Space
+from avlmaps.query.question import Modality, Part, Role
+from avlmaps.sim.scene import SceneObject
+
+SIZE_M = 0.05
+
+
+def block(low: tuple[float, float, float], cells: int = 8) -> np.ndarray:
+    return np.argwhere(np.ones((cells,) * 3)) + np.round(np.array(low) / SIZE_M).astype(int)
+
+
+def thing(category: str, low: tuple[float, float, float]) -> SceneObject:
+    high = tuple(value + 8 * SIZE_M for value in low)
+    return SceneObject(category, low, (high[0], high[1], high[2]))
+
+
+THINGS = (thing("chair", (0, 0, 0)), thing("chair", (2, 0, 0)), thing("bed", (4, 0, 0)))
+INDEX = np.concatenate([block(one.low) for one in THINGS])
+
+
+@dataclass
+class AskedMap:
+    """Answers from a table: for each word the blocks that it claims, and how surely."""
+
+    claims: dict[str, list[tuple[int, float]]]
+    space: Space = field(default_factory=lambda: Space(GridSpec(SIZE_M), INDEX, np.array([0.0, 0.0, 1.0])))
+
+    @property
+    def stored(self):
+        encoder = SimpleNamespace(vocabulary=("chair", "bed", "toilet", "wall"))
+        return SimpleNamespace(profile=SimpleNamespace(pixel_encoder=lambda: encoder))
+
+    def object(self, word: str, primary: bool = False) -> Heatmap:
+        owner = np.repeat(np.arange(3), 512)
+        claimed = self.claims.get(word, [])
+        mask = np.isin(owner, [number for number, _ in claimed])
+        order = {number: row for row, (number, _) in enumerate(claimed)}
+        instance = np.array([order[number] for number in owner[mask]], np.int64)
+        confidence = np.array([sure for _, sure in claimed], np.float32)
+        part = Part(Modality.OBJECT, word, Role.PRIMARY)
+        return Heatmap.of(NearThings(self.space, part, 2.0, mask, instance, confidence, bool(len(confidence))))
+
+
+def test_a_map_that_is_right_is_right_in_every_figure() -> None:
+    figures = measure(AskedMap({"chair": [(0, 0.9), (1, 0.8)], "bed": [(2, 0.9)]}), THINGS, {}, "room")  # pyright: ignore[reportArgumentType]
+    assert figures.within == (2, 2)
+    assert figures.precise == (3, 3)
+    assert (figures.found_count, figures.true_count) == (3, 3)
+    assert table_of([figures])["rows"][0][-1].startswith("1.000")
+
+
+def test_a_bed_taken_for_a_chair_costs_precision_and_the_bed() -> None:
+    figures = measure(AskedMap({"chair": [(0, 0.9), (2, 0.95)]}), THINGS, {}, "room")  # pyright: ignore[reportArgumentType]
+    assert figures.reached["bed"] == np.inf
+    assert figures.reached["chair"] > 0.5
+    assert figures.precise == (1, 2)
+    assert (figures.found_count, figures.true_count) == (1, 3)
+
+
+def test_what_it_is_not_sure_of_does_not_count_against_it() -> None:
+    figures = measure(AskedMap({"chair": [(0, 0.9), (2, 0.3)], "bed": [(2, 0.9)]}), THINGS, {}, "room")  # pyright: ignore[reportArgumentType]
+    assert figures.precise == (2, 2)
+
+
+def test_names_that_count_as_one_are_asked_as_one() -> None:
+    things = (*THINGS[:2], thing("four-poster", (4, 0, 0)))
+    figures = measure(AskedMap({"bed": [(2, 0.9)]}), things, {"four-poster": "bed"}, "room")  # pyright: ignore[reportArgumentType]
+    assert figures.reached["bed"] == 0.0
+
+
+def test_the_first_goal_of_a_map_lies_in_the_surest_instance() -> None:
+    goals = find_goals(AskedMap({"chair": [(0, 0.6), (1, 0.9)]}).object("chair"), 2)
+    assert [round(goal.position[0]) for goal in goals] == [2, 0]
+
+
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=20), st.lists(st.floats(0, 1), min_size=1, max_size=20))
+def test_the_area_under_the_curve_is_the_share_of_pairs_in_order(there: list[float], absent: list[float]) -> None:
+    pairs = [(a > b) + 0.5 * (a == b) for a in there for b in absent]
+    score, is_there = np.array(there + absent), np.arange(len(there) + len(absent)) < len(there)
+    assert auroc(score, is_there) == pytest.approx(np.mean(pairs))
+
+
+def test_one_side_alone_has_no_curve() -> None:
+    assert np.isnan(auroc(np.ones(3), np.ones(3, bool)))
