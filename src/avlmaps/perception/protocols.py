@@ -123,6 +123,25 @@ class ViewEncoder(Protocol):
 
 
 @runtime_checkable
+class NamedViewEncoder(ViewEncoder, Protocol):
+    """A view encoder that tells a closed set of rooms apart; see ``NamedPixelEncoder`` for its features."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What it tells apart."""
+        ...
+
+    @property
+    def codes(self) -> Float32[np.ndarray, "k d"]:
+        """The code of each name."""
+        ...
+
+    def meant(self, word: str) -> Float32[np.ndarray, " k"]:
+        """Return for each name how much a phrase means it, in [0, 1]; all zero where it means none."""
+        ...
+
+
+@runtime_checkable
 class SoundEncoder(Protocol):
     """Gives a sound features that words and other sounds can be compared with."""
 

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from avlmaps.maps.types import Keyframes
-from avlmaps.perception.protocols import ViewEncoder
+from avlmaps.perception.protocols import NamedViewEncoder, ViewEncoder
 from avlmaps.query.heatmap import HeatSettings, NearAnchors, normalised
 from avlmaps.query.level import Space
 from avlmaps.query.question import Part
@@ -41,8 +41,14 @@ def area_scores(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return for each keyframe the posterior of the name among all area names, and its score in [0, 1].
 
+    An encoder that tells named kinds of room apart says itself how likely each is.
+
     They are the same unless the settings ask for the paper's stretched cosines.
     """
+    if isinstance(encoder, NamedViewEncoder):
+        share = np.square(np.asarray(view, np.float64).reshape(-1, encoder.codes.shape[1]) @ encoder.codes.T)
+        likely = np.clip(share @ encoder.meant(name), 0.0, 1.0)
+        return likely, likely if settings.score == "posterior" else normalised(likely)
     others = [area for area in AREA_NAMES if area != name]
     words = np.asarray(encoder.encode_words([name, *others]), np.float64)
     competes = np.r_[True, words[1:] @ words[0] < settings.same_word_cosine]
@@ -91,6 +97,8 @@ def area_factor(
     anchors = np.asarray(places, np.float64).reshape(-1, 3)
     best = float(posterior.max(initial=0.0))
     note = "" if best >= 0.5 else f"no view is like {part.query!r}; the best score is {best:.2f}, below 0.50"
+    if isinstance(encoder, NamedViewEncoder) and not encoder.meant(part.query).any():
+        note = f"the view encoder knows no room like {part.query!r}; it knows: {', '.join(encoder.names)}"
     if not len(keyframes):
         note = "the map holds no keyframes"
     group = modes(space.level(anchors)[:, :2], scores, settings.link_m)

@@ -43,6 +43,10 @@ class EmbeddedViews:
         called = tuple((name, *notes.called.get(name, ())) for name in self.names)
         return Lexicon(self.names, called, notes.kinds, self._words)
 
+    def meant(self, word: str) -> Float32[np.ndarray, " k"]:
+        """Return for each of ``names`` how much a phrase means it; zero where it means none."""
+        return self.lexicon.meant(word)
+
     def encode(self, frames: Sequence[Frame]) -> Float32[np.ndarray, "n d"]:
         """Return a unit vector for each frame."""
         rooms = [self._network.see(frame).room for frame in frames]
