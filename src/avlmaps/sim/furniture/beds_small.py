@@ -51,7 +51,7 @@ def barred_crib(rng: np.random.Generator) -> Piece:
         ]
     solid = chance(rng, 0.5)
     for s in (1, -1):
-        high = top + draw(rng, 0.0, 0.12)
+        high = top + (draw(rng, 0.0, 0.12) if solid else 0.0)
         if solid:
             parts.append(slab(s * length / 2, 0.0, low - 0.12, 0.022, width, high - low + 0.12, look))
         else:

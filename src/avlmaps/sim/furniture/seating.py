@@ -1,5 +1,7 @@
 """Chairs with a wooden frame, by the way their backs are made."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
@@ -127,23 +129,23 @@ def windsor(rng: np.random.Generator) -> Piece:
     low = draw(rng, 0.14, 0.2)
     out = splay * (1 - low / under)
     parts.append(stretchers(rng, 2 * (x + out), 2 * (y + out), low, 0.018, look))
+    # The back stands a little within the edge of the seat, whose corners are round.
+    back, wide = replace(frame, depth=frame.depth - 0.08), frame.rear * 0.86
     number = count(rng, 5, 9)
     if chance(rng, 0.55):
         power = draw(rng, 2.0, 3.2)
-        parts.append(hoop(frame, frame.seat - 0.01, frame.rear * 0.92, 0.012, look, power))
+        parts.append(hoop(back, back.seat - 0.01, wide, 0.012, look, power))
         shares = np.linspace(-0.8, 0.8, number)
         tops = (1 - np.abs(shares) ** power) ** (1 / power)
-        ends = [frame.seat + float(t) * (frame.top - 0.02 - frame.seat) for t in tops]
+        ends = [back.seat + float(t) * (back.top - 0.02 - back.seat) for t in tops]
     else:
         crest = draw(rng, 0.05, 0.1)
-        place = (frame.back_x(frame.top - crest), 0.0, frame.top - crest)
+        place = (back.back_x(back.top - crest), 0.0, back.top - crest)
         parts.append(bent_rail(place, frame.rear * 1.04, crest, 0.02, draw(rng, 0.0, 0.05), look, draw(rng, 0.0, 0.03)))
-        shares, ends = np.linspace(-0.95, 0.95, number), [frame.top - crest + 0.01] * number
+        shares, ends = np.linspace(-0.95, 0.95, number), [back.top - crest + 0.01] * number
     for share, end in zip(shares.tolist(), ends, strict=True):
-        side = share * frame.rear * 0.46
-        parts.append(
-            tube([(frame.back_x(0.0), side * 0.85, frame.seat - 0.01), (frame.back_x(end), side, end)], 0.007, look, 4)
-        )
+        side, foot = share * wide / 2, (back.back_x(0.0), share * wide * 0.43, back.seat - 0.01)
+        parts.append(tube([foot, (back.back_x(end), side, end)], 0.007, look, 4))
     return finished(parts)
 
 
@@ -161,30 +163,29 @@ def cross_back(rng: np.random.Generator) -> Piece:
 
 @family("chair", "bentwood")
 def bentwood(rng: np.random.Generator) -> Piece:
-    """Return a café chair: round seat, legs of bent rods, a hoop for a back with another inside it."""
+    """Return a café chair: round seat, rods bent into rear legs and a hoop for a back, another hoop inside it."""
     wide = draw(rng, 0.38, 0.44)
-    frame = ChairFrame(
-        wide, wide, wide * 0.9, draw(rng, 0.44, 0.48), draw(rng, 0.83, 0.95), draw(rng, 0.06, 0.13), 0.05
-    )
+    seat, top = draw(rng, 0.44, 0.48), draw(rng, 0.83, 0.95)
+    # The rods pass the round seat where it is narrower than at its middle.
+    frame = ChairFrame(wide * 0.66, wide, wide * 0.82, seat, top, draw(rng, 0.06, 0.13), 0.05)
     look = material(pick(rng, ("wood", "wood", "black", "painted")), rng)
-    rod = draw(rng, 0.011, 0.016)
-    z = frame.seat - 0.03
+    rod, z = draw(rng, 0.011, 0.016), seat - 0.03
     cover = covering(rng) if chance(rng, 0.4) else look
     parts = [
         cylinder(0.0, 0.0, z, wide / 2, 0.022, look, 16),
         cylinder(0.0, 0.0, z + 0.02, wide * 0.46, 0.012, cover, 16),
-        hoop(frame, z, frame.rear, rod, look, draw(rng, 1.9, 2.6)),
     ]
-    inner = draw(rng, 0.45, 0.75)
-    low_top = frame.seat + (frame.top - frame.seat) * draw(rng, 0.7, 0.9)
-    within = ChairFrame(wide, wide, wide, frame.seat, low_top, frame.rake * 0.8, 0.0)
-    parts.append(hoop(within, z, frame.rear * inner, rod * 0.8, look))
-    splay = draw(rng, 0.02, 0.05)
-    style = named_leg(pick(rng, ("slim", "tapered")), 8, rod * 2.4)
-    for sx in (1, -1):
-        for sy in (1, -1):
-            x, y = sx * wide * 0.36, sy * wide * 0.36
-            parts.append(leg((x + sx * splay, y + sy * splay, 0.0), (x, y, z), style, look))
+    parts.append(hoop(frame, z, frame.rear, rod, look, draw(rng, 1.9, 2.6)))
+    within = replace(frame, top=seat + (top - seat) * draw(rng, 0.7, 0.9), rake=frame.rake * 0.8)
+    parts.append(hoop(within, z, frame.rear * draw(rng, 0.45, 0.75), rod * 0.8, look))
+    splay, style = draw(rng, 0.02, 0.05), named_leg(pick(rng, ("slim", "tapered")), 8, rod * 2.4)
+    for s in (1, -1):
+        x, y = wide * 0.36, s * wide * 0.36
+        parts.append(leg((x + splay, y + s * splay, 0.0), (x, y, z), style, look))
+        rear = (frame.back_x(0.0), s * frame.rear / 2, z)
+        parts.append(
+            leg((rear[0] - splay - 0.04, rear[1] + s * 0.01, 0.0), rear, named_leg("slim", 8, rod * 2.6), look)
+        )
     ring = [(wide * 0.38 * float(np.cos(a)), wide * 0.38 * float(np.sin(a)), 0.24) for a in np.linspace(0, 6.283, 13)]
     parts.append(tube(ring, rod * 0.6, look, 4))
     return finished(parts)

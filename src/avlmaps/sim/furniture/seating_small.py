@@ -335,7 +335,7 @@ def bean_bag(rng: np.random.Generator) -> Piece:
     """Return a slack bag with a hollow where one sits."""
     r, high = draw(rng, 0.35, 0.52), draw(rng, 0.4, 0.7)
     look = material("fabric", rng) if chance(rng, 0.7) else material("leather", rng)
-    body = ellipsoid((0.0, 0.0, high * 0.42), (r, r * draw(rng, 0.9, 1.05), high * 0.55), look, 18, 10)
+    body = ellipsoid((0.0, 0.0, high * 0.33), (r, r * draw(rng, 0.9, 1.05), high * 0.65), look, 18, 10)
     vertex = body.vertex.astype(np.float64).copy()
     vertex[:, 2] = np.maximum(vertex[:, 2], 0.0)
     angle = np.arctan2(vertex[:, 1], vertex[:, 0])

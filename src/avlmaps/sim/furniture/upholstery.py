@@ -158,8 +158,8 @@ def heap(rng: np.random.Generator, place: Triple, size: float, look: Material) -
     noise, stretch = _smooth_noise(rng, n, n), draw(rng, 0.7, 1.1)
     x = u * size * (0.85 + 0.15 * np.cos(2 * v + draw(rng, 0.0, 6.0)))
     y = v * size * stretch * (0.85 + 0.15 * np.cos(2 * u + draw(rng, 0.0, 6.0)))
-    z = size * fall * (draw(rng, 0.12, 0.3) + 0.14 * noise) + 0.012
-    grid = np.stack([x, y, np.maximum(z, 0.004)], axis=-1)
+    z = size * fall * (draw(rng, 0.1, 0.25) + 0.18 * np.abs(noise)) + 0.02
+    grid = np.stack([x, y, z], axis=-1)
     return cloth(grid, look).turned(draw(rng, 0.0, 6.28)).moved(*place)
 
 
