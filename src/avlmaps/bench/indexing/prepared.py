@@ -9,6 +9,7 @@ from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from jaxtyping import UInt8
 
@@ -19,6 +20,7 @@ from avlmaps.bench.indexing.true_voxels import TrueVoxels
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.version import __version__
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.images import read_picture
 from avlmaps.recordings.types import Recording
 from avlmaps.sim.recorder import RecordSettings, record_scene
 from avlmaps.sim.scene import NOTHING, Scene
@@ -52,7 +54,7 @@ class SceneJob:
         """This scene's own folder, named by everything that its recording depends on."""
         source = Path(self.spec)
         content = sha256(source.read_bytes()).hexdigest() if source.is_file() else ""
-        facts = [self.spec, content, msgspec_plain(self.recorded), __version__, _RECIPE]
+        facts = [self.spec, content, msgspec.to_builtins(self.recorded), __version__, _RECIPE]
         name = "".join(c if c.isalnum() else "-" for c in self.spec)[-40:]
         return self.work / f"{name}-{sha256(json.dumps(facts).encode()).hexdigest()[:12]}"
 
@@ -69,13 +71,6 @@ class SceneJob:
             fps=_FPS, sensor=wanted.sensor, hearing=wanted.hearing, sounds=self.sounds, sources=wanted.sources,  # pyright: ignore[reportArgumentType]
             ambiguous=wanted.ambiguous, max_frames=wanted.frames, workers=1,
         )  # fmt: skip
-
-
-def msgspec_plain(value: object) -> object:
-    """Return a dataclass as JSON holds it."""
-    import msgspec
-
-    return msgspec.to_builtins(value)
 
 
 @dataclass(eq=False)
@@ -148,15 +143,15 @@ class Workplace:
 
     def photo_of(self, task: Task) -> UInt8[np.ndarray, "h w 3"]:
         """Return a task's photo, drawn if need be."""
-        import cv2
-
         named = sha256(task.world_from_photo.round(9).tobytes()).hexdigest()[:12]
         path = self.job.folder / "photos" / f"{named}.png"
         if not path.exists():
+            import cv2
+
             path.parent.mkdir(parents=True, exist_ok=True)
             view = self._renderer.render(self.camera, task.world_from_photo)
             path.write_bytes(cv2.imencode(".png", np.ascontiguousarray(view.rgb[..., ::-1]))[1].tobytes())
-        return cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB)
+        return read_picture(path)
 
     @property
     def camera(self) -> Pinhole:
