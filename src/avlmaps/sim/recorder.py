@@ -302,7 +302,7 @@ def _take_up(name: str, size: int) -> None:
     cv2.setNumThreads(1)
     shared = SharedMemory(name)
     assert shared.buf is not None
-    _artist[:] = [ForkingPickler.loads(bytes(shared.buf[:size]))]
+    _artist[:] = [ForkingPickler.loads(bytes(shared.buf[:size]))]  # pyright: ignore[reportAttributeAccessIssue]
     shared.close()
 
 
