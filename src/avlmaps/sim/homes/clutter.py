@@ -6,7 +6,7 @@ import numpy as np
 
 from avlmaps.sim.furniture import Piece, Support
 from avlmaps.sim.furniture.joinery import chance, count, draw, pick
-from avlmaps.sim.homes.furnish import Furnisher, Stood, footprint, hangs
+from avlmaps.sim.homes.furnish import Among, Furnisher, Stood, floor_standing, footprint
 from avlmaps.sim.homes.polygons import corners_of, overlapping
 
 # What is found on the tops of what.
@@ -39,6 +39,10 @@ ON_TOP: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 _DENSITY = {"bookshelf": 1.6, "wall shelf": 1.3, "kitchen counter": 1.4, "dining table": 0.9, "sofa": 0.7, "bed": 0.5,
             "chair": 0.06, "wardrobe": 0.25, "refrigerator": 0.2, "armchair": 0.3}  # fmt: skip
+_NEVER_ON_TOPS = ("shade on pole", "tripod", "arc", "torchiere", "paper column", "many heads", "palm", "tree",
+                  "big leaves",
+                  "leaning", "standing in a frame", "leaning on a wall", "floor standing", "on a stand", "suitcase",
+                  "on a rolling stand", "rear projection", "office copier", "server in a rack")  # fmt: skip
 _LYING = (
     "box",
     "bag",
@@ -71,16 +75,20 @@ def things_on(f: Furnisher, anchor: Stood, wanted: Sequence[str], turn_rad: floa
     return done
 
 
+def _for_tops(family: str) -> bool:
+    return not family.startswith(("wall", "grandfather", "with pendulum")) and family not in _NEVER_ON_TOPS
+
+
 def _small_enough(f: Furnisher, category: str, top: Support) -> Piece | None:
     room = sorted(np.subtract(top.high, top.low).tolist())
     for _ in range(2):
-        piece = f.new(category)
+        piece = f.new(category, _for_tops)
         if piece is None:
             return None
         size = piece.mesh.size
         across = sorted(size[:2].tolist())
         low_enough = size[2] < min(top.clearance_m - 0.01, 0.75)
-        if low_enough and not hangs(piece) and across[0] < room[0] and across[1] < room[1] and across[1] < 0.9:
+        if low_enough and across[0] < room[0] and across[1] < room[1] and across[1] < 0.9:
             return piece
     return None
 
@@ -114,7 +122,15 @@ def _set(
     return False
 
 
-def set_at(f: Furnisher, anchor: Stood, category: str, depth: float, across: float, turn_rad: float = 0.0) -> bool:
+def set_at(
+    f: Furnisher,
+    anchor: Stood,
+    category: str,
+    depth: float,
+    across: float,
+    turn_rad: float = 0.0,
+    among: Among | None = None,
+) -> bool:
     """Stand a thing at a place on the largest top of a piece.
 
     Args:
@@ -124,8 +140,9 @@ def set_at(f: Furnisher, anchor: Stood, category: str, depth: float, across: flo
         depth: where, from 0 at the back to 1 at the front.
         across: where, from 0 to 1 across.
         turn_rad: how far it is turned out of the piece's own direction.
+        among: which families will do; any that stand where not said.
     """
-    if not anchor.piece.supports or (piece := f.new(category)) is None or hangs(piece):
+    if not anchor.piece.supports or (piece := f.new(category, among or _for_tops)) is None:
         return False
     top = max(anchor.piece.supports, key=lambda s: float(np.prod(np.subtract(s.high, s.low))))
     foot = footprint(piece.mesh)
@@ -133,7 +150,7 @@ def set_at(f: Furnisher, anchor: Stood, category: str, depth: float, across: flo
         return False
     low, high = np.array(top.low) + foot.half, np.array(top.high) - foot.half
     low, high = np.minimum(low, (low + high) / 2), np.maximum(high, (low + high) / 2)
-    nudge = np.array([(0.0, 0.0), (0.15, 0.0), (-0.1, 0.15), (-0.1, -0.15), (0.3, 0.0)])
+    nudge = np.array([(0.0, 0.0), (0.15, 0.0), (-0.1, 0.15), (-0.1, -0.15), (0.3, 0.0), (0.0, 0.4), (0.0, -0.4)])
     centre = low + (high - low) * np.clip(np.array([depth, across]) + nudge, 0.0, 1.0)
     return _set(f, anchor, top, piece, centre, np.full(len(centre), turn_rad), over_m=0.06)
 
@@ -153,8 +170,8 @@ def dress(f: Furnisher) -> None:
 def litter(f: Furnisher, wanted: Sequence[str] = _LYING) -> None:
     """Let things lie about on the floor, more in a messy room."""
     for _ in range(min(int(f.rng.poisson(0.5 + 6.0 * f.mess**2)), 12)):
-        piece = f.new(pick(f.rng, wanted))
-        if piece is None or hangs(piece) or float(piece.mesh.size[:2].max()) > 0.9:
+        piece = f.new(pick(f.rng, wanted), floor_standing)
+        if piece is None or float(piece.mesh.size[:2].max()) > 0.9:
             continue
         if chance(f.rng, 0.6):
             f.along(piece, front_m=0.0, gap_m=draw(f.rng, 0.0, 0.25), tries=5)

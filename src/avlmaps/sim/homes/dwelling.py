@@ -65,7 +65,7 @@ def _upper(rng: np.random.Generator, ground: Plan) -> Plan | None:
 
 def _furnished(rng: np.random.Generator, builder: SceneBuilder, plan: Plan, which: Families) -> None:
     """Build a floor and furnish its rooms."""
-    home = looks_of(rng, plan.rooms[0], None)
+    home = looks_of(rng, replace(plan.rooms[0], kind="living room"), None)
     looks = [looks_of(rng, room, home) for room in plan.rooms]
     first = len(builder.areas)
     for room in plan.rooms:

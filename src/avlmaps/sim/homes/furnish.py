@@ -1,13 +1,13 @@
 """The hands that furnish a room: try places for a piece until one is free, put it there, put things on it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.sim.furniture import Families, Piece, categories, make
-from avlmaps.sim.furniture.joinery import draw
+from avlmaps.sim.furniture import Families, Piece, families, make
+from avlmaps.sim.furniture.joinery import draw, pick
 from avlmaps.sim.homes.placing import Footprint, Ground, Place, Side
 from avlmaps.sim.homes.polygons import middle
 from avlmaps.sim.mesh import Mesh
@@ -17,22 +17,35 @@ _UNDER_LAMPS = ("dining table", "kitchen island", "coffee table", "bed")
 _TOUCH_M = 0.006  # pieces stand so far from the wall behind them
 
 
-def try_make(category: str, rng: np.random.Generator, which: Families, name: str | None = None) -> Piece | None:
-    """Make a piece, or None while its category has no recipe."""
-    return make(category, rng, which, name) if category in categories() else None
-
-
 # How high the lowest edge of what hangs on a wall is, metres.
 HANGING_M = {"picture": (1.1, 1.6), "mirror": (0.9, 1.3), "clock": (1.5, 2.0), "air conditioner": (1.9, 2.3),
-             "tv": (0.8, 1.3),
-             "wall shelf": (1.1, 1.7), "lamp": (1.4, 1.8), "kitchen cabinet": (1.38, 1.55), "range hood": (1.45, 1.7),
-             "water heater": (1.3, 1.7), "whiteboard": (0.8, 1.0), "towel": (0.9, 1.3), "radiator": (0.1, 0.15),
-             "coat rack": (1.4, 1.6), "plant": (1.4, 1.9), "telephone": (1.1, 1.4), "sink": (0.0, 0.0)}  # fmt: skip
+             "tv": (0.8, 1.3), "wall shelf": (1.1, 1.7), "lamp": (1.4, 1.8), "kitchen cabinet": (1.38, 1.55),
+             "range hood": (1.45, 1.7), "water heater": (1.3, 1.7), "whiteboard": (0.8, 1.0), "towel": (0.9, 1.3),
+             "radiator": (0.1, 0.15), "coat rack": (1.4, 1.6), "shower": (0.95, 1.1), "guitar": (0.9, 1.3),
+             "microwave": (1.4, 1.5), "plant": (1.4, 1.9), "telephone": (1.1, 1.4)}  # fmt: skip
+
+
+Among = Callable[[str], bool]  # tells of the name of a family whether it will do
+
+
+def floor_standing(family: str) -> bool:
+    """Tell whether a family stands on the floor: not on a worktop, not on a wall."""
+    return not family.startswith(("wall", "counter", "table top"))
+
+
+def wall_hung(family: str) -> bool:
+    """Tell whether a family is made to hang on a wall."""
+    return family.startswith("wall")
+
+
+def on_floor_or_wall(family: str) -> bool:
+    """Tell whether a family needs no worktop under it."""
+    return not family.startswith(("counter", "table top"))
 
 
 def hangs(piece: Piece) -> bool:
     """Tell whether a piece is made to hang on a wall."""
-    return piece.family.startswith("wall")
+    return wall_hung(piece.family)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,9 +117,13 @@ class Furnisher:
     stood: list[Stood] = field(default_factory=list)
     laid: dict[tuple[int, int], list[np.ndarray]] = field(default_factory=dict)
 
-    def new(self, category: str, name: str | None = None) -> Piece | None:
-        """Make a piece of a category that has recipes."""
-        return try_make(category, self.rng, self.which, name)
+    def new(self, category: str, among: Among | None = None) -> Piece | None:
+        """Make a piece of a category; where only some of its families will do, one of those, or None."""
+        if among is None:
+            return make(category, self.rng, self.which)
+        names = [name for name in families(category, self.which) if among(name)]
+        names = names or [name for name in families(category) if among(name)]
+        return make(category, self.rng, self.which, pick(self.rng, names)) if names else None
 
     def put(self, piece: Piece, place: Place, front_m: float = 0.0, solid: bool = True) -> Stood:
         """Add a piece to the scene at a place, and keep its place and a zone before it from others."""
@@ -259,17 +276,17 @@ class Furnisher:
 
     def stand(self, category: str, share: float = 1.0, front_m: float = 0.45, corner: float = 0.3,
               near: Float[np.ndarray, "2"] | None = None, sides: Sequence[Side] | None = None,
-              at_middle: float = 0.0) -> Stood | None:  # fmt: skip
+              at_middle: float = 0.0, among: Among = on_floor_or_wall) -> Stood | None:  # fmt: skip
         """Stand a piece of a category against a wall in a share of the cases, or hang it if it is made to hang."""
-        if self.rng.random() > share * self.fill or (piece := self.new(category)) is None:
+        if self.rng.random() > share * self.fill or (piece := self.new(category, among)) is None:
             return None
         return self._stand(piece, front_m, corner, near, sides, at_middle)
 
     def insist(self, category: str, front_m: float = 0.45, corner: float = 0.3, at_middle: float = 0.0,
-               tries: int = 3) -> Stood | None:  # fmt: skip
+               tries: int = 3, among: Among = on_floor_or_wall) -> Stood | None:  # fmt: skip
         """Stand what a room cannot do without, trying several shapes until one finds a place."""
         for _ in range(tries if self.fill > 0.5 or self.rng.random() < 0.6 else 0):
-            if (piece := self.new(category)) is None:
+            if (piece := self.new(category, among)) is None:
                 return None
             if (stood := self._stand(piece, front_m, corner, None, None, at_middle)) is not None:
                 return stood
@@ -277,9 +294,8 @@ class Furnisher:
 
     def _stand(self, piece: Piece, front_m: float, corner: float, near: Float[np.ndarray, "2"] | None,
                sides: Sequence[Side] | None, at_middle: float) -> Stood | None:  # fmt: skip
-        category = piece.category
         if hangs(piece):
-            return self.hang(piece, HANGING_M.get(category, (1.2, 1.7)), sides, near=near)
+            return self.hang(piece, HANGING_M.get(piece.category, (1.2, 1.7)), sides, near=near)
         return self.along(piece, sides, front_m, corner=corner, near=near, at_middle=at_middle)
 
     def row(self, wanted: Sequence[str], sides: Sequence[Side] | None = None, front_m: float = 0.6,
@@ -306,8 +322,8 @@ class Furnisher:
 
     def _shallow(self, category: str, deepest_m: float) -> Piece | None:
         for _ in range(4):
-            piece = self.new(category)
-            if piece is None or (float(piece.mesh.size[0]) < deepest_m and not hangs(piece)):
+            piece = self.new(category, floor_standing)
+            if piece is None or piece.mesh.size[0] < deepest_m:
                 return piece
         return None
 

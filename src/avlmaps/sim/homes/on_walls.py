@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from avlmaps.sim.furniture import Piece
 from avlmaps.sim.furniture.drapes import curtain
 from avlmaps.sim.furniture.joinery import chance, count, draw
-from avlmaps.sim.homes.furnish import Furnisher, footprint, hangs
+from avlmaps.sim.homes.furnish import Furnisher, footprint, hangs, on_floor_or_wall, wall_hung
 from avlmaps.sim.homes.placing import Side
 from avlmaps.sim.homes.polygons import area_m2, middle
 from avlmaps.sim.scene import Light
@@ -86,20 +85,13 @@ def adorn(f: Furnisher) -> None:
     rng = f.rng
     bare = 0.35 if f.kind in ("storage", "toilet", "bathroom", "laundry room", "copy room") else 1.0
     for _ in range(int(rng.poisson((0.5 + 0.09 * area_m2(f.ground.polygon)) * bare * f.fill))):
-        f.stand("picture")
+        f.stand("picture", among=wall_hung if chance(rng, 0.92) else on_floor_or_wall)
     shares = {"clock": 0.25, "mirror": 0.15, "wall shelf": 0.3, "air conditioner": 0.14, "lamp": 0.06, "plant": 0.03}
     for category, share in shares.items():
-        if chance(rng, share * (0.4 + 0.6 * bare)) and (piece := _hanging(f, category)) is not None:
+        among = None if category == "wall shelf" else wall_hung
+        if chance(rng, share * (0.4 + 0.6 * bare)) and (piece := f.new(category, among)) is not None:
             low, high = {"clock": (1.5, 2.0), "air conditioner": (1.9, 2.4)}.get(category, (1.1, 1.6))
             f.hang(piece, (low, high))
-
-
-def _hanging(f: Furnisher, category: str) -> Piece | None:
-    for _ in range(4):
-        piece = f.new(category)
-        if piece is None or hangs(piece) or category in ("air conditioner", "wall shelf"):
-            return piece
-    return None
 
 
 def light_up(f: Furnisher, by_day: float) -> None:

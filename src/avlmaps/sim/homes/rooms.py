@@ -6,7 +6,7 @@ from avlmaps.sim.furniture import Piece
 from avlmaps.sim.furniture.decor import carpet
 from avlmaps.sim.furniture.joinery import chance, count, draw, pick
 from avlmaps.sim.homes.clutter import set_at
-from avlmaps.sim.homes.furnish import Furnisher, Stood, footprint, hangs
+from avlmaps.sim.homes.furnish import Furnisher, Stood, footprint, hangs, wall_hung
 from avlmaps.sim.homes.polygons import middle
 from avlmaps.sim.homes.seats import seat_round
 
@@ -65,20 +65,26 @@ def _screen(f: Furnisher) -> Stood | None:
     if not chance(f.rng, 0.85):
         return None
     cabinet = f.stand("tv cabinet", 0.85, 0.6, corner=0.1, at_middle=0.6)
-    tv = f.new("tv")
-    if tv is None:
-        return cabinet
-    if hangs(tv):
-        near = cabinet.centre if cabinet is not None else None
-        sides = None
-        if cabinet is not None:
-            sides = [s for s in f.ground.sides if abs(np.cos(s.heading_rad - cabinet.place.heading_rad) - 1) < 1e-6]
-        low = cabinet.foot.high_m + 0.15 if cabinet is not None else 0.8
-        return f.hang(tv, (low, low + 0.35), sides, near=near) or cabinet
-    if cabinet is not None:
+    if cabinet is not None and chance(f.rng, 0.7):
         set_at(f, cabinet, "tv", 0.35, 0.5)
         return cabinet
-    return None
+    tv = f.new("tv", wall_hung if chance(f.rng, 0.8) else _self_standing)
+    if tv is None or not hangs(tv):
+        return cabinet if tv is None else f.along(tv, front_m=0.6) or cabinet
+    near = cabinet.centre if cabinet is not None else None
+    sides = None
+    if cabinet is not None:
+        sides = [s for s in f.ground.sides if np.cos(s.heading_rad - cabinet.place.heading_rad) > 0.999]
+    low = cabinet.foot.high_m + 0.15 if cabinet is not None else 0.8
+    return f.hang(tv, (low, low + 0.35), sides, near=near) or cabinet
+
+
+def _self_standing(family: str) -> bool:
+    return family in ("on a rolling stand", "rear projection")
+
+
+def _tall_lamp(family: str) -> bool:
+    return family in ("shade on pole", "tripod", "arc", "torchiere", "paper column", "many heads")
 
 
 def _facing(f: Furnisher, piece: Piece, screen: Stood) -> Stood | None:
@@ -100,7 +106,7 @@ def _sofa_corner(f: Furnisher, sofa: Stood) -> None:
     if chance(rng, 0.6):
         under(f, sofa.centre + (sofa.foot.half[0] + 0.6) * ahead, sofa.place.heading_rad,
               (draw(rng, 1.4, 2.2), draw(rng, 1.8, 3.0)))  # fmt: skip
-    if chance(rng, 0.5) and (lamp := f.new("lamp")) is not None and not hangs(lamp) and lamp.mesh.high[2] > 1.0:
+    if chance(rng, 0.5) and (lamp := f.new("lamp", _tall_lamp)) is not None:
         f.beside(lamp, sofa, draw(rng, 0.03, 0.15))
     if chance(rng, 0.4) and (side := f.new("side table")) is not None:
         f.beside(side, sofa, draw(rng, 0.02, 0.1))

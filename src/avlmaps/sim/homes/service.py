@@ -2,10 +2,16 @@
 
 import numpy as np
 
+from avlmaps.sim.furniture import Piece
 from avlmaps.sim.furniture.joinery import chance, count, draw, pick
-from avlmaps.sim.homes.furnish import Furnisher, Stood, footprint, hangs
+from avlmaps.sim.homes.clutter import set_at
+from avlmaps.sim.homes.furnish import Furnisher, Stood, floor_standing, footprint, wall_hung
 from avlmaps.sim.homes.rooms import dining_place, several
 from avlmaps.sim.homes.seats import seat_round
+
+
+def _let_in(family: str) -> bool:
+    return family in ("counter single bowl", "counter double bowl")
 
 
 def kitchen(f: Furnisher) -> None:
@@ -47,12 +53,12 @@ def _above(f: Furnisher, fitted: list[Stood]) -> None:
         return
     for stood in [s for s in fitted if s.piece.category in ("kitchen counter", "dishwasher", "washing machine")]:
         for _ in range(3):
-            cabinet = f.new("kitchen cabinet")
-            if cabinet is not None and hangs(cabinet):
+            cabinet = f.new("kitchen cabinet", wall_hung)
+            if cabinet is not None:
                 _over(f, cabinet, stood, low)
 
 
-def _over(f: Furnisher, piece, stood: Stood, z: float) -> Stood | None:
+def _over(f: Furnisher, piece: Piece, stood: Stood, z: float) -> Stood | None:
     foot = footprint(piece.mesh)
     if z + foot.high_m > f.height_m - 0.03:
         piece = type(piece)(piece.mesh.scaled(1, 1, max((f.height_m - 0.05 - z) / foot.high_m, 0.4)), (), (),
@@ -81,9 +87,18 @@ def _clear_of_holes(f: Furnisher, centre: np.ndarray, half_m: float, low: float,
 
 
 def _sink(f: Furnisher) -> None:
-    """Stand a sink where there is room for one of its own; counters mostly have theirs set in."""
-    if not any(stood.piece.category == "sink" for stood in f.stood) and chance(f.rng, 0.6):
-        f.insist("sink", 0.45, tries=2)
+    """Set a sink into a counter, or stand one of its own where there is room; sometimes a hob beside it."""
+    counters = [s for s in f.stood if s.piece.category == "kitchen counter"]
+    f.rng.shuffle(counters)  # type: ignore[arg-type]
+    sunk = any(set_at(f, s, "sink", 0.5, draw(f.rng, 0.1, 0.9), among=_let_in) for s in counters[:3])
+    if not sunk and not any(stood.piece.category == "sink" for stood in f.stood):
+        f.insist("sink", 0.45, tries=2, among=lambda name: name.startswith(("kitchen", "steel", "trough")))
+    if chance(f.rng, 0.25) and counters:
+        set_at(f, counters[-1], "stove", 0.5, draw(f.rng, 0.0, 1.0), among=lambda name: name.startswith("counter"))
+
+
+def _for_bathrooms(family: str) -> bool:
+    return not family.startswith(("kitchen", "steel", "counter", "trough"))
 
 
 def bathroom(f: Furnisher) -> None:
@@ -101,12 +116,13 @@ def bathroom(f: Furnisher) -> None:
         order.reverse()
     basin = None
     for category in order:
-        stood = f.insist(category, 0.35, corner=0.8 if category in ("bathtub", "shower") else 0.4)
+        among = _for_bathrooms if category == "sink" else floor_standing
+        stood = f.insist(category, 0.35, corner=0.8 if category in ("bathtub", "shower") else 0.4, among=among)
         basin = stood if category == "sink" else basin
-    if basin is not None and (mirror := f.new("mirror")) is not None and hangs(mirror):
+    if basin is not None and (mirror := f.new("mirror", wall_hung)) is not None:
         _over(f, mirror, basin, draw(rng, 1.15, 1.35))
     if large and chance(rng, 0.25):
-        f.stand("sink", 1.0, 0.4)
+        f.stand("sink", 1.0, 0.4, among=_for_bathrooms)
     several(f, {"washing machine": 0.3 * large, "towel": 0.8, "radiator": 0.25, "laundry basket": 0.35 * large,
                 "trash can": 0.5, "cabinet": 0.25 * large, "wall shelf": 0.3, "plant": 0.15, "water heater": 0.15,
                 "stool": 0.1,

@@ -64,6 +64,8 @@ def looks_of(rng: np.random.Generator, room: Room, home: Looks | None) -> Looks:
         wall_kind = "tile"
     elif chance(rng, 0.6):
         wall_kind = "plaster"
+    if home is None:
+        wall_kind = pick(rng, ("plaster", "plaster", "painted", "wallpaper"))  # what most rooms have
     plain = wall_kind in ("plaster", "painted")
     wall = surface(wall_kind, rng, _pale(rng) if plain else None)
     floor = surface(floor_kind, rng)
