@@ -46,7 +46,7 @@ def built(walk: Path) -> Path:
     """The map of the walk, built from the command line."""
     out = walk.parent / "room.avlmap"
     with pytest.raises(SystemExit) as stop:
-        main(["build", str(walk), "--out", str(out), "--voxel-size-m", "0.1"])
+        main(["build", str(walk), "--out", str(out), "--voxel-size-m", "0.1", "--profile", "colours"])
     assert stop.value.code == 0
     return out
 

@@ -202,7 +202,7 @@ def test_what_is_kept_of_a_keyframe_fits_together() -> None:
     keyframes, state = perceive_keyframes(
         recording,
         chosen,
-        profile("embedded"),
+        profile("colours"),
         np.random.default_rng(0),
         settings=KeyframeSettings(thumbnail_width_px=64),
     )
@@ -233,7 +233,7 @@ def test_a_profile_with_views_gives_area_features_and_one_without_keypoints_none
 
 
 def test_no_keyframes_are_a_map_without_pictures() -> None:
-    keyframes, _ = perceive_keyframes(RoomWalk(), [], profile("embedded"), np.random.default_rng(0))
+    keyframes, _ = perceive_keyframes(RoomWalk(), [], profile("colours"), np.random.default_rng(0))
     assert len(keyframes) == 0
     assert keyframes.world_from_camera.shape == (0, 4, 4)
     np.testing.assert_array_equal(keyframes.offsets, [0])
@@ -241,7 +241,7 @@ def test_no_keyframes_are_a_map_without_pictures() -> None:
 
 def test_keypoints_that_are_known_already_are_not_looked_for_again() -> None:
     """Resumed and undisturbed builds differ in which keypoints are at hand; the map must not."""
-    recording, used = RoomWalk(), profile("embedded")
+    recording, used = RoomWalk(), profile("colours")
     frame = recording.frame(0)
     state = used.place_encoder().fit([used.local_encoder().encode(frame.rgb)], np.random.default_rng(0))
     fresh = see_keyframe(frame, used, state)

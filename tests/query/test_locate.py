@@ -25,7 +25,7 @@ def rng() -> np.random.Generator:
 
 @pytest.fixture(scope="module")
 def stored() -> MapOfPictures:
-    return map_of(WALK, profile("embedded"), rng())
+    return map_of(WALK, profile("colours"), rng())
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_the_focal_length_is_kept_where_the_caller_is_sure(stored: MapOfPictures
 def test_the_pose_is_that_of_the_camera_that_took_the_photo() -> None:
     """With a colour camera beside the depth camera, whose poses the recording holds."""
     recording = RoomWalk(frames=8, turn=0.3, rig=Rig(CAMERA, Pinhole(290.0, 290.0, 160.0, 120.0, 320, 240), APART))
-    apart = map_of(recording, profile("embedded"), rng())
+    apart = map_of(recording, profile("colours"), rng())
     frame = recording.frame(5)
     found = locate(apart, frame.rgb, None, rng())
     assert_at(found, frame.world_from_camera @ inverse(APART), cm=1.0)
@@ -148,7 +148,7 @@ def test_a_map_without_any_depth_locates_nothing(stored: MapOfPictures, photo: n
 
 
 def test_one_keyframe_is_enough_for_a_map(stored: MapOfPictures) -> None:
-    single = map_of(RoomWalk(frames=1), profile("embedded"), rng())
+    single = map_of(RoomWalk(frames=1), profile("colours"), rng())
     assert_at(locate(single, WALK.frame(0).rgb, None, rng()), WALK.world_from_camera[0])
 
 

@@ -108,8 +108,20 @@ def profile(name: str) -> Profile:
 
 register_profile(
     Profile(
-        name="embedded",
+        name="colours",
         pixels="colours",
+        sounds="embedded",
+        local="rootsift",
+        place="vlad",
+        matcher="mutual-ratio",
+        about="objects by their colour alone: the quickest, and no network for pictures",
+    )
+)
+register_profile(
+    Profile(
+        name="embedded",
+        pixels="embedded",
+        views="embedded",
         sounds="embedded",
         local="rootsift",
         place="vlad",

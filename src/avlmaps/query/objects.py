@@ -246,10 +246,10 @@ def object_factor(
         QueryError: the encoder understands nothing of the word.
     """
     tint = tint_of(part.query) if rgb is not None and isinstance(encoder, NamedPixelEncoder) else None
-    asked = Asked.of(encoder, tint.thing if tint else part.query)
-    understood = f"{tint.text} {asked.understood}" if tint and asked.understood else asked.understood
     if tint and rgb is not None and not tint.thing:
         return colour_factor(space, rgb, tint, part, settings, heat)
+    asked = Asked.of(encoder, tint.thing if tint else part.query)
+    understood = f"{tint.text} {asked.understood}" if tint and asked.understood else asked.understood
     if not len(asked.rows) and isinstance(encoder, NamedPixelEncoder):
         note = f"the pixel encoder knows nothing like {part.query!r}"
         nothing = np.zeros(0, np.int64), np.zeros(0, np.float32), False, "", note
@@ -263,7 +263,7 @@ def object_factor(
     pieces = object_pieces(space, feature, encoder, rivals, asked, settings)
     if tint is not None and rgb is not None:
         pieces = replace(pieces, confidence=pieces.confidence * tinted_share(rgb, pieces.mask, pieces.instance, tint))
-    best = float(pieces.confidence.max(initial=0.0))
+    best = float(pieces.confidence.max(initial=0.0)) if tint else pieces.best
     note = "" if best >= 0.5 else _absence(part.query, len(pieces.mask), pieces.won, best)
     if understood and understood != part.query.strip().lower():
         note = f"understood only {understood!r} of {part.query!r}" + ("; " + note if note else "")
@@ -302,6 +302,7 @@ class Pieces:
         mean_probability: of each thing: the mean of its voxels' squared scores (for an encoder of names: p).
         confidence: how sure it is that each is what was asked for.
         won: how many voxels the word won before specks were left out.
+        best: highest confidence before that.
     """
 
     mask: Bool[np.ndarray, " n"]
@@ -309,6 +310,7 @@ class Pieces:
     mean_probability: Float32[np.ndarray, " i"]
     confidence: Float32[np.ndarray, " i"]
     won: int
+    best: float
 
 
 def object_pieces(
@@ -332,6 +334,7 @@ def object_pieces(
     won = int(mask.sum())
     instance = instances_of(space, mask, settings.link_m)
     confidence = confidence_of(mask, instance)
+    best = float(confidence.max(initial=0.0))
     mask, instance, confidence = _without_specks(mask, instance, confidence, settings.least_confidence)
     joined = joined_pieces(space.level(space.centres[mask]), instance, settings.link_m, settings.join_m)
     if len(confidence) > joined.max(initial=-1) + 1:
@@ -339,7 +342,8 @@ def object_pieces(
         confidence = confidence_of(mask, instance)
     mean = np.bincount(instance, weights=np.square(score[mask]), minlength=len(confidence)).astype(np.float64)
     mean /= np.maximum(np.bincount(instance, minlength=len(confidence)), 1)
-    return Pieces(mask, instance, mean.astype(np.float32), confidence, won)
+    best = max(best, float(confidence.max(initial=0.0)))
+    return Pieces(mask, instance, mean.astype(np.float32), confidence, won, best)
 
 
 def _without_specks(
