@@ -20,7 +20,7 @@ def test_build_and_info_tell_the_contracts_keys(built: Path, answer) -> None:
     told = answer("info", built)
     assert {"frames", "keyframes", "voxels", "sounds", "profile", "bytes", "elapsed_s"} <= told.keys()
     assert told["frames"] == 24
-    assert told["profile"] == "embedded"
+    assert told["profile"] == "colours"
     assert told["bytes"] > 0
     (sound,) = told["sounds"]
     assert {"onset_s", "offset_s", "position"} <= sound.keys()

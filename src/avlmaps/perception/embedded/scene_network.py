@@ -141,7 +141,9 @@ def load_network() -> SceneNetwork:
             f"The embedded pixel encoder's weights cannot be read ({fault}); install the package again, or make them "
             "with 'python -m training.pixels'."
         ) from fault
-    return SceneNetwork(weights, notes, sha256(weights + about).hexdigest())
+    # What makes the features is in the checksum; how they are read may change, and old maps can still be asked.
+    made_by = msgspec.structs.replace(notes, called={}, kinds={}, instances=InstanceNotes(), note="")
+    return SceneNetwork(weights, notes, sha256(weights + msgspec.json.encode(made_by)).hexdigest())
 
 
 def at_working_size(
