@@ -8,15 +8,18 @@ from those that are not (area under the ROC curve). Truth: boxes of things, of w
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from avlmaps.bench.intervals import wilson
+from avlmaps.core.progress import progress
 from avlmaps.sim.scene import SceneObject
 
 if TYPE_CHECKING:
+    from avlmaps.bench.indexing import IndexingSettings
     from avlmaps.query.avlmap import AVLMap
 
 STRUCTURE = ("wall", "floor", "ceiling", "column", "stairs", "railing")
@@ -26,6 +29,8 @@ REACH_M = 0.5
 FEWEST_VOXELS = 15
 SMALLEST_M = 0.3
 _MOSTLY, _A_QUARTER = 0.5, 0.25
+# What scenes from files call things, where two names stand for one kind of thing.
+COUNTS_AS = {"picture frame": "picture", "rug": "carpet", "couch": "sofa", "fridge": "refrigerator", "television": "tv"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +131,37 @@ def _distance(position: Sequence[float], things: Sequence[SceneObject]) -> float
     place = np.array(position)
     gaps = [np.maximum(np.array(t.low) - place, 0) + np.maximum(place - np.array(t.high), 0) for t in things]
     return float(min(np.linalg.norm(gap) for gap in gaps))
+
+
+def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, dict[str, list]]:
+    """Map scenes, or take the maps that the suite ``indexing`` left in the same folder, and measure each.
+
+    Args:
+        settings: which scenes, how they are recorded, with which models they are mapped.
+        out: recordings and maps are kept in its folder ``work``.
+    """
+    from avlmaps.bench.indexing.prepared import SceneJob, Workplace
+    from avlmaps.bench.indexing.runs import IndexingSettings
+    from avlmaps.sim.scenes import open_scene
+
+    settings = settings or IndexingSettings()
+    figures = []
+    for spec in progress(settings.scenes, "measuring", unit="scene"):
+        place = Workplace(
+            SceneJob(spec, settings.recorded, settings.sounds, settings.profile, out / "work"), open_scene
+        )
+        figures.append(measure(place.asked, place.truth.objects, COUNTS_AS, spec))
+    missed = {"columns": ["scene", "category", "first goal, m from a true one"], "rows": _missed(figures)}
+    return {"objects found by their names": table_of(figures), "categories whose first goal is elsewhere": missed}
+
+
+def _missed(scenes: Sequence[ObjectFigures]) -> list[list[str]]:
+    return [
+        [scene.scene, category, f"{distance:.2f}" if np.isfinite(distance) else "none"]
+        for scene in scenes
+        for category, distance in sorted(scene.reached.items())
+        if distance > REACH_M
+    ]
 
 
 def auroc(score: Float[np.ndarray, " n"], is_there: Bool[np.ndarray, " n"]) -> float:

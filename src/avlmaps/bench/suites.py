@@ -28,7 +28,7 @@ class Asked:
         scenes: recordings with poses, for ``locate``.
         profile: which models are measured.
         seed: of what is drawn at random.
-        indexing: what the suite ``indexing`` is run on; its own defaults if None.
+        indexing: what the suites ``indexing`` and ``objects`` are run on; its own defaults if None.
     """
 
     sounds: Path | None = None
@@ -42,7 +42,7 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
     """Run a suite and write SUITE.json, SUITE.md and SUITE.png into ``out``.
 
     Args:
-        suite: ``words``, ``sounds``, ``segmentation``, ``locate`` or ``indexing``.
+        suite: ``words``, ``sounds``, ``segmentation``, ``locate``, ``objects`` or ``indexing``.
         asked: what it measures on.
         out: folder to write into.
 
@@ -53,8 +53,15 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
         from avlmaps.bench.indexing.suite import run_indexing
 
         return run_indexing(asked.indexing, out)
-    tables = _SUITES[suite](asked)
     scenes = [source.resolve().name for source in (asked.sounds, *asked.scenes) if source is not None]
+    if suite == "objects":
+        from avlmaps.bench.indexing import DEFAULT_SCENES
+        from avlmaps.bench.objects import run_objects
+
+        tables = run_objects(asked.indexing, out)
+        scenes = list(asked.indexing.scenes if asked.indexing else DEFAULT_SCENES)
+    else:
+        tables = _SUITES[suite](asked)
     answer = {
         "suite": suite,
         "scenes": scenes,

@@ -12,12 +12,12 @@ from avlmaps.cli.verbs import Verb
 if TYPE_CHECKING:
     from avlmaps.bench.indexing import IndexingSettings
 
-Suite = Literal["words", "sounds", "segmentation", "locate", "indexing"]
+Suite = Literal["words", "sounds", "segmentation", "locate", "objects", "indexing"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Indexing:
-    """How the suite indexing makes, records and asks its scenes."""
+    """How the suites indexing and objects make, record and ask their scenes."""
 
     hearing: Literal["overlay", "acoustic"] = "overlay"
     """How sounds reach the microphone: mixed in as the paper did, or through rooms and doorways."""
@@ -42,6 +42,7 @@ class Bench(Verb):
     words: household phrases kept out of training; needs nothing.
     sounds, segmentation: need --sounds, a folder of clips with an index.csv.
     locate: needs --scenes, recordings with poses; half of the frames become the map, the others are asked.
+    objects: are things where the map says, in twelve held-out homes or in --scenes by name; shares its maps with indexing.
     indexing: objects told apart by sounds, photos and areas, in twelve held-out homes or in --scenes by name.
     """
 
@@ -50,7 +51,7 @@ class Bench(Verb):
     sounds: Path | None = None
     """Folder of sound clips with an index.csv (path, category, fold)."""
     scenes: tuple[str, ...] = ()
-    """Recordings with poses (locate); names of scenes such as house:1000000:held-out (indexing)."""
+    """Recordings with poses (locate); names of scenes such as house:1000000:held-out (objects, indexing)."""
     profile: str = "embedded"
     """Which models are measured."""
     out: Path = Path("bench_out")
@@ -58,13 +59,13 @@ class Bench(Verb):
     seed: int = 0
     """Seed of what is drawn at random."""
     indexing: Annotated[Indexing, OmitArgPrefixes] = field(default_factory=Indexing)
-    """Of the suite indexing alone."""
+    """Of the suites indexing and objects."""
 
     def run(self) -> None:
         """Measure, write the tables, print them."""
         from avlmaps.bench.suites import Asked, run_suite
 
-        indexing = self.indexing_settings() if self.suite == "indexing" else None
+        indexing = self.indexing_settings() if self.suite in ("indexing", "objects") else None
         scenes = () if indexing else tuple(map(Path, self.scenes))
         asked = Asked(self.sounds, scenes, self.profile, self.seed, indexing)
         answer = run_suite(self.suite, asked, self.out)
