@@ -1,7 +1,8 @@
-"""Walk a room, hear it, map it, ask it; how far each answer is off, the truth tells afterwards."""
+"""Make a home, drive through it, hear it, map it, ask it; how far each answer is off, the truth tells afterwards."""
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -10,20 +11,40 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from avlmaps.core.errors import MapError
-from avlmaps.core.progress import say
-from avlmaps.demo.report import write_report
-from avlmaps.recordings.audio import Sound
+from avlmaps.core.progress import progress, say
+from avlmaps.demo.questions import CLIP, MAP, PHOTO, Ask
 
 if TYPE_CHECKING:
+    from avlmaps.demo.evidence import Evidence
+    from avlmaps.demo.questions import PhotoView
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.question import Answer
-    from avlmaps.sim.record import Heard
-    from avlmaps.sim.room import Room
+    from avlmaps.recordings.types import Recording
+    from avlmaps.sim.recorder import RecordSettings
+    from avlmaps.sim.scene import Scene
 
 MARKER = ".avlmaps-demo"
 # A first goal within this distance of a true place, horizontally, is right (the paper's success radius).
 REACH_M = 1.0
-Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class DemoSettings:
+    """How large the demonstration is.
+
+    Attributes:
+        frames: at most so many are recorded.
+        size: columns and rows of the pictures.
+        sounds: so many are placed, if the walk has room for them.
+        workers: processes that draw; 0 takes as many as there are cores.
+        moments: of the walk that the report shows.
+    """
+
+    frames: int = 560
+    size: tuple[int, int] = (320, 240)
+    sounds: int = 8
+    workers: int = 0
+    moments: int = 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,31 +52,27 @@ class Step:
     """One question of the demonstration and what became of it.
 
     Attributes:
-        title: the question as a person would put it.
-        command: the command that asks it.
+        ask: the question and its truth.
         answer: what the map said, as `avlmaps query --json` prints it.
         picture: file name of its plot, in the demonstration's folder.
-        truth: places that would be right, metres; empty where the right answer is that there is none.
     """
 
-    title: str
-    command: str
+    ask: Ask
     answer: dict[str, Any]
     picture: str
-    truth: tuple[Point, ...]
 
     @property
     def off_m(self) -> float | None:
         """Horizontal distance from the first goal to the nearest true place; None where there is none."""
-        if not self.truth or not self.answer["goals"]:
+        if not self.ask.truth or not self.answer["goals"]:
             return None
-        goal = np.array(self.answer["goals"][0]["position"][:2])
-        return float(np.linalg.norm(np.array(self.truth)[:, :2] - goal, axis=1).min())
+        goal = self.answer["goals"][0]["position"]
+        return min(box.distance_m(goal) for box in self.ask.truth)
 
     @property
     def right(self) -> bool:
         """Whether the answer is right: the place, or that there is none."""
-        if not self.truth:
+        if not self.ask.truth:
             return not self.answer["found"]
         return bool(self.answer["found"]) and self.off_m is not None and self.off_m <= REACH_M
 
@@ -74,6 +91,7 @@ class DemoReport:
 
     Attributes:
         out: its folder.
+        scene: the home's name, as `avlmaps record --scene` takes it.
         steps: the questions.
         built: what `avlmaps build --json` prints.
         located: the photo's pose error in cm and degrees, or None where it was not located.
@@ -81,6 +99,7 @@ class DemoReport:
     """
 
     out: Path
+    scene: str
     steps: tuple[Step, ...]
     built: dict[str, Any]
     located: tuple[float, float] | None
@@ -92,12 +111,12 @@ class DemoReport:
             "out": str(self.out),
             "report": str(self.out / "report.html"),
             "recording": str(self.out / "recording"),
-            "map": str(self.out / "room.avlmap"),
+            "map": str(self.out / MAP),
             "voxels": self.built["voxels"],
             "sounds": len(self.built["sounds"]),
             "photo_error": None if self.located is None else {"cm": self.located[0], "deg": self.located[1]},
             "questions": [
-                {"question": s.title, "found": s.answer["found"], "right": s.right, "off_m": s.off_m}
+                {"question": s.ask.title, "found": s.answer["found"], "right": s.right, "off_m": s.off_m}
                 for s in self.steps
             ],
             "seconds": self.seconds,
@@ -105,43 +124,68 @@ class DemoReport:
 
     def lines(self) -> list[str]:
         """Return it as a person reads it."""
-        lines = [f"{'right' if step.right else 'WRONG'}  {step.title}  ->  {step.said}" for step in self.steps]
+        lines = [f"{'right' if step.right else 'WRONG'}  {step.ask.title}  ->  {step.said}" for step in self.steps]
         if self.located is not None:
             lines.append(f"photo located within {self.located[0]:.1f} cm and {self.located[1]:.2f} degrees")
         return [*lines, f"look at {self.out / 'report.html'}"]
 
 
-def run_demo(out: Path, seed: int = 0) -> DemoReport:
+def run_demo(
+    out: Path, seed: int = 0, scene: "Scene | None" = None, settings: DemoSettings | None = None
+) -> DemoReport:
     """Run the whole demonstration into a folder; an earlier one there is replaced, anything else is left alone.
+
+    Args:
+        out: the folder.
+        seed: another seed takes another home, walk, sounds and questions.
+        scene: a building to walk through instead of the home that the seed stands for.
+        settings: how large it is.
 
     Raises:
         MapError: the folder holds something that is no demonstration.
     """
+    from avlmaps.demo.evidence import Evidence
+    from avlmaps.demo.home import choose_home
+    from avlmaps.demo.report import write_report
     from avlmaps.maps.build import build_map, describe
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.recordings.open import open_recording
-    from avlmaps.sim.record import record_room
-    from avlmaps.sim.room import Room
 
     _make_room(out)
+    settings = settings or DemoSettings()
     seconds: dict[str, float] = {}
-    rng = np.random.default_rng(seed)
-    room = Room()
-    begin = perf_counter()
-    say("A robot walks through a furnished room with an RGB-D camera and a microphone.")
-    heard = record_room(room, out / "recording", _sources(room, rng), rng)
-    seconds["record"], begin = round(perf_counter() - begin, 1), perf_counter()
-    say("What it saw and heard becomes a map.")
-    stored = build_map(open_recording(out / "recording"), out / "room.avlmap")
-    seconds["build"], begin = round(perf_counter() - begin, 1), perf_counter()
-    say("The map is asked.")
-    asked = AVLMap(stored)
-    photo, located = _take_photo(room, asked, out)
-    steps = _ask_all(asked, room, heard, photo, out, rng)
-    seconds["ask"] = round(perf_counter() - begin, 1)
-    report = DemoReport(out, tuple(steps), describe(stored), located, seconds)
-    write_report(report, heard)
+    for_questions, for_photos, for_clip = np.random.default_rng(seed).spawn(3)
+    with _stage("home", seconds, "A home is built and furnished."):
+        scene = scene or choose_home(seed)
+    with _stage("record", seconds, f"A robot with a depth camera and a microphone drives through {_rooms(scene)}."):
+        recording = _record(scene, out, settings, seed)
+    with _stage("build", seconds, "What it saw and heard becomes a map."):
+        stored = build_map(recording, out / MAP)
+    with _stage("choose", seconds, "Questions are chosen by what is truly there."):
+        evidence = Evidence.of(recording)
+        asks, photo = _choose(scene, recording, evidence, out, for_questions, for_photos)
+        _write_clip(asks, out, for_clip)
+    with _stage("ask", seconds, "The map is asked."):
+        asked = AVLMap(stored)
+        answered = [
+            _answer(asked, ask, number, out) for number, ask in enumerate(progress(asks, "asking", unit="question"), 1)
+        ]
+        located = None if photo is None else _located(asked, photo, out)
+    steps = tuple(step for step, _ in answered)
+    report = DemoReport(out, scene.name, steps, describe(stored), located, seconds)
+    with _stage("report", seconds, "A page with pictures is written."):
+        write_report(
+            report, scene, recording, asked, evidence, photo, [answer for _, answer in answered], settings.moments
+        )
     return report
+
+
+@contextmanager
+def _stage(name: str, seconds: dict[str, float], sentence: str) -> Iterator[None]:
+    """Tell what begins, and keep how long it took."""
+    say(sentence)
+    begin = perf_counter()
+    yield
+    seconds[name] = round(perf_counter() - begin, 1)
 
 
 def _make_room(out: Path) -> None:
@@ -152,89 +196,80 @@ def _make_room(out: Path) -> None:
     (out / MARKER).touch()
 
 
-def _synthesised(category: str, rng: np.random.Generator) -> Sound:
-    from avlmaps.sim.synthesis import RATE_HZ, synthesise
-
-    return Sound(synthesise(category, rng), RATE_HZ)
+def _rooms(scene: "Scene") -> str:
+    return f"{len(scene.areas)} rooms ({scene.name})" if scene.areas else scene.name
 
 
-def _thing(room: "Room", category: str, colour: str, nearest_to: tuple[float, float]) -> Point:
-    """Return the centre of the thing of that category and colour that is nearest to a place."""
-    candidates = [t.centre for t in room.things if t.category == category and t.colour == colour]
-    return min(candidates, key=lambda c: (c[0] - nearest_to[0]) ** 2 + (c[1] - nearest_to[1]) ** 2)
+def record_settings(scene: "Scene", settings: DemoSettings) -> "RecordSettings":
+    """Return how a home is recorded: a Kinect's faults, and sounds that reach the microphone through the rooms."""
+    from avlmaps.demo.home import sounds_of
+    from avlmaps.sim.recorder import RecordSettings
+
+    return RecordSettings(
+        size=settings.size, sensor="kinect", hearing="acoustic", categories=sounds_of(scene), sources=settings.sounds,
+        max_frames=settings.frames, semantic=True, workers=settings.workers,
+    )  # fmt: skip
 
 
-def _sources(room: "Room", rng: np.random.Generator) -> list[Any]:
-    """Place a source at five things; two of the yellow chairs and two red cabinets are told apart by sound only."""
-    from avlmaps.sim.record import Source
+def _record(scene: "Scene", out: Path, settings: DemoSettings, seed: int) -> "Recording":
+    from avlmaps.recordings.open import open_recording
+    from avlmaps.sim.recorder import record_scene
 
-    placed = (
-        ("glass breaking", _thing(room, "table", "brown", (0, 0))),
-        ("microwave beep", _thing(room, "fridge", "white", (0, 0))),
-        ("keyboard typing", _thing(room, "chair", "yellow", (9, 2))),
-        ("snoring", _thing(room, "sofa", "blue", (6, 6))),
-        ("doorbell", _thing(room, "bookcase", "brown", (0, 5))),
-    )
-    return [Source(category, _synthesised(category, rng), place) for category, place in placed]
+    record_scene(scene, out / "recording", record_settings(scene, settings), seed)
+    return open_recording(out / "recording")
 
 
-def _take_photo(room: "Room", asked: "AVLMap", out: Path) -> tuple[Path, tuple[float, float] | None]:
-    """Take a photo from a place where the robot never stood, and measure how well the map locates it."""
+def _choose(
+    scene: "Scene",
+    recording: "Recording",
+    evidence: "Evidence",
+    out: Path,
+    for_questions: np.random.Generator,
+    for_photos: np.random.Generator,
+) -> "tuple[list[Ask], PhotoView | None]":
+    """Choose the questions, and take the photo that one of them asks with."""
     import cv2
 
-    from avlmaps.core.poses import rotation_angle_rad
-    from avlmaps.sim.raycast import render
-    from avlmaps.sim.record import CAMERA
+    from avlmaps.demo.photos import photo_views
+    from avlmaps.demo.questions import choose_questions
+    from avlmaps.sim.render import Renderer
 
-    truth = room.pose(7.0, 3.1, np.deg2rad(-70.0), np.deg2rad(8.0))
-    view = render(room.scene, CAMERA, truth)
-    photo = out / "photo.png"
-    cv2.imwrite(str(photo), view.rgb[..., ::-1])
-    pose = asked.locate(view.rgb).world_from_camera
-    if pose is None:
-        return photo, None
-    error_cm = 100.0 * float(np.linalg.norm(pose[:3, 3] - truth[:3, 3]))
-    return photo, (error_cm, float(np.rad2deg(rotation_angle_rad(pose, truth))))
+    renderer, camera = Renderer(scene), recording.rig.rgb
+    poses = np.asarray(recording.world_from_camera)
+    photos = photo_views(scene, renderer, camera, evidence, poses, for_photos)
+    asks, photo = choose_questions(evidence, photos, out, for_questions)
+    if photo is not None:
+        cv2.imwrite(str(out / PHOTO), renderer.render(camera, photo.world_from_camera).rgb[..., ::-1])
+    return asks, photo
 
 
-def _ask_all(
-    asked: "AVLMap", room: "Room", heard: "Sequence[Heard]", photo: Path, out: Path, rng: np.random.Generator
-) -> list[Step]:
+def _write_clip(asks: list[Ask], out: Path, rng: np.random.Generator) -> None:
+    """Make another recording of the sound that is asked for by a clip."""
     import soundfile
 
-    from avlmaps.language.sentence import parse_sentence
-    from avlmaps.query.question import Modality, Part, Question
+    from avlmaps.sim.hearing import Synthesised
 
-    clip = out / "another_microwave.wav"
-    sound = _synthesised("microwave beep", rng)
-    soundfile.write(clip, sound.samples, sound.rate_hz)
-    at = {event.category: event.track for event in heard}
-    red = tuple(t.centre for t in room.things if t.colour == "red")
-    east_chair, west_chair = _thing(room, "chair", "yellow", (9, 2)), _thing(room, "chair", "yellow", (1, 2))
+    for ask in asks:
+        if ask.kind == "clip":
+            _, sound = Synthesised().draw(ask.about, rng)
+            soundfile.write(out / CLIP, sound.samples, sound.rate_hz)
 
-    def step(title: str, question: Question, command: str, truth: Sequence[Point]) -> Step:
-        number = len(steps) + 1
-        answer: Answer = asked.ask(question)
-        picture = f"question_{number}.png"
-        if answer.heat is not None:
-            answer.heat.plot(out / picture)
-        return Step(title, command, answer.to_json(), picture, tuple(truth))
 
-    def sentence(text: str, truth: Sequence[Point]) -> Step:
-        return step(text, parse_sentence(text), f'avlmaps query room.avlmap "{text}"', truth)
+def _answer(asked: "AVLMap", ask: Ask, number: int, out: Path) -> "tuple[Step, Answer]":
+    answer = asked.ask(ask.question)
+    picture = f"question_{number}.png"
+    if answer.heat is not None:
+        answer.heat.plot(out / picture)
+    return Step(ask, answer.to_json(), picture), answer
 
-    def parts(title: str, options: str, truth: Sequence[Point], *named: Part) -> Step:
-        return step(title, Question.of(named), f"avlmaps query room.avlmap {options}", truth)
 
-    steps: list[Step] = []
-    steps.append(sentence("the red cabinet", red))
-    steps.append(sentence("the yellow chair near the sound of typing on a keyboard", [east_chair]))
-    steps.append(sentence("the yellow chair near the sound of breaking glass", [west_chair]))
-    clip_part = Part(Modality.SOUND, str(clip), is_file=True)
-    title = "where a sound like this clip was heard (another microwave)"
-    steps.append(parts(title, f"--sound-clip {clip.name}", at["microwave beep"], clip_part))
-    chair, picture = Part(Modality.OBJECT, "yellow chair"), Part(Modality.IMAGE, str(photo), is_file=True)
-    options = f'--object "yellow chair" --image {photo.name}'
-    steps.append(parts("the yellow chair near this photo", options, [east_chair], chair, picture))
-    steps.append(sentence("where the chainsaw was heard", []))
-    return steps
+def _located(asked: "AVLMap", photo: "PhotoView", out: Path) -> tuple[float, float] | None:
+    """Return how far off the map takes the photo's camera to be, cm and degrees; None where it is not located."""
+    from avlmaps.core.poses import rotation_angle_rad
+    from avlmaps.query.images import read_picture
+
+    pose, truth = asked.locate(read_picture(out / PHOTO)).world_from_camera, photo.world_from_camera
+    if pose is None:
+        return None
+    off_cm = 100.0 * float(np.linalg.norm(pose[:3, 3] - truth[:3, 3]))
+    return off_cm, float(np.rad2deg(rotation_angle_rad(pose, truth)))
