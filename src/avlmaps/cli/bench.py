@@ -42,7 +42,7 @@ class Bench(Verb):
     words: household phrases kept out of training; needs nothing.
     sounds, segmentation: need --sounds, a folder of clips with an index.csv.
     locate: needs --scenes, recordings with poses; half of the frames become the map, the others are asked.
-    objects: are things where the map says, in twelve held-out homes or in --scenes by name; shares its maps with indexing.
+    objects: are things where the map says, in the same scenes as indexing, whose maps it shares.
     indexing: objects told apart by sounds, photos and areas, in twelve held-out homes or in --scenes by name.
     """
 
