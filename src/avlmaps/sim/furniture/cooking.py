@@ -55,8 +55,10 @@ def _grate(x: float, y: float, z: float, size: float, look: Material) -> list[Me
 
 def _coil(x: float, y: float, z: float, size: float, look: Material, metal: Material) -> list[Mesh]:
     """Return an electric coil in its pan."""
-    rings = [tube([(*(circle(size * s, 14)[k] + (x, y)).tolist(), z + 0.012) for k in range(14)], 0.006, look, 4,
-                  closed=True) for s in (0.9, 0.5)]  # fmt: skip
+    rings = []
+    for share in (0.9, 0.5):
+        flat = circle(size * share, 12) + np.array((x, y))
+        rings.append(tube([(float(a), float(b), z + 0.012) for a, b in flat], 0.006, look, 3, closed=True))
     return [cylinder(x, y, z, size * 1.08, 0.006, metal, 14), *rings]
 
 
