@@ -23,12 +23,12 @@ class Verb:
 
 @dataclass(frozen=True, kw_only=True)
 class Demo(Verb):
-    """Walk a room, hear it, map it, ask it: the whole system in one command, with pictures and a report."""
+    """Drive through a home, hear it, map it, ask it: the whole system in one command, with a report.html."""
 
     out: Path = Path("demo_out")
     """Folder for the recording, the map, the pictures and report.html."""
     seed: int = 0
-    """Another seed places the sounds elsewhere."""
+    """Another seed takes another home, another drive, other sounds and questions."""
 
     def run(self) -> None:
         """Run the demonstration."""

@@ -120,8 +120,9 @@ def strip_of(
         count += np.bincount(category[category >= 0], minlength=len(names))
     share = count / max(int(count.sum()), 1)
     legend = tuple((names[i], _triple(colours[i]), float(share[i])) for i in np.argsort(-count, kind="stable"))
-    strips = [np.concatenate(row, axis=1) for row in rows]
-    return Strip(tuple(frame[0] for frame in frames), *strips, tuple(entry for entry in legend if entry[2] > 0.0))
+    colour, depth, seen = (np.concatenate(row, axis=1) for row in rows)
+    index = tuple(frame[0] for frame in frames)
+    return Strip(index, colour, depth, seen, tuple(entry for entry in legend if entry[2] > 0.0))
 
 
 def colour_of(name: str, number: int) -> tuple[int, int, int]:

@@ -150,7 +150,7 @@ def near_a_photo(
     """Ask for a thing of which there are several, by a photo that shows one; the caller writes that photo."""
     for near_m, margin_m in ((NEAR_M, MARGIN_M), (3.5, 0.8)):
         for photo in photos:
-            place = photo.world_from_camera[:3, 3]
+            place = photo.world_from_camera[:3, 3].tolist()
             for category, own in _furniture(evidence, used):
                 chosen = alone_near(evidence, own, place, near_m, margin_m)
                 if chosen is None or photo.share[chosen] < LEAST_PHOTO_SHARE:

@@ -215,11 +215,13 @@ def _verdict(report: "DemoReport") -> str:
     right = sum(step.right for step in report.steps)
     return (
         f"<h2>What it answered: {right} of {len(report.steps)} right</h2><p>The questions were chosen by rule from "
-        "what stands in the home, before the map was asked. An answer is right when its first goal lies within 1 m of a "
+        "what stands in the home, before the map was asked. An answer is right when its first goal lies "
+        "within 1 m of a "
         "true place, seen from above, or when the map says truly that there is none.</p>"
         '<p class="key"><span><svg viewBox="0 0 40 40"><g class="goal"><circle cx="20" cy="20" r="17"/></g></svg>'
         'goals, best first</span><span><svg viewBox="0 0 40 40"><circle class="truth" cx="20" cy="20" r="15"/></svg>'
-        'the truth</span><span><svg viewBox="0 0 40 40"><circle class="other" cx="20" cy="20" r="15"/></svg>others of the kind'
+        'the truth</span><span><svg viewBox="0 0 40 40"><circle class="other" cx="20" cy="20" '
+        'r="15"/></svg>others of the kind'
         "</span></p>"
     )
 
@@ -311,7 +313,8 @@ def _honest(report: "DemoReport", recording: "Recording") -> str:
         "<h2>What this is, and what it is not</h2>"
         "<p>The home, the drive, the pictures and the sounds are simulated. The furniture is of shape families that "
         "the networks never saw in training, and so is this home; the camera has the faults of a Kinect (noise that "
-        "grows with distance, holes at edges, blur), its poses are true, and sounds reach the microphone through the rooms, "
+        "grows with distance, holes at edges, blur), its poses are true, and sounds reach the microphone "
+        "through the rooms, "
         "with echo. The map is made by the very code that maps real recordings, with the small networks that ship with "
         "the package; they know about a hundred kinds of things and sixteen kinds of rooms. Six questions are a look, "
         "not a measurement: <code>avlmaps bench</code> measures, over many homes and with intervals.</p>"
