@@ -214,7 +214,7 @@ def beep(seconds: float = 1.0, hz: float = 1000.0) -> Sound:
 
 def sounding(position: tuple[float, float, float], onset_s: float, robot: tuple[float, ...], sound: Sound) -> Sounding:
     source = Source("microwave beep", position, -1, "beep", sound)
-    return Sounding(source, onset_s, onset_s + sound.duration_s, (robot[0], robot[1], robot[2]))
+    return Sounding(source, onset_s, onset_s + sound.duration_s, (float(robot[0]), float(robot[1]), float(robot[2])))
 
 
 def test_a_robot_that_stands_hears_the_clip_convolved_with_the_response() -> None:

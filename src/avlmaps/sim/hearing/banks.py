@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from avlmaps.sim.hearing.kinds import kind_of
 _LONGEST_S = 5.0
 
 
+@runtime_checkable
 class Bank(Protocol):
     """A collection of sounds by category."""
 

@@ -163,7 +163,7 @@ def _places(
     found: list[_Place] = []
     for category in kind.objects:
         own = [i for i, thing in enumerate(scene.objects) if thing.category == category]
-        at = [_Place(_mouth(scene, i, kind), int(i)) for i in rng.permutation(np.array(own, int))]
+        at = [_Place(_mouth(scene, int(i), kind), int(i)) for i in rng.permutation(np.array(own, int))]
         found += [place for place in at if _is_near(place, walk)]
         if found and category == kind.objects[0]:
             return found
