@@ -22,12 +22,15 @@ SPEED = {
     "Queries": "queries.py",
     "Locating a photo": "locate.py",
     "Keeping a map": "store.py",
+    "Drawing views": "render.py",
 }
 SUITES = {
     "words": "Words",
     "sounds": "Sounds",
     "segmentation": "Finding sounds in a track",
     "locate": "Where a photo was taken",
+    "objects": "Things by their names",
+    "indexing": "Things by sounds, photos and areas: the paper's Tables III to V",
 }
 INTRODUCTION = """# Benchmarks
 

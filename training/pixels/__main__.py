@@ -23,6 +23,8 @@ class Options:
     """Folder of the weights that ship."""
     minutes: float = 600.0
     """How long to train."""
+    start: Path | None = None
+    """Weights to begin with; training/pixels/start.npz are those that ship."""
     renderers: int = 1
     """Processes that render beside the training."""
 
@@ -46,7 +48,9 @@ def main(options: Options) -> None:
     module = [sys.executable, "-m", "training.pixels.worlds", "--out", str(first.out), "--step", str(options.renderers)]
     beside = [subprocess.Popen([*module, "--first-seed", str(10_000 + number)]) for number in range(options.renderers)]
     try:
-        fit.fit(fit.Options(shards=first.out, out=options.work / "network.pt", minutes=options.minutes))
+        fit.fit(
+            fit.Options(shards=first.out, out=options.work / "network.pt", minutes=options.minutes, start=options.start)
+        )
     finally:
         for process in beside:
             process.terminate()

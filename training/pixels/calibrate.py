@@ -10,7 +10,7 @@ import torch
 import tyro
 from torch import Tensor, nn
 from training.pixels.batches import Shards
-from training.pixels.export import load_network, write_onnx
+from training.pixels.export import load_network, write_onnx, write_start
 from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED
 from training.pixels.lexicon import CALLED, KINDS
 
@@ -31,6 +31,8 @@ class Options:
     """Rendered frames of held-out homes."""
     out: Path = Path("src/avlmaps/perception/embedded/weights")
     """Folder of rooms.onnx and rooms.json."""
+    start: Path = Path("training/pixels/start.npz")
+    """Where the weights are kept for a training that goes on from them."""
     count: int = 600
     """Frames to look at."""
     seed: int = 0
@@ -136,6 +138,7 @@ def calibrate(options: Options) -> dict[str, float]:
     told = figures(scores, bias, temperature)
     options.out.mkdir(parents=True, exist_ok=True)
     write_onnx(network, options.out / "rooms.onnx")
+    write_start(network, options.start)
     known = set(CATEGORIES) | set(ROOMS)
     notes = Notes(
         id="avlmaps/pixels-1",

@@ -17,6 +17,19 @@ def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
     return network.eval()
 
 
+def write_start(network: RoomNetwork, path: Path) -> None:
+    """Keep the weights, in half precision, so that another training can go on from them."""
+    arrays = {name: value.numpy() for name, value in network.state_dict().items()}
+    path.write_bytes(b"")
+    np.savez_compressed(path, **{n: a.astype(np.float16) if a.dtype == np.float32 else a for n, a in arrays.items()})
+
+
+def read_start(path: Path) -> dict[str, torch.Tensor]:
+    """Return the weights that ``write_start`` kept."""
+    with np.load(path, allow_pickle=False) as arrays:
+        return {n: torch.from_numpy(a.astype(np.float32) if a.dtype == np.float16 else a) for n, a in arrays.items()}
+
+
 def write_onnx(network: RoomNetwork, path: Path) -> None:
     """Write the network; its pictures may have any size that is a multiple of 16."""
     inputs = (torch.zeros(1, GEOMETRY, 64, 80), torch.zeros(1, COLOUR, 64, 80))

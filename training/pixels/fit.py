@@ -15,6 +15,7 @@ import torch
 import tyro
 from torch import Tensor, nn
 from training.pixels.batches import Batch, Shards, draw_batch
+from training.pixels.export import read_start
 from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED
 from training.pixels.network import RoomNetwork
 
@@ -40,7 +41,9 @@ class Options:
     seed: int = 0
     """Of windows and of the first weights."""
     resume: bool = False
-    """Go on from the checkpoint's weights."""
+    """Go on from the checkpoint."""
+    start: Path | None = None
+    """Begin with the weights of this file (``training/pixels/start.npz`` are those that ship) instead of random ones."""
     peer: Path | None = None
     """Checkpoint of another process that trains beside this one; both meet in the middle every minute."""
     widths: tuple[int, int, int, int] = (32, 64, 128, 192)
@@ -102,6 +105,8 @@ def fit(options: Options) -> None:
     rng = np.random.default_rng(options.seed)
     shards = Shards(options.shards)
     network = RoomNetwork(len(CATEGORIES), len(ROOMS), options.widths).to(device, memory_format=torch.channels_last)
+    if options.start is not None:
+        network.load_state_dict(read_start(options.start))
     if options.resume:
         network.load_state_dict(torch.load(options.out, map_location=device, weights_only=True)["last"])
     weight = torch.from_numpy(class_weights(shards, rng)).float().to(device)
