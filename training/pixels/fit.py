@@ -43,7 +43,7 @@ class Options:
     resume: bool = False
     """Go on from the checkpoint."""
     start: Path | None = None
-    """Begin with the weights of this file (``training/pixels/start.npz`` are those that ship) instead of random ones."""
+    """Begin with the weights of this file instead of random ones; ``training/pixels/start.npz`` are those that ship."""
     peer: Path | None = None
     """Checkpoint of another process that trains beside this one; both meet in the middle every minute."""
     widths: tuple[int, int, int, int] = (32, 64, 128, 192)
