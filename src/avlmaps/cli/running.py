@@ -49,12 +49,12 @@ def record(verb: "Record") -> dict[str, Any]:
     names = [*(thing.name for thing in scene.objects), None]  # an instance of -1 is no object
     events = [
         {
-            "onset_s": s.onset_s,
-            "offset_s": s.offset_s,
+            "onset_s": round(s.onset_s, 4),
+            "offset_s": round(s.offset_s, 4),
             "category": s.source.category,
             "clip": s.source.clip,
-            "position": list(s.robot),
-            "source": list(s.source.position),
+            "position": [round(value, 4) for value in s.robot],
+            "source": [round(value, 4) for value in s.source.position],
             "object": names[s.source.instance],
         }
         for s in made.heard
