@@ -43,7 +43,7 @@ def fits(scene: Scene) -> bool:
         for name in categories & set(FURNITURE)
     }
     in_two_rooms = [name for name, kinds in kinds_of_area.items() if len(kinds) >= 2]
-    return bool(spoken(categories)) and len(in_two_rooms) >= 2 and len(sounds_of(scene)) >= _FEWEST_SOUNDS
+    return bool(spoken(categories)) and len(in_two_rooms) >= 3 and len(sounds_of(scene)) >= _FEWEST_SOUNDS
 
 
 def sounds_of(scene: Scene) -> tuple[str, ...]:

@@ -6,16 +6,19 @@ from jaxtyping import Float
 from avlmaps.core.camera import Pinhole
 from avlmaps.demo.evidence import Evidence
 from avlmaps.demo.questions import PhotoView
+from avlmaps.sim.free_space import STRUCTURE
 from avlmaps.sim.render import Renderer
 from avlmaps.sim.scene import NOTHING, Scene
 from avlmaps.sim.views import random_views
 
-_TRIED = 60
+_TRIED = 150
 _OFF_THE_WALK_M = 0.4
 # The robot must have looked the same way from not too far: a wall's other side can be recognised by nobody.
 _LOOKED_FROM_M, _LOOKED_ALIKE_RAD = 2.0, np.deg2rad(45.0)
 _DEPTH_M = (1.0, 5.0)
 _STOREY_M = 1.5
+# A picture of a bare wall could be of any: so many things, walls not counted, fill so much of it each.
+_FEWEST_THINGS, _LEAST_SHARE = 4, 0.01
 
 
 def photo_views(
@@ -28,6 +31,7 @@ def photo_views(
 ) -> list[PhotoView]:
     """Return pictures that could be asked with: off the walk, looking at something that the walk looked at too."""
     found: list[PhotoView] = []
+    is_thing = np.array([thing.category not in STRUCTURE for thing in scene.objects], bool)
     for pose in random_views(scene, rng, _TRIED, camera):
         away = np.linalg.norm(evidence.walk - pose[:3, 3], axis=1)
         away_m = float(np.linalg.norm((evidence.walk - pose[:3, 3])[:, :2], axis=1).min())
@@ -38,6 +42,7 @@ def photo_views(
         solid = view.instance != NOTHING
         middle_m = float(np.median(view.depth_m[solid])) if solid.mean() > 0.9 else 0.0
         if _DEPTH_M[0] <= middle_m <= _DEPTH_M[1]:
-            shown = np.bincount(view.instance[solid], minlength=len(scene.objects))
-            found.append(PhotoView(pose, shown / solid.size, away_m))
+            share = np.bincount(view.instance[solid], minlength=len(scene.objects)) / solid.size
+            if (share[is_thing] >= _LEAST_SHARE).sum() >= _FEWEST_THINGS:
+                found.append(PhotoView(pose, share, away_m))
     return found

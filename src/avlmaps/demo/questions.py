@@ -4,8 +4,9 @@ Each needs more than a word: the same kind of thing stands in several places, an
 which one is meant; or the word was never a label; or there is no such thing.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,8 @@ RARE = ("piano", "pool table", "aquarium", "fireplace", "bicycle", "rocking hors
 ROOMS = ("kitchen", "bedroom", "living room", "bathroom", "office", "dining room", "children's room", "hallway", "gym")
 # The right thing is at most so far from the place that is named, and every other at least so much farther.
 NEAR_M, MARGIN_M = 2.5, 1.5
+# Which things are asked for, how near and how far the others: the first rule that something in the home keeps.
+_RULES = ((FURNITURE, NEAR_M, MARGIN_M), (FURNITURE, 3.5, 0.8), (SMALL, NEAR_M, MARGIN_M))
 APART_M = 1.0
 LEAST_PHOTO_SHARE = 0.02
 CLIP, PHOTO, MAP = "another_recording.wav", "photo.png", "home.avlmap"
@@ -98,18 +101,16 @@ def by_words(evidence: Evidence) -> Ask | None:
 def near_a_sound(evidence: Evidence, rng: np.random.Generator, used: Sequence[str] = ()) -> Ask | None:
     """Ask for a thing of which there are several, by a sound that was heard in one place."""
     names = [event.category for event in evidence.events]
-    for near_m, margin_m in ((NEAR_M, MARGIN_M), (3.5, 0.8)):
-        for event in (evidence.events[i] for i in rng.permutation(len(evidence.events))):
-            if names.count(event.category) > 1:
+    once = [evidence.events[i] for i in rng.permutation(len(names)) if names.count(evidence.events[i].category) == 1]
+    for wanted, near_m, margin_m in _RULES:
+        for (category, own), event in product(_several(evidence, wanted, used), once):
+            chosen = alone_near(evidence, own, event.source, near_m, margin_m)
+            if chosen is None or chosen != alone_near(evidence, own, event.robot, near_m, margin_m):
                 continue
-            for category, own in _furniture(evidence, used):
-                chosen = [alone_near(evidence, own, place, near_m, margin_m) for place in (event.source, event.robot)]
-                if chosen[0] is None or chosen[0] != chosen[1]:
-                    continue
-                text = f"the {category} near the sound of {event.category}"
-                why = f"There are {len(own)} things of that kind here; the sound was heard near one of them."
-                right = [Box.of(evidence.objects[chosen[0]])]
-                return _sentence("sound", text, why, right, _others(evidence, own, chosen[:1]), category)
+            text = f"the {category} near the sound of {event.category}"
+            why = f"There are {len(own)} things of that kind here; the sound was heard near one of them."
+            right = [Box.of(evidence.objects[chosen])]
+            return _sentence("sound", text, why, right, _others(evidence, own, chosen), category)
     return None
 
 
@@ -129,8 +130,9 @@ def like_a_clip(evidence: Evidence, folder: Path, rng: np.random.Generator, used
 
 def in_a_room(evidence: Evidence, rng: np.random.Generator, used: Sequence[str] = ()) -> Ask | None:
     """Ask for a thing that stands in rooms of several kinds, in one of these."""
-    for kind in sorted(ROOMS, key=lambda kind: (ROOMS.index(kind) > 4, rng.random())):
-        for category, own in _furniture(evidence, used):
+    rooms = sorted(ROOMS, key=lambda kind: (ROOMS.index(kind) > 4, rng.random()))
+    for wanted in (FURNITURE, SMALL):
+        for (category, own), kind in product(_several(evidence, wanted, used), rooms):
             right = [i for i in own if evidence.kind_of_area(i) == kind]
             wrong = [i for i in own if i not in right]
             if not evidence.shown[right].any() or not evidence.shown[wrong].any():
@@ -148,24 +150,18 @@ def near_a_photo(
     evidence: Evidence, photos: Sequence[PhotoView], folder: Path, used: Sequence[str] = ()
 ) -> tuple[Ask, PhotoView] | None:
     """Ask for a thing of which there are several, by a photo that shows one; the caller writes that photo."""
-    for near_m, margin_m in ((NEAR_M, MARGIN_M), (3.5, 0.8)):
-        for photo in photos:
+    for wanted, near_m, margin_m in _RULES:
+        for (category, own), photo in product(_several(evidence, wanted, used), photos):
             place = photo.world_from_camera[:3, 3].tolist()
-            for category, own in _furniture(evidence, used):
-                chosen = alone_near(evidence, own, place, near_m, margin_m)
-                if chosen is None or photo.share[chosen] < LEAST_PHOTO_SHARE:
-                    continue
-                parts = [
-                    Part(Modality.OBJECT, category),
-                    Part(Modality.IMAGE, str(folder / PHOTO), is_file=True),
-                ]
-                why = (
-                    f"There are {len(own)} things of that kind; the photo was taken {photo.away_m:.1f} m off the walk."
-                )
-                command = f'avlmaps query {MAP} --object "{category}" --image {PHOTO}'
-                right, others = (Box.of(evidence.objects[chosen]),), tuple(_others(evidence, own, [chosen]))
-                title = f"the {category} near where this photo was taken"
-                return Ask("photo", title, why, command, Question.of(parts), right, others, category), photo
+            chosen = alone_near(evidence, own, place, near_m, margin_m)
+            if chosen is None or photo.share[chosen] < LEAST_PHOTO_SHARE:
+                continue
+            parts = [Part(Modality.OBJECT, category), Part(Modality.IMAGE, str(folder / PHOTO), is_file=True)]
+            why = f"There are {len(own)} things of that kind; the photo was taken {photo.away_m:.1f} m off the walk."
+            command = f'avlmaps query {MAP} --object "{category}" --image {PHOTO}'
+            right, others = (Box.of(evidence.objects[chosen]),), tuple(_others(evidence, own, chosen))
+            title = f"the {category} near where this photo was taken"
+            return Ask("photo", title, why, command, Question.of(parts), right, others, category), photo
     return None
 
 
@@ -185,20 +181,20 @@ def choose_questions(
     """Return at most six questions, one of each kind that the home allows, and the photo that one of them needs."""
     asks: list[Ask] = []
 
-    def take(make: Callable[[list[str]], Ask | None]) -> None:
-        """Add a question about something new, or else about what was asked before."""
-        ask = make([ask.about for ask in asks]) or make([])
+    def take(ask: Ask | None) -> None:
         asks.extend([ask] if ask is not None else [])
 
-    take(lambda _: by_words(evidence))
-    take(lambda used: near_a_sound(evidence, rng, used))
+    def used() -> list[str]:
+        return [ask.about for ask in asks]
+
+    take(by_words(evidence))
+    take(near_a_sound(evidence, rng, used()))
     heard = [ask.title.rpartition("sound of ")[2] for ask in asks]
-    take(lambda _: like_a_clip(evidence, folder, rng, heard))
-    take(lambda used: in_a_room(evidence, rng, used))
-    used = [ask.about for ask in asks]
-    pictured = near_a_photo(evidence, photos, folder, used) or near_a_photo(evidence, photos, folder)
-    asks.extend([pictured[0]] if pictured else [])
-    take(lambda _: not_there(evidence, rng))
+    take(like_a_clip(evidence, folder, rng, heard))
+    take(in_a_room(evidence, rng, used()))
+    pictured = near_a_photo(evidence, photos, folder, used())
+    take(pictured[0] if pictured else None)
+    take(not_there(evidence, rng))
     return asks, pictured[1] if pictured else None
 
 
@@ -212,14 +208,15 @@ def alone_near(
     return away[0][1] if len(away) == 1 or away[1][0] - away[0][0] >= margin_m else None
 
 
-def _furniture(evidence: Evidence, used: Sequence[str]) -> list[tuple[str, list[int]]]:
-    """Return the ambiguous things that one sends a robot to, in the order of the list."""
+def _several(evidence: Evidence, wanted: Sequence[str], used: Sequence[str]) -> list[tuple[str, list[int]]]:
+    """Return those of the wanted things of which there are several, what was asked before last."""
     ambiguous = evidence.ambiguous()
-    return [(name, ambiguous[name]) for name in (*FURNITURE, *SMALL) if name in ambiguous and name not in used]
+    names = sorted((name for name in wanted if name in ambiguous), key=lambda name: name in used)
+    return [(name, ambiguous[name]) for name in names]
 
 
-def _others(evidence: Evidence, own: Sequence[int], right: Sequence[int | None]) -> list[Box]:
-    return [Box.of(evidence.objects[i]) for i in own if i not in right]
+def _others(evidence: Evidence, own: Sequence[int], right: int) -> list[Box]:
+    return [Box.of(evidence.objects[i]) for i in own if i != right]
 
 
 def _sentence(kind: str, text: str, why: str, truth: Sequence[Box], others: Sequence[Box], about: str) -> Ask:

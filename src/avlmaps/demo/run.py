@@ -35,14 +35,14 @@ class DemoSettings:
     Attributes:
         frames: at most so many are recorded.
         size: columns and rows of the pictures.
-        sounds: so many are placed, if the walk has room for them.
+        sounds: so many are placed, if the walk has room for them; None places one for every twelve seconds.
         workers: processes that draw; 0 takes as many as there are cores.
         moments: of the walk that the report shows.
     """
 
     frames: int = 560
     size: tuple[int, int] = (320, 240)
-    sounds: int = 8
+    sounds: int | None = None
     workers: int = 0
     moments: int = 24
 
