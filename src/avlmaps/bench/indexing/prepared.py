@@ -27,7 +27,7 @@ from avlmaps.sim.scene import NOTHING, Scene
 from avlmaps.sim.truth import Truth, read_truth
 
 _FPS = 5.0
-_PHOTOS_A_TASK = 5  # so many are tried for each that is wanted
+_PHOTOS_A_TASK = 12  # so many are tried for each that is wanted
 _RECIPE = 1  # raised when what a folder of work holds is made in another way
 
 
