@@ -119,10 +119,11 @@ def strip_of(
         rows[2].append(cv2.resize(colours[category], size, interpolation=cv2.INTER_NEAREST))
         count += np.bincount(category[category >= 0], minlength=len(names))
     share = count / max(int(count.sum()), 1)
-    legend = tuple((names[i], _triple(colours[i]), float(share[i])) for i in np.argsort(-count, kind="stable"))
+    order = [int(i) for i in np.argsort(-count, kind="stable") if count[i]]
+    legend = tuple((names[i], _triple(colours[i]), float(share[i])) for i in order)
     colour, depth, seen = (np.concatenate(row, axis=1) for row in rows)
     index = tuple(frame[0] for frame in frames)
-    return Strip(index, colour, depth, seen, tuple(entry for entry in legend if entry[2] > 0.0))
+    return Strip(index, colour, depth, seen, legend)
 
 
 def colour_of(name: str, number: int) -> tuple[int, int, int]:

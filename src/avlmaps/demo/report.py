@@ -185,8 +185,8 @@ def _track(recording: "Recording", evidence: "Evidence", report: "DemoReport") -
     )
     return (
         f'<h2>What it heard</h2><div class="card">{wave(loudness, duration_s, true, mapped)}<ul class="events">{events}'
-        f'</ul><p class="note">Shaded: the {_count(len(true), "sound")} that were truly made. Below: the '
-        f"{len(mapped)} that the map heard by itself. Press one to listen.</p></div>"
+        f'</ul><p class="note">Shaded: what truly sounded ({len(true)}). Below: what the map heard by itself '
+        f"({len(mapped)}). Press one to listen.</p></div>"
     )
 
 
@@ -294,7 +294,7 @@ def _read(step: "Step", name: str) -> np.ndarray:
 def _said(step: "Step") -> str:
     """Return the answer in a sentence, with the distance to the truth."""
     if not step.answer["found"]:
-        notes = "; ".join(part["note"] for part in step.answer["parts"] if part["note"])
+        notes = "; ".join(_without_folder(part["note"], step) for part in step.answer["parts"] if part["note"])
         told = "The map says that there is none here" + (f" ({escape(notes)})" if notes else "")
         return f"{told}, and so it is." if not step.ask.truth else f"{told}, but there is."
     goal = step.answer["goals"][0]
@@ -305,6 +305,14 @@ def _said(step: "Step") -> str:
     if step.ask.kind == "clip":
         return f"{told}: {step.off_m:.2f} m from where the robot was when it heard it."
     return f"{told}: {step.off_m:.2f} m from the true one." if step.off_m > 0.0 else f"{told}: on the true one."
+
+
+def _without_folder(note: str, step: "Step") -> str:
+    """Return a note with the names of files alone, as the commands beside it have them."""
+    for part in step.ask.question.parts:
+        if part.is_file:
+            note = note.replace(part.query, Path(part.query).name)
+    return note
 
 
 def _honest(report: "DemoReport", recording: "Recording") -> str:
