@@ -117,7 +117,7 @@ def _set(
         if not f.ground.fits(foot, at, np.array([way]), z, zones=False, except_for=anchor.number)[0]:
             continue  # under a cabinet that hangs too low, say
         taken.append(corner[k])
-        f.put(piece, foot.place(anchor.to_world(centre[k]), way, z), solid=False)
+        f.put(piece, foot.place(at[0], way, z))
         return True
     return False
 

@@ -43,6 +43,19 @@ def on_floor_or_wall(family: str) -> bool:
     return not family.startswith(("counter", "table top"))
 
 
+# Families that stand on the floor, of categories whose others stand on tops.
+_ON_FLOOR = {"printer": ("office copier",), "clock": ("grandfather",), "loudspeaker": ("floor standing", "on a stand"),
+             "towel": ("on a stand",), "tv": ("on a rolling stand", "rear projection"), "aquarium": ("tank",),
+             "fan": ("standing", "tower", "box", "without blades"), "microwave": (), "telephone": (),
+             "lamp": ("shade on pole", "tripod", "arc", "torchiere", "paper column", "many heads")}  # fmt: skip
+
+
+def _fit_to_stand(category: str) -> Among:
+    """Return which families of a category stand on the floor or hang on a wall by themselves."""
+    only = _ON_FLOOR.get(category)
+    return lambda name: wall_hung(name) or (on_floor_or_wall(name) and (only is None or name in only))
+
+
 def hangs(piece: Piece) -> bool:
     """Tell whether a piece is made to hang on a wall."""
     return wall_hung(piece.family)
@@ -276,17 +289,19 @@ class Furnisher:
 
     def stand(self, category: str, share: float = 1.0, front_m: float = 0.45, corner: float = 0.3,
               near: Float[np.ndarray, "2"] | None = None, sides: Sequence[Side] | None = None,
-              at_middle: float = 0.0, among: Among = on_floor_or_wall) -> Stood | None:  # fmt: skip
+              at_middle: float = 0.0, among: Among | None = None) -> Stood | None:  # fmt: skip
         """Stand a piece of a category against a wall in a share of the cases, or hang it if it is made to hang."""
-        if self.rng.random() > share * self.fill or (piece := self.new(category, among)) is None:
+        if self.rng.random() > share * self.fill:
+            return None
+        if (piece := self.new(category, among or _fit_to_stand(category))) is None:
             return None
         return self._stand(piece, front_m, corner, near, sides, at_middle)
 
     def insist(self, category: str, front_m: float = 0.45, corner: float = 0.3, at_middle: float = 0.0,
-               tries: int = 3, among: Among = on_floor_or_wall) -> Stood | None:  # fmt: skip
+               tries: int = 3, among: Among | None = None) -> Stood | None:  # fmt: skip
         """Stand what a room cannot do without, trying several shapes until one finds a place."""
         for _ in range(tries if self.fill > 0.5 or self.rng.random() < 0.6 else 0):
-            if (piece := self.new(category, among)) is None:
+            if (piece := self.new(category, among or _fit_to_stand(category))) is None:
                 return None
             if (stood := self._stand(piece, front_m, corner, None, None, at_middle)) is not None:
                 return stood

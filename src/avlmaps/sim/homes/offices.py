@@ -33,9 +33,9 @@ def open_plan_office(f: Furnisher) -> None:
                 heading = base.heading_rad + (0.0 if sign > 0 else np.pi)
                 stood = f.try_at(desk, centre[None], np.array([heading]), front_m=0.75) if chance(rng, 0.93) else None
                 if stood is not None:
-                    equip(f, stood, 0.95)
                     if chair is not None:
                         seat_round(f, stood, chair, 1, all_sides=False)
+                    equip(f, stood, 0.95)
             if with_partitions and partition is not None:
                 centre = middle(f.ground.polygon) + at * base.along + row * base.inward
                 f.try_at(partition, centre[None], np.array([base.heading_rad]), zones=False)

@@ -103,6 +103,7 @@ class Ground:
     _corner: list[np.ndarray] = field(default_factory=list)
     _height: list[tuple[float, float]] = field(default_factory=list)
     _zone: list[np.ndarray] = field(default_factory=list)
+    _way: list[np.ndarray] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._low = self.polygon.min(axis=0)
@@ -123,7 +124,7 @@ class Ground:
             centre: where the middle of its box would be.
             heading_rad: where its front would look.
             z: height of its origin.
-            zones: heed the zones kept clear.
+            zones: heed the zones kept clear before furniture; those before doors are heeded always.
             except_for: number of a piece that it may meet (a chair its table).
         """
         corner = corners_of(centre, np.broadcast_to(foot.half, centre.shape), heading_rad)
@@ -134,8 +135,8 @@ class Ground:
             for number, (corners, (lo, hi)) in enumerate(zip(self._corner, self._height, strict=True))
             if lo < high - 1e-4 and hi > low + 1e-4 and number != except_for
         ]
-        if zones and low < 1.2:
-            others += self._zone
+        if low < 1.2 and high > _UNDERFOOT_M:
+            others += self._way + (self._zone if zones else [])
         if others and good.any():
             good[good] = ~overlapping(corner[good], np.array(others), 0.003).any(axis=1)
         return good
@@ -155,19 +156,18 @@ class Ground:
 
     def _connected(self, free: np.ndarray, also: np.ndarray | None) -> bool:
         label, _ = ndimage.label(free)  # type: ignore[misc]
-        found = [self._label_near(label, place, 0.2) for place in self.must_m]
-        if found and (min(found) == 0 or len(set(found)) > 1):
+        sizes = np.bincount(label.ravel())
+        if len(sizes) < 2:
             return False
-        if also is None:
-            return True
-        here = self._label_near(label, also, 0.28)
-        return here > 0 and (not found or here == found[0])
+        most = int(np.argmax(sizes[1:])) + 1  # a pocket before a door is no way into the room
+        if any(not self._has_near(label == most, place, 0.2) for place in self.must_m):
+            return False
+        return also is None or self._has_near(label == most, also, 0.28)
 
-    def _label_near(self, label: np.ndarray, place: np.ndarray, reach_m: float) -> int:
+    def _has_near(self, mask: np.ndarray, place: np.ndarray, reach_m: float) -> bool:
         i, j = np.floor((place - self._low) / _CELL_M).astype(int)
         r = max(round(reach_m / _CELL_M), 1)
-        window = label[max(i - r, 0) : max(i + r + 1, 0), max(j - r, 0) : max(j + r + 1, 0)]
-        return int(window.max()) if window.size else 0
+        return bool(mask[max(i - r, 0) : max(i + r + 1, 0), max(j - r, 0) : max(j + r + 1, 0)].any())
 
     def _near(self, foot: Footprint, centre: np.ndarray, heading_rad: float, by_m: float) -> np.ndarray:
         c, s = np.cos(heading_rad), np.sin(heading_rad)
@@ -191,9 +191,9 @@ class Ground:
             self.keep_clear(zone, np.array([front_m / 2 - 0.005, foot.half[1] * 0.9]), heading_rad)
         return len(self._corner) - 1
 
-    def keep_clear(self, centre: np.ndarray, half_m: np.ndarray, heading_rad: float) -> None:
-        """Let nothing stand on an oriented rectangle."""
-        self._zone.append(corners_of(centre, half_m, np.asarray(heading_rad)))
+    def keep_clear(self, centre: np.ndarray, half_m: np.ndarray, heading_rad: float, way: bool = False) -> None:
+        """Let nothing stand on an oriented rectangle: before furniture, or (``way``) before a door."""
+        (self._way if way else self._zone).append(corners_of(centre, half_m, np.asarray(heading_rad)))
 
     def free_share(self) -> float:
         """Return which share of the room's floor a robot can stand on."""
@@ -226,12 +226,14 @@ def ground_of(plan: Plan, room: int) -> Ground:
             if not wall.built:
                 s, e = sorted((float((wall.a - side.a) @ side.along), float((wall.b - side.a) @ side.along)))
                 side.closed.append((s - 0.1, e + 0.1, 0.0, 9.0))
-                must.append(side.a + (s + e) / 2 * side.along + 0.45 * side.inward)
+                middle = side.a + (s + e) / 2 * side.along
+                must.append(middle + 0.45 * side.inward)
+                clear.append((middle + 0.45 * side.inward, np.array([0.45, min(0.5, (e - s) / 2)]), side.heading_rad))
             for hole in wall.holes:
                 _keep_hole(side, wall.at(hole.at_m), hole, must, clear)
     ground = Ground(inner, sides, np.array(must).reshape(-1, 2))
     for zone in clear:
-        ground.keep_clear(*zone)
+        ground.keep_clear(*zone, way=True)
     return ground
 
 

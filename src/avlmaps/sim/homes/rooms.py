@@ -208,10 +208,10 @@ def desk_place(f: Furnisher, computer: float = 0.75, front_m: float = 0.75) -> S
     rng = f.rng
     stood = f.insist("desk", front_m, 0.35, tries=2)
     if stood is not None:
-        equip(f, stood, computer)
         seat = f.new("office chair" if chance(rng, 0.7) else "chair")
         if seat is not None:
             seat_round(f, stood, seat, 1, all_sides=False)
+        equip(f, stood, computer)
     return stood
 
 
