@@ -118,7 +118,7 @@ def _angled(rng: np.random.Generator, sides: tuple[float, ...]) -> Piece:
     width = depth + 0.03
     length = draw(rng, 1.6, 3.2) if len(sides) == 1 else draw(rng, 2.0, 3.4)
     half = length / 2
-    inner, unit = length - len(sides) * width, (0.62, 0.95) if len(sides) == 1 else (0.75, 1.1)
+    inner, unit = length - len(sides) * width, (0.7, 1.0) if len(sides) == 1 else (0.75, 1.1)
     main = joined(run(rng, style, inner, depth, z - thick, plinth, dark, unit)).moved(y=-sum(sides) * width / 2)
     parts = [main, _top((0.0, -half), (width, half), z, thick, stone)]
     supports = [Support((0.02, -half), (width, half), z, 0.5)]
