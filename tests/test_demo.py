@@ -135,10 +135,6 @@ def test_the_report_is_whole_and_loads_nothing_from_the_network(small: DemoRepor
     assert len(text) < 6_000_000
 
 
-def test_a_second_run_replaces_the_first(small: DemoReport) -> None:
-    assert (small.out / ".avlmaps-demo").is_file()
-
-
 def test_a_folder_that_holds_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(MapError, match="holds something else than a demonstration"):
@@ -208,10 +204,10 @@ def test_saying_that_there_is_none_is_right_only_where_there_is_none(tmp_path: P
     assert not Step(asks[-1], {"found": True, "goals": [{"position": [0, 0, 0], "score": 1.0}]}, "p.png").right
 
 
-def test_the_chosen_home_can_be_asked_and_is_the_same_each_time() -> None:
+def test_the_chosen_home_is_one_that_no_training_has_seen_and_can_be_asked() -> None:
     scene = choose_home(0)
     assert fits(scene)
-    assert scene.name == choose_home(0).name
+    assert scene.name.startswith("house:30000")
     assert 5 <= len(scene.areas) <= 9
     assert not fits(small_flat())
     assert len(record_settings(scene, DemoSettings()).categories) >= 6

@@ -14,7 +14,7 @@ from avlmaps.sim.scene import Area, SceneObject
 from avlmaps.sim.truth import SEMANTIC, HeardEvent, read_truth
 
 # A thing was shown when it filled so much of the picture in so many frames.
-LEAST_SHARE, LEAST_FRAMES = 0.006, 3
+LEAST_SHARE, LEAST_FRAMES = 0.006, 2
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,8 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import AvlmapsError
-from avlmaps.demo.questions import FURNITURE, spoken
+from avlmaps.demo.evidence import Box, Evidence
+from avlmaps.demo.questions import FURNITURE, in_a_room, spoken
 from avlmaps.sim.hearing import KINDS, Synthesised
 from avlmaps.sim.scene import Scene
 from avlmaps.sim.scenes import open_scene
@@ -15,6 +16,7 @@ _TRIES = 40
 _ROOMS = (5, 9)
 _LARGEST_M2 = 110.0
 _FEWEST_SOUNDS = 6
+_FEWEST_FAR_APART, _FAR_M = 4, 4.0
 _EVERYWHERE = {"door", "folding door", "window", "picture"}
 
 
@@ -37,13 +39,26 @@ def fits(scene: Scene) -> bool:
         return False
     if sum(_area_m2(area.polygon) for area in scene.areas) > _LARGEST_M2:
         return False
-    categories = {thing.category for thing in scene.objects}
-    kinds_of_area = {
-        name: {scene.areas[t.area].kind for t in scene.objects if t.category == name and t.area >= 0}
-        for name in categories & set(FURNITURE)
-    }
-    in_two_rooms = [name for name, kinds in kinds_of_area.items() if len(kinds) >= 2]
-    return bool(spoken(categories)) and len(in_two_rooms) >= 3 and len(sounds_of(scene)) >= _FEWEST_SOUNDS
+    every = np.ones(len(scene.objects), bool)
+    evidence = Evidence(scene.objects, every, scene.areas, (), np.zeros(0), np.zeros((0, 3)))
+    in_room = in_a_room(evidence, np.random.default_rng(0))
+    return (
+        bool(spoken(thing.category for thing in scene.objects))
+        and in_room is not None
+        and in_room.about in FURNITURE
+        and len(_far_apart(evidence)) >= _FEWEST_FAR_APART
+        and len(sounds_of(scene)) >= _FEWEST_SOUNDS
+    )
+
+
+def _far_apart(evidence: Evidence) -> list[str]:
+    """Return the kinds of furniture of which one can be near a place that another is far from."""
+    found: list[str] = []
+    for category, own in evidence.ambiguous().items():
+        boxes = [Box.of(evidence.objects[i]) for i in own]
+        if category in FURNITURE and max(a.apart_m(b) for a in boxes for b in boxes) >= _FAR_M:
+            found.append(category)
+    return found
 
 
 def sounds_of(scene: Scene) -> tuple[str, ...]:

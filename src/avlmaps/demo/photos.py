@@ -17,8 +17,8 @@ _OFF_THE_WALK_M = 0.4
 _LOOKED_FROM_M, _LOOKED_ALIKE_RAD = 2.0, np.deg2rad(45.0)
 _DEPTH_M = (1.0, 5.0)
 _STOREY_M = 1.5
-# A picture of a bare wall could be of any: so many things, walls not counted, fill so much of it each.
-_FEWEST_THINGS, _LEAST_SHARE = 4, 0.01
+# A bare wall could be any: so many things, walls not counted, fill so much of a picture each.
+_FEWEST_THINGS, _LEAST_SHARE = 2, 0.01
 
 
 def photo_views(
@@ -29,8 +29,8 @@ def photo_views(
     world_from_camera: Float[np.ndarray, "n 4 4"],
     rng: np.random.Generator,
 ) -> list[PhotoView]:
-    """Return pictures that could be asked with: off the walk, looking at something that the walk looked at too."""
-    found: list[PhotoView] = []
+    """Return pictures off the walk, looking at what the walk looked at too; those that show most things first."""
+    found: list[tuple[int, PhotoView]] = []
     is_thing = np.array([thing.category not in STRUCTURE for thing in scene.objects], bool)
     for pose in random_views(scene, rng, _TRIED, camera):
         away = np.linalg.norm(evidence.walk - pose[:3, 3], axis=1)
@@ -43,6 +43,6 @@ def photo_views(
         middle_m = float(np.median(view.depth_m[solid])) if solid.mean() > 0.9 else 0.0
         if _DEPTH_M[0] <= middle_m <= _DEPTH_M[1]:
             share = np.bincount(view.instance[solid], minlength=len(scene.objects)) / solid.size
-            if (share[is_thing] >= _LEAST_SHARE).sum() >= _FEWEST_THINGS:
-                found.append(PhotoView(pose, share, away_m))
-    return found
+            things = int((share[is_thing] >= _LEAST_SHARE).sum())
+            found += [(things, PhotoView(pose, share, away_m))] if things >= _FEWEST_THINGS else []
+    return [photo for _, photo in sorted(found, key=lambda entry: -entry[0])]

@@ -35,7 +35,7 @@ ROOMS = ("kitchen", "bedroom", "living room", "bathroom", "office", "dining room
 # The right thing is at most so far from the place that is named, and every other at least so much farther.
 NEAR_M, MARGIN_M = 2.5, 1.5
 # Which things are asked for, how near and how far the others: the first rule that something in the home keeps.
-_RULES = ((FURNITURE, NEAR_M, MARGIN_M), (FURNITURE, 3.5, 0.8), (SMALL, NEAR_M, MARGIN_M))
+_RULES = ((FURNITURE, NEAR_M, MARGIN_M), (FURNITURE, 3.5, 0.8), (SMALL, NEAR_M, MARGIN_M), (SMALL, 3.5, 0.8))
 APART_M = 1.0
 LEAST_PHOTO_SHARE = 0.02
 CLIP, PHOTO, MAP = "another_recording.wav", "photo.png", "home.avlmap"
