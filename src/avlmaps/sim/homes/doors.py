@@ -64,7 +64,8 @@ def joined_up(
                 out[index] = _opened(rng, wall, rooms)
             else:
                 out[index] = wall.with_hole(_door(rng, wall, rooms, index in wanted))
-    return [_swung_free(rooms, out, index) for index in range(len(out))]
+    leaves: dict[int, list[np.ndarray]] = {}
+    return [_swung_free(rooms, out, index, leaves) for index in range(len(out))]
 
 
 def _tree(rooms: list[Room], walls: list[Wall], start: int, patience: float) -> set[int] | None:
@@ -140,7 +141,7 @@ def _door(rng: np.random.Generator, wall: Wall, rooms: list[Room], needed: bool)
     return Hole(kind, at, width, 0.0, head, open_rad, into_left, to_corner)
 
 
-def _swung_free(rooms: list[Room], walls: list[Wall], index: int) -> Wall:
+def _swung_free(rooms: list[Room], walls: list[Wall], index: int, leaves: dict[int, list[np.ndarray]]) -> Wall:
     """Return a wall whose open doors swing to where they stand in no other door's way; where none can, leafless."""
     wall = walls[index]
     holes = []
@@ -148,28 +149,44 @@ def _swung_free(rooms: list[Room], walls: list[Wall], index: int) -> Wall:
         if hole.kind == "door":
             sides = (hole.to_left, not hole.to_left)
             swings = [replace(hole, to_left=side, hinge=h) for side in sides for h in (hole.hinge, -hole.hinge)]
-            free = [swing for swing in swings if _leaf_is_free(rooms, walls, index, swing)]
+            free = [swing for swing in swings if _leaf_is_free(rooms, walls, index, swing, leaves)]
             hole = free[0] if free else replace(hole, kind="doorless")
+            if free:
+                leaves.setdefault(wall.left if hole.to_left else wall.right, []).append(_leaf_places(wall, hole))
         holes.append(hole)
     return replace(wall, holes=tuple(holes))
 
 
-def _leaf_is_free(rooms: list[Room], walls: list[Wall], index: int, hole: Hole) -> bool:
+def _leaf_places(wall: Wall, hole: Hole) -> np.ndarray:
+    """Return places along the open leaves of a door, the last at the edge of the last."""
+    into = wall.to_left if hole.to_left else -wall.to_left
+    wide = hole.width_m > 1.2
+    reach = hole.width_m / 2 if wide else hole.width_m
+    places = []
+    for hinge in (1, -1) if wide else (hole.hinge,):
+        foot = wall.at(hole.at_m + hinge * hole.width_m / 2)
+        way = -hinge * np.cos(hole.open_rad) * wall.along + np.sin(hole.open_rad) * into
+        places += [foot + share * reach * way for share in (0.25, 0.5, 0.75, 1.0)]
+    return np.array(places)
+
+
+def _leaf_is_free(
+    rooms: list[Room], walls: list[Wall], index: int, hole: Hole, leaves: dict[int, list[np.ndarray]]
+) -> bool:
+    """Tell whether an open door leaves room to pass by it, between it and walls, other doorways and their leaves."""
     wall = walls[index]
     room = wall.left if hole.to_left else wall.right
-    into = wall.to_left if hole.to_left else -wall.to_left
-    leaf = []
-    for hinge in (hole.hinge,) if hole.width_m <= 1.2 else (1, -1):
-        foot = wall.at(hole.at_m + hinge * hole.width_m / 2)
-        reach = hole.width_m if hole.width_m <= 1.2 else hole.width_m / 2
-        way = -hinge * np.cos(hole.open_rad) * wall.along + np.sin(hole.open_rad) * into
-        leaf += [foot + share * reach * way for share in (0.25, 0.5, 0.75, 1.0)]
-    places = np.array(leaf)
-    if (
-        not inside(rooms[room].polygon, places[-1:], -0.08).all()
-        or not inside(rooms[room].polygon, places, -0.03).all()
-    ):
+    polygon, places = rooms[room].polygon, _leaf_places(wall, hole)
+    if not inside(polygon, places[-1:], -0.08).all() or not inside(polygon, places, -0.03).all():
         return False
+    for end in range(3, len(places), 4):
+        tip, way = places[end], (places[end] - places[end - 1]) / np.linalg.norm(places[end] - places[end - 1])
+        beside_wall = inside(polygon, tip, -0.1) and not inside(polygon, tip, -0.35)
+        if not beside_wall and not inside(polygon, tip + 0.5 * way, -0.45):
+            return False
+    for other in leaves.get(room, []):
+        if np.min(np.linalg.norm(places[:, None] - other[None], axis=2)) < 1.0:
+            return False
     for number, other in enumerate(walls):
         if number == index or room not in (other.left, other.right):
             continue
