@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 _BINS = 700
 _MOMENT_WIDTH = 256
 _LEGEND = 14
+_FIRST = 0.4  # of the walk: the moment that is shown before the slider is touched
 _STAGES = (
     ("home", "home", "#7c6f9b"), ("record", "drive and record", "#1f6fbf"), ("build", "map", "#0b7a75"),
     ("choose", "choose questions", "#8a6d3b"), ("ask", "ask", "#b4531a"),
@@ -167,7 +168,8 @@ def _film(recording: "Recording", evidence: "Evidence", strip: Strip, sheet: She
     )
     return (
         f'<h2>What it saw</h2><div class="card"><div class="film">{figures}</div><div class="scrub">'
-        f'<input id="moment" type="range" min="0" max="{data["duration"]}" step="0.5" value="0" aria-label="moment">'
+        f'<input id="moment" type="range" min="0" max="{data["duration"]}" step="0.5" '
+        f'value="{_FIRST * data["duration"]:.1f}" aria-label="moment">'
         f'<output id="clock">0 s</output>{sound}</div><ul class="legend">{legend}</ul></div>'
         f'<script type="application/json" id="walk">{json.dumps(data, separators=(",", ":"))}</script>'
     )

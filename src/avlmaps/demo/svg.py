@@ -94,8 +94,7 @@ class Sheet:
             (x0, y1), (x1, y0) = self.at(*box.low[:2]), self.at(*box.high[:2])
             radius = [max((b - a) / 2 + 12, _LEAST_RING) for a, b in ((x0, x1), (y0, y1))]
             shape = f'cx="{(x0 + x1) / 2:.1f}" cy="{(y0 + y1) / 2:.1f}" rx="{radius[0]:.1f}" ry="{radius[1]:.1f}"'
-            under = f'<ellipse class="truth-under" {shape}/>' if kind == "truth" else ""
-            rings.append(f'{under}<ellipse class="{kind}" {shape}/>')
+            rings += [f'<ellipse class="{layer}" {shape}/>' for layer in (f"{kind}-under", kind)]
         return "".join(rings)
 
     def band(self, boxes: Sequence[Box]) -> str:
