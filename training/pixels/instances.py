@@ -31,9 +31,9 @@ class Options:
     """Folder of the recordings and maps."""
     out: Path = Path("src/avlmaps/perception/embedded/weights")
     """Folder of rooms.json, which is written anew."""
-    homes: int = 10
+    homes: int = 6
     """How many held-out homes."""
-    frames: int = 500
+    frames: int = 260
     """Frames of each walk."""
 
 
