@@ -273,6 +273,7 @@ def _leaves(mesh: Mesh, thick: float, hole: Hole, origin: np.ndarray, heading: f
         c, s = np.cos(turn), np.sin(turn)
         box = part @ np.array([[c, -s], [s, c]])
         low, high = box.min(axis=0), box.max(axis=0)
+        low[0] = c * hinge[0] + s * hinge[1]  # a plain leaf has no corners between its hinge and its edge
         middle = np.array([[c, -s], [s, c]]) @ ((low + high) / 2)
         c, s = np.cos(heading), np.sin(heading)
         out.append(Leaf(origin + np.array([[c, -s], [s, c]]) @ middle, (high - low) / 2, heading + turn, room))
