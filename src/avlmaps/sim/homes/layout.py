@@ -47,8 +47,12 @@ def _width_at(sides: list[tuple[float, float, float, float]], level: float) -> f
     return max(crossing) - min(crossing) if crossing else 0.0
 
 
+class _Unsound(Exception):  # noqa: N818
+    """A room came out too narrow: the layout is drawn anew. Never leaves this module."""
+
+
 def divided(
-    rng: np.random.Generator, polygon: Polygon, programme: Programme, slant: float
+    rng: np.random.Generator, polygon: Polygon, programme: Programme, slant: float, strict: bool = True
 ) -> list[tuple[str, Polygon]]:
     """Divide a convex polygon among a programme.
 
@@ -57,9 +61,13 @@ def divided(
         polygon: what to divide.
         programme: rooms with their areas; only the proportions count.
         slant: the probability that a cut is not at right angles to the sides.
+        strict: give up at the first room that is not sound.
     """
     if len(programme) == 1:
-        return [(programme[0][0], polygon)]
+        room = (programme[0][0], polygon)
+        if strict and not sound([room]):
+            raise _Unsound
+        return [room]
     sizes = np.array([size for _, size in programme])
     share = np.cumsum(sizes)[:-1] / sizes.sum()
     weight = np.exp(-(((share - 0.5) / 0.16) ** 2)) + 1e-3
@@ -72,7 +80,9 @@ def divided(
     if chance(rng, 0.5):
         direction = -direction
     first, second = cut(polygon, float(share[at]), direction)
-    return divided(rng, first, programme[: at + 1], slant) + divided(rng, second, programme[at + 1 :], slant)
+    return divided(rng, first, programme[: at + 1], slant, strict) + divided(
+        rng, second, programme[at + 1 :], slant, strict
+    )
 
 
 def along_corridor(
@@ -180,30 +190,43 @@ def floor_of(
     """
     slant = slanted if chance(rng, 0.4) and not stairs else 0.0
     size = sum(area for _, area in programme)
-    inner = [room for room in programme if room[0] not in _PASSAGES]
     for attempt in range(200):
-        shape = pick(rng, ("rectangle", "rectangle", "L", "T")) if size > 60 and not stairs else "rectangle"
-        parts = outlines(rng, size, shape)
-        use_corridor = stairs or (len(inner) >= 4 and chance(rng, 0.6 if attempt < 100 else 0.3))
-        rooms: list[tuple[str, Polygon]] = []
-        left = inner if use_corridor else list(programme)
-        for number, part in enumerate(parts):
-            last = number == len(parts) - 1
-            split = len(left) if last else _index_of_share(left, area_m2(part) / size)
-            mine, left = left[:split], left[split:]
-            if not mine:
-                break
-            if use_corridor and len(mine) >= 3:
-                rooms += along_corridor(rng, part, mine, slant, corridor, stairs)
-            else:
-                rooms += divided(rng, part, mine, slant)
+        try:
+            rooms = _attempt(rng, programme, corridor, slant, stairs, 0.6 if attempt < 100 else 0.3)
+        except _Unsound:
+            continue
         if stairs and (not any(kind == WELL and len(p) == 4 for kind, p in rooms)):
             continue
         if sound(rooms) and any(kind in _PASSAGES or len(rooms) < 6 for kind, _ in rooms):
             return rooms
     if stairs:
         return floor_of(rng, programme, corridor, slanted)
-    return divided(rng, rectangle(0.0, 0.0, np.sqrt(size) * 1.2, np.sqrt(size) / 1.2), programme, 0.0)
+    outline = rectangle(0.0, 0.0, np.sqrt(size) * 1.2, np.sqrt(size) / 1.2)
+    return divided(rng, outline, programme, 0.0, strict=False)
+
+
+def _attempt(
+    rng: np.random.Generator, programme: Programme, corridor: str, slant: float, stairs: bool, corridors: float
+) -> list[tuple[str, Polygon]]:
+    """Draw an outline and divide it once; ``corridors`` is the probability of cutting a corridor."""
+    size = sum(area for _, area in programme)
+    inner = [room for room in programme if room[0] not in _PASSAGES]
+    shape = pick(rng, ("rectangle", "rectangle", "L", "T")) if size > 60 and not stairs else "rectangle"
+    parts = outlines(rng, size, shape)
+    use_corridor = stairs or (len(inner) >= 4 and chance(rng, corridors))
+    rooms: list[tuple[str, Polygon]] = []
+    left = inner if use_corridor else list(programme)
+    for number, part in enumerate(parts):
+        last = number == len(parts) - 1
+        split = len(left) if last else _index_of_share(left, area_m2(part) / size)
+        mine, left = left[:split], left[split:]
+        if not mine:
+            break
+        if use_corridor and len(mine) >= 3:
+            rooms += along_corridor(rng, part, mine, slant, corridor, stairs)
+        else:
+            rooms += divided(rng, part, mine, slant)
+    return rooms
 
 
 def _long_way(polygon: Polygon) -> Float[np.ndarray, "2"]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture import Piece
-from avlmaps.sim.furniture.decor import carpet
+from avlmaps.sim.furniture.decor import CARPET_SHAPES, carpet
 from avlmaps.sim.furniture.joinery import chance, count, draw, pick
 from avlmaps.sim.homes.clutter import set_at
 from avlmaps.sim.homes.furnish import Furnisher, Stood, footprint, hangs, wall_hung
@@ -20,17 +20,17 @@ def several(f: Furnisher, wanted: dict[str, float], front_m: float = 0.4) -> lis
 
 def under(f: Furnisher, about: np.ndarray, heading_rad: float, size_m: tuple[float, float]) -> None:
     """Lay a carpet of about a size under what stands about a place."""
-    shape = pick(f.rng, ("plain", "fringed", "oval", "round"))
-    with_shape = carpet(f.rng, size_m[0], size_m[1], shape)
-    piece = Piece(with_shape.mesh, (), (), "carpet", shape)
-    foot = footprint(piece.mesh)
+    shapes = CARPET_SHAPES["training"] + CARPET_SHAPES["held-out"] if f.which == "all" else CARPET_SHAPES[f.which]
+    shape = pick(f.rng, [name for name in shapes if name not in ("runner", "doormat")])
+    mesh = carpet(f.rng, size_m[0], size_m[1], shape).mesh
     heading = np.array([heading_rad])
     for _ in range(3):
+        foot = footprint(mesh)
         if f.ground.fits(foot, about[None], heading, -1.0, zones=False)[0]:  # under all that stands
+            piece = Piece(mesh, category="carpet", family=shape)
             f.put(piece, foot.place(about, heading_rad), solid=False)
             return
-        piece = Piece(piece.mesh.scaled(0.8, 0.8, 1.0), (), (), "carpet", shape)
-        foot = footprint(piece.mesh)
+        mesh = mesh.scaled(0.8, 0.8, 1.0)
 
 
 def living_room(f: Furnisher) -> None:
