@@ -13,9 +13,8 @@ from training.pixels.batches import Shards
 from training.pixels.export import load_network, write_onnx, write_start
 from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED
 from training.pixels.lexicon import CALLED, KINDS
+from training.pixels.whole import whole_frame
 
-from avlmaps.core.camera import Pinhole
-from avlmaps.perception.embedded.geometry import channels
 from avlmaps.perception.embedded.scene_network import Notes
 
 PIXELS_PER_FRAME = 400
@@ -37,7 +36,7 @@ class Options:
     """Frames to look at."""
     seed: int = 0
     """Draws them."""
-    weights: str = "mean"
+    weights: str = "last"
     """``mean``: of the training's last stretch, or the ``last`` ones."""
 
 
@@ -53,21 +52,15 @@ class Scores:
 
 @torch.no_grad()
 def scores_of(network: nn.Module, options: Options) -> Scores:
-    """Look at held-out frames as the running system does: whole, at 320x240, half of them without colour."""
+    """Look at held-out frames as the running system does: whole, and in colour where they have it."""
     rng, shards = np.random.default_rng(options.seed), Shards(options.frames)
     category, label, room, share = [], [], [], []
     for _ in range(options.count):
         frames, index = shards.draw(rng)
-        depth = frames.depth[index].astype(np.float32) / 1000.0
-        fx, fy, cx, cy, *up, height = frames.camera[index]
-        camera = Pinhole(fx, fy, cx, cy, depth.shape[1], depth.shape[0])
-        geometry = torch.from_numpy(channels(depth, camera, np.array(up), height))[None]
-        colour = torch.zeros(1, 3, *depth.shape)
-        if (row := int(frames.rgb_row[index])) >= 0:
-            rgb = np.ascontiguousarray(frames.rgb[row].transpose(2, 0, 1))[None]
-            colour = torch.from_numpy(rgb).float() / 127.5 - 1.0
-        score, rooms = network(geometry, colour)
-        truth = np.where(depth > 0, frames.label[index], UNLABELLED)[::2, ::2]
+        geometry, colour, depth, labels = whole_frame(frames, index, with_colour=True)
+        score, rooms = network(torch.from_numpy(geometry), torch.from_numpy(colour))
+        score = score[:, :, : depth.shape[0] // 2, : depth.shape[1] // 2]
+        truth = np.where(depth > 0, labels, UNLABELLED)[::2, ::2]
         near = (depth[::2, ::2] < 4.0) & (truth != UNLABELLED)
         at = rng.permutation(np.flatnonzero(near))[:PIXELS_PER_FRAME]
         category.append(score[0].reshape(len(CATEGORIES), -1).T[at])

@@ -12,12 +12,10 @@ import numpy as np
 import torch
 import tyro
 from torch import Tensor, nn
-from training.pixels.batches import Frames, Shards
+from training.pixels.batches import Shards
 from training.pixels.export import load_network
 from training.pixels.network import RoomNetwork
-
-from avlmaps.core.camera import Pinhole
-from avlmaps.perception.embedded.geometry import channels
+from training.pixels.whole import whole_frame
 
 
 @dataclass(frozen=True)
@@ -28,31 +26,16 @@ class Options:
     """Checkpoint; its room head is replaced."""
     frames: Path = Path("build/pixels/training")
     """Rendered frames."""
-    count: int = 3000
+    count: int = 2000
     """Pictures to look at."""
     epochs: int = 60
     """Times that each is learnt from."""
-    weights: str = "mean"
+    weights: str = "last"
     """Which weights of the checkpoint."""
     threads: int = 2
     """CPU threads."""
     seed: int = 0
     """Draws the pictures."""
-
-
-def picture_of(frames: Frames, index: int, rng: np.random.Generator) -> tuple[Tensor, Tensor]:
-    """Return geometry and colour (withheld half of the time) of a whole frame, mirrored half of the time."""
-    depth = frames.depth[index].astype(np.float32) / 1000.0
-    fx, fy, cx, cy, *up, height = frames.camera[index]
-    row = int(frames.rgb_row[index])
-    colour = np.zeros((3, *depth.shape), np.float32)
-    if row >= 0 and rng.random() < 0.5:
-        colour = frames.rgb[row].transpose(2, 0, 1).astype(np.float32) / 127.5 - 1.0
-    if rng.random() < 0.5:
-        depth, colour, cx, up = depth[:, ::-1], colour[:, :, ::-1], depth.shape[1] - cx, [-up[0], up[1], up[2]]
-    camera = Pinhole(fx, fy, cx, cy, depth.shape[1], depth.shape[0])
-    geometry = channels(np.ascontiguousarray(depth), camera, np.array(up), height)
-    return torch.from_numpy(geometry)[None], torch.from_numpy(np.ascontiguousarray(colour))[None]
 
 
 @torch.no_grad()
@@ -66,7 +49,8 @@ def pooled(network: RoomNetwork, options: Options) -> tuple[Tensor, Tensor]:
         frames, index = shards.draw(rng)
         if frames.room[index].max() > 0.3:
             with torch.autocast("cpu", torch.bfloat16):
-                network(*picture_of(frames, index, rng))
+                geometry, colour, _, _ = whole_frame(frames, index, rng.random() < 0.5, rng.random() < 0.5)
+                network(torch.from_numpy(geometry), torch.from_numpy(colour))
             share.append(torch.from_numpy(np.array(frames.room[index])))
     handle.remove()
     return torch.cat(kept).float(), torch.stack(share)

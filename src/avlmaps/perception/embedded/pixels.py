@@ -48,7 +48,7 @@ class EmbeddedPixels:
         return Lexicon(self.names, called, notes.kinds, self._words)
 
     def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
-        """Return features on a grid of about 160x120; zero where there is no depth."""
+        """Return features on a grid of about 120x90; zero where there is no depth."""
         seen = self._network.see(frame)
         return np.where(seen.known[..., None], features_of(seen.category, self.codes), np.float32(0.0))
 

@@ -1,7 +1,7 @@
 """The network behind the embedded pixel and view encoders: what each pixel shows, and what kind of room it is.
 
 It looks at geometry in the frame of gravity, and at colour through a small late branch. It runs in onnxruntime at
-about 320x240, whatever the recording's size; ``training/pixels`` makes its weights.
+about 240x180, whatever the recording's size; ``training/pixels`` makes its weights.
 """
 
 import json
@@ -24,8 +24,8 @@ from avlmaps.recordings.registration import depth_in_colour
 from avlmaps.recordings.types import Frame
 
 # The network was trained on pictures whose focal length is up to so many pixels; a longer one is looked at smaller.
-_LONGEST_FOCAL_PX = 300.0
-_WIDTH = 320
+_LONGEST_FOCAL_PX = 240.0
+_WIDTH = 240
 _MULTIPLE = 16
 # Without ground a camera is taken to be upright and as high as people and robots mostly hold it.
 _USUAL_HEIGHT_M = 1.3

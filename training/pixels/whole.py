@@ -1,0 +1,35 @@
+"""Whole frames as the running system looks at them, for what is fitted after the network."""
+
+import cv2
+import numpy as np
+from training.pixels.batches import Frames
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.perception.embedded.geometry import channels
+
+WIDTH, HEIGHT = 240, 180
+_MULTIPLE = 16
+
+
+def whole_frame(
+    frames: Frames, index: int, with_colour: bool, mirrored: bool = False
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return geometry (1, 8, h, w) and colour (1, 3, h, w), padded, and depth and label without padding."""
+    h, w = frames.depth[index].shape
+    row = ((np.arange(HEIGHT) + 0.5) * h / HEIGHT).astype(int)
+    column = ((np.arange(WIDTH) + 0.5) * w / WIDTH).astype(int)
+    depth = frames.depth[index][row[:, None], column].astype(np.float32) / 1000.0
+    label = np.array(frames.label[index][row[:, None], column])
+    fx, fy, cx, cy, *up, height = frames.camera[index]
+    colour = np.zeros((3, HEIGHT, WIDTH), np.float32)
+    rgb_row = int(frames.rgb_row[index])
+    if with_colour and rgb_row >= 0:
+        rgb = cv2.resize(np.ascontiguousarray(frames.rgb[rgb_row]), (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+        colour = rgb.transpose(2, 0, 1).astype(np.float32) / 127.5 - 1.0
+    if mirrored:
+        depth, label, colour = depth[:, ::-1], label[:, ::-1], colour[:, :, ::-1]
+        cx, up = w - cx, [-up[0], up[1], up[2]]
+    camera = Pinhole(fx, fy, cx, cy, w, h).resized(WIDTH, HEIGHT)
+    geometry = channels(np.ascontiguousarray(depth), camera, np.array(up), height)
+    pad = ((0, 0), (0, -HEIGHT % _MULTIPLE), (0, -WIDTH % _MULTIPLE))
+    return np.pad(geometry, pad)[None], np.pad(colour, pad)[None], depth, label
