@@ -181,7 +181,8 @@ def _leaf_is_free(
         return False
     for end in range(3, len(places), 4):
         tip, way = places[end], (places[end] - places[end - 1]) / np.linalg.norm(places[end] - places[end - 1])
-        beside_wall = inside(polygon, tip, -0.1) and not inside(polygon, tip, -0.35)
+        halfway = places[end - 2]  # so far from its own wall that another wall is near it or none
+        beside_wall = not inside(polygon, halfway, -0.35) and not inside(polygon, tip, -0.35)
         if not beside_wall and not inside(polygon, tip + 0.5 * way, -0.45):
             return False
     for other in leaves.get(room, []):
