@@ -20,7 +20,7 @@ $(READY): requirements/lock.txt pyproject.toml
 	$(RUN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
 	touch $@
 
-demo: $(READY)  ## Walk a room, hear it, map it, ask it; pictures land in demo_out/.
+demo: $(READY)  ## Make a home, walk it, hear it, map it, ask it; pictures land in demo_out/.
 	$(RUN)/avlmaps demo --out demo_out
 
 test: $(READY)  ## Run every test (offline, two cores, no GPU).
