@@ -88,9 +88,9 @@ def _furnished(rng: np.random.Generator, builder: SceneBuilder, plan: Plan, whic
             if leaf.room == index:
                 foot = Footprint(np.zeros(2), leaf.half_m, 0.0, 2.0)
                 ground.take(foot, leaf.centre, leaf.heading_rad)
+        sparse = 0.3 if chance(rng, 0.04) else 1.0
         f = Furnisher(rng, builder, ground, first + index, room.kind, room.floor_m, room.height_m, which, plan.ceiling,
-                      fill * (0.3 if chance(rng, 0.04) else 1.0), float(np.clip(mess * draw(rng, 0.5, 1.6), 0,
-                                                                                1)))  # fmt: skip
+                      fill * sparse, min(mess * draw(rng, 0.5, 1.6), 1.0))  # fmt: skip
         fit_out(f, looks[index].wall)
         dress_windows(f, cloth, None)
         RULES[room.kind](f)
