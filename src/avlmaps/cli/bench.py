@@ -25,7 +25,7 @@ class Indexing:
     """Whose faults colour and depth have."""
     frames: int = 600
     """At most so many frames a scene."""
-    tasks_a_scene: int = 12
+    tasks_a_scene: int = 20
     """At most so many tasks a scene and table."""
     jobs: int = 0
     """Scenes side by side; 0 takes as many as there are cores."""

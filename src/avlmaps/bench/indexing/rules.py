@@ -18,7 +18,7 @@ from avlmaps.sim.scene import Area, SceneObject
 NEAR_M = 2.5  # the right thing is at most so far, horizontally, from the place to the thing's box
 MARGIN_M = 1.5  # and every other thing of the category at least so much farther
 APART_M = 1.0  # what stands in other areas is at least so far from the right things
-LEAST_SEEN = 80  # voxels: 0.2 m² of surface; smaller things fill a few pixels of 320x240
+LEAST_SEEN = 50  # voxels: an eighth of a square metre of surface
 LEAST_PIXELS = 0.01  # of a photo that show the thing
 _A_CATEGORY = 3  # tasks of one category in a scene and table, at most
 

@@ -47,7 +47,7 @@ class IndexingSettings:
     frames: int = 600
     sources: int = 14
     ambiguous: int = 2
-    tasks_a_scene: int = 12
+    tasks_a_scene: int = 20
     jobs: int = 0
     seed: int = 0
     load: Path | None = None
