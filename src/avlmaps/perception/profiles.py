@@ -108,17 +108,6 @@ def profile(name: str) -> Profile:
 
 register_profile(
     Profile(
-        name="colours",
-        pixels="colours",
-        sounds="embedded",
-        local="rootsift",
-        place="vlad",
-        matcher="mutual-ratio",
-        about="objects by their colour alone: the quickest, and no network for pictures",
-    )
-)
-register_profile(
-    Profile(
         name="embedded",
         pixels="embedded",
         views="embedded",
@@ -127,5 +116,16 @@ register_profile(
         place="vlad",
         matcher="mutual-ratio",
         about="small models shipped with the package: no download, no GPU",
+    )
+)
+register_profile(
+    Profile(
+        name="colours",
+        pixels="colours",
+        sounds="embedded",
+        local="rootsift",
+        place="vlad",
+        matcher="mutual-ratio",
+        about="objects by their colour alone: the quickest, and no network for pictures",
     )
 )

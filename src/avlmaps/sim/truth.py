@@ -157,7 +157,7 @@ def _read_area(entry: dict[str, Any]) -> Area:
     return Area(entry["kind"], polygon, entry["floor_m"], entry["ceiling_m"], entry["name"])
 
 
-def _rounded(values: Sequence[float]) -> list[float]:
+def _rounded(values: Sequence[float | int]) -> list[float]:
     return [round(float(value), 4) for value in values]
 
 
