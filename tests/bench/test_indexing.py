@@ -1,5 +1,6 @@
 """The indexing benchmark: its rules make ambiguous tasks with one right answer, its truth reaches the ceiling."""
 
+import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -54,7 +55,7 @@ def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], np.float64)
 
 
-def home(swap: bool = False) -> Scene:
+def home(swap: bool = False, moved_m: float = 0.0) -> Scene:
     """A kitchen and a bedroom; ``swap`` exchanges them."""
     kinds = ("bedroom", "kitchen") if swap else ("kitchen", "bedroom")
     areas = [
@@ -70,7 +71,9 @@ def home(swap: bool = False) -> Scene:
     ):  # fmt: skip
         builder.add("wall", box(low, high, PLAIN))
     for category, low, high in THINGS:
-        builder.add(category, box(low, high, PLAIN), area=0 if low[0] < 5 else 1)
+        by = np.array([0.0, 0.0, moved_m])
+        corners = (tuple(np.array(corner) + by) for corner in (low, high))
+        builder.add(category, box(*corners, PLAIN), area=0 if low[0] < 5 else 1)
     return builder.build()
 
 
@@ -170,6 +173,15 @@ def test_a_chair_that_the_recording_does_not_show_is_neither_asked_for_nor_a_riv
     for hidden in (0, 1):
         seen = np.where(np.arange(2) == hidden, 0, 100)
         assert sound_tasks(replace(evidence, seen=seen), np.random.default_rng(0), 10) == []
+
+
+def test_what_stands_on_another_storey_is_no_rival():
+    evidence = evidence_of([(0, 0), (6, 0), (6, 0)], (Event("snoring", (5.0, 0.5, 1.3)),))
+    above = replace(evidence.objects[2], low=(5.8, -0.2, 3.0), high=(6.2, 0.2, 3.9))
+    stacked = replace(evidence, objects=(*evidence.objects[:2], above))
+    assert sound_tasks(stacked, np.random.default_rng(0), 10) == []
+    (task,) = sound_tasks(replace(stacked, storey_m=(-0.4, 2.6)), np.random.default_rng(0), 10)
+    assert task.targets == (evidence.box(1),)
 
 
 def test_a_photo_asks_only_for_what_it_shows():
@@ -349,7 +361,14 @@ def test_a_whole_run_makes_tables_and_a_second_one_makes_nothing_again(tmp_path:
         return home()
 
     settings = IndexingSettings(
-        scenes=("home",), frames=20, sources=2, ambiguous=0, tasks_a_scene=2, jobs=1, save=tmp_path / "tasks.json"
+        scenes=("home",),
+        profile="colours",
+        frames=20,
+        sources=2,
+        ambiguous=0,
+        tasks_a_scene=2,
+        jobs=1,
+        save=tmp_path / "tasks.json",
     )
     first = run(settings, tmp_path / "work", open_spec)
     assert opened == ["home"]
@@ -358,6 +377,12 @@ def test_a_whole_run_makes_tables_and_a_second_one_makes_nothing_again(tmp_path:
     assert opened == []
     assert second.tasks == first.tasks
     assert second.scenes[0].answers == first.scenes[0].answers
+    (tmp_path / "other").mkdir()
+    shutil.copytree(tmp_path / "work", tmp_path / "other" / "work")
+    for photo in (tmp_path / "other").rglob("photos"):
+        shutil.rmtree(photo)
+    with pytest.raises(TaskError, match="no longer the scene"):
+        run(replace(settings, save=None), tmp_path / "other" / "work", lambda spec: home(swap=True, moved_m=0.5))
     made = tables(first)
     by_name = {row[0]: row for row in made["Table III: area-object"]["rows"]}
     asked = sum(task.kind is TaskKind.AREA for task in first.tasks.tasks)

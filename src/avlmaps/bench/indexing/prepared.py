@@ -15,7 +15,7 @@ from jaxtyping import UInt8
 
 from avlmaps.bench.indexing.asked_scene import AskedScene
 from avlmaps.bench.indexing.rules import Event, Evidence, Photo, area_tasks, photo_tasks, sound_tasks
-from avlmaps.bench.indexing.tasks import Recorded, Task, TaskKind
+from avlmaps.bench.indexing.tasks import Recorded, Task, TaskError, TaskKind
 from avlmaps.bench.indexing.true_voxels import TrueVoxels
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.version import __version__
@@ -23,11 +23,12 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.images import read_picture
 from avlmaps.recordings.types import Recording
 from avlmaps.sim.recorder import RecordSettings, record_scene
-from avlmaps.sim.scene import NOTHING, Scene
+from avlmaps.sim.scene import NOTHING, Scene, SceneObject
 from avlmaps.sim.truth import Truth, read_truth
 
 _FPS = 5.0
 _PHOTOS_A_TASK = 12  # so many are tried for each that is wanted
+_STOREY_BELOW_M, _STOREY_ABOVE_M = 1.7, 1.3  # from the camera's height
 _RECIPE = 1  # raised when what a folder of work holds is made in another way
 
 
@@ -88,7 +89,14 @@ class Workplace:
     @cached_property
     def scene(self) -> Scene:
         """The scene itself; making it takes seconds, and a second run needs it only for new photos."""
-        return self.open_spec(self.job.spec)
+        scene = self.open_spec(self.job.spec)
+        folder = self.job.folder / "recording"
+        if folder.exists() and not _same_things(scene.objects, read_truth(folder).objects):
+            raise TaskError(
+                f"{self.job.spec} is no longer the scene that {folder} was recorded in (the simulator has changed); "
+                f"remove {self.job.folder} and run again."
+            )
+        return scene
 
     @cached_property
     def _renderer(self):
@@ -165,7 +173,9 @@ class Workplace:
         seen = np.bincount(label[label != NOTHING], minlength=len(truth.objects))
         acoustic = self.job.recorded.hearing == "acoustic"
         events = tuple(Event(e.category, e.source if acoustic else e.robot) for e in truth.events)
-        return Evidence(self.job.spec, truth.objects, seen, truth.areas, events)
+        eye_m = float(np.median(self.recording.world_from_camera[:, 2, 3]))
+        storey_m = (eye_m - _STOREY_BELOW_M, eye_m + _STOREY_ABOVE_M)
+        return Evidence(self.job.spec, truth.objects, seen, truth.areas, events, storey_m)
 
     def tasks(self, most: int) -> list[Task]:
         """Make this scene's tasks, at most so many of each kind."""
@@ -189,6 +199,14 @@ class Workplace:
             shown = np.bincount(instance[instance != NOTHING], minlength=len(self.truth.objects))
             found.append(Photo(pose, shown / instance.size))
         return found
+
+
+def _same_things(made: Sequence[SceneObject], recorded: Sequence[SceneObject]) -> bool:
+    """Tell whether things are the same, to the rounding of the files."""
+    if [thing.category for thing in made] != [thing.category for thing in recorded]:
+        return False
+    corners = (np.array([(*thing.low, *thing.high) for thing in things]) for things in (made, recorded))
+    return bool(np.allclose(*corners, rtol=0.0, atol=1e-3))
 
 
 def _fresh(folder: Path) -> Path:

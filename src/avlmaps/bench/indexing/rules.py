@@ -46,6 +46,8 @@ class Evidence:
         seen: for each thing how many voxels of the map it fills.
         areas: its rooms.
         events: its sounds.
+        storey_m: heights between which lies the storey that was recorded; things of others are neither asked for nor
+            rivals, since distances are horizontal.
     """
 
     scene: str
@@ -53,12 +55,14 @@ class Evidence:
     seen: Int[np.ndarray, " objects"]
     areas: tuple[Area, ...] = ()
     events: tuple[Event, ...] = ()
+    storey_m: tuple[float, float] = (-np.inf, np.inf)
 
     def ambiguous(self) -> dict[str, list[int]]:
         """Return the things of each category of which the recording shows two or more; unseen ones are among them."""
         found: dict[str, list[int]] = {}
         for instance, thing in enumerate(self.objects):
-            if thing.category not in STRUCTURE:
+            on_storey = self.storey_m[0] <= thing.centre[2] <= self.storey_m[1]
+            if thing.category not in STRUCTURE and on_storey:
                 found.setdefault(thing.category, []).append(instance)
         return {name: own for name, own in found.items() if sum(map(self.shows, own)) >= 2}
 
