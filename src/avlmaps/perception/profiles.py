@@ -1,6 +1,6 @@
 """Profiles: which backend serves which module. A map keeps the name of its profile and every model's card."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 from avlmaps.core.errors import BackendError
@@ -106,26 +106,23 @@ def profile(name: str) -> Profile:
     return _PROFILES[name]
 
 
-register_profile(
-    Profile(
-        name="embedded",
-        pixels="embedded",
-        views="embedded",
-        sounds="embedded",
-        local="rootsift",
-        place="vlad",
-        matcher="mutual-ratio",
-        about="small models shipped with the package: no download, no GPU",
-    )
+_EMBEDDED = Profile(
+    name="embedded",
+    pixels="embedded",
+    views="embedded",
+    sounds="embedded",
+    local="rootsift",
+    place="vlad",
+    matcher="mutual-ratio",
+    about="small models shipped with the package: no download, no GPU",
 )
+register_profile(_EMBEDDED)
 register_profile(
-    Profile(
+    replace(
+        _EMBEDDED,
         name="colours",
         pixels="colours",
-        sounds="embedded",
-        local="rootsift",
-        place="vlad",
-        matcher="mutual-ratio",
+        views="",
         about="objects by their colour alone: the quickest, and no network for pictures",
     )
 )

@@ -1,15 +1,13 @@
 """The embedded pixel encoder: probabilities of categories for each pixel, in the space of words (see ``codes``)."""
 
 from collections.abc import Sequence
-from functools import cached_property
-from typing import cast
 
 import numpy as np
 from jaxtyping import Float, Float32
 
-from avlmaps.core.registry import Kind, load
-from avlmaps.perception.embedded.codes import Lexicon, features_of, word_codes
-from avlmaps.perception.embedded.scene_network import SceneNetwork, load_network
+from avlmaps.perception.embedded.codes import features_of
+from avlmaps.perception.embedded.named import NamedEncoder
+from avlmaps.perception.embedded.scene_network import SceneNetwork
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.types import Frame
 
@@ -17,7 +15,7 @@ from avlmaps.recordings.types import Frame
 SMALLEST_LOG_AREA, LARGEST_LOG_AREA = -4.0, 0.7
 
 
-class EmbeddedPixels:
+class EmbeddedPixels(NamedEncoder):
     """Tells some hundred things of homes and offices apart by their shape, helped a little by colour.
 
     Args:
@@ -26,11 +24,8 @@ class EmbeddedPixels:
     """
 
     def __init__(self, network: SceneNetwork | None = None, words: WordEncoder | None = None) -> None:
-        self._network = load_network() if network is None else network
-        self._words = cast(WordEncoder, load(Kind.WORDS, "embedded")) if words is None else words
+        super().__init__("categories", network, words)
         notes = self._network.notes
-        self.names = notes.categories
-        self.codes = word_codes(self.names, self._words)
         self.card = ModelCard(
             id=notes.id, dim=self.codes.shape[1], licence="MIT", checksum=self._network.checksum, note=notes.note
         )
@@ -40,21 +35,10 @@ class EmbeddedPixels:
         """The categories that compete for a voxel, without ``other``."""
         return tuple(name for name in self.names if name != "other")
 
-    @cached_property
-    def lexicon(self) -> Lexicon:
-        """Which categories a phrase means."""
-        notes = self._network.notes
-        called = tuple((name, *notes.called.get(name, ())) for name in self.names)
-        return Lexicon(self.names, called, notes.kinds, self._words)
-
     def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
         """Return features on a grid of about 120x90; zero where there is no depth."""
         seen = self._network.see(frame)
         return np.where(seen.known[..., None], features_of(seen.category, self.codes), np.float32(0.0))
-
-    def meant(self, word: str) -> Float32[np.ndarray, " k"]:
-        """Return for each of ``names`` how much a phrase means it, 1 for the most meant; zero where it means none."""
-        return self.lexicon.meant(word)
 
     def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
         """Return a unit vector for each phrase; zero for one that means none of the categories."""

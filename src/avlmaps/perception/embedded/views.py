@@ -1,20 +1,18 @@
 """The embedded view encoder: what kind of room a picture shows, in the space of words (see ``codes``)."""
 
 from collections.abc import Sequence
-from functools import cached_property
-from typing import cast
 
 import numpy as np
 from jaxtyping import Float32
 
-from avlmaps.core.registry import Kind, load
-from avlmaps.perception.embedded.codes import Lexicon, features_of, word_codes
-from avlmaps.perception.embedded.scene_network import SceneNetwork, load_network
+from avlmaps.perception.embedded.codes import features_of
+from avlmaps.perception.embedded.named import NamedEncoder
+from avlmaps.perception.embedded.scene_network import SceneNetwork
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.types import Frame
 
 
-class EmbeddedViews:
+class EmbeddedViews(NamedEncoder):
     """Tells kinds of room apart by what stands in them.
 
     Args:
@@ -23,11 +21,8 @@ class EmbeddedViews:
     """
 
     def __init__(self, network: SceneNetwork | None = None, words: WordEncoder | None = None) -> None:
-        self._network = load_network() if network is None else network
-        self._words = cast(WordEncoder, load(Kind.WORDS, "embedded")) if words is None else words
+        super().__init__("rooms", network, words)
         notes = self._network.notes
-        self.names = notes.rooms
-        self.codes = word_codes(self.names, self._words)
         self.card = ModelCard(
             id=notes.id.replace("pixels", "views"),
             dim=self.codes.shape[1],
@@ -35,17 +30,6 @@ class EmbeddedViews:
             checksum=self._network.checksum,
             note=f"Knows these kinds of room: {', '.join(self.names)}.",
         )
-
-    @cached_property
-    def lexicon(self) -> Lexicon:
-        """Which kinds of room a phrase means."""
-        notes = self._network.notes
-        called = tuple((name, *notes.called.get(name, ())) for name in self.names)
-        return Lexicon(self.names, called, notes.kinds, self._words)
-
-    def meant(self, word: str) -> Float32[np.ndarray, " k"]:
-        """Return for each of ``names`` how much a phrase means it; zero where it means none."""
-        return self.lexicon.meant(word)
 
     def encode(self, frames: Sequence[Frame]) -> Float32[np.ndarray, "n d"]:
         """Return a unit vector for each frame."""

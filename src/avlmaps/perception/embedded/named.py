@@ -1,0 +1,39 @@
+"""What the embedded pixel and view encoders share: names, their codes, and which of them a phrase means."""
+
+from functools import cached_property
+from typing import cast
+
+import numpy as np
+from jaxtyping import Float32
+
+from avlmaps.core.registry import Kind, load
+from avlmaps.perception.embedded.codes import Lexicon, word_codes
+from avlmaps.perception.embedded.scene_network import SceneNetwork, load_network
+from avlmaps.perception.protocols import WordEncoder
+
+
+class NamedEncoder:
+    """An encoder that tells some names apart.
+
+    Args:
+        names: what it tells apart; ``categories`` or ``rooms`` of the network's notes.
+        network: which; the one that ships if None.
+        words: the word encoder whose space the features live in; the embedded one if None.
+    """
+
+    def __init__(self, names: str, network: SceneNetwork | None, words: WordEncoder | None) -> None:
+        self._network = load_network() if network is None else network
+        self._words = cast(WordEncoder, load(Kind.WORDS, "embedded")) if words is None else words
+        self.names: tuple[str, ...] = getattr(self._network.notes, names)
+        self.codes = word_codes(self.names, self._words)
+
+    @cached_property
+    def lexicon(self) -> Lexicon:
+        """Which of the names a phrase means."""
+        notes = self._network.notes
+        called = tuple((name, *notes.called.get(name, ())) for name in self.names)
+        return Lexicon(self.names, called, notes.kinds, self._words)
+
+    def meant(self, word: str) -> Float32[np.ndarray, " k"]:
+        """Return for each of ``names`` how much a phrase means it, 1 for the most meant; zero where it means none."""
+        return self.lexicon.meant(word)
