@@ -7,13 +7,13 @@ storey below it, that holds a fair share of what is level there: table tops hold
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.poses import apply
 from avlmaps.maps.gravity import MAX_DEPTH_M, NEAR_RAD
+from avlmaps.recordings.subset import Subset
 from avlmaps.recordings.types import Frame, Ground, Recording
 
 BIN_M = 0.02
@@ -80,42 +80,17 @@ def _level_heights(frame: Frame, up: Float[np.ndarray, "3"]) -> Float[np.ndarray
     return apply(frame.world_from_camera, points[:-1, :-1][smooth][level]) @ up
 
 
-class GroundedRecording(Recording):
-    """A recording whose frames know which way is up and where the floor is."""
+class GroundedRecording(Subset):
+    """A whole recording whose frames know which way is up and where the floor is."""
 
     def __init__(self, whole: Recording, ground: Ground) -> None:
         """Put a recording on its ground."""
-        self.whole = whole
+        super().__init__(whole, range(len(whole)))
         self.ground = ground
-        self.path: Path = whole.path
-        self.format: str = whole.format
-        self.rig = whole.rig
-        self.stamps_s = whole.stamps_s
-        self.world_from_camera = whole.world_from_camera
-        self.up_in_world = whole.up_in_world
-        self.audio = whole.audio
-        self.notices = whole.notices
 
     def frame(self, index: int) -> Frame:
         """Read one frame and tell it the ground."""
         return replace(self.whole.frame(index), ground=self.ground)
-
-    def name(self, index: int) -> str:
-        """Return what the recording calls the frame."""
-        return self.whole.name(index)
-
-    def colour_file(self, index: int) -> Path | None:
-        """Return the frame's colour file."""
-        return self.whole.colour_file(index)
-
-    def depth_file(self, index: int) -> Path | None:
-        """Return the frame's depth file."""
-        return self.whole.depth_file(index)
-
-    @property
-    def depth_units_per_m(self) -> float:
-        """The recording's."""
-        return self.whole.depth_units_per_m
 
     @cached_property
     def fingerprint(self) -> str:
