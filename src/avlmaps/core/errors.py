@@ -32,3 +32,19 @@ class QueryError(AvlmapsError):
 
 class SceneError(AvlmapsError):
     """A scene cannot be read from its files: one is missing, truncated, or not what its layout says."""
+
+
+class LanguageError(AvlmapsError):
+    """A command cannot be turned into a program: it was not understood, or no chat model gave a usable answer."""
+
+
+class ProgramError(AvlmapsError):
+    """A program is refused or stopped: it is not of the allowed syntax, misuses a skill, or exceeds its budget."""
+
+
+class NavigationError(AvlmapsError):
+    """A robot cannot be driven: no way leads there, it is stuck, or its connection failed."""
+
+
+class GoalNotFoundError(AvlmapsError):
+    """What a command names is not in the map; skills raise it, and the trace records it."""

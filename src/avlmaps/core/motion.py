@@ -1,0 +1,73 @@
+"""How a robot moves over a floor: poses on the ground, the paper's discrete actions, and what came of a movement.
+
+Plain values that a simulated body and a navigator share without knowing each other. All in the level frame (z up,
+metres); headings are radians, counter-clockwise from +x. On the compass +y is north and +x is east (REP 103's ENU).
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from math import cos, hypot, pi, sin
+
+FORWARD_M = 0.1
+TURN_RAD = pi / 36  # 5 degrees
+
+
+class Action(StrEnum):
+    """The paper's actions: 0.1 m forward, 5 degrees to a side, stop; the value is the word in a trace."""
+
+    FORWARD = "move_forward"
+    LEFT = "turn_left"
+    RIGHT = "turn_right"
+    STOP = "stop"
+
+
+@dataclass(frozen=True, slots=True)
+class GroundPose:
+    """Where a robot stands and looks.
+
+    Attributes:
+        x_m: level x.
+        y_m: level y.
+        heading_rad: counter-clockwise from +x, in (−π, π].
+    """
+
+    x_m: float
+    y_m: float
+    heading_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not all(abs(value) < 1e9 for value in (self.x_m, self.y_m, self.heading_rad)):  # NaN fails as well
+            raise ValueError(f"({self.x_m}, {self.y_m}) m, {self.heading_rad} rad is no pose")
+        object.__setattr__(self, "heading_rad", wrapped(self.heading_rad))
+
+    def turned(self, angle_rad: float) -> "GroundPose":
+        """Return the pose turned to the left by an angle."""
+        return GroundPose(self.x_m, self.y_m, self.heading_rad + angle_rad)
+
+    def ahead(self, distance_m: float) -> "GroundPose":
+        """Return the pose moved along its heading."""
+        x_m = self.x_m + distance_m * cos(self.heading_rad)
+        return GroundPose(x_m, self.y_m + distance_m * sin(self.heading_rad), self.heading_rad)
+
+    def distance_m(self, other: "GroundPose") -> float:
+        """Return the horizontal distance to another pose."""
+        return hypot(self.x_m - other.x_m, self.y_m - other.y_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """What came of one movement of a body.
+
+    Attributes:
+        pose: where the body is now, as its odometry says.
+        contact: whether it touched something, and stopped or slid along it.
+    """
+
+    pose: GroundPose
+    contact: bool = False
+
+
+def wrapped(angle_rad: float) -> float:
+    """Return the angle in (−π, π]."""
+    turned = (angle_rad + pi) % (2 * pi) - pi
+    return pi if turned == -pi else turned

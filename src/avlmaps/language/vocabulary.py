@@ -1,0 +1,184 @@
+"""The robot's vocabulary: every skill that a program may call, in one table.
+
+`Vocabulary` is that table: each method with its typed signature and docstring is a skill. The interpreter calls
+nothing else, the chat prompt is made from it, the grammar writes programs in it, and `avlmaps.navigate` implements it.
+Names are those of the paper and of VLMaps; angles in degrees and metres, since people write programs in them.
+"""
+
+from dataclasses import dataclass
+from math import hypot, isfinite
+from typing import Protocol, runtime_checkable
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place in the world, metres. Programs add places, subtract them, and scale them by numbers.
+
+    Attributes:
+        x: world x.
+        y: world y.
+        z: world z.
+    """
+
+    x: float
+    y: float
+    z: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not all(isfinite(value) for value in (self.x, self.y, self.z)):
+            raise ValueError(f"({self.x}, {self.y}, {self.z}) is no place")
+
+    def __add__(self, other: "Place") -> "Place":
+        return Place(self.x + other.x, self.y + other.y, self.z + other.z)
+
+    def __sub__(self, other: "Place") -> "Place":
+        return Place(self.x - other.x, self.y - other.y, self.z - other.z)
+
+    def __mul__(self, factor: float) -> "Place":
+        return Place(self.x * factor, self.y * factor, self.z * factor)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, divisor: float) -> "Place":
+        return Place(self.x / divisor, self.y / divisor, self.z / divisor)
+
+    def distance_m(self, other: "Place") -> float:
+        """Return the distance over the ground to another place, the world's z being up."""
+        return hypot(self.x - other.x, self.y - other.y)
+
+
+class Heat(Protocol):
+    """A heatmap over the map; programs can only multiply it with another and hand it on (`query.Heatmap` is one)."""
+
+    def __mul__(self, other: "Heat", /) -> "Heat": ...
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture that a program has loaded.
+
+    Attributes:
+        path: its file.
+    """
+
+    path: str
+
+
+@dataclass(frozen=True, slots=True)
+class Clip:
+    """A recorded sound that a program has loaded.
+
+    Attributes:
+        path: its file.
+    """
+
+    path: str
+
+
+# What a movement can be told to go to: a phrase ("chair"), a place, or a heatmap (its best place).
+Target = str | Place | Heat
+
+
+@runtime_checkable
+class Vocabulary(Protocol):
+    """What a robot can be told to do. A skill whose thing is not in the map raises ``GoalNotFoundError``."""
+
+    def load_image(self, path: str) -> Picture:
+        """Load a picture from a file, to ask where it was taken."""
+        ...
+
+    def load_sound(self, path: str) -> Clip:
+        """Load a recorded sound from a file, to ask where one like it was heard."""
+        ...
+
+    def get_major_map(
+        self,
+        obj: str | None = None,
+        sound: str | Clip | None = None,
+        img: Picture | None = None,
+        area: str | None = None,
+    ) -> Heat:
+        """Return the heatmap of what is sought itself (falls to nothing within 0.5 m). Give exactly one argument."""
+        ...
+
+    def get_map(
+        self,
+        obj: str | None = None,
+        sound: str | Clip | None = None,
+        img: Picture | None = None,
+        area: str | None = None,
+    ) -> Heat:
+        """Return the heatmap of what the sought thing is near or in (falls off over 5 m). Give exactly one argument."""
+        ...
+
+    def get_max_pos_3d(self, heat: Heat) -> Place:
+        """Return the best place of a heatmap, or of several multiplied with each other."""
+        ...
+
+    def get_pos(self, target: Target) -> Place:
+        """Return the place of the best goal for a phrase or a heatmap."""
+        ...
+
+    def get_contour(self, target: Target) -> list[Place]:
+        """Return the outline on the ground of the best instance of an object, counter-clockwise."""
+        ...
+
+    def move_to(self, target: Target) -> None:
+        """Drive to a place, or as near to it as the robot can stand and see it."""
+        ...
+
+    def move_to_object(self, name: Target) -> None:
+        """Drive to the nearest point beside the nearest object of that name."""
+        ...
+
+    def move_in_between(self, a: Target, b: Target) -> None:
+        """Drive to the middle between the nearest points of two things."""
+        ...
+
+    def move_to_left(self, target: Target, distance_m: float = 0.5) -> None:
+        """Drive to the left side of a thing, as the robot sees it from where it stands, so far from its edge."""
+        ...
+
+    def move_to_right(self, target: Target, distance_m: float = 0.5) -> None:
+        """Drive to the right side of a thing, as the robot sees it from where it stands, so far from its edge."""
+        ...
+
+    def move_north(self, target: Target, distance_m: float = 0.5) -> None:
+        """Drive to the north (+y) of a thing, so far from its edge."""
+        ...
+
+    def move_south(self, target: Target, distance_m: float = 0.5) -> None:
+        """Drive to the south (−y) of a thing, so far from its edge."""
+        ...
+
+    def move_east(self, target: Target, distance_m: float = 0.5) -> None:
+        """Drive to the east (+x) of a thing, so far from its edge."""
+        ...
+
+    def move_west(self, target: Target, distance_m: float = 0.5) -> None:
+        """Drive to the west (−x) of a thing, so far from its edge."""
+        ...
+
+    def face(self, target: Target) -> None:
+        """Turn on the spot until the thing is straight ahead."""
+        ...
+
+    def turn(self, angle_deg: float) -> None:
+        """Turn on the spot: to the right by a positive angle, to the left by a negative one."""
+        ...
+
+    def turn_absolute(self, compass_deg: float) -> None:
+        """Turn on the spot to a heading on the compass: 0 north (+y), 90 east (+x), 180 south, 270 west."""
+        ...
+
+    def move_forward(self, distance_m: float) -> None:
+        """Drive straight ahead; with a negative distance turn round first, so that the robot sees where it goes."""
+        ...
+
+    def with_object_on_left(self, target: Target) -> None:
+        """Turn on the spot until the thing is straight to the left of the robot."""
+        ...
+
+    def with_object_on_right(self, target: Target) -> None:
+        """Turn on the spot until the thing is straight to the right of the robot."""
+        ...
