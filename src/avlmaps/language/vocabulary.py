@@ -47,6 +47,7 @@ class Place:
         return hypot(self.x - other.x, self.y - other.y)
 
 
+@runtime_checkable
 class Heat(Protocol):
     """A heatmap over the map; programs can only multiply it with another and hand it on (`query.Heatmap` is one)."""
 
@@ -121,6 +122,10 @@ class Vocabulary(Protocol):
 
     def get_contour(self, target: Target) -> list[Place]:
         """Return the outline on the ground of the best instance of an object, counter-clockwise."""
+        ...
+
+    def current_pos(self) -> Place:
+        """Return the place where the robot stands now; keep it to come back later."""
         ...
 
     def move_to(self, target: Target) -> None:

@@ -1,0 +1,46 @@
+"""What every way from a command to a program has in common."""
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+
+@dataclass(frozen=True, slots=True)
+class Translation:
+    """A program for a command.
+
+    Attributes:
+        program: text in the robot's vocabulary, as `avlmaps.language.program` parses it.
+        notes: one sentence each, for the person who gave the command: how something was taken that could have been
+            meant in another way.
+    """
+
+    program: str
+    notes: tuple[str, ...] = ()
+
+
+@runtime_checkable
+class Translator(Protocol):
+    """Turns what a person says into a program of the robot's vocabulary."""
+
+    @property
+    def name(self) -> str:
+        """The word by which a user chooses this translator, such as `rules` or `chat`."""
+        ...
+
+    def program_for(self, command: str) -> Translation:
+        """Return the program for a command.
+
+        Raises:
+            LanguageError: the command was not understood, or no usable answer came.
+        """
+        ...
+
+    def repair(self, command: str, program: str, error: str) -> Translation | None:
+        """Return another program for a command whose program failed, or None where there is no other.
+
+        Args:
+            command: what the person said.
+            program: the program that failed.
+            error: the sentence that says why.
+        """
+        ...
