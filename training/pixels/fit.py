@@ -1,7 +1,8 @@
 """Training: ``python -m training.pixels.fit --shards build/pixels/training --minutes 80``.
 
-Runs on a GPU where there is one, else on the CPU in bfloat16. The learning rate follows the clock, so that a run of
-any length ends well; a checkpoint is written every few minutes, and ``--resume`` goes on from it.
+Runs on a GPU where there is one, else on the CPU, in bfloat16 where the processor multiplies that (where it does not,
+bfloat16 is three times slower than float32). The learning rate follows the clock, so that a run of any length ends
+well; a checkpoint is written every few minutes, and ``--resume`` goes on from it.
 """
 
 import sys
@@ -9,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter, time
+from typing import Literal
 
 import numpy as np
 import torch
@@ -17,6 +19,7 @@ from torch import Tensor, nn
 from training.pixels.batches import Batch, Shards, draw_batch
 from training.pixels.export import read_start
 from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED
+from training.pixels.muon import Muon
 from training.pixels.network import RoomNetwork
 
 
@@ -34,6 +37,8 @@ class Options:
     """Pictures in a step."""
     rate: float = 2e-3
     """Highest learning rate."""
+    optimiser: Literal["muon", "adamw"] = "muon"
+    """What turns gradients into steps."""
     threads: int = 2
     """CPU threads."""
     colour_kept: float = 0.5
@@ -77,13 +82,31 @@ def class_weights(shards: Shards, rng: np.random.Generator) -> np.ndarray:
     return np.clip(np.sqrt(0.01 / np.maximum(share, 1e-6)), 0.25, 2.5)
 
 
+def _halves(device: torch.device) -> bool:
+    """Say whether the device multiplies bfloat16 rather than imitates it."""
+    return device.type != "cpu" or torch.cpu._is_avx512_bf16_supported()
+
+
+def optimisers_of(network: nn.Module, options: Options) -> list[torch.optim.Optimizer]:
+    """Return Muon for the convolutions inside the network, AdamW for its outputs, biases and norms (or for all)."""
+    inside: list[Tensor] = []
+    if options.optimiser == "muon":
+        inside = [
+            p for name, p in network.named_parameters() if p.ndim == 4 and not name.startswith(("score", "colour.0"))
+        ]
+    chosen = {id(p) for p in inside}
+    rest = [p for p in network.parameters() if id(p) not in chosen]
+    adam = torch.optim.AdamW(rest, lr=options.rate, weight_decay=0.02)
+    return [Muon(inside, lr=options.rate), adam] if inside else [adam]
+
+
 def losses(network: nn.Module, batch: Batch, weight: Tensor, device: torch.device) -> tuple[Tensor, Tensor, float]:
     """Return the loss of the pixels, that of the rooms, and the share of pixels that are right."""
     geometry, colour, label, near, room = (
         torch.from_numpy(a).to(device) for a in (batch.geometry, batch.colour, batch.label, batch.weight, batch.room)
     )
     geometry, colour = (x.to(memory_format=torch.channels_last) for x in (geometry, colour))
-    with torch.autocast(device.type, torch.bfloat16):
+    with torch.autocast(device.type, torch.bfloat16, enabled=_halves(device)):
         score, rooms = network(geometry, colour)
     score = score.float()
     each = nn.functional.cross_entropy(score, label, ignore_index=UNLABELLED, reduction="none", label_smoothing=0.03)
@@ -97,6 +120,25 @@ def losses(network: nn.Module, batch: Batch, weight: Tensor, device: torch.devic
     return pixels, views, right
 
 
+def _begun(options: Options, device: torch.device) -> tuple[RoomNetwork, list[torch.optim.Optimizer]]:
+    """Return the network and its optimisers: new, with the weights that ship, or as the checkpoint left them."""
+    network = RoomNetwork(len(CATEGORIES), len(ROOMS), options.widths).to(device, memory_format=torch.channels_last)
+    if options.start is not None:
+        network.load_state_dict(read_start(options.start))
+    optimisers = optimisers_of(network, options)
+    if options.resume:
+        kept = torch.load(options.out, map_location=device, weights_only=True)
+        network.load_state_dict(kept["last"])
+        for optimiser, state in zip(optimisers, kept["moments"], strict=True):
+            optimiser.load_state_dict(state)
+    return network, optimisers
+
+
+def _rate_at(options: Options, done: float, step: int) -> float:
+    """Return the learning rate at a share of the time: a short rise, then half a cosine."""
+    return float(options.rate * min(1.0, (step + 1) / 100) * (0.5 + 0.5 * np.cos(np.pi * done)) + 1e-6)
+
+
 def fit(options: Options) -> None:
     """Train until the time is over."""
     torch.manual_seed(options.seed)
@@ -104,35 +146,29 @@ def fit(options: Options) -> None:
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     rng = np.random.default_rng(options.seed)
     shards = Shards(options.shards)
-    network = RoomNetwork(len(CATEGORIES), len(ROOMS), options.widths).to(device, memory_format=torch.channels_last)
-    if options.start is not None:
-        network.load_state_dict(read_start(options.start))
-    if options.resume:
-        network.load_state_dict(torch.load(options.out, map_location=device, weights_only=True)["last"])
+    network, optimisers = _begun(options, device)
     weight = torch.from_numpy(class_weights(shards, rng)).float().to(device)
-    optimiser = torch.optim.AdamW(network.parameters(), lr=options.rate, weight_decay=0.02)
-    if options.resume and (moments := torch.load(options.out, map_location=device, weights_only=True).get("moments")):
-        optimiser.load_state_dict(moments)
     average, begin, step, shown, saved = Average(network), perf_counter(), 0, perf_counter(), perf_counter()
     met, peer_stamp = perf_counter(), time()
     ahead = ThreadPoolExecutor(1)  # the next batch is drawn while the network learns from this one
     coming = ahead.submit(draw_batch, shards, options.batch, rng, options.colour_kept)
     running = np.zeros(3)
     while (done := (perf_counter() - begin) / 60.0 / options.minutes) < 1.0:
-        for group in optimiser.param_groups:
-            group["lr"] = float(options.rate * min(1.0, (step + 1) / 100) * (0.5 + 0.5 * np.cos(np.pi * done)) + 1e-6)
+        for group in (group for optimiser in optimisers for group in optimiser.param_groups):
+            group["lr"] = _rate_at(options, done, step)
         batch, coming = coming.result(), ahead.submit(draw_batch, shards, options.batch, rng, options.colour_kept)
         pixels, views, right = losses(network, batch, weight, device)
-        optimiser.zero_grad(set_to_none=True)
+        network.zero_grad(set_to_none=True)
         (pixels + 0.15 * views).backward()
         nn.utils.clip_grad_norm_(network.parameters(), 2.0)
-        optimiser.step()
+        for optimiser in optimisers:
+            optimiser.step()
         average.take(network, max(1.0 / (step + 10), 0.002))
         step += 1
         running += 0.02 * (np.array([float(pixels.detach()), float(views.detach()), right]) - running)
         now = perf_counter()
         if options.peer is not None and now - met > 60:
-            save(options, network, average, optimiser, step)
+            save(options, network, average, optimisers, step)
             if options.peer.is_file() and options.peer.stat().st_mtime > peer_stamp:
                 peer_stamp = options.peer.stat().st_mtime
                 meet(network, options.peer)
@@ -145,10 +181,10 @@ def fit(options: Options) -> None:
             )  # fmt: skip
             shown = now
         if now - saved > 240:
-            save(options, network, average, optimiser, step)
+            save(options, network, average, optimisers, step)
             saved = now
     ahead.shutdown(cancel_futures=True)
-    save(options, network, average, optimiser, step)
+    save(options, network, average, optimisers, step)
 
 
 @torch.no_grad()
@@ -160,13 +196,15 @@ def meet(network: nn.Module, peer: Path) -> None:
             value.lerp_(others[name].to(value), 0.5)
 
 
-def save(options: Options, network: nn.Module, average: Average, optimiser: torch.optim.Optimizer, step: int) -> None:
+def save(
+    options: Options, network: nn.Module, average: Average, optimisers: list[torch.optim.Optimizer], step: int
+) -> None:
     """Write the checkpoint so that a reader never meets half of one."""
     options.out.parent.mkdir(parents=True, exist_ok=True)
     about = {key: str(value) for key, value in asdict(options).items()}
     scratch = options.out.with_suffix(".part")
     state = {"last": network.state_dict(), "mean": average.state, "widths": list(options.widths), "step": step}
-    state["moments"] = optimiser.state_dict()
+    state["moments"] = [optimiser.state_dict() for optimiser in optimisers]
     torch.save({**state, "categories": list(CATEGORIES), "rooms": list(ROOMS), "options": about}, scratch)
     scratch.rename(options.out)
 

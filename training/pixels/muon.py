@@ -1,0 +1,49 @@
+"""Muon: steps along each layer's momentum made orthogonal, so that no direction learns faster than another.
+
+The method is Keller Jordan's (2024); the size of a step follows Liu et al., "Muon is Scalable for LLM Training"
+(2025), so that one learning rate serves this and AdamW. PyTorch's own ``torch.optim.Muon`` takes no convolutions.
+"""
+
+from collections.abc import Iterable
+
+import torch
+from torch import Tensor
+
+# Coefficients of the quintic iteration that takes singular values between 0 and 1 near 1 in five rounds.
+_QUINTIC = (3.4445, -4.7750, 2.0315)
+_ROUNDS = 5
+
+
+def orthogonal(matrix: Tensor) -> Tensor:
+    """Return about U Vᵀ of the matrix's U S Vᵀ, (m, n); singular values come out between about 0.7 and 1.2."""
+    tall = matrix.shape[0] > matrix.shape[1]
+    x = matrix.T if tall else matrix
+    x = x / (x.norm() + 1e-7)
+    a, b, c = _QUINTIC
+    for _ in range(_ROUNDS):
+        square = x @ x.T
+        x = a * x + (b * square + c * square @ square) @ x
+    return x.T if tall else x
+
+
+class Muon(torch.optim.Optimizer):
+    """Muon for weights of two or more dimensions; a convolution's kernel counts as one row for each output."""
+
+    def __init__(self, params: Iterable[Tensor], lr: float, momentum: float = 0.95, weight_decay: float = 0.02) -> None:
+        """Begin without momentum."""
+        super().__init__(list(params), {"lr": lr, "momentum": momentum, "weight_decay": weight_decay})
+
+    @torch.no_grad()
+    def step(self, closure: None = None) -> None:
+        """Take one step along the gradients that are there."""
+        for group in self.param_groups:
+            for weight in group["params"]:
+                if weight.grad is None:
+                    continue
+                state = self.state[weight]
+                speed = state.setdefault("momentum", torch.zeros_like(weight))
+                speed.lerp_(weight.grad, 1.0 - group["momentum"])
+                ahead = weight.grad.lerp(speed, group["momentum"]).reshape(len(weight), -1)
+                size = 0.2 * max(ahead.shape) ** 0.5
+                weight.mul_(1.0 - group["lr"] * group["weight_decay"])
+                weight.add_(orthogonal(ahead).reshape(weight.shape), alpha=-group["lr"] * size)
