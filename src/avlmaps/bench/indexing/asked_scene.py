@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float32, Int, UInt8
 
+from avlmaps.bench.indexing.baselines import WeakHearing, alike_keyframe
 from avlmaps.bench.indexing.factors import VoxelHeat, true_places, true_regions, true_things
 from avlmaps.bench.indexing.tasks import Task
-from avlmaps.bench.indexing.weak_sounds import WeakSounds
 from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import apply
 from avlmaps.core.registry import Kind
@@ -19,8 +19,6 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.level import Space
 from avlmaps.query.question import Modality, Part, Role
-from avlmaps.query.sounds import SoundSettings, sound_factor
-from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.types import Recording
 from avlmaps.sim.truth import Truth
 
@@ -111,37 +109,17 @@ class AskedScene:
 
     def weak_sound(self, task: Task, role: Role) -> Heatmap | None:
         """The sound, as a weaker ear tells it."""
-
-        def make() -> Heatmap:
-            part, _ = self._part(Modality.SOUND, task.context, role)
-            scores = self._weak_ear.scores(self._clips, task.context)
-            heat = self.asked.settings.heat
-            return Heatmap.of(sound_factor(self.space, self.asked.stored.sounds, scores, part, SoundSettings(), heat))
-
-        return self._once(("weak", task.context, role), make)
+        return self._once(("weak", task.context, role), lambda: self._weak_hearing.heat(task.context, role))
 
     @cached_property
-    def _weak_ear(self) -> WeakSounds:
-        return WeakSounds.learnt(np.random.default_rng([self.seed, 1]))
-
-    @cached_property
-    def _clips(self):
-        stored = self.asked.stored
-        return [AudioTrack.open(stored.clip_path(i)).read() for i in range(len(stored.sounds))]
+    def _weak_hearing(self) -> WeakHearing:
+        return WeakHearing(self.asked, self.seed)
 
     def alike_keyframe(self, task: Task, role: Role) -> Heatmap | None:
         """The photo, put where the most alike keyframe was taken; its pose is not worked out."""
-
-        def make() -> Heatmap:
-            part, falloff = self._part(Modality.IMAGE, task.context, role)
-            stored, rgb = self.asked.stored, self.photo_of(task)
-            local = stored.profile.local_encoder().encode(rgb)
-            place = stored.profile.place_encoder().encode(rgb, local, stored.place_state)
-            best = int(np.argmax(np.asarray(stored.keyframes.place, np.float32) @ place))
-            pose = np.asarray(stored.keyframes.world_from_camera[best], np.float64)
-            return Heatmap.of(true_places(self.space, part, falloff, [pose[None, :3, 3]]))
-
-        return self._once(("alike", task.name, role), make)
+        return self._once(
+            ("alike", task.name, role), lambda: alike_keyframe(self.asked, self.photo_of(task), task.context, role)
+        )
 
     def area_as_object(self, task: Task, role: Role) -> Heatmap | None:
         """The area's name, asked of the pixel features as if it were a thing; None where they know nothing of it."""

@@ -11,13 +11,14 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 
 from avlmaps.bench.indexing.asked_scene import AskedScene
 from avlmaps.bench.indexing.rules import Event, Evidence, Photo, area_tasks, photo_tasks, sound_tasks
 from avlmaps.bench.indexing.tasks import Recorded, Task, TaskError, TaskKind
 from avlmaps.bench.indexing.true_voxels import TrueVoxels
 from avlmaps.core.camera import Pinhole
+from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.version import __version__
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.images import read_picture
@@ -151,15 +152,20 @@ class Workplace:
 
     def photo_of(self, task: Task) -> UInt8[np.ndarray, "h w 3"]:
         """Return a task's photo, drawn if need be."""
-        named = sha256(task.world_from_photo.round(9).tobytes()).hexdigest()[:12]
+        return read_picture(self.photo_file(task.world_from_photo))
+
+    def photo_file(self, world_from_camera: Float[np.ndarray, "4 4"]) -> Path:
+        """Return the file of a photo taken from a pose, drawn if need be."""
+        named = sha256(world_from_camera.round(9).tobytes()).hexdigest()[:12]
         path = self.job.folder / "photos" / f"{named}.png"
         if not path.exists():
             import cv2
 
             path.parent.mkdir(parents=True, exist_ok=True)
-            view = self._renderer.render(self.camera, task.world_from_photo)
-            path.write_bytes(cv2.imencode(".png", np.ascontiguousarray(view.rgb[..., ::-1]))[1].tobytes())
-        return read_picture(path)
+            view = self._renderer.render(self.camera, world_from_camera)
+            content = cv2.imencode(".png", np.ascontiguousarray(view.rgb[..., ::-1]))[1].tobytes()
+            write_bytes_atomically(path, content)
+        return path
 
     @property
     def camera(self) -> Pinhole:
@@ -180,14 +186,14 @@ class Workplace:
     def tasks(self, most: int) -> list[Task]:
         """Make this scene's tasks, at most so many of each kind."""
         evidence = self.evidence
-        photos = self._photos(_PHOTOS_A_TASK * most)
+        photos = self.photos(_PHOTOS_A_TASK * most)
         return [
             *area_tasks(evidence, self.job.rng(1), most),
             *sound_tasks(evidence, self.job.rng(2), most),
             *photo_tasks(evidence, photos, self.job.rng(3), most),
         ]
 
-    def _photos(self, count: int) -> Sequence[Photo]:
+    def photos(self, count: int) -> Sequence[Photo]:
         """Look from places where the robot never stood, held out from the walk; only on the floor that it walked."""
         from avlmaps.sim.views import random_views
 

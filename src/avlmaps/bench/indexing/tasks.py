@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
+from typing import TypeVar
 
 import msgspec
 import numpy as np
@@ -13,6 +14,7 @@ from avlmaps.core.files import write_bytes_atomically
 from avlmaps.sim.mesh import Triple
 
 SCHEMA_VERSION = 1
+T = TypeVar("T")
 
 
 class TaskError(AvlmapsError):
@@ -134,8 +136,7 @@ class TaskSet:
 
 def save_tasks(tasks: TaskSet, path: Path) -> None:
     """Write tasks and their truth as JSON."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_bytes_atomically(path, msgspec.json.format(msgspec.json.encode(tasks), indent=1) + b"\n")
+    save_versioned(tasks, path)
 
 
 def load_tasks(path: Path) -> TaskSet:
@@ -144,14 +145,29 @@ def load_tasks(path: Path) -> TaskSet:
     Raises:
         TaskError: there are none, they are of another schema, or damaged.
     """
+    return load_versioned(path, TaskSet, SCHEMA_VERSION)
+
+
+def save_versioned(tasks: object, path: Path) -> None:
+    """Write a dataclass that has a ``schema_version`` as JSON."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes_atomically(path, msgspec.json.format(msgspec.json.encode(tasks), indent=1) + b"\n")
+
+
+def load_versioned(path: Path, kind: type[T], schema_version: int) -> T:
+    """Read what ``save_versioned`` wrote.
+
+    Raises:
+        TaskError: there is nothing, it is of another schema, or damaged.
+    """
     try:
         content = path.read_bytes()
     except OSError as fault:
         raise TaskError(f"The tasks {path} cannot be read ({fault.strerror}); check the name.") from fault
     try:
         version = msgspec.json.decode(content).get("schema_version")
-        if version == SCHEMA_VERSION:
-            return msgspec.json.decode(content, type=TaskSet)
+        if version == schema_version:
+            return msgspec.json.decode(content, type=kind)
     except (msgspec.DecodeError, msgspec.ValidationError, AttributeError) as fault:
         raise TaskError(f"The tasks {path} are damaged ({fault}); save them anew with --save-tasks.") from fault
-    raise TaskError(f"The tasks {path} are of schema {version}, this avlmaps reads {SCHEMA_VERSION}; save them anew.")
+    raise TaskError(f"The tasks {path} are of schema {version}, this avlmaps reads {schema_version}; save them anew.")

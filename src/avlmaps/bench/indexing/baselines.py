@@ -1,0 +1,56 @@
+"""What the paper's baselines make of a map that they share with us: a weaker ear, and retrieval without a pose."""
+
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import UInt8
+
+from avlmaps.bench.indexing.factors import true_places
+from avlmaps.bench.indexing.weak_sounds import WeakSounds
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.heatmap import Heatmap
+from avlmaps.query.question import Modality, Part, Role
+from avlmaps.query.sounds import SoundSettings, sound_factor
+from avlmaps.recordings.audio import AudioTrack, Sound
+
+
+class WeakHearing:
+    """The sounds of a map, as a weaker ear tells them.
+
+    Args:
+        asked: the map.
+        seed: of the ear's examples.
+    """
+
+    def __init__(self, asked: AVLMap, seed: int) -> None:
+        self._asked, self._seed = asked, seed
+
+    def heat(self, name: str, role: Role) -> Heatmap:
+        """Return the heat of a kind of sound."""
+        asked = self._asked
+        scores = self._ear.scores(self._clips, name)
+        part = Part(Modality.SOUND, name, role)
+        factor = sound_factor(
+            asked.space, asked.stored.sounds, scores, part, SoundSettings(), asked.settings.heat
+        )  # fmt: skip
+        return Heatmap.of(factor)
+
+    @cached_property
+    def _ear(self) -> WeakSounds:
+        return WeakSounds.learnt(np.random.default_rng([self._seed, 1]))
+
+    @cached_property
+    def _clips(self) -> list[Sound]:
+        stored = self._asked.stored
+        return [AudioTrack.open(stored.clip_path(i)).read() for i in range(len(stored.sounds))]
+
+
+def alike_keyframe(asked: AVLMap, rgb: UInt8[np.ndarray, "h w 3"], name: str, role: Role) -> Heatmap:
+    """Return the heat around the place where the keyframe most like a picture was taken."""
+    stored = asked.stored
+    local = stored.profile.local_encoder().encode(rgb)
+    place = stored.profile.place_encoder().encode(rgb, local, stored.place_state)
+    best = int(np.argmax(np.asarray(stored.keyframes.place, np.float32) @ place))
+    pose = np.asarray(stored.keyframes.world_from_camera[best], np.float64)
+    part = Part(Modality.IMAGE, name, role, is_file=True)
+    return Heatmap.of(true_places(asked.space, part, asked.settings.heat.falloff_per_m(role), [pose[None, :3, 3]]))
