@@ -1,0 +1,217 @@
+"""From a command to what the robot did: translate, parse, run, and try again where the translator can.
+
+The whole way in one function; a program is data all along, and nothing but the table of skills ever runs.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from inspect import signature
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.errors import LanguageError, ProgramError
+from avlmaps.core.motion import Action
+from avlmaps.language.program import Budget, Step, Trace, parse_program, run_program
+from avlmaps.language.translator import Translation, Translator
+from avlmaps.navigate.driver import Driver
+from avlmaps.navigate.moves import Move
+from avlmaps.navigate.readable import Readable, offered_by
+from avlmaps.navigate.skills import Robot, RobotSettings
+from avlmaps.query.avlmap import AVLMap
+
+_MOST_PROGRAMS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """A step of a program, and the movement that it made.
+
+    Attributes:
+        step: the call of a skill.
+        move: what the robot did; None where it did not move.
+    """
+
+    step: Step
+    move: Move | None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the step as JSON has it; a movement is its result."""
+        told = self.step.to_json()
+        return told if self.move is None else {**told, "result": self.move.to_json()}
+
+    def __str__(self) -> str:
+        text = f"line {self.step.line}: {self.step.text}"
+        return text if self.move is None else f"{text}: {self.move}"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of a command.
+
+    Attributes:
+        command: what was said.
+        programs: what ran, in order; more than one where the translator had to try again.
+        notes: what a person should know: how something was taken, what the map is not sure of.
+        done: every step, a failed one too.
+        moves: every movement.
+        error: why it was not obeyed to its end, one sentence; None where it was.
+        error_type: the class of that error.
+        elapsed_s: from the command to the end.
+    """
+
+    command: str
+    programs: tuple[str, ...]
+    notes: tuple[str, ...]
+    done: tuple[Done, ...]
+    moves: tuple[Move, ...]
+    error: str | None
+    error_type: str | None
+    elapsed_s: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether the program ran to its end and every place was reached."""
+        return self.error is None and all(move.reached for move in self.moves)
+
+    @property
+    def program(self) -> str:
+        """The program; where there were several, one after the other."""
+        return "\n# What was left to do:\n".join(self.programs)
+
+    @property
+    def subgoals(self) -> tuple[Move, ...]:
+        """The movements to a place, in order."""
+        return tuple(move for move in self.moves if move.goal is not None)
+
+    @property
+    def actions(self) -> tuple[Action, ...]:
+        """All discrete actions, in order."""
+        return tuple(action for move in self.moves for action in move.actions)
+
+    @property
+    def path(self) -> Float[np.ndarray, "n 2"]:
+        """The places passed, level x and y, metres."""
+        return np.concatenate([np.zeros((0, 2)), *(move.path for move in self.moves)])
+
+    @property
+    def path_m(self) -> float:
+        """How far the robot drove."""
+        return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the outcome with the keys of the command line's contract."""
+        return {
+            "program": self.program,
+            "steps": [one.to_json() for one in self.done],
+            "actions": [str(action) for action in self.actions],
+            "subgoals": [move.to_json() for move in self.subgoals],
+            "ok": self.ok,
+            "error": self.error,
+            "notes": list(self.notes),
+            "path_m": round(self.path_m, 3),
+            "elapsed_s": round(self.elapsed_s, 3),
+        }
+
+
+def _silent(_: str) -> None:
+    """Tell nobody."""
+
+
+def instruct(
+    command: str,
+    asked: AVLMap,
+    driver: Driver,
+    translator: Translator,
+    budget: Budget | None = None,
+    *,
+    settings: RobotSettings | None = None,
+    readable: Readable | None = None,
+    tell: Callable[[str], None] = _silent,
+) -> Outcome:
+    """Do what a command says.
+
+    Args:
+        command: what a person says, such as ``go to the chair near the sound of glass breaking``.
+        asked: the map.
+        driver: moves the robot, in the map's level frame.
+        translator: turns the command into a program.
+        budget: what each run of a program may use up.
+        settings: how the robot takes its skills.
+        readable: which files the program may load; by default those in the working directory, and those that the
+            command names.
+        tell: is given lines as it goes: the program, what is found, each step.
+
+    Raises:
+        LanguageError: the command was not understood. Whatever happens later is in the outcome.
+    """
+    begin = perf_counter()
+    translation = translator.program_for(command)
+    robot = Robot(asked, driver, settings, readable or offered_by(command), lambda line: tell(f"  {line}"))
+    run = _Run(command, translator, robot, budget, tell)
+    run.through(translation)
+    error, error_type = (None, None) if run.last is None else (run.last.error, run.last.error_type)
+    return Outcome(
+        command, tuple(run.programs), (*run.notes, *robot.seeker.notes), tuple(run.done), tuple(robot.moves), error,
+        error_type, perf_counter() - begin,
+    )  # fmt: skip
+
+
+class _Run:
+    """The programs of one command, one after the other until one runs to its end."""
+
+    def __init__(
+        self, command: str, translator: Translator, robot: Robot, budget: Budget | None, tell: Callable[[str], None]
+    ) -> None:
+        self.command = command
+        self.translator = translator
+        self.robot = robot
+        self.budget = budget
+        self.tell = tell
+        self.programs: list[str] = []
+        self.notes: list[str] = []
+        self.done: list[Done] = []
+        self.last: Trace | None = None
+
+    def through(self, translation: Translation | None) -> None:
+        while translation is not None:
+            self.programs.append(translation.program)
+            for note in translation.notes:
+                self.note(note)
+            for line in translation.program.splitlines():
+                self.tell(f"> {line}")
+            self.last = self.ran(translation.program)
+            if self.last.error is None or len(self.programs) == _MOST_PROGRAMS:
+                return
+            self.tell(f"failed: {self.last.error}")
+            translation = self.repaired(translation.program, self.last)
+
+    def ran(self, text: str) -> Trace:
+        try:
+            program = parse_program(text)
+        except ProgramError as fault:
+            return Trace((), str(fault), type(fault).__name__, 0.0)
+        return run_program(program, self.robot, self.budget, self.on_step)
+
+    def on_step(self, step: Step) -> None:
+        moved = self.robot.moves[sum(one.move is not None for one in self.done) :]
+        self.done.append(Done(step, moved[-1] if moved else None))
+        if moved or step.error is None:
+            self.tell(str(self.done[-1]))
+
+    def repaired(self, program: str, trace: Trace) -> Translation | None:
+        """Return the program that the translator writes instead; what was done is told to those who ask."""
+        repair: Any = self.translator.repair
+        done = [one.step.text for one in self.done if one.step.error is None]
+        more = {"done": done} if "done" in signature(repair).parameters else {}
+        try:
+            return repair(self.command, program, trace.error, **more)
+        except LanguageError as fault:
+            self.note(f"no other program came: {fault}")
+            return None
+
+    def note(self, note: str) -> None:
+        self.notes.append(note)
+        self.tell(f"note: {note}")

@@ -1,0 +1,83 @@
+"""Which files a program may name. A program may come from a language model, so it reads nothing that nobody offered."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from avlmaps.core.errors import QueryError
+
+MOST_BYTES = 200_000_000
+# A word of a command that is a file: quoted, or without spaces; pictures and sounds both end in a suffix.
+_QUOTED = re.compile(r"\"([^\"\n]+\.\w{2,5})\"|'([^'\n]+\.\w{2,5})'|“([^”\n]+\.\w{2,5})”")
+_PLAIN = re.compile(r"[^\s\"'“”,;()]+\.\w{2,5}(?!\w)")
+
+
+@dataclass(frozen=True, slots=True)
+class Readable:
+    """The files that a program may load.
+
+    Attributes:
+        roots: folders; a file in or below one may be read, and a relative name is sought there in turn.
+        named: files that a person named, wherever they are.
+    """
+
+    roots: tuple[Path, ...] = field(default_factory=lambda: (Path.cwd(),))
+    named: tuple[str, ...] = ()
+
+    def find(self, name: str, what: str) -> Path:
+        """Return the file of that name.
+
+        Args:
+            name: as the program gives it.
+            what: ``picture`` or ``clip``, for the sentence of an error.
+
+        Raises:
+            QueryError: it is not there, not offered to the program, or far too large.
+        """
+        if not name.strip() or "\0" in name:
+            raise QueryError(f"The {what} has no name; give the name of a file.")
+        offered = name in self.named
+        for root in self.roots or (Path(),):
+            path = root / name
+            inside = any(_is_within(path, other) for other in self.roots)
+            if (inside or offered) and path.is_file():
+                return _not_too_large(path, what)
+        if offered or any(_is_within(root / name, other) for root in self.roots for other in self.roots):
+            raise QueryError(f"The {what} {name} is not there; check the name.")
+        folders = ", ".join(str(root) for root in self.roots)
+        raise QueryError(
+            f"The {what} {name} may not be read by a program: it lies outside of {folders or 'every folder'} and the "
+            "command does not name it; name it in the command, word for word."
+        )
+
+
+def named_files(command: str) -> tuple[str, ...]:
+    """Return the files that a command names, as it writes them."""
+    quoted = [next(filter(None, groups)) for groups in _QUOTED.findall(command)]
+    return tuple(dict.fromkeys([*quoted, *_PLAIN.findall(command)]))
+
+
+def offered_by(command: str, roots: Sequence[Path] | None = None) -> Readable:
+    """Return what a command's program may read: what the command names, and what lies in some folders.
+
+    Args:
+        command: what a person said.
+        roots: folders; the working directory where they are not given.
+    """
+    return Readable((Path.cwd(),) if roots is None else tuple(roots), named_files(command))
+
+
+def _is_within(path: Path, root: Path) -> bool:
+    """Tell whether a path, with every link followed, lies in a folder."""
+    try:
+        return path.resolve().is_relative_to(root.resolve())
+    except OSError:  # a name too long, a loop of links
+        return False
+
+
+def _not_too_large(path: Path, what: str) -> Path:
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise QueryError(f"The {what} {path} has {size:,} bytes, more than {MOST_BYTES:,}; give a smaller one.")
+    return path

@@ -1,0 +1,304 @@
+"""The robot: every skill of the vocabulary over a map that can be asked and a driver that moves a body.
+
+Places in programs are in the world, as in the map's answers; what is left, north or straight ahead is worked out in
+the level frame, where the robot moves. Headings are counter-clockwise from +x; a program's turns are clockwise and its
+compass has 0 in the north, as people say it, and only this module translates.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi, radians
+from typing import cast
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.errors import NavigationError, ProgramError
+from avlmaps.core.motion import Action, wrapped
+from avlmaps.language.vocabulary import Clip, Heat, Picture, Place, Target
+from avlmaps.navigate.arguments import kind_of, number_of, text_of
+from avlmaps.navigate.driver import Arrival, Driver
+from avlmaps.navigate.moves import Move, Triple, joined
+from avlmaps.navigate.outline import Outline, bearing_rad, middle_between, to_the_left
+from avlmaps.navigate.readable import Readable
+from avlmaps.navigate.seeking import Seeker
+from avlmaps.navigate.things import Thing
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.heatmap import Heatmap
+
+_NORTH, _EAST = np.array([0.0, 1.0]), np.array([1.0, 0.0])
+_MOST_M, _MOST_TURNS_DEG = 1000.0, 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class RobotSettings:
+    """How a robot takes its skills."""
+
+    guess: bool = False
+    """Go to the best guess where the map is not sure that there is such a thing."""
+    persist: bool = False
+    """Go on with a program where a place is not reached, as the paper's evaluation does, instead of stopping."""
+
+
+def _silent(_: str) -> None:
+    """Tell nobody."""
+
+
+class Robot:
+    """A robot that knows a map and can drive; it implements `avlmaps.language.vocabulary.Vocabulary`.
+
+    Where a phrase alone says what is meant, skills that stand in relation to the robot (`face`, `move_to_left`,
+    `move_to_object` ...) take the nearest thing of that name that the map is sure of; `move_to`, `get_pos` and
+    `get_contour` take the best. A heatmap of several parts always means its best place.
+
+    Attributes:
+        asked: the map.
+        driver: what moves the body.
+        settings: how skills are taken.
+        seeker: asks the map what a program means.
+        moves: what it did so far.
+    """
+
+    def __init__(
+        self,
+        asked: AVLMap,
+        driver: Driver,
+        settings: RobotSettings | None = None,
+        readable: Readable | None = None,
+        tell: Callable[[str], None] = _silent,
+    ) -> None:
+        """Make a robot.
+
+        Args:
+            asked: the map.
+            driver: moves the body in the map's level frame.
+            settings: how skills are taken.
+            readable: which files a program may load; those in the working directory by default.
+            tell: is given a line for each thing found, as it happens.
+        """
+        self.asked = asked
+        self.driver = driver
+        self.settings = settings or RobotSettings()
+        self.seeker = Seeker(asked, self.settings.guess, readable or Readable(), tell)
+        self.moves: list[Move] = []
+
+    def load_image(self, path: str) -> Picture:
+        """Load a picture from a file, to ask where it was taken."""
+        from avlmaps.query.images import read_picture
+
+        read_picture(self.seeker.readable.find(text_of(path, "load_image"), "picture"))
+        return Picture(path)
+
+    def load_sound(self, path: str) -> Clip:
+        """Load a recorded sound from a file, to ask where one like it was heard."""
+        from avlmaps.query.sounds import read_clip
+
+        read_clip(self.seeker.readable.find(text_of(path, "load_sound"), "clip"))
+        return Clip(path)
+
+    def get_major_map(
+        self,
+        obj: str | None = None,
+        sound: str | Clip | None = None,
+        img: Picture | None = None,
+        area: str | None = None,
+    ) -> Heat:
+        """Return the heatmap of what is sought itself (falls to nothing within 0.5 m). Give exactly one argument."""
+        return cast("Heat", self.seeker.heat("get_major_map", obj, sound, img, area, primary=True))
+
+    def get_map(
+        self,
+        obj: str | None = None,
+        sound: str | Clip | None = None,
+        img: Picture | None = None,
+        area: str | None = None,
+    ) -> Heat:
+        """Return the heatmap of what the sought thing is near or in (falls off over 5 m). Give exactly one argument."""
+        return cast("Heat", self.seeker.heat("get_map", obj, sound, img, area, primary=False))
+
+    def get_max_pos_3d(self, heat: Heat) -> Place:
+        """Return the best place of a heatmap, or of several multiplied with each other."""
+        if not isinstance(heat, Heatmap):
+            raise ProgramError(f"get_max_pos_3d takes a heatmap, such as get_major_map returns, not {kind_of(heat)}.")
+        return self._place(self.seeker.best(heat).place)
+
+    def get_pos(self, target: Target) -> Place:
+        """Return the place of the best goal for a phrase or a heatmap."""
+        return self._place(self.seeker.best(target).place)
+
+    def get_contour(self, target: Target) -> list[Place]:
+        """Return the outline on the ground of the best instance of an object, counter-clockwise."""
+        return [self._place(self._on_floor(corner)) for corner in self.seeker.best(target).outline.corners]
+
+    def current_pos(self) -> Place:
+        """Return the place where the robot stands now; keep it to come back later."""
+        return self._place(self._on_floor(self._here))
+
+    def move_to(self, target: Target) -> None:
+        """Drive to a place, or as near to it as the robot can stand and see it."""
+        thing = self.seeker.best(target)
+        self._go("move_to", thing, thing.place, face=thing.place if thing.solid else None)
+
+    def move_to_object(self, name: Target) -> None:
+        """Drive to the nearest point beside the nearest object of that name."""
+        thing = self.seeker.meant(name, self._here)
+        beside = np.append(thing.outline.nearest_to(self._here), thing.place[2])
+        self._go("move_to_object", thing, beside, face=self._on_floor(thing.outline.centre))
+
+    def move_in_between(self, a: Target, b: Target) -> None:
+        """Drive to the middle between the nearest points of two things."""
+        first, second = self.seeker.pair(a, b, self._here)
+        middle = middle_between(first.outline, second.outline)
+        both = Thing(
+            f"between {first.name or 'a place'} and {second.name or 'a place'}",
+            Outline.at(middle),
+            self._on_floor(middle),
+        )
+        self._go("move_in_between", both, both.place)
+
+    def move_to_left(self, target: Target, distance_m: float = 0.5) -> None:
+        """Drive to the left side of a thing, as the robot sees it from where it stands, so far from its edge."""
+        thing = self.seeker.meant(target, self._here)
+        self._go_beside("move_to_left", thing, to_the_left(self._towards(thing)), distance_m)
+
+    def move_to_right(self, target: Target, distance_m: float = 0.5) -> None:
+        """Drive to the right side of a thing, as the robot sees it from where it stands, so far from its edge."""
+        thing = self.seeker.meant(target, self._here)
+        self._go_beside("move_to_right", thing, -to_the_left(self._towards(thing)), distance_m)
+
+    def move_north(self, target: Target, distance_m: float = 0.5) -> None:
+        """Drive to the north (+y) of a thing, so far from its edge."""
+        self._go_beside("move_north", self.seeker.meant(target, self._here), _NORTH, distance_m)
+
+    def move_south(self, target: Target, distance_m: float = 0.5) -> None:
+        """Drive to the south (−y) of a thing, so far from its edge."""
+        self._go_beside("move_south", self.seeker.meant(target, self._here), -_NORTH, distance_m)
+
+    def move_east(self, target: Target, distance_m: float = 0.5) -> None:
+        """Drive to the east (+x) of a thing, so far from its edge."""
+        self._go_beside("move_east", self.seeker.meant(target, self._here), _EAST, distance_m)
+
+    def move_west(self, target: Target, distance_m: float = 0.5) -> None:
+        """Drive to the west (−x) of a thing, so far from its edge."""
+        self._go_beside("move_west", self.seeker.meant(target, self._here), -_EAST, distance_m)
+
+    def face(self, target: Target) -> None:
+        """Turn on the spot until the thing is straight ahead."""
+        self._turn_to_see("face", target, at_rad=0.0)
+
+    def turn(self, angle_deg: float) -> None:
+        """Turn on the spot: to the right by a positive angle, to the left by a negative one."""
+        angle = number_of(angle_deg, "turn", _MOST_TURNS_DEG, "degrees")
+        self._done("turn", "", None, [self.driver.turn(-radians(angle))])
+
+    def turn_absolute(self, compass_deg: float) -> None:
+        """Turn on the spot to a heading on the compass: 0 north (+y), 90 east (+x), 180 south, 270 west."""
+        compass = number_of(compass_deg, "turn_absolute", _MOST_TURNS_DEG, "degrees")
+        self._turn_towards("turn_absolute", "", pi / 2 - radians(compass))
+
+    def move_forward(self, distance_m: float) -> None:
+        """Drive straight ahead; with a negative distance turn round first, so that the robot sees where it goes."""
+        distance_m = number_of(distance_m, "move_forward", _MOST_M, "metres")
+        arrivals = [self.driver.turn(pi)] if distance_m < 0.0 else []
+        ahead = self.driver.pose.ahead(abs(distance_m))
+        arrivals.append(self.driver.forward(abs(distance_m)))
+        self._done("move_forward", "", self._on_floor(np.array([ahead.x_m, ahead.y_m])), arrivals)
+
+    def with_object_on_left(self, target: Target) -> None:
+        """Turn on the spot until the thing is straight to the left of the robot."""
+        self._turn_to_see("with_object_on_left", target, at_rad=pi / 2)
+
+    def with_object_on_right(self, target: Target) -> None:
+        """Turn on the spot until the thing is straight to the right of the robot."""
+        self._turn_to_see("with_object_on_right", target, at_rad=-pi / 2)
+
+    @property
+    def actions(self) -> list[Action]:
+        """All discrete actions so far."""
+        return [action for move in self.moves for action in move.actions]
+
+    @property
+    def path(self) -> Float[np.ndarray, "n 2"]:
+        """The places passed so far, level x and y."""
+        return np.concatenate([np.zeros((0, 2)), *(move.path for move in self.moves)])
+
+    @cached_property
+    def floor_m(self) -> float:
+        """Level height of the map's floor."""
+        from avlmaps.maps.obstacles import floor_height
+
+        space = self.asked.space
+        return floor_height(space.level(space.centres)[:, 2], space.grid.voxel_size_m) if len(space) else 0.0
+
+    @property
+    def _here(self) -> Float[np.ndarray, "2"]:
+        pose = self.driver.pose
+        return np.array([pose.x_m, pose.y_m])
+
+    def _on_floor(self, xy: Float[np.ndarray, "2"]) -> Float[np.ndarray, "3"]:
+        return np.append(xy, self.floor_m)
+
+    def _place(self, level: Float[np.ndarray, "3"]) -> Place:
+        return Place(*_triple(self.asked.space.world(level)))
+
+    def _towards(self, thing: Thing) -> Float[np.ndarray, "2"]:
+        """Return the direction in which the robot sees a thing; straight ahead where it stands in its middle."""
+        bearing = bearing_rad(self._here, thing.outline.centre)
+        bearing = self.driver.pose.heading_rad if bearing is None else bearing
+        return np.array([np.cos(bearing), np.sin(bearing)])
+
+    def _go_beside(self, skill: str, thing: Thing, direction: Float[np.ndarray, "2"], distance_m: float) -> None:
+        distance_m = number_of(distance_m, skill, _MOST_M, "metres")
+        if distance_m < 0.0:
+            raise ProgramError(f"{skill} takes a distance of 0 m or more, not {distance_m:g}; go to the other side.")
+        self._go(skill, thing, self._on_floor(thing.outline.beside(direction, distance_m)))
+
+    def _go(
+        self, skill: str, thing: Thing, goal: Float[np.ndarray, "3"], face: Float[np.ndarray, "3"] | None = None
+    ) -> None:
+        """Drive to a place of the level frame, and look at another once there."""
+        world = self.asked.space.world
+        looked_at = None if face is None else world(face)
+        self._done(skill, thing.name, goal, [self.driver.go_to(world(goal), face=looked_at)])
+
+    def _turn_to_see(self, skill: str, target: Target, at_rad: float) -> None:
+        """Turn until a thing is seen at an angle from straight ahead, counter-clockwise."""
+        thing = self.seeker.meant(target, self._here)
+        bearing = bearing_rad(self._here, thing.outline.centre)
+        heading = self.driver.pose.heading_rad if bearing is None else bearing - at_rad
+        self._turn_towards(skill, thing.name, heading)
+
+    def _turn_towards(self, skill: str, name: str, heading_rad: float) -> None:
+        angle = wrapped(heading_rad - self.driver.pose.heading_rad)
+        self._done(skill, name, None, [self.driver.turn(angle)])
+
+    def _done(self, skill: str, name: str, goal: Float[np.ndarray, "3"] | None, arrivals: Sequence[Arrival]) -> None:
+        """Keep what came of a movement, and stop where it was to a place: there the paper's tasks are judged."""
+        if goal is not None and arrivals[-1].actions[-1:] != (Action.STOP,):
+            arrivals = [*arrivals, self.driver.stop()]
+        arrival = joined(arrivals)
+        world = self.asked.space.world
+        pose = arrival.pose
+        stop = _triple(world(self._on_floor(np.array([pose.x_m, pose.y_m]))))
+        target = None if goal is None else _triple(world(goal))
+        move = Move(
+            skill, name, target, stop, pose.heading_rad, arrival.reached, arrival.actions, arrival.path, arrival.note,
+            arrival.contacts,
+        )  # fmt: skip
+        self.moves.append(move)
+        if not move.reached and not self.settings.persist:
+            raise NavigationError(_not_reached(move))
+
+
+def _triple(vector: Float[np.ndarray, "3"]) -> Triple:
+    x, y, z = (float(value) for value in vector)
+    return x, y, z
+
+
+def _not_reached(move: Move) -> str:
+    why = move.note.rstrip(".") or "the driver gave up"
+    if move.distance_m is None:
+        return f"{move.skill} could not be finished: {why}; the robot looks along {np.rad2deg(move.heading_rad):.0f}°."
+    what = move.name or "The place"
+    return f"{what} was not reached: {why}; the robot stopped {move.distance_m:.2f} m from it."
