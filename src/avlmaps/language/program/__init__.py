@@ -1,0 +1,25 @@
+"""Programs for robots: a small subset of Python, parsed and run over the table of skills, never by Python.
+
+``parse_program`` refuses whatever is no part of a program; ``run_program`` runs what is left within a budget.
+"""
+
+from avlmaps.language.program.budget import Budget
+from avlmaps.language.program.interpreter import run_program
+from avlmaps.language.program.parser import parse_program
+from avlmaps.language.program.syntax import Program
+from avlmaps.language.program.table import ROBOT, SKILLS, Parameter, Skill, skill_lines
+from avlmaps.language.program.trace import Step, Trace
+
+__all__ = [
+    "ROBOT",
+    "SKILLS",
+    "Budget",
+    "Parameter",
+    "Program",
+    "Skill",
+    "Step",
+    "Trace",
+    "parse_program",
+    "run_program",
+    "skill_lines",
+]

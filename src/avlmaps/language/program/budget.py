@@ -1,0 +1,31 @@
+"""What a program may use up before it is stopped, and the sentence that says so."""
+
+from dataclasses import dataclass, fields
+
+from avlmaps.core.errors import ProgramError
+
+
+def refused(line: int, text: str) -> ProgramError:
+    """Return the error that says what is wrong on a line of a program."""
+    return ProgramError(f"Line {line}: {text}.")
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """What one run of a program may use up; running past any of them stops it."""
+
+    steps: int = 100_000
+    """Parts of the program that are worked out; going through a collection counts each of its elements."""
+    skill_calls: int = 200
+    """Skills called."""
+    elements: int = 200_000
+    """Elements of collections and characters of strings made, those kept in the trace too; never given back."""
+    factors: int = 16
+    """Heatmaps multiplied into one."""
+    seconds: float = 1800.0
+    """Wall time, the skills' own included; looked at before and after each skill and now and then between."""
+
+    def __post_init__(self) -> None:
+        for limit in fields(self):
+            if not getattr(self, limit.name) > 0:
+                raise ValueError(f"a budget needs some {limit.name}, not {getattr(self, limit.name)}")

@@ -1,0 +1,322 @@
+"""What can be told of a program before it runs: names without a value, and kinds that do not fit.
+
+A robot that has begun to move should not stop half way for a slip that could be seen from the start.
+"""
+
+from collections.abc import Callable
+from enum import Enum, auto
+from typing import Any
+
+from avlmaps.core.errors import ProgramError
+from avlmaps.language.program.budget import refused
+from avlmaps.language.program.calls import nearest, parameter_of
+from avlmaps.language.program.kinds import (
+    Kind,
+    check_comparison,
+    check_function,
+    check_indexed,
+    check_sign,
+    check_truth,
+    check_unpacked,
+    check_walked,
+    kind_of_result,
+)
+from avlmaps.language.program.syntax import (
+    Assign,
+    Binary,
+    BuiltinCall,
+    Collection,
+    Comparison,
+    Conditional,
+    Constant,
+    Element,
+    Expression,
+    For,
+    If,
+    Logical,
+    Name,
+    Perform,
+    SkillCall,
+    Statement,
+    Target,
+    Unary,
+    Update,
+    parts_of,
+    statements_of,
+)
+from avlmaps.language.program.table import SKILLS, Parameter, Skill
+
+# Passes over the program in which the kinds of its names settle; a program that needs more is left to the run.
+_MOST_PASSES = 6
+
+
+class Unsure(Enum):
+    """What is known of the kind of a value where that is no one kind."""
+
+    ANYTHING = auto()
+    NOT_YET = auto()
+
+
+Guess = Kind | Unsure
+
+
+def check(statements: tuple[Statement, ...]) -> None:
+    """Refuse a program that must fail wherever it gets to what is wrong with it.
+
+    Raises:
+        ProgramError: a name never has a value where it is used, or a value is of no kind that fits.
+    """
+    every = {name for statement in statements_of(statements) for name in _names_given(statement)}
+    _check_names(statements, set(), every)
+    kinds = _Kinds()
+    if kinds.settle(statements):
+        for statement in statements_of(statements):
+            kinds.see(statement)
+
+
+def check_argument(line: int, skill: Skill, parameter: Parameter, kind: Kind) -> None:
+    """Refuse a skill an argument of a kind that its parameter does not take."""
+    if kind in parameter.kinds:
+        return
+    takes = [str(each) for each in Kind if each in parameter.kinds]
+    wanted = takes[0] if len(takes) == 1 else f"{', '.join(takes[:-1])} or {takes[-1]}"
+    makers = [f"`{other.name}`" for other in SKILLS.values() if other.returns in parameter.kinds - {Kind.NOTHING}]
+    made = f"; {' or '.join(makers)} gives one" if makers and len(parameter.kinds) == 1 else ""
+    raise refused(
+        line, f"`{skill.name}` takes {wanted} as its `{parameter.name}`, not {kind}; it is {skill.signature}{made}"
+    )
+
+
+def kind_of_constant(value: object) -> Kind:
+    """Return the kind of a literal."""
+    if value is None:
+        return Kind.NOTHING
+    if isinstance(value, bool):
+        return Kind.TRUTH
+    return Kind.STRING if isinstance(value, str) else Kind.NUMBER
+
+
+def _names_given(statement: Statement) -> tuple[str, ...]:
+    match statement:
+        case Assign() | For():
+            return statement.target.names
+        case Update():
+            return (statement.name,)
+    return ()
+
+
+def _check_names(block: tuple[Statement, ...], given: set[str], every: set[str]) -> None:
+    """Go through a block in its order; what is given a value in it is added to ``given``."""
+    for statement in block:
+        match statement:
+            case If():
+                for branch in statement.branches:
+                    _check_used(branch.test, given, every)
+                    _check_names(branch.body, given, every)
+                _check_names(statement.otherwise, given, every)
+            case For():
+                _check_used(statement.through, given, every)
+                # Any round but the first may use what a later line of the body gave.
+                given.update(statement.target.names)
+                given.update(name for inner in statements_of(statement.body) for name in _names_given(inner))
+                _check_names(statement.body, given, every)
+            case Assign():
+                _check_used(statement.value, given, every)
+                given.update(statement.target.names)
+            case Update():
+                _check_used(Name(statement.name, statement.line), given, every)
+                _check_used(statement.value, given, every)
+            case Perform():
+                _check_used(statement.call, given, every)
+
+
+def _check_used(top: Expression, given: set[str], every: set[str]) -> None:
+    for part in parts_of(top):
+        if isinstance(part, Name) and part.name not in given:
+            raise _without_value(part, given, every)
+
+
+def _without_value(name: Name, given: set[str], every: set[str]) -> ProgramError:
+    if name.name in every:
+        return refused(name.line, f"`{name.name}` is used before it has a value; give it one on a line above")
+    if name.name in ("true", "false", "none", "null"):
+        return refused(name.line, f"`{name.name}` has no value; write True, False or None")
+    close = nearest(name.name, sorted(given))
+    if close:
+        return ProgramError(f"Line {name.line}: `{name.name}` has no value; did you mean `{close}`?")
+    return refused(name.line, f"`{name.name}` has no value; give it one on a line above, or put a phrase in quotes")
+
+
+def _joined(first: Guess, second: Guess) -> Guess:
+    if Unsure.NOT_YET in (first, second):
+        return second if first is Unsure.NOT_YET else first
+    return first if first is second else Unsure.ANYTHING
+
+
+class _Kinds:
+    """The kind of each name, where every line that gives it a value gives it one of the same kind."""
+
+    def __init__(self) -> None:
+        self.names: dict[str, Guess] = {}
+
+    def settle(self, statements: tuple[Statement, ...]) -> bool:
+        """Find the kinds of all names; return whether they came to rest."""
+        for _ in range(_MOST_PASSES):
+            before = dict(self.names)
+            for statement in statements_of(statements):
+                try:
+                    self.see(statement)
+                except ProgramError:
+                    # With kinds that are not settled this may be no fault; the last pass will tell.
+                    for name in _names_given(statement):
+                        self.names[name] = Unsure.ANYTHING
+            if self.names == before:
+                return True
+        return False
+
+    def see(self, statement: Statement) -> None:
+        """Add what one statement tells of its names' kinds; refuse what cannot be."""
+        match statement:
+            case Assign():
+                self._give(statement)
+            case Update():
+                made = self.arithmetic(
+                    statement.line, statement.operator, self.names.get(statement.name, Unsure.NOT_YET),
+                    self.of(statement.value),
+                )  # fmt: skip
+                if statement.operator == "+" and made is Kind.LIST:
+                    raise grown(statement)
+                self._join(statement.name, made)
+            case Perform():
+                self.of(statement.call)
+            case If():
+                for branch in statement.branches:
+                    self._truth(branch.test)
+            case For():
+                kind = self.of(statement.through)
+                if isinstance(kind, Kind):
+                    check_walked(statement.line, kind)
+                counts = kind is Kind.RANGE and not statement.target.unpacks
+                for name in statement.target.names:
+                    self._join(name, Kind.NUMBER if counts else Unsure.ANYTHING)
+
+    def _give(self, statement: Assign) -> None:
+        target, value = statement.target, statement.value
+        kind = self.of(value)
+        if not target.unpacks:
+            self._join(target.names[0], kind)
+            return
+        if isinstance(kind, Kind):
+            check_unpacked(statement.line, kind)
+        written = value.elements if isinstance(value, Collection) else None
+        if written is not None and len(written) != len(target.names):
+            raise misfit(statement.line, target, len(written))
+        for at, name in enumerate(target.names):
+            self._join(name, self.of(written[at]) if written is not None else Unsure.ANYTHING)
+
+    def _join(self, name: str, kind: Guess) -> None:
+        self.names[name] = _joined(self.names.get(name, Unsure.NOT_YET), kind)
+
+    def _truth(self, test: Expression) -> None:
+        kind = self.of(test)
+        if isinstance(kind, Kind):
+            check_truth(test.line, kind)
+
+    def of(self, part: Expression) -> Guess:
+        """Return the kind of an expression; refuse what cannot be."""
+        return _GUESS[type(part)](self, part)
+
+    def constant(self, part: Constant) -> Guess:
+        return kind_of_constant(part.value)
+
+    def name(self, part: Name) -> Guess:
+        return self.names.get(part.name, Unsure.NOT_YET)
+
+    def collection(self, part: Collection) -> Guess:
+        for element in part.elements:
+            self.of(element)
+        return Kind.LIST if part.is_list else Kind.TUPLE
+
+    def unary(self, part: Unary) -> Guess:
+        if part.operator == "not":
+            self._truth(part.operand)
+            return Kind.TRUTH
+        kind = self.of(part.operand)
+        if isinstance(kind, Kind):
+            check_sign(part.line, part.operator, kind)
+        return Kind.NUMBER
+
+    def binary(self, part: Binary) -> Guess:
+        return self.arithmetic(part.line, part.operator, self.of(part.left), self.of(part.right))
+
+    def comparison(self, part: Comparison) -> Guess:
+        kinds = [self.of(each) for each in (part.first, *part.rest)]
+        for operator, left, right in zip(part.operators, kinds, kinds[1:], strict=False):
+            if isinstance(left, Kind) and isinstance(right, Kind):
+                check_comparison(part.line, operator, left, right)
+        return Kind.TRUTH
+
+    def logical(self, part: Logical) -> Guess:
+        joined: Guess = Unsure.NOT_YET
+        for operand in part.operands:
+            joined = _joined(joined, self.of(operand))
+        for operand in part.operands[:-1]:
+            self._truth(operand)
+        return joined
+
+    def conditional(self, part: Conditional) -> Guess:
+        self._truth(part.test)
+        return _joined(self.of(part.chosen), self.of(part.otherwise))
+
+    def element(self, part: Element) -> Guess:
+        of, index = self.of(part.of), self.of(part.index)
+        if isinstance(of, Kind) and isinstance(index, Kind):
+            check_indexed(part.line, of, index)
+        return Unsure.ANYTHING
+
+    def function(self, call: BuiltinCall) -> Guess:
+        kinds = tuple(self.of(argument) for argument in call.arguments)
+        known = tuple(kind for kind in kinds if isinstance(kind, Kind))
+        if len(known) == len(kinds):
+            check_function(call.line, call.function, known)
+        return Kind.RANGE if call.function == "range" else Kind.NUMBER
+
+    def skill(self, call: SkillCall) -> Guess:
+        skill = SKILLS[call.skill]
+        for argument in call.arguments:
+            kind = self.of(argument.value)
+            if isinstance(kind, Kind):
+                check_argument(argument.value.line, skill, parameter_of(skill, argument.parameter), kind)
+        return skill.returns
+
+    def arithmetic(self, line: int, operator: str, left: Guess, right: Guess) -> Guess:
+        """Return the kind that an operator makes of two, as far as they are known."""
+        if isinstance(left, Kind) and isinstance(right, Kind):
+            return kind_of_result(line, operator, left, right)
+        return Unsure.NOT_YET if Unsure.NOT_YET in (left, right) else Unsure.ANYTHING
+
+
+_GUESS: dict[type, Callable[[_Kinds, Any], Guess]] = {
+    Constant: _Kinds.constant,
+    Name: _Kinds.name,
+    Collection: _Kinds.collection,
+    Unary: _Kinds.unary,
+    Binary: _Kinds.binary,
+    Comparison: _Kinds.comparison,
+    Logical: _Kinds.logical,
+    Conditional: _Kinds.conditional,
+    Element: _Kinds.element,
+    BuiltinCall: _Kinds.function,
+    SkillCall: _Kinds.skill,
+}
+
+
+def grown(statement: Update) -> ProgramError:
+    """Return the refusal of `+=` on a list, which in Python changes it under all of its names."""
+    name = statement.name
+    return refused(statement.line, f"a list is not changed but made anew; write `{name} = {name} + [...]`")
+
+
+def misfit(line: int, target: Target, values: int) -> ProgramError:
+    """Return the refusal of an assignment of more or fewer values than names."""
+    return refused(line, f"{len(target.names)} names cannot take {values} values; give one value to each")

@@ -1,0 +1,375 @@
+"""Runs a parsed program over a vocabulary. Nothing but the skills of the table is ever called or looked up."""
+
+from collections.abc import Callable
+from enum import Enum, auto
+from time import monotonic
+from typing import Any
+
+from avlmaps.core.errors import AvlmapsError, ProgramError
+from avlmaps.language.program.budget import Budget, refused
+from avlmaps.language.program.calls import check_exactly_one, parameter_of
+from avlmaps.language.program.check import check_argument, grown, misfit
+from avlmaps.language.program.kinds import (
+    COLLECTIONS,
+    Kind,
+    check_comparison,
+    check_function,
+    check_indexed,
+    check_truth,
+    check_unpacked,
+    check_walked,
+)
+from avlmaps.language.program.syntax import (
+    Assign,
+    Binary,
+    BuiltinCall,
+    Collection,
+    Comparison,
+    Conditional,
+    Constant,
+    Element,
+    Expression,
+    For,
+    If,
+    Logical,
+    Name,
+    Perform,
+    Program,
+    SkillCall,
+    Statement,
+    Target,
+    Unary,
+    Update,
+    Word,
+)
+from avlmaps.language.program.table import SKILLS
+from avlmaps.language.program.trace import Step, Trace, told
+from avlmaps.language.program.values import (
+    Made,
+    Value,
+    adopted,
+    call_function,
+    combined,
+    element_of,
+    kind_of,
+    shown,
+    signed,
+    size_of,
+    size_of_shown,
+)
+from avlmaps.language.vocabulary import Vocabulary
+
+# Between two skills the clock is looked at once in so many steps.
+_STEPS_BETWEEN_LOOKS = 256
+
+
+def run_program(
+    program: Program,
+    vocabulary: Vocabulary,
+    budget: Budget | None = None,
+    on_step: Callable[[Step], None] | None = None,
+    *,
+    clock: Callable[[], float] = monotonic,
+) -> Trace:
+    """Run a program to its end, or to its first error; the trace tells which, and what was done.
+
+    Errors of the project's family that a skill raises end the program and stand in the trace. Any other exception is a
+    mistake of the vocabulary's programmer and comes through, as does the user's interrupt.
+
+    Args:
+        program: what to run.
+        vocabulary: whose skills are called.
+        budget: what the run may use up; the defaults where none is given.
+        on_step: told of each step once it is over, a failed one too.
+        clock: seconds; replaced in tests.
+
+    Raises:
+        TypeError: the vocabulary lacks a skill, or a skill returned what its signature does not promise.
+    """
+    if not isinstance(vocabulary, Vocabulary):
+        raise TypeError(f"{type(vocabulary).__name__} does not have every skill of a Vocabulary")
+    run = _Run(vocabulary, budget or Budget(), on_step or (lambda step: None), clock)
+    error = error_type = None
+    try:
+        run.block(program.statements)
+    except _SkillFailedError as failed:
+        error, error_type = str(failed), type(failed.fault).__name__
+    except ProgramError as fault:
+        error, error_type = str(fault), ProgramError.__name__
+    return Trace(tuple(run.steps), error, error_type, clock() - run.started)
+
+
+class _SkillFailedError(Exception):
+    """A skill raised an error that ends the program."""
+
+    def __init__(self, line: int, what: str, fault: AvlmapsError) -> None:
+        super().__init__(f"Line {line}, {what}: {fault}")
+        self.fault = fault
+
+
+class _Next(Enum):
+    """Where a run goes on after a statement."""
+
+    STATEMENT = auto()
+    ROUND = auto()
+    AFTER_LOOP = auto()
+
+
+_AFTER_WORD = {"pass": _Next.STATEMENT, "break": _Next.AFTER_LOOP, "continue": _Next.ROUND}
+
+
+class _Run:
+    """One run: the values of its names, and what is left of its budget."""
+
+    def __init__(
+        self, vocabulary: Vocabulary, budget: Budget, on_step: Callable[[Step], None], clock: Callable[[], float]
+    ) -> None:
+        self.vocabulary = vocabulary
+        self.budget = budget
+        self.on_step = on_step
+        self.clock = clock
+        self.started = clock()
+        self.names: dict[str, Any] = {}
+        self.steps: list[Step] = []
+        self.worked_out = 0
+        self.made = 0
+
+    # ---- the budget
+
+    def step(self, line: int, count: int = 1) -> None:
+        """Count parts worked out; stop the program that has used them up."""
+        before = self.worked_out
+        self.worked_out += count
+        if self.worked_out > self.budget.steps:
+            raise refused(
+                line, f"the program takes more than {self.budget.steps} steps; shorten its loops or raise the budget"
+            )
+        if before // _STEPS_BETWEEN_LOOKS != self.worked_out // _STEPS_BETWEEN_LOOKS:
+            self.look_at_clock(line)
+
+    def keep(self, line: int, elements: int) -> None:
+        """Count elements made; stop the program that has used them up."""
+        self.made += elements
+        if self.made > self.budget.elements:
+            raise refused(
+                line,
+                f"the program makes more than {self.budget.elements} elements of lists, texts and trace; make fewer or "
+                "raise the budget",
+            )
+
+    def look_at_clock(self, line: int) -> None:
+        """Stop the program whose time is over."""
+        if self.clock() - self.started > self.budget.seconds:
+            raise refused(line, f"the program takes longer than {self.budget.seconds:g} s; do less or raise the budget")
+
+    # ---- statements
+
+    def block(self, statements: tuple[Statement, ...]) -> _Next:
+        for statement in statements:
+            after = self.statement(statement)
+            if after is not _Next.STATEMENT:
+                return after
+        return _Next.STATEMENT
+
+    def statement(self, statement: Statement) -> _Next:
+        self.step(statement.line)
+        match statement:
+            case Assign():
+                self.give(statement.line, statement.target, self.value(statement.value))
+            case Update():
+                self.update(statement)
+            case Perform():
+                self.value(statement.call)
+            case If():
+                return self.block(self.chosen_block(statement))
+            case For():
+                return self.loop(statement)
+            case Word():
+                return _AFTER_WORD[statement.word]
+        return _Next.STATEMENT
+
+    def chosen_block(self, statement: If) -> tuple[Statement, ...]:
+        for branch in statement.branches:
+            if self.truth(branch.test):
+                return branch.body
+        return statement.otherwise
+
+    def loop(self, statement: For) -> _Next:
+        through = self.value(statement.through)
+        check_walked(statement.line, kind_of(through))
+        for element in through:
+            self.step(statement.line)
+            self.give(statement.line, statement.target, element)
+            if self.block(statement.body) is _Next.AFTER_LOOP:
+                break
+        return _Next.STATEMENT
+
+    def give(self, line: int, target: Target, value: Any) -> None:
+        if not target.unpacks:
+            self.names[target.names[0]] = value
+            return
+        check_unpacked(line, kind_of(value))
+        if len(value) != len(target.names):
+            raise misfit(line, target, len(value))
+        self.names.update(zip(target.names, value, strict=True))
+
+    def update(self, statement: Update) -> None:
+        before = self.value(Name(statement.name, statement.line))
+        value = self.value(statement.value)
+        if statement.operator == "+" and kind_of(before) is kind_of(value) is Kind.LIST:
+            raise grown(statement)
+        self.names[statement.name] = self.arithmetic(statement.line, statement.operator, before, value)
+
+    # ---- expressions
+
+    def value(self, part: Expression) -> Any:
+        self.step(part.line)
+        return _EVALUATE[type(part)](self, part)
+
+    def truth(self, part: Expression) -> bool:
+        value = self.value(part)
+        check_truth(part.line, kind_of(value))
+        return bool(value)
+
+    def constant(self, part: Constant) -> Value:
+        return part.value
+
+    def name(self, part: Name) -> Value:
+        try:
+            return self.names[part.name]
+        except KeyError:
+            raise refused(
+                part.line, f"`{part.name}` has no value yet; give it one before, on every way that leads here"
+            ) from None
+
+    def collection(self, part: Collection) -> Value:
+        elements = [self.value(element) for element in part.elements]
+        made = elements if part.is_list else tuple(elements)
+        self.keep(part.line, size_of(part.line, made))
+        return made
+
+    def unary(self, part: Unary) -> Value:
+        if part.operator == "not":
+            return not self.truth(part.operand)
+        return signed(part.line, part.operator, self.value(part.operand))
+
+    def binary(self, part: Binary) -> Value:
+        left = self.value(part.left)
+        return self.arithmetic(part.line, part.operator, left, self.value(part.right))
+
+    def arithmetic(self, line: int, operator: str, left: Any, right: Any) -> Value:
+        try:
+            made = combined(line, operator, left, right, self.budget.factors)
+        except ProgramError:
+            raise
+        except AvlmapsError as fault:
+            raise _SkillFailedError(line, f"`{operator}`", fault) from fault
+        if isinstance(made, (str, list, tuple)):
+            self.keep(line, size_of(line, made))
+        elif isinstance(made, Made):
+            self.keep(line, len(made.how))
+            self.look_at_clock(line)
+        return made
+
+    def comparison(self, part: Comparison) -> bool:
+        left = self.value(part.first)
+        for operator, operand in zip(part.operators, part.rest, strict=True):
+            right = self.value(operand)
+            check_comparison(part.line, operator, kind_of(left), kind_of(right))
+            self.step(part.line, size_of(part.line, left) + size_of(part.line, right))
+            if not _COMPARE[operator](left, right):
+                return False
+            left = right
+        return True
+
+    def logical(self, part: Logical) -> Value:
+        stops_at = part.operator == "or"
+        for operand in part.operands[:-1]:
+            value = self.value(operand)
+            check_truth(operand.line, kind_of(value))
+            if bool(value) is stops_at:
+                return value
+        return self.value(part.operands[-1])
+
+    def conditional(self, part: Conditional) -> Value:
+        return self.value(part.chosen if self.truth(part.test) else part.otherwise)
+
+    def element(self, part: Element) -> Value:
+        of, index = self.value(part.of), self.value(part.index)
+        check_indexed(part.line, kind_of(of), kind_of(index))
+        return element_of(part.line, of, index)
+
+    def builtin_call(self, part: BuiltinCall) -> Value:
+        arguments = [self.value(argument) for argument in part.arguments]
+        kinds = tuple(kind_of(argument) for argument in arguments)
+        check_function(part.line, part.function, kinds)
+        if part.function in ("min", "max") and kinds[0] in COLLECTIONS:
+            self.step(part.line, len(arguments[0]))
+        return call_function(part.line, part.function, arguments)
+
+    # ---- skills
+
+    def skill_call(self, part: SkillCall) -> Value:
+        skill = SKILLS[part.skill]
+        arguments = {argument.parameter: self.value(argument.value) for argument in part.arguments}
+        for name, value in arguments.items():
+            check_argument(part.line, skill, parameter_of(skill, name), kind_of(value))
+        check_exactly_one(part.line, skill, sum(value is not None for value in arguments.values()))
+        self.look_at_clock(part.line)
+        if len(self.steps) == self.budget.skill_calls:
+            raise refused(
+                part.line,
+                f"the program calls more than {self.budget.skill_calls} skills; shorten its loops or raise the budget",
+            )
+        seen = {name: shown(value) for name, value in arguments.items()}
+        self.keep(part.line, size_of_shown(seen))
+        result = self.perform(part, arguments, seen)
+        self.look_at_clock(part.line)
+        return result
+
+    def perform(self, part: SkillCall, arguments: dict[str, Any], seen: dict[str, Any]) -> Value:
+        """Call the skill, the one place where a program reaches anything."""
+        skill, began = SKILLS[part.skill], self.clock()
+        given = {name: value.heat if isinstance(value, Made) else value for name, value in arguments.items()}
+        try:
+            returned = getattr(self.vocabulary, skill.name)(**given)
+        except AvlmapsError as fault:
+            self.record(Step(skill.name, seen, None, part.line, self.clock() - began, str(fault)))
+            raise _SkillFailedError(part.line, skill.name, fault) from fault
+        how = f"{skill.name}({', '.join(f'{name}={told(value)}' for name, value in seen.items())})"
+        result = adopted(skill, returned, how)
+        content = shown(result)
+        self.record(Step(skill.name, seen, content, part.line, self.clock() - began))
+        self.keep(part.line, size_of(part.line, result) + size_of_shown(content))
+        return result
+
+    def record(self, step: Step) -> None:
+        self.steps.append(step)
+        self.on_step(step)
+
+
+_EVALUATE: dict[type, Callable[[_Run, Any], Value]] = {
+    Constant: _Run.constant,
+    Name: _Run.name,
+    Collection: _Run.collection,
+    Unary: _Run.unary,
+    Binary: _Run.binary,
+    Comparison: _Run.comparison,
+    Logical: _Run.logical,
+    Conditional: _Run.conditional,
+    Element: _Run.element,
+    SkillCall: _Run.skill_call,
+    BuiltinCall: _Run.builtin_call,
+}
+_COMPARE: dict[str, Callable[[Any, Any], bool]] = {
+    "==": lambda left, right: left == right,
+    "!=": lambda left, right: left != right,
+    "<": lambda left, right: left < right,
+    "<=": lambda left, right: left <= right,
+    ">": lambda left, right: left > right,
+    ">=": lambda left, right: left >= right,
+    "in": lambda left, right: left in right,
+    "not in": lambda left, right: left not in right,
+    "is": lambda left, right: left is right,
+    "is not": lambda left, right: left is not right,
+}
