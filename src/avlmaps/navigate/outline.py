@@ -48,7 +48,7 @@ class Outline:
         mask, corner, cell_m = _raster(ground, size_m, join_m)
         found, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
         line = found[0] if len(found) == 1 else cv2.convexHull(np.concatenate(found))
-        line = cv2.approxPolyDP(line, 0.5 * size_m / cell_m, True)
+        line = cv2.approxPolyDP(line, 1.0, True)
         corners = corner + (line.reshape(-1, 2).astype(np.float64) + 0.5) * cell_m
         return cls(corners if _signed_area_m2(corners) >= 0.0 else corners[::-1])
 

@@ -1,0 +1,205 @@
+"""Which chair is meant, where it is and what it covers, asked of a map; which files a program may read."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from avlmaps.core.errors import GoalNotFoundError, ProgramError, QueryError
+from avlmaps.core.motion import GroundPose
+from avlmaps.language.vocabulary import Picture, Place
+from avlmaps.navigate.outline import Outline, middle_between
+from avlmaps.navigate.readable import Readable, named_files, offered_by
+from avlmaps.navigate.skills import Robot, RobotSettings
+from avlmaps.query.avlmap import AVLMap
+from helpers.kinematic import KinematicDriver
+from query.query_fakes import FakeViews, furnished_map, keyframes_at, sounds_of
+
+BIG_CHAIR, SMALL_CHAIR = (0.6, 0.6), (5.1, 3.1)
+
+
+def track(x: float, y: float) -> np.ndarray:
+    return np.stack([np.linspace(x, x + 0.2, 5), np.full(5, y), np.full(5, 1.2)], axis=1)
+
+
+def furnished_robot(x: float = 3.0, y: float = 2.0, settings: RobotSettings | None = None, **parts: object) -> Robot:
+    return Robot(AVLMap(furnished_map(**parts)), KinematicDriver(GroundPose(x, y)), settings)
+
+
+def xy(place: Place) -> tuple[float, float]:
+    return place.x, place.y
+
+
+def test_a_phrase_means_the_best_thing_where_it_is_and_the_nearest_where_the_robot_is() -> None:
+    robot = furnished_robot(4.8, 2.6)
+    assert xy(robot.get_pos("chair")) == pytest.approx(BIG_CHAIR, abs=0.06)
+    robot.move_to("chair")
+    assert robot.moves[-1].goal[:2] == pytest.approx(BIG_CHAIR, abs=0.06)
+    robot = furnished_robot(4.8, 2.6)
+    robot.move_to_object("chair")
+    assert robot.moves[-1].stop[:2] == pytest.approx((5.0, 3.0), abs=0.03)
+    robot.move_east("chair", 0.5)
+    assert robot.moves[-1].goal[:2] == pytest.approx((SMALL_CHAIR[0] + 0.6, SMALL_CHAIR[1]), abs=0.03)
+
+
+def test_a_heatmap_of_two_parts_says_which_one_is_meant_wherever_the_robot_is() -> None:
+    robot = furnished_robot(0.3, 0.3, sounds=sounds_of([track(5.0, 3.1)], [0.9]))
+    heat = robot.get_major_map(obj="chair") * robot.get_map(sound="dog")
+    assert xy(robot.get_max_pos_3d(heat)) == pytest.approx(SMALL_CHAIR, abs=0.15)
+    robot.move_to_object(heat)
+    assert robot.moves[-1].stop[:2] == pytest.approx((5.0, 3.0), abs=0.03)
+    assert robot.moves[-1].name == "'chair' near 'dog'"
+
+
+def test_the_outline_goes_round_the_thing_counter_clockwise_on_the_floor() -> None:
+    contour = furnished_robot().get_contour("table")
+    corners = np.array([xy(place) for place in contour])
+    assert np.ptp(corners, axis=0) == pytest.approx((0.8, 0.8), abs=0.03)
+    x, y = corners.T
+    assert 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) == pytest.approx(0.64, abs=0.05)
+    assert {round(place.z, 3) for place in contour} == {0.025}
+
+
+def test_the_place_where_the_robot_stands_can_be_kept_and_come_back_to() -> None:
+    robot = furnished_robot(3.0, 2.0)
+    home = robot.current_pos()
+    robot.move_to("chair")
+    robot.move_to(home)
+    assert robot.moves[-1].stop == pytest.approx((3.0, 2.0, 0.025))
+    assert robot.get_contour(home)[0].distance_m(home) == pytest.approx(0.0)
+
+
+def test_between_two_of_a_kind_takes_two_and_never_one_twice() -> None:
+    robot = furnished_robot()
+    robot.move_in_between("chair", "chair")
+    assert robot.moves[-1].goal[:2] == pytest.approx((2.85, 1.85), abs=0.05)
+    robot.move_in_between("table", Place(3.0, 0.9, 0.0))
+    assert robot.moves[-1].goal[:2] == pytest.approx((2.4, 0.9), abs=0.03)
+    with pytest.raises(GoalNotFoundError, match="There is only one 'table' in the map"):
+        robot.move_in_between("table", "table")
+
+
+def test_a_map_that_is_tilted_is_driven_on_its_level_ground() -> None:
+    stored = furnished_map()
+    stored.up_in_world = np.array([0.0, -1.0, 0.0])  # a camera's world: y down
+    asked = AVLMap(stored)
+    robot = Robot(asked, KinematicDriver(GroundPose(0.0, 0.0), asked.space.level_from_world))
+    place = robot.get_pos("table")
+    level = asked.space.level(np.array([place.x, place.y, place.z]))
+    robot.move_to("table")
+    assert (robot.driver.pose.x_m, robot.driver.pose.y_m) == pytest.approx(level[:2])
+    assert robot.moves[-1].goal == pytest.approx((place.x, place.y, place.z))
+    robot.move_north("table", 0.5)
+    level_goal = asked.space.level(np.array(robot.moves[-1].goal))
+    assert level_goal[1] > level[1] + 0.5
+
+
+def test_what_is_not_there_is_told_in_one_sentence_with_what_to_do() -> None:
+    robot = furnished_robot(sounds=sounds_of([track(5.0, 3.1)], [0.2]))
+    with pytest.raises(GoalNotFoundError, match=r"'dog' is not found in the map: sound 'dog': none of the 1 heard"):
+        robot.move_to(robot.get_major_map(sound="dog"))
+    with pytest.raises(GoalNotFoundError, match=r"or let the robot go to the best guess\.$"):
+        robot.move_to(robot.get_major_map(obj="chair") * robot.get_map(sound="dog"))
+    assert robot.moves == []
+
+
+def test_the_best_guess_is_gone_to_only_when_that_is_asked_for() -> None:
+    sounds = sounds_of([track(5.0, 3.1)], [0.3])
+    robot = furnished_robot(settings=RobotSettings(guess=True), sounds=sounds)
+    robot.move_to(robot.get_major_map(sound="dog"))
+    assert robot.moves[-1].goal[:2] == pytest.approx((5.1, 3.1), abs=0.15)
+    assert any("not sure of 'dog'" in note for note in robot.seeker.notes)
+
+
+def test_things_that_are_never_together_are_told_apart_from_things_that_are_missing() -> None:
+    views = np.array([[1.0, 0.0]], np.float32)
+    robot = furnished_robot(views=FakeViews(), keyframes=keyframes_at(np.array([[60.0, 60.0, 1.2]]), views))
+    heat = robot.get_major_map(obj="chair") * robot.get_map(area="kitchen")
+    with pytest.raises(GoalNotFoundError, match="do not come together anywhere"):
+        robot.move_to(heat)
+
+
+def test_exactly_one_thing_is_asked_for_at_a_time() -> None:
+    robot = furnished_robot()
+    with pytest.raises(ProgramError, match="exactly one of obj, sound, img and area; it was given obj and sound"):
+        robot.get_map(obj="chair", sound="dog")
+    with pytest.raises(ProgramError, match="it was given none of them"):
+        robot.get_major_map()
+    with pytest.raises(ProgramError, match="takes as img what load_image returns, not a str"):
+        robot.get_map(img="photo.png")  # pyright: ignore[reportArgumentType]
+
+
+def test_a_program_reads_only_what_it_was_offered(tmp_path: Path) -> None:
+    inside, outside = tmp_path / "work", tmp_path / "secret"
+    for folder in (inside, outside):
+        folder.mkdir()
+        cv2.imwrite(str(folder / "photo.png"), np.zeros((4, 4, 3), np.uint8))
+    (inside / "link.png").symlink_to(outside / "photo.png")
+    (inside / "text.png").write_text("no picture")
+    robot = furnished_robot()
+    robot.seeker.readable = Readable((inside,), (str(outside / "photo.png"),))
+    assert robot.load_image("photo.png") == Picture("photo.png")
+    assert robot.load_image(str(outside / "photo.png")).path == str(outside / "photo.png")
+    robot.seeker.readable = Readable((inside,))
+    for name in (str(outside / "photo.png"), "../secret/photo.png", "link.png", "/etc/passwd"):
+        with pytest.raises(QueryError, match=r"may not be read by a program: it lies outside of .*work"):
+            robot.load_image(name)
+        with pytest.raises(QueryError, match="may not be read by a program"):
+            robot.get_map(img=Picture(name))  # one that no load_image gave
+    for name, sentence in (
+        ("nothing.png", "is not there"),
+        ("text.png", "cannot be read as an image"),
+        (" ", "no name"),
+    ):
+        with pytest.raises(QueryError, match=sentence):
+            robot.load_image(name)
+
+
+def test_the_files_that_a_command_names_are_offered_as_it_writes_them(tmp_path: Path) -> None:
+    command = "go between ./a/006899.png and the chair, then to \"my holiday.jpg\" and where '/x/bark 2.wav' was heard."
+    assert named_files(command) == ("my holiday.jpg", "/x/bark 2.wav", "./a/006899.png", *named_files(command)[3:])
+    assert "/etc/passwd" not in named_files(command)
+    assert offered_by(command, [tmp_path]).roots == (tmp_path,)
+    assert named_files("go to the chair. Then stop.") == ()
+
+
+voxels = st.lists(st.tuples(st.integers(-15, 15), st.integers(-15, 15)), min_size=1, max_size=40, unique=True)
+
+
+@given(voxels)
+def test_an_outline_holds_its_voxels_and_runs_counter_clockwise(cells: list[tuple[int, int]]) -> None:
+    middles = (np.array(cells) + 0.5) * 0.05
+    outline = Outline.round(middles, 0.05)
+    for middle in middles:
+        assert outline.distance_m(middle) < 0.03
+    assert np.all(outline.corners >= middles.min(axis=0) - 0.15)
+    assert np.all(outline.corners <= middles.max(axis=0) + 0.15)
+    x, y = outline.corners.T
+    assert x @ np.roll(y, -1) - y @ np.roll(x, -1) >= 0.0
+
+
+def test_an_outline_keeps_the_corner_of_an_l() -> None:
+    grid = np.stack(np.meshgrid(np.arange(40), np.arange(40), indexing="ij"), axis=-1).reshape(-1, 2)
+    middles = (grid[(grid < 10).any(axis=1)] + 0.5) * 0.05
+    outline = Outline.round(middles, 0.05)
+    assert not outline.contains(np.array([1.2, 1.2]))
+    assert outline.contains(np.array([0.2, 1.8]))
+    assert outline.distance_m(np.array([1.2, 1.2])) == pytest.approx(0.7, abs=0.02)
+
+
+def test_between_two_cupboards_that_face_is_the_middle_of_the_aisle() -> None:
+    a = Outline(np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 0.5], [0.0, 0.5]]))
+    b = Outline(np.array([[1.0, 2.0], [5.0, 2.0], [5.0, 2.5], [1.0, 2.5]]))
+    assert middle_between(a, b) == pytest.approx((2.5, 1.25))
+    assert middle_between(b, a) == pytest.approx((2.5, 1.25))
+
+
+def test_between_a_thing_and_one_inside_its_u_is_never_inside_the_thing() -> None:
+    u = Outline(np.array([[0, 0], [5, 0], [5, 4], [4, 4], [4, 1], [1, 1], [1, 4], [0, 4]], float))
+    thing = Outline(np.array([[1.5, 2.0], [3.5, 2.0], [3.5, 3.0], [1.5, 3.0]]))
+    middle = middle_between(u, thing)
+    assert not u.contains(middle)
+    assert not thing.contains(middle)
