@@ -1,0 +1,183 @@
+"""Names in a clause: things, sounds, areas and files, out of the tree that the grammar makes of them."""
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from avlmaps.core.errors import LanguageError
+from avlmaps.language.rules.intents import Named, Target
+from avlmaps.language.rules.words import PAST_TENSES, SOUND_NOUNS, SOUND_VERBS
+from avlmaps.language.sentence import AREA_WORDS
+from avlmaps.query.question import Modality
+
+# A toilet is a thing to drive to, as in VLMaps; the room is the bathroom.
+_AREAS = AREA_WORDS - {"toilet"}
+# Parts of a room have no place of their own in a map; the room has.
+_PARTS_OF_AREAS = frozenset(
+    {"middle", "centre", "center", "end", "corner", "back", "front", "side", "rest", "inside", "part"}
+)
+_NOT_TOLD_APART = frozenset(
+    {"other", "others", "second", "third", "fourth", "fifth", "furthest", "farthest", "nth", "next"}
+)
+_STANDING = frozenset({"is", "are", "was", "were", "stands", "stand", "sits", "lies", "hangs", "lives"})
+_SOUNDING = re.compile(rf"(?:{'|'.join(SOUND_VERBS)})ing")
+_PAST = re.compile(rf"({'|'.join(SOUND_VERBS)})(?:ed|ped|med|ned|ped)")
+_PRESENT = re.compile(rf"({'|'.join(SOUND_VERBS)})(?:e?s)?")
+
+
+class Names:
+    """Reads names, and keeps notes of how one was taken that could be meant in another way."""
+
+    def __init__(self, files: tuple[str, ...]) -> None:
+        self.files = files
+        self.notes: list[str] = []
+
+    def target(self, node: Any) -> Target:
+        """Return the target of a `target`, `near_target` or `item` node, or of a node that holds the parts of one."""
+        children = node.children if node.data in ("target", "near_target") else [node]
+        named, context = self._item(children[0])
+        for place in children[1:]:
+            context += self._context(place)
+        return Target(named, tuple(context))
+
+    def target_of(self, parts: list[Any]) -> Target:
+        """Return the target whose thing and places stand side by side in a rule."""
+        named, context = self._core(parts[0])
+        for place in parts[1:]:
+            context += self._context(place)
+        return Target(named, tuple(context))
+
+    def _item(self, node: Any) -> tuple[Named | None, list[Named]]:
+        if is_token(node, "IT"):
+            return None, []
+        if is_rule(node, "item", "near_item"):
+            inner = [child for child in node.children if not is_token(child, "ARTICLE")]
+            article = next((str(child) for child in node.children if is_token(child, "ARTICLE")), "")
+            named, context = self._item(inner[0])
+            if named is not None and re.match(r"any\b|one of", article, re.IGNORECASE):
+                named = Named(named.modality, _singular(named.words), named.is_file)
+            return named, context
+        return self._core(node)
+
+    def _context(self, place: Any) -> list[Named]:
+        """Return what a place names; sides of things are no more than near them, which is noted."""
+        if is_rule(place, "heard", "heard_clip"):
+            named, more = self._core(place)
+            return [named, *more]
+        context: list[Named] = []
+        for child in place.children:
+            if is_token(child, "FRONT_OF", "BEHIND", "SIDE_OF", "AHEAD"):
+                self._note_side(child)
+            if is_rule(child, "item", "near_item", "near_target"):
+                found = self.target(child)
+                if found.sought is None:
+                    raise LanguageError("'it' cannot say where another thing is; name what it is near.")
+                context += [found.sought, *found.context]
+        return context
+
+    def _note_side(self, token: Any) -> None:
+        if token.type == "AHEAD":
+            self.notes.append("'in front of you' was left out: the best place on the map is taken.")
+        else:
+            self.notes.append(f"{str(token).strip()!r} after a thing was taken as near.")
+
+    def _core(self, node: Any) -> tuple[Named, list[Named]]:
+        """Return what a name means: the thing, and the area that its "of" puts it in."""
+        kind = node.data
+        if kind in ("picture", "clip", "heard_clip"):
+            mark = next(token for token in node.children if is_token(token, "IMAGE_FILE", "CLIP_FILE"))
+            modality = Modality.IMAGE if mark.type == "IMAGE_FILE" else Modality.SOUND
+            return Named(modality, self.files[int(mark[2:-1])], is_file=True), []
+        spoken = [str(word) for word in _words(node)]
+        if kind == "sound":
+            return Named(Modality.SOUND, " ".join(spoken)), []
+        if kind == "sound_verb":
+            verb = next(str(token) for token in node.children if is_token(token, "SOUND_VERB"))
+            return Named(Modality.SOUND, f"{' '.join(spoken)} {verb.lower()}"), []
+        if kind == "heard":
+            return self._heard(node, spoken)
+        return self._thing(spoken)
+
+    def _heard(self, node: Any, spoken: list[str]) -> tuple[Named, list[Named]]:
+        """Return what was heard; "where the sofa is" is the sofa, "where the glass broke" is glass breaking."""
+        told = any(is_token(token, "HEARD", "WHERE_HEARD", "SOUND_OF") for token in node.children)
+        if not told and spoken[-1].lower() in _STANDING and len(spoken) > 1:
+            return self._thing(spoken[:-1])
+        if told and any(is_token(token, "WHERE_HEARD") for token in node.children):
+            return Named(Modality.SOUND, " ".join(spoken)), []
+        kept = [word for word in spoken if word.lower() not in ("was", "were", "is", "are", "being", "has", "been")]
+        sounding = [*kept[:-1], _sounding(kept[-1])] if kept and not told else kept
+        if not told and not _is_sound(sounding):
+            raise LanguageError(
+                f"'where {' '.join(spoken)}' is not understood; say what was heard there, like: where you heard a dog "
+                "barking, or where the thing is, like: next to the sofa."
+            )
+        return Named(Modality.SOUND, " ".join(sounding)), []
+
+    def _thing(self, spoken: list[str]) -> tuple[Named, list[Named]]:
+        """Return an object, or a sound or an area if the last word says so."""
+        if spoken[0].lower() in _NOT_TOLD_APART and len(spoken) > 1:
+            raise LanguageError(
+                f"{spoken[0]!r} cannot be told from the map in {' '.join(spoken)!r}; say what it is near, like: the "
+                f"{' '.join(spoken[1:])} near the window."
+            )
+        if spoken[0].lower() in ("nearest", "closest") and len(spoken) > 1:
+            spoken = spoken[1:]
+        last = spoken[-1].lower()
+        if last in _AREAS and "of" in spoken[1:-1]:
+            return self._of_area(spoken)
+        if last in _AREAS:
+            return Named(Modality.AREA, " ".join(spoken)), []
+        return Named(Modality.SOUND if _is_sound(spoken) else Modality.OBJECT, " ".join(spoken)), []
+
+    def _of_area(self, spoken: list[str]) -> tuple[Named, list[Named]]:
+        at = spoken.index("of")
+        thing, area = spoken[:at], [word for word in spoken[at + 1 :] if word.lower() not in ("the", "a", "an", "this")]
+        where = Named(Modality.AREA, " ".join(area))
+        if thing[-1].lower() in _PARTS_OF_AREAS:
+            if thing[-1].lower() not in ("middle", "centre", "center", "inside"):
+                self.notes.append(f"'{' '.join(thing)} of' was left out: the {where.words} as a whole is taken.")
+            return where, []
+        return Named(Modality.OBJECT, " ".join(thing)), [where]
+
+
+def is_token(node: Any, *types: str) -> bool:
+    """Return whether a child of a tree is a token of one of these types."""
+    return getattr(node, "type", None) in types
+
+
+def is_rule(node: Any, *names: str) -> bool:
+    """Return whether a child of a tree is a rule of one of these names."""
+    return getattr(node, "data", None) in names
+
+
+def _words(node: Any) -> Iterator[str]:
+    for child in node.children:
+        if (
+            is_token(child, "WORD", "AND", "AND_JOIN", "OF", "ON")
+            or (is_token(child, "ARTICLE") and "phrase" in node.data)
+            or (is_token(child, "ARTICLE") and "noise" in node.data)
+        ):
+            yield str(child)
+        elif hasattr(child, "data"):
+            yield from _words(child)
+
+
+def _is_sound(spoken: list[str]) -> bool:
+    last = spoken[-1].lower()
+    return last in SOUND_NOUNS or (len(spoken) > 1 and bool(_SOUNDING.fullmatch(last)))
+
+
+def _sounding(word: str) -> str:
+    """Return the -ing form of a verb that tells of a sound: "barked", "broke"."""
+    if word.lower() in PAST_TENSES:
+        return PAST_TENSES[word.lower()]
+    for form in (_PAST, _PRESENT):
+        found = form.fullmatch(word.lower())
+        if found:
+            return f"{found[1]}ing"
+    return word
+
+
+def _singular(words: str) -> str:
+    return words[:-1] if words.endswith("s") and not words.endswith("ss") else words
