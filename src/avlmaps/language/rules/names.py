@@ -61,11 +61,11 @@ class Names:
 
     def _context(self, place: Any) -> list[Named]:
         """Return what a place names; sides of things are no more than near them, which is noted."""
-        if is_rule(place, "heard", "heard_clip"):
-            named, more = self._core(place)
-            return [named, *more]
         context: list[Named] = []
         for child in place.children:
+            if is_rule(child, "heard"):
+                named, more = self._core(child)
+                context += [named, *more]
             if is_token(child, "FRONT_OF", "BEHIND", "SIDE_OF", "AHEAD"):
                 self._note_side(child)
             if is_rule(child, "item", "near_item", "near_target"):
@@ -93,7 +93,7 @@ class Names:
             return Named(Modality.SOUND, " ".join(spoken)), []
         if kind == "sound_verb":
             verb = next(str(token) for token in node.children if is_token(token, "SOUND_VERB"))
-            return Named(Modality.SOUND, f"{' '.join(spoken)} {verb.lower()}"), []
+            return Named(Modality.SOUND, f"{' '.join(spoken[1:])} {verb.lower()}"), []
         if kind == "heard":
             return self._heard(node, spoken)
         return self._thing(spoken)

@@ -45,6 +45,7 @@ def parser() -> Any:
     grammar = files("avlmaps.language.rules").joinpath("command.lark").read_text(encoding="utf-8")
     listed = {name: value for name, value in vars(words).items() if name.isupper() and isinstance(value, str)}
     listed["SOUND_VERBS"] = "|".join(words.SOUND_VERBS)
+    listed["STOPS"] = words.STOPS.replace("<SPELLED>", words.SPELLED)
     grammar = re.sub(r"<([A-Z_]+)>", lambda found: f"(?:{listed[found[1]]})".replace("/", r"\/"), grammar)
     return Lark(grammar, parser="lalr", lexer="contextual", maybe_placeholders=False)
 
@@ -224,6 +225,8 @@ class _Reader:
         if "COMPASS" in found:
             return TurnTo(_heading(found["COMPASS"]))
         around = found.get("AROUND", "") + found.get("U_TURN", "")
+        if around and re.match("look", said, re.IGNORECASE) and around == "around":
+            return Turn(360.0)
         if around:
             return Turn(360.0 if re.search(r"circle|all the way|complete|full|360", around, re.IGNORECASE) else 180.0)
         side = words.side_of(found.get("SIDE", "")) or (

@@ -60,6 +60,12 @@ NEGATIONS = (
     r"cannot|can't|whichever|unlike"
 )
 
+# What may stand after a direction; before anything else it begins a name, as in "the left lamp".
+STOPS = (
+    r"(?=\s*$|\s*[,\d]|\s+(?:by|for|at|in|near|next|inside|beside|through|to|towards?|about|turn|rotation|spin|twice|once|thrice|"
+    r"slightly|around|round|just|until|from|away)\b|\s+<SPELLED>\b)"
+)
+
 # Said for politeness or by habit; nothing changes when they are left out.
 FILLERS = (
     r"(?:hey|hi|hello|ok|okay|dear|yo|alright|all right|so|well|right|now)(?: there)?,? (?:mr\.? |little )?(?:robot|robbie|rover|"
@@ -89,10 +95,10 @@ FILLERS = (
     r"right now|straight away|as fast as you can|as soon as you can|asap|for me|for us|actually|basically|maybe|"
     r"perhaps|yourself over|whenever you(?:'re| are) ready|when you(?:'re| are) ready|when you have a (?:moment|minute)|"
     r"on your own|by yourself|also|again please|at your leisure|would you|will you|okay\?|exactly|precisely|roughly|"
-    r"approximately|about(?= (?:\d|one|two|three|half|a |four|five|ten))|around(?= (?:\d+|one|two|three|half|four|five)\b)|"
+    r"approximately|about(?= (?:\d|one|two|three|half|a |four|five|ten))|"
     r"directly(?= (?:to|in|on|at|by|north|south|left|right|behind|between))|straight(?= (?:to|over|into)\b)|right(?= (?:next to|"
-    r"beside|by|in front|behind|up to|between|in between|over to|near))|all the way(?= (?:to|over|up|back))|"
-    r"immediately(?= )|somewhere(?= (?:between|in|near|by|close))|anywhere(?= (?:between|near))|there(?= (?:between|next to|near)))\b",
+    r"beside|by (?:the|a|my)|in front|behind|up to|between|in between|over to|near))|all the way(?= (?:to|over|up|back))|"
+    r"somewhere(?= (?:between|in|near|by|close))|anywhere(?= (?:between|near))|there(?= (?:between|next to|near)))\b",
     r"\b(?:now|ok|okay|alright|will you|would you|could you|yeah|yes|got it|understood|alright|good|great)\b(?=\s*[,.;!?]|\s*$)",
     r"^(?:now|also|yes|sure)\b",
     r"(?<=; )(?:now|also|and)\b",
@@ -139,7 +145,7 @@ SPELLED = rf"(?:{_WHOLE}{_POINT}{_AND_PART}|{'|'.join(sorted(_SOME, key=len, rev
 # "2m" needs no space, "two metres" does: "am" is no metre.
 _MEASURED = rf"(?:({_FIGURES})[ -]?|({SPELLED})[ -])"
 _UNIT = "|".join(_UNITS_M)
-_BEFORE = r"(?:(?:for|by|at|some|a (?:distance|further)(?: of)?|another|the next) )*"
+_BEFORE = r"(?:(?:for|by|at|some|around|about|within|a (?:distance|further)(?: of)?|another|the next) )*"
 DISTANCE = rf"{_BEFORE}(?:{_MEASURED}(?:more |further |long )?(?:{_UNIT})\b{_AND_PART}|{_LITTLE})(?: further| farther)?"
 # A word for a little may stand before a side; a number of degrees says the angle itself.
 ANGLE = (

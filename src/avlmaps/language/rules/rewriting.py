@@ -1,0 +1,218 @@
+"""What a command is rewritten to before it is cut: the same, with fewer ways to say it.
+
+Politeness goes; "the photo x.png was taken" becomes the photo; "and then", "after that", a full stop become one mark.
+Each entry is a pattern, matched without regard to case, and what stands instead of it; they apply in their order.
+"""
+
+import re
+from functools import cache
+
+from avlmaps.language.rules import words
+
+_DETERMINER = words.DETERMINER
+_SHOT = (
+    r"(?:photo(?:graph)?s?|picture|pic|image|snap(?:shot)?|shot|frame|view|still|selfie|scene|image file|screenshot)"
+)
+_TAKEN = r"(?:(?:was|is|has been|were)? ?(?:taken|shot|captured|made|recorded|photographed|snapped|shows?|comes from|came from))"
+_RECORDING = r"(?:sounds?|noises?|recording|audio|clip|snippet|sample|track|file|sound clip|audio clip|audio snippet)"
+_HEARD = r"(?:(?:was|were|is|has been|can be|could be) (?:heard|recorded|played)|came from|comes from)"
+_SPOT = r"(?:place|spot|location|point|position|area|room|site|viewpoint|pose)"
+_I = r"(?:i|you|we|they|it|he|she|someone|the robot)"
+_BEGINS_THING = rf"(?:{_DETERMINER}\b|⟦|it\b|them\b)"
+
+_PATH_OF = (
+    r"(?:called|named|file|at|in|from|under|stored (?:at|in|under)|taken (?:at|in)|with the (?:file ?)?name|path|of|taken|that)"
+)
+_ABOUT_FILES = [
+    # "where the photo x.png was taken", "the place in this picture: x.png" are the picture itself.
+    (
+        rf"(?:(?:(?:{_DETERMINER} )?{_SPOT} )?(?:where (?:{_I} )?(?:have |has |had )?(?:took|take|taken|shot|snapped|captured|made|see|saw|"
+        rf"photographed)? ?|(?:that (?:is |you see |i see )?)?(?:shown|seen|pictured|depicted|photographed|captured|visible) (?:in|on|by|at) )|"
+        rf"(?:{_DETERMINER} )?{_SPOT} (?:in|of|on|from) )?(?:{_DETERMINER} )?(?:\w+ )?{_SHOT}(?: {_PATH_OF})*:? ⟦(i\d+)⟧(?: {_TAKEN})?"
+        r"(?: (?:at|from|in)\b(?= ?[,.;!?]|$))?",
+        r" ⟦\1⟧",
+    ),
+    (rf"(?:(?:{_DETERMINER} )?{_SPOT} )?where (?:(?:{_I} )(?:took|take|shot|snapped|captured|made) )?⟦(i\d+)⟧(?: {_TAKEN})?", r" ⟦\1⟧"),
+    (
+        rf"(?:(?:{_DETERMINER} )?{_SPOT} )?(?:where (?:{_I} )?(?:could |can |have |had )?(?:heard|hear|recorded)? ?)?"
+        rf"(?:something (?:like|similar to) |what you hear in )?(?:{_DETERMINER} )?(?:\w+ )?{_RECORDING}(?: (?:called|named|file|clip|"
+        rf"recording|of|in|like|from|at|as in|under|similar to|on|recorded in|heard in|{_DETERMINER}|{_RECORDING}))*:? ⟦(c\d+)⟧(?: {_HEARD})?",
+        r" ⟦\1⟧",
+    ),
+    (
+        rf"(?:(?:{_DETERMINER} )?{_SPOT} )?where (?:{_I} (?:could |can |have )?(?:heard?|recorded) )?(?:something like )?⟦(c\d+)⟧(?: {_HEARD})?",
+        r" ⟦\1⟧",
+    ),
+    (rf"{_DETERMINER} ⟦", "⟦"),
+]
+
+_ABOUT_PLACES = [
+    (
+        r",?\s*\b(?:that|this|it|there|which)?(?:'s| is| would be| will be) (?:exactly |precisely |just )?(?:where|the (?:place|spot|position|"
+        r"location)(?: where| that)?|your (?:next |first |last |final )?(?:goal|destination|target|stop))\b(?: (?:i|we|you)\b[^,.;!?]*|"
+        r" to \w+[^,.;!?]*)?(?=[,.;!?]|$)",
+        " ; stop there",
+    ),
+    (r"\b(?:the following|as follows)\b:?", " "),
+    (rf"\b{_DETERMINER} {_SPOT} (?:where|at which|in which|from which)\b", "where"),
+    (
+        rf"\b(?:to |at |in |into )?(?:{_DETERMINER}|some|any|somewhere|someplace|a) (?:good |free )?{_SPOT}(?: that is| which is| that's|"
+        rf" located| right)? (?=(?:near|next to|beside|by|close|in|inside|on|between|in between|half|to the|left|right|north|south|east|"
+        rf"west|behind|opposite|{words.DISTANCE})\b)",
+        "to ",
+    ),
+    (
+        r"\b(?:the|an?) (?:place|spot|location|position|origin|source|direction|whereabouts) of (?=the|an?\b|this|that|my|your)",
+        "",
+    ),
+    (r"\bthe (?:origin|source) of (?=sound|noise)", "the "),
+    (
+        rf"\b(?:that|which|who) (?:is|are|was|were|stands?|sits?|lies|hangs|lives)(?: (?:located|standing|situated|placed|sitting|found|"
+        rf"right|just))*(?= (?:near|next|beside|by|close|in|inside|on|at|under|behind|in front|opposite|against|to the|where)\b)",
+        "",
+    ),
+    (
+        r"(?<=\w) (?:located|situated|standing|placed)(?= (?:near|next to|beside|by|close to|in|inside|on|at|under|against|behind)\b)",
+        "",
+    ),
+    (r"\b(?:that|which) (?:has|have|contains?|holds?)\b", "with"),
+    (r"\b(with (?:the|an?) [\w ]+?) on (?:it|top of it|top)\b", r"\1"),
+    (
+        r"\b(?:in|inside|around|of|somewhere in) (?:the|this|our) (?:environment|scene|map|surroundings|vicinity|building|apartment|flat|"
+        r"world|place)\b|\bin (?:here|there)\b|\baround here\b",
+        "",
+    ),
+]
+
+_SEQUENCE = (
+    r"(?:and |but )?(?:then|after (?:that|this|which)|afterwards?|subsequently|thereafter|thereupon|following (?:that|this)|"
+    r"(?<!the )(?<!very )(?<!your )next(?! to\b| (?:room|door|goal|stop|destination|target|\d|\w+ (?:metres|meters|steps)))|finally|lastly|at last|last of all|to finish(?: off)?|"
+    r"in the end|at the end(?! of)|secondly|thirdly|fourthly|in the first place|firstly|first of all|first off|to (?:begin|start) with|"
+    r"followed by|later(?: on)?|from there|at that point|as (?:a|the) (?:first|second|third|next|last|final) step|"
+    r"(?:once|when|whenever|as soon as|after) (?:(?:you|it|the robot) (?:(?:are|is|'re|get|arrive|have arrived|have|'ve) ?)*(?:there|done|"
+    r"finished|arrived|arrive|that|done (?:that|so|this)|completed (?:that|this|it)|here)|there|done|finished|that(?: is|'s) (?:done|finished|over)|arriving)"
+    r"(?: there| with that)?|(?:up)?on (?:your )?arrival|having done (?:that|so|this)|that done|whereupon|thence|and after|and last|"
+    r"and lastly|eventually|ultimately|at the very end)"
+)
+_REACH = (
+    r"(?:(?:you|it|the robot)\b ?)?(?:(?:have|has|'ve|are|is|'re|having) ?)?(?:reach(?:ed|ing|es)?|get(?:s|ting)? (?:to|near)|got(?:ten)? "
+    r"(?:to|near)|arriv(?:e|es|ed|ing) (?:at|in|to|by|near)|come to|been to|visited|visiting|made it to|standing (?:at|in|by|near|next to)|"
+    r"(?:are|is|'re) (?:at|in|inside|near|next to|beside|by|close to)|at|in front of|inside|in|by|near|next to|beside|done with|"
+    r"finished with|through with)"
+)
+_UNTIL = r"(?:until|till|'til|til)"
+
+_ABOUT_ORDER = [
+    (
+        r"\bback and forth\b|\bto and fro\b|\bforth and back\b|\bbackwards? and forwards?\b|\bforwards? and backwards?\b",
+        "⟦shuttle⟧",
+    ),
+    (r"(?:destination|goal|target):", "go to "),
+    (r":", ","),
+    (rf"(?<=\w) \d+[.)]\s+(?=(?:{words.MOVE}|{words.TURN}|{words.FACE})\b)", "; "),
+    (rf"(^|[,;.])\s*({words.COUNT})\s*,\s*", r"\1 \2 "),
+    (r"(?<!\d)[.!?]+(?=\s|$)|[!?]+|(?<=\d)\.(?=\s|$)", ";"),
+    (r"(?<!the )(?<!your )(?<!very )(?<!our )\bfirst\b,?(?! (?:goal|stop|destination|target|room|door|floor))", " "),
+    (rf"(?:^|[,;]|\band\b|\bor\b)?\s*\b{_SEQUENCE}\b\s*,?", " ; "),
+    (rf"\b(?:{words.MOVE})(?: (?:straight|forwards?|ahead|on|along))* {_UNTIL} {_REACH}\b", "go to"),
+    (rf"\b(?:stop|halt|stand still|pause)(?: moving| there| only)? (?:when|once|as soon as) {_REACH}\b", "go to"),
+    (
+        rf"(?:(?<=;)|^|,|\band\b)\s*(?:once|when|whenever|as soon as|after|upon|on|having|now that) (?:(?:you|it|the robot)(?: are| is|'re) (?=between|in "
+        rf"between|to the|left|right|behind|half))",
+        " ; ⟦arrival⟧ go ",
+    ),
+    (
+        rf"(?:(?<=;)|^|,|\band\b)\s*(?:once|when|whenever|as soon as|upon|having|now that) {_REACH}\b",
+        " ; ⟦arrival⟧ go to",
+    ),
+    (rf"(?:(?<=;)|^)\s*(?:after|on) {_REACH}\b", " ; ⟦arrival⟧ go to"),
+    (rf"(?:(?<=;)|^)\s*after (?:you(?:'ve| have)? |having )?", " ; "),
+    (rf"(?:(?<=;)|^)\s*before (?:you |then |finally )?", " ; ⟦before⟧ "),
+    (
+        rf"(?<!metres)(?<!meters)(?<!metre)(?<!meter)(?<!steps)(?<!feet)(?<!\dm)(?<! m)(?<!cm)(?:,\s*| )\bbefore (?:you |then |finally )?(?=\w)",
+        " ; ",
+    ),
+    (rf",?\s*\b(?:but )?(?:only )?after (?:{_REACH}\b|you(?:'ve| have)? |having )?", " ; ⟦after⟧ "),
+]
+
+_BEGINS_ACTION = (
+    rf"(?:{words.RETURN}|{words.FACE}|{words.TURN}|{words.MOVE}|{words.BACK_UP}|(?:make|take|do|perform|hang) (?:an?|one|two|three|\d+)\b|"
+    rf"circle|orbit|patrol|monitor|inspect|observe|examine|repeat|do (?:that|this|it|so)|back(?= (?:to|again)\b|\s*(?:[,;]|$))|"
+    rf"reverse|to (?={_BEGINS_THING}|where\b|the\b|your start|start)|between|in between|in the middle|half-?way|(?:to|on|at) (?:the|its|your) "
+    rf"(?:left|right|north|south|east|west)|with (?={_BEGINS_THING})(?=[^;]*\b(?:on|to|at) (?:your|its|the) (?:left|right)|[^;]*(?:behind|front of) "
+    rf"(?:you|yourself))|(?:so|such) that|keep(?:ing)?|have (?=.* (?:on|to) your)|put(?:ting)? (?=.* (?:on|to) your)|so (?:you|the)|"
+    rf"(?:making|make) sure|ensuring|(?:{words.MANIPULATE})(?= (?:{_DETERMINER}|up|it|me)\b)|{words.NEGATIONS}|(?:{words.ALL_COUNTS}))"
+)
+
+_ABOUT_ACTIONS = [
+    (
+        rf"\b(?:{words.TURN}|move|stand|position yourself|orient yourself)(?: (?:left|right|around|round))? (?:{_UNTIL}|so that|such that|so|to have|"
+        rf"in such a way that) (?:(?:you|it|the robot) )?(?:(?:are|is|'re|can) )?(?:directly )?(?:face|facing|see|looking (?:at|to|towards?)|look at|"
+        rf"have (?=[^;]* (?:ahead|in front)))\b",
+        "; face",
+    ),
+    (
+        rf"\b(?:so that|such that|so|in order to|so as to|in such a way that) (?:(?:you|it|the robot|your \w+)(?: are|'re| is)? )?(?:directly )?"
+        rf"(?:face|faces|facing|see|look(?:ing)? at|looking (?:to|towards?))\b",
+        "; face",
+    ),
+    (
+        rf"\b(?:{words.TURN}|move|stand|position yourself|stop|park)(?: (?:left|right|around|round))? (?:{_UNTIL}|so that|such that|so|in such a way that)\b",
+        "; so that",
+    ),
+    (rf"\b(?:turn|move|rotate) to have\b", "; have"),
+    (
+        r"(?<!^)(?<!; )\b(?:so that|such that|in such a way that|so)(?= (?:the|an?|it|you have|my|your|this)\b)",
+        "; so that",
+    ),
+    (
+        rf",? (?=with (?={_BEGINS_THING})[^;,]*?\b(?:(?:on|to|at) (?:your|its|the) (?:left|right)|behind (?:you|yourself)|in front of (?:you|yourself)))",
+        " ; ",
+    ),
+    (
+        rf",? (?=(?:keeping|having|leaving) (?={_BEGINS_THING})[^;,]*?\b(?:(?:on|to|at) (?:your|its|the) (?:left|right)|behind (?:you|yourself)))",
+        " ; ",
+    ),
+    (r",? (?<!; )(?<!be )(?<!to )(?=(?:facing|looking (?:at|towards?|to|north|south|east|west))\b)", " ; "),
+    (rf",? (?=with your back (?:to|towards|against))", " ; "),
+    (rf",?\s*\band (?:now |also |please )?(?={_BEGINS_ACTION}(?:\b|$))", " ; "),
+    (rf",\s*(?={_BEGINS_ACTION}(?:\b|$))", " ; "),
+    (
+        r"\b(?:go|come|drive|walk|move|head|run)(?: over)?(?: (?:to|and))? (?=(?:see|look at|look for|visit|check|find|inspect|have a look at|take a look "
+        r"at|stand|stop|wait|park)\b)",
+        "",
+    ),
+    (r"(?:(?<=;)|^)\s*(?:see|look for) ", " find "),
+]
+
+# "and in the kitchen" goes on telling where the thing is.
+_ABOUT_ENDS = [
+    (r",?\s*\band (?=(?:near|next to|beside|by|close to|at|around|alongside|in|inside|within|where)\b)", " "),
+    (r"(?:(?<=;)|^)\s*(?:and|but|or|so|also|again)\b,?(?! )", " "),
+    (r"(?:(?<=;)|^)\s*(?:and|but)\s+", " "),
+    (r"\s+(?:and|,)+\s*(?=;|$)", " "),
+    (r"\s+(?:then|too|as well|though|instead of that|once more please|again(?= ?[;,]))\s*(?=;|$)", " "),
+]
+
+
+@cache
+def _all() -> tuple[tuple[re.Pattern[str], str], ...]:
+    fillers = [(filler, " ") for filler in words.FILLERS]
+    tidy = [(r"\s+", " "), (r"\s+(?=[,;])", "")]
+    listed = [*_ABOUT_FILES, *_ABOUT_PLACES, *fillers, *tidy, *_ABOUT_ORDER, *fillers, *_ABOUT_ACTIONS, *_ABOUT_ENDS, *tidy]
+    return tuple((re.compile(pattern, re.IGNORECASE), instead) for pattern, instead in listed)
+
+
+def rewritten(text: str) -> str:
+    """Return a command in fewer words, `;` between its clauses."""
+    text = _without_ahead(text)
+    for pattern, instead in _all():
+        text = pattern.sub(instead, text)
+    return text
+
+
+def _without_ahead(text: str) -> str:
+    """Return a text with a mark for "the table in front of you", which is not "with the table in front of you"."""
+    wanted = r"\b(?:with|keep(?:ing)?|have|having|so|such|until|till)\b[^,.;!?]*?"
+    ahead = r"(?:(?:that|which) is )?(?:directly |right )?(?:in front|ahead) of (?:you|the robot|yourself)\b"
+    return re.sub(rf"({wanted}{ahead})|{ahead}", lambda found: found[1] or "⟦ahead⟧", text, flags=re.IGNORECASE)
