@@ -1,6 +1,7 @@
 """Which things a program's words, heatmaps and places mean, asked of a map."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -33,6 +34,8 @@ class Seeker:
         self.readable = readable
         self.notes: list[str] = []
         self._tell = tell
+        self._handed_out: dict[Place, Thing] = {}
+        self._last_told = ""
 
     def heat(self, skill: str, obj: object, sound: object, img: object, area: object, *, primary: bool) -> Heatmap:
         """Return the heatmap of the one thing that is given.
@@ -117,7 +120,8 @@ class Seeker:
         """Return the things that a target may mean, best first, and whether it says itself which one."""
         if isinstance(target, Place):
             level = self.asked.space.level(np.array([target.x, target.y, target.z]))
-            return [Thing("", Outline.at(level[:2]), level)], True
+            known = self._handed_out.get(target, Thing("", Outline.at(level[:2]), level))
+            return [replace(known, outline=Outline.at(level[:2]))], True
         heat = self.asked.object(target, primary=True) if isinstance(target, str) else target
         if not isinstance(heat, Heatmap):
             raise ProgramError(f"A skill takes a phrase, a place or a heatmap to go to, not {kind_of(target)}.")
@@ -127,6 +131,18 @@ class Seeker:
         if not heat.found:
             self.note(f"the map is not sure of {things[0].name}; this is its best guess, {things[0].sure:.2f} sure")
         return things, tells_one(heat)
+
+    def place_of(self, target: Target) -> Place:
+        """Return the place of the best thing that a target may mean; told where to go, a robot knows it again.
+
+        Raises:
+            GoalNotFoundError: there is none.
+        """
+        thing = self.best(target)
+        x, y, z = (float(value) for value in self.asked.space.world(thing.place))
+        place = Place(x, y, z)
+        self._handed_out[place] = thing
+        return place
 
     def note(self, note: str) -> None:
         """Keep a note, once, and tell it."""
@@ -138,7 +154,9 @@ class Seeker:
         self.note(heat.factors[0].note)
 
     def _chosen(self, thing: Thing, of: int) -> Thing:
-        if thing.name:
-            place = ", ".join(f"{value:.2f}" for value in self.asked.space.world(thing.place))
-            self._tell(f"{thing.name}: at ({place}) m, {thing.sure:.2f} sure" + (f", one of {of}" if of > 1 else ""))
+        place = ", ".join(f"{value:.2f}" for value in self.asked.space.world(thing.place))
+        line = f"{thing.name}: at ({place}) m, {thing.sure:.2f} sure"
+        if thing.name and not self._last_told.startswith(line):
+            self._last_told = line + (f", one of {of}" if of > 1 else "")
+            self._tell(self._last_told)
         return thing

@@ -121,11 +121,11 @@ class Robot:
         """Return the best place of a heatmap, or of several multiplied with each other."""
         if not isinstance(heat, Heatmap):
             raise ProgramError(f"get_max_pos_3d takes a heatmap, such as get_major_map returns, not {kind_of(heat)}.")
-        return self._place(self.seeker.best(heat).place)
+        return self.seeker.place_of(heat)
 
     def get_pos(self, target: Target) -> Place:
         """Return the place of the best goal for a phrase or a heatmap."""
-        return self._place(self.seeker.best(target).place)
+        return self.seeker.place_of(target)
 
     def get_contour(self, target: Target) -> list[Place]:
         """Return the outline on the ground of the best instance of an object, counter-clockwise."""

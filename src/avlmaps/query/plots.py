@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from avlmaps.maps.stored import StoredMap
 
 _PAPER = "#f6f5f1"
-_INK = "#26292e"
+INK = "#26292e"
 _PATH = "#2f6fb0"
 _SOUND = "#0b7a75"
 _COLOURMAP = "inferno"
@@ -39,27 +39,27 @@ def plot_heat(heat: Heatmap, path: Path, goals: Sequence[Goal]) -> Path:
     Raises:
         QueryError: the picture cannot be written there.
     """
-    return _save(draw_heat(heat, goals), path)
+    return save(draw_heat(heat, goals), path)
 
 
 def draw_heat(heat: Heatmap, goals: Sequence[Goal]) -> "Figure":
     """Draw a heatmap as ``plot_heat`` does, for a notebook."""
     view = TopDown.of(heat.space)
-    panels = len(heat.factors) + (len(heat.factors) > 1)
-    figure, axes = _panels(view, panels)
+    count = len(heat.factors) + (len(heat.factors) > 1)
+    figure, axes = panels(view, count)
     for factor, ax in zip(heat.factors, axes, strict=False):
-        _draw_ground(ax, view, heat.space)
+        draw_ground(ax, view, heat.space)
         _draw_heat(ax, view, factor.values)
         _draw_anchors(ax, factor)
         note = "" if factor.found else " · not found"
-        ax.set_title(f"{_asked(factor)} ({factor.part.role}){note}", fontsize=10, color=_INK, loc="left")
-    if panels > 1:
-        _draw_ground(axes[-1], view, heat.space)
+        ax.set_title(f"{_asked(factor)} ({factor.part.role}){note}", fontsize=10, color=INK, loc="left")
+    if count > 1:
+        draw_ground(axes[-1], view, heat.space)
         _draw_heat(axes[-1], view, heat.values)
         title = f"all together · peak {heat.peak:.2f}" + ("" if heat.found else " · not found")
-        axes[-1].set_title(title, fontsize=10, color=_INK, loc="left", fontweight="bold")
+        axes[-1].set_title(title, fontsize=10, color=INK, loc="left", fontweight="bold")
     _draw_goals(axes[-1], heat.space, goals)
-    _finish(figure, axes, with_heat=True)
+    finish(figure, axes, with_heat=True)
     return figure
 
 
@@ -71,22 +71,22 @@ def plot_map(stored: "StoredMap", path: Path | str) -> Path:
     """
     space = Space(stored.grid, stored.voxels.index, stored.up_in_world, stored)
     view = TopDown.of(space)
-    figure, axes = _panels(view, 1)
-    _draw_ground(axes[0], view, space)
+    figure, axes = panels(view, 1)
+    draw_ground(axes[0], view, space)
     sounds = stored.sounds
     for k in range(len(sounds)):
         track = space.level(sounds.track[sounds.track_offsets[k] : sounds.track_offsets[k + 1]])
         axes[0].plot(*track[:, :2].T, color=_SOUND, linewidth=5, alpha=0.45, solid_capstyle="round")
-        _mark(axes[0], track.mean(axis=0), f"{sounds.onset_s[k]:.0f} s", _SOUND)
+        mark(axes[0], track.mean(axis=0), f"{sounds.onset_s[k]:.0f} s", _SOUND)
     if len(sounds):
         axes[0].plot([], [], color=_SOUND, linewidth=5, alpha=0.45, label="where a sound was heard, and when")
     title = f"{Path(stored.path).name}: {len(space):,} voxels, {len(sounds)} sounds"
-    axes[0].set_title(title, fontsize=10, color=_INK, loc="left", fontweight="bold")
-    _finish(figure, axes, with_heat=False)
-    return _save(figure, Path(path))
+    axes[0].set_title(title, fontsize=10, color=INK, loc="left", fontweight="bold")
+    finish(figure, axes, with_heat=False)
+    return save(figure, Path(path))
 
 
-def _panels(view: TopDown, count: int) -> "tuple[Figure, list[Axes]]":
+def panels(view: TopDown, count: int) -> "tuple[Figure, list[Axes]]":
     """Return a figure with panels side by side, as large as the map's shape asks for."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -105,20 +105,20 @@ def _panels(view: TopDown, count: int) -> "tuple[Figure, list[Axes]]":
     return figure, list(axes[:count])
 
 
-def _draw_ground(ax: "Axes", view: TopDown, space: Space) -> None:
-    """Draw the map's colours, a little washed out so that heat stands out, and the path walked."""
+def draw_ground(ax: "Axes", view: TopDown, space: Space, with_walk: bool = True) -> None:
+    """Draw the map's colours, a little washed out so that what lies over them stands out, and the path walked."""
     ground = np.where(view.seen[..., None], 0.72 * view.rgb / 255.0 + 0.28, _rgb(_PAPER))
     ax.imshow(ground, origin="lower", extent=view.extent, interpolation="nearest")
     ax.set_aspect("equal")
     ax.set_facecolor(_PAPER)
     ax.autoscale(False)
-    ax.set_xlabel("x (m)", fontsize=8, color=_INK)
-    ax.set_ylabel("y (m)", fontsize=8, color=_INK)
-    ax.tick_params(labelsize=7, colors=_INK, length=2)
+    ax.set_xlabel("x (m)", fontsize=8, color=INK)
+    ax.set_ylabel("y (m)", fontsize=8, color=INK)
+    ax.tick_params(labelsize=7, colors=INK, length=2)
     for spine in ax.spines.values():
         spine.set_color("#c9c7c0")
     walk = walked(space)
-    if len(walk) > 1:
+    if with_walk and len(walk) > 1:
         ax.plot(*walk[:, :2].T, color="white", linewidth=2.6, alpha=0.8)
         ax.plot(*walk[:, :2].T, color=_PATH, linewidth=1.2, label="path of the camera")
 
@@ -153,11 +153,12 @@ def _draw_goals(ax: "Axes", space: Space, goals: Sequence[Goal]) -> None:
     """Number the goals, and write their scores into the legend."""
     for number, goal in enumerate(goals, 1):
         x, y, z = space.level(np.array(goal.position))
-        _mark(ax, np.array([x, y, z]), str(number), _INK)
+        mark(ax, np.array([x, y, z]), str(number), INK)
         ax.plot([], [], " ", label=f"{number}: score {goal.score:.2f}, z = {z:.2f} m")
 
 
-def _mark(ax: "Axes", point_level: Float[np.ndarray, "3"], text: str, colour: str) -> None:
+def mark(ax: "Axes", point_level: Float[np.ndarray, "3"], text: str, colour: str) -> None:
+    """Write a short text in a bubble beside a place."""
     box = {"boxstyle": "circle,pad=0.25" if len(text) < 3 else "round,pad=0.25", "facecolor": colour}
     ax.annotate(
         text,
@@ -176,7 +177,7 @@ def _mark(ax: "Axes", point_level: Float[np.ndarray, "3"], text: str, colour: st
     ax.plot(*point_level[:2], marker="o", markersize=5, color=colour, markeredgecolor="white", zorder=7)
 
 
-def _finish(figure: "Figure", axes: "Sequence[Axes]", with_heat: bool) -> None:
+def finish(figure: "Figure", axes: "Sequence[Axes]", with_heat: bool) -> None:
     """Add the legends and the scale of heat."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -185,13 +186,13 @@ def _finish(figure: "Figure", axes: "Sequence[Axes]", with_heat: bool) -> None:
     for ax in axes:
         if ax.get_legend_handles_labels()[1]:
             ax.legend(
-                fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.11), ncols=2, frameon=False, labelcolor=_INK
+                fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.11), ncols=2, frameon=False, labelcolor=INK
             )
     if with_heat:
         shown = ListedColormap(colormaps[_COLOURMAP](0.15 + 0.8 * np.linspace(0.0, 1.0, 256)))
         bar = figure.colorbar(ScalarMappable(cmap=shown), ax=list(axes), shrink=0.7, pad=0.015, fraction=0.04)
-        bar.set_label("heat", fontsize=8, color=_INK)
-        bar.ax.tick_params(labelsize=7, colors=_INK)
+        bar.set_label("heat", fontsize=8, color=INK)
+        bar.ax.tick_params(labelsize=7, colors=INK)
         bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
 
 
@@ -206,7 +207,12 @@ def _rgb(colour: str) -> Float[np.ndarray, "3"]:
     return np.array(to_rgb(colour))
 
 
-def _save(figure: "Figure", path: Path) -> Path:
+def save(figure: "Figure", path: Path) -> Path:
+    """Write a picture, of the kind that its suffix tells.
+
+    Raises:
+        QueryError: the picture cannot be written there.
+    """
     if path.suffix.lower().lstrip(".") not in figure.canvas.get_supported_filetypes():
         raise QueryError(f"A picture cannot be written as {path.name!r}; give it the suffix .png, .jpg, .svg or .pdf.")
     try:

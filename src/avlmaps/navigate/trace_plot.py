@@ -1,0 +1,109 @@
+"""The way that a robot drove, over the map seen from above: obstacles faint, start, goals, stops, what it met."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.motion import GroundPose
+from avlmaps.navigate.moves import Move
+from avlmaps.query.level import Space
+from avlmaps.query.plots import INK, draw_ground, finish, mark, panels, save
+from avlmaps.query.topdown import TopDown
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from avlmaps.maps.obstacles import Obstacles
+
+_WAY = "#d6336c"
+_GOAL = "#1f7a4d"
+_MET = "#c92a2a"
+_OBSTACLE_RGBA = (0.15, 0.16, 0.18, 0.30)
+_LONGEST_NAME = 60
+
+
+def plot_way(
+    path: Path,
+    space: Space,
+    start: GroundPose,
+    moves: Sequence[Move],
+    obstacles: "Obstacles | None" = None,
+    met: Float[np.ndarray, "m 2"] | None = None,
+    title: str = "",
+) -> Path:
+    """Write a picture of a robot's way; see ``draw_way``.
+
+    Raises:
+        QueryError: the picture cannot be written there.
+    """
+    return save(draw_way(space, start, moves, obstacles, met, title), path)
+
+
+def draw_way(
+    space: Space,
+    start: GroundPose,
+    moves: Sequence[Move],
+    obstacles: "Obstacles | None" = None,
+    met: Float[np.ndarray, "m 2"] | None = None,
+    title: str = "",
+) -> "Figure":
+    """Draw a robot's way, for a notebook.
+
+    Args:
+        space: the map's voxels, with its colours.
+        start: where the robot stood at first.
+        moves: what it did; those to a place are numbered.
+        obstacles: what the map knows to stand in the way.
+        met: (m, 2) places where it met something that the map did not know, level x and y.
+        title: such as the command.
+    """
+    view = TopDown.of(space)
+    figure, (ax,) = panels(view, 1)
+    draw_ground(ax, view, space, with_walk=False)
+    if obstacles is not None:
+        _draw_obstacles(ax, obstacles)
+    for move in moves:
+        ax.plot(*move.path.T, color="white", linewidth=3.2, alpha=0.9, zorder=4)
+        ax.plot(*move.path.T, color=_WAY, linewidth=1.8, zorder=5)
+    _draw_pose(ax, start, "start")
+    if met is not None and len(met):
+        ax.plot(*met.T, linestyle="none", marker="x", markersize=5, color=_MET, zorder=6, label="met on the way")
+    for number, move in enumerate((one for one in moves if one.goal is not None), 1):
+        _draw_subgoal(ax, space, number, move)
+    ax.set_title(title, fontsize=10, color=INK, loc="left", fontweight="bold", wrap=True)
+    finish(figure, [ax], with_heat=False)
+    return figure
+
+
+def _draw_obstacles(ax: "Axes", obstacles: "Obstacles") -> None:
+    from avlmaps.maps.obstacles import CellState
+
+    layer = np.zeros((*obstacles.states.T.shape, 4))
+    layer[obstacles.states.T == CellState.OCCUPIED] = _OBSTACLE_RGBA
+    low = obstacles.origin_m
+    high = low + np.array(obstacles.states.shape) * obstacles.cell_size_m
+    ax.imshow(layer, origin="lower", extent=(low[0], high[0], low[1], high[1]), interpolation="nearest", zorder=2)
+
+
+def _draw_pose(ax: "Axes", pose: GroundPose, name: str) -> None:
+    turn_deg = float(np.rad2deg(pose.heading_rad)) - 90.0
+    ax.plot(
+        pose.x_m, pose.y_m, linestyle="none", marker=(3, 0, turn_deg), markersize=11, color=_WAY,
+        markeredgecolor="white", zorder=8, label=name,
+    )  # fmt: skip
+
+
+def _draw_subgoal(ax: "Axes", space: Space, number: int, move: Move) -> None:
+    """Ring the goal, dot the stop, and join them where they are apart."""
+    goal, stop = space.level(np.array(move.goal)), space.level(np.array(move.stop))
+    ax.plot(*np.stack([goal, stop])[:, :2].T, color=_GOAL, linewidth=1.2, linestyle=":", zorder=6)
+    ax.plot(*goal[:2], linestyle="none", marker="o", markersize=11, markerfacecolor="none", markeredgecolor=_GOAL,
+            markeredgewidth=2.0, zorder=7)  # fmt: skip
+    mark(ax, stop, str(number), _GOAL if move.reached else _MET)
+    name = (move.name or move.skill.replace("_", " "))[:_LONGEST_NAME]
+    reached = f"{move.distance_m:.2f} m from it" if move.reached else "not reached"
+    ax.plot([], [], " ", label=f"{number}: {name}, {reached}")

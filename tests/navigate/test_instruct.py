@@ -1,0 +1,139 @@
+"""A sentence becomes a program, the program a way; what goes wrong is told, repaired where it can be, never hidden."""
+
+import json
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from avlmaps.core.errors import LanguageError
+from avlmaps.core.motion import GroundPose
+from avlmaps.language.program import Budget
+from avlmaps.language.rules import RulesTranslator
+from avlmaps.language.translator import Translation
+from avlmaps.navigate.instruct import Outcome, instruct
+from avlmaps.navigate.trace_plot import draw_way, plot_way
+from avlmaps.query.avlmap import AVLMap
+from helpers.kinematic import KinematicDriver
+from query.query_fakes import furnished_map, sounds_of
+
+
+class Scripted:
+    """A translator that gives the next of its programs each time, and keeps what it was told of the last."""
+
+    name = "scripted"
+
+    def __init__(self, *programs: str) -> None:
+        self.programs = list(programs)
+        self.errors: list[str] = []
+        self.done: list[list[str]] = []
+
+    def program_for(self, command: str) -> Translation:
+        return Translation(self.programs.pop(0), ("taken as it stands",))
+
+    def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:
+        self.errors.append(error)
+        self.done.append(list(done))
+        if not self.programs:
+            raise LanguageError("The model has nothing more to say; ask another.")
+        return Translation(self.programs.pop(0))
+
+
+def told(command: str, translator=None, driver: KinematicDriver | None = None, **more) -> tuple[Outcome, list[str]]:
+    track = np.stack([np.linspace(5.0, 5.2, 5), np.full(5, 3.1), np.full(5, 1.2)], axis=1)
+    asked = AVLMap(furnished_map(sounds=sounds_of([track], [0.9])))
+    lines: list[str] = []
+    driver = driver or KinematicDriver(GroundPose(3.0, 2.0))
+    return instruct(command, asked, driver, translator or RulesTranslator(), tell=lines.append, **more), lines
+
+
+def test_a_sentence_is_obeyed_and_told_as_it_goes() -> None:
+    outcome, lines = told("go to the chair near the sound of the dog, then turn left")
+    assert outcome.ok
+    assert outcome.error is None
+    (subgoal,) = outcome.subgoals
+    assert subgoal.goal[:2] == pytest.approx((5.1, 3.1), abs=0.15)
+    assert subgoal.name == "'chair' near 'dog'"
+    assert lines[0].startswith("> ")
+    assert any("'chair' near 'dog': at (5.1" in line for line in lines)
+    assert "turn(angle_deg=-90)" in lines[-1]
+
+
+def test_the_outcome_is_the_contract_of_the_command_line() -> None:
+    outcome, _ = told("go to the table, then face the chair")
+    answer = json.loads(json.dumps(outcome.to_json(), allow_nan=False))
+    assert {"program", "steps", "actions", "subgoals", "ok", "error", "notes", "path_m", "elapsed_s"} == set(answer)
+    assert {"skill", "arguments", "result"} <= set(answer["steps"][0])
+    assert {"goal", "stop", "distance_m"} <= set(answer["subgoals"][0])
+    assert answer["steps"][-1]["result"]["heading_rad"] == pytest.approx(outcome.moves[-1].heading_rad, abs=1e-3)
+    assert answer["actions"][-1] in ("turn_left", "turn_right")
+    assert answer["actions"].count("stop") == 1
+    assert answer["path_m"] == pytest.approx(np.hypot(*np.subtract(outcome.subgoals[0].stop[:2], (3, 2))), abs=0.01)
+
+
+def test_what_is_not_understood_is_an_error_before_anything_moves() -> None:
+    driver = KinematicDriver(GroundPose(3.0, 2.0))
+    with pytest.raises(LanguageError):
+        told("gabble gabble the", driver=driver)
+    assert driver.told == []
+
+
+def test_what_is_not_in_the_map_ends_the_command_and_keeps_what_was_done() -> None:
+    outcome, _ = told("go to the table, then go to the chair near the sound of a rooster")
+    assert not outcome.ok
+    assert outcome.error_type == "GoalNotFoundError"
+    assert "sound 'rooster'" in str(outcome.error)
+    assert [move.skill for move in outcome.moves] == ["move_to_object"]
+    assert outcome.done[-1].step.error is not None
+    assert outcome.to_json()["ok"] is False
+
+
+def test_a_place_that_is_not_reached_makes_the_outcome_not_ok() -> None:
+    outcome, _ = told("go to the table", driver=KinematicDriver(GroundPose(3.0, 2.0), reaches=False))
+    assert not outcome.ok
+    assert "a wall is in the way" in str(outcome.error)
+    assert outcome.subgoals[0].reached is False
+
+
+def test_a_program_that_fails_is_repaired_and_told_what_was_done() -> None:
+    translator = Scripted('robot.turn(90)\nrobot.move_to("piano")', "import os", 'robot.move_to_object("chair")')
+    outcome, lines = told("play the piano", translator)
+    assert outcome.ok
+    assert len(outcome.programs) == 3
+    assert outcome.programs[-1] in outcome.program
+    assert "'piano'" in translator.errors[0]
+    assert "import" in translator.errors[1]
+    assert translator.done == [["turn(angle_deg=90)"], ["turn(angle_deg=90)"]]
+    assert [move.skill for move in outcome.moves] == ["turn", "move_to_object"]
+    assert outcome.notes[0] == "taken as it stands"
+    assert any(line.startswith("failed: ") for line in lines)
+
+
+def test_a_translator_that_gives_up_leaves_the_error_of_the_program() -> None:
+    outcome, _ = told("play the piano", Scripted('robot.move_to("piano")'))
+    assert "'piano'" in str(outcome.error)
+    assert any("nothing more to say" in note for note in outcome.notes)
+
+
+def test_repairing_ends() -> None:
+    outcome, _ = told("x", Scripted(*["robot.move_to('piano')"] * 50))
+    assert not outcome.ok
+    assert len(outcome.programs) < 10
+
+
+def test_a_budget_holds_for_the_robot_too() -> None:
+    outcome, _ = told("spin", Scripted("for i in range(1000):\n    robot.turn(10)"), budget=Budget(skill_calls=5))
+    assert outcome.error_type == "ProgramError"
+    assert len(outcome.moves) <= 5
+
+
+def test_the_way_is_drawn_with_start_goals_and_stops(tmp_path) -> None:
+    outcome, _ = told("go to the table, then go to the chair")
+    asked = AVLMap(furnished_map())
+    figure = draw_way(asked.space, GroundPose(3.0, 2.0), outcome.moves, met=np.array([[1.0, 1.0]]), title="there")
+    labels = figure.axes[0].get_legend_handles_labels()[1]
+    assert labels[0] == "start"
+    assert any(label.startswith("2: 'chair'") for label in labels)
+    lines = [line.get_xydata() for line in figure.axes[0].get_lines()]
+    assert any(len(line) and np.allclose(np.asarray(line)[-1], outcome.subgoals[0].stop[:2]) for line in lines)
+    assert plot_way(tmp_path / "way.png", asked.space, GroundPose(3.0, 2.0), outcome.moves).stat().st_size > 5000
