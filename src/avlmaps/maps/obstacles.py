@@ -17,6 +17,7 @@ from avlmaps.maps.types import Voxels
 
 STRONG_PEAK = 0.3  # of what the most crowded height has over the median: the lowest one with so much is the floor
 MOST_CELLS = 100_000_000
+SIGHT_M = (1.2, 1.7)  # heights over the floor of a robot's and of a person's eyes: what stands there blocks the view
 
 
 class CellState(IntEnum):
@@ -39,8 +40,15 @@ class Body:
     """What is lower than this is floor to it: it can drive over, and depth is no more exact."""
     min_hits: int = 3
     """Voxels with fewer pixels count for nothing: a depth camera's lone speckles."""
+    flies_m: float | None = None
+    """How high its lowest part flies over the floor; None for a body that stands on it."""
 
     def __post_init__(self) -> None:
+        if self.flies_m is not None and not 0.0 <= self.flies_m < self.height_m:
+            raise MapError(
+                f"A body that flies {self.flies_m} m over the floor and reaches up to {self.height_m} m is none; "
+                "height_m is the height of its top over the floor."
+            )
         if not (self.radius_m >= 0.0 and 0.0 < self.step_m < self.height_m):
             raise MapError(
                 f"A body of radius {self.radius_m} m that steps over {self.step_m} m and is {self.height_m} m high is "
@@ -58,6 +66,8 @@ class Obstacles:
         cell_size_m: edge of a cell.
         floor_m: level z of the floor.
         states: `CellState` of each cell.
+        tall: where something stands at the height of eyes (`SIGHT_M`), so that nobody looks over it; None where
+            that is not known.
     """
 
     level_from_world: Float64[np.ndarray, "3 3"]
@@ -65,6 +75,7 @@ class Obstacles:
     cell_size_m: float
     floor_m: float
     states: UInt8[np.ndarray, "nx ny"]
+    tall: Bool[np.ndarray, "nx ny"] | None = None
 
     def cell_of(self, points_world: Float[np.ndarray, "*n 3"]) -> Int[np.ndarray, "*n 2"]:
         """Return the cell above or below which each point of the world lies; it may be outside of the grid."""
@@ -105,11 +116,13 @@ def find_obstacles(
     up_in_world: Float[np.ndarray, "3"],
     body: Body | None = None,
     cell_size_m: float | None = None,
+    ignored: Bool[np.ndarray, " n"] | None = None,
 ) -> Obstacles:
     """Draw the grid of a map.
 
     A cell is occupied where a voxel stands between the body's step and its height over the floor, free where the
-    floor was seen and nothing stands, and unknown elsewhere.
+    floor was seen and nothing stands, and unknown elsewhere. For a body that flies, what it flies over is as good as
+    a floor, and only what reaches into its height stands in the way.
 
     Args:
         voxels: the map's.
@@ -117,6 +130,7 @@ def find_obstacles(
         up_in_world: which way is up.
         body: of the robot that is to move there.
         cell_size_m: edge of a cell; that of a voxel by default, and not smaller (the floor would have holes).
+        ignored: voxels of what this body passes through or over; where only such stand, a cell is free.
 
     Raises:
         MapError: the map has no voxel with enough hits, or would need too large a grid.
@@ -127,7 +141,8 @@ def find_obstacles(
         raise MapError(
             f"Cells of {cell_size_m} m are smaller than the map's voxels of {grid.voxel_size_m} m; ask for larger ones."
         )
-    index = np.asarray(voxels.index)[np.asarray(voxels.hits) >= body.min_hits]
+    sure = np.asarray(voxels.hits) >= body.min_hits
+    index = np.asarray(voxels.index)[sure]
     if len(index) == 0:
         raise MapError(
             f"None of the map's {len(voxels)} voxels was hit {body.min_hits} times, so that no floor can be found; "
@@ -138,9 +153,13 @@ def find_obstacles(
     floor_m = floor_height(level[:, 2], grid.voxel_size_m)
     cell = _cells(level, level_from_world, grid.voxel_size_m, cell_size_m)
     low = cell.min(axis=(0, 1))
-    return Obstacles(
-        level_from_world, low * cell_size_m, cell_size_m, floor_m, _states(cell - low, level[:, 2] - floor_m, body)
-    )
+    height_m = level[:, 2] - floor_m
+    passed = np.zeros(len(index), bool) if ignored is None else np.asarray(ignored, bool)[sure]
+    states = _states(cell - low, height_m, body, passed)
+    tall = np.zeros(states.shape, bool)
+    at_eyes = (height_m >= SIGHT_M[0]) & (height_m <= SIGHT_M[1])
+    tall[tuple(np.moveaxis(cell[:, at_eyes] - low, -1, 0))] = True
+    return Obstacles(level_from_world, low * cell_size_m, cell_size_m, floor_m, states, tall)
 
 
 def _cells(
@@ -152,7 +171,7 @@ def _cells(
 
 
 def _states(
-    cell: Int[np.ndarray, "8 n 2"], height_m: Float[np.ndarray, " n"], body: Body
+    cell: Int[np.ndarray, "8 n 2"], height_m: Float[np.ndarray, " n"], body: Body, ignored: Bool[np.ndarray, " n"]
 ) -> UInt8[np.ndarray, "nx ny"]:
     """Return the grid's states from the cells and the height over the floor of each voxel."""
     size = cell.max(axis=(0, 1)) + 1
@@ -162,7 +181,12 @@ def _states(
         )
     states = np.full(size, CellState.UNKNOWN, np.uint8)
     floor = np.abs(height_m) < body.step_m
-    in_the_way = (height_m >= body.step_m) & (height_m <= body.height_m)
+    lowest_m = body.step_m if body.flies_m is None else body.flies_m
+    in_the_way = (height_m >= lowest_m) & (height_m <= body.height_m)
+    if body.flies_m is not None:
+        floor = (height_m > -body.step_m) & (height_m < lowest_m)
+    floor |= in_the_way & ignored
+    in_the_way &= ~ignored
     for state, these in ((CellState.FREE, floor), (CellState.OCCUPIED, in_the_way)):
         states[cell[:, these, 0], cell[:, these, 1]] = state
     return states

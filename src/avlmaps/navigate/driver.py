@@ -57,7 +57,7 @@ class Driver(Protocol):
         ...
 
     def forward(self, distance_m: float) -> Arrival:
-        """Drive straight ahead, as far as nothing is in the way; a negative distance drives straight back."""
+        """Drive straight ahead, as far as nothing is in the way; for a negative distance it turns round first."""
         ...
 
     def stop(self) -> Arrival:

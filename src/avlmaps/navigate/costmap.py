@@ -1,0 +1,181 @@
+"""What a metre costs: where a body's middle may be, how much room it has there, and what it is worth to keep away.
+
+Everything is in the level frame. A grid's cell (i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · cell_size_m``.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Float64, Int
+
+from avlmaps.core.errors import NavigationError
+from avlmaps.maps.obstacles import Body, CellState, Obstacles, find_obstacles
+from avlmaps.navigate.bodies import BASE, BodyShape
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
+
+_HALF_DIAGONAL = np.sqrt(0.5)  # of a cell: what stands in one may stand in its nearest corner
+
+
+@dataclass(frozen=True, slots=True)
+class CostSettings:
+    """What counts as a way, and what it costs."""
+
+    soft_m: float = 0.4
+    """Beyond its radius the body would like so much room; with more of it a metre costs no less."""
+    near_cost: float = 4.0
+    """What a metre costs more where the body just fits; a metre in the open costs 1."""
+    hole_m: float = 0.3
+    """Gaps in the seen floor up to so wide are crossed; no larger unknown region ever is. 0 crosses none."""
+    hole_cost: float = 2.0
+    """What a metre of such a gap costs more."""
+    unknown_room_m: float = 0.0
+    """The body's middle keeps so far from larger unknown regions: for robots that could fall down stairs."""
+
+    def __post_init__(self) -> None:
+        if not (self.soft_m > 0.0 and min(self.near_cost, self.hole_m, self.hole_cost, self.unknown_room_m) >= 0.0):
+            raise NavigationError("The settings of a cost map must not be negative, and soft_m must be over 0.")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Costmap:
+    """A floor as one body finds it.
+
+    Attributes:
+        origin_m: level x and y of the corner of cell (0, 0).
+        cell_size_m: edge of a cell.
+        radius_m: of the body.
+        passable: where its middle may be.
+        cost: what a metre costs there, at least 1.
+        room_m: distance from a cell's middle to the nearest obstacle, never overstated; inf where there is none.
+        occupied: the obstacles themselves.
+        opaque: what blocks the view over the floor.
+    """
+
+    origin_m: Float64[np.ndarray, "2"]
+    cell_size_m: float
+    radius_m: float
+    passable: Bool[np.ndarray, "nx ny"]
+    cost: Float32[np.ndarray, "nx ny"]
+    room_m: Float32[np.ndarray, "nx ny"]
+    occupied: Bool[np.ndarray, "nx ny"]
+    opaque: Bool[np.ndarray, "nx ny"]
+
+    def in_cells(self, xy: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
+        """Return places in units of cells, from the corner of cell (0, 0)."""
+        return (np.asarray(xy, np.float64) - self.origin_m) / self.cell_size_m
+
+    def cell_of(self, xy: Float[np.ndarray, "*n 2"]) -> Int[np.ndarray, "*n 2"]:
+        """Return the cell of each place, which may lie off the grid."""
+        return np.floor(self.in_cells(xy)).astype(np.int64)
+
+    def middle_of(self, cell: Int[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
+        """Return the level x and y of the middle of each cell."""
+        return self.origin_m + (np.asarray(cell) + 0.5) * self.cell_size_m
+
+    def holds(self, xy: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
+        """Tell which places lie on the grid."""
+        cell = self.cell_of(xy)
+        return np.all((cell >= 0) & (cell < self.passable.shape), axis=-1)
+
+    def is_passable(self, xy: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
+        """Tell at which places the body's middle may be; nowhere off the grid."""
+        inside = self.holds(xy)
+        i, j = np.moveaxis(np.where(inside[..., None], self.cell_of(xy), 0), -1, 0)
+        return np.asarray(inside & self.passable[i, j])
+
+
+def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE) -> Obstacles:
+    """Find what stands in a body's way in a map, by its height and by the words that count as obstacles to it.
+
+    Args:
+        avlmap: the map; asked for the words of the shape.
+        shape: of the robot that is to move there.
+
+    Raises:
+        MapError: the map holds too little to find a floor.
+        QueryError: a word of the shape means nothing to the map's encoder.
+        BackendError: the shape has words, and the map's profile has no pixel encoder.
+    """
+    stored = avlmap.stored
+    ignored = np.zeros(len(stored.voxels), bool)
+    for word in shape.ignores:
+        ignored |= _voxels_called(avlmap, word)
+    if shape.only is not None:
+        counting = np.zeros(len(stored.voxels), bool)
+        for word in shape.only:
+            counting |= _voxels_called(avlmap, word)
+        ignored |= ~counting
+    body = Body(shape.radius_m, shape.height_m, shape.step_m, flies_m=shape.flies_m)
+    return find_obstacles(stored.voxels, stored.grid, stored.up_in_world, body, ignored=ignored)
+
+
+def _voxels_called(avlmap: "AVLMap", word: str) -> Bool[np.ndarray, " n"]:
+    from avlmaps.query.goals import lead_of
+    from avlmaps.query.heatmap import NearThings
+
+    things = lead_of(avlmap.object(word))
+    return things.mask if isinstance(things, NearThings) else np.zeros(len(avlmap.space), bool)
+
+
+def costmap_of(
+    obstacles: Obstacles,
+    radius_m: float,
+    settings: CostSettings | None = None,
+    met: Bool[np.ndarray, "nx ny"] | None = None,
+) -> Costmap:
+    """Inflate obstacles for a body.
+
+    Args:
+        obstacles: what the map knows.
+        radius_m: of the body.
+        settings: what it costs to come near.
+        met: cells that the body found occupied, though the map has nothing there.
+    """
+    settings = settings or CostSettings()
+    occupied = obstacles.states == CellState.OCCUPIED
+    if met is not None:
+        occupied = occupied | met
+    free = (obstacles.states == CellState.FREE) & ~occupied
+    cell_m = obstacles.cell_size_m
+    room_m = np.maximum(_distance(occupied) - np.float32(_HALF_DIAGONAL), 0.0) * np.float32(cell_m)
+    holes = _small_holes(free | occupied, settings.hole_m / cell_m) & ~free & ~occupied
+    passable = (free | holes) & (room_m >= radius_m)
+    if settings.unknown_room_m > 0.0:
+        known = np.pad(free | holes | occupied, 1)
+        passable &= _distance(~known)[1:-1, 1:-1] * np.float32(cell_m) > settings.unknown_room_m
+    lacking = np.clip(1.0 - (room_m - np.float32(radius_m)) / np.float32(settings.soft_m), 0.0, 1.0)
+    cost = 1.0 + np.float32(settings.near_cost) * lacking * lacking
+    cost[holes] += np.float32(settings.hole_cost)
+    tall = obstacles.tall
+    return Costmap(
+        np.asarray(obstacles.origin_m, np.float64),
+        cell_m,
+        radius_m,
+        passable,
+        cost.astype(np.float32),
+        room_m,
+        occupied,
+        occupied if tall is None else tall & (obstacles.states != CellState.FREE),
+    )
+
+
+def _distance(mask: Bool[np.ndarray, "nx ny"]) -> Float32[np.ndarray, "nx ny"]:
+    """Return the distance, in cells, from each cell's middle to that of the nearest true one; inf without any."""
+    if not mask.any():
+        return np.full(mask.shape, np.inf, np.float32)
+    return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+
+
+def _small_holes(known: Bool[np.ndarray, "nx ny"], width: float) -> Bool[np.ndarray, "nx ny"]:
+    """Close gaps of up to so many cells: a cell is in one where every disc over it, so wide, meets a known cell."""
+    radius = int(width / 2.0 + 1e-6)
+    if radius < 1 or known.all():
+        return np.zeros(known.shape, bool)
+    away = np.hypot(*np.mgrid[-radius : radius + 1, -radius : radius + 1])
+    disc = (away <= radius + 0.01).astype(np.uint8)
+    around = np.pad(known.astype(np.uint8), 2 * radius)
+    return cv2.morphologyEx(around, cv2.MORPH_CLOSE, disc)[2 * radius : -2 * radius, 2 * radius : -2 * radius] > 0

@@ -1,0 +1,261 @@
+"""Ways over a cost map: SciPy's Dijkstra over cells with sixteen neighbours, pulled straight where that costs no more.
+
+A large floor is searched twice: first over blocks of cells, split into their connected parts, so that what is
+connected stays so; then over the cells along the way that was found. The second search always finds a way where the
+first did, and its cost was never above 1.1 times the least in the tests on random floors.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Float64, Int
+from scipy.sparse import csgraph, csr_array
+
+from avlmaps.navigate import grid_kernels
+from avlmaps.navigate.costmap import Costmap
+
+_EVERY = 6  # cells of a straight run of a path from which shortcuts may begin
+_WINDOW = 48  # such points that a shortcut may leap
+_AROUND = (4, 2, 1, 0)  # blocks around the coarse way that are searched, where they hold no more than so many cells
+
+
+@dataclass(frozen=True, slots=True)
+class PlanSettings:
+    """How ways are found."""
+
+    exact_cells: int = 100_000
+    """Floors with no more cells that can be passed are searched at once; larger ones coarse to fine."""
+    escape_m: float = 1.0
+    """How far a body that stands where the map lets none stand may go straight to get out."""
+    beside_m: float = 2.0
+    """How far from a place that cannot be stood on the body may stop instead."""
+    roomy_m: float = 0.03
+    """A stop beside a place may be farther from it by so much for each unit of cost that it saves."""
+    own_m: tuple[float, ...] = (0.15, 0.5)
+    """What blocks the view within so far of a place is the thing there itself; the first that lets it be seen."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Way:
+    """A way for a body's middle.
+
+    Attributes:
+        points: (n, 2) level x and y of its corners, from start to goal, metres.
+        cost: the sum over its metres of what each costs.
+        length_m: its length.
+    """
+
+    points: Float64[np.ndarray, "n 2"]
+    cost: float
+    length_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stop:
+    """Where to stop for a place.
+
+    Attributes:
+        xy: level x and y; that of the place itself where a body can stand there.
+        beside_m: how far from the place that is; 0 for the place itself.
+        seen: whether the place can be seen from there.
+    """
+
+    xy: Float64[np.ndarray, "2"]
+    beside_m: float = 0.0
+    seen: bool = True
+
+
+class Planner:
+    """Finds ways over one cost map; what several ways share is worked out once.
+
+    Attributes:
+        costmap: what it plans on.
+        settings: how.
+    """
+
+    def __init__(self, costmap: Costmap, settings: PlanSettings | None = None) -> None:
+        self.costmap = costmap
+        self.settings = settings or PlanSettings()
+
+    @cached_property
+    def _part(self) -> Int[np.ndarray, "nx ny"]:
+        """The connected part that each cell belongs to, 0 where none can pass. Corners are not cut, so four sides."""
+        return cv2.connectedComponents(self.costmap.passable.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)[1]
+
+    @cached_property
+    def _is_small(self) -> bool:
+        return int(np.count_nonzero(self.costmap.passable)) <= self.settings.exact_cells
+
+    @cached_property
+    def _cells(self) -> "_CellGraph":
+        return _CellGraph.of(self.costmap.passable, self.costmap)
+
+    @cached_property
+    def _blocks(self) -> "_BlockGraph":
+        return _BlockGraph.of(self.costmap)
+
+    def way(self, start: Float[np.ndarray, "2"], goal: Float[np.ndarray, "2"]) -> Way | None:
+        """Return the cheapest way between two places, None where there is none.
+
+        Args:
+            start: level x and y; from where no body could stand the way leads straight to the nearest place that can.
+            goal: level x and y, where the body can stand.
+        """
+        if not self.costmap.is_passable(goal):
+            return None
+        out = self.entry(start, int(self._part[tuple(self.costmap.cell_of(goal))]))
+        if out is None:
+            return None
+        first, last = self.costmap.cell_of(out), self.costmap.cell_of(goal)
+        cells = self._search(first, last)
+        corners = np.concatenate([[self.costmap.in_cells(out)], cells[1:-1] + 0.5, [self.costmap.in_cells(goal)]])
+        return self._measured(self._straightened(corners), None if out is start else start)
+
+    def entry(self, start: Float[np.ndarray, "2"], part: int | None = None) -> Float64[np.ndarray, "2"] | None:
+        """Return where a body at a place joins the cells that can be passed: at the place itself where it can.
+
+        Args:
+            start: level x and y.
+            part: only to this connected part.
+        """
+        costmap = self.costmap
+        if costmap.is_passable(start):
+            at = self._part[tuple(costmap.cell_of(start))]
+            return start if part is None or at == part else None
+        mask = costmap.passable if part is None else self._part == part
+        cells, _ = self._near(mask, start, self.settings.escape_m)
+        x, y = costmap.in_cells(start)
+        # What it stands in itself does not hold it back, as with a goal.
+        open_line = grid_kernels.seen_from(x, y, cells, costmap.occupied, costmap.radius_m / costmap.cell_size_m)
+        ways_out = cells[open_line]
+        return costmap.middle_of(ways_out[0]) if len(ways_out) else None
+
+    def stop_for(self, start: Float[np.ndarray, "2"], place: Float[np.ndarray, "2"]) -> Stop | None:
+        """Return where a body that comes from a start stops for a place, None where it comes nowhere near.
+
+        That is the place itself where the body can stand and get there, else the nearest from which the place can be
+        seen, else the nearest at all.
+        """
+        costmap = self.costmap
+        out = self.entry(start)
+        if out is None or not costmap.holds(place):
+            return None
+        part = self._part[tuple(costmap.cell_of(out))]
+        if self._part[tuple(costmap.cell_of(place))] == part:
+            return Stop(np.asarray(place, np.float64))
+        cells, distance_m = self._near(self._part == part, place, self.settings.beside_m)
+        if not len(cells):
+            return None
+        order = np.argsort(distance_m + self.settings.roomy_m * (costmap.cost[tuple(cells.T)] - 1.0), kind="stable")
+        cells, distance_m = cells[order], distance_m[order]
+        x, y = costmap.in_cells(place)
+        for own_m in self.settings.own_m:
+            seen = grid_kernels.seen_from(x, y, cells, costmap.opaque, own_m / costmap.cell_size_m)
+            if seen.any():
+                best = int(np.argmax(seen))
+                return Stop(costmap.middle_of(cells[best]), float(distance_m[best]))
+        return Stop(costmap.middle_of(cells[0]), float(distance_m[0]), seen=False)
+
+    def _near(
+        self, mask: Bool[np.ndarray, "nx ny"], xy: Float[np.ndarray, "2"], reach_m: float
+    ) -> tuple[Int[np.ndarray, "n 2"], Float64[np.ndarray, " n"]]:
+        """Return the true cells within reach of a place and their distances, nearest first."""
+        costmap = self.costmap
+        low = np.maximum(costmap.cell_of(np.asarray(xy) - reach_m), 0)
+        high = np.maximum(costmap.cell_of(np.asarray(xy) + reach_m) + 1, low)
+        cells = low + np.argwhere(mask[low[0] : high[0], low[1] : high[1]])
+        distance_m = np.linalg.norm(costmap.middle_of(cells) - xy, axis=1)
+        order = np.argsort(distance_m, kind="stable")
+        order = order[distance_m[order] <= reach_m]
+        return cells[order], distance_m[order]
+
+    def _search(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "n 2"]:
+        """Return the cells of the cheapest way between two cells of one connected part."""
+        if self._is_small:
+            return self._cells.path(first, last)
+        return _CellGraph.of(self._corridor(first, last), self.costmap).path(first, last)
+
+    def _corridor(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Bool[np.ndarray, "nx ny"]:
+        """Return the cells around the cheapest way over blocks."""
+        passable, size = self.costmap.passable, grid_kernels.BLOCK
+        blocks = self._blocks.path(first, last)
+        nx, ny = passable.shape
+        way = np.zeros((-(-nx // size), -(-ny // size)), np.uint8)
+        way[tuple(blocks.T)] = 1
+        mask = passable
+        for around in _AROUND:
+            wide = cv2.dilate(way, np.ones((2 * around + 1, 2 * around + 1), np.uint8))
+            mask = wide.astype(bool).repeat(size, 0).repeat(size, 1)[:nx, :ny] & passable
+            if np.count_nonzero(mask) <= self.settings.exact_cells:
+                break
+        return mask
+
+    def _straightened(self, corners: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
+        """Pull a path straight wherever that costs no more, clearance included; in cells."""
+        passable, cost = self.costmap.passable, self.costmap.cost
+        step = np.round(np.diff(corners, axis=0), 6)
+        turns = np.r_[True, (step[1:] != step[:-1]).any(axis=1), True] if len(step) else np.ones(len(corners), bool)
+        turns |= np.arange(len(corners)) % _EVERY == 0
+        thinned = np.ascontiguousarray(corners[turns])
+        return thinned[grid_kernels.shortcuts(thinned, passable, cost, _WINDOW)]
+
+    def _measured(self, points: Float[np.ndarray, "n 2"], before: Float[np.ndarray, "2"] | None) -> Way:
+        costmap = self.costmap
+        cost = grid_kernels.path_cost(points, costmap.passable, costmap.cost)
+        xy = costmap.origin_m + points * costmap.cell_size_m
+        if before is not None:
+            xy = np.concatenate([[before], xy])
+        length_m = float(np.linalg.norm(np.diff(xy, axis=0), axis=1).sum())
+        return Way(xy, float(cost) * costmap.cell_size_m, length_m)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _CellGraph:
+    """Cells joined with their sixteen neighbours; a step cuts no corner."""
+
+    number: Int[np.ndarray, "nx ny"]
+    cells: Int[np.ndarray, "n 2"]
+    weights: csr_array
+
+    @classmethod
+    def of(cls, mask: Bool[np.ndarray, "nx ny"], costmap: Costmap) -> "_CellGraph":
+        number, cells = grid_kernels.numbered(mask)
+        return cls(number, cells, _sparse(*grid_kernels.cell_graph(number, cells, costmap.cost)))
+
+    def path(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "k 2"]:
+        return self.cells[_path(self.weights, int(self.number[tuple(first)]), int(self.number[tuple(last)]))]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _BlockGraph:
+    """The connected parts of blocks of cells, joined where they touch."""
+
+    node: Int[np.ndarray, "nx ny"]
+    middle: Float64[np.ndarray, "parts 2"]
+    weights: csr_array
+
+    @classmethod
+    def of(cls, costmap: Costmap) -> "_BlockGraph":
+        node, middle, mean = grid_kernels.block_parts(costmap.passable, costmap.cost)
+        return cls(node, middle, _sparse(*grid_kernels.block_graph(node, middle, mean)))
+
+    def path(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "k 2"]:
+        """Return the blocks of the cheapest way."""
+        parts = _path(self.weights, int(self.node[tuple(first)]), int(self.node[tuple(last)]))
+        return (self.middle[parts] / grid_kernels.BLOCK).astype(np.int64)
+
+
+def _sparse(starts: np.ndarray, columns: np.ndarray, weights: np.ndarray) -> csr_array:
+    count = len(starts) - 1
+    return csr_array((weights, columns, starts), shape=(count, count))
+
+
+def _path(weights: csr_array, first: int, last: int) -> Int[np.ndarray, " k"]:
+    """Return the nodes of the cheapest path; there must be one."""
+    _, before = csgraph.dijkstra(weights, indices=first, return_predecessors=True)
+    nodes = [last]
+    while nodes[-1] != first:
+        nodes.append(int(before[nodes[-1]]))
+    return np.array(nodes[::-1])
