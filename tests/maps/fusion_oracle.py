@@ -75,7 +75,7 @@ def pixels_of(frame: Frame, features: np.ndarray, grid: GridSpec, settings: Fusi
     cell_column, cell_row = np.where(inside[:, None], place * cells / size, 0).astype(int).T
     return Pixels(
         grid.index_of(poses.apply(frame.world_from_camera, seen)),
-        np.maximum(np.exp(-np.sum(seen**2, axis=1) / (2 * settings.weight_variance_m2)), 1e-30),
+        np.maximum(np.exp(-np.sum(seen**2, axis=1) / (2 * settings.variance_m2)), 1e-30),
         np.full(len(seen), frame.stamp_s),
         np.where(inside[:, None], frame.rgb[row, column], np.nan),
         np.where(inside[:, None], features[cell_row, cell_column], 0.0),

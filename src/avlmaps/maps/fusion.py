@@ -78,7 +78,7 @@ class VoxelAccumulator:
         cells, (feature_rows, feature_columns) = self._cells(features)
         lookup = self._lookup_for(frame.rig, feature_rows, feature_columns)
         pose = self._pose_of(frame)
-        limits = self.settings.min_depth_m, self.settings.max_depth_m, 0.5 / self.settings.weight_variance_m2
+        limits = self.settings.min_depth_m, self.settings.max_depth_m, 0.5 / self.settings.variance_m2
         traced = kernels.trace(
             np.require(frame.depth_m, np.float32, ["C", "W"]),
             (lookup.x, lookup.y),

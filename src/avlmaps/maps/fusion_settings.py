@@ -6,6 +6,8 @@ import numpy as np
 
 from avlmaps.core.errors import MapError
 
+PAPERS_VARIANCE_M2 = 0.6
+
 
 @dataclass(frozen=True, slots=True)
 class FusionSettings:
@@ -15,8 +17,9 @@ class FusionSettings:
     """Leave out pixels that are nearer."""
     max_depth_m: float = 10.0
     """Leave out pixels that are farther."""
-    weight_variance_m2: float = 0.6
-    """The 0.6 of the weight exp(−d² / (2·0.6)), d the distance from the camera in metres."""
+    weight_variance_m2: float | None = None
+    """The 0.6 of the weight exp(−d² / (2·0.6)), d the distance from the camera in metres. None takes what the profile's
+    pixel encoder is best at: the paper's 0.6 for most."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.min_depth_m < self.max_depth_m < np.inf:
@@ -24,5 +27,10 @@ class FusionSettings:
                 f"Depths from {self.min_depth_m} to {self.max_depth_m} m are no range; "
                 "let it begin above 0 and end at a finite, greater depth."
             )
-        if not 0.0 < self.weight_variance_m2 < np.inf:
+        if not 0.0 < self.variance_m2 < np.inf:
             raise MapError(f"The weight's variance is {self.weight_variance_m2}; it must be positive and finite.")
+
+    @property
+    def variance_m2(self) -> float:
+        """The weight's variance; the paper's where none was chosen."""
+        return PAPERS_VARIANCE_M2 if self.weight_variance_m2 is None else self.weight_variance_m2

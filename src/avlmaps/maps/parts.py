@@ -130,6 +130,7 @@ def build_part(
         MapError: there are no such frames, or too many of them cannot be read.
     """
     out, used = Path(out), profile(profile_name)
+    settings = settings.for_profile(used.weight_variance_m2)
     if not 0 <= start < stop <= len(recording):
         raise MapError(f"There are no frames {start} to {stop}; {recording.path} has frames 0 to {len(recording)}.")
     key, span = fusion_key(recording, settings, used), (start, stop, settings.frames.step)

@@ -1,6 +1,6 @@
 """Everything about a build that can be chosen, nested by stage. A field's docstring is its help on the command line."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from avlmaps.core.errors import MapError
@@ -61,6 +61,12 @@ class BuildSettings:
     def __post_init__(self) -> None:
         _require(0.001 <= self.voxel_size_m <= 10.0, f"The voxel size is {self.voxel_size_m} m", "between 0.001 and 10")
         _require(self.seed >= 0, f"seed is {self.seed}", "0 or more")
+
+    def for_profile(self, weight_variance_m2: float) -> "BuildSettings":
+        """Return the settings with what was left to the profile filled in."""
+        if self.fusion.weight_variance_m2 is not None:
+            return self
+        return replace(self, fusion=replace(self.fusion, weight_variance_m2=weight_variance_m2))
 
 
 def _require(holds: bool, fault: str, wanted: str) -> None:
