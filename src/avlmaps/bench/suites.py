@@ -11,6 +11,7 @@ from avlmaps.core.files import write_bytes_atomically
 
 if TYPE_CHECKING:
     from avlmaps.bench.indexing import IndexingSettings
+    from avlmaps.bench.navigation import NavigationSettings
 
 Table = Mapping[str, Any]  # {"columns": [...], "rows": [[...]]}
 
@@ -29,6 +30,7 @@ class Asked:
         profile: which models are measured.
         seed: of what is drawn at random.
         indexing: what the suites ``indexing`` and ``objects`` are run on; its own defaults if None.
+        navigation: what the suite ``navigation`` is run on; its own defaults if None.
     """
 
     sounds: Path | None = None
@@ -36,13 +38,14 @@ class Asked:
     profile: str = "embedded"
     seed: int = 0
     indexing: "IndexingSettings | None" = None
+    navigation: "NavigationSettings | None" = None
 
 
 def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
     """Run a suite and write SUITE.json, SUITE.md and SUITE.png into ``out``.
 
     Args:
-        suite: ``words``, ``sounds``, ``segmentation``, ``locate``, ``objects`` or ``indexing``.
+        suite: ``words``, ``sounds``, ``segmentation``, ``locate``, ``objects``, ``indexing`` or ``navigation``.
         asked: what it measures on.
         out: folder to write into.
 
@@ -53,6 +56,10 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
         from avlmaps.bench.indexing.suite import run_indexing
 
         return run_indexing(asked.indexing, out)
+    if suite == "navigation":
+        from avlmaps.bench.navigation.suite import run_navigation
+
+        return run_navigation(asked.navigation, out)
     scenes = [source.resolve().name for source in (asked.sounds, *asked.scenes) if source is not None]
     if suite == "objects":
         from avlmaps.bench.indexing import DEFAULT_SCENES

@@ -11,13 +11,15 @@ from avlmaps.cli.verbs import Verb
 
 if TYPE_CHECKING:
     from avlmaps.bench.indexing import IndexingSettings
+    from avlmaps.bench.navigation import NavigationSettings
 
-Suite = Literal["words", "sounds", "segmentation", "locate", "objects", "indexing"]
+Suite = Literal["words", "sounds", "segmentation", "locate", "objects", "indexing", "navigation"]
+Series = Literal["sounds-1", "sounds-2", "sounds-3", "images", "pairs", "commands", "spatial"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Indexing:
-    """How the suites indexing and objects make, record and ask their scenes."""
+    """How the suites indexing, objects and navigation make, record and ask their scenes."""
 
     hearing: Literal["overlay", "acoustic"] = "overlay"
     """How sounds reach the microphone: mixed in as the paper did, or through rooms and doorways."""
@@ -26,13 +28,27 @@ class Indexing:
     frames: int = 600
     """At most so many frames a scene."""
     tasks_a_scene: int = 20
-    """At most so many tasks a scene and table."""
+    """At most so many tasks a scene and table (indexing)."""
     jobs: int = 0
     """Scenes side by side; 0 takes as many as there are cores."""
     tasks: Path | None = None
-    """Ask the tasks of this file instead of making some."""
+    """Ask the tasks (or run the missions) of this file instead of making some."""
     save_tasks: Path | None = None
-    """Write the tasks and their truth into this file."""
+    """Write the tasks (or missions) and their truth into this file."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Navigation:
+    """What robots are told in the suite navigation."""
+
+    sequences: int = 200
+    """Sequences of four sounds (at each range), and of an image and two objects; pairs are 119 for each 200."""
+    series: tuple[Series, ...] = ()
+    """Which experiments; all by default."""
+    language: Literal["rules", "chat", "none"] = "rules"
+    """What turns sentences into programs; none gives robots the programs themselves."""
+    guess: bool = True
+    """Let robots go to the best guess where the map is not sure, as the paper's always do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +60,7 @@ class Bench(Verb):
     locate: needs --scenes, recordings with poses; half of the frames become the map, the others are asked.
     objects: are things where the map says, in the same scenes as indexing, whose maps it shares.
     indexing: objects told apart by sounds, photos and areas, in twelve held-out homes or in --scenes by name.
+    navigation: robots sent from sentence to place, in twelve held-out homes or in --scenes by name.
     """
 
     suite: Positional[Suite]
@@ -51,7 +68,7 @@ class Bench(Verb):
     sounds: Path | None = None
     """Folder of sound clips with an index.csv (path, category, fold)."""
     scenes: tuple[str, ...] = ()
-    """Recordings with poses (locate); names of scenes such as house:1000000:held-out (objects, indexing)."""
+    """Recordings with poses (locate); names of scenes such as house:1000000:held-out (the others)."""
     profile: str = "embedded"
     """Which models are measured."""
     out: Path = Path("bench_out")
@@ -59,15 +76,18 @@ class Bench(Verb):
     seed: int = 0
     """Seed of what is drawn at random."""
     indexing: Annotated[Indexing, OmitArgPrefixes] = field(default_factory=Indexing)
-    """Of the suites indexing and objects."""
+    """Of the suites indexing, objects and navigation."""
+    navigation: Annotated[Navigation, OmitArgPrefixes] = field(default_factory=Navigation)
+    """Of the suite navigation."""
 
     def run(self) -> None:
         """Measure, write the tables, print them."""
         from avlmaps.bench.suites import Asked, run_suite
 
         indexing = self.indexing_settings() if self.suite in ("indexing", "objects") else None
-        scenes = () if indexing else tuple(map(Path, self.scenes))
-        asked = Asked(self.sounds, scenes, self.profile, self.seed, indexing)
+        navigation = self.navigation_settings() if self.suite == "navigation" else None
+        scenes = () if indexing or navigation else tuple(map(Path, self.scenes))
+        asked = Asked(self.sounds, scenes, self.profile, self.seed, indexing, navigation)
         answer = run_suite(self.suite, asked, self.out)
         lines: list[str] = []
         for name, table in answer["tables"].items():
@@ -91,4 +111,26 @@ class Bench(Verb):
             seed=self.seed,
             load=chosen.tasks,
             save=chosen.save_tasks,
+        )
+
+    def navigation_settings(self) -> "NavigationSettings":
+        """Return what the suite navigation is run on."""
+        from avlmaps.bench import navigation
+
+        chosen, scenes = self.navigation, self.indexing
+        return navigation.NavigationSettings(
+            scenes=self.scenes or navigation.DEFAULT_SCENES,
+            series=tuple(map(navigation.Series, chosen.series)) or tuple(navigation.Series),
+            profile=self.profile,
+            hearing=scenes.hearing,
+            sounds=self.sounds,
+            sensor=scenes.sensor,
+            frames=scenes.frames,
+            sequences=chosen.sequences,
+            language=chosen.language,
+            guess=chosen.guess,
+            jobs=scenes.jobs,
+            seed=self.seed,
+            load=scenes.tasks,
+            save=scenes.save_tasks,
         )

@@ -103,6 +103,14 @@ class FreeSpace:
         i, j = self.cell_of(self.nearest(b))
         return float(self.distances_m(a)[i, j])
 
+    def distances_to_any_m(self, places: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "nx ny"]:
+        """Return how far the robot drives from every cell to the nearest of some places, inf where it cannot go."""
+        grid = np.full(self.free.shape, np.inf)
+        if len(places):
+            nodes = np.unique([self._node(place) for place in places])
+            grid[self.free] = csgraph.dijkstra(self._metric(), indices=nodes, min_only=True)
+        return grid
+
     def paths(self, places: Float[np.ndarray, "k 2"]) -> tuple[np.ndarray, np.ndarray]:
         """Return the cost (k, k) of driving between places, and for each the way back to it, for `path`.
 
@@ -194,16 +202,24 @@ def occupied(scene: Scene, space: FreeSpace, low_m: float, high_m: float) -> Boo
     return grid
 
 
+def floor_cells(
+    scene: Scene, floor_m: float, origin: Float[np.ndarray, "2"], shape: tuple[int, int], cell_m: float
+) -> Bool[np.ndarray, "nx ny"]:
+    """Return which cells of a grid have floor at a height, narrow gaps such as door sills counted with it."""
+    ground = np.zeros(shape, np.bool_)
+    flat, _, _ = _flat_triangles(scene, only_named=_has_floor(scene))
+    corners = scene.mesh.corners()[flat].astype(np.float64)
+    mark_slab(corners, floor_m - 0.25, floor_m + 0.15, origin, cell_m, ground)
+    gap = 2 * round(_THRESHOLD_M / cell_m / 2) + 1
+    return cv2.morphologyEx(ground.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((gap, gap), np.uint8)) > 0
+
+
 def _one_floor(scene: Scene, floor_m: float, radius_m: float, height_m: float, cell_m: float) -> FreeSpace:
     corners = scene.mesh.corners().astype(np.float64)
     origin = np.floor((scene.mesh.low[:2].astype(np.float64) - 2 * cell_m) / cell_m) * cell_m
     nx, ny = (int(np.ceil(extent / cell_m)) + 2 for extent in scene.mesh.high[:2] - origin)
     shape = (nx, ny)
-    ground = np.zeros(shape, np.bool_)
-    flat, _, _ = _flat_triangles(scene, only_named=_has_floor(scene))
-    mark_slab(corners[flat], floor_m - 0.25, floor_m + 0.15, origin, cell_m, ground)
-    gap = 2 * round(_THRESHOLD_M / cell_m / 2) + 1
-    ground = cv2.morphologyEx(ground.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((gap, gap), np.uint8)) > 0
+    ground = floor_cells(scene, floor_m, origin, shape, cell_m)
     blocked = np.zeros(shape, np.bool_)
     mark_slab(corners, floor_m + _STEP_M, floor_m + height_m, origin, cell_m, blocked)
     apart = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)

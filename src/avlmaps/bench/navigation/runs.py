@@ -1,0 +1,246 @@
+"""Running the benchmark: first all scenes' missions are made, then robots are sent, every scene in its own process."""
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, TypeVar
+
+from avlmaps.bench.indexing.prepared import SceneJob
+from avlmaps.bench.indexing.tasks import TaskError
+from avlmaps.bench.navigation.configurations import Configuration, configurations
+from avlmaps.bench.navigation.episodes import Episode, Journal
+from avlmaps.bench.navigation.missions import (
+    Mission,
+    MissionSet,
+    allocated,
+    asked_for,
+    load_missions,
+    save_missions,
+)
+from avlmaps.bench.navigation.place import NavigationPlace
+from avlmaps.bench.navigation.settings import NavigationSettings
+from avlmaps.core.progress import progress, say, silence
+from avlmaps.core.version import __version__
+from avlmaps.language.translator import Translator
+from avlmaps.navigate.bodies import BASE
+from avlmaps.sim.scene import Scene
+from avlmaps.sim.scenes import open_scene
+
+_RECIPE = 1  # raised when missions are made, or robots sent, in another way
+_LOOK_S = 2.0
+T = TypeVar("T")
+OpenSpec = Callable[[str], Scene]
+
+
+@dataclass(frozen=True, slots=True)
+class SceneFacts:
+    """What one scene was.
+
+    Attributes:
+        scene: its name.
+        frames: how many the map was made of.
+        voxels: how many it has.
+        sounds: how many sounds were heard, and how many there were.
+        episodes: what became of its missions, by mission and then configuration.
+    """
+
+    scene: str
+    frames: int
+    voxels: int
+    sounds: tuple[int, int]
+    episodes: tuple[Episode, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of all scenes."""
+
+    settings: NavigationSettings
+    missions: MissionSet
+    scenes: tuple[SceneFacts, ...]
+
+    @property
+    def episodes(self) -> list[Episode]:
+        """All episodes, scene by scene."""
+        return [episode for scene in self.scenes for episode in scene.episodes]
+
+
+@dataclass(frozen=True, slots=True)
+class _Todo:
+    """What one process does: make a scene's missions, or send robots on some."""
+
+    job: SceneJob
+    settings: NavigationSettings
+    missions: tuple[Mission, ...]
+    journal: Path
+    open_spec: OpenSpec
+
+
+def run(settings: NavigationSettings, out: Path, open_spec: OpenSpec = open_scene) -> Outcome:
+    """Record and map every scene, and send robots on missions in it.
+
+    Args:
+        settings: what.
+        out: folder for ``work`` (recordings and maps, shared with the indexing suite), ``navigation_missions.json``
+            and ``episodes``; a run that was broken off goes on from there.
+        open_spec: makes a scene of its name (tests give small ones).
+
+    Raises:
+        TaskError: the missions cannot be read, do not fit, or no scene yields any.
+    """
+    missions = _missions(settings, out, open_spec)
+    kept = tuple(mission for mission in missions.missions if mission.series in settings.series)
+    if not kept:
+        raise TaskError(
+            f"The {len(missions.scenes)} scenes yield no mission of {', '.join(settings.series)}; take larger ones, or "
+            f"more frames than {missions.recorded.frames}."
+        )
+    missions = replace(missions, missions=kept)
+    if settings.save is not None:
+        save_missions(missions, settings.save)
+    todo = [
+        _Todo(job, settings, tuple(one for one in kept if one.scene == job.spec), _journal(out, job), open_spec)
+        for job in _jobs(settings, missions, out)
+    ]
+    total = sum(len(_pairs(one.missions)) for one in todo)
+    scenes = _side_by_side(_sent, todo, settings.jobs, "navigation", lambda: _count(todo), total)
+    return Outcome(settings, missions, tuple(scenes))
+
+
+def _jobs(settings: NavigationSettings, missions: MissionSet, out: Path) -> list[SceneJob]:
+    work = out / "work"
+    return [SceneJob(name, missions.recorded, settings.sounds, settings.profile, work) for name in missions.scenes]
+
+
+def _journal(out: Path, job: SceneJob) -> Path:
+    return out / "episodes" / f"{job.folder.name}.jsonl"
+
+
+def _pairs(missions: Sequence[Mission]) -> list[tuple[Mission, Configuration]]:
+    return [(mission, one) for mission in missions for one in configurations(mission.series)]
+
+
+def _count(todo: Sequence[_Todo]) -> int:
+    return sum(Journal(one.journal).count() for one in todo)
+
+
+def _missions(settings: NavigationSettings, out: Path, open_spec: OpenSpec) -> MissionSet:
+    """Return the missions of a file, of a run that was broken off, or made anew."""
+    if settings.load is not None:
+        given = load_missions(settings.load)
+        if given.recorded.sounds != settings.recorded.sounds:
+            wanted = f"name the folder {given.recorded.sounds!r} with" if given.recorded.sounds else "leave out"
+            raise TaskError(f"The missions {settings.load} were made with other sounds; {wanted} --sounds.")
+        return given
+    asked = asked_for(
+        settings.recorded, settings.scenes, settings.series, settings.sequences, settings.profile, BASE, __version__,
+        _RECIPE,
+    )  # fmt: skip
+    path = out / "navigation_missions.json"
+    if path.exists():
+        before = load_missions(path)
+        if before.asked == asked:
+            return before
+    empty = MissionSet(settings.recorded, settings.scenes, BASE.radius_m, (), asked)
+    todo = [_Todo(job, settings, (), _journal(out, job), open_spec) for job in _jobs(settings, empty, out)]
+    made = _side_by_side(_made, todo, settings.jobs, "mapping", None, len(todo))
+    own = [mission for series in settings.series for mission in _shared_out(settings, series, made)]
+    missions = replace(empty, missions=tuple(own))
+    save_missions(missions, path)
+    return missions
+
+
+def _shared_out(settings: NavigationSettings, series: Any, made: list[list[Mission]]) -> list[Mission]:
+    own = [[mission for mission in scene if mission.series is series] for scene in made]
+    total = settings.total(series)
+    return allocated(own, sum(map(len, own)) if total is None else total)
+
+
+def _made(todo: _Todo) -> list[Mission]:
+    """Record and map a scene, and make its missions."""
+    return NavigationPlace(todo.job, todo.settings, todo.open_spec).missions()
+
+
+def _sent(todo: _Todo) -> SceneFacts:
+    """Send robots on a scene's missions, those aside that are done."""
+    settings, journal = todo.settings, Journal(todo.journal)
+    done = journal.read()
+    place = NavigationPlace(todo.job, settings, todo.open_spec)
+    asked = place.work.asked_scene
+    pairs = [(mission, one) for mission, one in _pairs(todo.missions) if asked.has(one.needs)]
+    keyed = [(_key(settings, mission, one), mission, one) for mission, one in pairs]
+    if any(key not in done for key, _, _ in keyed):
+        pilot = place.pilot(list(todo.missions), translator_named(settings.language))
+        for key, mission, one in keyed:
+            if key not in done:
+                done[key] = pilot.run(mission, one, key)
+                journal.add(done[key])
+    info = place.work.asked.stored.info.counts
+    sounds = (info.sounds, len(place.work.truth.events))
+    episodes = tuple(done[key] for key, _, _ in keyed)
+    return SceneFacts(todo.job.spec, info.frames, info.voxels, sounds, episodes)
+
+
+def _key(settings: NavigationSettings, mission: Mission, one: Configuration) -> str:
+    facts = (mission.fingerprint, repr(one), settings.profile, settings.language, settings.guess, repr(BASE))
+    return sha256("\n".join(map(str, (*facts, settings.recorded, __version__, _RECIPE))).encode()).hexdigest()[:24]
+
+
+def translator_named(language: str) -> Translator | None:
+    """Return what turns sentences into programs; None for programs as they are."""
+    if language == "none":
+        return None
+    if language == "chat":
+        from avlmaps.language.chat import ChatTranslator
+
+        return ChatTranslator()
+    from avlmaps.language.rules import RulesTranslator
+
+    return RulesTranslator()
+
+
+def _side_by_side(
+    do: Callable[[_Todo], T], todo: Sequence[_Todo], jobs: int, label: str, done: Callable[[], int] | None, total: int
+) -> list[T]:
+    """Do something for every scene, in processes of their own where there are several, and show how far it is.
+
+    Args:
+        do: what.
+        todo: for each scene.
+        jobs: at most so many at once; 0 for as many as there are cores.
+        label: of the progress bar.
+        done: tells how many parts are done; None where a scene is one part.
+        total: how many parts there are.
+    """
+    workers = min(jobs or os.cpu_count() or 1, len(todo))
+    unit = "scene" if done is None else "episode"
+    if workers < 2:
+        results: list[T] = []
+        for one in todo:
+            results.append(do(one))
+            say(f"{label}: {one.job.spec} is done, {len(results)} of {len(todo)}")
+        return results
+    with ProcessPoolExecutor(workers, get_context("spawn"), silence) as pool:
+        futures = [pool.submit(do, one) for one in todo]
+        for _ in progress(_ticks(futures, done), label, total=total, unit=unit):
+            pass
+        return [future.result() for future in futures]
+
+
+def _ticks(futures: Sequence[Future[T]], done: Callable[[], int] | None) -> Iterator[None]:
+    """Yield once for each part that is done; a process that fails ends all."""
+    shown, waiting = 0, set(futures)
+    while waiting:
+        over, waiting = wait(waiting, _LOOK_S, FIRST_COMPLETED)
+        for future in over:
+            if future.exception() is not None:
+                for other in waiting:
+                    other.cancel()
+                future.result()
+        count = len(futures) - len(waiting) if done is None else done()
+        yield from [None] * max(count - shown, 0)
+        shown = max(shown, count)
