@@ -1,12 +1,24 @@
-"""Driving to a place: what every driver offers, and what came of it."""
+"""Driving to a place: what every driver offers, and the one that plans on a map and follows its way itself."""
 
-from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import pi
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.motion import Action, GroundPose
+from avlmaps.core.motion import FORWARD_M, Action, GroundPose, Moved, wrapped
+from avlmaps.maps.obstacles import Obstacles
+from avlmaps.navigate import grid_kernels
+from avlmaps.navigate.bodies import BASE, Body, BodyShape
+from avlmaps.navigate.controller import ActionController, VelocityController, VelocitySettings, bearing, turns_for
+from avlmaps.navigate.costmap import CostSettings, costmap_of
+from avlmaps.navigate.met import Met
+from avlmaps.navigate.planner import Planner, PlanSettings, Stop
+
+_SAMPLE_M = 0.02  # places along a straight move that are looked at
+_STILL_M = 0.005  # a step that brings the body no farther was stopped
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,3 +75,255 @@ class Driver(Protocol):
     def stop(self) -> Arrival:
         """Stand still."""
         ...
+
+
+@dataclass(frozen=True, slots=True)
+class DriveSettings:
+    """How a `MapDriver` drives."""
+
+    mode: Literal["actions", "velocity"] = "actions"
+    """By the paper's discrete actions, or by velocities."""
+    tolerance_m: float = 0.15
+    """It has arrived when it stands no farther from where it is to stop."""
+    most_plans: int = 40
+    """It gives up a place after so many plans; each contact takes one."""
+    most_movements: int = 5_000
+    """It gives up a place after so many actions, or ticks of a velocity."""
+    costs: CostSettings = field(default_factory=CostSettings)
+    """What a way costs."""
+    planning: PlanSettings = field(default_factory=PlanSettings)
+    """How ways are found."""
+    velocities: VelocitySettings = field(default_factory=VelocitySettings)
+    """Bounds of the velocities."""
+
+
+@dataclass(slots=True)
+class _Trip:
+    """What happened since a movement was told."""
+
+    path: list[tuple[float, float]]
+    actions: list[Action] = field(default_factory=list)
+    contacts: int = 0
+    movements: int = 0
+
+
+class MapDriver:
+    """Plans on a map, follows the way with its eyes on the body's pose, and plans anew when it meets something.
+
+    What it meets is kept for later drives, beside the map. No movement is made of which the map foretells a contact.
+
+    Attributes:
+        obstacles: what the map knows.
+        body: what it moves.
+        shape: of the body; radius and height must be those that the obstacles were found for.
+        settings: how it drives.
+        met: what the map does not know.
+    """
+
+    def __init__(
+        self, obstacles: Obstacles, body: Body, shape: BodyShape = BASE, settings: DriveSettings | None = None
+    ) -> None:
+        self.obstacles, self.body, self.shape = obstacles, body, shape
+        self.settings = settings or DriveSettings()
+        self.met = Met(obstacles, shape.radius_m)
+        self.met.stood_at(body.pose)
+
+    @property
+    def pose(self) -> GroundPose:
+        """Where the body is."""
+        return self.body.pose
+
+    @cached_property
+    def planner(self) -> Planner:
+        """Finds ways round what is known by now."""
+        settings = self.settings
+        costmap = costmap_of(self.obstacles, self.shape.radius_m, settings.costs, self.met.cells)
+        return Planner(costmap, settings.planning)
+
+    def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
+        """Drive to a place, or as near to it as the robot can stand and see it.
+
+        Args:
+            place: in the world, metres; its height does not matter.
+            face: a place in the world to look at once there.
+        """
+        goal = self._level(place)
+        trip = self._trip()
+        stop, note = None, f"it gave up after {self.settings.most_plans} plans"
+        for _ in range(self.settings.most_plans):
+            stop = self.planner.stop_for(self._xy, goal)
+            way = None if stop is None else self.planner.way(self._xy, stop.xy)
+            if way is None:
+                return self._arrival(trip, False, self._no_way(goal))
+            if self._follow(way.points, trip):
+                note = ""
+                break
+            if trip.movements >= self.settings.most_movements:
+                note = f"it gave up after {trip.movements} movements"
+                break
+        if face is not None:
+            x_m, y_m = self._level(face)
+            self._turned(wrapped(bearing(self.pose, float(x_m), float(y_m)) - self.pose.heading_rad), trip)
+        return self._at_stop(trip, stop, goal, note)
+
+    def turn(self, angle_rad: float) -> Arrival:
+        """Turn on the spot, to the left by a positive angle; by actions as nearly as 5 degrees allow."""
+        trip = self._trip()
+        self._turned(angle_rad, trip)
+        return self._arrival(trip, True)
+
+    def forward(self, distance_m: float) -> Arrival:
+        """Drive straight ahead, as far as nothing is in the way; for a negative distance it turns round first."""
+        trip = self._trip()
+        if distance_m < 0.0:
+            self._turned(pi, trip)
+        start, distance_m = self.pose, abs(distance_m)
+        if self.settings.mode == "velocity":
+            end = start.ahead(distance_m)
+            arrived = distance_m == 0.0 or self._follow(np.array([self._xy, [end.x_m, end.y_m]]), trip)
+        else:
+            arrived = self._stepped(round(distance_m / FORWARD_M), trip)
+        gone_m = start.distance_m(self.pose)
+        return self._arrival(trip, arrived, "" if arrived else f"something is in the way after {gone_m:.2f} m")
+
+    def stop(self) -> Arrival:
+        """Stand still."""
+        trip = self._trip()
+        self._take(Action.STOP, trip)
+        return self._arrival(trip, True)
+
+    @property
+    def _xy(self) -> Float[np.ndarray, "2"]:
+        return np.array([self.pose.x_m, self.pose.y_m])
+
+    def _level(self, place: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"]:
+        return np.asarray(place, np.float64) @ self.obstacles.level_from_world[:2].T
+
+    def _trip(self) -> _Trip:
+        return _Trip([(self.pose.x_m, self.pose.y_m)])
+
+    def _arrival(self, trip: _Trip, reached: bool, note: str = "") -> Arrival:
+        return Arrival(reached, self.pose, tuple(trip.actions), np.array(trip.path), note, trip.contacts)
+
+    def _at_stop(self, trip: _Trip, stop: Stop | None, goal: Float[np.ndarray, "2"], note: str) -> Arrival:
+        """Tell how a drive ended that had a way, and stop there."""
+        self._take(Action.STOP, trip)
+        if stop is None:
+            return self._arrival(trip, False, note)
+        off_m = float(np.hypot(*(self._xy - stop.xy)))
+        away_m = float(np.hypot(*(self._xy - goal)))
+        if off_m > self.settings.tolerance_m:
+            return self._arrival(trip, False, f"{note or 'it got no nearer'}, {away_m:.2f} m from the place")
+        if not stop.seen:
+            return self._arrival(
+                trip, False, f"no way leads to where the place can be seen; it stands {away_m:.2f} m away from it"
+            )
+        beside = f"the robot cannot stand in the place itself; it stands {away_m:.2f} m beside it"
+        return self._arrival(trip, True, beside if stop.beside_m > 0.0 else "")
+
+    def _no_way(self, goal: Float[np.ndarray, "2"]) -> str:
+        if not self.planner.costmap.holds(goal):
+            return f"the place ({goal[0]:.2f}, {goal[1]:.2f}) m is off the map"
+        if self.planner.entry(self._xy) is None:
+            return "nothing round the robot is known to be free, so that it cannot set out"
+        return "no way leads there that is wide enough for the robot"
+
+    def _safe(self, start: GroundPose, end: GroundPose) -> bool:
+        """Tell whether a straight move touches nothing that is known; out of a tight place it may, if that helps."""
+        costmap = self.planner.costmap
+        count = int(start.distance_m(end) / _SAMPLE_M) + 2
+        part = np.linspace(0.0, 1.0, count)[:, None]
+        xy = (1 - part) * [start.x_m, start.y_m] + part * [end.x_m, end.y_m]
+        cell_m = costmap.cell_size_m
+        room_m = cell_m * grid_kernels.room_along(
+            costmap.in_cells(xy), costmap.occupied, costmap.radius_m / cell_m + 1.0
+        )
+        if room_m.min() >= costmap.radius_m - 1e-6:
+            return True
+        return bool(room_m[0] < costmap.radius_m and room_m.min() >= room_m[0] - 1e-6 and room_m[-1] > room_m[0])
+
+    def _follow(self, points: Float[np.ndarray, "n 2"], trip: _Trip) -> bool:
+        """Follow a way until its end; return False where something stopped it, which it then knows of."""
+        if self.settings.mode == "velocity":
+            return self._follow_smoothly(points, trip)
+        controller = ActionController(points, self._safe)
+        while trip.movements < self.settings.most_movements:
+            action = controller.action(self.pose)
+            if action is Action.STOP:
+                return True
+            if action is None:
+                return controller.route.to_end_m(self.pose) <= self.settings.tolerance_m
+            if not self._take(action, trip):
+                return False
+        return False
+
+    def _follow_smoothly(self, points: Float[np.ndarray, "n 2"], trip: _Trip) -> bool:
+        settings = self.settings.velocities
+        controller, idle = VelocityController(points, settings, self._safe), 0
+        while trip.movements < self.settings.most_movements and idle < 5 / settings.tick_s:
+            costmap = self.planner.costmap
+            reach = (costmap.radius_m + settings.slow_room_m) / costmap.cell_size_m
+            room = grid_kernels.room_at(*costmap.in_cells(self._xy), costmap.occupied, reach) * costmap.cell_size_m
+            speed = controller.speed_m_s + settings.speed_m_s2 * settings.tick_s
+            ahead_m = speed * settings.tick_s + 0.5 * speed**2 / settings.speed_m_s2
+            along = self.pose.turned(0.5 * controller.turn_rad_s * ahead_m / max(speed, 0.05))
+            command = controller.command(
+                self.pose, room - costmap.radius_m, not self._safe(self.pose, along.ahead(ahead_m))
+            )
+            if command is None:
+                return True
+            before = self.pose
+            if not self._drive(*command, trip):
+                return False
+            idle = 0 if before.distance_m(self.pose) > 1e-4 or abs(command[1]) > 0.01 else idle + 1
+        return controller.route.to_end_m(self.pose) <= self.settings.tolerance_m
+
+    def _stepped(self, steps: int, trip: _Trip) -> bool:
+        for _ in range(steps):
+            if not self._safe(self.pose, self.pose.ahead(FORWARD_M)) or not self._take(Action.FORWARD, trip):
+                return False
+        return True
+
+    def _turned(self, angle_rad: float, trip: _Trip) -> None:
+        if self.settings.mode == "actions":
+            for action in turns_for(angle_rad):
+                self._take(action, trip)
+            return
+        controller = VelocityController(np.array([self._xy]), self.settings.velocities)
+        left_rad, heading_rad = angle_rad, self.pose.heading_rad
+        while trip.movements < self.settings.most_movements:
+            command = controller.turn(left_rad)
+            if command is None:
+                return
+            self._drive(*command, trip)
+            left_rad -= wrapped(self.pose.heading_rad - heading_rad)
+            heading_rad = self.pose.heading_rad
+
+    def _take(self, action: Action, trip: _Trip) -> bool:
+        """Take an action; return False where something stopped it."""
+        before = self.pose
+        moved = self.body.act(action)
+        trip.actions.append(action)
+        told = before.ahead(FORWARD_M) if action is Action.FORWARD else before
+        return self._noted(trip, before, told, moved)
+
+    def _drive(self, speed_m_s: float, turn_rad_s: float, trip: _Trip) -> bool:
+        """Drive for a tick; return False where something stopped it."""
+        tick_s, before = self.settings.velocities.tick_s, self.pose
+        moved = self.body.drive(speed_m_s, turn_rad_s, tick_s)
+        told = before.turned(0.5 * turn_rad_s * tick_s).ahead(speed_m_s * tick_s)
+        return self._noted(trip, before, told, moved)
+
+    def _noted(self, trip: _Trip, before: GroundPose, told: GroundPose, moved: Moved) -> bool:
+        trip.movements += 1
+        trip.path.append((moved.pose.x_m, moved.pose.y_m))
+        meant_m = before.distance_m(told)
+        stopped = moved.contact or (meant_m > 2 * _STILL_M and before.distance_m(moved.pose) < _STILL_M)
+        if meant_m:
+            self.met.stood_at(moved.pose)
+        if not stopped:
+            return True
+        trip.contacts += moved.contact
+        if self.met.touched(before, told, moved.pose):
+            self.__dict__.pop("planner", None)
+        return False

@@ -139,10 +139,12 @@ def block_parts(passable, cost):  # pragma: no cover - compiled
 @njit(cache=True)
 def _meets(node, i, j, di, dj):  # pragma: no cover - compiled
     """Tell whether a step leads into another block's part, and is not just the next one along the same border."""
-    if not _open_step(node, i, j, di, dj) or node[i, j] == node[i + di, j + dj]:
+    crosses_i = di == 1 and i % BLOCK == BLOCK - 1
+    crosses_j = (dj == 1 and j % BLOCK == BLOCK - 1) or (dj == -1 and j % BLOCK == 0)
+    if (di != 0 and not crosses_i) or (dj != 0 and not crosses_j) or not _open_step(node, i, j, di, dj):
         return False
     if di != 0 and dj != 0:
-        return (i + di) // BLOCK != i // BLOCK and (j + dj) // BLOCK != j // BLOCK
+        return True
     back_i, back_j = i - dj, j - di
     if back_i < 0 or back_j < 0:
         return True
