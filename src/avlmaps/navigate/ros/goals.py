@@ -1,0 +1,114 @@
+"""What a ROS robot is told to do, and how it stands with it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import StrEnum
+from time import monotonic
+from typing import Any
+from uuid import uuid4
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.motion import GroundPose
+
+_STEP_M = 0.05
+_MOST_PLACES = 20_000
+
+
+class End(StrEnum):
+    """How a goal ended."""
+
+    SUCCEEDED = "succeeded"
+    CANCELLED = "cancelled"
+    FAILED = "failed"
+    ABSENT = "absent"
+    """Nobody took it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One goal for one action server.
+
+    Attributes:
+        action: the server's name.
+        kind: the action's type.
+        arguments: the goal's message.
+        limit_s: how long it may take.
+    """
+
+    action: str
+    kind: str
+    arguments: dict[str, Any]
+    limit_s: float
+
+
+@dataclass(slots=True, eq=False)
+class Goal:
+    """A task that was sent. The network's thread writes what comes of it; the first end stands.
+
+    Attributes:
+        task: what was asked for.
+        id: its name on the bridge, unlike any other client's.
+        answered: whether anything was heard of it.
+        end: how it ended; None while it has not.
+        note: why, where the robot says.
+    """
+
+    task: Task
+    id: str = field(default_factory=lambda: f"avlmaps-{uuid4().hex}")
+    answered: bool = False
+    end: End | None = None
+    note: str = ""
+
+    def over(self, end: End, note: str = "") -> None:
+        """Take note that it ended."""
+        if self.end is None:
+            self.answered, self.end, self.note = True, end, note
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What to send for a movement, and how to tell whether it was made.
+
+    Attributes:
+        tasks: the first whose server is there is done.
+        off: given where the robot stands afterwards, how it is not as it should be; empty where it is.
+        note: something to say even so.
+    """
+
+    tasks: tuple[Task, ...]
+    off: Callable[[GroundPose], str]
+    note: str = ""
+
+
+class Track:
+    """The places that a robot passed, level frame, a few centimetres apart."""
+
+    def __init__(self, start: GroundPose) -> None:
+        self._places = [(start.x_m, start.y_m)]
+
+    def passed(self, pose: GroundPose) -> None:
+        """Add where it is now."""
+        x_m, y_m = self._places[-1]
+        if abs(pose.x_m - x_m) + abs(pose.y_m - y_m) >= _STEP_M:
+            self._places.append((pose.x_m, pose.y_m))
+        if len(self._places) > _MOST_PLACES:
+            del self._places[1::2]
+
+    @property
+    def places(self) -> Float[np.ndarray, "n 2"]:
+        """All of them, in order."""
+        return np.array(self._places, np.float64)
+
+
+class Watch:
+    """Tells how long something takes."""
+
+    def __init__(self) -> None:
+        self._begun_s = monotonic()
+
+    @property
+    def took_s(self) -> float:
+        """Seconds since it was made."""
+        return monotonic() - self._begun_s

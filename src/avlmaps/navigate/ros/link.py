@@ -1,0 +1,190 @@
+"""One connection to rosbridge: opened, listened to, sent over, and closed. Nothing here knows of robots."""
+
+import threading
+from collections.abc import Callable
+from importlib.util import find_spec
+from ipaddress import ip_address
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+import msgspec
+
+from avlmaps.core.errors import BackendError, NavigationError
+from avlmaps.navigate.ros.messages import Incoming, shown, text_in
+
+if TYPE_CHECKING:
+    from avlmaps.navigate.ros.wire import Bridge
+
+DEFAULT_PORT = 9090
+START_IT = (
+    "start rosbridge on the robot with `ros2 launch rosbridge_server rosbridge_websocket_launch.xml` (ROS 1: "
+    "`roslaunch rosbridge_server rosbridge_websocket.launch`), and check the address, the port and the firewall"
+)
+_MOST_TOLD = 20
+
+
+class Link:
+    """A connection that stands or is over; it never comes back by itself.
+
+    What arrives is handed to listeners in the network's thread. They keep what they need and notify ``heard``, on
+    which the driver's thread waits; neither sends anything while it holds it.
+
+    Attributes:
+        url: where to.
+        heard: notified whenever something has arrived or changed.
+        lost: why the connection is over; None while it stands.
+        told: what the bridge complained about, the latest last.
+        unread: how many messages were none, and were left out.
+    """
+
+    def __init__(self, url: str, token: str | None = None, timeout_s: float = 10.0) -> None:
+        """Connect.
+
+        Args:
+            url: ``ws://host:9090`` or ``wss://host``.
+            token: sent as ``Authorization: Bearer``, for a proxy in front of the bridge that asks for it.
+            timeout_s: how long to wait for the robot.
+
+        Raises:
+            BackendError: roslibpy is not installed.
+            NavigationError: nobody answers there, or the address is none.
+        """
+        self.url = address(url)
+        headers = {} if token is None else {"Authorization": f"Bearer {_checked(token, self.url)}"}
+        self.heard = threading.Condition()
+        self.lost: str | None = None
+        self.told: list[str] = []
+        self.unread = 0
+        self._open = False
+        self._listeners: list[Callable[[Incoming], None]] = []
+        self._topics: dict[str, Any] = {}
+        self._bridge = self._opened(headers, timeout_s)
+
+    def _opened(self, headers: dict[str, str], timeout_s: float) -> "Bridge":
+        if find_spec("roslibpy") is None:
+            raise BackendError("Driving a ROS robot needs roslibpy; get it with: pip install 'avlmaps[ros]'")
+        try:
+            from avlmaps.navigate.ros.wire import Bridge, start_reactor
+
+            start_reactor()
+            bridge = Bridge(self.url, headers, self._arrived, self._unreadable, self._stands, self._over, timeout_s)
+        except RuntimeError as fault:
+            raise NavigationError(
+                f"No connection to {self.url} can be made from this process ({shown(str(fault), 300)}); start a new "
+                "one, without the environment variable ROSLIBPY_TRANSPORT."
+            ) from None
+        with self.heard:
+            self.heard.wait_for(lambda: self.lost is not None or self._open, timeout_s)
+        if not self._open:
+            bridge.factory.drop()
+            why = (self.lost or f"no answer within {timeout_s:g} s").rstrip(".")
+            raise NavigationError(f"No rosbridge answers at {self.url} ({why}); {START_IT}.")
+        return bridge
+
+    def listen(self, listener: Callable[[Incoming], None]) -> None:
+        """Hand on what answers goals and calls, from now on."""
+        self._listeners.append(listener)
+
+    def subscribe(self, topic: str, kind: str, hand_on: Callable[[msgspec.Raw], None]) -> None:
+        """Hand on what is published; a listener raises ``ValueError`` for what it cannot read."""
+        self._topic(topic, kind).subscribe(hand_on)
+
+    def advertise(self, topic: str, kind: str) -> None:
+        """Tell that something will be published."""
+        self._topic(topic, kind).advertise()
+
+    def publish(self, topic: str, message: dict[str, Any]) -> None:
+        """Publish to a topic that was advertised."""
+        self._topics[topic].publish(message)
+
+    def send(self, operation: dict[str, Any]) -> None:
+        """Send one operation of the protocol; nothing happens where the connection is over."""
+        import roslibpy
+
+        if self.lost is None:
+            self._bridge.send_on_ready(roslibpy.Message(operation))
+
+    def close(self) -> None:
+        """End the connection."""
+        self._bridge.factory.drop()
+        with self.heard:
+            self.heard.wait_for(lambda: self.lost is not None, 2.0)
+            self.lost = self.lost or "it was closed"
+
+    def _topic(self, topic: str, kind: str) -> Any:
+        import roslibpy
+
+        if topic not in self._topics:
+            self._topics[topic] = roslibpy.Topic(self._bridge, topic, kind, reconnect_on_close=False)
+        return self._topics[topic]
+
+    def _arrived(self, message: Incoming) -> None:
+        """In the network's thread: sort one message."""
+        if message.op == "publish":
+            if message.topic in self._topics:
+                self._bridge.emit(message.topic, message.msg)
+        elif message.op == "status":
+            if message.level in ("error", "warning"):
+                self._keep(text_in(message.msg))
+        else:
+            for listener in self._listeners:
+                listener(message)
+        with self.heard:
+            self.heard.notify_all()
+
+    def _keep(self, complaint: str) -> None:
+        with self.heard:
+            self.told.append(complaint)
+            del self.told[:-_MOST_TOLD]
+
+    def _unreadable(self, _why: str) -> None:
+        with self.heard:
+            self.unread += 1
+            self.heard.notify_all()
+
+    def _stands(self) -> None:
+        with self.heard:
+            self._open = True
+            self.heard.notify_all()
+
+    def _over(self, why: str) -> None:
+        with self.heard:
+            self.lost = self.lost or why or "it was closed"
+            self.heard.notify_all()
+
+
+def address(url: str) -> str:
+    """Return the websocket address that a user means: ``robot``, ``robot:9090`` and ``ws://robot`` are one.
+
+    Raises:
+        NavigationError: it is no address of a websocket.
+    """
+    whole = url if "://" in url else f"ws://{url}"
+    try:
+        parts = urlsplit(whole)
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        host, port, parts = None, None, urlsplit("")
+    if parts.scheme not in ("ws", "wss") or not host or parts.username or any(c <= " " or c > "~" for c in url):
+        raise NavigationError(f"{shown(url)!r} is no address of a rosbridge; write it as ws://HOST:{DEFAULT_PORT}.")
+    port = port or (DEFAULT_PORT if parts.scheme == "ws" else 443)
+    name = f"[{host}]" if ":" in host else host
+    return f"{parts.scheme}://{name}:{port}{parts.path or '/'}" + (f"?{parts.query}" if parts.query else "")
+
+
+def _checked(token: str, url: str) -> str:
+    if not token or any(c <= " " or c > "~" for c in token):
+        raise NavigationError("The token for the robot is empty or has a blank in it; give it as one word.")
+    host = urlsplit(url).hostname or ""
+    if url.startswith("ws://") and not _is_own(host):
+        raise NavigationError(
+            f"A token would go to {url} in the clear; give a wss:// address, or reach the robot through an SSH tunnel."
+        )
+    return token
+
+
+def _is_own(host: str) -> bool:
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"

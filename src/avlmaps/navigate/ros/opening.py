@@ -1,0 +1,85 @@
+"""Opening a driver for a real robot by the name of what drives it."""
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.maps.obstacles import Obstacles
+from avlmaps.navigate.ros.base import RosDriver
+from avlmaps.navigate.ros.frames import Frames
+from avlmaps.navigate.ros.move_base import MoveBaseDriver
+from avlmaps.navigate.ros.nav2 import Nav2Driver
+from avlmaps.navigate.ros.plans import Standing
+from avlmaps.navigate.ros.settings import RosSettings
+
+if TYPE_CHECKING:
+    from avlmaps.navigate.planner import Planner
+
+RosKind = Literal["nav2", "move_base"]
+
+
+def open_ros_driver(
+    kind: RosKind,
+    url: str,
+    frames: Frames | None = None,
+    obstacles: Obstacles | None = None,
+    *,
+    settings: RosSettings | None = None,
+    level_from_world: Float[np.ndarray, "3 3"] | None = None,
+    token: str | None = None,
+) -> RosDriver:
+    """Connect to a robot over rosbridge.
+
+    Args:
+        kind: what drives it: Nav2 in ROS 2, or move_base in ROS 1.
+        url: ``ws://host:9090``.
+        frames: the robot's frames, and how they lie to the map.
+        obstacles: of the map; a goal that is not free on it is moved to the nearest place from which it can be seen.
+        settings: names, patience, tolerances.
+        level_from_world: the map's rotation into its level frame (`Space.level_from_world`); that of the obstacles,
+            or else the identity, by default.
+        token: sent as ``Authorization: Bearer`` to a proxy before the bridge.
+
+    Raises:
+        NavigationError: nobody answers there, or the robot does not know where it is.
+        BackendError: roslibpy is not installed.
+    """
+    settings = settings or RosSettings()
+    if level_from_world is None and obstacles is not None:
+        level_from_world = obstacles.level_from_world
+    standing = None if obstacles is None else standing_on(obstacles, settings.radius_m)
+    driver = {"nav2": Nav2Driver, "move_base": MoveBaseDriver}[kind]
+    return driver(url, frames, settings, standing=standing, level_from_world=level_from_world, token=token)
+
+
+def standing_on(obstacles: Obstacles, radius_m: float) -> Standing:
+    """Return what moves goals to where a body can stand and get to, by a map's obstacles.
+
+    Args:
+        obstacles: of the map.
+        radius_m: of the body.
+    """
+    from avlmaps.navigate.costmap import costmap_of
+    from avlmaps.navigate.planner import Planner
+
+    return _Standing(Planner(costmap_of(obstacles, radius_m)))
+
+
+class _Standing:
+    def __init__(self, planner: "Planner") -> None:
+        self._planner = planner
+
+    def __call__(
+        self, start: Float[np.ndarray, "2"], wanted: Float[np.ndarray, "2"]
+    ) -> tuple[Float[np.ndarray, "2"], str] | str:
+        if self._planner.entry(start) is None:
+            return (
+                f"The robot says that it is at ({start[0]:.2f}, {start[1]:.2f}), where the map has no floor to stand "
+                "on; set how its frames lie to the map"
+            )
+        stop = self._planner.stop_for(start, wanted)
+        if stop is None:
+            return f"No way leads near ({wanted[0]:.2f}, {wanted[1]:.2f}) on the map for a body of that radius"
+        note = f"The place is not free on the map; it was sent {stop.beside_m:.2f} m beside it" if stop.beside_m else ""
+        return stop.xy, note

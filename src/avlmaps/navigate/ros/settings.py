@@ -1,0 +1,45 @@
+"""How a ROS robot is driven: names, patience and tolerances. Its speed is the robot's own affair."""
+
+from dataclasses import dataclass
+
+from avlmaps.core.errors import NavigationError
+
+
+@dataclass(frozen=True, slots=True)
+class RosSettings:
+    """What may differ from robot to robot."""
+
+    namespace: str = ""
+    """Of the robot's actions (``/robot1`` for ``/robot1/navigate_to_pose``)."""
+    tf_namespace: str = ""
+    """Of its transforms, where they are not on /tf and /tf_static."""
+    radius_m: float = 0.25
+    """Of the body, to find where it can stand on our map; the robot keeps its own distance on the way."""
+    goal_timeout_s: float = 300.0
+    """A goal that is not over by then is cancelled."""
+    answer_timeout_s: float = 10.0
+    """A goal of which nothing is heard by then has nobody to take it."""
+    cancel_timeout_s: float = 3.0
+    """How long to wait until a cancelled goal is over."""
+    connect_timeout_s: float = 10.0
+    """How long to wait for the connection."""
+    pose_timeout_s: float = 10.0
+    """How long to wait for the first pose."""
+    pose_max_age_s: float = 3.0
+    """Transforms that are older tell no pose; the robot is not driven without one."""
+    reached_m: float = 0.5
+    """A robot that says it has arrived must stand this near; Nav2's own tolerance is 0.25 m by default."""
+    reached_rad: float = 0.35
+    """And look so nearly where it was told to."""
+    speed_m_s: float = 0.15
+    """For Nav2's straight drives, which need one told; what limits the robot has still hold."""
+
+    def __post_init__(self) -> None:
+        for name in ("namespace", "tf_namespace"):
+            bare = getattr(self, name).strip("/")
+            if bare and not all(part.isidentifier() for part in bare.split("/")):
+                raise NavigationError(f"{getattr(self, name)!r} is no ROS namespace; write it as /robot1.")
+            object.__setattr__(self, name, f"/{bare}" if bare else "")
+        numbers = [getattr(self, name) for name in self.__slots__ if not name.endswith("namespace")]
+        if not all(0.0 < number < 1e5 for number in numbers):
+            raise NavigationError("The settings of a ROS robot must be over 0.")

@@ -1,0 +1,166 @@
+"""roslibpy's own connection, made safe: sizes capped, messages read strictly, certificates checked, no silent retries.
+
+Importing this module imports twisted; only `link` does, and only when a robot is asked for.
+
+roslibpy tries again for ever when a connection is lost, and then sends what was meant for then; a goal that comes
+minutes late is a danger. Here a connection that is lost stays lost, and the driver makes a new one for the next goal.
+"""
+
+import threading
+from collections.abc import Callable, Mapping
+from math import ceil
+from typing import Any
+
+import msgspec
+import roslibpy
+from autobahn.twisted.websocket import connectWS
+from roslibpy.comm.comm_autobahn import AutobahnRosBridgeClientFactory, AutobahnRosBridgeProtocol
+from twisted.internet import reactor as _reactor
+from twisted.internet.error import ReactorNotRestartable
+from twisted.internet.ssl import optionsForClientTLS
+
+from avlmaps.navigate.ros.messages import MOST_BYTES, Incoming, shown
+
+reactor: Any = _reactor  # its methods are put on it at run time
+_PING_EVERY_S, _PING_WAIT_S = 5.0, 10.0
+_starting = threading.Lock()
+
+
+class _Protocol(AutobahnRosBridgeProtocol):
+    """Reads what comes as data, and hands it on; what is no message is counted and left out."""
+
+    factory: "_Factory"
+
+    def onMessage(self, payload: bytes, isBinary: bool) -> None:  # noqa: N802, N803 - autobahn's names
+        """Read one message."""
+        try:
+            if isBinary:
+                raise ValueError("binary")
+            message = msgspec.json.decode(payload, type=Incoming)
+            self.factory.on_incoming(message)
+        except (ValueError, TypeError, RecursionError) as fault:
+            self.factory.on_fault(shown(str(fault)))
+
+    def onClose(self, wasClean: bool, code: int | None, reason: str | None) -> None:  # noqa: N802, N803
+        """Keep why the connection ended."""
+        self.factory.told = shown(str(reason or ""))
+
+    def send_message(self, payload: bytes) -> None:
+        """Send one message, if the connection still stands by then."""
+        reactor.callFromThread(self._post, payload)
+
+    def _post(self, payload: bytes) -> None:
+        if self.state == self.STATE_OPEN:
+            self.sendMessage(payload)
+
+
+class _Factory(AutobahnRosBridgeClientFactory):
+    """Makes one connection and reports when it is there, and when it is over."""
+
+    protocol = _Protocol
+    maxRetries = 0  # noqa: N815 - twisted's name
+    noisy = False
+
+    def __init__(
+        self,
+        url: str,
+        headers: Mapping[str, str],
+        on_incoming: Callable[[Incoming], None],
+        on_fault: Callable[[str], None],
+        on_open: Callable[[], None],
+        on_over: Callable[[str], None],
+        timeout_s: float,
+    ) -> None:
+        super().__init__(url, headers=dict(headers))
+        self.on_incoming, self.on_fault, self.on_open, self.on_over = on_incoming, on_fault, on_open, on_over
+        self.timeout_s = timeout_s
+        self.told = ""
+        self.setProtocolOptions(
+            maxFramePayloadSize=MOST_BYTES,
+            maxMessagePayloadSize=MOST_BYTES,
+            openHandshakeTimeout=timeout_s,
+            closeHandshakeTimeout=1,
+            autoPingInterval=_PING_EVERY_S,
+            autoPingTimeout=_PING_WAIT_S,
+        )
+
+    def connect(self) -> None:
+        """Begin to connect, in the reactor's thread."""
+        reactor.callFromThread(self._begin)
+
+    def _begin(self) -> None:
+        # Without options autobahn would take any certificate for the robot's.
+        options = optionsForClientTLS(str(self.host)) if self.isSecure else None
+        self.connector = connectWS(self, options, timeout=ceil(self.timeout_s))
+
+    def ready(self, proto: AutobahnRosBridgeProtocol) -> None:
+        """Take note that messages can go."""
+        super().ready(proto)
+        self.on_open()
+
+    def clientConnectionLost(self, connector: Any, reason: Any) -> None:  # noqa: N802 - twisted's name
+        """Take note that it is over."""
+        self._proto = None
+        self.on_over(self.told or shown(reason.getErrorMessage()))
+
+    def clientConnectionFailed(self, connector: Any, reason: Any) -> None:  # noqa: N802 - twisted's name
+        """Take note that nobody answered."""
+        self.on_over(shown(reason.getErrorMessage()))
+
+    def drop(self) -> None:
+        """End the connection in any state; from any thread."""
+        reactor.callFromThread(self._drop)
+
+    def _drop(self) -> None:
+        proto = self._proto
+        if proto is not None and proto.state == proto.STATE_OPEN:
+            proto.sendClose()
+        elif self.connector is not None:
+            self.connector.disconnect()
+
+
+class Bridge(roslibpy.Ros):
+    """roslibpy's connection over the factory above; its topics work on it as on any other."""
+
+    def __init__(
+        self,
+        url: str,
+        headers: Mapping[str, str],
+        on_incoming: Callable[[Incoming], None],
+        on_fault: Callable[[str], None],
+        on_open: Callable[[], None],
+        on_over: Callable[[str], None],
+        timeout_s: float,
+    ) -> None:
+        """Begin to connect. All that is given is called in the network's thread."""
+        self._mine = _Factory(url, headers, on_incoming, on_fault, on_open, on_over, timeout_s)
+        super().__init__(url)
+
+    def connect(self) -> None:
+        """Connect through our own factory, in place of the one that roslibpy has just made."""
+        self.factory = self._mine
+        super().connect()
+
+
+def start_reactor() -> None:
+    """Run twisted's reactor in a thread of its own, once in a process.
+
+    Raises:
+        RuntimeError: it ran before and was stopped; twisted cannot start it again.
+    """
+    with _starting:
+        if reactor.running:
+            return
+        begun, fault = threading.Event(), []
+
+        def run() -> None:
+            try:
+                reactor.callWhenRunning(begun.set)
+                reactor.run(installSignalHandlers=False)
+            except ReactorNotRestartable as ended:
+                fault.append(ended)
+                begun.set()
+
+        threading.Thread(target=run, name="avlmaps-ros", daemon=True).start()
+        if not begun.wait(10.0) or fault:
+            raise RuntimeError("twisted's reactor was stopped earlier in this process and cannot start again")
