@@ -108,7 +108,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> DemoReport:
 def test_the_whole_demonstration_runs_on_a_small_flat(small: DemoReport) -> None:
     told = small.to_json()
     assert list(told) == [
-        "out", "report", "recording", "map", "voxels", "sounds", "photo_error", "questions", "seconds"
+        "out", "report", "recording", "map", "voxels", "sounds", "photo_error", "questions", "drive", "seconds",
     ]  # fmt: skip
     assert told["voxels"] > 500
     assert Path(told["map"]).is_dir()

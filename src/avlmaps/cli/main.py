@@ -8,6 +8,7 @@ from typing import Annotated, Any, Union
 import tyro
 
 from avlmaps.cli.bench import Bench
+from avlmaps.cli.go import Go
 from avlmaps.cli.output import UsageError
 from avlmaps.cli.verbs import AddSounds, Build, Demo, Info, Locate, Profiles, Query, Record, TeachSound, Verb
 from avlmaps.core.errors import AvlmapsError
@@ -26,6 +27,7 @@ VERBS: dict[str, type[Verb]] = {
     "info": Info,
     "query": Query,
     "locate": Locate,
+    "go": Go,
     "teach-sound": TeachSound,
     "profiles": Profiles,
     "bench": Bench,

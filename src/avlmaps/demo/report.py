@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from avlmaps.demo.drive import drive_card
 from avlmaps.demo.pictures import (
     Plan,
     Strip,
@@ -37,7 +38,7 @@ _LEGEND = 14
 _FIRST = 0.4  # of the walk: the moment that is shown before the slider is touched
 _STAGES = (
     ("home", "home", "#7c6f9b"), ("record", "drive and record", "#1f6fbf"), ("build", "map", "#0b7a75"),
-    ("choose", "choose questions", "#8a6d3b"), ("ask", "ask", "#b4531a"),
+    ("choose", "choose questions", "#8a6d3b"), ("ask", "ask", "#b4531a"), ("drive", "go", "#d6336c"),
 )  # fmt: skip
 
 
@@ -79,6 +80,7 @@ def write_report(
         f'<svg width="0" height="0" aria-hidden="true"><defs>{sheet.picture(ground, "ground")}</defs></svg>',
         _verdict(report),
         *shown,
+        "" if report.drive is None else drive_card(report.drive, sheet, report.scene),
         _honest(report, recording),
     ]
     own = files("avlmaps.demo")
@@ -334,6 +336,7 @@ def _honest(report: "DemoReport", recording: "Recording") -> str:
         f'avlmaps query {MAP} "the chair in the kitchen" --json\n'
         f"avlmaps locate {MAP} your_photo.jpg\n"
         f"avlmaps info {MAP}\n"
+        f'avlmaps go {MAP} "go to the table, then turn left" --scene {spec} --plot way.png\n'
         f"avlmaps record --scene {spec} --out another_walk --seed 1\n"
         f"avlmaps build another_walk --out another.avlmap\n"
         f"avlmaps demo --seed 1</code></pre>"

@@ -1,4 +1,7 @@
-"""Make a home, drive through it, hear it, map it, ask it; how far each answer is off, the truth tells afterwards."""
+"""Make a home, drive through it, hear it, map it, ask it, send a robot through it.
+
+How far each answer and each stop is off, the truth tells afterwards.
+"""
 
 import shutil
 from collections.abc import Iterator
@@ -15,6 +18,7 @@ from avlmaps.core.progress import progress, say
 from avlmaps.demo.questions import CLIP, MAP, PHOTO, Ask
 
 if TYPE_CHECKING:
+    from avlmaps.demo.drive import Drive
     from avlmaps.demo.evidence import Evidence
     from avlmaps.demo.questions import PhotoView
     from avlmaps.query.avlmap import AVLMap
@@ -96,6 +100,7 @@ class DemoReport:
         built: what `avlmaps build --json` prints.
         located: the photo's pose error in cm and degrees, or None where it was not located.
         seconds: how long each stage took.
+        drive: what the robot did when it was told where to go; None where there was nothing to go to.
     """
 
     out: Path
@@ -104,6 +109,7 @@ class DemoReport:
     built: dict[str, Any]
     located: tuple[float, float] | None
     seconds: dict[str, float] = field(default_factory=dict)
+    drive: "Drive | None" = None
 
     def to_json(self) -> dict[str, Any]:
         """Return it as `avlmaps demo --json` prints it."""
@@ -119,6 +125,7 @@ class DemoReport:
                 {"question": s.ask.title, "found": s.answer["found"], "right": s.right, "off_m": s.off_m}
                 for s in self.steps
             ],
+            "drive": None if self.drive is None else self.drive.to_json(),
             "seconds": self.seconds,
         }
 
@@ -127,6 +134,7 @@ class DemoReport:
         lines = [f"{'right' if step.right else 'WRONG'}  {step.ask.title}  ->  {step.said}" for step in self.steps]
         if self.located is not None:
             lines.append(f"photo located within {self.located[0]:.1f} cm and {self.located[1]:.2f} degrees")
+        lines += [] if self.drive is None else self.drive.lines()
         return [*lines, f"look at {self.out / 'report.html'}"]
 
 
@@ -144,6 +152,7 @@ def run_demo(
     Raises:
         MapError: the folder holds something that is no demonstration.
     """
+    from avlmaps.demo.drive import drive
     from avlmaps.demo.evidence import Evidence
     from avlmaps.demo.home import choose_home
     from avlmaps.demo.report import write_report
@@ -171,7 +180,9 @@ def run_demo(
         ]
         located = None if photo is None else _located(asked, photo, out)
     steps = tuple(step for step, _ in answered)
-    report = DemoReport(out, scene.name, steps, describe(stored), located, seconds)
+    with _stage("drive", seconds, "A robot is told where to go."):
+        driven = drive(asks, asked, scene, out, say)
+    report = DemoReport(out, scene.name, steps, describe(stored), located, seconds, driven)
     with _stage("report", seconds, "A page with pictures is written."):
         write_report(
             report, scene, recording, asked, evidence, photo, [answer for _, answer in answered], settings.moments

@@ -129,6 +129,7 @@ def instruct(
     *,
     settings: RobotSettings | None = None,
     readable: Readable | None = None,
+    translation: Translation | None = None,
     tell: Callable[[str], None] = _silent,
 ) -> Outcome:
     """Do what a command says.
@@ -142,13 +143,14 @@ def instruct(
         settings: how the robot takes its skills.
         readable: which files the program may load; by default those in the working directory, and those that the
             command names.
+        translation: what the translator made of the command, where it was asked before.
         tell: is given lines as it goes: the program, what is found, each step.
 
     Raises:
         LanguageError: the command was not understood. Whatever happens later is in the outcome.
     """
     begin = perf_counter()
-    translation = translator.program_for(command)
+    translation = translation or translator.program_for(command)
     robot = Robot(asked, driver, settings, readable or offered_by(command), lambda line: tell(f"  {line}"))
     run = _Run(command, translator, robot, budget, tell)
     run.through(translation)

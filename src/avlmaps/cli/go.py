@@ -1,0 +1,88 @@
+"""`avlmaps go`: a sentence becomes a program, and the robot drives."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from tyro.conf import OmitArgPrefixes, Positional, arg
+
+from avlmaps.cli.output import emit, place, table_lines
+from avlmaps.cli.verbs import Verb
+from avlmaps.core.errors import NavigationError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chat:
+    """The chat model of --language chat; what is not given is read from AVLMAPS_CHAT_MODEL and its like."""
+
+    chat_model: str | None = None
+    """Name of the chat model. Default: the only one that the server has."""
+    chat_url: str | None = None
+    """Address of the server, such as http://localhost:11434/v1. Default: OpenAI's own."""
+    chat_replay: Path | None = None
+    """A file of what a chat model answered: made where it is missing, asked instead of the model where it is there."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Go(Verb):
+    """Tell the robot where to go, in a sentence; it writes its program, drives, and tells how near it came.
+
+    The map is all that the robot knows. Its body is simulated in --scene, which must be the scene that was recorded:
+    recordings of `avlmaps record` and their maps lie in their scene's frame. A real robot drives with --robot.
+
+    Example: avlmaps go MAP "first go to the sofa, then face the tv" --scene house:7 --plot way.png
+    """
+
+    map: Positional[Path]
+    """The map."""
+    sentence: Positional[str]
+    """What the robot is to do."""
+    scene: str | None = None
+    """The scene in which the simulated body drives: house:SEED, office:SEED or a file, as for `avlmaps record`."""
+    language: Literal["rules", "chat"] = "rules"
+    """Who writes the program: a grammar that needs nothing, or a chat model (pip install 'avlmaps[chat]')."""
+    chat: Annotated[Chat, OmitArgPrefixes] = field(default_factory=Chat)
+    """Which chat model."""
+    body: Literal["base", "drone"] = "base"
+    """Whose body: what stands in the way of a wheeled base may not be in that of a drone."""
+    robot: Literal["simulated", "nav2", "move_base"] = "simulated"
+    """What moves: a simulated body, or a real robot over rosbridge (pip install 'avlmaps[ros]')."""
+    ros: str = "ws://localhost:9090"
+    """Address of rosbridge, for --robot nav2 and move_base."""
+    ros_frames: Path | None = None
+    """A JSON file that tells how the robot's frames lie to the map's (docs/robots.md)."""
+    start: Annotated[str | None, arg(metavar="X,Y,HEADING")] = None
+    """Where the simulated robot starts: metres, degrees counter-clockwise from +x. Default: where the walk began."""
+    guess: bool = False
+    """Go to the best guess where the map is not sure that it holds what is named."""
+    dry_run: bool = False
+    """Print the program, and do not drive; neither the map nor a scene is opened."""
+    plot: Path | None = None
+    """Draw the way over the map into this picture: start, goals, stops, what was met."""
+
+    def run(self) -> None:
+        """Drive."""
+        from avlmaps.cli.going import go
+
+        answer = go(self)
+        emit(answer, go_lines(answer), self.json)
+        if not answer["ok"]:
+            raise NavigationError(answer["error"])
+
+
+def go_lines(answer: dict[str, Any]) -> list[str]:
+    """Lay out what `go` tells: the program, and the places."""
+    lines = answer["program"].splitlines()
+    rows = [
+        (
+            number, goal["name"] or goal["skill"].replace("_", " "), place(goal["goal"]), place(goal["stop"]),
+            f"{goal['distance_m']:.2f} m" + ("" if goal["reached"] else ", not reached"),
+        )
+        for number, goal in enumerate(answer["subgoals"], 1)
+    ]  # fmt: skip
+    lines += table_lines(("", "went to", "goal", "stopped at", "away"), rows) if rows else []
+    lines += [f"note: {note}" for note in answer["notes"]]
+    if answer["steps"]:
+        done = "done" if answer["ok"] else "not done"
+        lines.append(f"{done}: {answer['path_m']:.1f} m driven, {len(answer['actions'])} actions")
+    return lines

@@ -1,0 +1,158 @@
+"""The demonstration's last step: a spoken command is obeyed in the home, and judged by what truly stands there."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.motion import GroundPose
+from avlmaps.demo.questions import MAP, Ask
+from avlmaps.demo.run import REACH_M
+from avlmaps.demo.svg import Sheet
+
+if TYPE_CHECKING:
+    from avlmaps.navigate.instruct import Outcome
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.sim.scene import Scene
+
+PICTURE = "drive.png"
+# The robot is sent to what was asked for in these ways: together they need every sense, and nothing beside the command.
+_TOLD = ("sound", "area", "words")
+_MOST_LEGS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """A command, and what became of it.
+
+    Attributes:
+        command: what the robot was told.
+        asks: what each leg goes to, with its truth.
+        start: where it stood; None where it could not be put anywhere.
+        outcome: what it did; None where it could not begin.
+        error: why not, or why it did not end.
+    """
+
+    command: str
+    asks: tuple[Ask, ...]
+    start: GroundPose | None
+    outcome: "Outcome | None"
+    error: str | None
+
+    @property
+    def off_m(self) -> tuple[float | None, ...]:
+        """For each leg how far from the nearest true thing the robot stopped; None where it never stopped for it."""
+        stops = [move.stop for move in self.outcome.subgoals] if self.outcome else []
+        stops += [None] * (len(self.asks) - len(stops))
+        return tuple(
+            None if stop is None else min(box.distance_m(stop) for box in ask.truth)
+            for ask, stop in zip(self.asks, stops, strict=False)
+        )
+
+    @property
+    def right(self) -> tuple[bool, ...]:
+        """For each leg whether the robot stopped at the right thing."""
+        return tuple(off is not None and off <= REACH_M for off in self.off_m)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as `avlmaps demo --json` prints it."""
+        legs = [
+            {"to": ask.title, "right": right, "off_m": None if off is None else round(off, 3)}
+            for ask, right, off in zip(self.asks, self.right, self.off_m, strict=True)
+        ]
+        outcome = None if self.outcome is None else self.outcome.to_json()
+        return {"command": self.command, "legs": legs, "error": self.error, "outcome": outcome}
+
+    def lines(self) -> list[str]:
+        """Return it as a person reads it."""
+        lines = [f"told: {self.command}"]
+        for ask, right, off in zip(self.asks, self.right, self.off_m, strict=True):
+            where = "never stopped for it" if off is None else f"stopped {off:.2f} m from the true one"
+            lines.append(f"{'right' if right else 'WRONG'}  {ask.title}  ->  {where}")
+        return lines + ([f"it ended early: {self.error}"] if self.error else [])
+
+
+def command_for(asks: Sequence[Ask]) -> tuple[str, tuple[Ask, ...]] | None:
+    """Return a command and what its legs go to, chosen by the kinds of questions; None where there is nothing."""
+    legs = [ask for kind in _TOLD for ask in asks if ask.kind == kind and ask.truth][:_MOST_LEGS]
+    if not legs:
+        return None
+    first, *others = (f"go to {ask.title}" for ask in legs)
+    return (f"first {first}, then {others[0]}" if others else first), tuple(legs)
+
+
+def drive(asks: Sequence[Ask], asked: "AVLMap", scene: "Scene", out: Path, tell: Callable[[str], None]) -> Drive | None:
+    """Tell a robot in the home where to go, and draw its way.
+
+    Args:
+        asks: the questions of the demonstration.
+        asked: the map, all that the robot knows.
+        scene: the home, in which its body moves.
+        out: the demonstration's folder.
+        tell: is given the program and the steps as they go.
+    """
+    from avlmaps.demo.driving import robot_in
+    from avlmaps.language.rules import RulesTranslator
+    from avlmaps.navigate.instruct import instruct
+    from avlmaps.navigate.skills import RobotSettings
+    from avlmaps.navigate.trace_plot import plot_way
+
+    chosen = command_for(asks)
+    if chosen is None:
+        return None
+    command, legs = chosen
+    try:
+        robot = robot_in(asked, scene)
+        # What it is sent to is truly there, so that it may go where it is not sure; whether that was right is told.
+        outcome = instruct(
+            command, asked, robot.driver, RulesTranslator(), settings=RobotSettings(guess=True), tell=tell
+        )
+    except AvlmapsError as fault:
+        return Drive(command, legs, None, None, str(fault))
+    met = getattr(robot.driver, "met_m", None)
+    plot_way(out / PICTURE, asked.space, robot.start, outcome.moves, robot.obstacles, met, f"“{command}”")
+    return Drive(command, legs, robot.start, outcome, outcome.error)
+
+
+def drive_card(drive: Drive, sheet: Sheet, scene: str) -> str:
+    """Return the report's part on the drive.
+
+    Args:
+        drive: what was told and done.
+        sheet: the frame of the drawings; the ground is drawn in the page already.
+        scene: the home's name, as `avlmaps go --scene` takes it.
+    """
+    right = sum(drive.right)
+    head = (
+        f"<h2>What it did when told: {right} of {len(drive.asks)} places right</h2><p>The sentence became a program, "
+        "the program asked the map, and the robot drove there with nothing but the map to find its way: 10 cm ahead or "
+        "5 degrees to a side at a time, in the home as it truly is. A stop is right when it lies within 1 m of the "
+        "thing that was meant.</p>"
+    )
+    if drive.outcome is None or drive.start is None:
+        return head + f'<div class="card"><p>“{escape(drive.command)}”: {escape(str(drive.error))}</p></div>'
+    way = np.column_stack([drive.outcome.path, np.zeros(len(drive.outcome.path))])
+    drawing = sheet.drawing(
+        [
+            '<use href="#ground"/>', sheet.rings([box for ask in drive.asks for box in ask.others], "other"),
+            sheet.rings([box for ask in drive.asks for box in ask.truth], "truth"),
+            sheet.walk(way) if len(way) else "", sheet.dot((drive.start.x_m, drive.start.y_m), "robot"),
+            sheet.goals([move.stop for move in drive.outcome.subgoals]),
+        ],
+        "the robot's way, seen from above",
+    )  # fmt: skip
+    verdict = "right" if right == len(drive.asks) else "wrong"
+    legs = "".join(f"<li>{escape(line)}</li>" for line in drive.lines()[1:])
+    told = f"{drive.outcome.path_m:.1f} m driven, {len(drive.outcome.actions)} actions"
+    return (
+        f'{head}<article class="card question"><div class="head"><h3>“{escape(drive.command)}”</h3>'
+        f'<span class="verdict {verdict}">{right} of {len(drive.asks)}</span></div>'
+        f"<pre><code>{escape(drive.outcome.program.strip())}</code></pre>{drawing}"
+        f'<ul>{legs}</ul><p class="note">{told}. Yellow: where it began; numbers: where it stopped; green: what was '
+        f"meant; dashed: others of the kind.</p><p><code>avlmaps go {MAP} &quot;{escape(drive.command)}&quot; --scene "
+        f'{escape(scene)} --guess --plot {PICTURE}</code> <a href="{PICTURE}">its plot</a></p></article>'
+    )

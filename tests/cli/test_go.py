@@ -1,0 +1,127 @@
+"""`avlmaps go`: a sentence in, a drive out; what can go wrong is one sentence each."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from avlmaps.sim.materials import material
+from avlmaps.sim.room import Room
+from avlmaps.sim.scene import Scene, SceneBuilder
+from avlmaps.sim.shapes import slab
+
+
+def scene_of(room: Room) -> Scene:
+    """Return the analytic room, whose map the fixtures build, as a scene of triangles."""
+    width, depth, height = room.size
+    plain = material("painted", np.random.default_rng(0))
+    builder = SceneBuilder("room")
+    builder.add("floor", slab(width / 2, depth / 2, -0.1, width, depth, 0.1, plain))
+    for x, y, w, d in (
+        (width / 2, -0.05, width, 0.1), (width / 2, depth + 0.05, width, 0.1),
+        (-0.05, depth / 2, 0.1, depth), (width + 0.05, depth / 2, 0.1, depth),
+    ):  # fmt: skip
+        builder.add("wall", slab(x, y, 0.0, w, d, height, plain))
+    for thing in room.things:
+        for low, high in thing.parts:
+            (x, y), (w, d, h) = (
+                [(a + b) / 2 for a, b in zip(low[:2], high[:2], strict=True)],
+                [b - a for a, b in zip(low, high, strict=True)],
+            )
+            builder.add(thing.category, slab(x, y, low[2], w, d, h, plain))
+    return builder.build()
+
+
+@pytest.fixture
+def in_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let any scene be the room that the map was made of."""
+    monkeypatch.setattr("avlmaps.sim.scenes.open_scene", lambda spec: scene_of(Room()))
+
+
+def test_a_sentence_is_obeyed_and_told(answer, built: Path, tmp_path: Path, in_room: None) -> None:
+    plot = tmp_path / "way.png"
+    said = answer("go", built, "go to the red thing, then turn left", "--scene", "room", "--plot", plot)
+    assert {"program", "steps", "actions", "subgoals", "ok"} <= set(said)
+    assert said["ok"] is True
+    assert said["error"] is None
+    (subgoal,) = said["subgoals"]
+    assert {"goal", "stop", "distance_m"} <= set(subgoal)
+    assert subgoal["distance_m"] < 1.5
+    assert said["actions"].count("stop") == 1
+    assert set(said["actions"]) <= {"move_forward", "turn_left", "turn_right", "stop"}
+    assert plot.stat().st_size > 5000
+
+
+def test_the_program_and_the_trace_are_told_as_it_drives(run, built: Path, in_room: None) -> None:
+    status, out, err = run("go", built, "turn left", "--scene", "room", "--start", "4.4,3.2,90")
+    assert status == 0, err
+    assert out.splitlines()[0] == "robot.turn(-90)"
+    assert "> robot.turn(-90)" in err
+    assert "heading 180°" in err
+
+
+def test_what_cannot_be_obeyed_is_told_with_status_1_and_json_all_the_same(run, built: Path, in_room: None) -> None:
+    import json
+
+    status, out, err = run("go", built, "go to the purple elephant near the sound of thunder", "--scene", "x", "--json")
+    assert status == 1
+    assert err.splitlines()[-1].startswith("avlmaps: ")
+    said = json.loads(out)
+    assert said["ok"] is False
+    assert said["error"] in err
+    assert said["steps"][-1]["error"]
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "sentence"),
+    [
+        (("nowhere.avlmap", "go to the chair", "--scene", "house:7"), 1, "nowhere.avlmap is not there"),
+        (("MAP", "go to the chair", "--scene", "house:seven"), 1, "names no seed"),
+        (("MAP", "gabble gabble the", "--scene", "house:7"), 1, "is not understood"),
+        (("MAP", "", "--scene", "house:7"), 1, "empty"),
+        (("MAP", "go to the chair"), 2, "go needs --scene"),
+        (("MAP", "go to the chair", "--scene", "house:7", "--start", "here"), 2, "--start takes x,y,heading"),
+        (("MAP", "go to the chair", "--scene", "house:7", "--start", "nan,1,2"), 2, "--start takes x,y,heading"),
+        (("MAP", "go to the chair", "--robot", "nav2", "--start", "1,2,3"), 2, "belong to a simulated robot"),
+        (("MAP", "go to the chair", "--scene", "missing.glb"), 1, "there is no scene"),
+    ],
+)
+def test_each_mistake_is_one_sentence(run, built: Path, words: tuple[str, ...], status: int, sentence: str) -> None:
+    got, out, err = run("go", *[str(built) if word == "MAP" else word for word in words])
+    assert got == status
+    assert sentence in err
+    assert "Traceback" not in err
+    assert out == ""
+
+
+@pytest.mark.parametrize("start", ["1.2,0.35,0", "40,40,0"])
+def test_a_start_in_a_thing_or_outside_is_refused(run, built: Path, in_room: None, start: str) -> None:
+    status, out, err = run("go", built, "turn left", "--scene", "room", "--start", start)
+    assert status == 1
+    assert "cannot stand at" in err
+    assert out == ""
+
+
+def test_a_scene_that_the_map_was_not_made_of_is_refused(run, built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    elsewhere = Room(things=(), size=(2.0, 2.0, 2.6))
+    monkeypatch.setattr("avlmaps.sim.scenes.open_scene", lambda spec: scene_of(elsewhere))
+    status, _, err = run("go", built, "turn left", "--scene", "room")
+    assert status == 1
+    assert "is not the one that was mapped" in err
+
+
+def test_a_dry_run_prints_the_program_and_opens_nothing(answer) -> None:
+    said = answer("go", "nowhere.avlmap", "go to the chair, then turn left", "--dry-run")
+    assert said["program"].splitlines() == ['robot.move_to_object("chair")', "robot.turn(-90)"]
+    assert said["steps"] == said["actions"] == said["subgoals"] == []
+
+
+def test_a_chat_model_without_its_extra_says_how_to_get_it(run, built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "openai", None)
+    monkeypatch.setenv("OPENAI_API_KEY", "none")
+    words = ("--scene", "house:7", "--language", "chat", "--chat-model", "m", "--chat-url", "http://localhost:9/v1")
+    status, _, err = run("go", built, "go to the chair", *words)
+    assert status == 1
+    assert "avlmaps[chat]" in err
