@@ -65,6 +65,14 @@ class Route:
         return hypot(pose.x_m - x, pose.y_m - y)
 
 
+def _farthest(
+    route: Route, lookaheads_m: tuple[float, ...], pose: GroundPose, safe: Safe | None
+) -> tuple[float, float]:
+    """Return the first place so far along a way to which a body can go straight; the last where there is none."""
+    places = [route.at(route.along_m + lookahead_m) for lookahead_m in lookaheads_m]
+    return next((place for place in places if safe is None or safe(pose, GroundPose(*place))), places[-1])
+
+
 class ActionController:
     """Chooses the paper's actions: turns until it looks along the way as well as 5 degrees allow, then steps on."""
 
@@ -118,11 +126,7 @@ class ActionController:
 
     def _target(self, pose: GroundPose) -> tuple[float, float]:
         """Return the place to head for: as far along the way as it can go straight."""
-        for lookahead_m in _LOOKAHEADS_M:
-            x_m, y_m = self.route.at(self.route.along_m + lookahead_m)
-            if self._safe(pose, GroundPose(x_m, y_m)):
-                break
-        return x_m, y_m
+        return _farthest(self.route, _LOOKAHEADS_M, pose, self._safe)
 
 
 def turns_for(angle_rad: float) -> list[Action]:
@@ -219,11 +223,8 @@ class VelocityController:
         return self._limited(0.0, self._turn_by(angle_left_rad))
 
     def _target(self, pose: GroundPose) -> tuple[float, float]:
-        for part in _SHORTER:
-            x_m, y_m = self.route.at(self.route.along_m + part * self.settings.lookahead_m)
-            if self._safe is None or self._safe(pose, GroundPose(x_m, y_m)):
-                break
-        return x_m, y_m
+        lookaheads_m = tuple(part * self.settings.lookahead_m for part in _SHORTER)
+        return _farthest(self.route, lookaheads_m, pose, self._safe)
 
     def _stands(self) -> bool:
         return abs(self.speed_m_s) < 1e-9 and abs(self.turn_rad_s) < 1e-9

@@ -263,7 +263,8 @@ class MapDriver:
         while trip.movements < self.settings.most_movements and idle < 5 / settings.tick_s:
             costmap = self.planner.costmap
             reach = (costmap.radius_m + settings.slow_room_m) / costmap.cell_size_m
-            room = grid_kernels.room_at(*costmap.in_cells(self._xy), costmap.occupied, reach) * costmap.cell_size_m
+            x, y = costmap.in_cells(self._xy)
+            room = grid_kernels.room_at(x, y, costmap.occupied, reach) * costmap.cell_size_m
             speed = controller.speed_m_s + settings.speed_m_s2 * settings.tick_s
             ahead_m = speed * settings.tick_s + 0.5 * speed**2 / settings.speed_m_s2
             along = self.pose.turned(0.5 * controller.turn_rad_s * ahead_m / max(speed, 0.05))
