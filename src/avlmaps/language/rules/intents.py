@@ -157,6 +157,13 @@ class Again:
 
 
 @dataclass(frozen=True, slots=True)
+class Following:
+    """Do all that follows so many times."""
+
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
 class Stay:
     """Stay here."""
 
@@ -168,4 +175,4 @@ class Mention:
     target: Target
 
 
-Intent = Go | Front | Move | Turn | TurnTo | Face | Beside | Viewpoints | Shuttle | Repeated | Again | Stay | Mention
+Intent = Go | Front | Move | Turn | TurnTo | Face | Beside | Viewpoints | Shuttle | Repeated | Again | Following | Stay | Mention

@@ -19,10 +19,11 @@ _PARTS_OF_AREAS = frozenset(
 _NOT_TOLD_APART = frozenset(
     {"other", "others", "second", "third", "fourth", "fifth", "furthest", "farthest", "nth", "next"}
 )
+_MEASURES = frozenset({"degrees", "degree", "metres", "meters", "metre", "cm", "centimetres", "centimeters", "times"})
 _STANDING = frozenset({"is", "are", "was", "were", "stands", "stand", "sits", "lies", "hangs", "lives"})
-_SOUNDING = re.compile(rf"(?:{'|'.join(SOUND_VERBS)})ing")
-_PAST = re.compile(rf"({'|'.join(SOUND_VERBS)})(?:ed|ped|med|ned|ped)")
-_PRESENT = re.compile(rf"({'|'.join(SOUND_VERBS)})(?:e?s)?")
+_SOUNDING = re.compile(rf"(?:{'|'.join(SOUND_VERBS)})[a-z]?ing")
+_PAST = re.compile(rf"({'|'.join(SOUND_VERBS)})([a-z]?)ed")
+_PRESENT = re.compile(rf"({'|'.join(SOUND_VERBS)})()(?:e?s)?")
 
 
 class Names:
@@ -46,6 +47,11 @@ class Names:
         for place in parts[1:]:
             context += self._context(place)
         return Target(named, tuple(context))
+
+    def heard_at(self, parts: list[Any]) -> Target:
+        """Return the sound of a `phrase` node, and where the places after it say that it was."""
+        context = [named for place in parts[1:] for named in self._context(place)]
+        return Target(Named(Modality.SOUND, " ".join(_words(parts[0]))), tuple(context))
 
     def _item(self, node: Any) -> tuple[Named | None, list[Named]]:
         if is_token(node, "IT"):
@@ -106,8 +112,11 @@ class Names:
         if told and any(is_token(token, "WHERE_HEARD") for token in node.children):
             return Named(Modality.SOUND, " ".join(spoken)), []
         kept = [word for word in spoken if word.lower() not in ("was", "were", "is", "are", "being", "has", "been")]
+        if not told and len(kept) > 2 and f"{kept[-2]} {kept[-1]}".lower() in ("went off", "goes off"):
+            kept = [*kept[:-2], "going", "off"]
+        being = len(kept) < len(spoken) and kept[-1:] and kept[-1].lower().endswith("ing")
         sounding = [*kept[:-1], _sounding(kept[-1])] if kept and not told else kept
-        if not told and not _is_sound(sounding):
+        if not told and not being and not _is_sound(sounding) and sounding[-2:] != ["going", "off"]:
             raise LanguageError(
                 f"'where {' '.join(spoken)}' is not understood; say what was heard there, like: where you heard a dog "
                 "barking, or where the thing is, like: next to the sofa."
@@ -116,6 +125,11 @@ class Names:
 
     def _thing(self, spoken: list[str]) -> tuple[Named, list[Named]]:
         """Return an object, or a sound or an area if the last word says so."""
+        if _MEASURES.intersection(word.lower() for word in spoken):
+            raise LanguageError(
+                f"{' '.join(spoken)!r} is not understood as the name of a thing; say how far or how much in figures, like: "
+                "go forward 2 metres, or: turn left 30 degrees."
+            )
         if spoken[0].lower() in _NOT_TOLD_APART and len(spoken) > 1:
             raise LanguageError(
                 f"{spoken[0]!r} cannot be told from the map in {' '.join(spoken)!r}; say what it is near, like: the "
@@ -175,7 +189,7 @@ def _sounding(word: str) -> str:
     for form in (_PAST, _PRESENT):
         found = form.fullmatch(word.lower())
         if found:
-            return f"{found[1]}ing"
+            return f"{found[1]}{found[2]}ing"
     return word
 
 

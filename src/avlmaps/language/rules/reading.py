@@ -12,6 +12,7 @@ from avlmaps.language.rules.intents import (
     Again,
     Beside,
     Face,
+    Following,
     Front,
     Go,
     Goal,
@@ -55,7 +56,7 @@ def read_clause(tree: Any, names: Names) -> Intent:
     action = next(child for child in tree.children if not is_token(child, "COUNT"))
     if is_rule(action, "action"):
         action = action.children[0]
-    counts = [words.count_of(child) for child in tree.children if is_token(child, "COUNT")]
+    counts = [words.count_of(child) for child in [*tree.children, *action.children] if is_token(child, "COUNT")]
     count = counts[0] if counts else None
     if count is not None and not 1 <= count <= _MOST_TIMES:
         raise LanguageError(
@@ -76,6 +77,9 @@ class _Reader:
         intent = reader(node)
         if self.count is None or isinstance(intent, Shuttle | Again | Mention | Stay):
             return intent
+        if self.count > 1 and isinstance(intent, Go) and intent.goals[0].relation is Relation.BETWEEN:
+            first, second = intent.goals[0].targets
+            return Shuttle((first, second), self.count)
         return intent if self.count == 1 else Repeated((intent,), self.count)
 
     # Going.
@@ -116,6 +120,10 @@ class _Reader:
                 f"{verb!r} does not say where to; say it like: {verb} to the sofa, or: {verb} forward 2 metres."
             )
         return Stay()
+
+    def _leave(self, node: Any) -> Intent:
+        self.names.notes.append(f"{str(node.children[0])!r} is left to the next way to go.")
+        return Mention(self._targets(node)[0])
 
     def _front_goal(self, node: Any) -> Intent:
         inner = [child for child in node.children if hasattr(child, "data")][0]
@@ -296,6 +304,13 @@ class _Reader:
 
     def _again(self, _: Any) -> Intent:
         return Again(2 if self.count is None else self.count)
+
+    def _mention_heard(self, node: Any) -> Intent:
+        return Mention(self.names.heard_at([child for child in node.children if hasattr(child, "data")]))
+
+    def _following(self, _: Any) -> Intent:
+        count, self.count = self.count or 1, None
+        return Following(count)
 
     def _mention(self, node: Any) -> Intent:
         return Mention(self._targets(node)[0])

@@ -11,7 +11,7 @@ from avlmaps.language.rules import words
 
 _DETERMINER = words.DETERMINER
 _SHOT = (
-    r"(?:photo(?:graph)?s?|picture|pic|image|snap(?:shot)?|shot|frame|view|still|selfie|scene|image file|screenshot)"
+    r"(?:photo(?:graph)?s?|picture|pic|image|snap(?:shot)?|shot|frame|view|still|selfie|scene|image file|screenshot|pictures|images|snapshots)"
 )
 _TAKEN = r"(?:(?:was|is|has been|were)? ?(?:taken|shot|captured|made|recorded|photographed|snapped|shows?|comes from|came from))"
 _RECORDING = r"(?:sounds?|noises?|recording|audio|clip|snippet|sample|track|file|sound clip|audio clip|audio snippet)"
@@ -24,18 +24,27 @@ _PATH_OF = (
     r"(?:called|named|file|at|in|from|under|stored (?:at|in|under)|taken (?:at|in)|with the (?:file ?)?name|path|of|taken|that)"
 )
 _ABOUT_FILES = [
+    (rf"\bwhere {_I} (?:was|were|am|are|stood|is)(?: standing)? when {_I} (?=(?:took|shot|made|snapped|captured))", "where i "),
+    (r"\bfind out (?=where|what)", "find "),
+    (rf"\b(?:{_DETERMINER} )?(?:exact |same |very )?{_SPOT} (?:where|at which|in which|from which|from where)\b|\bwherever\b", "where"),
+    (rf"\b(?:{_DETERMINER} )?{_SPOT} (?:that |which )?{_I} (?=(?:took|shot|saw|photographed|captured|heard)\b)", "where i "),
     # "where the photo x.png was taken", "the place in this picture: x.png" are the picture itself.
     (
         rf"(?:(?:(?:{_DETERMINER} )?{_SPOT} )?(?:where (?:{_I} )?(?:have |has |had )?(?:took|take|taken|shot|snapped|captured|made|see|saw|"
-        rf"photographed)? ?|(?:that (?:is |you see |i see )?)?(?:shown|seen|pictured|depicted|photographed|captured|visible) (?:in|on|by|at) )|"
-        rf"(?:{_DETERMINER} )?{_SPOT} (?:in|of|on|from) )?(?:{_DETERMINER} )?(?:\w+ )?{_SHOT}(?: {_PATH_OF})*:? ⟦(i\d+)⟧(?: {_TAKEN})?"
+        rf"photographed)?(?: in| on| at)? ?|(?:that (?:is |you see |i see )?)?(?:shown|seen|pictured|depicted|photographed|captured|visible) (?:in|on|by|at) )|"
+        rf"(?:{_DETERMINER} )?{_SPOT} (?:in|of|on|from) )?(?:{_DETERMINER} (?:\w+ )?)?{_SHOT}(?: {_PATH_OF})*:? ⟦(i\d+)⟧(?: {_TAKEN})?"
         r"(?: (?:at|from|in)\b(?= ?[,.;!?]|$))?",
         r" ⟦\1⟧",
     ),
-    (rf"(?:(?:{_DETERMINER} )?{_SPOT} )?where (?:(?:{_I} )(?:took|take|shot|snapped|captured|made) )?⟦(i\d+)⟧(?: {_TAKEN})?", r" ⟦\1⟧"),
+    (
+        rf"(?:{_DETERMINER} )?(?:same )?{_SPOT} (?:(?:that is |which is )?(?:shown|seen|pictured|depicted|photographed|captured|visible|as) )?"
+        rf"(?:in |of |on |by |at |from |as )?⟦(i\d+)⟧",
+        r" ⟦\1⟧",
+    ),
+    (rf"(?:(?:{_DETERMINER} )?{_SPOT} )?where (?:(?:{_I} )(?:took|take|shot|snapped|captured|made|photographed|saw|see)(?: in| on)? )?⟦(i\d+)⟧(?: {_TAKEN})?", r" ⟦\1⟧"),
     (
         rf"(?:(?:{_DETERMINER} )?{_SPOT} )?(?:where (?:{_I} )?(?:could |can |have |had )?(?:heard|hear|recorded)? ?)?"
-        rf"(?:something (?:like|similar to) |what you hear in )?(?:{_DETERMINER} )?(?:\w+ )?{_RECORDING}(?: (?:called|named|file|clip|"
+        rf"(?:something (?:like|similar to) |what you hear in )?(?:{_DETERMINER} (?:\w+ )?)?{_RECORDING}(?: (?:called|named|file|clip|"
         rf"recording|of|in|like|from|at|as in|under|similar to|on|recorded in|heard in|{_DETERMINER}|{_RECORDING}))*:? ⟦(c\d+)⟧(?: {_HEARD})?",
         r" ⟦\1⟧",
     ),
@@ -47,14 +56,24 @@ _ABOUT_FILES = [
 ]
 
 _ABOUT_PLACES = [
+    (r"^it(?:'s| is| must be) (.+?),? (?:that |where |which )?(?:i (?:want|need|would like|'d like) you|you (?:should|must|need to|have to|are to))\b"
+     r"[^,.;!?]*", r"go to \1"),
+    (r"\b(?:each|all|every one|both|every) of (?:the following|these|those)(?: \w+)?:?|\bthe following (?:places|things|objects|spots|locations):?", " "),
+    (r"\bwhatever (?:made|makes|was making|is making|produced|caused)\b|\bwhat(?:ever)? sounded like\b", " "),
+    (rf"(?:^|(?<=[;.]))\s*((?:in|near|by|next to|beside|on|inside) [^,;.]*?),? (?:there is|there's|you (?:will|can) (?:find|see)|you'll (?:find|see)) "
+     rf"([^,;.]+)", r" there is \2 \1"),
+    (rf"\b(?:{words.MOVE}) (?:to|towards?|closer to) ([^,;.]+?),? (?:until|till) you(?:'re| are) ({words.DISTANCE})(?: away)? (?:from|of) it\b",
+     r"stop \g<2> from \1"),
+    (rf"\band back(?: again)?(?=,? {words.COUNT}\b)", " ⟦shuttle⟧"),
+    (r"(?:^|(?<=[;.,])) ?off (?:you go )?(?=to\b|with you to\b)", " go "),
+    (r"(?<=\w) with you(?= ?[,.;!?]|$)", ""),
     (
         r",?\s*\b(?:that|this|it|there|which)?(?:'s| is| would be| will be) (?:exactly |precisely |just )?(?:where|the (?:place|spot|position|"
         r"location)(?: where| that)?|your (?:next |first |last |final )?(?:goal|destination|target|stop))\b(?: (?:i|we|you)\b[^,.;!?]*|"
         r" to \w+[^,.;!?]*)?(?=[,.;!?]|$)",
         " ; stop there",
     ),
-    (r"\b(?:the following|as follows)\b:?", " "),
-    (rf"\b{_DETERMINER} {_SPOT} (?:where|at which|in which|from which)\b", "where"),
+    (r"\bas follows\b:?|\bthe following:", " "),
     (
         rf"\b(?:to |at |in |into )?(?:{_DETERMINER}|some|any|somewhere|someplace|a) (?:good |free )?{_SPOT}(?: that is| which is| that's|"
         rf" located| right)? (?=(?:near|next to|beside|by|close|in|inside|on|between|in between|half|to the|left|right|north|south|east|"
@@ -67,7 +86,7 @@ _ABOUT_PLACES = [
     ),
     (r"\bthe (?:origin|source) of (?=sound|noise)", "the "),
     (
-        rf"\b(?:that|which|who) (?:is|are|was|were|stands?|sits?|lies|hangs|lives)(?: (?:located|standing|situated|placed|sitting|found|"
+        rf"\b(?:that|which|who)(?:'s| is| are| was| were| stands?| sits?| lies| hangs| lives)(?: (?:located|standing|situated|placed|sitting|found|"
         rf"right|just))*(?= (?:near|next|beside|by|close|in|inside|on|at|under|behind|in front|opposite|against|to the|where)\b)",
         "",
     ),
@@ -75,6 +94,7 @@ _ABOUT_PLACES = [
         r"(?<=\w) (?:located|situated|standing|placed)(?= (?:near|next to|beside|by|close to|in|inside|on|at|under|against|behind)\b)",
         "",
     ),
+    (r"\b(?:nearest|closest) ([\w-]+(?: [\w-]+)?) to (?=(?:the|my|a)\b)", r"\1 near "),
     (r"\b(?:that|which) (?:has|have|contains?|holds?)\b", "with"),
     (r"\b(with (?:the|an?) [\w ]+?) on (?:it|top of it|top)\b", r"\1"),
     (
@@ -103,6 +123,11 @@ _REACH = (
 _UNTIL = r"(?:until|till|'til|til)"
 
 _ABOUT_ORDER = [
+    (r",?\s*\bbut first\b,?|[,;.]?\s*\b(?:but )?(?:before (?:that|this|doing (?:so|that))|prior to (?:that|this)|beforehand)\b,?", " ; ⟦after⟧ "),
+    (r"(?:^|(?<=[;.]))\s*on (?:your|the) way to\b", " ; ⟦before⟧ go to"),
+    (r",?\s*\b(?:while |when )?on (?:your|the) way to\b", " ; go to"),
+    (rf"\b(?:do|repeat|perform|execute) (?:the following|this|these)?(?: \w+)?,? ({words.COUNT})\s*[:;]", r"; ⟦following⟧ \1 ;"),
+    (rf"\b(?:for )?({words.COUNT})\s*:", r"; ⟦following⟧ \1 ;"),
     (
         r"\bback and forth\b|\bto and fro\b|\bforth and back\b|\bbackwards? and forwards?\b|\bforwards? and backwards?\b",
         "⟦shuttle⟧",
@@ -114,6 +139,8 @@ _ABOUT_ORDER = [
     (r"(?<!\d)[.!?]+(?=\s|$)|[!?]+|(?<=\d)\.(?=\s|$)", ";"),
     (r"(?<!the )(?<!your )(?<!very )(?<!our )\bfirst\b,?(?! (?:goal|stop|destination|target|room|door|floor))", " "),
     (rf"(?:^|[,;]|\band\b|\bor\b)?\s*\b{_SEQUENCE}\b\s*,?", " ; "),
+    (rf"\b(?:{words.MOVE})(?: (?:straight|forwards?|ahead|on|along))* {_UNTIL} (?:you|it)(?:'re| are| is)(?: standing| positioned)? (?=between|in between|"
+     rf"halfway|to the (?:left|right)|left|right|behind|north|south|east|west|{words.DISTANCE})", "stop "),
     (rf"\b(?:{words.MOVE})(?: (?:straight|forwards?|ahead|on|along))* {_UNTIL} {_REACH}\b", "go to"),
     (rf"\b(?:stop|halt|stand still|pause)(?: moving| there| only)? (?:when|once|as soon as) {_REACH}\b", "go to"),
     (
@@ -140,14 +167,19 @@ _BEGINS_ACTION = (
     rf"circle|orbit|patrol|monitor|inspect|observe|examine|repeat|do (?:that|this|it|so)|back(?= (?:to|again)\b|\s*(?:[,;]|$))|"
     rf"reverse|to (?={_BEGINS_THING}|where\b|the\b|your start|start)|between|in between|in the middle|half-?way|(?:to|on|at) (?:the|its|your) "
     rf"(?:left|right|north|south|east|west)|with (?={_BEGINS_THING})(?=[^;]*\b(?:on|to|at) (?:your|its|the) (?:left|right)|[^;]*(?:behind|front of) "
-    rf"(?:you|yourself))|(?:so|such) that|keep(?:ing)?|have (?=.* (?:on|to) your)|put(?:ting)? (?=.* (?:on|to) your)|so (?:you|the)|"
-    rf"(?:making|make) sure|ensuring|(?:{words.MANIPULATE})(?= (?:{_DETERMINER}|up|it|me)\b)|{words.NEGATIONS}|(?:{words.ALL_COUNTS}))"
+    rf"(?:you|yourself))|(?:so|such) that|let|keep(?:ing)?|have (?=.* (?:on|to) your)|put(?:ting)? (?=.* (?:on|to) your)|so (?:you|the)|"
+    rf"(?:making|make) sure|ensuring|(?:{words.MANIPULATE})(?= (?:{_DETERMINER}|up|it|me)\b)|{words.NEGATIONS})"
 )
 
 _ABOUT_ACTIONS = [
     (
+        r"\b(?:go|come|drive|walk|move|head|run)(?: over)?(?: (?:to|and))? (?=(?:see|look at|look for|visit|check|find|inspect|have a look at|take a look "
+        r"at|stand|stop|wait|park|position|place|sit|stay|face|get)\b)",
+        "",
+    ),
+    (
         rf"\b(?:{words.TURN}|move|stand|position yourself|orient yourself)(?: (?:left|right|around|round))? (?:{_UNTIL}|so that|such that|so|to have|"
-        rf"in such a way that) (?:(?:you|it|the robot) )?(?:(?:are|is|'re|can) )?(?:directly )?(?:face|facing|see|looking (?:at|to|towards?)|look at|"
+        rf"in such a way that) (?:(?:you|it|the robot)\b ?)?(?:(?:are|is|'re|can|end up) )?(?:directly )?(?:face|facing|see|looking (?:at|to|towards?)|look at|"
         rf"have (?=[^;]* (?:ahead|in front)))\b",
         "; face",
     ),
@@ -157,7 +189,7 @@ _ABOUT_ACTIONS = [
         "; face",
     ),
     (
-        rf"\b(?:{words.TURN}|move|stand|position yourself|stop|park)(?: (?:left|right|around|round))? (?:{_UNTIL}|so that|such that|so|in such a way that)\b",
+        rf"\b(?:{words.TURN}|move|stand|position yourself|orient yourself|stop|park)(?: (?:left|right|around|round))? (?:{_UNTIL}|so that|such that|so|in such a way that)\b",
         "; so that",
     ),
     (rf"\b(?:turn|move|rotate) to have\b", "; have"),
@@ -177,17 +209,14 @@ _ABOUT_ACTIONS = [
     (rf",? (?=with your back (?:to|towards|against))", " ; "),
     (rf",?\s*\band (?:now |also |please )?(?={_BEGINS_ACTION}(?:\b|$))", " ; "),
     (rf",\s*(?={_BEGINS_ACTION}(?:\b|$))", " ; "),
-    (
-        r"\b(?:go|come|drive|walk|move|head|run)(?: over)?(?: (?:to|and))? (?=(?:see|look at|look for|visit|check|find|inspect|have a look at|take a look "
-        r"at|stand|stop|wait|park)\b)",
-        "",
-    ),
     (r"(?:(?<=;)|^)\s*(?:see|look for) ", " find "),
+    (r"(?:(?<=;)|^)\s*back(?: again)?\s*(?=;|$)", " return"),
+    (r"(?:(?<=;)|^)\s*back (?=to\b)", " return "),
 ]
 
 # "and in the kitchen" goes on telling where the thing is.
 _ABOUT_ENDS = [
-    (r",?\s*\band (?=(?:near|next to|beside|by|close to|at|around|alongside|in|inside|within|where)\b)", " "),
+    (r",?\s*\b(?:and|but) (?=(?:near|next to|beside|by|close to|at|around|alongside|in|inside|within|where)\b)", " "),
     (r"(?:(?<=;)|^)\s*(?:and|but|or|so|also|again)\b,?(?! )", " "),
     (r"(?:(?<=;)|^)\s*(?:and|but)\s+", " "),
     (r"\s+(?:and|,)+\s*(?=;|$)", " "),

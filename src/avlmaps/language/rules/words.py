@@ -9,7 +9,7 @@ from collections.abc import Sequence
 # Verbs that lead to a place. "find the chair" and "show me the chair" go there, too.
 # Verbs that take what they lead to without "to": "find the chair" and "show me the chair" go there, too.
 VISIT = (
-    r"show (?:me|us)(?: the way to)?|(?:go |come )?(?:look|search|hunt)(?:ing)? for|check (?:out|on)|checking (?:out|on)|checked out|"
+    r"show (?:me|us)(?: the way to)?|(?:find|locate|get) (?:me|us)|(?:go |come )?(?:look|search|hunt)(?:ing)? for|check (?:out|on)|checking (?:out|on)|checked out|"
     r"(?:your|the)(?: (?:next|first|final|last))? (?:goal|destination|target|stop) (?:is|should be|will be|would be)|"
     r"(?:visit|approach|reach|find|locate|seek|follow|enter|join|pass|tour|access|revisit|spot|track down|seek out|pay)(?:e?s|e?d)?|"
     r"found|(?:visit|approach|reach|find|locat|seek|follow|enter|join|pass|revisit)ing|get (?:me|us) to|"
@@ -22,28 +22,30 @@ GO = (
     r"locate|stand|drive|steer|navigate|stop) (?:yourself|itself|the robot)|pop (?:over|round)|set (?:off|out)|setting (?:off|out)|"
     r"(?:take|bring|lead|guide|escort|drive|walk|accompany|steer) (?:me|us)|(?:wait for|meet) (?:me|us)|"
     r"(?:i|we)(?:'d| would)?(?: really)? (?:want|need|expect|like|prefer) (?:you|the robot)(?: to be| standing| parked| waiting)?|"
-    r"head out|end up|come to (?:a|rest|a (?:complete )?(?:stop|halt|rest|standstill))|keep (?:going|moving|driving|walking|on)|"
+    r"head out|end up|come to (?:a|rest|a (?:complete )?(?:stop|halt|rest|standstill))|keep (?:going|moving|driving|walking|on)|off you go|"
     r"keep on (?:going|moving|driving|walking)|carry on|take (?:a|up) (?:position|station|stand|your (?:place|position))|be positioned|be located|"
     r"(?:go|move|drive|navigate|walk|travel|head|proceed|roll|run|ride|wander|stroll|come|get|step|continue|stop|halt|pause|stand|"
-    r"park|wait|stay|rest|settle|hurry|finish|relocate|scoot|glide|cruise|amble|saunter|trundle|dash|zoom|race|steer|advance|"
+    r"start|begin|park|wait|stay|rest|settle|hurry|finish|relocate|scoot|glide|cruise|amble|saunter|trundle|dash|zoom|race|steer|advance|"
     r"return|arrive|journey|march|venture|migrate|creep|crawl|linger|hover|remain|transfer|backtrack|shift|hop|be|rush|slide|end|"
-    r"skip|sprint|jog|hike|trek|hold)(?:e?s)?|"
+    r"inch|nudge|edge|shuffle|budge|skip|sprint|jog|hike|trek|hold)(?:e?s)?|"
     r"(?:going|moving|driving|navigating|walking|travell?ing|heading|proceeding|rolling|running|riding|wandering|strolling|coming|"
     r"getting|stepping|continuing|stopping|halting|pausing|standing|parking|waiting|staying|finishing|advancing|returning|"
-    r"arriving|went|gone|been|got|gotten|came|moved|driven|driven|walked|arrived|stopped|returned|relocating|traveled|travelled)"
+    r"arriving|went|gone|been|got|gotten|came|moved|driven|driven|walked|arrived|stopped|returned|relocating|starting|beginning|traveled|travelled)"
 )
 # Either of them.
 MOVE = rf"(?:{VISIT}|{GO})"
 DETERMINER = r"(?:the|an?|this|that|these|those|my|your|our|his|her|their)"
 RETURN = (
     r"(?:return|head|go|come|get|move|drive|walk|navigate|travel|roll|make your way|find your way|run|bring yourself|"
-    r"take (?:me|yourself)|trundle|wander)(?:ing|s)? back|return(?:ing|s)?|backtrack|retrace your steps"
+    r"take (?:me|yourself)|trundle|wander)(?:ing|s)? back|return(?:ing|s)?|double back|doubling back|turn back(?= to)|go home|backtrack|retrace your steps"
 )
 TURN = (
-    r"(?:turn|rotate|spin|swivel|pivot|swing|veer|revolve|twist|reorient|bear)(?: (?:yourself|itself|on the spot|in place))?|"
+    r"(?:turn|rotate|spin|swivel|pivot|swing|veer|revolve|twirl|twist|reorient|bear)(?: (?:yourself|itself|on the spot|in place))?|"
     r"(?:turning|rotating|spinning|swivell?ing|pivoting|turned|rotated)(?: (?:on the spot|in place))?"
 )
 FACE = (
+    r"(?:turn|direct|shift|focus|point)(?:ing)? (?:your|its) (?:attention|head|gaze|camera|eyes?|face|front|nose|body|view|sensors?) "
+    r"(?:to|towards?|at|on|onto)|"
     r"(?:turn|rotate|spin|swivel|pivot|swing)(?:ing)?(?: yourself)?(?: a?round)?(?: and| so as)? (?:to )?(?:face|facing|look at|"
     r"look (?:to|towards?)|be facing)|(?:orient|point|aim|direct|align)(?:ing)?(?: (?:yourself|itself|your (?:camera|head|front|"
     r"face|nose|eyes|gaze|view)))?(?: (?:at|to|towards?|with))?|(?:have|take) a look (?:at|to|towards?)|"
@@ -68,6 +70,17 @@ STOPS = (
 
 # Said for politeness or by habit; nothing changes when they are left out.
 FILLERS = (
+    r"\bfirst things first\b:?,?",
+    r"\b(?:i|we)(?:'d| would| will|'ll)? (?:really )?(?:be (?:very |so |really )?(?:glad|happy|grateful|pleased|delighted|obliged) if|"
+    r"appreciate it if|like it if|love it if|prefer it if|be grateful if) you(?: could| would| can)?\b",
+    r"\b(?:i (?:was|am|'m) wondering (?:if|whether)|i wonder if|(?:do|would) you think) (?:you|the robot)(?: could| would| can| might)?\b",
+    r"\b(?:it would|it'd|that would|it will) be (?:really |very |so )?(?:great|nice|good|lovely|wonderful|kind|helpful|ideal|perfect)(?: of you)?"
+    r"(?: if (?:you|the robot)(?: (?:could|would|can))?| (?:to|for you to))?\b",
+    r"\bwhat (?:i|we) (?:want|need|would like|'d like)(?: you to do)? (?:is|would be)(?: for you)?(?: to)?\b",
+    r"(?:^|(?<=[;,] )|(?<=please ))(?:mind|care to|fancy|do you mind)(?= \w+)(?! the\b)",
+    r"\b(?:when(?:ever)?|as soon as|if|once) you (?:(?:have|get|find) (?:a|some|the) (?:moment|minute|second|chance|time)|can|are (?:ready|able)|"
+    r"'re (?:ready|able)|feel like it|have time)\b",
+    r"\b(?:(?:i|we)(?:'m| am|'d| would| have| need|'ve)* )?(?:asking|request(?:ing)?|instruct(?:ing)?|command(?:ing)?|order(?:ing)?|telling|ask) (?:you|the robot) to\b",
     r"(?:hey|hi|hello|ok|okay|dear|yo|alright|all right|so|well|right|now)(?: there)?,? (?:mr\.? |little )?(?:robot|robbie|rover|"
     r"buddy|friend|assistant)\b",
     r"^(?:(?:hey|hi|hello|yo)(?: there)?|ok|okay|alright|all right|so|well|now|right|good|great|robot|cool)\b(?=\s*,)",
@@ -85,7 +98,7 @@ FILLERS = (
     r"\b(?:i|we)(?:'d| would) (?:be (?:glad|happy|grateful) if|appreciate it if) you(?: could| would)?\b",
     r"\b(?:it would|it'd|that would) be (?:great|nice|good|lovely|wonderful|kind|helpful)(?: of you)?(?: if you (?:could|would)|"
     r" to)?\b",
-    r"\b(?:you|the robot|it|we)(?: (?:should|must|shall|need to|have to|are to|is to|ought to|will(?: want to| need to)?|can|may|"
+    r"(?<!where )\b(?:you|the robot|it|we)(?: (?:should|must|shall|need to|have to|are to|is to|ought to|will(?: want to| need to)?|can|may|"
     r"might want to|is going to|are going to|could)|'ll|'d better|'re going to)(?: then| first| now| also)?\b(?! be (?:able|found))",
     r"\b(?:let's|let us|try to|try and|make sure (?:to|that you|you)|be sure to|remember to|have the robot|get the robot to|"
     r"make the robot|tell the robot to|go ahead and|feel free to|proceed to(?= (?:go|move|turn|face|drive|walk|look|find|stop))|"
@@ -93,7 +106,7 @@ FILLERS = (
     r"start (?:off )?(?:by|with)|begin (?:by|with)|finish (?:off )?by|end by|conclude by|continue by|follow this by)\b",
     r"\b(?:please|pls|plz|kindly|just|simply|quickly|slowly|carefully|gently|quietly|safely|immediately|at once|right away|"
     r"right now|straight away|as fast as you can|as soon as you can|asap|for me|for us|actually|basically|maybe|"
-    r"perhaps|yourself over|whenever you(?:'re| are) ready|when you(?:'re| are) ready|when you have a (?:moment|minute)|"
+    r"perhaps|whenever you(?:'re| are) ready|when you(?:'re| are) ready|when you have a (?:moment|minute)|"
     r"on your own|by yourself|also|again please|at your leisure|would you|will you|okay\?|exactly|precisely|roughly|"
     r"approximately|about(?= (?:\d|one|two|three|half|a |four|five|ten))|"
     r"directly(?= (?:to|in|on|at|by|north|south|left|right|behind|between))|straight(?= (?:to|over|into)\b)|right(?= (?:next to|"
@@ -149,18 +162,17 @@ _BEFORE = r"(?:(?:for|by|at|some|around|about|within|a (?:distance|further)(?: o
 DISTANCE = rf"{_BEFORE}(?:{_MEASURED}(?:more |further |long )?(?:{_UNIT})\b{_AND_PART}|{_LITTLE})(?: further| farther)?"
 # A word for a little may stand before a side; a number of degrees says the angle itself.
 ANGLE = (
-    rf"(?:by |for |through |at |an angle of )*(?:{_MEASURED}(?:degrees?|deg\b|°|radians?|rad\b)|(?:a )?(?:quarter|half|full)(?: an?)? turn|"
+    rf"(?:by |for |through |at |an angle of |another |about |around |some )*(?:{_MEASURED}(?:degrees?|deg\b|°|radians?|rad\b)|(?:a )?(?:quarter|half|full)(?: an?)? turn|"
     rf"{_LITTLE}|(?:a )?half[ -]?way)"
 )
 COUNT = (
-    rf"(?:once|twice|thrice|(?:for )?(?:(?:{_FIGURES}|{_WHOLE}|a couple of|a few|several) (?:more )?(?:times?|rounds?|laps?|loops?|"
+    rf"(?:once|twice|thrice|(?:for )?(?:(?:{_FIGURES}|{_WHOLE}|a couple of|a few|several) (?:more )?(?:times?|rounds?|laps?|loops?|trips?|round trips?|"
     r"rotations?|repetitions|cycles)))(?: in a row| in total| over| more)?"
 )
 
-ALL_COUNTS = COUNT
-
 # A sound is told from a thing by its last word.
 SOUND_VERBS = (
+    "play rain drum strum toot mow vacuum brew blar blast sizzl bubbl flow gush chatter bang thump tap scratch jingl groan moan sigh bleat "
     "bark cry weep ring tick break shatter sneeze snore crow drip buzz beep knock slam hum roar crackl splash laugh cough "
     "meow chirp sing run clap typ chim clank clatter creak crash growl hiss honk howl mew moo oink pop purr quack rattl "
     "rustl scream shout squeak talk speak thud tweet whin whistl yell fall burst flush pour hammer drill saw click boil"
@@ -176,7 +188,7 @@ PAST_TENSES = {
     "sings": "singing", "fell": "falling", "falls": "falling", "ran": "running", "runs": "running", "burst": "bursting",
     "spoke": "speaking", "crew": "crowing", "wept": "weeping", "shattered": "shattering", "slammed": "slamming",
     "dripped": "dripping", "hummed": "humming", "clapped": "clapping", "popped": "popping", "cried": "crying", "cries": "crying",
-    "smashed": "smashing",
+    "smashed": "smashing", "rung": "ringing", "blew": "blowing", "sung": "singing", "went off": "going off",
 }  # fmt: skip
 
 

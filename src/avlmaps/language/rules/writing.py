@@ -9,6 +9,7 @@ from avlmaps.language.rules.intents import (
     Again,
     Beside,
     Face,
+    Following,
     Front,
     Go,
     Goal,
@@ -53,7 +54,9 @@ def _with_fronts_resolved(intents: Sequence[Intent]) -> list[Intent]:
     """
     resolved: list[Intent] = []
     held: Front | None = None
-    for intent in intents:
+    for at, intent in enumerate(intents):
+        if isinstance(intent, Following):
+            return [*resolved, Repeated(tuple(_with_fronts_resolved(intents[at + 1 :])), intent.count)]
         if held is not None and held.near and _plain_thing(intent):
             resolved.append(_with_context(intent, held))
             held = None
@@ -127,7 +130,7 @@ class _Writer:
                 self._again(count)
             case Mention(target=target):
                 self._target(target)
-            case Stay() | Front():
+            case Stay() | Front() | Following():
                 pass
 
     def _do(self, call: str) -> None:
