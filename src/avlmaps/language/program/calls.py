@@ -5,7 +5,7 @@ from difflib import get_close_matches
 
 from avlmaps.core.errors import ProgramError
 from avlmaps.language.program.budget import refused
-from avlmaps.language.program.syntax import Argument, BuiltinCall, Constant, Expression, SkillCall
+from avlmaps.language.program.syntax import Argument, BuiltinCall, Expression, SkillCall
 from avlmaps.language.program.table import ROBOT, SKILLS, Parameter, Skill
 
 # How few and how many arguments each function takes; None is no limit.
@@ -72,8 +72,6 @@ def bind_skill(
     missing = [each.name for each in skill.parameters if each.default is None and each.name not in given]
     if missing:
         raise refused(line, f"`{skill.name}` needs its {_listed(missing)}; it is {skill.signature}")
-    if skill.takes_exactly_one:
-        check_exactly_one(line, skill, sum(argument.value != Constant(None, line) for argument in bound))
     return SkillCall(skill.name, tuple(bound), line)
 
 

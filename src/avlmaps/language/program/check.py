@@ -4,12 +4,13 @@ A robot that has begun to move should not stop half way for a slip that could be
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from enum import Enum, auto
 from typing import Any
 
 from avlmaps.core.errors import ProgramError
 from avlmaps.language.program.budget import refused
-from avlmaps.language.program.calls import nearest, parameter_of
+from avlmaps.language.program.calls import check_exactly_one, nearest, parameter_of
 from avlmaps.language.program.kinds import (
     Kind,
     check_comparison,
@@ -158,21 +159,20 @@ class _Kinds:
 
     def __init__(self) -> None:
         self.names: dict[str, Guess] = {}
+        self.settled = False
 
     def settle(self, statements: tuple[Statement, ...]) -> bool:
         """Find the kinds of all names; return whether they came to rest."""
         for _ in range(_MOST_PASSES):
             before = dict(self.names)
             for statement in statements_of(statements):
-                try:
+                # With kinds that are not settled a fault may be none; what is one still is when all are seen again.
+                with suppress(ProgramError):
                     self.see(statement)
-                except ProgramError:
-                    # With kinds that are not settled this may be no fault; the last pass will tell.
-                    for name in _names_given(statement):
-                        self.names[name] = Unsure.ANYTHING
             if self.names == before:
-                return True
-        return False
+                self.settled = True
+                break
+        return self.settled
 
     def see(self, statement: Statement) -> None:
         """Add what one statement tells of its names' kinds; refuse what cannot be."""
@@ -184,7 +184,7 @@ class _Kinds:
                     statement.line, statement.operator, self.names.get(statement.name, Unsure.NOT_YET),
                     self.of(statement.value),
                 )  # fmt: skip
-                if statement.operator == "+" and made is Kind.LIST:
+                if self.settled and statement.operator == "+" and made is Kind.LIST:
                     raise grown(statement)
                 self._join(statement.name, made)
             case Perform():
@@ -283,10 +283,13 @@ class _Kinds:
 
     def skill(self, call: SkillCall) -> Guess:
         skill = SKILLS[call.skill]
-        for argument in call.arguments:
-            kind = self.of(argument.value)
+        kinds = [self.of(argument.value) for argument in call.arguments]
+        for argument, kind in zip(call.arguments, kinds, strict=True):
             if isinstance(kind, Kind):
                 check_argument(argument.value.line, skill, parameter_of(skill, argument.parameter), kind)
+        surely = sum(isinstance(kind, Kind) and kind is not Kind.NOTHING for kind in kinds)
+        if surely > 1 or all(kind is Kind.NOTHING for kind in kinds):
+            check_exactly_one(call.line, skill, surely)
         return skill.returns
 
     def arithmetic(self, line: int, operator: str, left: Guess, right: Guess) -> Guess:

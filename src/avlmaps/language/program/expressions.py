@@ -26,7 +26,8 @@ DEEPEST = 50
 
 _TERNARY, _OR, _AND, _NOT, _COMPARE, _SUM, _TERM, _SIGN = range(8)
 _LEVELS = {"+": _SUM, "-": _SUM, "*": _TERM, "/": _TERM, "//": _TERM, "%": _TERM}
-_COMPARISONS = frozenset({"==", "!=", "<", "<=", ">", ">="})
+_COMPARISONS = frozenset({"==", "!=", "<", "<=", ">", ">=", "in", "is"})
+_INFIXES = frozenset({*_LEVELS, *_COMPARISONS, "not", "and", "or", "if"})
 _CONSTANTS = {"None": None, "True": True, "False": False}
 
 
@@ -51,14 +52,15 @@ class Expressions:
 
     def sees(self, *texts: str) -> bool:
         """Return whether the next token is one of these words or signs."""
-        return self.here.form in (Form.SIGN, Form.WORD) and self.here.text in texts
+        # Names are never keywords, strings keep their quotes: no other token has the text of a word or sign.
+        return self.tokens[self.at].text in texts
 
     def took(self, text: str) -> bool:
         """Go past a word or sign if it comes next, and return whether it did."""
-        if self.sees(text):
-            self.at += 1
-            return True
-        return False
+        if self.tokens[self.at].text != text:
+            return False
+        self.at += 1
+        return True
 
     def need(self, text: str, where: str) -> None:
         """Go past a word or sign that must come next."""
@@ -95,7 +97,9 @@ class Expressions:
     def _infixes(self, left: Expression, level: int) -> Expression:
         while True:
             line, word = self.here.line, self.here.text
-            if self.here.form is Form.SIGN and _LEVELS.get(word, -1) >= level:
+            if word not in _INFIXES:
+                return left
+            if _LEVELS.get(word, -1) >= level:
                 self.take()
                 left = Binary(word, left, self.expression(_LEVELS[word] + 1), line)
             elif level <= _COMPARE and self._comparison_here():
@@ -114,11 +118,7 @@ class Expressions:
 
     def _comparison_here(self) -> bool:
         after = self.tokens[min(self.at + 1, len(self.tokens) - 1)]
-        return (
-            (self.here.form is Form.SIGN and self.here.text in _COMPARISONS)
-            or self.sees("in", "is")
-            or (self.sees("not") and after.form is Form.WORD and after.text == "in")
-        )
+        return self.here.text in _COMPARISONS or (self.sees("not") and after.text == "in")
 
     def _comparison(self, first: Expression) -> Comparison:
         line, operators, rest = self.here.line, [], []

@@ -51,6 +51,7 @@ from avlmaps.language.program.values import (
     call_function,
     combined,
     element_of,
+    handed_on,
     kind_of,
     shown,
     signed,
@@ -330,7 +331,7 @@ class _Run:
     def perform(self, part: SkillCall, arguments: dict[str, Any], seen: dict[str, Any]) -> Value:
         """Call the skill, the one place where a program reaches anything."""
         skill, began = SKILLS[part.skill], self.clock()
-        given = {name: value.heat if isinstance(value, Made) else value for name, value in arguments.items()}
+        given = {name: handed_on(value) for name, value in arguments.items()}
         try:
             returned = getattr(self.vocabulary, skill.name)(**given)
         except AvlmapsError as fault:

@@ -13,7 +13,7 @@ class Kind(StrEnum):
     """A kind of value; its word is what errors call it."""
 
     NOTHING = "None"
-    TRUTH = "True or False"
+    TRUTH = "a truth value"
     NUMBER = "a number"
     STRING = "a string"
     LIST = "a list"

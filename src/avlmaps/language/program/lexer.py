@@ -45,7 +45,7 @@ _REFUSED_WORDS = {
     "as": "give a value a name with `name = value`",
 }
 _REFUSED_SIGNS = {
-    "**": "multiply with `*`",
+    "**": "multiply with `*`, and write each argument",
     "**=": "multiply with `*`",
     ":=": "give the value its name on a line before, with `=`",
     "@": "there are no decorators and no matrices",
@@ -215,6 +215,8 @@ class _Lexer:
             )
         text, kind = found.group(), found.lastgroup
         self.at = found.end()
+        if kind in ("space", "comment"):
+            return
         match kind:
             case "string":
                 self._string(text)

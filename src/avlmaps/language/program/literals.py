@@ -35,8 +35,9 @@ def number(line: int, text: str) -> int | float:
 
 def bounded(line: int, value: int | float) -> int | float:
     """Return a number, unless it is too far from zero, infinite or none at all."""
+    # Not a number is on neither side.
     if not -LARGEST <= value <= LARGEST:
-        raise refused(line, f"a number came out beyond {LARGEST:.0e} in size; programs reckon in metres and degrees")
+        raise refused(line, "a number came out beyond 1e15 in size; programs reckon in metres and degrees")
     return value
 
 
@@ -58,4 +59,7 @@ def _unescaped(line: int, escape: str) -> str:
         code = int(escape[2:], 16)
         if 0x20 <= code <= 0x10FFFF and not 0xD800 <= code <= 0xDFFF:
             return chr(code)
-    raise refused(line, f"the string has `{escape}`, which stands for no character here; write `\\\\` for a backslash")
+    raise refused(
+        line,
+        f"the string has a backslash before {escape[1:]!r}, which makes no character; write `\\\\` for a backslash",
+    )

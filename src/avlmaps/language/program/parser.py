@@ -10,6 +10,7 @@ from avlmaps.language.program.syntax import (
     Assign,
     Branch,
     Collection,
+    Element,
     Expression,
     For,
     If,
@@ -77,13 +78,13 @@ class _Statements(Expressions):
         self.take()
         return statements
 
-    def _block(self, after: str) -> tuple[Statement, ...]:
+    def _block(self, word: str, after: str) -> tuple[Statement, ...]:
         self.need(":", f"after {after}")
         if self.here.form is not Form.LINE_END:
             return tuple(self._simple_line())
         self.take()
         if self.here.form is not Form.INDENT:
-            raise refused(self.here.line, f"the block of {after} is missing; indent the lines that belong to it")
+            raise refused(self.here.line, f"the block of `{word}` is missing; indent the lines that belong to it")
         self.take()
         statements: list[Statement] = []
         while self.here.form is not Form.DEDENT:
@@ -98,9 +99,9 @@ class _Statements(Expressions):
                 break
             word = self.take()
             test = self.whole()
-            branches.append(Branch(test, self._block(f"the condition of `{word.text}`"), word.line))
+            branches.append(Branch(test, self._block(word.text, f"the condition of `{word.text}`"), word.line))
         if self.took("else"):
-            otherwise = self._block("`else`")
+            otherwise = self._block("else", "`else`")
         return If(tuple(branches), otherwise, line)
 
     def _for(self) -> For:
@@ -109,7 +110,7 @@ class _Statements(Expressions):
         self.need("in", "after the name that `for` gives")
         through = self.listed(":")
         self.loops += 1
-        body = self._block("what `for` goes through")
+        body = self._block("for", "what `for` goes through")
         self.loops -= 1
         return For(target, through, body, line)
 
@@ -162,4 +163,6 @@ class _Statements(Expressions):
             names = [part.name for part in written.elements if isinstance(part, Name)]
             if len(names) == len(written.elements):
                 return Target(tuple(check_assignable(line, name) for name in names), unpacks=True)
-        raise refused(line, "only names are given values; a list is not changed but made anew, as in `a = a + [b]`")
+        if isinstance(written, Element):
+            raise refused(line, "a list is not changed but made anew, as in `a = a + [b]`")
+        raise refused(line, "only a name is given a value, or several as in `a, b = 1, 2`; put it left of the `=`")

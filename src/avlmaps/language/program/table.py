@@ -15,7 +15,6 @@ ROBOT = "robot"
 _KINDS: dict[Any, tuple[Kind, str]] = {
     NoneType: (Kind.NOTHING, "None"),
     bool: (Kind.TRUTH, "bool"),
-    int: (Kind.NUMBER, "int"),
     float: (Kind.NUMBER, "float"),
     str: (Kind.STRING, "str"),
     Place: (Kind.PLACE, "Place"),

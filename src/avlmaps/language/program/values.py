@@ -83,6 +83,8 @@ def combined(line: int, operator: str, left: Any, right: Any, factors: int) -> V
     kind = kind_of_result(line, operator, kind_of(left), kind_of(right))
     if kind is Kind.HEAT:
         return _product(line, left, right, factors)
+    if kind is Kind.PLACE:
+        left, right = handed_on(left), handed_on(right)
     try:
         made = _ARITHMETIC[operator](left, right)
     except ZeroDivisionError:
@@ -166,6 +168,13 @@ def _rounded(line: int, arguments: list[Any]) -> int | float:
     if type(digits) is not int or not -15 <= digits <= 15:
         raise refused(line, f"`round` takes a whole number of digits from -15 to 15, not {digits}")
     return bounded(line, round(arguments[0], digits))
+
+
+def handed_on(value: Value) -> Any:
+    """Return what a skill is given for a value: the heatmap itself; floats, since signatures have no whole numbers."""
+    if isinstance(value, Made):
+        return value.heat
+    return float(value) if type(value) is int else value
 
 
 def adopted(skill: Skill, result: Any, how: str) -> Value:

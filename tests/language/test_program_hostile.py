@@ -1,0 +1,97 @@
+"""Tens of thousands of hostile programs: none reaches anything but a skill, and none runs past its budget."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from avlmaps.core.errors import ProgramError
+from avlmaps.language.program import Budget, parse_program, run_program
+from helpers.hostile_programs import ESCAPES, WORDS
+from helpers.recording_robot import RecordingRobot
+
+TESTS = Path(__file__).parents[1]
+
+
+def watched(*arguments: str) -> dict[str, Any]:
+    """Run hostile programs in a process of their own whose every audit event is seen; return what it tells."""
+    script = TESTS / "helpers" / "hostile_programs.py"
+    environment = os.environ | {"PYTHONPATH": str(TESTS), "PYTHONHASHSEED": "0"}
+    command = [sys.executable, str(script), *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, timeout=290)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return json.loads(done.stdout)
+
+
+def test_twenty_thousand_hostile_programs_reach_nothing_and_stop() -> None:
+    told = watched("20000", "1")
+    assert told["programs"] == 20_000 == told["refused"] + told["stopped"] + told["ended"]
+    # Not one audit event: nothing is opened, connected, started, imported or compiled, and no id or frame is asked.
+    assert told["events"] == []
+    # Every refusal is one sentence with its line, every trace is JSON, no more skills are called than the budget has,
+    # and nothing but skills is looked up on the robot or in a heatmap.
+    assert told["faults"] == []
+    # A hundred programs at a time, giants among them, on a machine that may be busy.
+    assert told["slowest_batch_s"] < 20
+    assert told["largest_trace"] < 100_000
+    assert told["grown_mb"] < 100
+    # And the programs are not all turned away at the door.
+    assert told["ended"] > 1000 and told["stopped"] > 500 and told["calls"] > 10_000 and told["sentences"] > 300
+
+
+def test_the_watch_sees_a_parser_that_hands_the_text_to_python() -> None:
+    told = watched("300", "1", "--leak")
+    assert {event for event, _ in told["events"]} == {"compile"}
+    assert told["faults"]
+
+
+SMALL = Budget(steps=500, skill_calls=5, elements=500)
+
+
+@given(st.one_of(st.text(max_size=60), st.lists(st.sampled_from([*WORDS, *ESCAPES]), max_size=12).map(" ".join)))
+def test_any_text_is_a_program_or_refused(text: str) -> None:
+    try:
+        program = parse_program(text)
+    except ProgramError as fault:
+        assert str(fault).startswith(("Line ", "The program ")) and str(fault).endswith((".", "?"))
+        str(fault).encode("utf-8")
+        return
+    robot = RecordingRobot()
+    trace = run_program(program, robot, SMALL)
+    assert len(robot.calls) <= 5 and robot.looked_up == []
+    json.dumps(trace.to_json(), allow_nan=False)
+
+
+@pytest.mark.parametrize("grown", ["(a, a)", "[a, a]", "a + a", "[a] + [a]", "(a, 1, a)"])
+def test_what_doubles_at_each_step_is_stopped_while_it_is_small(grown: str) -> None:
+    start = "'x'" if grown == "a + a" else "[1]"
+    text = f"a = {start}\nfor i in range(1000):\n    a = {grown}\n" + "b = a == a\nmove_to('x')\n"
+    try:
+        trace = run_program(parse_program(text), RecordingRobot(), Budget(elements=5000))
+    except ProgramError as fault:
+        assert "neither" in str(fault)
+        return
+    assert trace.error and ("elements" in trace.error or "nest" in trace.error) and not trace.steps
+
+
+def test_heatmaps_that_double_are_stopped_before_their_product_is_large() -> None:
+    trace = run_program(parse_program("h = get_map('a')\nfor i in range(100):\n    h = h * h\n"), RecordingRobot())
+    assert trace.error == "Line 3: more than 16 Heats are multiplied into one; leave some out."
+
+
+@pytest.mark.parametrize("letter", ["ｅ", "𝐞", "ℯ"])
+def test_a_letter_that_only_looks_like_one_makes_no_name(letter: str) -> None:
+    for text in (
+        f"{letter}val('1')",
+        f"robot.mov{letter}_to('x')",
+        f"x{letter} = 1",
+        f"robot.turn(angl{letter}_deg=1)",
+    ):
+        with pytest.raises(ProgramError, match=f"U\\+{ord(letter):04X}"):
+            parse_program(text)
