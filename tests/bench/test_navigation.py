@@ -32,12 +32,9 @@ from avlmaps.core.motion import Action, GroundPose, Moved
 from avlmaps.language.program import parse_program
 from avlmaps.language.rules import command_to_program
 from avlmaps.maps.obstacles import CellState, Obstacles
-from avlmaps.sim.mesh import Material
-from avlmaps.sim.scene import Area, Scene, SceneBuilder
-from avlmaps.sim.shapes import box as box_mesh
 from avlmaps.sim.synthesis import MAKERS
+from helpers.small_home import HEARD, furnished
 
-PLAIN = Material()
 BOX = Box((1.0, 1.0, 0.0), (2.0, 3.0, 1.0))
 metres = st.floats(-9.0, 9.0)
 angles = st.floats(-pi, pi)
@@ -161,30 +158,6 @@ def test_sides_are_those_of_the_compass_and_of_the_beholder():
 
 
 # Missions.
-
-
-def furnished() -> Scene:
-    """A room of 8 x 6 m with a wall across it that leaves a door of 1 m, and things in both halves."""
-    corners = np.array([[0, 0], [8, 0], [8, 6], [0, 6]], np.float64)
-    builder = SceneBuilder("made", areas=[Area("kitchen", corners, name="kitchen")])
-    builder.add("floor", box_mesh((0, 0, -0.1), (8, 6, 0), PLAIN))
-    for low, high in (
-        ((-0.1, -0.1, 0), (0, 6.1, 2.6)), ((8, -0.1, 0), (8.1, 6.1, 2.6)), ((0, -0.1, 0), (8, 0, 2.6)),
-        ((0, 6, 0), (8, 6.1, 2.6)), ((3.95, 0, 0), (4.05, 5, 2.6)),
-    ):  # fmt: skip
-        builder.add("wall", box_mesh(low, high, PLAIN))
-    for category, x, y in (
-        ("chair", 0.5, 0.5), ("chair", 7.5, 0.5), ("table", 2.0, 3.0), ("lamp", 7.0, 5.0), ("plant", 0.5, 5.5),
-        ("lamp", 0.5, 3.0), ("tv", 7.5, 3.0),
-    ):  # fmt: skip
-        builder.add(category, box_mesh((x - 0.25, y - 0.25, 0), (x + 0.25, y + 0.25, 0.9), PLAIN), area=0)
-    return builder.build()
-
-
-HEARD = (
-    ("snoring", 1.5, 1.0), ("doorbell", 6.5, 1.0), ("frying", 2.0, 5.0), ("laughing", 6.0, 5.0),
-    ("dog bark", 1.2, 4.0), ("doorbell", 1.2, 2.2), ("blender", 5.0, 2.0), ("toilet flush", 6.0, 3.0),
-)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -505,3 +478,15 @@ def test_ambiguous_things_are_those_of_the_indexing_benchmark(ground: Ground):
     for goal, task in things:
         assert goal.boxes == task.targets
         assert task.context in {name for name, _, _ in HEARD}
+
+
+@given(st.floats(-0.5, 2.5), st.floats(-0.5, 2.5), st.integers(0, 1_000))
+def test_room_is_the_distance_to_the_nearest_occupied_cell(x: float, y: float, seed: int):
+    rng = np.random.default_rng(seed)
+    states = np.where(rng.random((20, 16)) < 0.05, CellState.OCCUPIED, CellState.FREE).astype(np.uint8)
+    obstacles = Obstacles(np.eye(3), np.array([0.3, -0.1]), 0.1, 0.0, states)
+    low = np.argwhere(states == CellState.OCCUPIED) * 0.1 + (0.3, -0.1)
+    at = np.array([x, y])
+    apart = np.linalg.norm(np.maximum(np.maximum(low - at, at - low - 0.1), 0.0), axis=1).min(initial=np.inf)
+    room = Foreknowledge(obstacles, 0.25).room_m((x, y))
+    assert room == pytest.approx(apart, abs=1e-9) if apart < 0.25 - 1e-9 else room >= 0.25 - 1e-9

@@ -22,12 +22,12 @@ class Floor:
     Attributes:
         space: where a robot of the radius can stand and drive to from there.
         radius_m: of the robot.
-        floor_m: height of the floor, world.
+        number: which floor of the building, counted from the lowest.
     """
 
     space: FreeSpace
     radius_m: float
-    floor_m: float
+    number: int = 0
     _ways: dict[tuple[object, ...], Float[np.ndarray, "nx ny"]] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -44,10 +44,10 @@ class Floor:
         """
         eye_m = float(np.median(camera[:, 2]))
         below = [index for index, height in enumerate(floor_heights(scene)) if height < eye_m]
-        whole = free_space(scene, radius_m, height_m, floor=below[-1] if below else 0)
+        number = below[-1] if below else 0
+        whole = free_space(scene, radius_m, height_m, floor=number)
         parts = [whole.part_with(camera[index, :2]) for index in (0, len(camera) // 2)]
-        space = max(parts, key=lambda part: part.area_m2)
-        return cls(space, radius_m, space.floor_m)
+        return cls(max(parts, key=lambda part: part.area_m2), radius_m, number)
 
     def reachable(self, goal: Goal) -> bool:
         """Tell whether some place from which the goal counts as reached can be driven to."""

@@ -24,7 +24,8 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.language.translator import Translator
 from avlmaps.maps.obstacles import Body, Obstacles, find_obstacles
 from avlmaps.navigate.bodies import BASE
-from avlmaps.navigate.driver import Driver
+from avlmaps.navigate.driver import Driver, MapDriver
+from avlmaps.sim.body import Building, SimulatedBody
 from avlmaps.sim.scene import Scene
 
 _PHOTOS = 120  # drawn in a scene; those that show too little are left
@@ -51,6 +52,11 @@ class NavigationPlace:
         """The true ground."""
         camera = self.work.recording.world_from_camera[:, :3, 3]
         return Floor.walked(self.work.scene, camera, BASE.radius_m, BASE.height_m)
+
+    @cached_property
+    def building(self) -> Building:
+        """What is truly in a robot's way."""
+        return Building(self.work.scene, BASE.step_m, BASE.height_m, self.floor.number)
 
     @cached_property
     def obstacles(self) -> Obstacles:
@@ -91,7 +97,10 @@ class NavigationPlace:
                 made += pair_missions(self.ground, rng, most)
             else:
                 made += sound_missions(self.ground, series, rng, most)
-        return numbered(made)
+        return numbered([mission for mission in made if self._fits(mission.pose)])
+
+    def _fits(self, pose: GroundPose) -> bool:
+        return self.building.clearance_m(pose.x_m, pose.y_m) > BASE.radius_m
 
     def _rng(self, stream: int) -> np.random.Generator:
         return self.job.rng(_STREAM + stream)
@@ -116,10 +125,7 @@ class NavigationPlace:
         )  # fmt: skip
 
     def _launch(self, start: GroundPose) -> tuple[Driver, WatchedBody]:
-        from avlmaps.navigate.driver import MapDriver
-        from avlmaps.sim.body import SimulatedBody
-
-        body = WatchedBody(SimulatedBody(self.work.scene, start, BASE.radius_m, BASE.height_m), self._known)
+        body = WatchedBody(SimulatedBody(self.building, start, BASE.radius_m), self._known)
         return MapDriver(self.obstacles, body), body
 
 

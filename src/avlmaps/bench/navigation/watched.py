@@ -1,13 +1,14 @@
 """A body under watch: what it touched, and whether the map had told before that it would."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
 from avlmaps.core.motion import FORWARD_M, Action, GroundPose, Moved
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.navigate.bodies import Body
+
+_EXACT_M = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,29 +18,27 @@ class Foreknowledge:
     Attributes:
         obstacles: the map's own grid.
         radius_m: of the robot.
-        room_m: (nx, ny) distance from each cell's middle to the edge of the nearest occupied cell.
     """
 
     obstacles: Obstacles
     radius_m: float
-    room_m: Float[np.ndarray, "nx ny"] = field(init=False)
 
-    def __post_init__(self) -> None:
-        from scipy.ndimage import distance_transform_edt
-
-        occupied = self.obstacles.states == CellState.OCCUPIED
-        cell_m = self.obstacles.cell_size_m
-        room = np.full(occupied.shape, np.inf)
-        if occupied.any():
-            room = np.asarray(distance_transform_edt(~occupied, sampling=cell_m)) - 0.5 * cell_m
-        object.__setattr__(self, "room_m", room)
+    def room_m(self, xy: tuple[float, float]) -> float:
+        """Return the distance from a place (level x and y) to the nearest occupied cell, inf beyond the radius."""
+        cell_m, origin = self.obstacles.cell_size_m, self.obstacles.origin_m
+        at = np.asarray(xy, np.float64) - origin
+        low = np.maximum(np.floor((at - self.radius_m) / cell_m).astype(np.int64), 0)
+        high = np.maximum(np.floor((at + self.radius_m) / cell_m).astype(np.int64) + 1, 0)
+        near = self.obstacles.states[low[0] : high[0], low[1] : high[1]] == CellState.OCCUPIED
+        corner = (np.argwhere(near) + low) * cell_m
+        if not len(corner):
+            return np.inf
+        apart = np.maximum(np.maximum(corner - at, at - corner - cell_m), 0.0)
+        return float(np.linalg.norm(apart, axis=1).min())
 
     def foretells(self, xy: tuple[float, float]) -> bool:
         """Tell whether the map shows an obstacle within the robot's radius of a place (level x and y)."""
-        cell = np.floor((np.array(xy) - self.obstacles.origin_m) / self.obstacles.cell_size_m).astype(np.int64)
-        if (cell < 0).any() or (cell >= self.room_m.shape).any():
-            return False
-        return bool(self.room_m[tuple(cell)] < self.radius_m)
+        return self.room_m(xy) < self.radius_m - _EXACT_M
 
 
 class WatchedBody:
