@@ -147,7 +147,8 @@ class RosDriver(ABC):
     # One movement.
 
     def _level(self, place: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"]:
-        return (self._level_from_world @ np.asarray(place, np.float64))[:2]
+        known = np.isfinite(place).all()  # what is no number stays none, without a warning
+        return (self._level_from_world @ np.asarray(place, np.float64))[:2] if known else np.full(2, np.nan)
 
     def _plan_to(
         self, start: GroundPose, wanted: Float[np.ndarray, "2"], looked_at: Float[np.ndarray, "2"] | None

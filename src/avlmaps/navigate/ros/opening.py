@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.ros.base import RosDriver
 from avlmaps.navigate.ros.frames import Frames
 from avlmaps.navigate.ros.move_base import MoveBaseDriver
@@ -14,6 +13,7 @@ from avlmaps.navigate.ros.plans import Standing
 from avlmaps.navigate.ros.settings import RosSettings
 
 if TYPE_CHECKING:
+    from avlmaps.maps.obstacles import Obstacles
     from avlmaps.navigate.planner import Planner
 
 RosKind = Literal["nav2", "move_base"]
@@ -23,7 +23,7 @@ def open_ros_driver(
     kind: RosKind,
     url: str,
     frames: Frames | None = None,
-    obstacles: Obstacles | None = None,
+    obstacles: "Obstacles | None" = None,
     *,
     settings: RosSettings | None = None,
     level_from_world: Float[np.ndarray, "3 3"] | None = None,
@@ -53,7 +53,7 @@ def open_ros_driver(
     return driver(url, frames, settings, standing=standing, level_from_world=level_from_world, token=token)
 
 
-def standing_on(obstacles: Obstacles, radius_m: float) -> Standing:
+def standing_on(obstacles: "Obstacles", radius_m: float) -> Standing:
     """Return what moves goals to where a body can stand and get to, by a map's obstacles.
 
     Args:
