@@ -79,7 +79,7 @@ class Costmap:
     def holds(self, xy: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
         """Tell which places lie on the grid."""
         cell = self.cell_of(xy)
-        return np.all((cell >= 0) & (cell < self.passable.shape), axis=-1)
+        return np.asarray(np.all((cell >= 0) & (cell < self.passable.shape), axis=-1))
 
     def is_passable(self, xy: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
         """Tell at which places the body's middle may be; nowhere off the grid."""

@@ -18,7 +18,7 @@ from avlmaps.navigate.costmap import Costmap
 
 _EVERY = 6  # cells of a straight run of a path from which shortcuts may begin
 _WINDOW = 48  # such points that a shortcut may leap
-_AROUND = (4, 2, 1, 0)  # blocks around the coarse way that are searched, where they hold no more than so many cells
+_AROUND = (4, 2, 1)  # blocks around the coarse way that are searched: fewer where they hold too many cells
 
 
 @dataclass(frozen=True, slots=True)

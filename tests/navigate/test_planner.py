@@ -1,0 +1,252 @@
+"""Ways: never through what is in the way, found wherever there is one, and hardly dearer than the cheapest."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import label
+from test_costmap import CELL_M, grid_of, of_states
+
+from avlmaps.maps.obstacles import CellState, Obstacles
+from avlmaps.navigate.costmap import costmap_of
+from avlmaps.navigate.planner import Planner, PlanSettings
+
+COARSE = PlanSettings(exact_cells=1)
+
+
+def clutter(seed, size=90):
+    """Return a floor with boxes and walls with doors, and unseen spots."""
+    rng = np.random.default_rng(seed)
+    states = np.full((size, size), CellState.FREE, np.uint8)
+    for _ in range(rng.integers(0, 14)):
+        i, j = rng.integers(0, size, 2)
+        w, d = rng.integers(2, size // 4, 2)
+        states[i : i + w, j : j + d] = rng.choice([CellState.OCCUPIED, CellState.OCCUPIED, CellState.UNKNOWN])
+    for _ in range(rng.integers(0, 4)):
+        at, door = rng.integers(5, size - 5), rng.integers(5, size - 20)
+        wall = np.ones(size, bool)
+        wall[door : door + rng.integers(8, 16)] = False
+        if rng.random() < 0.5:
+            states[at : at + 2, wall] = CellState.OCCUPIED
+        else:
+            states[wall, at : at + 2] = CellState.OCCUPIED
+    return states
+
+
+def two_places(planner, seed):
+    cells = np.argwhere(planner.costmap.passable)
+    picked = cells[np.random.default_rng(seed).integers(0, len(cells), 2)]
+    return planner.costmap.middle_of(picked)
+
+
+def costs_along(costmap, points):
+    """Return the cost of a path by fine samples, and whether all lie on passable cells."""
+    total = 0.0
+    for a, b in pairwise(points):
+        samples = a + (b - a) * ((np.arange(400) + 0.5) / 400)[:, None]
+        if not costmap.is_passable(samples).all():
+            return np.inf
+        total += costmap.cost[tuple(costmap.cell_of(samples).T)].mean() * np.linalg.norm(b - a)
+    return total
+
+
+@settings(max_examples=60)
+@given(seed=st.integers(0, 100_000), coarse=st.booleans())
+def test_a_way_is_found_where_there_is_one_and_never_leads_through_an_obstacle(seed, coarse):
+    planner = Planner(costmap_of(of_states(clutter(seed)), 0.15), COARSE if coarse else None)
+    costmap = planner.costmap
+    if not costmap.passable.any():
+        return
+    start, goal = two_places(planner, seed)
+    parts = label(costmap.passable)[0]
+    connected = parts[tuple(costmap.cell_of(start))] == parts[tuple(costmap.cell_of(goal))]
+    way = planner.way(start, goal)
+    assert (way is not None) == connected
+    if way is not None:
+        np.testing.assert_allclose(way.points[[0, -1]], [start, goal])
+        assert way.cost == pytest.approx(costs_along(costmap, way.points), rel=0.02, abs=1e-3)
+        assert way.cost >= way.length_m - 1e-6
+        assert way.length_m >= np.linalg.norm(goal - start) - 1e-9
+
+
+@settings(max_examples=60)
+@given(seed=st.integers(0, 100_000))
+def test_searching_coarse_to_fine_costs_at_most_a_tenth_more(seed):
+    costmap = costmap_of(of_states(clutter(seed, 120)), 0.1)
+    exact, coarse = Planner(costmap), Planner(costmap, COARSE)
+    if not costmap.passable.any():
+        return
+    start, goal = two_places(exact, seed)
+    way, other = exact.way(start, goal), coarse.way(start, goal)
+    assert (way is None) == (other is None)
+    if way is not None and other is not None:
+        assert other.cost <= 1.1 * way.cost + 1e-9
+
+
+@given(seed=st.integers(0, 100_000))
+def test_pulling_it_straight_never_makes_a_way_dearer(seed):
+    planner = Planner(costmap_of(of_states(clutter(seed)), 0.1))
+    if not planner.costmap.passable.any():
+        return
+    start, goal = two_places(planner, seed)
+    way = planner.way(start, goal)
+    if way is None:
+        return
+    cells = planner._search(planner.costmap.cell_of(start), planner.costmap.cell_of(goal))
+    rough = planner._measured(np.concatenate([cells[:1], cells[1:-1], cells[-1:]]) + 0.5, None)
+    assert way.cost <= rough.cost + 1e-6
+
+
+@given(seed=st.integers(0, 100_000), turns=st.integers(1, 3), mirrored=st.booleans())
+def test_a_turned_or_mirrored_floor_has_turned_and_mirrored_ways(seed, turns, mirrored):
+    states = clutter(seed, 60)
+    other = np.rot90(states[::-1] if mirrored else states, turns)
+    number = np.arange(states.size).reshape(states.shape)
+    numbers = np.rot90(number[::-1] if mirrored else number, turns)
+    one, two = (Planner(costmap_of(of_states(np.ascontiguousarray(grid)), 0.1)) for grid in (states, other))
+    if not one.costmap.passable.any():
+        return
+    places = two_places(one, seed)
+    moved = two.costmap.middle_of(
+        np.array([np.argwhere(numbers == number[tuple(c)])[0] for c in one.costmap.cell_of(places)])
+    )
+    way, same = one.way(*places), two.way(*moved)
+    assert (way is None) == (same is None)
+    if way is not None and same is not None:
+        assert same.cost == pytest.approx(way.cost, rel=0.02)
+        first, second = (
+            planner._search(*planner.costmap.cell_of(ends)) for planner, ends in ((one, places), (two, moved))
+        )
+        assert one._measured(first + 0.5, None).cost == pytest.approx(two._measured(second + 0.5, None).cost, rel=1e-5)
+
+
+@given(
+    start=st.tuples(st.floats(0.1, 4.9), st.floats(0.1, 4.9)), goal=st.tuples(st.floats(0.1, 4.9), st.floats(0.1, 4.9))
+)
+def test_over_an_empty_floor_the_way_is_straight(start, goal):
+    planner = Planner(costmap_of(of_states(np.full((100, 100), CellState.FREE)), 0.2))
+    way = planner.way(np.array(start), np.array(goal))
+    assert way.length_m == pytest.approx(np.hypot(*np.subtract(start, goal)), abs=1e-6)
+
+
+def test_a_way_keeps_to_the_middle_of_a_door():
+    states = np.full((80, 60), CellState.FREE, np.uint8)
+    states[40, :20] = states[40, 40:] = CellState.OCCUPIED  # a door one metre wide round y = 1.5
+    way = Planner(costmap_of(of_states(states), 0.2)).way(np.array([0.5, 0.6]), np.array([3.5, 0.6]))
+    at_door = [np.interp(2.025, way.points[:, 0], way.points[:, 1])]
+    assert at_door[0] == pytest.approx(1.5, abs=0.2)
+
+
+def test_a_body_that_stands_too_near_to_something_gets_out_on_its_own_side():
+    states = np.full((80, 40), CellState.FREE, np.uint8)
+    states[40] = CellState.OCCUPIED  # a wall right across
+    planner = Planner(costmap_of(of_states(states), 0.2))
+    near_wall = np.array([1.95, 1.0])
+    assert not planner.costmap.is_passable(near_wall)
+    way = planner.way(near_wall, np.array([0.5, 1.0]))
+    np.testing.assert_allclose(way.points[0], near_wall)
+    assert way.points[:, 0].max() <= 1.95
+    assert planner.way(near_wall, np.array([3.5, 1.0])) is None
+
+
+PLAN = """
+########################
+#..........#...........#
+#..........#...........#
+#..........#...........#
+#..........#...........#
+#..........#...........#
+#.....oo...#...........#
+#.....oo...............#
+#......................#
+#......................#
+#..........#...........#
+########################
+"""
+
+
+def rooms(tall=None, thing="#"):
+    """Return two rooms of cells of 0.25 m with a thing in the left one, one cell from the wall."""
+    obstacles = grid_of(PLAN.replace("o", thing), 0.25)
+    return Obstacles(
+        np.eye(3),
+        np.zeros(2),
+        0.25,
+        0.0,
+        obstacles.states,
+        obstacles.states == CellState.OCCUPIED if tall is None else tall,
+    )
+
+
+def test_a_place_that_can_be_stood_on_is_the_stop_itself():
+    planner = Planner(costmap_of(rooms(), 0.1))
+    stop = planner.stop_for(np.array([0.6, 0.6]), np.array([4.6, 2.1]))
+    assert stop.beside_m == 0.0
+    np.testing.assert_array_equal(stop.xy, [4.6, 2.1])
+
+
+def test_a_thing_is_approached_from_where_it_is_seen_and_not_through_a_wall():
+    """A sofa against the wall: the nearest free place lies behind the wall, the stop must be in front."""
+    states = np.full((60, 60), CellState.FREE, np.uint8)
+    tall = np.zeros((60, 60), bool)
+    states[30:32], tall[30:32] = CellState.OCCUPIED, True  # a wall, with a door at its end
+    states[30:32, :12], tall[30:32, :12] = CellState.FREE, False
+    states[14:30, 30:50] = CellState.OCCUPIED  # a sofa of 0.8 m, low, against it
+    obstacles = Obstacles(np.eye(3), np.zeros(2), CELL_M, 0.0, states, tall)
+    planner = Planner(costmap_of(obstacles, 0.15))
+    back_of_sofa = np.array([1.45, 2.0])
+    for start in ([2.6, 2.0], [0.3, 2.0]):
+        stop = planner.stop_for(np.array(start), back_of_sofa)
+        assert stop.seen
+        assert stop.xy[0] < 1.5
+        assert planner.way(np.array(start), stop.xy) is not None
+
+
+def test_of_a_picture_on_a_wall_the_stop_is_on_its_side():
+    states = np.full((60, 60), CellState.FREE, np.uint8)
+    states[30:33, 10:] = CellState.OCCUPIED
+    states[22:30, 20:40] = CellState.UNKNOWN  # it hangs over something that was not seen through
+    planner = Planner(costmap_of(of_states(states), 0.1))
+    stop = planner.stop_for(np.array([2.5, 1.0]), np.array([1.51, 1.5]))
+    assert stop.seen
+    assert stop.xy[0] < 1.5
+
+
+@given(seed=st.integers(0, 100_000))
+def test_a_stop_can_be_stood_on_and_reached_and_is_no_farther_than_said(seed):
+    planner = Planner(costmap_of(of_states(clutter(seed)), 0.15))
+    costmap = planner.costmap
+    if not costmap.passable.any():
+        return
+    start = two_places(planner, seed)[0]
+    place = np.random.default_rng(seed).uniform(0.1, 4.4, 2)
+    stop = planner.stop_for(start, place)
+    if stop is None:
+        return
+    assert costmap.is_passable(stop.xy)
+    assert planner.way(start, stop.xy) is not None
+    assert np.linalg.norm(stop.xy - place) == pytest.approx(stop.beside_m, abs=1e-9)
+    assert stop.beside_m <= planner.settings.beside_m
+
+
+def test_there_is_no_stop_far_from_a_place_or_off_the_map():
+    planner = Planner(costmap_of(of_states(np.pad(np.full((40, 40), CellState.FREE), ((0, 100), (0, 0)))), 0.1))
+    start = np.array([1.0, 1.0])
+    assert planner.stop_for(start, np.array([6.0, 1.0])) is None
+    assert planner.stop_for(start, np.array([60.0, 1.0])) is None
+    assert planner.stop_for(start, np.array([3.0, 1.0])).beside_m == pytest.approx(1.0, abs=0.1)
+    assert planner.way(start, np.array([6.0, 1.0])) is None
+
+
+def test_a_closed_room_has_no_way_in():
+    obstacles = grid_of(PLAN.replace("o", "."), 0.25)
+    states = obstacles.states.copy()
+    states[11, :] = CellState.OCCUPIED
+    planner = Planner(costmap_of(Obstacles(np.eye(3), np.zeros(2), 0.25, 0.0, states), 0.1))
+    inside, outside = np.array([1.0, 1.0]), np.array([5.0, 2.0])
+    assert planner.way(inside, outside) is None
+    stop = planner.stop_for(inside, np.array([3.4, 1.0]))
+    assert stop is not None
+    assert not stop.seen
