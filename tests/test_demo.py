@@ -10,13 +10,18 @@ import numpy as np
 import pytest
 
 from avlmaps.core.errors import MapError
+from avlmaps.core.motion import GroundPose
 from avlmaps.demo import run_demo
+from avlmaps.demo.drive import Drive, command_for
 from avlmaps.demo.evidence import Box, Evidence
 from avlmaps.demo.home import choose_home, fits
 from avlmaps.demo.pictures import colour_of, envelope, from_above
 from avlmaps.demo.questions import FURNITURE, RARE, SMALL, SPOKEN, PhotoView, choose_questions
 from avlmaps.demo.run import REACH_M, DemoReport, DemoSettings, Step, record_settings
 from avlmaps.demo.svg import Sheet
+from avlmaps.language.rules import command_to_program
+from avlmaps.navigate.instruct import Outcome
+from avlmaps.navigate.moves import Move
 from avlmaps.perception.embedded.scene_network import load_network
 from avlmaps.query.question import Modality
 from avlmaps.sim import furniture
@@ -115,6 +120,8 @@ def test_the_whole_demonstration_runs_on_a_small_flat(small: DemoReport) -> None
     assert {"words", "area", "absent"} <= {step.ask.kind for step in small.steps}
     assert set(told["questions"][0]) == {"question", "found", "right", "off_m"}
     assert len(small.lines()) >= len(small.steps) + 1
+    assert told["drive"]["command"].startswith("first go to the ")
+    assert len(told["drive"]["legs"]) == 2
     assert json.loads(json.dumps(told)) == told
 
 
@@ -130,9 +137,36 @@ def test_the_report_is_whole_and_loads_nothing_from_the_network(small: DemoRepor
         elif not source.startswith("data:image/"):
             assert (small.out / source).is_file(), source
     assert "http" not in text
+    assert "What it did when told" in text
     for step in small.steps:
         assert (small.out / step.picture).is_file()
     assert len(text) < 6_000_000
+
+
+def test_a_command_is_made_of_questions_that_have_a_place(tmp_path: Path) -> None:
+    asks, _ = choose_questions(two_rooms(), [], tmp_path, np.random.default_rng(0))
+    chosen = command_for(asks)
+    assert chosen is not None
+    command, legs = chosen
+    area = next(ask.title for ask in asks if ask.kind == "area")
+    assert command == f"first go to the chair near the sound of keyboard typing, then go to {area}"
+    assert [ask.kind for ask in legs] == ["sound", "area"]
+    assert command_to_program(command).count("robot.move_to(") == 2
+    assert command_for([ask for ask in asks if ask.kind in ("absent", "clip")]) is None
+
+
+@pytest.mark.parametrize(("away_m", "right"), [(0.9, True), (1.1, False)])
+def test_a_stop_is_right_within_a_metre_of_what_was_meant(tmp_path: Path, away_m: float, right: bool) -> None:
+    asks, _ = choose_questions(two_rooms(), [], tmp_path, np.random.default_rng(0))
+    chair = asks[1].truth[0]
+    stop = (chair.high[0] + away_m, chair.high[1], 0.0)
+    move = Move("move_to", "'chair'", (0.0, 0.0, 0.0), stop, 0.0, True, (), np.zeros((1, 2)))
+    outcome = Outcome("go", ("",), (), (), (move,), "Line 2: no.", "NavigationError", 1.0)
+    drive = Drive("go", (asks[1], asks[3]), GroundPose(0.0, 0.0), outcome, outcome.error)
+    assert drive.right == (right, False)
+    assert drive.off_m == (pytest.approx(away_m), None)
+    assert drive.to_json()["legs"][1] == {"to": asks[3].title, "right": False, "off_m": None}
+    assert "never stopped for it" in drive.lines()[2]
 
 
 def test_a_folder_that_holds_something_else_is_left_alone(tmp_path: Path) -> None:

@@ -8,6 +8,11 @@ from avlmaps.cli.output import UsageError
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+    from jaxtyping import Float
+
     from avlmaps.cli.go import Go
     from avlmaps.core.motion import GroundPose
     from avlmaps.language.translator import Translator
@@ -24,11 +29,15 @@ class _Ready:
         driver: moves it.
         start: where it stands.
         obstacles: what the map knows to stand in its way.
+        met: tells where it met something that the map does not know.
+        close: ends the connection; a real robot stops where it is.
     """
 
     driver: "Driver"
     start: "GroundPose"
     obstacles: "Obstacles"
+    met: "Callable[[], Float[np.ndarray, 'm 2'] | None]"
+    close: "Callable[[], None]"
 
 
 def go(verb: "Go") -> dict[str, Any]:
@@ -59,14 +68,17 @@ def _driven(verb: "Go", translator: "Translator", start: "GroundPose | None") ->
     translation = translator.program_for(verb.sentence)  # what is not understood is told before a scene is made
     robot = _in_scene(verb, asked, start) if verb.robot == "simulated" else _real(verb, asked)
     settings = RobotSettings(guess=verb.guess)
-    outcome = instruct(
-        verb.sentence, asked, robot.driver, translator, settings=settings, translation=translation, tell=say
-    )
+    try:
+        outcome = instruct(
+            verb.sentence, asked, robot.driver, translator, settings=settings, translation=translation, tell=say
+        )
+    finally:
+        robot.close()
     if verb.plot is not None:
         from avlmaps.navigate.trace_plot import plot_way
 
-        met = getattr(robot.driver, "met_m", None)
-        plot_way(verb.plot, asked.space, robot.start, outcome.moves, robot.obstacles, met, f"“{verb.sentence}”")
+        title = f"“{verb.sentence}”"
+        plot_way(verb.plot, asked.space, robot.start, outcome.moves, robot.obstacles, robot.met(), title)
     return outcome.to_json()
 
 
@@ -103,7 +115,7 @@ def _in_scene(verb: "Go", asked: "AVLMap", start: "GroundPose | None") -> _Ready
     from avlmaps.sim.scenes import open_scene
 
     robot = robot_in(asked, open_scene(verb.scene or ""), SHAPES[verb.body], start)
-    return _Ready(robot.driver, robot.start, robot.obstacles)
+    return _Ready(robot.driver, robot.start, robot.obstacles, lambda: robot.met, lambda: None)
 
 
 def _real(verb: "Go", asked: "AVLMap") -> _Ready:
@@ -115,4 +127,4 @@ def _real(verb: "Go", asked: "AVLMap") -> _Ready:
     obstacles = obstacles_for(asked, SHAPES[verb.body])
     kind = "nav2" if verb.robot == "nav2" else "move_base"
     driver = open_ros_driver(kind, verb.ros, frames, obstacles)
-    return _Ready(driver, driver.pose, obstacles)
+    return _Ready(driver, driver.pose, obstacles, lambda: None, driver.close)

@@ -113,8 +113,7 @@ def drive(asks: Sequence[Ask], asked: "AVLMap", scene: "Scene", out: Path, tell:
         )
     except AvlmapsError as fault:
         return Drive(command, legs, None, None, str(fault))
-    met = getattr(robot.driver, "met_m", None)
-    plot_way(out / PICTURE, asked.space, robot.start, outcome.moves, robot.obstacles, met, f"“{command}”")
+    plot_way(out / PICTURE, asked.space, robot.start, outcome.moves, robot.obstacles, robot.met, f"“{command}”")
     return Drive(command, legs, robot.start, outcome, outcome.error)
 
 

@@ -1,6 +1,7 @@
 """A simulated robot put into the scene that a map was made of: only its body meets the scene, its program the map."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -10,10 +11,12 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE, BodyShape
 from avlmaps.navigate.costmap import costmap_of, obstacles_for
-from avlmaps.navigate.driver import Driver
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.sim.free_space import FreeSpace, floor_heights, free_space
 from avlmaps.sim.scene import Scene
+
+if TYPE_CHECKING:
+    from avlmaps.navigate.driver import MapDriver
 
 _LEVEL_DEG = 2.0
 # Where the camera was, the scene must have room; a map of another building has it at half of the places at most.
@@ -32,9 +35,14 @@ class SimulatedRobot:
         obstacles: what the map knows to stand in its way.
     """
 
-    driver: Driver
+    driver: "MapDriver"
     start: GroundPose
     obstacles: Obstacles
+
+    @property
+    def met(self) -> Float[np.ndarray, "m 2"]:
+        """The places where it met something that the map does not know, level x and y."""
+        return self.obstacles.origin_m + (np.argwhere(self.driver.met.cells) + 0.5) * self.obstacles.cell_size_m
 
 
 def robot_in(asked: AVLMap, scene: Scene, shape: BodyShape = BASE, start: GroundPose | None = None) -> SimulatedRobot:
@@ -63,7 +71,7 @@ def robot_in(asked: AVLMap, scene: Scene, shape: BodyShape = BASE, start: Ground
     body = SimulatedBody(
         scene, start, shape.radius_m, shape.height_m, step_m=shape.step_m, flies_m=shape.flies_m, floor=floor
     )
-    return SimulatedRobot(MapDriver(obstacles, body), start, obstacles)
+    return SimulatedRobot(MapDriver(obstacles, body, shape), start, obstacles)
 
 
 def _floor(scene: Scene, cameras: Float[np.ndarray, "k 4 4"]) -> int | None:
