@@ -125,3 +125,29 @@ def test_a_chat_model_without_its_extra_says_how_to_get_it(run, built: Path, mon
     status, _, err = run("go", built, "go to the chair", *words)
     assert status == 1
     assert "avlmaps[chat]" in err
+
+
+def test_a_real_robot_is_driven_over_rosbridge_and_let_go_at_the_end(
+    answer, built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from avlmaps.core.motion import GroundPose
+    from helpers.kinematic import KinematicDriver
+
+    asked: list[tuple[object, ...]] = []
+
+    class Far(KinematicDriver):
+        def close(self) -> None:
+            asked.append(("closed",))
+
+    def connect(kind: str, url: str, frames: object, obstacles: object) -> Far:
+        asked.append((kind, url, frames is not None, obstacles is not None))
+        return Far(GroundPose(4.4, 3.2))
+
+    monkeypatch.setattr("avlmaps.navigate.ros.open_ros_driver", connect)
+    frames = tmp_path / "frames.json"
+    frames.write_text('{"map_frame": "map"}')
+    words = ("--robot", "nav2", "--ros", "ws://robot:9090", "--ros-frames", frames)
+    said = answer("go", built, "turn left, then move forward 1 metre", *words)
+    assert said["ok"] is True
+    assert asked == [("nav2", "ws://robot:9090", True, True), ("closed",)]
+    assert said["subgoals"][0]["goal"][:2] == pytest.approx([4.4, 4.2])
