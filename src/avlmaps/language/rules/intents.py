@@ -27,11 +27,11 @@ class Target:
 
     Attributes:
         sought: the thing itself, or None for "it": what was named last.
-        context: what it is near or in.
+        context: what it is near or in; None again for "it".
     """
 
     sought: Named | None
-    context: tuple[Named, ...] = ()
+    context: tuple[Named | None, ...] = ()
 
 
 class Relation(StrEnum):
@@ -175,4 +175,19 @@ class Mention:
     target: Target
 
 
-Intent = Go | Front | Move | Turn | TurnTo | Face | Beside | Viewpoints | Shuttle | Repeated | Again | Following | Stay | Mention
+Intent = (
+    Go
+    | Front
+    | Move
+    | Turn
+    | TurnTo
+    | Face
+    | Beside
+    | Viewpoints
+    | Shuttle
+    | Repeated
+    | Again
+    | Following
+    | Stay
+    | Mention
+)

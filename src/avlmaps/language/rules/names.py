@@ -20,6 +20,9 @@ _NOT_TOLD_APART = frozenset(
     {"other", "others", "second", "third", "fourth", "fifth", "furthest", "farthest", "nth", "next"}
 )
 _MEASURES = frozenset({"degrees", "degree", "metres", "meters", "metre", "cm", "centimetres", "centimeters", "times"})
+_NO_THINGS = frozenset(
+    {"left", "right", "front", "back", "side", "rear", "middle", "centre", "center", "north", "south", "east", "west"}
+)
 _STANDING = frozenset({"is", "are", "was", "were", "stands", "stand", "sits", "lies", "hangs", "lives"})
 _SOUNDING = re.compile(rf"(?:{'|'.join(SOUND_VERBS)})[a-z]?ing")
 _PAST = re.compile(rf"({'|'.join(SOUND_VERBS)})([a-z]?)ed")
@@ -53,7 +56,7 @@ class Names:
         context = [named for place in parts[1:] for named in self._context(place)]
         return Target(Named(Modality.SOUND, " ".join(_words(parts[0]))), tuple(context))
 
-    def _item(self, node: Any) -> tuple[Named | None, list[Named]]:
+    def _item(self, node: Any) -> tuple[Named | None, list[Named | None]]:
         if is_token(node, "IT"):
             return None, []
         if is_rule(node, "item", "near_item"):
@@ -65,9 +68,9 @@ class Names:
             return named, context
         return self._core(node)
 
-    def _context(self, place: Any) -> list[Named]:
+    def _context(self, place: Any) -> list[Named | None]:
         """Return what a place names; sides of things are no more than near them, which is noted."""
-        context: list[Named] = []
+        context: list[Named | None] = []
         for child in place.children:
             if is_rule(child, "heard"):
                 named, more = self._core(child)
@@ -76,8 +79,6 @@ class Names:
                 self._note_side(child)
             if is_rule(child, "item", "near_item", "near_target"):
                 found = self.target(child)
-                if found.sought is None:
-                    raise LanguageError("'it' cannot say where another thing is; name what it is near.")
                 context += [found.sought, *found.context]
         return context
 
@@ -87,7 +88,7 @@ class Names:
         else:
             self.notes.append(f"{str(token).strip()!r} after a thing was taken as near.")
 
-    def _core(self, node: Any) -> tuple[Named, list[Named]]:
+    def _core(self, node: Any) -> tuple[Named, list[Named | None]]:
         """Return what a name means: the thing, and the area that its "of" puts it in."""
         kind = node.data
         if kind in ("picture", "clip", "heard_clip"):
@@ -104,7 +105,7 @@ class Names:
             return self._heard(node, spoken)
         return self._thing(spoken)
 
-    def _heard(self, node: Any, spoken: list[str]) -> tuple[Named, list[Named]]:
+    def _heard(self, node: Any, spoken: list[str]) -> tuple[Named, list[Named | None]]:
         """Return what was heard; "where the sofa is" is the sofa, "where the glass broke" is glass breaking."""
         told = any(is_token(token, "HEARD", "WHERE_HEARD", "SOUND_OF") for token in node.children)
         if not told and spoken[-1].lower() in _STANDING and len(spoken) > 1:
@@ -123,13 +124,16 @@ class Names:
             )
         return Named(Modality.SOUND, " ".join(sounding)), []
 
-    def _thing(self, spoken: list[str]) -> tuple[Named, list[Named]]:
+    def _thing(self, spoken: list[str]) -> tuple[Named, list[Named | None]]:
         """Return an object, or a sound or an area if the last word says so."""
         if _MEASURES.intersection(word.lower() for word in spoken):
             raise LanguageError(
-                f"{' '.join(spoken)!r} is not understood as the name of a thing; say how far or how much in figures, like: "
+                f"{' '.join(spoken)!r} is not understood as the name of a thing; say how far or how much in "
+                "figures, like: "
                 "go forward 2 metres, or: turn left 30 degrees."
             )
+        if len(spoken) == 1 and spoken[0].lower() in _NO_THINGS:
+            raise LanguageError(f"{spoken[0]!r} of what is not said; say it like: go to the left of the sofa.")
         if spoken[0].lower() in _NOT_TOLD_APART and len(spoken) > 1:
             raise LanguageError(
                 f"{spoken[0]!r} cannot be told from the map in {' '.join(spoken)!r}; say what it is near, like: the "
@@ -144,7 +148,7 @@ class Names:
             return Named(Modality.AREA, " ".join(spoken)), []
         return Named(Modality.SOUND if _is_sound(spoken) else Modality.OBJECT, " ".join(spoken)), []
 
-    def _of_area(self, spoken: list[str]) -> tuple[Named, list[Named]]:
+    def _of_area(self, spoken: list[str]) -> tuple[Named, list[Named | None]]:
         at = spoken.index("of")
         thing, area = spoken[:at], [word for word in spoken[at + 1 :] if word.lower() not in ("the", "a", "an", "this")]
         where = Named(Modality.AREA, " ".join(area))

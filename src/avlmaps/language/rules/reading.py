@@ -35,6 +35,10 @@ _LITTLE_M = 0.5
 _MOST_TIMES = 100
 _MOST_VIEWPOINTS = 36
 _ROUND = 8
+_RELATIONS = {
+    "there": Relation.THERE, "start_place": Relation.START, "halfway": Relation.HALFWAY, "before": Relation.FRONT,
+    "behind": Relation.BEHIND,
+}  # fmt: skip
 _SIDES = {"north": Relation.NORTH, "south": Relation.SOUTH, "east": Relation.EAST, "west": Relation.WEST}
 
 
@@ -126,7 +130,7 @@ class _Reader:
         return Mention(self._targets(node)[0])
 
     def _front_goal(self, node: Any) -> Intent:
-        inner = [child for child in node.children if hasattr(child, "data")][0]
+        inner = next(child for child in node.children if hasattr(child, "data"))
         return Front((self._goal(inner),))
 
     def _front_near(self, node: Any) -> Intent:
@@ -150,25 +154,13 @@ class _Reader:
             return _at(self.names.target(node))
         targets = tuple(self._targets(node))
         distance_m = self._distance(node)
-        match node.data:
-            case "between":
-                return Goal(Relation.BETWEEN, self._pair(node.children[0]))
-            case "there":
-                return Goal(Relation.THERE)
-            case "start_place":
-                return Goal(Relation.START)
-            case "halfway":
-                return Goal(Relation.HALFWAY, targets)
-            case "sideways":
-                return self._sideways(node, targets, distance_m)
-            case "apart":
-                return Goal(Relation.APART, targets, _LITTLE_M if distance_m is None else distance_m)
-            case "before":
-                return Goal(Relation.FRONT, targets, distance_m)
-            case "behind":
-                return Goal(Relation.BEHIND, targets, distance_m)
-            case _:
-                return _at(targets[0])
+        if node.data in ("between", "between_path"):
+            return Goal(Relation.BETWEEN, self._pair(node if node.data == "between_path" else node.children[0]))
+        if node.data == "sideways":
+            return self._sideways(node, targets, distance_m)
+        if node.data == "apart":
+            return Goal(Relation.APART, targets, _LITTLE_M if distance_m is None else distance_m)
+        return Goal(_RELATIONS.get(node.data, Relation.AT), targets, distance_m)
 
     def _sideways(self, node: Any, targets: tuple[Target, ...], distance_m: float | None) -> Goal:
         told = next(str(child) for child in node.children if is_token(child, "SIDE_OF", "POSS_SIDE", "ITS_SIDE"))
@@ -282,7 +274,7 @@ class _Reader:
     # Around things, and again.
 
     def _shuttle(self, node: Any) -> Intent:
-        held = next((child for child in node.children if is_rule(child, "pair", "path", "ends")))
+        held = next(child for child in node.children if is_rule(child, "pair", "path", "ends"))
         return Shuttle(self._pair(held), self.count)
 
     def _circle(self, node: Any) -> Intent:

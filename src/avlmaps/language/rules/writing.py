@@ -20,7 +20,6 @@ from avlmaps.language.rules.intents import (
     Relation,
     Repeated,
     Shuttle,
-    Stay,
     Target,
     Turn,
     TurnTo,
@@ -128,10 +127,9 @@ class _Writer:
                 self._loop(body, count)
             case Again(count=count):
                 self._again(count)
-            case Mention(target=target):
-                self._target(target)
-            case Stay() | Front() | Following():
-                pass
+            case _:
+                if isinstance(intent, Mention):
+                    self._target(intent.target)
 
     def _do(self, call: str) -> None:
         self.lines.append(f"robot.{call}")
@@ -201,17 +199,20 @@ class _Writer:
 
     def _target(self, target: Target) -> str:
         """Return how a target is written: a plain thing as its name, anything else as its map."""
-        if target.sought is None:
-            if self.last is None or self.last.sought is None:
-                raise LanguageError("'it' refers to nothing that was named; name the thing, like: face the sofa.")
-            target = Target(self.last.sought, (*self.last.context, *target.context))
-        self.last = target
-        sought = target.sought
-        assert sought is not None
-        if sought.modality is Modality.OBJECT and not target.context:
+        sought, *around = [named for part in (target.sought, *target.context) for named in self._meant(part)]
+        self.last = Target(sought, tuple(around))
+        if sought.modality is Modality.OBJECT and not around:
             return _quoted(sought.words)
-        maps = [self._map(sought, "get_major_map"), *(self._map(named, "get_map") for named in target.context)]
+        maps = [self._map(sought, "get_major_map"), *(self._map(named, "get_map") for named in around)]
         return self._kept("heat", " * ".join(maps))
+
+    def _meant(self, part: Named | None) -> list[Named]:
+        """Return what a part of a target stands for: itself, or for "it" all that was named last."""
+        if part is not None:
+            return [part]
+        if self.last is None:
+            raise LanguageError("'it' refers to nothing that was named; name the thing, like: face the sofa.")
+        return [named for named in (self.last.sought, *self.last.context) if named is not None]
 
     def _map(self, named: Named, skill: str) -> str:
         value = _quoted(named.words)
