@@ -188,6 +188,17 @@ def test_the_time_of_skills_counts() -> None:
     assert trace.elapsed_s == 120.0
 
 
+def test_a_program_whose_last_skill_took_too_long_is_done_all_the_same() -> None:
+    now = [0.0]
+
+    def drives(**given: Any) -> None:
+        now[0] += 400.0
+
+    robot = robot_that("move_to", drives)
+    trace = run_program(parse_program("move_to('a')"), robot, Budget(seconds=100.0), clock=lambda: now[0])
+    assert trace.ok and trace.elapsed_s == 400.0
+
+
 def test_a_program_without_skills_looks_at_the_clock_too() -> None:
     program = parse_program("for i in range(100_000):\n    x = i\n")
     trace = run_program(program, RecordingRobot(), Budget(steps=10**9, seconds=5.0), clock=ticking(1.0))

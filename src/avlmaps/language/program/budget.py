@@ -23,7 +23,7 @@ class Budget:
     factors: int = 16
     """Heatmaps multiplied into one."""
     seconds: float = 1800.0
-    """Wall time, the skills' own included; looked at before and after each skill and now and then between."""
+    """Wall time, the skills' own included; looked at before each skill and now and then between."""
 
     def __post_init__(self) -> None:
         for limit in fields(self):

@@ -324,9 +324,7 @@ class _Run:
             )
         seen = {name: shown(value) for name, value in arguments.items()}
         self.keep(part.line, size_of_shown(seen))
-        result = self.perform(part, arguments, seen)
-        self.look_at_clock(part.line)
-        return result
+        return self.perform(part, arguments, seen)
 
     def perform(self, part: SkillCall, arguments: dict[str, Any], seen: dict[str, Any]) -> Value:
         """Call the skill, the one place where a program reaches anything."""

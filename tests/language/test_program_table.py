@@ -1,0 +1,92 @@
+"""The table of skills is the vocabulary's, and the page about programs shows it as it is."""
+
+import inspect
+import os
+import re
+from pathlib import Path
+from typing import Protocol
+
+import pytest
+
+from avlmaps.core.errors import ProgramError
+from avlmaps.language.program import SKILLS, parse_program, run_program, skill_lines
+from avlmaps.language.program.calls import BUILTINS
+from avlmaps.language.program.kinds import Kind
+from avlmaps.language.program.table import skills_of
+from avlmaps.language.vocabulary import Vocabulary
+from helpers.recording_robot import RecordingRobot
+
+PAGE = Path(__file__).parents[2] / "docs" / "programs.md"
+
+
+def test_every_skill_of_the_vocabulary_is_in_the_table_and_nothing_else() -> None:
+    declared = [name for name in vars(Vocabulary) if not name.startswith("_")]
+    assert list(SKILLS) == declared
+    for name, skill in SKILLS.items():
+        method = getattr(Vocabulary, name)
+        assert [each.name for each in skill.parameters] == list(inspect.signature(method).parameters)[1:]
+        assert skill.doc == " ".join(inspect.getdoc(method).split())  # type: ignore[union-attr]
+
+
+def test_a_signature_reads_as_it_is_written() -> None:
+    assert SKILLS["move_north"].signature == "move_north(target: str | Place | Heat, distance_m: float = 0.5) -> None"
+    assert SKILLS["get_contour"].signature == "get_contour(target: str | Place | Heat) -> list[Place]"
+    assert SKILLS["get_map"].parameters[1].kinds == {Kind.STRING, Kind.CLIP, Kind.NOTHING}
+
+
+def test_only_alternatives_must_be_given_one_at_a_time() -> None:
+    assert {name for name, skill in SKILLS.items() if skill.takes_exactly_one} == {"get_map", "get_major_map"}
+
+
+def test_lines_for_a_prompt_hold_every_signature_and_what_it_does() -> None:
+    lines = skill_lines()
+    assert len(lines) == len(SKILLS)
+    assert lines[0] == "robot.load_image(path: str) -> Picture: Load a picture from a file, to ask where it was taken."
+    assert skill_lines("", [SKILLS["turn"]])[0].startswith("turn(angle_deg: float) -> None: Turn on the spot")
+
+
+def test_a_vocabulary_that_programs_have_no_values_for_is_a_mistake() -> None:
+    class Odd(Protocol):
+        def skill(self, thing: dict[str, int]) -> None: ...
+
+    class Starred(Protocol):
+        def skill(self, *things: str) -> None: ...
+
+    for vocabulary in (Odd, Starred):
+        with pytest.raises(TypeError, match="skill"):
+            skills_of(vocabulary)
+
+
+def test_the_page_shows_the_table_as_it_is() -> None:
+    """After a change of the vocabulary: AVLMAPS_UPDATE_SNAPSHOTS=1 make test."""
+    rows = [f"| `{skill.signature.replace('|', chr(92) + '|')}` | {skill.doc} |" for skill in SKILLS.values()]
+    table = "\n".join(["| skill | what it does |", "|---|---|", *rows])
+    text = PAGE.read_text(encoding="utf-8")
+    before, rest = text.split("<!-- skills -->\n")
+    kept, after = rest.split("\n<!-- end of skills -->")
+    if os.environ.get("AVLMAPS_UPDATE_SNAPSHOTS"):
+        PAGE.write_text(f"{before}<!-- skills -->\n{table}\n<!-- end of skills -->{after}", encoding="utf-8")
+        kept = table
+    assert kept == table
+
+
+def test_every_program_of_the_page_runs() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    programs = re.findall(r"```python\n# a program\n(.*?)```", text, re.DOTALL)
+    assert len(programs) >= 4
+    for program in programs:
+        assert run_program(parse_program(program), RecordingRobot()).error is None, program
+
+
+def test_every_refusal_of_the_page_is_what_is_said() -> None:
+    pairs = re.findall(r"^\| `([^`]+)` \| (Line 1: .*?) \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(pairs) >= 6
+    for program, said in pairs:
+        with pytest.raises(ProgramError) as refusal:
+            parse_program(program)
+        assert str(refusal.value) == said
+
+
+def test_the_page_names_every_function() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    assert all(f"`{name}" in text for name in BUILTINS)
