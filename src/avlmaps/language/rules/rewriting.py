@@ -336,7 +336,7 @@ _ABOUT_ENDS = [
 @cache
 def _all() -> tuple[tuple[re.Pattern[str], str], ...]:
     fillers = [(filler, " ") for filler in words.FILLERS]
-    tidy = [(r"\s+", " "), (r"\s+(?=[,;])", "")]
+    tidy = [(r"\s+", " "), (r"\s+(?=[,;])", ""), (r"^[\s,]+", ""), (r";[\s,]+", "; ")]
     listed = [*_ABOUT_FILES, *_ABOUT_PLACES, *fillers, *tidy]
     listed += [*_ABOUT_ORDER, *fillers, *_ABOUT_ACTIONS, *_ABOUT_ENDS, *tidy]
     return tuple((re.compile(pattern, re.IGNORECASE), instead) for pattern, instead in listed)
