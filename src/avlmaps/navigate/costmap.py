@@ -53,6 +53,7 @@ class Costmap:
         room_m: distance from a cell's middle to the nearest obstacle, never overstated; inf where there is none.
         occupied: the obstacles themselves.
         opaque: what blocks the view over the floor.
+        free: where the floor was seen and nothing stands.
     """
 
     origin_m: Float64[np.ndarray, "2"]
@@ -63,6 +64,7 @@ class Costmap:
     room_m: Float32[np.ndarray, "nx ny"]
     occupied: Bool[np.ndarray, "nx ny"]
     opaque: Bool[np.ndarray, "nx ny"]
+    free: Bool[np.ndarray, "nx ny"]
 
     def in_cells(self, xy: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
         """Return places in units of cells, from the corner of cell (0, 0)."""
@@ -160,6 +162,7 @@ def costmap_of(
         room_m,
         occupied,
         occupied if tall is None else tall & (obstacles.states != CellState.FREE),
+        free,
     )
 
 

@@ -320,7 +320,7 @@ def seen_from(x, y, cells, opaque, own):  # pragma: no cover - compiled
         y: of the thing.
         cells: (n, 2) the cells to look from.
         opaque: what blocks the view.
-        own: what is opaque round the thing, without a gap and within so many cells of it, is the thing itself.
+        own: what is opaque within so many cells of the thing is the thing itself.
     """
     seen = np.zeros(cells.shape[0], np.bool_)
     nx, ny = opaque.shape
@@ -328,14 +328,11 @@ def seen_from(x, y, cells, opaque, own):  # pragma: no cover - compiled
         dx, dy = cells[n, 0] + 0.5 - x, cells[n, 1] + 0.5 - y
         length = np.hypot(dx, dy)
         steps = int(length / 0.2) + 1
-        in_thing, free = True, True
-        for s in range(steps):
+        free = True
+        for s in range(int(own / length * steps) if length > 0.0 else steps, steps):
             part = s / steps
             i, j = int(np.floor(x + part * dx)), int(np.floor(y + part * dy))
-            blocks = 0 <= i < nx and 0 <= j < ny and opaque[i, j]
-            if not blocks and part * length > 1.0:
-                in_thing = False
-            if blocks and not (in_thing and part * length <= own):
+            if part * length > own and 0 <= i < nx and 0 <= j < ny and opaque[i, j]:
                 free = False
                 break
         seen[n] = free

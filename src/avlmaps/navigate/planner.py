@@ -33,8 +33,9 @@ class PlanSettings:
     """How far from a place that cannot be stood on the body may stop instead."""
     roomy_m: float = 0.03
     """A stop beside a place may be farther from it by so much for each unit of cost that it saves."""
-    own_m: tuple[float, ...] = (0.15, 0.5)
-    """What blocks the view within so far of a place is the thing there itself; the first that lets it be seen."""
+    own_m: tuple[float, ...] = (0.075, 0.2, 0.35, 0.5, 0.7)
+    """What blocks the view within so far of a place is the thing there itself: the least that lets it be seen, so
+    that a wardrobe is seen through its front and not through its back and the wall. For free floor just the first."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,9 +128,10 @@ class Planner:
         mask = costmap.passable if part is None else self._part == part
         cells, _ = self._near(mask, start, self.settings.escape_m)
         x, y = costmap.in_cells(start)
-        # What it stands in itself does not hold it back, as with a goal.
-        open_line = grid_kernels.seen_from(x, y, cells, costmap.occupied, costmap.radius_m / costmap.cell_size_m)
-        ways_out = cells[open_line]
+        # What the map has under its middle does not hold it back, a wall beside it does.
+        within = bool(costmap.holds(start)) and bool(costmap.occupied[tuple(costmap.cell_of(start))])
+        own = costmap.radius_m / costmap.cell_size_m if within else 1.0
+        ways_out = cells[grid_kernels.seen_from(x, y, cells, costmap.occupied, own)]
         return costmap.middle_of(ways_out[0]) if len(ways_out) else None
 
     def stop_for(self, start: Float[np.ndarray, "2"], place: Float[np.ndarray, "2"]) -> Stop | None:
@@ -151,7 +153,8 @@ class Planner:
         order = np.argsort(distance_m + self.settings.roomy_m * (costmap.cost[tuple(cells.T)] - 1.0), kind="stable")
         cells, distance_m = cells[order], distance_m[order]
         x, y = costmap.in_cells(place)
-        for own_m in self.settings.own_m:
+        things = 1 if costmap.free[tuple(costmap.cell_of(place))] else None  # on free floor there is no thing
+        for own_m in self.settings.own_m[:things]:
             seen = grid_kernels.seen_from(x, y, cells, costmap.opaque, own_m / costmap.cell_size_m)
             if seen.any():
                 best = int(np.argmax(seen))
