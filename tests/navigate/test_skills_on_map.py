@@ -114,6 +114,13 @@ def test_the_best_guess_is_gone_to_only_when_that_is_asked_for() -> None:
     assert any("not sure of 'dog'" in note for note in robot.seeker.notes)
 
 
+def test_a_guess_leaves_out_what_is_nowhere_near() -> None:
+    robot = furnished_robot(settings=RobotSettings(guess=True), sounds=sounds_of([track(60.0, 60.0)], [0.9]))
+    robot.move_to(robot.get_major_map(obj="chair") * robot.get_map(sound="dog"))
+    assert robot.moves[-1].goal[:2] == pytest.approx(BIG_CHAIR, abs=0.06)
+    assert any("this is its best guess" in note for note in robot.seeker.notes)
+
+
 def test_things_that_are_never_together_are_told_apart_from_things_that_are_missing() -> None:
     views = np.array([[1.0, 0.0]], np.float32)
     robot = furnished_robot(views=FakeViews(), keyframes=keyframes_at(np.array([[60.0, 60.0, 1.2]]), views))

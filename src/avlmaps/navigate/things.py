@@ -53,15 +53,18 @@ def things_in(heat: Heatmap, guess: bool = False) -> list[Thing]:
 
     Args:
         heat: what is sought, and what it is near.
-        guess: take the best guess where the map is not sure that there is such a thing.
+        guess: take the best guess where the map is not sure that there is such a thing; where nothing comes together
+            with what it is near, the thing alone.
 
     Raises:
         GoalNotFoundError: there is none.
     """
     goals = heat.goals(_MOST_GOALS) if heat.found or guess else []
+    lead = lead_of(heat)
+    if not goals and guess and len(heat.factors) > 1:
+        goals = Heatmap.of(lead).goals(_MOST_GOALS)
     if not goals:
         raise GoalNotFoundError(why_not(heat, guess))
-    lead = lead_of(heat)
     return [_thing(heat, lead, goal) for goal in goals]
 
 
