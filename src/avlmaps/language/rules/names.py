@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 from avlmaps.core.errors import LanguageError
@@ -95,7 +96,16 @@ class Names:
             mark = next(token for token in node.children if is_token(token, "IMAGE_FILE", "CLIP_FILE"))
             modality = Modality.IMAGE if mark.type == "IMAGE_FILE" else Modality.SOUND
             return Named(modality, self.files[int(mark[2:-1])], is_file=True), []
-        spoken = [str(word) for word in _words(node)]
+        tokens = list(_words(node))
+        spoken = [str(word) for word in tokens]
+        # A gap of two characters is a comma and a space.
+        if any(after.start_pos - word.end_pos == 2 for word, after in pairwise(tokens)):
+            raise LanguageError(
+                f"'{', '.join(spoken)}' could be one thing or several; put 'the' before each, like: the sofa, the table "
+                "and the bed."
+            )
+        if len(spoken) == 1 and spoken[0].lower() in ("sound", "sounds", "noise", "noises"):
+            raise LanguageError("Which sound is not said; say it like: go to the sound of rain.")
         if kind == "sound":
             return Named(Modality.SOUND, " ".join(spoken)), []
         if kind == "sound_verb":
@@ -169,14 +179,14 @@ def is_rule(node: Any, *names: str) -> bool:
     return getattr(node, "data", None) in names
 
 
-def _words(node: Any) -> Iterator[str]:
+def _words(node: Any) -> Iterator[Any]:
     for child in node.children:
         if (
             is_token(child, "WORD", "AND", "AND_JOIN", "OF", "ON")
             or (is_token(child, "ARTICLE") and "phrase" in node.data)
             or (is_token(child, "ARTICLE") and "noise" in node.data)
         ):
-            yield str(child)
+            yield child
         elif hasattr(child, "data"):
             yield from _words(child)
 

@@ -89,6 +89,19 @@ _ABOUT_FILES = [
 ]
 
 _ABOUT_PLACES = [
+    (r"\btake (?:up )?(?:a|your) (?:position|place|spot|stand)\b", "stand"),
+    (r"\b(?:pay|give) ([^,;.]+?) a (?:quick |short )?visit\b", r"visit \1"),
+    (
+        r"\b(?:do|make|drive|run|walk|complete) (\w+) (?:full )?(?:laps?|rounds?|circles?|loops?|tours?) "
+        r"(?:a?round|of) ([^,;.]+)",
+        r"circle \2 \1 times",
+    ),
+    (
+        rf"\b((?:{words.TURN})(?: (?:to the )?(?:left|right))?(?: by)? (?:\d+|{words.SPELLED}))(?= (?:to (?:the|"
+        r"your) )?(?:left|right)\b|"
+        r"\s*[,;.]|\s*$)",
+        r"\1 degrees",
+    ),
     (r"\bin the (?:general )?direction of\b", "towards"),
     (r"\b(?:is|would be|'s) (?:a|the) (?:\w+ )?(?:place|spot|position) (?:to|for|where)\b[^,.;!?]*", " ; stop there"),
     (r"\bsearch (the [\w ]+?) for ([^,;.]+)", r"find \2 in \1"),
@@ -164,7 +177,8 @@ _ABOUT_PLACES = [
     (r"\b(?:that|which) (?:has|have|contains?|holds?)\b", "with"),
     (r"\b(with (?:the|an?) [\w ]+?) on (?:it|top of it|top)\b", r"\1"),
     (
-        r"\b(?:in|inside|around|of|somewhere in) (?:the|this|our) (?:environment|scene|map|surroundings|vicinity|"
+        r"\b(?:in|inside|around|of|somewhere in) (?:the|this|our) (?:environment|scene|map|surroundings(?! of)|"
+        r"vicinity(?! of)|"
         r"building|apartment|flat|"
         r"world|place)\b|\bin (?:here|there)\b|\baround here\b",
         "",
@@ -262,7 +276,9 @@ _BEGINS_ACTION = (
     r"(?:to|on|at) (?:the|its|your) "
     rf"(?:left|right|north|south|east|west)|with (?={_BEGINS_THING})(?=[^;]*\b(?:on|to|at) (?:your|its|the) "
     r"(?:left|right)|[^;]*(?:behind|front of) "
-    r"(?:you|yourself))|(?:so|such) that|let|keep(?:ing)?|have (?=.* (?:on|to) your)|put(?:ting)? (?=.* (?:on|to) "
+    rf"(?:you|yourself))|(?:so|such) that|let|{words.DISTANCE} (?:forwards?|ahead|back|left|right|to (?:the|your) "
+    r"(?:left|right)|north|south|east|west)|"
+    rf"keep(?:ing)?|have (?=.* (?:on|to) your)|put(?:ting)? (?=.* (?:on|to) "
     r"your)|so (?:you|the)|"
     rf"(?:making|make) sure|ensuring|(?:{words.MANIPULATE})(?= (?:{_DETERMINER}|up|it|me)\b)|{words.NEGATIONS})"
 )

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 # Verbs that lead to a place. "find the chair" and "show me the chair" go there, too.
 # Verbs that take what they lead to without "to": "find the chair" and "show me the chair" go there, too.
 VISIT = (
+    r"be (?:taken|brought|led|guided|driven) to|(?:find|make|work|pick) (?:your|its) way to|make straight for|"
     r"show (?:me|us)(?: the way to)?|(?:find|locate|get) (?:me|us)|(?:go |come )?(?:look|search|hunt)(?:ing)? for|"
     r"check (?:out|on)|checking (?:out|on)|checked out|"
     r"(?:your|the)(?: (?:next|first|final|last))? (?:goal|destination|target|stop) (?:is|should be|will be|would be)|"
@@ -22,6 +23,7 @@ VISIT = (
 )
 # Verbs that lead to a place with "to", "next to", "left of" and their like: "move the chair" is refused.
 GO = (
+    r"make a (?:quick |short |brief )?stop|(?:trot|tiptoe|whizz|zip|meander|mosey|drift|motor|scurry|pootle|waltz)|"
     r"(?:make|find|work|pick|wend) (?:your|its) way|(?:position|place|put|station|bring|take|get|plant|park|move|"
     r"transport|situate|set|"
     r"locate|stand|drive|steer|navigate|stop) (?:yourself|itself|the robot)|pop (?:over|round)|set (?:off|out)|"
@@ -68,7 +70,8 @@ FACE = (
     r"facing|look at|"
     r"look (?:to|towards?)|be facing)|(?:orient|point|aim|direct|align)(?:ing)?(?: (?:yourself|itself|your "
     r"(?:camera|head|front|"
-    r"face|nose|eyes|gaze|view)))?(?: (?:at|to|towards?|with))?|(?:have|take) a look (?:at|to|towards?)|"
+    r"face|nose|eyes|gaze|view)|the (?:camera|robot)))? (?:at|to|towards?|with)|(?:have|take) a look (?:at|to|"
+    r"towards?)|"
     r"(?:look|gaze|stare|glance|peer|watch)(?:ing)?(?: over)?(?: (?:at|to|towards?|in the direction of|into))?|"
     r"(?:face|facing|faced|watch)(?: (?:to|towards?|in the direction of))?"
 )
@@ -93,6 +96,7 @@ STOPS = (
 
 # Said for politeness or by habit; nothing changes when they are left out.
 FILLERS = (
+    r"\b(?:let|allow|permit) the robot(?: to)?\b",
     r"\b(?:i|we)(?:'d| would)? (?:want|need|like|wish) to (?=(?:go|get|visit|see(?! (?:you|the robot))|be|find|"
     r"reach|move|drive)\b)",
     r"\bfrom (?:where you (?:are|stand)|here|your (?:current )?(?:position|place|location|spot))(?: now| on)?,?",
