@@ -296,19 +296,19 @@ def test_every_sentence_is_translated_into_the_program_that_is_meant(ground: Gro
     ]
     files = ("./0123456789ab.png", "./ba9876543210.png")
     for one in made:
-        parse_program(one.program(0, files))
-        assert names_of(command_to_program(one.sentence(0, files))) == names_of(one.program(0, files)), one.sentence()
+        parse_program(one.program(files))
+        assert names_of(command_to_program(one.sentence(files))) == names_of(one.program(files)), one.sentence()
 
 
-def test_the_rest_of_a_command_leaves_out_what_is_done():
+def test_a_command_names_all_goals_in_order_or_one_alone():
     said = ["the chair", "the table", "the tv"]
     goals = tuple(an_object(name.removeprefix("the "), [BOX]) for name in said)
     one = Mission("m", Series.COMMANDS, "made", (0, 0, 0), goals, "First {0}, then {1}, last {2}.")
     assert one.sentence() == "First the chair, then the table, last the tv."
-    assert one.sentence(1) == "First go to the table, and then go to the tv."
-    assert one.sentence(2) == "Go to the tv."
+    assert one.sentence(only=2) == "Go to the tv."
+    assert replace(one, command="").sentence() == joined(said)
     assert joined(said) == "First go to the chair, then go to the table, and then go to the tv."
-    assert one.program(1) == 'robot.move_to_object("table")\nrobot.move_to_object("tv")'
+    assert one.program(only=1) == 'robot.move_to_object("table")'
 
 
 def test_a_sound_is_called_by_the_first_of_its_names():

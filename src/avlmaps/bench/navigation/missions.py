@@ -68,24 +68,25 @@ class Mission:
         """The poses of the cameras that took the photos."""
         return [np.array(photo, np.float64) for photo in self.photos]
 
-    def sentence(self, first: int = 0, files: tuple[str, ...] = ()) -> str:
+    def sentence(self, files: tuple[str, ...] = (), only: int | None = None) -> str:
         """Return the command as a person would give it.
 
         Args:
-            first: leave out the goals before this one (a robot that broke off is told the rest).
             files: the photos' files.
+            only: name just this goal (a robot whose program broke off is told what is left one by one).
         """
         said = [_named(goal.said, files) for goal in self.goals]
-        if self.command and first == 0:
-            text = self.command
-            for number, words in enumerate(said):
-                text = text.replace(f"{{{number}}}", words)
-            return _named(text, files)
-        return joined(said[first:])
+        if only is not None:
+            return joined([said[only]]) if self.goals[only].moves else f"Face {said[only]}."
+        text = self.command or joined(said)
+        for number, words in enumerate(said):
+            text = text.replace(f"{{{number}}}", words)
+        return _named(text, files)
 
-    def program(self, first: int = 0, files: tuple[str, ...] = ()) -> str:
-        """Return the program that a perfect translator would write."""
-        return "\n".join(_named(goal.program, files) for goal in self.goals[first:])
+    def program(self, files: tuple[str, ...] = (), only: int | None = None) -> str:
+        """Return the program that a perfect translator would write, for all goals or for one of them."""
+        goals = self.goals if only is None else self.goals[only : only + 1]
+        return "\n".join(_named(goal.program, files) for goal in goals)
 
     @property
     def fingerprint(self) -> str:

@@ -1,7 +1,7 @@
 """Sending a robot on a mission: sentence, program, skills, driver, body; and judging every stop."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,16 @@ from avlmaps.navigate.skills import Robot, RobotSettings
 _BUDGET = Budget(seconds=1e6)
 _MOST_HEATS = 100  # kept in memory
 Launch = Callable[[GroundPose], tuple[Driver, WatchedBody]]
+
+
+@dataclass(slots=True)
+class _Log:
+    """What was told and done on a mission so far."""
+
+    commands: list[str] = field(default_factory=list)
+    programs: list[str] = field(default_factory=list)
+    legs: list[Leg] = field(default_factory=list)
+    understood: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +66,8 @@ class Pilot:
     def run(self, mission: Mission, configuration: Configuration, key: str = "") -> Episode:
         """Send a robot on a mission.
 
-        Where a program breaks off at a goal that the map does not know, the robot is told the remaining goals, from
-        where it stands, so that they count by themselves.
+        Where a program breaks off, because the map does not know a goal, the robot is told those that it has not been
+        to one by one, from where it stands, so that each counts by itself.
 
         Args:
             mission: what to do.
@@ -69,41 +79,42 @@ class Pilot:
         driver, body = self.launch(mission.pose)
         asked = Perceived(self.scene, configuration.senses)
         robot = Robot(asked, driver, RobotSettings(guess=self.guess, persist=True), Readable((self.photos,)))
-        told, programs, legs, understood = self._driven(mission, robot, driver)
+        log = self._driven(mission, robot, driver)
         return Episode(
-            mission.name, mission.series, mission.scene, configuration.name, self.seed, tuple(told), tuple(programs),
-            tuple(legs), body.contacts, body.foretold, understood, key,
+            mission.name, mission.series, mission.scene, configuration.name, self.seed, tuple(log.commands),
+            tuple(log.programs), tuple(log.legs), body.contacts, body.foretold, log.understood, key,
         )  # fmt: skip
 
-    def _driven(self, mission: Mission, robot: Robot, driver: Driver) -> tuple[list[str], list[str], list[Leg], bool]:
-        files = self.photo_names(mission)
-        told: list[str] = []
-        programs: list[str] = []
-        legs: list[Leg] = []
-        while len(legs) < len(mission.goals):
-            told.append(mission.sentence(len(legs), files))
-            rest = mission.goals[len(legs) :]
-            try:
-                program = self._program(mission, len(legs), files, told[-1])
-                programs.append(program)
-                parsed = parse_program(program)
-            except AvlmapsError as fault:
-                legs += [self._missed(goal, driver.pose, str(fault)) for goal in rest]
-                return told, programs, legs, False
-            begin, before = driver.pose, len(robot.moves)
-            trace = run_program(parsed, robot, _BUDGET)
-            legs += self._judged(rest, begin, robot.moves[before:])
-            if trace.error is None:
-                rest = mission.goals[len(legs) :]
-                legs += [self._missed(goal, driver.pose, "The program ends before it.") for goal in rest]
-            elif len(legs) < len(mission.goals):
-                legs.append(self._missed(mission.goals[len(legs)], driver.pose, trace.error))
-        return told, programs, legs, True
+    def _driven(self, mission: Mission, robot: Robot, driver: Driver) -> _Log:
+        """Tell the whole command; where its program breaks off, tell what is left one by one."""
+        files, goals, log = self.photo_names(mission), mission.goals, _Log()
+        error = self._told(mission.sentence(files), mission.program(files), goals, robot, log)
+        broke_off = error is not None and log.understood and len(goals) > 1
+        for number in range(len(log.legs), len(goals)):
+            if broke_off:
+                alone = goals[number : number + 1]
+                own = self._told(mission.sentence(files, number), mission.program(files, number), alone, robot, log)
+            else:
+                own = error
+            if len(log.legs) <= number:
+                log.legs.append(self._missed(goals[number], driver.pose, own or "The program ends before it."))
+        return log
 
-    def _program(self, mission: Mission, first: int, files: tuple[str, ...], command: str) -> str:
-        if self.translator is None:
-            return mission.program(first, files)
-        return self.translator.program_for(command).program
+    def _told(self, command: str, program: str, goals: Sequence[Goal], robot: Robot, log: _Log) -> str | None:
+        """Tell a robot something and judge its stops; return why it broke off, None where it did not."""
+        log.commands.append(command)
+        try:
+            if self.translator is not None:
+                program = self.translator.program_for(command).program
+            log.programs.append(program)
+            parsed = parse_program(program)
+        except AvlmapsError as fault:
+            log.understood = False
+            return str(fault)
+        begin, before = robot.driver.pose, len(robot.moves)
+        trace = run_program(parsed, robot, _BUDGET)
+        log.legs += self._judged(goals, begin, robot.moves[before:])
+        return trace.error
 
     def _judged(self, goals: Sequence[Goal], begin: GroundPose, moves: Sequence[Move]) -> list[Leg]:
         """Return a leg for each movement that was for a goal: a place for a place, a turn for a way to look."""

@@ -22,8 +22,9 @@ from avlmaps.bench.navigation.watched import Foreknowledge, WatchedBody
 from avlmaps.core.errors import BackendError
 from avlmaps.core.motion import GroundPose
 from avlmaps.language.translator import Translator
-from avlmaps.maps.obstacles import Body, Obstacles, find_obstacles
+from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE
+from avlmaps.navigate.costmap import obstacles_for
 from avlmaps.navigate.driver import Driver, MapDriver
 from avlmaps.sim.body import Building, SimulatedBody
 from avlmaps.sim.scene import Scene
@@ -61,9 +62,7 @@ class NavigationPlace:
     @cached_property
     def obstacles(self) -> Obstacles:
         """What the map shows to be in the way."""
-        stored = self.work.asked.stored
-        body = Body(radius_m=BASE.radius_m, height_m=BASE.height_m, step_m=BASE.step_m)
-        return find_obstacles(stored.voxels, stored.grid, stored.up_in_world, body)
+        return obstacles_for(self.work.asked, BASE)
 
     @cached_property
     def _known(self) -> Foreknowledge:
