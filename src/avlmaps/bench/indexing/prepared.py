@@ -18,6 +18,7 @@ from avlmaps.bench.indexing.rules import Event, Evidence, Photo, area_tasks, pho
 from avlmaps.bench.indexing.tasks import Recorded, Task, TaskError, TaskKind
 from avlmaps.bench.indexing.true_voxels import TrueVoxels
 from avlmaps.core.camera import Pinhole
+from avlmaps.core.errors import MapError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.version import __version__
 from avlmaps.query.avlmap import AVLMap
@@ -129,7 +130,10 @@ class Workplace:
         from avlmaps.maps.build import build_map
 
         path = self.job.folder / f"{self.job.profile}.avlmap"
-        return AVLMap(build_map(self.recording, path, self.job.profile, overwrite=True, progress=False))
+        try:  # one that is there already is taken as it is
+            return AVLMap(build_map(self.recording, path, self.job.profile, progress=False))
+        except MapError:  # by another release, or with other settings
+            return AVLMap(build_map(self.recording, path, self.job.profile, overwrite=True, progress=False))
 
     @cached_property
     def _true_voxels(self) -> TrueVoxels:
