@@ -102,11 +102,14 @@ def _require_same_frame(asked: AVLMap, scene: Scene, cameras: Float[np.ndarray, 
 def _start_near(
     cameras: Float[np.ndarray, "k 4 4"], obstacles: Obstacles, room: FreeSpace, shape: BodyShape
 ) -> GroundPose:
-    """Return a place near the beginning of the walk that is free in the map and in the scene, looking as the camera."""
+    """Return a place near the beginning of the walk that is free in the map and in the scene, looking as the camera.
+
+    It lies in the part of the map from which most can be reached: what a walk began on, its camera often never saw.
+    """
     level = np.asarray(obstacles.level_from_world)
     heading = 0.0
     costmap = costmap_of(obstacles, shape.radius_m)
-    free: Bool[np.ndarray, "nx ny"] = costmap.passable & (costmap.room_m >= shape.radius_m + _MARGIN_M)
+    free = _largest_part(costmap.passable) & (costmap.room_m >= shape.radius_m + _MARGIN_M)
     places = costmap.middle_of(np.argwhere(free))
     places = places[np.asarray(room.is_free(places), bool)] if len(places) else places
     if not len(places):
@@ -122,3 +125,11 @@ def _start_near(
     i, j = costmap.cell_of(places[near]).T
     x, y = places[near[np.argmax(np.round(costmap.room_m[i, j], 1) - 0.01 * away[near])]]
     return GroundPose(float(x), float(y), heading)
+
+
+def _largest_part(free: Bool[np.ndarray, "nx ny"]) -> Bool[np.ndarray, "nx ny"]:
+    """Return the largest connected part."""
+    from scipy.ndimage import label
+
+    part, count = label(free, np.ones((3, 3)))  # pyright: ignore[reportGeneralTypeIssues]
+    return part == 1 + np.argmax(np.bincount(part.ravel(), minlength=2)[1:]) if count else free
