@@ -1,0 +1,151 @@
+"""What a chat translator is told: which model, where it is, and how long to wait for it."""
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from ipaddress import ip_address
+from math import isfinite
+from pathlib import Path
+from typing import Any
+from urllib.parse import SplitResult, urlsplit
+
+from avlmaps.core.errors import LanguageError
+
+HOSTED_URL = "https://api.openai.com/v1"
+# What servers on the same machine are sent, who ask for no key; the client insists on one.
+NO_KEY = "none"
+_PREFIX = "AVLMAPS_CHAT_"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChatSettings:
+    """Which chat model writes programs, where it is served, and within which limits.
+
+    ``from_environment`` fills what is not given from ``AVLMAPS_CHAT_MODEL``, ``AVLMAPS_CHAT_TIMEOUT_S`` and so on.
+    """
+
+    model: str | None = None
+    """Name of the model; without one, the only model that a server offers, or the one that was recorded."""
+    base_url: str = HOSTED_URL
+    """Address of the API; that of a server on the same machine ends in /v1 mostly."""
+    api_key: str | None = field(default=None, repr=False)
+    """The key; servers on the same machine mostly need none. Better set in the environment than on a command line."""
+    timeout_s: float = 120.0
+    """Seconds to wait for one answer, with all attempts at it."""
+    retries: int = 2
+    """How often a request is sent again where the server is busy, fails, or breaks off."""
+    rounds: int = 2
+    """How often the model may correct a program that cannot be used or that failed while it ran."""
+    temperature: float | None = 0.0
+    """How freely the model chooses its words, 0 to 2; none: as the server likes."""
+    max_tokens: int = 2048
+    """Most tokens of an answer, with what a reasoning model thinks."""
+    seed: int | None = 0
+    """Seed of the model's choices; none: as the server likes."""
+    replay: Path | None = None
+    """A JSONL file: made and filled with every exchange where it is missing, asked instead of the model where it is."""
+
+    def __post_init__(self) -> None:
+        split = _split(self.base_url)
+        if split is None or split.scheme not in ("http", "https") or not split.hostname:
+            shown = "What was given" if "@" in self.base_url else repr(self.base_url)  # a password is not repeated
+            raise LanguageError(
+                f"{shown} is no address of a chat server; give one like {HOSTED_URL} or http://localhost:11434/v1."
+            )
+        if self.api_key is not None and not (self.api_key.isascii() and self.api_key.isprintable()):
+            raise LanguageError("The key for the chat model holds characters that no key has; copy it again.")
+        if self.temperature is not None:  # 0 and 0.0 are one request
+            object.__setattr__(self, "temperature", float(self.temperature))
+        if not (isfinite(self.timeout_s) and 0 < self.timeout_s <= 86400):
+            raise LanguageError(f"A chat model cannot be waited for {self.timeout_s} s; give more than 0, up to 86400.")
+        for name, value, least, most in (
+            ("retries", self.retries, 0, 10),
+            ("rounds", self.rounds, 0, 10),
+            ("max_tokens", self.max_tokens, 1, 1_000_000),
+            ("temperature", self.temperature or 0, 0, 2),
+        ):
+            if not least <= value <= most:
+                raise LanguageError(f"The chat setting {name} is {value}; give {least} to {most}.")
+
+    @classmethod
+    def from_environment(cls, environment: Mapping[str, str] = os.environ, **given: Any) -> "ChatSettings":
+        """Return the settings that are given, and for what is not given (or None) those of the environment.
+
+        ``OPENAI_BASE_URL`` and ``OPENAI_API_KEY`` are a pair: the key goes to that address (or the hosted one where
+        none is set) and to no other; for another address there is ``AVLMAPS_CHAT_API_KEY``.
+
+        Args:
+            environment: variables by name.
+            given: fields of the settings.
+
+        Raises:
+            LanguageError: a variable does not hold what its setting needs.
+        """
+        chosen = {name: value for name, value in given.items() if value is not None}
+        for each in fields(cls):
+            text = environment.get(_PREFIX + each.name.upper(), "").strip()
+            if text and each.name not in chosen:
+                chosen[each.name] = _read(each.name, text)
+        openai_url = environment.get("OPENAI_BASE_URL", "").strip() or HOSTED_URL
+        chosen.setdefault("base_url", openai_url)
+        if "api_key" not in chosen and chosen["base_url"].rstrip("/") == openai_url.rstrip("/"):
+            chosen["api_key"] = environment.get("OPENAI_API_KEY", "").strip() or None
+        return cls(**chosen)
+
+    @property
+    def hosted(self) -> bool:
+        """Whether the address is OpenAI's own."""
+        return urlsplit(self.base_url).hostname == urlsplit(HOSTED_URL).hostname
+
+    @property
+    def on_this_machine(self) -> bool:
+        """Whether the address is of the same machine, to which no proxy leads."""
+        host = urlsplit(self.base_url).hostname or ""
+        try:
+            return ip_address(host).is_loopback
+        except ValueError:
+            return host == "localhost" or host.endswith(".localhost")
+
+    @property
+    def shown_url(self) -> str:
+        """The address without a user, a password or a query, as errors may show it."""
+        split = urlsplit(self.base_url)
+        host = f"[{split.hostname}]" if ":" in (split.hostname or "") else split.hostname
+        return f"{split.scheme}://{host}{f':{split.port}' if split.port else ''}{split.path.rstrip('/')}"
+
+
+def variable(setting: str) -> str:
+    """Return the name of the environment variable that sets a setting."""
+    return _PREFIX + setting.upper()
+
+
+def _split(url: str) -> SplitResult | None:
+    """Return the parts of an address, None for what is none (a port that is no number, a broken IPv6 address)."""
+    try:
+        split = urlsplit(url)
+        _ = split.port
+    except ValueError:
+        return None
+    return split if url.isprintable() and " " not in url else None
+
+
+def _read(name: str, text: str) -> object:
+    """Return the value of a setting from the text of its variable."""
+    kinds: dict[str, tuple[Callable[[str], object], str]] = {
+        "timeout_s": (float, "a number of seconds"),
+        "retries": (int, "a whole number"),
+        "rounds": (int, "a whole number"),
+        "temperature": (_or_none(float), "a number or 'none'"),
+        "max_tokens": (int, "a whole number"),
+        "seed": (_or_none(int), "a whole number or 'none'"),
+        "replay": (Path, "the path of a file"),
+    }
+    kind, wanted = kinds.get(name, (str, "text"))
+    try:
+        return kind(text)
+    except ValueError:
+        raise LanguageError(f"The variable {variable(name)} is {text!r}; give {wanted}.") from None
+
+
+def _or_none(kind: Callable[[str], object]) -> Callable[[str], object]:
+    return lambda text: None if text.lower() == "none" else kind(text)

@@ -1,0 +1,182 @@
+"""From a command to a program by a chat model, corrected where it cannot be used or where it failed."""
+
+import re
+from collections.abc import Sequence
+
+from avlmaps.core.errors import LanguageError, ProgramError
+from avlmaps.language.chat.answer import Answer, UnusableAnswerError, program_text, quoted, without_thoughts
+from avlmaps.language.chat.endpoint import Endpoint
+from avlmaps.language.chat.prompt import (
+    command_message,
+    failed_message,
+    plain_command,
+    program_message,
+    system_prompt,
+    unusable_message,
+)
+from avlmaps.language.chat.replay import Message, Replay, Request
+from avlmaps.language.chat.settings import ChatSettings
+from avlmaps.language.program import Program, parse_program
+from avlmaps.language.program.syntax import Constant, SkillCall, expressions_of, parts_of
+from avlmaps.language.translator import Translation
+
+_MOST_SAID_CHARACTERS = 4000
+_LOADERS = frozenset({"load_image", "load_sound"})
+
+
+class ChatTranslator:
+    """Programs by any model behind an endpoint of the OpenAI chat protocol, or from a file of what one answered.
+
+    A program that does not parse, or that loads a file which the command does not name, goes back to the model with
+    the sentence that says why; so does one that failed while it ran, with what was done before. Each command has
+    `ChatSettings.rounds` such corrections in all.
+    """
+
+    def __init__(self, settings: ChatSettings | None = None) -> None:
+        self._settings = settings or ChatSettings.from_environment()
+        self._replay = Replay.open(self._settings.replay) if self._settings.replay else None
+        self._endpoint: Endpoint | None = None
+        self._model = self._settings.model
+        self._command = ""
+        self._rounds_used = 0
+
+    @property
+    def name(self) -> str:
+        """The word by which a user chooses this translator."""
+        return "chat"
+
+    def program_for(self, command: str) -> Translation:
+        """Return the program that the model writes for a command; it parses, but has not run.
+
+        Raises:
+            LanguageError: the command is empty or too long, no answer came, or none held a program.
+        """
+        self._command, self._rounds_used = command, 0
+        return self._translated(command, _opening(command))
+
+    def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:
+        """Return a program for what is left of a command after its program failed, None where no round is left.
+
+        The new program goes on from where the robot stands: it is not to repeat what was done, and nothing that the
+        failed program gave a name to is known in it.
+
+        Args:
+            command: what the person said.
+            program: the program that failed.
+            error: the sentence that says why.
+            done: the steps that were done before it failed, one text each, such as `move_to(target="sofa")`. Without
+                them the model is told that all before the failing line was done, and has to find out which that is.
+
+        Raises:
+            LanguageError: no answer came, or none held a program.
+        """
+        if command != self._command:
+            self._command, self._rounds_used = command, 0
+        if self._rounds_used >= self._settings.rounds:
+            return None
+        self._rounds_used += 1
+        failed = (Message("assistant", program_message(program)), Message("user", failed_message(error, done)))
+        return self._translated(command, (*_opening(command), *failed))
+
+    def _translated(self, command: str, messages: tuple[Message, ...]) -> Translation:
+        """Return the program that a conversation leads to, with as many corrections as are left."""
+        corrected: list[str] = []
+        read = written = 0
+        while True:
+            answer = self._asked(messages)
+            read, written = read + answer.tokens[0], written + answer.tokens[1]
+            try:
+                program = program_text(answer)
+                check_files(_parsed(program, answer), plain_command(command))
+                return Translation(program, self._notes(answer.model, corrected, read, written))
+            except (ProgramError, UnusableAnswerError) as fault:
+                if self._rounds_used >= self._settings.rounds:
+                    raise LanguageError(
+                        f"The chat model {answer.model or self._model!r} wrote no usable program in "
+                        f"{_attempts(self._rounds_used + 1)}, the last time because: {_one_sentence(fault)} Say it in "
+                        "other words, or ask another model."
+                    ) from None
+                said = without_thoughts(answer.content).strip()[:_MOST_SAID_CHARACTERS] or "(nothing)"
+                messages = (*messages, Message("assistant", said), Message("user", unusable_message(str(fault))))
+                corrected.append(_one_sentence(fault))
+            self._rounds_used += 1
+
+    def _asked(self, messages: tuple[Message, ...]) -> Answer:
+        """Return the answer to a conversation, from the file where there is one."""
+        settings, replay = self._settings, self._replay
+        replayed = replay if replay and not replay.recording else None
+        if self._model is None:
+            self._model = (replayed.model or "") if replayed else self._server().model()
+        request = Request(self._model, messages, settings.temperature, settings.seed, settings.max_tokens)
+        if replayed:
+            return replayed.answer(request)
+        answer = self._server().complete(request)
+        if replay:
+            replay.add(request, answer)
+        return answer
+
+    def _server(self) -> Endpoint:
+        """Return the endpoint, made when it is first needed: a replay needs neither a key nor the client."""
+        if self._endpoint is None:
+            self._endpoint = Endpoint(self._settings)
+        return self._endpoint
+
+    def _notes(self, model: str, corrected: Sequence[str], read: int, written: int) -> tuple[str, ...]:
+        """Return what a person should know of how a program came about."""
+        replay = self._replay
+        replayed = replay is not None and not replay.recording
+        where = f"replayed from {replay.path}" if replay and replayed else f"at {self._settings.shown_url}"
+        tokens = f", {read} tokens read and {written} written" if read or written else ""
+        notes = [f"Written by {model or self._model} {where}{tokens}."]
+        notes += [f"Corrected, because: {fault}" for fault in corrected]
+        for name in self._endpoint.left_out if self._endpoint else ():
+            notes.append(f"The server does not take a {name}, so the next answer may be another.")
+        return tuple(notes)
+
+
+def check_files(program: Program, command: str) -> None:
+    """Refuse a program that loads a file which its command does not name.
+
+    Raises:
+        ProgramError: it does, or its file's name is not written out.
+    """
+    for top in expressions_of(program.statements):
+        for part in parts_of(top):
+            if not (isinstance(part, SkillCall) and part.skill in _LOADERS):
+                continue
+            path = part.arguments[0].value
+            name = path.value if isinstance(path, Constant) else None
+            if not isinstance(name, str) or not name.strip():
+                raise ProgramError(f"Line {part.line}: `{part.skill}` takes the file's name written out in quotes.")
+            if not _names_file(command, name.removeprefix("./")):
+                raise ProgramError(f"Line {part.line}: the file {name!r} is not named in the command.")
+
+
+def _names_file(command: str, name: str) -> bool:
+    """Return whether a file's name stands in a command as a whole, and not as a part of another."""
+    return re.search(rf"(?<![\w/.-])(?:\./)?{re.escape(name)}(?![\w/-]|\.\w)", command) is not None
+
+
+def _opening(command: str) -> tuple[Message, ...]:
+    return (Message("system", system_prompt()), Message("user", command_message(command)))
+
+
+def _parsed(program: str, answer: Answer) -> Program:
+    """Return the parsed program; where the model wrote no code at all, say that rather than what is wrong with it."""
+    try:
+        return parse_program(program)
+    except ProgramError as fault:
+        if "`" not in answer.content:
+            raise UnusableAnswerError(
+                f"The answer has no code block, and by itself it is no program: {fault}"
+            ) from None
+        raise
+
+
+def _one_sentence(fault: Exception) -> str:
+    """Return a fault's sentence as a terminal can show it: it may quote what a model wrote."""
+    return quoted(str(fault), 300).strip("“”")
+
+
+def _attempts(count: int) -> str:
+    return "1 attempt" if count == 1 else f"{count} attempts"

@@ -1,0 +1,142 @@
+"""Which program is read out of a model's answer, and which answers hold none."""
+
+from contextlib import suppress
+from time import process_time
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from avlmaps.core.errors import LanguageError
+from avlmaps.language.chat.answer import Answer, UnusableAnswerError, program_text, quoted, without_thoughts
+
+GO = 'robot.move_to_object("sofa")'
+TURN = "robot.turn(90)"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        f"```python\n{GO}\n```",
+        f"```\n{GO}\n```",
+        f"```py\n{GO}\n```\n",
+        f"~~~python\n{GO}\n~~~",
+        f"````python\n{GO}\n````",
+        f"``` python \n{GO}\n```",
+        f"Here is the program:\n\n```python\n{GO}\n```\nIt drives to the sofa.",
+        f"1. So:\n   ```python\n   {GO}\n   ```",
+        f"First idea:\n```python\n{TURN}\n```\nBetter:\n```python\n{GO}\n```",
+        f"```python\n{GO}\n```\nIt prints\n```text\nnothing\n```",
+        f"```python\n{GO}\n```\nand, cut off:\n```python\nrobot.mo",
+        f"```python\r\n{GO}\r\n```",
+        GO,
+        f"\n\n{GO}\n",
+        f"`{GO}`",
+        f"```{GO}```",
+        f"<think>I could ```python\n{TURN}\n```</think>\n```python\n{GO}\n```",
+        f"the robot should ```python\n{TURN}\n``` or so</think>{GO}",
+        f"[THINK]hm[/THINK]```python\n{GO}\n```",
+        f"<thinking>\nhm\n</thinking>\n{GO}",
+    ],
+)
+def test_the_program_is_found_in_whatever_stands_around_it(content: str) -> None:
+    assert program_text(Answer(content)) == GO
+
+
+@pytest.mark.parametrize(
+    ("answer", "why"),
+    [
+        (Answer(""), "empty"),
+        (Answer(" \n "), "empty"),
+        (Answer("<think>I go on and on"), "empty"),
+        (Answer("", tool_calls=1, finish="tool_calls"), "called a tool"),
+        (Answer(f"```python\n{GO}"), "never closed"),
+        (Answer("```python\n\n```"), "block is empty"),
+        (Answer("```python\n```"), "block is empty"),
+    ],
+)
+def test_an_answer_without_a_program_may_be_corrected(answer: Answer, why: str) -> None:
+    with pytest.raises(UnusableAnswerError, match=why):
+        program_text(answer)
+
+
+@pytest.mark.parametrize(
+    ("answer", "why"),
+    [
+        (Answer("", refusal="I can't help with that."), "refuses the command: “I can't help with that.”"),
+        (Answer("half of", finish="content_filter"), "refuses the command"),
+        (Answer("I'm sorry, but I can't assist with that request."), "refuses the command: “I'm sorry"),
+        (Answer("I’m sorry, I cannot do this."), "refuses the command"),
+        (Answer("<think>bad</think>I cannot write this."), "refuses the command: “I cannot write this.”"),
+        (Answer("Unfortunately, that is against my rules."), "refuses"),
+        (Answer("```python\n# cannot: the robot has no arms\n```"), "cannot be done: “the robot has no arms”"),
+        (Answer("# cannot: the robot has no arms"), "cannot be done: “the robot has no arms”"),
+        (Answer("Cannot: it has no arms"), "cannot be done"),
+        (
+            Answer(f"```python\n{GO}\n```", finish="length", tokens=(9, 77)),
+            "cut off after 77 tokens; raise AVLMAPS_CHAT_MAX",
+        ),
+    ],
+)
+def test_a_refusal_and_a_cut_answer_end_it(answer: Answer, why: str) -> None:
+    with pytest.raises(LanguageError, match=why) as told:
+        program_text(answer)
+    assert not isinstance(told.value, UnusableAnswerError)
+
+
+def test_a_phrase_that_looks_like_a_refusal_inside_a_program_is_a_phrase() -> None:
+    program = 'robot.face("sorry sign")\n# cannot: be moved'
+    assert program_text(Answer(f"```python\n{program}\n```")) == program
+
+
+@given(st.text(max_size=300))
+def test_a_text_of_somebody_elses_is_one_short_line_without_control_characters(text: str) -> None:
+    shown = quoted(text, 50)
+    assert shown.isprintable()
+    assert len(shown) <= 52
+
+
+@given(st.text(alphabet="ab<>/think`\n []THINK", max_size=60))
+def test_what_comes_after_the_last_thought_is_all_that_is_left(text: str) -> None:
+    assert without_thoughts(f"<think>{text}</think>{GO}") == GO
+    assert "</think>" not in without_thoughts(text)
+
+
+@given(st.text(alphabet="`~ \npython(ab)", max_size=80))
+def test_no_answer_is_read_into_anything_but_a_program_or_a_sentence(text: str) -> None:
+    try:
+        program = program_text(Answer(text))
+    except LanguageError as fault:
+        assert str(fault)
+    else:
+        assert program.strip()
+
+
+def test_a_block_is_read_back_as_it_was_written() -> None:
+    program = 'for i in range(3):\n    robot.turn(10)\n    if i == 1:\n        robot.face("~~~")'
+    assert program_text(Answer(f"Text\n```python\n{program}\n```\nmore text")) == program
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "(" * 200_000,
+        "`" * 200_000,
+        "`" * 100_000 + "a" * 100_000,
+        "~" * 200_000 + "`",
+        "```" + "a" * 200_000 + "`",
+        "# cannot:" + " " * 200_000 + "\x00",
+        "<think>" * 100_000,
+        "</think>" * 100_000,
+        "```\n" * 10_000,
+        "\n" * 200_000,
+        " " * 200_000 + "x",
+        "#!" * 100_000 + "i am",
+    ],
+    ids=range(12),
+)
+def test_reading_an_answer_takes_no_longer_than_it_is_long(text: str) -> None:
+    began = process_time()
+    with suppress(LanguageError):
+        program_text(Answer(text))
+    assert process_time() - began < 3
