@@ -109,6 +109,12 @@ def block_parts(passable, cost):  # pragma: no cover - compiled
     for bi in range(0, nx, BLOCK):
         for bj in range(0, ny, BLOCK):
             end_i, end_j = min(bi + BLOCK, nx), min(bj + BLOCK, ny)
+            if passable[bi:end_i, bj:end_j].all():  # most blocks are one part
+                node[bi:end_i, bj:end_j] = count
+                middle[count, 0], middle[count, 1] = 0.5 * (bi + end_i), 0.5 * (bj + end_j)
+                mean[count] = cost[bi:end_i, bj:end_j].mean()
+                count += 1
+                continue
             for i in range(bi, end_i):
                 for j in range(bj, end_j):
                     if not passable[i, j] or node[i, j] >= 0:
@@ -164,7 +170,7 @@ def block_graph(node, middle, mean):  # pragma: no cover - compiled
     degree = np.zeros(middle.shape[0] + 1, np.int32)
     for i in range(nx):
         for j in range(ny):
-            if node[i, j] < 0:
+            if node[i, j] < 0 or (i % BLOCK != BLOCK - 1 and j % BLOCK != BLOCK - 1):
                 continue
             for k in range(4):
                 di, dj = STEPS[k, 0], STEPS[k, 1]

@@ -16,9 +16,9 @@ from scipy.sparse import csgraph, csr_array
 from avlmaps.navigate import grid_kernels
 from avlmaps.navigate.costmap import Costmap
 
-_EVERY = 6  # cells of a straight run of a path from which shortcuts may begin
-_WINDOW = 48  # such points that a shortcut may leap
-_AROUND = (4, 2, 1)  # blocks around the coarse way that are searched: fewer where they hold too many cells
+_EVERY = 8  # cells of a straight run of a path from which shortcuts may begin
+_WINDOW = 24  # such points that a shortcut may leap
+_AROUND = (2, 1)  # blocks around the coarse way that are searched: fewer where they hold too many cells
 
 
 @dataclass(frozen=True, slots=True)
