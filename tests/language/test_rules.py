@@ -1,6 +1,7 @@
 """From commands to programs by rules."""
 
 import time
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -35,10 +36,25 @@ def test_the_list_is_long_enough_and_names_nothing_twice() -> None:
 
 
 _POLITE = ("please", "could", "can ", "would", "hey", "ok", "hello", "i ", "i'd", "it ", "alright", "robot", "there ")
-_VERBS = ("go ", "move ", "turn ", "walk ", "find ", "face ", "stop ", "stand ", "drive ", "visit ", "rotate ", "look at ")
+_VERBS = (
+    "go ",
+    "move ",
+    "turn ",
+    "walk ",
+    "find ",
+    "face ",
+    "stop ",
+    "stand ",
+    "drive ",
+    "visit ",
+    "rotate ",
+    "look at ",
+)
 
 
-@pytest.mark.parametrize("around", ["please {}", "{}. Thanks!", "Hey robot, could you {}, please?", "I'd like you to {}"])
+@pytest.mark.parametrize(
+    "around", ["please {}", "{}. Thanks!", "Hey robot, could you {}, please?", "I'd like you to {}"]
+)
 def test_politeness_changes_nothing(around: str) -> None:
     orders = [command.rstrip(".!") for command, _ in listed() if not command.lower().startswith(_POLITE)]
     if around.startswith(("Hey", "I'd")):
@@ -58,7 +74,29 @@ def test_two_sentences_do_one_after_the_other() -> None:
 
 
 WORDS = st.text("abcdefghijklmnopqrstuvwxyzäß", min_size=2, max_size=9)
-_TAKEN = ("to", "it", "in", "on", "by", "at", "of", "an", "as", "if", "so", "up", "we", "us", "me", "he", "or", "is", "am", "the", "and")
+_TAKEN = (
+    "to",
+    "it",
+    "in",
+    "on",
+    "by",
+    "at",
+    "of",
+    "an",
+    "as",
+    "if",
+    "so",
+    "up",
+    "we",
+    "us",
+    "me",
+    "he",
+    "or",
+    "is",
+    "am",
+    "the",
+    "and",
+)
 
 
 @cache
@@ -76,9 +114,7 @@ def test_names_are_open(adjective: str, noun: str) -> None:
     name = f"{adjective} {noun}"
     assert same_program(command_to_program(f"find the {name}"), f'move_to_object("{name}")')
     assert same_program(command_to_program(f"stop 2 m left of the {name}"), f'move_to_left("{name}", 2)')
-    assert same_program(
-        command_to_program(f"go between the {name} and the sofa"), f'move_in_between("{name}", "sofa")'
-    )
+    assert same_program(command_to_program(f"go between the {name} and the sofa"), f'move_in_between("{name}", "sofa")')
 
 
 @settings(max_examples=15, deadline=None)
@@ -175,11 +211,12 @@ def test_the_rules_are_a_translator() -> None:
     assert translator.repair("go to the sofa", "robot.move_to_object('sofa')", "no way leads there") is None
 
 
-KNOWN = st.sampled_from(
-    "go to the chair near and then turn left 2 metres of between sound where you heard , . ; photo x.png bark.wav in front "
-    "with on your face it twice back forth from until once before after a every ' \" ⟦ ⟦i0⟧ 7 % first please move is that "
-    "stop there sofa kitchen degrees half so you are circle monitor repeat don't i want find me".split(" ")
+_KNOWN = (
+    "go to the chair near and then turn left 2 metres of between sound where you heard , . ; photo x.png bark.wav in "
+    "front with on your face it twice back forth from until once before after a every ' \" ⟦ ⟦i0⟧ 7 % first please move "
+    "is that stop there sofa kitchen degrees half so you are circle monitor repeat don't i want find me"
 )
+KNOWN = st.sampled_from(_KNOWN.split(" "))
 
 
 @settings(max_examples=60, deadline=None)
@@ -198,17 +235,29 @@ def test_nothing_but_a_program_or_a_language_error_comes_out(text: str) -> None:
 
 @pytest.mark.parametrize(
     "garbage",
-    ["a " * 250, "the the and " * 42, "go to " * 83, "é⟦% " * 125, "x" * 500, "a," * 250, "photo of " * 55, "where the sound " * 31,
-     "with the " * 55, "and then " * 55, "two and a half " * 33, "between the a and " * 27, "if you don't mind " * 27, "." * 499 + "x"],
-)  # fmt: skip
+    [
+        "a " * 250,
+        "the the and " * 42,
+        "go to " * 83,
+        "é⟦% " * 125,
+        "x" * 500,
+        "a," * 250,
+        "photo of " * 55,
+        "where the sound " * 31,
+        "with the " * 55,
+        "and then " * 55,
+        "two and a half " * 33,
+        "between the a and " * 27,
+        "if you don't mind " * 27,
+        "." * 499 + "x",
+    ],
+)
 def test_garbage_is_refused_at_once(garbage: str) -> None:
     command_to_program("turn left")
     took_s = []
     for _ in range(3):
         start_s = time.process_time()
-        try:
+        with suppress(LanguageError):
             command_to_program(garbage[:500])
-        except LanguageError:
-            pass
         took_s.append(time.process_time() - start_s)
     assert min(took_s) < 0.2

@@ -101,8 +101,8 @@ class Names:
         # A gap of two characters is a comma and a space.
         if any(after.start_pos - word.end_pos == 2 for word, after in pairwise(tokens)):
             raise LanguageError(
-                f"'{', '.join(spoken)}' could be one thing or several; put 'the' before each, like: the sofa, the table "
-                "and the bed."
+                f"'{', '.join(spoken)}' could be one thing or several; put 'the' before each, like: the sofa, the "
+                "table and the bed."
             )
         if len(spoken) == 1 and spoken[0].lower() in ("sound", "sounds", "noise", "noises"):
             raise LanguageError("Which sound is not said; say it like: go to the sound of rain.")
