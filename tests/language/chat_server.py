@@ -94,7 +94,7 @@ def hung_up(handler: BaseHTTPRequestHandler, _: Event) -> None:
 
 def silent(handler: BaseHTTPRequestHandler, over: Event) -> None:
     """No answer until the test is over."""
-    over.wait(30)
+    over.wait(90)
     handler.close_connection = True
 
 

@@ -32,7 +32,7 @@ def no_environment(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _translator(server: ChatServer, **changes: Any) -> ChatTranslator:
-    return ChatTranslator(ChatSettings(**{"base_url": server.url, "model": "m", "timeout_s": 10.0, **changes}))
+    return ChatTranslator(ChatSettings(**{"base_url": server.url, "model": "m", "timeout_s": 60.0, **changes}))
 
 
 def _block(program: str) -> str:
