@@ -204,8 +204,10 @@ class FakeRobot:
         action = goal["action"].rsplit("/", 1)[-1]
         if action == "spin":
             self.pose = self.pose.turned(args["target_yaw"])
-        elif action in ("drive_on_heading", "backup"):
-            self.pose = self.pose.ahead(args["target"]["x"] * (-1.0 if action == "backup" else 1.0))
+        elif action == "drive_on_heading":
+            assert args["target"]["x"] > 0.0
+            assert args["speed"] > 0.0  # Nav2 refuses other signs
+            self.pose = self.pose.ahead(args["target"]["x"])
         else:
             stamped = args["pose"] if self.ros == 2 else args["target_pose"]
             assert stamped["header"]["frame_id"] == self.frames[0]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose, wrapped
-from avlmaps.navigate.ros import Frames, GroundTransform
+from avlmaps.navigate.ros import Frames, GroundTransform, RosSettings
 
 metres = st.floats(-100.0, 100.0)
 angles = st.floats(-10.0, 10.0)
@@ -117,6 +117,7 @@ def test_the_file_of_the_documentation_is_read(tmp_path):
     text = (Path(__file__).parents[2] / "docs" / "robots.md").read_text(encoding="utf-8")
     block = text.split("```json", 1)[1].split("```", 1)[0]
     (tmp_path / "robot.json").write_text(block)
+    assert RosSettings.read(tmp_path / "robot.json") == RosSettings(namespace="/robot1", goal_timeout_s=120.0)
     frames = Frames.read(tmp_path / "robot.json")
     assert frames == Frames("map", "base_link", GroundTransform(1.2, -0.4, pi / 2))
 
@@ -140,6 +141,16 @@ def test_a_spoiled_file_is_refused_in_one_sentence(tmp_path, content):
     (tmp_path / "robot.json").write_bytes(content)
     with pytest.raises(NavigationError):
         Frames.read(tmp_path / "robot.json")
+
+
+@pytest.mark.parametrize(
+    "settings",
+    ['{"speed": 1.0}', '{"reached_m": "far"}', '{"reached_m": -1.0}', '{"namespace": 3}', '{"reached_m": []}'],
+)
+def test_spoiled_settings_are_refused_in_one_sentence(tmp_path, settings):
+    (tmp_path / "robot.json").write_text(f'{{"settings": {settings}}}')
+    with pytest.raises(NavigationError):
+        RosSettings.read(tmp_path / "robot.json")
 
 
 def test_a_missing_file_is_refused_in_one_sentence(tmp_path):

@@ -3,7 +3,9 @@
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
+from math import pi
 from typing import ClassVar, Self
 
 import numpy as np
@@ -16,7 +18,7 @@ from avlmaps.navigate.ros.contact import Contact
 from avlmaps.navigate.ros.frames import Frames
 from avlmaps.navigate.ros.goals import End, Goal, Plan, Task, Track, Watch
 from avlmaps.navigate.ros.link import Link
-from avlmaps.navigate.ros.plans import Standing, ahead_of, place_to_stand, turned_from
+from avlmaps.navigate.ros.plans import LEAST_M, LONGEST_M, Standing, ahead_of, place_to_stand, turned_from
 from avlmaps.navigate.ros.settings import RosSettings
 
 _LOOK_EVERY_S = 0.1
@@ -117,8 +119,14 @@ class RosDriver(ABC):
         return self._move(lambda start: turned_from(start, angle_rad, self.settings, self._turn_tasks))
 
     def forward(self, distance_m: float) -> Arrival:
-        """Drive straight ahead, or straight back by a negative distance."""
-        return self._move(lambda start: ahead_of(start, distance_m, self.settings, self._forward_tasks))
+        """Drive straight ahead; for a negative distance it turns round first, so that it sees where it goes."""
+        if not -LONGEST_M < distance_m <= -LEAST_M:
+            return self._move(lambda start: ahead_of(start, distance_m, self.settings, self._forward_tasks))
+        turned = self.turn(pi)
+        if not turned.reached:
+            return turned
+        driven = self.forward(-distance_m)
+        return replace(driven, path=np.concatenate([turned.path, driven.path]))
 
     def stop(self) -> Arrival:
         """Cancel whatever the robot is at, whoever sent it there, and tell whether it stands still."""

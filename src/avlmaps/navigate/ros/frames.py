@@ -130,28 +130,23 @@ class Frames:
 
     @classmethod
     def read(cls, path: Path | str) -> "Frames":
-        """Read the frames from a JSON file.
+        """Read the frames from a JSON file, which may hold `RosSettings` as well.
 
         Raises:
             NavigationError: the file cannot be read or does not hold what it must.
         """
+        told = RobotFile.read(path)
+        shift = told.map_from_avlmap
         try:
-            with Path(path).open("rb") as stream:
-                content = stream.read(_MOST_BYTES)
-            told = msgspec.json.decode(content, type=_File)
-            shift = GroundTransform(
-                told.map_from_avlmap.x_m, told.map_from_avlmap.y_m, radians(told.map_from_avlmap.yaw_deg)
-            )
-        except (OSError, ValueError) as fault:
-            raise NavigationError(
-                f"The frames of the robot cannot be read from {path} ({fault}); write it as docs/robots.md shows."
-            ) from None
-        return cls(told.map_frame, told.base_frame, shift)
+            lie = GroundTransform(shift.x_m, shift.y_m, radians(shift.yaw_deg))
+        except ValueError as fault:
+            raise _unreadable(path, fault) from None
+        return cls(told.map_frame, told.base_frame, lie)
 
     def write(self, path: Path | str) -> None:
         """Write them to a JSON file that ``read`` takes."""
         shift = self.map_from_avlmap
-        told = _File(self.map_frame, self.base_frame, _Shift(shift.x_m, shift.y_m, degrees(shift.yaw_rad)))
+        told = RobotFile(self.map_frame, self.base_frame, _Shift(shift.x_m, shift.y_m, degrees(shift.yaw_rad)))
         write_bytes_atomically(Path(path), msgspec.json.format(msgspec.json.encode(told), indent=2) + b"\n")
 
 
@@ -161,7 +156,28 @@ class _Shift(msgspec.Struct, forbid_unknown_fields=True):
     yaw_deg: float = 0.0
 
 
-class _File(msgspec.Struct, forbid_unknown_fields=True):
+class RobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """What a robot's file may hold; `Frames.read` and `RosSettings.read` check it further."""
+
     map_frame: str = "map"
     base_frame: str = "base_link"
     map_from_avlmap: _Shift = msgspec.field(default_factory=_Shift)
+    settings: dict[str, float | str] = msgspec.field(default_factory=dict)
+
+    @classmethod
+    def read(cls, path: Path | str) -> "RobotFile":
+        """Read a robot's file.
+
+        Raises:
+            NavigationError: it cannot be read, or is no such file.
+        """
+        try:
+            with Path(path).open("rb") as stream:
+                content = stream.read(_MOST_BYTES)
+            return msgspec.json.decode(content, type=cls)
+        except (OSError, ValueError, RecursionError) as fault:
+            raise _unreadable(path, fault) from None
+
+
+def _unreadable(path: Path | str, fault: Exception) -> NavigationError:
+    return NavigationError(f"The robot's file {path} cannot be read ({fault}); write it as docs/robots.md shows.")

@@ -25,8 +25,6 @@ _WHY = {
     208: "no way leads there on its own map",
     701: "turning took too long",
     703: "something is in the way of turning",
-    711: "driving back took too long",
-    714: "something is in the way behind it",
     721: "driving straight took too long",
     723: "something is in the way ahead",
 }
@@ -35,8 +33,8 @@ _WHY = {
 class Nav2Driver(RosDriver):
     """Sends goals to Nav2.
 
-    Turns go to its ``spin`` behaviour, straight drives to ``drive_on_heading`` and ``backup``: they do what is less
-    than the tolerance of a goal, and look out for obstacles. Where no behaviour server runs they become goals.
+    Turns go to its ``spin`` behaviour, straight drives to ``drive_on_heading``: they do what is less than the
+    tolerance of a goal, and look out for obstacles. Where no behaviour server runs they become goals.
     """
 
     called: ClassVar[str] = "Nav2"
@@ -67,14 +65,14 @@ class Nav2Driver(RosDriver):
 
     def _forward_tasks(self, start: GroundPose, distance_m: float) -> tuple[Task, ...]:
         speed = self.settings.speed_m_s
-        allowed_s = 10.0 + 3.0 * abs(distance_m) / speed
+        allowed_s = 10.0 + 3.0 * distance_m / speed
         arguments = {
-            "target": {"x": abs(distance_m), "y": 0.0, "z": 0.0},
+            "target": {"x": distance_m, "y": 0.0, "z": 0.0},
             "speed": speed,
             "time_allowance": duration(allowed_s),
         }
-        action, kind = ("drive_on_heading", "DriveOnHeading") if distance_m > 0.0 else ("backup", "BackUp")
-        straight = Task(self._named(action), f"nav2_msgs/action/{kind}", arguments, allowed_s + 5.0)
+        kind = "nav2_msgs/action/DriveOnHeading"
+        straight = Task(self._named("drive_on_heading"), kind, arguments, allowed_s + 5.0)
         return (straight, *super()._forward_tasks(start, distance_m))
 
     def _send(self, goal: Goal) -> None:
@@ -108,7 +106,7 @@ class Nav2Driver(RosDriver):
             return self._answers.pop(main, False)
 
     def _used(self) -> tuple[str, ...]:
-        return tuple(name for name in ("spin", "drive_on_heading", "backup") if self._named(name) not in self._absent)
+        return tuple(name for name in ("spin", "drive_on_heading") if self._named(name) not in self._absent)
 
     def _heard(self, message: Incoming) -> None:
         """In the network's thread: take in what answers a goal or a call."""

@@ -1,5 +1,6 @@
 """Opening a driver for a real robot by the name of what drives it."""
 
+import os
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -39,13 +40,15 @@ def open_ros_driver(
         settings: names, patience, tolerances.
         level_from_world: the map's rotation into its level frame (`Space.level_from_world`); that of the obstacles,
             or else the identity, by default.
-        token: sent as ``Authorization: Bearer`` to a proxy before the bridge.
+        token: sent as ``Authorization: Bearer`` to a proxy before the bridge; by default the environment variable
+            AVLMAPS_ROS_TOKEN, where it is set.
 
     Raises:
         NavigationError: nobody answers there, or the robot does not know where it is.
         BackendError: roslibpy is not installed.
     """
     settings = settings or RosSettings()
+    token = token or os.environ.get("AVLMAPS_ROS_TOKEN") or None
     if level_from_world is None and obstacles is not None:
         level_from_world = obstacles.level_from_world
     standing = None if obstacles is None else standing_on(obstacles, settings.radius_m)

@@ -14,8 +14,9 @@ from avlmaps.navigate.ros.settings import RosSettings
 Standing = Callable[[Float[np.ndarray, "2"], Float[np.ndarray, "2"]], tuple[Float[np.ndarray, "2"], str] | str]
 Tasks = Callable[[GroundPose, float], tuple[Task, ...]]
 
-_LEAST_M, _LEAST_RAD = 0.01, 0.01  # a movement so small is none
+LEAST_M, LEAST_RAD = 0.01, 0.01  # a movement so small is none
 _FAR_M = 1e6
+LONGEST_M = 1000.0  # of a straight drive
 
 
 def place_to_stand(
@@ -71,12 +72,12 @@ def turned_from(start: GroundPose, angle_rad: float, settings: RosSettings, task
         allowed = min(settings.reached_rad, max(0.05, abs(angle_rad) / 2))
         return f"it is {degrees(wrong):.0f} degrees from where it was to turn" if wrong > allowed else ""
 
-    return Plan(() if abs(angle_rad) < _LEAST_RAD else tasks(start, angle_rad), off)
+    return Plan(() if abs(angle_rad) < LEAST_RAD else tasks(start, angle_rad), off)
 
 
 def ahead_of(start: GroundPose, distance_m: float, settings: RosSettings, tasks: Tasks) -> Plan | str:
     """Plan a straight drive, or return why that cannot be."""
-    if not abs(distance_m) < 1000.0:
+    if not abs(distance_m) < LONGEST_M:
         return f"{distance_m} m is no distance to drive"
     target = start.ahead(distance_m)
 
@@ -85,7 +86,7 @@ def ahead_of(start: GroundPose, distance_m: float, settings: RosSettings, tasks:
         allowed = min(settings.reached_m, max(0.05, abs(distance_m) / 2))
         return f"it is {away_m:.2f} m from where it was to drive" if away_m > allowed else ""
 
-    return Plan(() if abs(distance_m) < _LEAST_M else tasks(start, distance_m), off)
+    return Plan(() if abs(distance_m) < LEAST_M else tasks(start, distance_m), off)
 
 
 def _bearing_rad(from_x: float, from_y: float, to_x: float, to_y: float) -> float | None:

@@ -1,8 +1,11 @@
 """How a ROS robot is driven: names, patience and tolerances. Its speed is the robot's own affair."""
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
 
 from avlmaps.core.errors import NavigationError
+from avlmaps.navigate.ros.frames import RobotFile
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +39,25 @@ class RosSettings:
 
     def __post_init__(self) -> None:
         for name in ("namespace", "tf_namespace"):
-            bare = getattr(self, name).strip("/")
+            bare = str(getattr(self, name)).strip("/")
             if bare and not all(part.isidentifier() for part in bare.split("/")):
                 raise NavigationError(f"{getattr(self, name)!r} is no ROS namespace; write it as /robot1.")
             object.__setattr__(self, name, f"/{bare}" if bare else "")
-        numbers = [getattr(self, name) for name in self.__slots__ if not name.endswith("namespace")]
-        if not all(0.0 < number < 1e5 for number in numbers):
-            raise NavigationError("The settings of a ROS robot must be over 0.")
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if not name.endswith("namespace") and not (isinstance(value, (int, float)) and 0.0 < value < 1e5):
+                raise NavigationError(f"{name} is {value!r}; the settings of a ROS robot are numbers over 0.")
+
+    @classmethod
+    def read(cls, path: Path | str) -> Self:
+        """Read what a robot's file sets, by the names above, under ``settings``.
+
+        Raises:
+            NavigationError: the file cannot be read, or sets what there is not.
+        """
+        told: dict[str, Any] = RobotFile.read(path).settings
+        unknown = sorted(set(told) - set(cls.__slots__))
+        if unknown:
+            known = ", ".join(cls.__slots__)
+            raise NavigationError(f"{path} sets {unknown[0]!r}, which a ROS robot has not; it has {known}.")
+        return cls(**told)
