@@ -213,8 +213,8 @@ def test_the_rules_are_a_translator() -> None:
 
 _KNOWN = (
     "go to the chair near and then turn left 2 metres of between sound where you heard , . ; photo x.png bark.wav in "
-    "front with on your face it twice back forth from until once before after a every ' \" ⟦ ⟦i0⟧ 7 % first please move "
-    "is that stop there sofa kitchen degrees half so you are circle monitor repeat don't i want find me"
+    "front with on your face it twice back forth from until once before after a every ' \" ⟦ ⟦i0⟧ 7 % first please "
+    "move is that stop there sofa kitchen degrees half so you are circle monitor repeat don't i want find me"
 )
 KNOWN = st.sampled_from(_KNOWN.split(" "))
 
