@@ -48,8 +48,7 @@ def place_to_stand(
     x_m, y_m = (float(value) for value in xy)
     asked = None if looked_at is None else _bearing_rad(x_m, y_m, *looked_at)
     travel = _bearing_rad(start.x_m, start.y_m, x_m, y_m)
-    along = start.heading_rad if travel is None else travel
-    target = GroundPose(x_m, y_m, along if asked is None else asked)
+    target = GroundPose(x_m, y_m, next((angle for angle in (asked, travel) if angle is not None), start.heading_rad))
 
     def off(now: GroundPose) -> str:
         away_m, turned = now.distance_m(target), abs(wrapped(now.heading_rad - target.heading_rad))
