@@ -262,7 +262,7 @@ def test_a_recorded_run_is_repeated_without_server_key_or_client(
     replaying = ChatTranslator(ChatSettings(replay=path))  # no key, no address, not even the model's name
     again = replaying.program_for(COMMAND)
     assert again.program == first.program == GO
-    assert again.notes[0] == f"Written by test-model-0101 replayed from {path}, 1200 tokens read and 20 written."
+    assert again.notes[0] == f"Written by test-model-0101 replayed from {path}, 2400 tokens read and 40 written."
     assert again.notes[1:] == first.notes[1:]
     repaired = replaying.repair(COMMAND, GO, "no sofa", done=["turn(angle_deg=5)"])
     assert repaired is not None and repaired.program == second.program
@@ -273,7 +273,7 @@ def test_a_recorded_run_is_repeated_without_server_key_or_client(
 
 def test_neither_key_nor_address_gets_into_the_file(server: ChatServer, tmp_path: Path) -> None:
     path = tmp_path / "chat.jsonl"
-    server.answer(said(f"{_block(GO)} {KEY}", refusal=None))
+    server.answer(said(f"{_block(GO)}\n{KEY}", refusal=None))
     _translator(server, replay=path, api_key=KEY).program_for(COMMAND)
     text = path.read_text(encoding="utf-8")
     assert GO.replace('"', '\\"') in text
