@@ -20,7 +20,7 @@ from training.pixels.batches import Batch, Shards, draw_batch
 from training.pixels.export import read_start
 from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED
 from training.pixels.muon import Muon
-from training.pixels.network import RoomNetwork
+from training.pixels.network import RoomNetwork, has_bfloat16
 
 
 @dataclass(frozen=True)
@@ -82,11 +82,6 @@ def class_weights(shards: Shards, rng: np.random.Generator) -> np.ndarray:
     return np.clip(np.sqrt(0.01 / np.maximum(share, 1e-6)), 0.25, 2.5)
 
 
-def _halves(device: torch.device) -> bool:
-    """Say whether the device multiplies bfloat16 rather than imitates it."""
-    return device.type != "cpu" or torch.cpu._is_avx512_bf16_supported()
-
-
 def optimisers_of(network: nn.Module, options: Options) -> list[torch.optim.Optimizer]:
     """Return Muon for the convolutions inside the network, AdamW for its outputs, biases and norms (or for all)."""
     inside: list[Tensor] = []
@@ -106,7 +101,7 @@ def losses(network: nn.Module, batch: Batch, weight: Tensor, device: torch.devic
         torch.from_numpy(a).to(device) for a in (batch.geometry, batch.colour, batch.label, batch.weight, batch.room)
     )
     geometry, colour = (x.to(memory_format=torch.channels_last) for x in (geometry, colour))
-    with torch.autocast(device.type, torch.bfloat16, enabled=_halves(device)):
+    with torch.autocast(device.type, torch.bfloat16, enabled=has_bfloat16(device)):
         score, rooms = network(geometry, colour)
     score = score.float()
     each = nn.functional.cross_entropy(score, label, ignore_index=UNLABELLED, reduction="none", label_smoothing=0.03)

@@ -14,7 +14,7 @@ import tyro
 from torch import Tensor, nn
 from training.pixels.batches import Shards
 from training.pixels.export import load_network
-from training.pixels.network import RoomNetwork
+from training.pixels.network import RoomNetwork, has_bfloat16
 from training.pixels.whole import whole_frame
 
 
@@ -48,7 +48,7 @@ def pooled(network: RoomNetwork, options: Options) -> tuple[Tensor, Tensor]:
     while len(share) < options.count:
         frames, index = shards.draw(rng)
         if frames.room[index].max() > 0.3:
-            with torch.autocast("cpu", torch.bfloat16):
+            with torch.autocast("cpu", torch.bfloat16, enabled=has_bfloat16(torch.device("cpu"))):
                 geometry, colour, _, _ = whole_frame(frames, index, rng.random() < 0.5, rng.random() < 0.5)
                 network(torch.from_numpy(geometry), torch.from_numpy(colour))
             share.append(torch.from_numpy(np.array(frames.room[index])))
