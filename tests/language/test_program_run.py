@@ -2,9 +2,12 @@
 
 from collections.abc import Callable, Iterator
 from itertools import count
+from time import process_time
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from avlmaps.core.errors import AvlmapsError, GoalNotFoundError, NavigationError, ProgramError, QueryError
 from avlmaps.language.program import SKILLS, Budget, Step, Trace, parse_program, run_program
@@ -148,6 +151,29 @@ def test_every_part_that_is_worked_out_is_a_step() -> None:
 )  # fmt: skip
 def test_a_loop_that_is_too_long_stops_at_its_steps(text: str) -> None:
     assert "takes more than 2000 steps" in str(ran(text, steps=2000).error)
+
+
+@pytest.mark.parametrize("sought", ["0.5", "'x'", "None", "(1,)", "[]", "range(3)", "get_pos('x')"])
+@pytest.mark.parametrize("sign", ["in", "not in"])
+def test_no_range_is_counted_through_for_what_is_no_whole_number(sought: str, sign: str) -> None:
+    # Python takes some seconds for these, in one go that neither a budget nor an interrupt ends.
+    began = process_time()
+    assert ran(f"for i in range(5):\n    x = {sought} {sign} range(50_000_000)\nturn(1 if x else 0)").steps[
+        -1
+    ].arguments == {"angle_deg": sign == "not in"}
+    assert process_time() - began < 1
+
+
+@given(
+    st.one_of(st.integers(-9, 9), st.integers(-36, 36).map(lambda quarters: quarters / 4), st.booleans()),
+    st.tuples(st.integers(-9, 9), st.integers(-9, 9), st.integers(-3, 3).filter(bool)),
+)
+def test_a_number_is_in_a_range_where_python_says_so(sought: float | bool, bounds: tuple[int, int, int]) -> None:
+    trace = ran(f"turn(1 if {sought} in range{bounds} else 0)\nturn(1 if {sought} not in range{bounds} else 0)")
+    assert [step.arguments["angle_deg"] for step in trace.steps] == [
+        sought in range(*bounds),
+        sought not in range(*bounds),
+    ]
 
 
 def test_a_comparison_costs_what_it_goes_through() -> None:

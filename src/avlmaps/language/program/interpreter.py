@@ -52,6 +52,7 @@ from avlmaps.language.program.values import (
     combined,
     element_of,
     handed_on,
+    is_among,
     kind_of,
     shown,
     signed,
@@ -367,8 +368,8 @@ _COMPARE: dict[str, Callable[[Any, Any], bool]] = {
     "<=": lambda left, right: left <= right,
     ">": lambda left, right: left > right,
     ">=": lambda left, right: left >= right,
-    "in": lambda left, right: left in right,
-    "not in": lambda left, right: left not in right,
+    "in": is_among,
+    "not in": lambda left, right: not is_among(left, right),
     "is": lambda left, right: left is right,
     "is not": lambda left, right: left is not right,
 }

@@ -132,6 +132,18 @@ def element_of(line: int, values: list[Any] | tuple[Any, ...], index: Any) -> Va
     return values[index]
 
 
+def is_among(value: Any, collection: list[Any] | tuple[Any, ...] | range) -> bool:
+    """Return whether a value is among the elements of a collection, as Python's `in` has it.
+
+    Python counts through a range for all but a whole number, in one go that nothing can stop; here nobody does.
+    """
+    if not isinstance(collection, range):
+        return value in collection
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    return isinstance(value, int) and value in collection
+
+
 def call_function(line: int, function: str, arguments: list[Any]) -> Value:
     """Return what one of the functions returns; its arguments are of kinds that it takes."""
     match function:
