@@ -1,11 +1,14 @@
 """Programs that want out, and a run over many of them in a process that tells of everything they reach.
 
-Run as a script: python hostile_programs.py COUNT SEED [--leak]; it prints one JSON object. With --leak the parser is
-replaced by one that lets Python compile the text, to show that the watch over the process sees it.
+Run as a script: python hostile_programs.py COUNT SEED FILE [--leak | --hang]; it prints one JSON object. FILE holds
+the number of the program that is run, so that one that never ends is known. With --leak the parser is replaced by one
+that lets Python compile the text, with --hang by one that never ends, to show that the watch over the process sees it.
 """
 # ruff: noqa: E501 -- tables of programs
 
 import json
+import os
+import signal
 import sys
 from collections import Counter
 from collections.abc import Callable
@@ -82,6 +85,9 @@ LARGEST = (
     "\ud800" * 100, "x = '" + "\U0001f600" * 10_000 + "'", "x = 1_" + "0_" * 9_000, "x = ." + "." * 9_000, "x" * 20_001,
     "\n".join(f"a{i} = 1" for i in range(1500)) + "\nturn(b)", "if 1:\n turn(1)\n" + "elif 1:\n turn(1)\n" * 800,
     "a0 = 1\n" + "\n".join(f"a{i} = a{i + 1} if a{i} else 1" for i in range(500)),
+    "x = 0.5 in range(1000000000000000)", "x = 'x' not in range(-1000000000000000, 1000000000000000)",
+    "x = robot.get_pos('x') in range(1000000000000000)", "x = range(3) in range(1000000000000000)",
+    "x = [range(1000000000000000)] == [range(999999999999999)]\nturn(len(range(1000000000000000)))",
 )  # fmt: skip
 WORDS = (
     "robot", "turn", "move_to", "get_map", "get_pos", "x", "y", "a", "_", "__class__", "__globals__", "eval", "open", "os", "if",
@@ -99,7 +105,7 @@ ALIKE = {
 
 def _giant(random: Random) -> str:
     """Return a program that is small to write and large to parse or to run."""
-    many = random.choice((3, 30, 60, 300, 3000))
+    many = random.choice((3, 10, 30, 60, 100, 300, random.choice((300, 3000))))
     what = random.choice(("[]", "(1, 2)", "'abc'", "[1, 2, 3]", "get_map('x')", "1", "1.5", "get_pos('x')", "range(9)"))
     sign = random.choice(("+", "-", "*", "and", "or", "==", "<", "in", "%", ","))
     opening, closing = random.choice((("(", ")"), ("[", "]"), ("len(", ")"), ("get_pos(", ")"), ("-(", ")")))
@@ -125,6 +131,7 @@ def _giant(random: Random) -> str:
         lambda: "x = 1" + " if 1 else (2" * many + ")" * many,
         lambda: "#" + "x" * many * 10,
         lambda: "\n" * many * 5 + "turn(1)",
+        lambda: f"x = {what} {random.choice(('in', 'not in'))} range({10**random.randint(1, 15)})\nturn(1 if x else 2)",
         lambda: f"x = range({10**random.randint(1, 15)})\ny = max(x)\nz = 5 in x\nw = [x, x] == [x, x]\nturn(len(x))",
         lambda: f"p = get_pos('x')\nfor i in range({many}):\n    p = p * 1000\nmove_to(p)",
         lambda: f"h = get_map('x')\nfor i in range({many}):\n    h = h * h\nmove_to(h)",
@@ -215,12 +222,12 @@ def _spliced(random: Random) -> str:
 def _working(random: Random) -> str:
     from helpers.working_programs import working_program
 
-    return working_program(random)
+    return working_program(random, 1)
 
 
 _WAYS: tuple[tuple[int, Callable[[Random], str]], ...] = (
-    (4, lambda random: _block(random, 3)),
-    (5, _working),
+    (5, lambda random: _block(random, 3)),
+    (4, _working),
     (3, lambda random: _mutated(random, _working(random))),
     (2, lambda random: _mutated(random, random.choice(VALID))),
     (2, lambda random: _mutated(random, random.choice(ESCAPES))),
@@ -242,6 +249,9 @@ def hostile_programs(count: int, seed: int) -> "list[str]":
 
 # The clock of the process is asked once for so many programs: it costs more than most of them.
 _BATCH = 100
+# Time of the processor after which a program is taken never to end; the alarm ends the process, for in the middle of
+# what Python does in one go nothing else would.
+_MOST_SECONDS = 10.0
 
 
 class _Watch:
@@ -259,15 +269,22 @@ class _Watch:
             raise RuntimeError(f"a program reached {event}")
 
 
-def main(count: int, seed: int, leak: bool) -> dict[str, Any]:
+def _leak(text: str) -> Any:
+    return compile(text, "", "exec")
+
+
+def _hang(text: str) -> Any:
+    return text in range(10**15)
+
+
+def main(count: int, seed: int, where: int, parse: Callable[[str], Any], most_s: float) -> dict[str, Any]:
     import resource
 
     from avlmaps.core.errors import ProgramError
     from avlmaps.language.program import Budget, parse_program, run_program
     from helpers.recording_robot import RecordedHeat, RecordingRobot
 
-    budget = Budget(steps=3000, skill_calls=20, elements=3000, seconds=20.0)
-    parse: Callable[[str], Any] = (lambda text: compile(text, "", "exec")) if leak else parse_program
+    budget = Budget(steps=1500, skill_calls=20, elements=3000, seconds=20.0)
     watch, told, said, faults = _Watch(), Counter[str](), set[str](), []
     slowest_s, largest, calls, began, programs = 0.0, 0, 0, process_time(), hostile_programs(count, seed)
     run_program(parse_program(VALID[1]), RecordingRobot(), budget)
@@ -276,6 +293,8 @@ def main(count: int, seed: int, leak: bool) -> dict[str, Any]:
         if index % _BATCH == 0:
             slowest_s, began = max(slowest_s, process_time() - began), process_time()
         robot, trace, error = RecordingRobot(), None, None
+        os.pwrite(where, f"{index:9}".encode(), 0)
+        signal.setitimer(signal.ITIMER_PROF, most_s)
         watch.on = True
         try:
             program = parse(text)
@@ -286,6 +305,7 @@ def main(count: int, seed: int, leak: bool) -> dict[str, Any]:
         except BaseException as fault:  # noqa: BLE001
             faults.append(f"{type(fault).__name__}: {fault} of {text[:200]!r}")
         watch.on = False
+        signal.setitimer(signal.ITIMER_PROF, 0)
         told["ended" if trace and trace.ok else "stopped" if trace else "refused"] += 1
         if error is not None:
             said.add("".join(letter for letter in error if letter.isalpha())[:40])
@@ -313,4 +333,9 @@ def _is_one_sentence(error: str) -> bool:
 
 
 if __name__ == "__main__":
-    print(json.dumps(main(int(sys.argv[1]), int(sys.argv[2]), "--leak" in sys.argv)))  # noqa: T201
+    from avlmaps.language.program import parse_program
+
+    reads = _leak if "--leak" in sys.argv else _hang if "--hang" in sys.argv else parse_program
+    file = os.open(sys.argv[3], os.O_WRONLY | os.O_CREAT)
+    told = main(int(sys.argv[1]), int(sys.argv[2]), file, reads, 0.3 if reads is _hang else _MOST_SECONDS)
+    print(json.dumps(told))  # noqa: T201

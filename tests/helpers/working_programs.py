@@ -80,7 +80,7 @@ class _Working:
         return text
 
 
-def working_program(random: Random) -> str:
-    """Return a program that is one, and mostly runs to its end."""
+def working_program(random: Random, deep: int = 2) -> str:
+    """Return a program that is one, and mostly runs to its end; its blocks nest so deep."""
     start = "n = 3\nm = 2.5\ni = 1\ns = 'tv'\nk = [1, 4]\np = get_pos('door')\nh = get_map('desk')\n"
-    return start + _Working(random).block(2)
+    return start + _Working(random).block(deep)
