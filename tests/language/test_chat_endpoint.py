@@ -8,6 +8,8 @@ import logging
 import socket
 import sys
 from collections.abc import Iterator
+from threading import Event
+from threading import enumerate as enumerate_threads
 from time import monotonic
 from typing import Any
 
@@ -23,6 +25,7 @@ from chat_server import (
     sent,
     silent,
     trickle,
+    without_body,
 )
 
 from avlmaps.core.errors import LanguageError
@@ -192,13 +195,46 @@ def test_an_answer_without_end_is_not_read_to_its_end(server: ChatServer, status
     assert ("more than 1024 KiB" if status == 200 else f"HTTP {status}") in sentence
 
 
-@pytest.mark.parametrize("reply", [silent, trickle(200), trickle(500)])
+@pytest.mark.parametrize(
+    "reply",
+    [
+        silent,
+        trickle(200),
+        trickle(500),
+        without_body(b"HTTP/1.1 200 OK\r\n", b"X-n: 1\r\n"),
+        without_body(b"", b"HTTP/1.1 100 Continue\r\n\r\n"),
+    ],
+)
 def test_the_deadline_holds_however_slow_the_answer_is(server: ChatServer, reply: Any) -> None:
     server.answer(reply)
     began = monotonic()
     sentence = _sentence(server, timeout_s=0.4, retries=5)
     assert monotonic() - began < 30
     assert "no answer within 0.4 s: raise AVLMAPS_CHAT_TIMEOUT_S" in sentence or "HTTP 500" in sentence
+
+
+def test_the_deadline_holds_while_the_name_of_the_host_is_sought(monkeypatch: pytest.MonkeyPatch) -> None:
+    over = Event()
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: over.wait(60) and [])
+    began = monotonic()
+    try:
+        with pytest.raises(LanguageError, match=r"no answer within 0\.4 s"):
+            Endpoint(ChatSettings(base_url="http://model.test/v1", timeout_s=0.4)).complete(_request())
+        assert monotonic() - began < 30
+    finally:
+        over.set()
+
+
+def test_whoever_is_late_is_left_and_leaves(server: ChatServer) -> None:
+    server.answer(without_body(b"HTTP/1.1 200 OK\r\n", b"X-n: 1\r\n"), "robot.turn(90)")
+    endpoint = Endpoint(_settings(server, timeout_s=0.4))
+    with pytest.raises(LanguageError, match="no answer within"):
+        endpoint.complete(_request())
+    late = [thread for thread in enumerate_threads() if thread.name == "avlmaps-chat"]
+    for thread in late:
+        thread.join(30)
+        assert not thread.is_alive()
+    assert Endpoint(_settings(server)).complete(_request()).content == "robot.turn(90)"
 
 
 @pytest.mark.parametrize("reply", [half(b'{"choices": [{"message": {"content": "robot.tu', 400), hung_up])

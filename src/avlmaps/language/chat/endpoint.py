@@ -7,8 +7,10 @@ carry the command elsewhere), no proxy stands before this very machine, and a ke
 
 import re
 from collections.abc import Iterator
+from concurrent.futures import Future
 from dataclasses import replace
 from importlib import import_module
+from threading import Thread
 from time import monotonic, sleep
 from typing import Any
 
@@ -101,19 +103,43 @@ class Endpoint:
         return {"model": request.model, "messages": messages, **kept}
 
     def _asked(self, resource: str, **parameters: Any) -> bytes:
-        """Return the body of one request's answer; raises EndpointFault where none came."""
-        try:
-            with self._client() as client:
-                ask = client.models.with_streaming_response.list
-                if resource == "chat":
-                    ask = client.chat.completions.with_streaming_response.create
-                with ask(**parameters, timeout=max(self._deadline - monotonic(), 0.01)) as response:
-                    return self._read(response.iter_bytes(), MOST_BYTES)
-        except (self._openai.OpenAIError, self._http_error) as fault:
-            raise _endpoint_fault(fault) from None
+        """Return the body of one request's answer; raises EndpointFault where none came before the deadline.
 
-    def _client(self) -> Any:
+        The HTTP library bounds each read, but not all of them together (headers that trickle in have no end), nor the
+        search for the host's name. So a thread asks, and is left where it is late, its connection closed under it.
+        """
+        deadline = self._deadline
+        answer: Future[bytes] = Future()
+        with self._client(deadline) as client:
+
+            def ask() -> None:
+                try:
+                    answer.set_result(self._exchanged(client, resource, parameters, deadline))
+                except BaseException as fault:  # noqa: BLE001 - raised below, where it is waited for
+                    answer.set_exception(fault)
+
+            Thread(target=ask, name="avlmaps-chat", daemon=True).start()
+            try:
+                return answer.result(max(deadline - monotonic(), 0.01))
+            except (self._openai.OpenAIError, self._http_error) as fault:
+                raise _endpoint_fault(fault) from None
+            except TimeoutError:
+                raise EndpointFault("timeout") from None
+
+    def _exchanged(self, client: Any, resource: str, parameters: dict[str, Any], deadline: float) -> bytes:
+        """Return the body of an answer to one request, however long it takes until it begins."""
+        ask = client.models.with_streaming_response.list
+        if resource == "chat":
+            ask = client.chat.completions.with_streaming_response.create
+        with ask(**parameters, timeout=max(deadline - monotonic(), 0.01)) as response:
+            return _read(response.iter_bytes(), MOST_BYTES, deadline)
+
+    def _client(self, deadline: float) -> Any:
         """Return a new client: one for each request, so that no connection is left open between commands."""
+
+        def on_response(response: Any) -> None:
+            self._on_response(response, deadline)
+
         return self._openai.OpenAI(
             api_key=self._settings.api_key or NO_KEY,
             base_url=self._settings.base_url,
@@ -121,20 +147,9 @@ class Endpoint:
             http_client=self._openai.DefaultHttpxClient(
                 trust_env=not self._settings.on_this_machine,
                 follow_redirects=False,
-                event_hooks={"request": [self._on_request], "response": [self._on_response]},
+                event_hooks={"request": [self._on_request], "response": [on_response]},
             ),
         )
-
-    def _read(self, chunks: Iterator[bytes], most: int) -> bytes:
-        """Return a body; one that is too long, or that trickles in beyond the deadline, raises EndpointFault."""
-        body = bytearray()
-        for chunk in chunks:
-            body += chunk
-            if len(body) > most:
-                raise EndpointFault("huge", message=f"{most >> 10} KiB")
-            if monotonic() > self._deadline:
-                raise EndpointFault("timeout")
-        return bytes(body)
 
     def _on_request(self, request: Any) -> None:
         """Take away what the client adds from the environment of the hosted service when another is asked."""
@@ -142,11 +157,11 @@ class Endpoint:
             for header in [name for name in request.headers if _FOR_THE_HOSTED.match(name)]:
                 del request.headers[header]
 
-    def _on_response(self, response: Any) -> None:
+    def _on_response(self, response: Any, deadline: float) -> None:
         """Stop at every status that is no success, before the client reads a body without limit."""
         if response.status_code >= 300:
             try:
-                body = self._read(response.iter_bytes(), _MOST_ERROR_BYTES)
+                body = _read(response.iter_bytes(), _MOST_ERROR_BYTES, deadline)
             except (EndpointFault, self._http_error):
                 body = b""
             fault = read_error(response.status_code, body, response.headers.get("retry-after"))
@@ -194,6 +209,18 @@ def _client_library() -> tuple[Any, type[Exception]]:
         raise LanguageError("The chat models need the openai client: pip install 'avlmaps[chat]'.") from None
     http_library = openai.DefaultHttpxClient.__mro__[1].__module__.partition(".")[0]
     return openai, import_module(http_library).HTTPError
+
+
+def _read(chunks: Iterator[bytes], most: int, deadline: float) -> bytes:
+    """Return a body; one that is too long, or that trickles in beyond the deadline, raises EndpointFault."""
+    body = bytearray()
+    for chunk in chunks:
+        body += chunk
+        if len(body) > most:
+            raise EndpointFault("huge", message=f"{most >> 10} KiB")
+        if monotonic() > deadline:
+            raise EndpointFault("timeout")
+    return bytes(body)
 
 
 def _endpoint_fault(fault: Exception) -> EndpointFault:
