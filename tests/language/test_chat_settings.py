@@ -113,6 +113,8 @@ def test_what_is_no_address_is_refused(url: str) -> None:
         ({"temperature": 2.5}, "temperature is 2.5; give 0 to 2"),
         ({"temperature": float("nan")}, "temperature is nan"),
         ({"max_tokens": 0}, "max_tokens is 0; give 1 to"),
+        ({"base_url": "http://api.openai.com/v1"}, "sent the key in clear; give https://api.openai.com/v1"),
+        ({"base_url": "http://API.openai.com:443"}, "sent the key in clear"),
         ({"api_key": "sk-\nx"}, "key for the chat model holds characters"),
         ({"api_key": "schlüssel"}, "key for the chat model holds characters"),
     ],

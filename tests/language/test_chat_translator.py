@@ -113,6 +113,40 @@ def test_a_hostile_program_is_refused_however_often_it_comes(server: ChatServer,
     assert len(server.asked) == 2
 
 
+@pytest.mark.parametrize("program", ["pass", "x = 1", "# the robot is there", "if False:\n    pass"])
+def test_a_program_that_does_nothing_is_no_translation_however_often_it_comes(server: ChatServer, program: str) -> None:
+    server.answer(_block(program))
+    with pytest.raises(LanguageError, match="no usable program in 3 attempts"):
+        _translator(server).program_for(COMMAND)
+    assert len(server.asked) == 3
+    with pytest.raises(LanguageError, match="no usable program in 1 attempt"):
+        _translator(server, rounds=0).program_for(COMMAND)
+
+
+def test_a_program_that_moves_nothing_is_corrected(server: ChatServer) -> None:
+    server.answer(_block('p = robot.get_pos("sofa")'), _block(GO))
+    translation = _translator(server).program_for(COMMAND)
+    assert translation.program == GO
+    assert translation.notes[1].startswith("Corrected, because: The program does not move the robot")
+    assert "does not move the robot" in server.asked[1].messages[3]["content"]
+
+
+def test_a_model_that_insists_on_asking_alone_is_sent_back_once(server: ChatServer) -> None:
+    asks = 'p = robot.get_pos("sofa")'
+    server.answer(_block(asks))
+    assert _translator(server).program_for("tell where the sofa is").program == asks
+    assert len(server.asked) == 2
+    assert _translator(server, rounds=0).program_for("tell where the sofa is").program == asks
+    assert len(server.asked) == 3
+
+
+def test_several_blocks_are_asked_for_as_one(server: ChatServer) -> None:
+    both = f"{GO}\nrobot.turn(90)"
+    server.answer(f"First:\n{_block(GO)}\nThen:\n{_block('robot.turn(90)')}", _block(both))
+    assert _translator(server).program_for("go to the sofa and turn right").program == both
+    assert "one block with all steps" in server.asked[1].messages[3]["content"]
+
+
 def test_without_rounds_the_first_fault_is_told(server: ChatServer) -> None:
     server.answer("I would go to the sofa.")
     with pytest.raises(

@@ -90,3 +90,9 @@ def test_every_refusal_of_the_page_is_what_is_said() -> None:
 def test_the_page_names_every_function() -> None:
     text = PAGE.read_text(encoding="utf-8")
     assert all(f"`{name}" in text for name in BUILTINS)
+
+
+def test_which_skills_move_the_robot_is_told_from_what_they_return() -> None:
+    moving = {name for name, skill in SKILLS.items() if skill.moves}
+    words = ("move", "face", "turn", "with_object")
+    assert moving == {name for name in SKILLS if name.startswith(words)}

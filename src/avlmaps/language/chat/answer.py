@@ -45,10 +45,11 @@ class Answer:
 
 
 def program_text(answer: Answer) -> str:
-    """Return the program that an answer holds: its last whole code block, or all of it where it has no block.
+    """Return the program that an answer holds: its one code block, or all of it where it has no block.
 
     Raises:
-        UnusableAnswerError: it holds none, and why is said so that the model can do better.
+        UnusableAnswerError: it holds none, or several that differ (each may be one step of the whole); why is said so
+            that the model can do better.
         LanguageError: the model refused, says that the command cannot be done, or was cut off.
     """
     if answer.refusal or answer.finish == "content_filter":
@@ -62,7 +63,7 @@ def program_text(answer: Answer) -> str:
     if not said.strip():
         tools = "It called a tool instead of writing a program." if answer.tool_calls else "The answer is empty."
         raise UnusableAnswerError(f"{tools} There are no tools: write the program as text in one code block.")
-    program = _last_block(said)
+    program = _only_block(said)
     written = said.strip() if program is None else program
     lines = [line.strip() for line in written.splitlines() if line.strip()]
     if len(lines) == 1 and (cannot := _CANNOT.match(lines[0])):
@@ -98,8 +99,8 @@ def _refused(text: str) -> str:
     return f"The chat model refuses the command: {quoted(text)}; say it in other words, or ask another model."
 
 
-def _last_block(said: str) -> str | None:
-    """Return the last whole code block that can be Python, None where there is no block at all."""
+def _only_block(said: str) -> str | None:
+    """Return the one code block that can be Python, None where there is no block at all."""
     if one_line := _ONE_LINE.match(said.strip()):
         return one_line[2].strip()
     blocks: list[tuple[str, str]] = []
@@ -115,10 +116,15 @@ def _last_block(said: str) -> str | None:
             begun = None
         else:
             inside.append(line)
-    if not blocks and begun is not None:
+    if begun is not None and (not blocks or (begun[1] in _PYTHON and "".join(inside).strip())):
         raise UnusableAnswerError("The code block is never closed, so it may be half a program.")
     fitting = [text for language, text in blocks if language in _PYTHON] or [text for _, text in blocks]
-    return fitting[-1] if fitting else None
+    different = list(dict.fromkeys(text for text in fitting if text.strip()))
+    if len(different) > 1:
+        raise UnusableAnswerError(
+            f"There are {len(different)} code blocks that differ; write one block with all steps in it."
+        )
+    return different[0] if different else fitting[0] if fitting else None
 
 
 def _fence(line: str) -> tuple[str, str]:

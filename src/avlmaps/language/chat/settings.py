@@ -52,6 +52,8 @@ class ChatSettings:
             raise LanguageError(
                 f"{shown} is no address of a chat server; give one like {HOSTED_URL} or http://localhost:11434/v1."
             )
+        if self.hosted and split.scheme != "https":
+            raise LanguageError(f"{self.shown_url} would be sent the key in clear; give {HOSTED_URL}.")
         if self.api_key is not None and not (self.api_key.isascii() and self.api_key.isprintable()):
             raise LanguageError("The key for the chat model holds characters that no key has; copy it again.")
         if self.temperature is not None:  # 0 and 0.0 are one request

@@ -16,11 +16,15 @@ from avlmaps.language.chat.prompt import (
 )
 from avlmaps.language.chat.replay import Message, Replay, Request
 from avlmaps.language.chat.settings import ChatSettings
-from avlmaps.language.program import Program, parse_program
+from avlmaps.language.program import SKILLS, Program, parse_program
 from avlmaps.language.program.syntax import Constant, SkillCall, expressions_of, parts_of
 from avlmaps.language.translator import Translation
 
 _MOST_SAID_CHARACTERS = 4000
+_MOVES_NOTHING = (
+    "The program does not move the robot, so that nothing would be done; write the movements that the command says, "
+    "or `# cannot: ` and the reason."
+)
 _LOADERS = frozenset({"load_image", "load_sound"})
 
 
@@ -29,7 +33,8 @@ class ChatTranslator:
 
     A program that does not parse, or that loads a file which the command does not name, goes back to the model with
     the sentence that says why; so does one that failed while it ran, with what was done before. Each command has
-    `ChatSettings.rounds` such corrections in all.
+    `ChatSettings.rounds` such corrections in all. A program that moves nothing goes back as well; one that asks for
+    something all the same is taken the second time, for the model may know that nothing more was said.
     """
 
     def __init__(self, settings: ChatSettings | None = None) -> None:
@@ -87,7 +92,9 @@ class ChatTranslator:
             read, written = read + answer.tokens[0], written + answer.tokens[1]
             try:
                 program = program_text(answer)
-                check_files(_parsed(program, answer), plain_command(command))
+                parsed = _parsed(program, answer)
+                check_files(parsed, plain_command(command))
+                check_moves(parsed, insisted=_MOVES_NOTHING in corrected or self._rounds_used >= self._settings.rounds)
                 return Translation(program, self._notes(answer.model, corrected, read, written))
             except (ProgramError, UnusableAnswerError) as fault:
                 if self._rounds_used >= self._settings.rounds:
@@ -132,6 +139,21 @@ class ChatTranslator:
         for name in self._endpoint.left_out if self._endpoint else ():
             notes.append(f"The server does not take a {name}, so the next answer may be another.")
         return tuple(notes)
+
+
+def check_moves(program: Program, *, insisted: bool = False) -> None:
+    """Refuse a program that moves nothing: it would be told as done, with nothing done.
+
+    Args:
+        program: what a model wrote.
+        insisted: whether the model was told so before, or cannot be; then a program that asks for something is taken.
+
+    Raises:
+        UnusableAnswerError: it moves nothing.
+    """
+    if any(SKILLS[skill].moves for skill in program.skills) or (insisted and program.skills):
+        return
+    raise UnusableAnswerError(_MOVES_NOTHING)
 
 
 def check_files(program: Program, command: str) -> None:

@@ -75,6 +75,11 @@ class Skill:
         """Whether its parameters are alternatives: several, each None unless it is given."""
         return len(self.parameters) > 1 and all(each.default == "None" for each in self.parameters)
 
+    @property
+    def moves(self) -> bool:
+        """Whether the robot moves by it; skills that do return nothing, all others something."""
+        return self.returns is Kind.NOTHING
+
     def parameter(self, name: str) -> Parameter | None:
         """Return the parameter of that name, if there is one."""
         return next((each for each in self.parameters if each.name == name), None)
