@@ -10,9 +10,10 @@ from typing import Any
 from avlmaps.core.errors import QueryError
 from avlmaps.query.question import MOST_CHARACTERS, Modality, Part, Question
 
-# A phrase that ends in one of these is an area; "kitchen table" ends in a thing.
+# A phrase that ends in one of these is an area; "kitchen table" ends in a thing. A toilet is a thing, as in VLMaps, and
+# a room only where something is in it ("the mirror in the toilet") or as "toilet room".
 AREA_WORDS = frozenset({
-    "kitchen", "kitchenette", "bathroom", "bedroom", "washroom", "restroom", "toilet", "office", "corridor",
+    "kitchen", "kitchenette", "bathroom", "bedroom", "washroom", "restroom", "office", "corridor",
     "hallway", "hall", "foyer", "lobby", "entrance", "lounge", "garage", "garden", "patio", "terrace", "balcony",
     "gym", "library", "pantry", "basement", "cellar", "attic", "staircase", "stairwell", "workshop", "lab",
     "laboratory", "classroom", "nursery", "studio", "canteen", "cafeteria", "restaurant", "shop", "room", "area",
@@ -66,8 +67,15 @@ def _parts(tree: Any) -> list[Part]:
     for node in tree.children:
         if isinstance(node, str):
             continue
-        parts += _parts(node) if node.data in ("near", "within", "more") else [_part(node)]
+        inner = _parts(node) if node.data in ("near", "within", "more") else [_part(node)]
+        parts += [_as_room(part) for part in inner] if node.data == "within" else inner
     return parts
+
+
+def _as_room(part: Part) -> Part:
+    """Return what something is in: a toilet as the room."""
+    is_toilet = part.modality is Modality.OBJECT and part.query.lower() == "toilet"
+    return Part(Modality.AREA, part.query) if is_toilet else part
 
 
 def _part(node: Any) -> Part:

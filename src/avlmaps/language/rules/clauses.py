@@ -7,6 +7,7 @@ left" becomes "going to the sink", "visit the sofa", "turn left".
 import re
 from dataclasses import dataclass
 
+from avlmaps.language.rules.bare import with_articles
 from avlmaps.language.rules.rewriting import rewritten
 
 _PICTURES = r"png|jpe?g|bmp|webp|tiff?"
@@ -54,12 +55,14 @@ def split_clauses(command: str) -> Clauses:
     text, files = _without_files(text)
     text = text.replace('"', " ")
     text = re.sub(r"(?<=\d)\s*°", " degrees", text)
+    text = re.sub(r"(?:^|(?<=\n))\s*[-*•]\s+", "; ", text)
+    text = re.sub(r"\s*(?:[-=]+>|→|⇒|➜)\s*", "; ", text)
     text = re.sub(r"\s*(?:[—–]|\s-+\s|\.\.\.|…)\s*", ", ", text)
     text = re.sub(r"(?:^|(?<=[;\n.!?]))\s*(?:\d+|[a-h])[.)]\s+", "; ", text)
     text = re.sub(r"\s*\n\s*", "; ", text.strip())
     text = rewritten(re.sub(r"\s+", " ", text.replace("&", " and ")))
     pieces = [piece.strip(" ,") for piece in re.split(r"\s*;[\s;,]*", text)]
-    return Clauses(tuple(_in_order([piece for piece in pieces if piece])), tuple(files))
+    return Clauses(tuple(_in_order([with_articles(piece) for piece in pieces if piece])), tuple(files))
 
 
 def _without_files(text: str) -> tuple[str, list[str]]:

@@ -7,12 +7,20 @@ from typing import Any
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.rules.intents import Named, Target
-from avlmaps.language.rules.words import PAST_TENSES, SOUND_NOUNS, SOUND_VERBS
+from avlmaps.language.rules.words import NOISES, PAST_TENSES, SOUND_NOUNS, SOUND_VERBS
 from avlmaps.language.sentence import AREA_WORDS
 from avlmaps.query.question import Modality
 
-# A toilet is a thing to drive to, as in VLMaps; the room is the bathroom.
-_AREAS = AREA_WORDS - {"toilet"}
+# Words that no name has: what holds one was not understood, and is refused rather than sought on the map.
+_NEVER_NAMED = frozenset({
+    "one", "ones", "is", "are", "was", "were", "be", "been", "has", "had", "does", "did", "somewhere", "someplace",
+    "anywhere", "everywhere", "here", "quick", "quickly", "please", "over", "across", "along", "about", "with", "again",
+    "whoever", "whatever", "came", "comes", "coming", "heard", "said", "someone", "somebody", "something", "anything",
+    "everything", "everyone", "just", "okay", "ok", "might", "may", "also", "too", "very", "my", "your", "its", "away",
+    "toward", "towards", "during", "while", "since", "though", "although", "everybody", "another", "both", "each",
+    "either", "lots", "around", "onto", "upon", "maybe", "really", "actually", "first", "lastly", "finally",
+})  # fmt: skip
+_POINTED_AT = frozenset({"place", "spot", "location", "position", "thing", "point", "direction", "way", "source"})
 # Parts of a room have no place of their own in a map; the room has.
 _PARTS_OF_AREAS = frozenset(
     {"middle", "centre", "center", "end", "corner", "back", "front", "side", "rest", "inside", "part"}
@@ -51,11 +59,6 @@ class Names:
         for place in parts[1:]:
             context += self._context(place)
         return Target(named, tuple(context))
-
-    def heard_at(self, parts: list[Any]) -> Target:
-        """Return the sound of a `phrase` node, and where the places after it say that it was."""
-        context = [named for place in parts[1:] for named in self._context(place)]
-        return Target(Named(Modality.SOUND, " ".join(_words(parts[0]))), tuple(context))
 
     def _item(self, node: Any) -> tuple[Named | None, list[Named | None]]:
         if is_token(node, "IT"):
@@ -151,10 +154,16 @@ class Names:
             )
         if spoken[0].lower() in ("nearest", "closest") and len(spoken) > 1:
             spoken = spoken[1:]
+        if [word.lower() for word in spoken] == ["toilet-room"]:
+            return Named(Modality.AREA, spoken[0][: -len("-room")]), []
+        if spoken[0].lower() in NOISES and spoken[1:2] == ["of"]:
+            noisy = [word for word in spoken[2:] if word.lower() not in ("the", "a", "an", "my", "your", "that")]
+            return Named(Modality.SOUND, " ".join([*noisy, spoken[0]])), []
+        _refuse_words_of_no_name(spoken)
         last = spoken[-1].lower()
-        if last in _AREAS and "of" in spoken[1:-1]:
+        if last in AREA_WORDS and "of" in spoken[1:-1]:
             return self._of_area(spoken)
-        if last in _AREAS:
+        if last in AREA_WORDS:
             return Named(Modality.AREA, " ".join(spoken)), []
         return Named(Modality.SOUND if _is_sound(spoken) else Modality.OBJECT, " ".join(spoken)), []
 
@@ -167,6 +176,26 @@ class Names:
                 self.notes.append(f"'{' '.join(thing)} of' was left out: the {where.words} as a whole is taken.")
             return where, []
         return Named(Modality.OBJECT, " ".join(thing)), [where]
+
+
+def _refuse_words_of_no_name(spoken: list[str]) -> None:
+    """Refuse what is no name, such as "the place" or "chair over": it would be sought on the map as it stands."""
+    words = [word.lower() for word in spoken]
+    known = ("someone", "somebody", "something") if _is_sound(spoken) else ()
+    odd = next(
+        (
+            word
+            for word in words
+            if (word in _NEVER_NAMED and word not in known) or re.fullmatch(r"\w+['’](?:re|ve|ll|d|m)", word)
+        ),
+        None,
+    )
+    if odd is None and (len(words) > 1 or words[0] not in _POINTED_AT):
+        return
+    raise LanguageError(
+        f"{' '.join(spoken)!r} is not understood as the name of a thing; say it like: the chair near the sound of glass "
+        "breaking."
+    )
 
 
 def is_token(node: Any, *types: str) -> bool:
@@ -192,8 +221,10 @@ def _words(node: Any) -> Iterator[Any]:
 
 
 def _is_sound(spoken: list[str]) -> bool:
+    if not spoken:
+        return False
     last = spoken[-1].lower()
-    return last in SOUND_NOUNS or (len(spoken) > 1 and bool(_SOUNDING.fullmatch(last)))
+    return last in SOUND_NOUNS or bool(_SOUNDING.fullmatch(last))
 
 
 def _sounding(word: str) -> str:

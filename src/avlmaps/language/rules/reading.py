@@ -297,9 +297,6 @@ class _Reader:
     def _again(self, _: Any) -> Intent:
         return Again(2 if self.count is None else self.count)
 
-    def _mention_heard(self, node: Any) -> Intent:
-        return Mention(self.names.heard_at([child for child in node.children if hasattr(child, "data")]))
-
     def _following(self, _: Any) -> Intent:
         count, self.count = self.count or 1, None
         return Following(count)

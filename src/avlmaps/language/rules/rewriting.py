@@ -7,7 +7,7 @@ Each entry is a pattern, matched without regard to case, and what stands instead
 import re
 from functools import cache
 
-from avlmaps.language.rules import words
+from avlmaps.language.rules import spoken, words
 
 _DETERMINER = words.DETERMINER
 _SHOT = (
@@ -86,6 +86,8 @@ _ABOUT_FILES = [
         r" ⟦\1⟧",
     ),
     (rf"{_DETERMINER} ⟦", "⟦"),
+    # "stand where x.png was taken" has lost the word that led there.
+    (rf"\b({words.GO})\s+(?=⟦[ic]\d)", r"\1 to "),
 ]
 
 _ABOUT_PLACES = [
@@ -353,7 +355,7 @@ _ABOUT_ENDS = [
 def _all() -> tuple[tuple[re.Pattern[str], str], ...]:
     fillers = [(filler, " ") for filler in words.FILLERS]
     tidy = [(r"\s+", " "), (r"\s+(?=[,;])", ""), (r"^[\s,]+", ""), (r";[\s,]+", "; ")]
-    listed = [*_ABOUT_FILES, *_ABOUT_PLACES, *fillers, *tidy]
+    listed = [*spoken.PATTERNS, *tidy, *_ABOUT_FILES, *_ABOUT_PLACES, *fillers, *tidy]
     listed += [*_ABOUT_ORDER, *fillers, *_ABOUT_ACTIONS, *_ABOUT_ENDS, *tidy]
     return tuple((re.compile(pattern, re.IGNORECASE), instead) for pattern, instead in listed)
 

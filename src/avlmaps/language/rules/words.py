@@ -221,10 +221,10 @@ _AND_PART = r"(?: and (?:a half|half|a quarter|three quarters))?"
 SPELLED = rf"(?:{_WHOLE}{_POINT}{_AND_PART}|{'|'.join(sorted(_SOME, key=len, reverse=True))})"
 # "2m" needs no space, "two metres" does: "am" is no metre.
 _MEASURED = rf"(?:({_FIGURES})[ -]?|({SPELLED})[ -])"
-_UNIT = "|".join(_UNITS_M)
+UNIT = "|".join(_UNITS_M)
 _BEFORE = r"(?:(?:for|by|at|some|around|about|within|a (?:distance|further)(?: of)?|another|the next) )*"
 DISTANCE = (
-    rf"{_BEFORE}(?:{_MEASURED}(?:more |further |long )?(?:{_UNIT})\b{_AND_PART}|{_LITTLE})(?: further| "
+    rf"{_BEFORE}(?:{_MEASURED}(?:more |further |long )?(?:{UNIT})\b{_AND_PART}|{_LITTLE})(?: further| "
     r"farther| away(?! from)| off(?! of| the))?"
 )
 # A word for a little may stand before a side; a number of degrees says the angle itself.
@@ -272,8 +272,8 @@ SOUND_VERBS = [
     "tick",
     "break",
     "shatter",
-    "sneeze",
-    "snore",
+    "sneez",
+    "snor",
     "crow",
     "drip",
     "buzz",
@@ -328,12 +328,57 @@ SOUND_VERBS = [
     "saw",
     "click",
     "boil",
+    "whisper",
+    "rumbl",
+    "giggl",
+    "sob",
+    "mumbl",
+    "gurgl",
+    "squeal",
+    "clink",
+    "crunch",
+    "hoot",
+    "croak",
+    "wail",
+    "trickl",
+    "murmur",
+    "cheer",
+    "grind",
+    "whir",
+    "smash",
+    "fizz",
+    "sputter",
+    "sniff",
+    "chant",
+    "argu",
+    "squawk",
+    "neigh",
+    "gobbl",
+    "cluck",
+    "grunt",
+    "hiccup",
+    "burp",
+    "yawn",
+    "breath",
+    "applaud",
+    "explod",
+    "vibrat",
+    "blow",
+    "scream",
+    "patter",
 ]
 SOUND_NOUNS = frozenset({
     "laughter", "footsteps", "applause", "thunder", "music", "bark", "meow", "siren", "snoring", "sneezing", "coughing",
     "crying", "barking", "sobbing", "chirping", "knocking", "typing", "whistling", "singing", "clapping", "shouting",
     "screaming", "laughing", "ringing", "beeping", "buzzing", "meowing", "thunderstorm", "chatter", "conversation",
     "noise", "explosion", "thud", "bang", "scream",
+})  # fmt: skip
+# What "of" makes a sound: "the bark of a dog".
+NOISES = frozenset({
+    "bark", "barks", "meow", "cry", "cries", "scream", "screams", "shout", "shouts", "ring", "beep", "beeps", "buzz", "hum",
+    "roar", "chirp", "howl", "hiss", "clatter", "rattle", "murmur", "rumble", "squeak", "creak", "crash", "bang", "thud",
+    "splash", "growl", "whistle", "whine", "moan", "knock", "snore", "snores", "laughter", "crackle", "chime", "chimes",
+    "jingle", "rustle", "babble", "footsteps", "chatter", "tweet", "purr", "sobs", "song", "voice", "voices",
 })  # fmt: skip
 PAST_TENSES = {
     "broke": "breaking", "broken": "breaking", "breaks": "breaking", "rang": "ringing", "rings": "ringing", "sang": "s"
@@ -381,7 +426,7 @@ def _sum_of_words(words: Sequence[str]) -> float:
 
 def metres_of(text: str) -> float | None:
     """Return how many metres a distance says, or None for "a bit", which says only which way."""
-    found = re.search(rf"{_MEASURED}(?:more |further |long )?(?:({_UNIT})\b)({_AND_PART})", text.lower())
+    found = re.search(rf"{_MEASURED}(?:more |further |long )?(?:({UNIT})\b)({_AND_PART})", text.lower())
     if found is None:
         return None
     unit = next(size for name, size in _UNITS_M.items() if re.fullmatch(name, found[3]))

@@ -68,6 +68,11 @@ def _with_fronts_resolved(intents: Sequence[Intent]) -> list[Intent]:
     return resolved if held is None else [*resolved, Go(held.goals)]
 
 
+def _is_it(goal: Goal) -> bool:
+    """Return whether a goal is only "it", as in "the sofa, go to it": one way, not two."""
+    return goal.relation is Relation.AT and goal.targets[0] == Target(None)
+
+
 def _plain_thing(intent: Intent) -> bool:
     return isinstance(intent, Go) and all(
         goal.relation is Relation.AT and goal.targets[0].sought is not None for goal in intent.goals
@@ -140,7 +145,7 @@ class _Writer:
     def _go(self, go: Go) -> None:
         for goal in go.goals:
             lines = self._lines_to(goal)
-            if go.arrival and (not lines or lines == self.last_goal):
+            if (go.arrival or _is_it(goal)) and (not lines or lines == self.last_goal):
                 continue
             self.lines += lines
             self.last_goal = lines or self.last_goal

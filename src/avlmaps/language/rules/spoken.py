@@ -1,0 +1,206 @@
+"""How people speak around a command: asides, preambles, statements that name a thing before the order that means it.
+
+Each entry is a pattern, matched without regard to case, and what stands instead of it; they apply in their order, before
+those of `rewriting`. "⟦said⟧" begins a clause that only names a thing: "The phone's ringing, drive to it" becomes
+"⟦said⟧ where the phone was ringing, drive to it".
+"""
+
+from avlmaps.language.rules import words
+
+_DETERMINER = words.DETERMINER
+_BEGINS = r"(?:^|(?<=[.;!?,:]))\s*(?:(?:and|but|so|well|look|hey|now|listen),? )?"
+_ENDS = r"(?=\s*(?:[.;!?,:)]|$))"
+_GOING = rf"(?:{words.MOVE}|{words.RETURN}|{words.TURN}|{words.FACE})"
+_NO_NAME = r"(?:and|or|it|one|that|which|who|where|is|are|was|were|robot|then|goal|target|destination|task)"
+# A thing with its article and up to five words, none of which can be a verb or a connective.
+_THING = rf"(?:{_DETERMINER}(?: (?!(?:{_NO_NAME}|{words.GO})\b)[\w-]+){{1,5}}?)"
+_AT_A_PLACE = (
+    r"(?=(?:near|next to|beside|by|close to|in|inside|within|on|at|under|behind|against|between|opposite|where)\b)"
+)
+_SOUNDING = rf"(?:(?:{'|'.join(words.SOUND_VERBS)})[a-z]?ing|going off)"
+_SOUNDED = rf"(?:(?:{'|'.join(words.SOUND_VERBS)})[a-z]?ed|{'|'.join(words.PAST_TENSES)})"
+_WAS = r"(?:'s| is| was| are| were| has been| have been|'s been| keeps?| started| has started)"
+_SOMEONE = r"(?:someone|somebody|something)"
+_SHOT = r"(?:photo(?:graph)?|picture|pic|image|snap(?:shot)?|shot|screenshot|frame)"
+_RECORDING = r"(?:recording|sound|noise|clip|sound clip|audio clip|audio|sample|snippet)"
+_MEASURE = rf"(?:\d+(?:[.,]\d+)?|{words.SPELLED})[ -]?(?:{words.UNIT}|degrees?|deg|°)\b"
+_ABOUT = r"(?:(?:about|around|roughly|approximately|approx\.?|circa|say|maybe|perhaps|like|by|for|some),? )*"
+
+_HASTE = (
+    r"(?:be quick(?: about it)?|hurry(?: up)?|make it (?:quick|snappy|fast)|get a move on|be careful|careful|take your "
+    r"time|no (?:rush|hurry)|(?:don't|do not) (?:rush|hurry)|quick(?:ly)?|fast|chop[- ]chop|step on it|on the double|"
+    r"pronto|move it)"
+)
+_ASIDES = [
+    (
+        r",\s*(?:would you|will you|could you|can you|won't you|would ya|yeah|if you please|please and thank you|"
+        r"(?:there's|like|be) a (?:good|dear|love|nice|clever) ?\w*|you know|dear|pal|ok(?:ay)?|got it|right(?=\s*\?))"
+        rf"{_ENDS}",
+        "",
+    ),
+    (rf"(?:\s*[,;.!]|\s+and)\s*(?:and )?{_HASTE}(?=\s*(?:[.;!?,]|$))", ""),
+    (rf"^{_HASTE}(?:\s*[,.;!:]|\s+and\b)\s*", ""),
+    (r"\b(?:as (?:fast|quick(?:ly)?|soon|quietly|carefully|directly) as (?:possible|you (?:can|could)))\b", " "),
+    (r"\bwithout (?:delay|hurry|haste|rush(?:ing)?|hesitation)\b", " "),
+    (r"\bbe (?:a|so) (?:dear|love|good|kind|nice|sport|gem|good \w+) (?:and|as to)\b", " "),
+    (r"\bif (?:it|that)(?:'s| is|'s not| is not| isn't)(?: not)?(?: too much)?(?: of)?(?: an?)? (?:trouble|bother|hassle|problem|okay|ok|alright|fine)(?: with you| for you)?\b", " "),
+    (r"\bwhy (?:don't|do not|not)(?: you| we)?\b", " "),
+    (rf"{_BEGINS}(?:how|what) about (?:you )?", " "),
+    (r"\b(?:is there )?any chance (?:that )?(?:you|of you|of)(?: could| can| would| might)?\b", " "),
+    (r"\b(?:would|is) it (?:be )?possible(?: for you)? to\b", " "),
+    (r"\b(?:do|could you do|would you do) (?:me|us) a favou?r(?: and|:|,)?", " "),
+    (
+        rf"\b(?:could|can|would|will|should|may|let|make) ({_DETERMINER} [^,;.!?]+?) be your (?:\w+ )?(?:stop|goal|"
+        r"destination|target)\b",
+        r"go to \1",
+    ),
+]  # fmt: skip
+
+_MATTER = (
+    r"(?:plans?|tasks?|missions?|jobs?|orders?|instructions?|commands?|requests?|assignments?|errands?|routes?|"
+    r"objectives?|deal|things?|steps?|tour|itinerary|program(?:me)?)"
+)
+_WANTED = (
+    r"(?:what|all)(?: that)? (?:i|we|you)(?:'d| would)?(?: really)? (?:want|need|like|ask|have|must|should)(?: of| from)?"
+    r"(?: (?:you|the robot))?(?: (?:to )?do)?(?: (?:now|next|today|first))?"
+)
+_FOR_YOU = r"(?: (?:for (?:you|now|today|me|us)|to do|now|next|today))*"
+_OPENING = r"^(?:(?:ok(?:ay)?|so|now|right|well|alright|all right|hey|hi|hello|robot|and|listen|attention)[,!. ]+)*"
+_PREAMBLES = [
+    (
+        rf"{_OPENING}(?:(?:(?:new|next|first|final|last|your|the|my|our|another|now) )+)?(?:destination|goal|target|stop|"
+        rf"waypoint)(?: (?:for you|now|today))*\s*:\s*",
+        "go to ",
+    ),
+    (
+        rf"{_OPENING}(?:(?:here(?:'s| is| are|s)|this is|that is|these are|i(?:'ve| have)(?: got)?) )?"
+        rf"(?:(?:an?|the|your|my|our|new|next|first|one|another|last|final|small|little|quick|simple|more|some|following) "
+        rf")*(?:{_MATTER}{_FOR_YOU}|change of plans?|{_WANTED})(?: (?:is|are)(?: as follows| this| the following)?)?\s*:\s*",
+        "",
+    ),
+    (
+        rf"{_OPENING}(?:(?:your|the|my|our|next|first|new|last|only|current) )+(?:{_MATTER}){_FOR_YOU} (?:is|would be|will "
+        r"be)(?: now)?(?: for you)? to\b",
+        "",
+    ),
+    (rf"{_OPENING}{_WANTED} (?:is|would be|'s)(?: for you| that you| you)?(?: to)?\b", ""),
+    (r"^(?:listen|attention|look|hey you|excuse me|sorry|hm+|um+|uh+|er+|oh|ah)(?: up| here)?\s*[,!.:]\s*", ""),
+    (
+        r"(?:(?<=[.;,!])|^)\s*(?:and )?(?:first(?:ly)?|second(?:ly)?|third(?:ly)?|fourth|fifth|last(?:ly)?|next|then|"
+        r"finally|after that|step (?:\d+|one|two|three|four|five))\s*:\s*",
+        " ; ",
+    ),
+]
+
+_IT_WAS = (
+    r"(?:(?:it|that|this|they|he|she)(?:'s| is| was| are| were| has been)?(?: (?:just|coming|came|comes|come|heard|made|"
+    r"recorded|played))?(?: from)?|the (?:sound|noise)(?: is| was)?(?: (?:coming|came|comes|come|heard))?(?: from)?)"
+)
+_LOOK_INTO = (
+    r"(?:(?:go|come|drive|run|head|move)(?: over)?(?: there)?(?: and| to)? )?(?:see|find out|check|figure out|"
+    r"look|discover|investigate|learn)"
+)
+_STATEMENTS = [
+    (r"\bit's\b", "it is"),
+    (r"\b(you|we|they)'re\b", r"\1 are"),
+    (rf"\bto where (?:it|that) (?:is|was)(?: coming from)?{_ENDS}", "to it"),
+    (rf"({_SHOT}|{_RECORDING}|file)\s*[,:]\s*(?=⟦)", r"\1 "),
+    # "where it was taken": of the picture that was named.
+    (
+        rf"\b({words.GO}) (?:back )?(?:to )?(?:the (?:\w+ )?(?:place|spot|location) )?where (?:it|that|this|(?:the|that|this) "
+        rf"(?:{_SHOT}|{_RECORDING})) (?:was|is|has been|got|had been) (?:taken|shot|made|snapped|captured|recorded|heard)\b(?! ?[:,]? ?⟦)",
+        r"\1 to it",
+    ),
+    (
+        rf"\b(?:the (?:\w+ )?(?:place|spot|location) )?where (?:it|that|this|(?:the|that|this) (?:{_SHOT}|{_RECORDING})) "
+        r"(?:was|is|has been|got|had been) (?:taken|shot|made|snapped|captured|recorded|heard)\b(?! ?[:,]? ?⟦)",
+        "it",
+    ),
+    (r"(⟦[ic]\d+⟧\s+(?:was|is|has been) (?:taken|shot|made|heard|recorded)) (?:some(?:where|place)|in here|here)\b", r"\1"),
+    (
+        rf"{_BEGINS}(?:take a look at|have a look at|look at|see|consider|take|check|listen to|play) (?=(?:{_DETERMINER} (?:\w+ )?)?"
+        rf"(?:(?:{_SHOT}|{_RECORDING})\b[^⟦.;]*)?⟦[^.;,!?]*[.;,!?].*\b(?:it|there)\b)",
+        " ⟦said⟧ ",
+    ),
+    # "I heard a crash, go and see where that came from".
+    (rf"\b{_LOOK_INTO} (?:where|what|who) {_IT_WAS}{_ENDS}", "go to it"),
+    (rf"\b{_LOOK_INTO} (?:what(?:'s| is| was)? (?:happened|happening|going on|wrong|up|the matter)|what made (?:it|that)(?: noise| sound)?)(?: there)?{_ENDS}", "go to it"),
+    (rf"\b(?:go(?: and)? )?(?:check (?:it|that|this) out|investigate(?: it| that| this)?|look into (?:it|that)|see to (?:it|that)|check on it|track (?:it|that) down|find (?:its|the) (?:source|origin)(?: of (?:it|that))?|have a look there){_ENDS}", "go to it"),
+    (rf"\b(?:go|drive|come|run|head)(?: over)?(?: and|,)? (?:see|look|check|have a look|take a look|find out){_ENDS}", "go to it"),
+    (r"\bthere (?:should|must|ought to|might|may|used to|seems? to|has to|will|could) be\b|\bthere (?:was|were)\b(?! heard)", "there is"),
+    (rf"{_BEGINS}(?:is|are|isn't|aren't) there (?=(?:an?|any|some|the|my)\b)", " there is "),
+    (rf"{_BEGINS}(?:(?:do|did|can|could) )?(?:you|we|i)(?:'ve| have)?(?: (?:can|could|just|still|now))*(?: be)? (?:hear(?:d|ing)?)(?: (?:an?|the|this|that|my|your|some))?(?: (?:sounds?|noises?) of(?: (?:an?|the|this|that|my|your))?)? (?=[\w⟦])(?!it\b)", " ⟦said⟧ the sound of "),
+    (rf"{_BEGINS}(?:(?:do|can|did|could) )?(?:you|i|we)(?:'ve| have)?(?: (?:can|could|may|might|just|still))* (?:see|saw|know|knew|remember|recall|noticed?|seen|spot|spotted|lost|left|misplaced|forgot) (?={_DETERMINER}\b|⟦)", " ⟦said⟧ "),
+    (rf"{_BEGINS}(?:remember|recall) (?={_DETERMINER}\b|⟦)", " ⟦said⟧ "),
+    (rf"{_BEGINS}(?:here(?:'s| is| are)|this is|that's|that is|these are) (?={_DETERMINER}\b|⟦)", " ⟦said⟧ "),
+    (rf"{_BEGINS}i(?:'m| am| was|'ve been| have been) (?:looking for|searching for|after|hunting for|trying to find|in search of)\b", " find "),
+    (rf"{_BEGINS}where(?:'s| is| are| was| were) ({_DETERMINER}[^.;!?,]+?|music|{_SOMEONE} [^.;!?,]+?) (?:coming|heard)(?: from)?\s*\?", r" ⟦said⟧ the sound of \1 ;"),
+    (rf"{_BEGINS}where(?: does| did| do) ({_DETERMINER}[^.;!?,]+?) (?:come|originate|sound) from\s*\?", r" ⟦said⟧ the sound of \1 ;"),
+    (rf"{_BEGINS}where(?:'s| is| are| was| were) ({_DETERMINER}[^.;!?,]+?)\s*\?", r" ⟦said⟧ \1 ;"),
+    (rf"{_BEGINS}({_THING}|{_SOMEONE}){_WAS} (?:\w+ly |just |still |now |again )?({_SOUNDING})\b", r" ⟦said⟧ where \1 was \2"),
+    (rf"{_BEGINS}({_THING}|{_SOMEONE})(?: has| have)?(?: just)? ({_SOUNDED})\b(?=[^.;!?,]*(?:[.;!?,]|\band\b))", r" ⟦said⟧ where \1 \2"),
+    (rf"{_BEGINS}({_THING})(?:'s| is| are| stands?| sits?| hangs?| lies| lives?)(?: (?:located|somewhere|right|just|over|standing|sitting|lying|placed|situated|up|out|back|there))* (?!where\b){_AT_A_PLACE}(?=[^.;!?,]*[.;!?,])", r" ⟦said⟧ \1 "),
+    # "the big lamp: face it": named, not yet gone to.
+    (rf"{_BEGINS}({_DETERMINER} [^,;.:!?]+)[,:.?!] (?=(?:(?:please|now|could you|can you|would you|just) )*(?:{words.FACE}|{words.TURN}|stop|stand|park|wait|go|move|drive|position yourself)\b[^,;.:!?]*\b(?:it|its|it's)\b)", r" ⟦said⟧ \1 ; "),
+    (r"\b(?:the )?(?:sound of )?(?:whoever|whatever|who|what)(?:'s| is| was)(?: making)? (?=" + _SOUNDING + r"\b)", "the sound of "),
+]  # fmt: skip
+
+_ADVERB = r"(?:somewhere|someplace|right|just|over|up|down|out|back|directly|close|there|here|off|way|located)"
+_PLACES = [
+    (
+        r"\s*[,;.(]\s*(?:and )?(?:i mean |i meant |namely |that is,? |specifically |meaning )?(?:the|that) one,? (?:(?:that "
+        rf"is|that's|which is|which's|{_ADVERB}) )*(?=(?:near|next to|beside|by|close to|in|inside|on|at|with|where|under|"
+        r"behind|from|against|between|opposite)\b)",
+        " ",
+    ),
+    (
+        rf"({_THING}) (?:(?:that|which)(?:'s| is| was) )?(?:(?:somewhere|someplace|anywhere) )?(?:(?:over|back|up|down|out|in|"
+        r"right|just|around|round) )*(?:here|there)\b(?!['’])(?! (?:is|are|was|to)\b)",
+        r"\1",
+    ),
+    (rf"({_THING}) (?:somewhere|someplace|nearby|some place|somewhere or other){_ENDS}", r"\1"),
+    (rf"({_THING}) (?:just |right )?outside(?: of)? (?={_DETERMINER}\b)", r"\1 near "),
+    (rf"({_THING})(?: (?:that|which)(?:'s| is))?(?: {_ADVERB})+ {_AT_A_PLACE}", r"\1 "),
+    (
+        rf"({_THING})(?<!place)(?<!spot)(?<!location)(?<!room)(?<!area)(?<!position) (?:(?:that|which) is |that's |as )?(?:shown|seen|pictured|depicted|"
+        rf"photographed|captured|visible) (?=(?:in|on) (?:{_DETERMINER} )?(?:\w+ )?(?:{_SHOT} )?(?:file )?⟦)",
+        r"\1 near ",
+    ),
+    (rf"\b(near) (?:in|on) (?=(?:{_DETERMINER} )?(?:\w+ )?(?:{_SHOT} )?(?:file )?⟦)", r"\1 "),
+    (
+        rf"\b(in|into|inside|within|enter|entering) ({_DETERMINER}) toilet(?=\s*(?:[,.;:!?]|$)| (?:and|then|or|where|near|by|"
+        r"next|beside|with|please|before|after|twice|now|over)\b)",
+        r"\1 \2 toilet-room",
+    ),
+]
+
+_MOTION = [
+    (
+        rf"\b(?:a (?:little )?bit|a little|slightly|a tad|a short (?:way|distance))(?: more| further)?,? {_ABOUT}(?={_MEASURE})",
+        "",
+    ),
+    (rf"\s*,\s*{_ABOUT}(?={_MEASURE}(?: (?:away|off|apart))?\s*(?:[.;!?]|$|, |\b(?:and|then)\b))", " "),
+    (
+        rf"\b(?:point|orient|orientate|aim|direct|align|head) (?:yourself|itself) (?=(?:to (?:the|your) )?(?:due )?(?:left|right|"
+        rf"{words.COMPASS}|around|round|by)\b)",
+        "turn ",
+    ),
+    (
+        r"\b(?:squeeze|wedge|tuck|slot|slip|install|wheel|haul|drag|swing|plonk|plop|nestle|sandwich|lodge|manoeuvre|maneuver|"
+        r"deposit|fit|base|anchor|seat|sit|hide|insert)(?: (?:yourself|itself))?(?: in| down| up)*(?= (?:in[- ])?between\b)",
+        "go",
+    ),
+    (
+        r"\b(?:squeeze|wedge|tuck|slot|slip|install|wheel|haul|drag|plonk|plop|nestle|lodge|manoeuvre|maneuver|deposit|fit|base|"
+        r"anchor|seat|sit|hide|insert) (?:yourself|itself)(?: down| up| over| across)*(?= )",
+        "go",
+    ),
+    (
+        rf"\b({words.TURN})((?: to (?:the|your))? (?:left|right))?(?: by)? (?:an?|one) (quarter|half)(?=\s*(?:[,.;!?]|$)| to "
+        r"(?:the|your)\b| and\b)",
+        r"\1\2 a \3 turn",
+    ),
+    (r"\b(?:spin|twirl|whirl)(?: yourself)? (?:a?round )(?:once|one time)\b", "turn in a full circle"),
+]
+
+PATTERNS = ((r"\s+", " "), *_ASIDES, *_PREAMBLES, *_STATEMENTS, *_PLACES, *_MOTION)
