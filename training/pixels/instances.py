@@ -12,12 +12,15 @@ from scipy.optimize import minimize
 from training.pixels.worlds import FIRST_CALIBRATION_SEED
 
 from avlmaps.bench.objects import FEWEST_VOXELS, GROWN_M, STRUCTURE
+from avlmaps.core.errors import MapError
 from avlmaps.maps.build import build_map
+from avlmaps.maps.stored import StoredMap
 from avlmaps.perception.embedded.pixels import LARGEST_LOG_AREA, SMALLEST_LOG_AREA, EmbeddedPixels
 from avlmaps.perception.embedded.scene_network import InstanceNotes, Notes
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.objects import Asked, ObjectSettings, Rivals, object_pieces
 from avlmaps.recordings.open import open_recording
+from avlmaps.recordings.types import Recording
 from avlmaps.sim.recorder import RecordSettings, record_scene
 from avlmaps.sim.scenes import open_scene
 from avlmaps.sim.truth import read_truth
@@ -54,7 +57,7 @@ def pieces_of(folder: Path, seed: int, frames: int) -> Iterator[Pieces]:
     if not (recording / "objects.json").is_file():
         settings = RecordSettings(hearing="none", sensor="kinect", max_frames=frames, workers=1)
         record_scene(scene, recording, settings, seed)
-    asked = AVLMap(build_map(open_recording(recording), folder / f"{seed}.avlmap", overwrite=True))
+    asked = AVLMap(_map_of(open_recording(recording), folder / f"{seed}.avlmap"))
     encoder = asked.stored.profile.pixel_encoder()
     assert isinstance(encoder, EmbeddedPixels)
     things, feature, space = read_truth(recording).objects, asked.stored.voxels.feature, asked.space
@@ -74,6 +77,14 @@ def pieces_of(folder: Path, seed: int, frames: int) -> Iterator[Pieces]:
         large = count >= FEWEST_VOXELS // 3
         area = count * space.grid.voxel_size_m**2
         yield Pieces(name, pieces.mean_probability[large], area[large], share[large] >= 0.5)
+
+
+def _map_of(recording: Recording, path: Path) -> StoredMap:
+    """Return the map of a recording by the weights as they are now; one that is there already is not made again."""
+    try:
+        return build_map(recording, path)
+    except MapError:  # by other weights
+        return build_map(recording, path, overwrite=True)
 
 
 def fit_instances(found: list[Pieces]) -> InstanceNotes:
