@@ -1,42 +1,57 @@
-"""How many of sixty free paraphrases the rules understand: written before the grammar, and not looked at by its writer.
+"""How many free paraphrases the rules understand, written by others than the writer of the grammar.
 
-The count alone is asserted and told, so that whoever works on the grammar stays blind to what is asked; the failing
-ones are listed by ``python tests/language/test_paraphrases.py``. A grammar that was mended by that list is to be
-measured on new paraphrases.
+The first set is the development set: the grammar was mended by what failed in it, so its count only holds what was
+reached. The second was written blind afterwards and was never looked at by who mends the grammar; it measures. The
+failing ones of the development set are listed by ``python tests/language/test_paraphrases.py``; a grammar that was
+mended by the second set is to be measured on new paraphrases.
 """
 
 import json
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 from program_equality import same_program
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.program import parse_program
 from avlmaps.language.rules import command_to_program
 
-COMMANDS = Path(__file__).parent / "commands" / "paraphrases.jsonl"
+COMMANDS = Path(__file__).parent / "commands"
+DEVELOPMENT = COMMANDS / "paraphrases.jsonl"
+BLIND = COMMANDS / "paraphrases_2.jsonl"
+SETS = [path for path in (DEVELOPMENT, BLIND) if path.exists()]
+REACHED = 60
 ASKED_FOR = 0.9
 
 
-def test_every_paraphrase_is_asked_once_and_its_programs_are_programs() -> None:
-    paraphrases = _paraphrases()
-    assert len(paraphrases) == 60
+@pytest.mark.parametrize("path", SETS, ids=lambda path: path.stem)
+def test_every_paraphrase_is_asked_once_and_its_programs_are_programs(path: Path) -> None:
+    paraphrases = _paraphrases(path)
+    assert len(paraphrases) == len(path.read_text(encoding="utf-8").splitlines()) >= 50
     for command, programs in paraphrases.items():
         for program in programs:
             assert parse_program(program), command
             assert same_program(program, program), command
 
 
-def test_nine_of_ten_free_paraphrases_become_the_right_program() -> None:
-    paraphrases = _paraphrases()
+def test_the_development_set_stays_understood() -> None:
+    paraphrases = _paraphrases(DEVELOPMENT)
+    assert len(paraphrases) == 60
+    assert len(paraphrases) - len(wrong_answers(paraphrases, command_to_program)) >= REACHED
+
+
+@pytest.mark.skipif(not BLIND.exists(), reason="no blind set has been written")
+def test_nine_of_ten_blind_paraphrases_become_the_right_program() -> None:
+    paraphrases = _paraphrases(BLIND)
     asked, right = len(paraphrases), len(paraphrases) - len(wrong_answers(paraphrases, command_to_program))
     assert right >= ASKED_FOR * asked, f"{right} of {asked} are right"
 
 
-def test_a_translator_that_says_the_same_to_everything_fails() -> None:
-    paraphrases = _paraphrases()
-    assert len(wrong_answers(paraphrases, lambda _: 'robot.move_to_object("chair")')) >= 59
+@pytest.mark.parametrize("path", SETS, ids=lambda path: path.stem)
+def test_a_translator_that_says_the_same_to_everything_fails(path: Path) -> None:
+    paraphrases = _paraphrases(path)
+    assert len(wrong_answers(paraphrases, lambda _: 'robot.move_to_object("chair")')) >= 0.9 * len(paraphrases)
 
 
 def wrong_answers(paraphrases: dict[str, list[str]], translate: Callable[[str], str]) -> dict[str, str]:
@@ -52,15 +67,15 @@ def wrong_answers(paraphrases: dict[str, list[str]], translate: Callable[[str], 
     return wrong
 
 
-def _paraphrases() -> dict[str, list[str]]:
-    rows = [json.loads(line) for line in COMMANDS.read_text(encoding="utf-8").splitlines()]
+def _paraphrases(path: Path) -> dict[str, list[str]]:
+    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
     return {row["command"]: row.get("programs") or [row["program"]] for row in rows}
 
 
 if __name__ == "__main__":
     import sys
 
-    asked = _paraphrases()
+    asked = _paraphrases(DEVELOPMENT)
     failing = wrong_answers(asked, command_to_program)
     for command, answer in failing.items():
         sys.stdout.write(f"{command}\n  came:   {answer!r}\n  wanted: {asked[command][0]!r}\n")

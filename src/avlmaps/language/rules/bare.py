@@ -1,7 +1,7 @@
 """Bare nouns: "sofa, then kitchen", "fridge, please".
 
-Without article and verb any word could be a verb that is not known, so only the names that a home or an office is full of
-are taken as things to go to; "dance" stays what is not understood.
+Without article and verb any word could be a verb that is not known, so only the names that a home or an office is full
+of are taken as things to go to; "dance" stays what is not understood.
 """
 
 import re
@@ -11,25 +11,31 @@ from avlmaps.language.rules import words
 from avlmaps.language.sentence import AREA_WORDS
 
 _THINGS = (
-    "armchair bag ball basket bath bathtub bed bench bicycle bike bin blinds board book bookcase bookshelf bookshelves "
-    "bottle bowl box bucket cabinet carpet chair chest clock closet coat coffee-table column computer cooker cot couch "
-    "counter countertop cradle crib cup cupboard curtain curtains cushion desk dishwasher door doorway drawer dresser "
-    "dryer fan faucet fireplace flower flowers freezer fridge heater jacket kettle keyboard ladder lamp laptop mattress "
-    "microwave mirror monitor mug nightstand oven painting pan photocopier piano pillar pillow plant poster pot printer "
-    "radiator rack refrigerator rug screen shelf shelves shower sideboard sink sofa staircase stairs stereo stool stove "
-    "suitcase table tap telephone television toaster toilet towel toy trashcan treadmill tv umbrella vase wardrobe washbasin "
-    "washer whiteboard window"
-).split()
+    "armchair", "bag", "ball", "basket", "bath", "bathtub", "bed", "bench", "bicycle", "bike", "bin", "blinds",
+    "board", "book", "bookcase", "bookshelf", "bookshelves", "bottle", "bowl", "box", "bucket", "cabinet", "carpet",
+    "chair", "chest", "clock", "closet", "coat", "coffee-table", "column", "computer", "cooker", "cot", "couch",
+    "counter", "countertop", "cradle", "crib", "cup", "cupboard", "curtain", "curtains", "cushion", "desk",
+    "dishwasher", "door", "doorway", "drawer", "dresser", "dryer", "fan", "faucet", "fireplace", "flower", "flowers",
+    "freezer", "fridge", "heater", "jacket", "kettle", "keyboard", "ladder", "lamp", "laptop", "mattress",
+    "microwave", "mirror", "monitor", "mug", "nightstand", "oven", "painting", "pan", "photocopier", "piano",
+    "pillar", "pillow", "plant", "poster", "pot", "printer", "radiator", "rack", "refrigerator", "rug", "screen",
+    "shelf", "shelves", "shower", "sideboard", "sink", "sofa", "staircase", "stairs", "stereo", "stool", "stove",
+    "suitcase", "table", "tap", "telephone", "television", "toaster", "toilet", "towel", "toy", "trashcan",
+    "treadmill", "tv", "umbrella", "vase", "wardrobe", "washbasin", "washer", "whiteboard", "window",
+)  # fmt: skip
 _PAIRS = (
-    "trash can", "garbage can", "coffee machine", "coffee maker", "washing machine", "vending machine", "potted plant",
-    "filing cabinet", "chest of drawers", "bedside table", "coffee table", "dining table", "kitchen table", "front door",
-    "back door", "kitchen island", "water cooler", "fire extinguisher", "charging station", "living room", "dining room",
-    "meeting room", "waiting room", "bath tub", "tv stand", "book shelf",
+    "trash can", "garbage can", "coffee machine", "coffee maker", "washing machine", "vending machine",
+    "potted plant", "filing cabinet", "chest of drawers", "bedside table", "coffee table", "dining table",
+    "kitchen table", "front door", "back door", "kitchen island", "water cooler", "fire extinguisher",
+    "charging station", "living room", "dining room", "meeting room", "waiting room", "bath tub", "tv stand",
+    "book shelf",
 )  # fmt: skip
 _KINDS = (
-    "red green blue yellow black white brown grey gray orange purple pink beige big small large little tall low long round "
-    "square wooden leather glass metal plastic old new left right front back double single empty open"
-).split()
+    "red", "green", "blue", "yellow", "black", "white", "brown", "grey", "gray", "orange", "purple", "pink", "beige",
+    "big", "small", "large", "little", "tall", "low", "long", "round", "square", "wooden", "leather", "glass",
+    "metal", "plastic", "old", "new", "left", "right", "front", "back", "double", "single", "empty", "open",
+    "nearest", "closest",
+)  # fmt: skip
 _NAME = (
     rf"(?:(?:{'|'.join(_KINDS)}) )*"
     rf"(?:{'|'.join(_PAIRS)}|(?:{'|'.join([*_THINGS, *sorted(AREA_WORDS - {'area', 'zone', 'room', 'shop'})])}))"

@@ -46,7 +46,8 @@ class Clauses:
 
     def shown(self, text: str) -> str:
         """Return a text of a clause with its files in place again."""
-        return re.sub(r"⟦[ic](\d+)⟧", lambda found: self.files[int(found[1])], text)
+        spoken = re.sub(r"⟦said⟧ ?|(?<=toilet)-room", "", text)
+        return re.sub(r"⟦[ic](\d+)⟧", lambda found: self.files[int(found[1])], spoken)
 
 
 def split_clauses(command: str) -> Clauses:

@@ -7,7 +7,7 @@ from typing import Any
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.rules.intents import Named, Target
-from avlmaps.language.rules.words import NOISES, PAST_TENSES, SOUND_NOUNS, SOUND_VERBS
+from avlmaps.language.rules.sounds import NOISES, PAST_TENSES, SOUND_NOUNS, SOUND_VERBS, SOUNDING_THINGS
 from avlmaps.language.sentence import AREA_WORDS
 from avlmaps.query.question import Modality
 
@@ -20,7 +20,9 @@ _NEVER_NAMED = frozenset({
     "toward", "towards", "during", "while", "since", "though", "although", "everybody", "another", "both", "each",
     "either", "lots", "around", "onto", "upon", "maybe", "really", "actually", "first", "lastly", "finally",
 })  # fmt: skip
-_POINTED_AT = frozenset({"place", "spot", "location", "position", "thing", "point", "direction", "way", "source"})
+_POINTED_AT = frozenset(
+    {"place", "spot", "location", "position", "thing", "point", "direction", "way", "source", "area", "zone"}
+)
 # Parts of a room have no place of their own in a map; the room has.
 _PARTS_OF_AREAS = frozenset(
     {"middle", "centre", "center", "end", "corner", "back", "front", "side", "rest", "inside", "part"}
@@ -30,7 +32,23 @@ _NOT_TOLD_APART = frozenset(
 )
 _MEASURES = frozenset({"degrees", "degree", "metres", "meters", "metre", "cm", "centimetres", "centimeters", "times"})
 _NO_THINGS = frozenset(
-    {"left", "right", "front", "back", "side", "rear", "middle", "centre", "center", "north", "south", "east", "west"}
+    {
+        "left",
+        "right",
+        "front",
+        "back",
+        "side",
+        "rear",
+        "middle",
+        "centre",
+        "center",
+        "north",
+        "south",
+        "east",
+        "west",
+        "up",
+        "down",
+    }
 )
 _STANDING = frozenset({"is", "are", "was", "were", "stands", "stand", "sits", "lies", "hangs", "lives"})
 _SOUNDING = re.compile(rf"(?:{'|'.join(SOUND_VERBS)})[a-z]?ing")
@@ -160,6 +178,9 @@ class Names:
             noisy = [word for word in spoken[2:] if word.lower() not in ("the", "a", "an", "my", "your", "that")]
             return Named(Modality.SOUND, " ".join([*noisy, spoken[0]])), []
         _refuse_words_of_no_name(spoken)
+        if len(spoken) > 1 and spoken[0].lower() in SOUNDING_THINGS:
+            self.notes.append(f"{' '.join(spoken)!r} was taken as a sound.")
+            return Named(Modality.SOUND, " ".join(spoken)), []
         last = spoken[-1].lower()
         if last in AREA_WORDS and "of" in spoken[1:-1]:
             return self._of_area(spoken)
@@ -193,8 +214,8 @@ def _refuse_words_of_no_name(spoken: list[str]) -> None:
     if odd is None and (len(words) > 1 or words[0] not in _POINTED_AT):
         return
     raise LanguageError(
-        f"{' '.join(spoken)!r} is not understood as the name of a thing; say it like: the chair near the sound of glass "
-        "breaking."
+        f"{' '.join(spoken)!r} is not understood as the name of a thing; say it like: the chair near the sound of "
+        "glass breaking."
     )
 
 

@@ -29,6 +29,7 @@ from avlmaps.language.rules.intents import (
     Viewpoints,
 )
 from avlmaps.language.rules.names import Names, is_rule, is_token
+from avlmaps.language.rules.sounds import SOUND_VERBS
 
 # A little, a bit, slightly: how far a robot goes when told so, metres.
 _LITTLE_M = 0.5
@@ -49,7 +50,7 @@ def parser() -> Any:
 
     grammar = files("avlmaps.language.rules").joinpath("command.lark").read_text(encoding="utf-8")
     listed = {name: value for name, value in vars(words).items() if name.isupper() and isinstance(value, str)}
-    listed["SOUND_VERBS"] = "|".join(words.SOUND_VERBS)
+    listed["SOUND_VERBS"] = "|".join(SOUND_VERBS)
     listed["STOPS"] = words.STOPS.replace("<SPELLED>", words.SPELLED)
     grammar = re.sub(r"<([A-Z_]+)>", lambda found: f"(?:{listed[found[1]]})".replace("/", r"\/"), grammar)
     return Lark(grammar, parser="lalr", lexer="contextual", maybe_placeholders=False)

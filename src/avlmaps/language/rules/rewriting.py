@@ -223,7 +223,7 @@ _ABOUT_ORDER = [
     (r"(?:^|(?<=[;.]))\s*on (?:your|the) way to\b", " ; ⟦before⟧ go to"),
     (r",?\s*\b(?:while |when )?on (?:your|the) way to\b", " ; go to"),
     (
-        rf"\b(?:do|repeat|perform|execute) (?:the following|this|these)?(?: \w+)?,? ({words.COUNT})\s*[:;]",
+        rf"\b(?:do|repeat|perform|execute)(?: (?:the following|this|these)(?: \w+)?)?,? ({words.COUNT})\s*[:;]",
         r"; ⟦foll"
         r"owing⟧ \1 ;",
     ),

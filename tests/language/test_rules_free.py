@@ -1,0 +1,102 @@
+"""Sentences as people speak: statements before orders, asides, preambles, bare nouns; and what must not be guessed."""
+
+from pathlib import Path
+
+import pytest
+from program_equality import same_program
+
+from avlmaps.core.errors import LanguageError
+from avlmaps.language.rules import RulesTranslator, command_to_program
+
+# How many of them have to be right; the others may be refused, but are never read as something else.
+ASKED_FOR = 0.95
+
+
+def free() -> dict[str, str]:
+    """Return the free sentences with their programs, written from what they mean."""
+    text = (Path(__file__).parent / "commands" / "free.tsv").read_text(encoding="utf-8")
+    pairs = [line.split("\t") for line in text.splitlines() if line and not line.startswith("#")]
+    assert len(pairs) == len(dict(pairs))
+    return {command.replace("\\n", "\n"): program.replace(" | ", "\n") for command, program in pairs}
+
+
+def test_free_sentences_are_understood_and_none_is_read_as_something_else() -> None:
+    sentences = free()
+    assert len(sentences) >= 200
+    refused = []
+    for command, program in sentences.items():
+        try:
+            written = command_to_program(command)
+        except LanguageError:
+            refused.append(command)
+            continue
+        assert same_program(written, program), (command, written)
+    assert len(refused) <= (1 - ASKED_FOR) * len(sentences), refused
+
+
+# No name holds a verb, a pronoun or an adverb: it would be sought on the map as it stands.
+NEVER_GUESSED = [
+    "dance",
+    "hammer",
+    "the sofa is near the TV",
+    "the phone is ringing",
+    "I heard a crash",
+    "go to the blue one",
+    "go to the chair over",
+    "go to the place",
+    "go to somebody",
+    "Look up",
+    "Is the sofa free?",
+    "The lamp and the sofa: stop between them",
+    "stop where it",
+    "Someone broke a window, go there",
+    "don't go to the kitchen, go to the bedroom",
+    "go to where it came from and",
+    "go there",
+    "check it out",
+]
+
+
+@pytest.mark.parametrize("command", NEVER_GUESSED)
+def test_what_is_no_order_is_refused(command: str) -> None:
+    with pytest.raises(LanguageError) as caught:
+        written = command_to_program(command)
+        pytest.fail(written)
+    assert "⟦" not in str(caught.value)
+
+
+@pytest.mark.parametrize("said", ["the phone is ringing", "I see a sofa", "there's a lamp by the bed", "I heard rain"])
+def test_a_statement_is_no_way_to_go(said: str) -> None:
+    assert same_program(command_to_program(f"{said}. Turn left."), "turn(-90)")
+    assert same_program(command_to_program(f"{said}, turn left"), "turn(-90)")
+
+
+@pytest.mark.parametrize(
+    "aside", [", quick", ", will you?", ", okay?", " - hurry!", ", if you please", " and be quick about it"]
+)
+@pytest.mark.parametrize("order", ["turn left", "go to the sofa", "stop 2 m left of the bed", "find the sound of rain"])
+def test_asides_change_nothing(order: str, aside: str) -> None:
+    assert same_program(command_to_program(order + aside), command_to_program(order))
+
+
+@pytest.mark.parametrize(
+    "preamble", ["Your task: ", "Here's the plan: ", "What I want is for you to ", "One more thing: "]
+)
+@pytest.mark.parametrize("order", ["turn left", "go to the sofa, then face the window", "stop 2 m left of the bed"])
+def test_preambles_change_nothing(order: str, preamble: str) -> None:
+    assert same_program(command_to_program(preamble + order), command_to_program(order))
+
+
+def test_a_thing_that_sounds_is_a_sound_and_that_is_told() -> None:
+    translation = RulesTranslator().program_for("go to the crying baby")
+    assert 'get_major_map(sound="crying baby")' in translation.program
+    assert translation.notes == ("'crying baby' was taken as a sound.",)
+    assert same_program(command_to_program("go to the running shoes"), 'move_to_object("running shoes")')
+
+
+def test_a_toilet_is_a_thing_unless_something_is_in_it() -> None:
+    assert same_program(command_to_program("face the toilet"), 'face("toilet")')
+    assert same_program(command_to_program("wait in the toilet"), 'move_to(get_major_map(area="toilet"))')
+    inside = 'move_to(get_major_map(obj="sink") * get_map(area="toilet"))'
+    assert same_program(command_to_program("go to the sink in the toilet"), inside)
+    assert same_program(command_to_program("go to the toilet paper"), 'move_to_object("toilet paper")')
