@@ -1,6 +1,7 @@
 """A program means what Python means by it: the two are read and run side by side."""
 
 import math
+import re
 from collections import Counter
 from functools import cache
 from random import Random
@@ -31,7 +32,8 @@ def accepted() -> tuple[Program, ...]:
     texts = [*VALID, *(working_program(Random(seed)) for seed in range(60)), *hostile_programs(600, 7)]
     found = []
     for text in texts:
-        if len(text) > 1500:
+        # Python itself would count through such a range for hours.
+        if len(text) > 1500 or re.search(r"= .* in range\(-?\d{7,}", text):
             continue
         try:
             found.append(parse_program(text))
