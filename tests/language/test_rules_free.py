@@ -46,6 +46,8 @@ NEVER_GUESSED = [
     "go to the place",
     "go to somebody",
     "Look up",
+    "Look left and right",
+    "stand on the window side of the bed",
     "Is the sofa free?",
     "The lamp and the sofa: stop between them",
     "stop where it",

@@ -211,7 +211,8 @@ def _refuse_words_of_no_name(spoken: list[str]) -> None:
         ),
         None,
     )
-    if odd is None and (len(words) > 1 or words[0] not in _POINTED_AT):
+    aside = "side of" in " ".join(words) or all(word in _NO_THINGS or word == "and" for word in words)
+    if odd is None and not aside and (len(words) > 1 or words[0] not in _POINTED_AT):
         return
     raise LanguageError(
         f"{' '.join(spoken)!r} is not understood as the name of a thing; say it like: the chair near the sound of "

@@ -44,6 +44,19 @@ _ASIDES = [
     (r"\b(?:as (?:fast|quick(?:ly)?|soon|quietly|carefully|directly) as (?:possible|you (?:can|could)))\b", " "),
     (r"\bif you(?:'d| would) be so (?:kind|good)\b", " "),
     (r",? should you (?:choose|wish|decide) to accept(?: it)?,?", " "),
+    (
+        rf"{_BEGINS}(?:i'm|i am|we're|we are|it's|it is|they're) (?:(?:very|so|really|quite|a bit|getting|too) )*"
+        rf"(?!(?:{_DETERMINER}|in|at|on|near|by|where|next|{words.COMPASS})\b)[\w-]+(?<!ing)"
+        rf"(?: (?:in|at) {_DETERMINER} \w+)?\s*[.,;!] (?=\w)",
+        " ",
+    ),
+    (r"\b(?:it's |it is )?(?:now )?time (?:for you )?to (?=\w)", " "),
+    (r"\bas (?:close|near) as (?:possible|you can)(?: get)? to\b", "to"),
+    (r"\b(?:let's |let us )?have you (?=(?:at|in|by|near|next|beside|on|between|left|right)\b)", "i want you "),
+    (
+        rf"\b(you|{words.GO}) over (?=(?:by|at|near|next to|in|on|beside|behind|between) (?:{_DETERMINER}|where)\b)",
+        r"\1 ",
+    ),
     (r"\bwithout (?:delay|hurry|haste|rush(?:ing)?|hesitation)\b", " "),
     (r"\bbe (?:a|so) (?:dear|love|good|kind|nice|sport|gem|good \w+) (?:and|as to)\b", " "),
     (
@@ -75,6 +88,7 @@ _WANTED = (
 _FOR_YOU = r"(?: (?:for (?:you|now|today|me|us)|to do|now|next|today))*"
 _OPENING = r"^(?:(?:ok(?:ay)?|so|now|right|well|alright|all right|hey|hi|hello|robot|and|listen|attention)[,!. ]+)*"
 _PREAMBLES = [
+    (r"(?:(?<=[.;,!])|^)\s*(?:and )?(?:second|third|fourth|last), (?=\w)", " ; "),
     (
         rf"{_OPENING}(?:(?:(?:new|next|first|final|last|your|the|my|our|another|now) )+)?(?:destination|goal|"
         rf"target|stop|"
@@ -145,6 +159,16 @@ _STATEMENTS = [
         rf"{_BEGINS}where (?:do|did|can|could|have) (?:you|i|we) (?:last |just )?(?:see|seen|find) ({_DETERMINER} "
         rf"[^.;!?,]+?)\s*\?",
         r" ; ⟦said⟧ \1 ;",
+    ),
+    (rf"(?<=\w )(?:its|the) (?:source|origin){_ENDS}", "it"),
+    (rf"\b(?:track|trace|chase|pursue|investigate|check) (?=(?:{_DETERMINER} )?(?:sounds?|noises?)\b)", "find "),
+    (
+        rf"[,;.]?\s*\b(?:and )?on the way(?: there)?,? (?=(?:{words.MOVE})\b)",
+        " ; ⟦after⟧ ",
+    ),
+    (
+        rf"[,;.]\s*(?:and |but )?((?:{words.MOVE})\b[^,;.!?]*?) on the way(?: there)?{_ENDS}",
+        r" ; ⟦after⟧ \1",
     ),
     (r"\bhaving arrived(?: there)?\b", "then"),
     (r"\bfirst off (?=to\b)", "go "),
@@ -311,6 +335,10 @@ _PLACES = [
 ]
 
 _MOTION = [
+    (r"\b(?:hang|take|make|do) an? (left|right)(?! angle)(?: turn)?\b", r"turn \1"),
+    (rf"\b(?:move|go|come|step) up (?=(?:a (?:little )?bit|a little)\b|{_ABOUT}{_MEASURE})", "go forward "),
+    (rf"\b(?:go|carry|keep|drive|move|continue|keep going) on (?={_ABOUT}{_MEASURE})", "go forward "),
+    (r"\bturn half-?\s?way (?:a?round)\b", "turn around"),
     (r"\b(?:by |through |at )?an? right angle\b", "90 degrees"),
     (rf"\b(?:slightly|a bit|a little) (left|right),? {_ABOUT}(?={_MEASURE})", r"\1 "),
     (
