@@ -17,7 +17,6 @@ AREA_WORDS = frozenset({
     "hallway", "hall", "foyer", "lobby", "entrance", "lounge", "garage", "garden", "patio", "terrace", "balcony",
     "gym", "library", "pantry", "basement", "cellar", "attic", "staircase", "stairwell", "workshop", "lab",
     "study", "den", "playroom", "conservatory", "porch", "storeroom", "passageway",
-   
     "laboratory", "classroom", "nursery", "studio", "canteen", "cafeteria", "restaurant", "shop", "room", "area",
     "zone",
 })  # fmt: skip
