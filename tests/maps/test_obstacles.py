@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -162,3 +164,58 @@ def test_a_grid_too_large_for_memory_is_refused():
 def test_a_body_that_is_none_is_refused():
     with pytest.raises(MapError, match="the radius must not be negative, and the step between 0 and the height"):
         Body(step_m=2.0)
+
+
+def walk(*places, step_m=0.4, high_m=1.3):
+    """Return where a camera was that was carried straight from place to place."""
+    legs = pairwise(places)
+    xy = np.concatenate(
+        [np.linspace(a, b, int(np.ceil(np.hypot(*np.subtract(b, a)) / step_m)) + 1) for a, b in legs]
+    )  # fmt: skip
+    return np.column_stack([xy, np.full(len(xy), high_m)])
+
+
+def test_where_the_camera_was_carried_is_free_though_the_floor_was_never_seen():
+    tilted = poses.from_quaternion(np.zeros(3), np.array([0.2, -0.3, 0.1, 0.9]))
+    went = walk((-1.0, 1.5), (3.0, 1.5), high_m=1.3)
+    went = went[(went[:, 0] < 0.4) | (went[:, 0] > 0.6)]
+    hole = room()[~((room()[:, 1] > 1.2) & (room()[:, 1] < 1.8) & (room()[:, 2] < 0.1))]
+    for turned in (np.eye(4), tilted):
+        voxels, up = voxels_of(poses.apply(turned, hole)), turned[:3, 2]
+        before, after = (
+            find_obstacles(voxels, GRID, up, walked=places) for places in (None, poses.apply(turned, went))
+        )
+        for place in ((-0.95, 1.5), (0.2, 1.5), (0.2, 1.65), (2.6, 1.5), (2.8, 1.4)):
+            point = turned[:3, :3] @ [*place, 0.0]
+            assert (before.state_at(point), after.state_at(point)) == (UNKNOWN, FREE)
+        for place in ((1.5, 1.5), (4.02, 1.5), (0.2, 2.8), (-0.5, 1.9)):  # the table, the wall, and what is off the way
+            point = turned[:3, :3] @ [*place, 0.0]
+            assert after.state_at(point) == before.state_at(point) != FREE
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_walk_only_ever_makes_unknown_cells_free(seed):
+    rng = np.random.default_rng(seed)
+    went = np.column_stack([rng.uniform((-2, -2), (6, 5), (20, 2)), rng.uniform(-1.0, 4.0, 20)])
+    before, after = (find_obstacles(voxels_of(room()), GRID, UP, walked=walked) for walked in (None, went))
+    shift = np.round((before.origin_m - after.origin_m) / GRID.voxel_size_m).astype(int)
+    part = after.states[shift[0] :, shift[1] :][: before.states.shape[0], : before.states.shape[1]]
+    changed = part != before.states
+    assert np.all(before.states[changed] == UNKNOWN)
+    assert np.all(part[changed] == FREE)
+    carried = went[(went[:, 2] > 0.2) & (went[:, 2] < 2.2)]
+    assert np.all(after.state_at(carried) != UNKNOWN)
+
+
+@pytest.mark.parametrize("high_m, state", [(1.3, FREE), (4.1, UNKNOWN), (-1.3, UNKNOWN)])
+def test_only_a_walk_on_this_storey_counts(high_m, state):
+    places = walk((0.1, 2.8), (0.4, 2.8), high_m=high_m)
+    assert find_obstacles(voxels_of(room()), GRID, UP, walked=places).state_at(np.array([0.2, 2.8, 0.0])) == state
+
+
+def test_between_two_places_far_apart_nobody_knows_the_way_and_a_wrong_pose_is_left_out():
+    places = np.array([[-1.5, 1.0, 1.2], [-0.3, 1.0, 1.2], [900.0, 1.0, 1.2], [np.nan, 0.0, 1.2]])
+    obstacles = find_obstacles(voxels_of(room()), GRID, UP, walked=places)
+    assert [obstacles.state_at(np.array([x, 1.0, 0.0])) for x in (-1.5, -0.9, -0.3)] == [FREE, UNKNOWN, FREE]
+    assert obstacles.states.shape[0] < 200

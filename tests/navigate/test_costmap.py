@@ -1,6 +1,7 @@
 """What a metre costs: unknown is not free, room is never overstated, and words decide what is in the way."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -136,7 +137,8 @@ class _WordMap:
             index.astype(np.int32), np.zeros((n, 0), np.float16), zero.astype(np.float32), np.zeros((n, 3), np.uint8),
             zero, np.full(n, 9, np.int64),
         )  # fmt: skip
-        self.stored = type("Stored", (), {"voxels": voxels, "grid": grid, "up_in_world": np.array([0.0, 0.0, 1.0])})()
+        keyframes = SimpleNamespace(world_from_camera=np.zeros((0, 4, 4)))
+        self.stored = SimpleNamespace(voxels=voxels, grid=grid, up_in_world=np.eye(3)[2], keyframes=keyframes)
 
 
 @pytest.fixture
@@ -188,3 +190,12 @@ def test_what_stands_at_the_height_of_eyes_is_kept(furnished):
     obstacles = obstacles_for(furnished, BASE)
     tall = {name: bool(obstacles.tall[tuple(obstacles.cell_of(np.array([*xy, 0.0])))]) for name, xy in PLACES.items()}
     assert tall == {"table": False, "chair": True, "lamp": True, "floor": False}
+
+
+def test_where_the_map_was_walked_the_body_may_go(furnished):
+    off = np.array([[4.0 + 0.3 * k, 1.5, 1.2] for k in range(8)])
+    assert not costmap_of(obstacles_for(furnished), BASE.radius_m).is_passable(off[4:, :2]).any()
+    poses = np.tile(np.eye(4), (len(off), 1, 1))
+    poses[:, :3, 3] = off
+    furnished.stored.keyframes.world_from_camera = poses
+    assert costmap_of(obstacles_for(furnished), BASE.radius_m).is_passable(off[:, :2]).all()

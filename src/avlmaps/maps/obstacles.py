@@ -17,6 +17,11 @@ from avlmaps.maps.types import Voxels
 
 STRONG_PEAK = 0.3  # of what the most crowded height has over the median: the lowest one with so much is the floor
 MOST_CELLS = 100_000_000
+_FAR_CELLS = 2.0**40  # farther off no grid reaches
+_CARRIED_M = (0.1, 2.3)  # heights over the floor at which a camera is carried by who walks on it
+_WALKER_M = 0.25  # radius of who carries it; a larger body is promised no more
+_STRIDE_M = 0.5  # between two places no farther apart it went straight
+_BEYOND_M = 3.0  # a walk farther beyond what was seen is a wrong pose
 SIGHT_M = (1.2, 1.7)  # heights over the floor of a robot's and of a person's eyes: what stands there blocks the view
 
 
@@ -80,7 +85,8 @@ class Obstacles:
     def cell_of(self, points_world: Float[np.ndarray, "*n 3"]) -> Int[np.ndarray, "*n 2"]:
         """Return the cell above or below which each point of the world lies; it may be outside of the grid."""
         level_xy = points_world @ self.level_from_world[:2].T
-        return np.floor((level_xy - self.origin_m) / self.cell_size_m).astype(np.int64)
+        cell = np.floor((level_xy - self.origin_m) / self.cell_size_m)
+        return np.where(np.abs(cell) < _FAR_CELLS, cell, -1.0).astype(np.int64)  # NaN is off the grid as well
 
     def centre_of(self, cells: Int[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 3"]:
         """Return the point of the world on the floor in the middle of each cell."""
@@ -92,8 +98,9 @@ class Obstacles:
         """Return the state at each point of the world; unknown outside of the grid."""
         cells = self.cell_of(points_world)
         inside = np.all((cells >= 0) & (cells < self.states.shape), axis=-1)
-        i, j = np.moveaxis(np.where(inside[..., None], cells, 0), -1, 0)
-        return np.where(inside, self.states[i, j], CellState.UNKNOWN).astype(np.uint8)
+        states = np.full(inside.shape, CellState.UNKNOWN, np.uint8)
+        states[inside] = self.states[tuple(cells[inside].T)]
+        return states
 
     def standable(self, radius_m: float) -> Bool[np.ndarray, "nx ny"]:
         """Return the free cells on whose middle a body fits: nothing occupied within its radius.
@@ -117,12 +124,14 @@ def find_obstacles(
     body: Body | None = None,
     cell_size_m: float | None = None,
     ignored: Bool[np.ndarray, " n"] | None = None,
+    walked: Float[np.ndarray, "k 3"] | None = None,
 ) -> Obstacles:
     """Draw the grid of a map.
 
     A cell is occupied where a voxel stands between the body's step and its height over the floor, free where the
     floor was seen and nothing stands, and unknown elsewhere. For a body that flies, what it flies over is as good as
-    a floor, and only what reaches into its height stands in the way.
+    a floor, and only what reaches into its height stands in the way. Where the camera was carried the floor is free as
+    well, though it never looked down there, unless something was seen to stand there.
 
     Args:
         voxels: the map's.
@@ -131,6 +140,7 @@ def find_obstacles(
         body: of the robot that is to move there.
         cell_size_m: edge of a cell; that of a voxel by default, and not smaller (the floor would have holes).
         ignored: voxels of what this body passes through or over; where only such stand, a cell is free.
+        walked: where the camera was, world, in the order of time; only places of this storey count.
 
     Raises:
         MapError: the map has no voxel with enough hits, or would need too large a grid.
@@ -152,10 +162,14 @@ def find_obstacles(
     level = grid.centre_of(index) @ level_from_world.T
     floor_m = floor_height(level[:, 2], grid.voxel_size_m)
     cell = _cells(level, level_from_world, grid.voxel_size_m, cell_size_m)
-    low = cell.min(axis=(0, 1))
+    steps = _strides(walked, level_from_world, floor_m, cell_size_m, cell)
+    reach = min(body.radius_m, _WALKER_M) / cell_size_m
+    ends = np.concatenate([cell.reshape(-1, 2), np.floor(steps - reach), np.floor(steps + reach)]).astype(np.int64)
+    low, size = ends.min(axis=0), np.ptp(ends, axis=0) + 1
     height_m = level[:, 2] - floor_m
     passed = np.zeros(len(index), bool) if ignored is None else np.asarray(ignored, bool)[sure]
-    states = _states(cell - low, height_m, body, passed)
+    states = _states(cell - low, size, height_m, body, passed)
+    states[_under(steps - low, reach, states.shape) & (states == CellState.UNKNOWN)] = CellState.FREE
     tall = np.zeros(states.shape, bool)
     at_eyes = (height_m >= SIGHT_M[0]) & (height_m <= SIGHT_M[1])
     tall[tuple(np.moveaxis(cell[:, at_eyes] - low, -1, 0))] = True
@@ -170,11 +184,44 @@ def _cells(
     return np.floor((level[None, :, :2] + offsets[:, None, :2]) / cell_size_m).astype(np.int64)
 
 
+def _strides(
+    walked: Float[np.ndarray, "k 3"] | None,
+    level_from_world: Float[np.ndarray, "3 3"],
+    floor_m: float,
+    cell_size_m: float,
+    seen: Int[np.ndarray, "8 n 2"],
+) -> Float[np.ndarray, "m 2"]:
+    """Return places along a walk on a floor, closer to each other than a cell, in units of cells."""
+    if walked is None or not len(walked):
+        return np.zeros((0, 2))
+    level = np.asarray(walked, np.float64) @ level_from_world.T
+    at, height_m = level[:, :2] / cell_size_m, level[:, 2] - floor_m
+    beyond = _BEYOND_M / cell_size_m
+    near = (at >= seen.min(axis=(0, 1)) - beyond) & (at <= seen.max(axis=(0, 1)) + beyond)
+    ours = near.all(axis=1) & (height_m >= _CARRIED_M[0]) & (height_m <= _CARRIED_M[1])  # NaN is none of them
+    both = ours[:-1] & ours[1:] & (np.linalg.norm(at[1:] - at[:-1], axis=1) <= _STRIDE_M / cell_size_m)
+    part = np.linspace(0.0, 1.0, int(np.ceil(_STRIDE_M / cell_size_m)) + 1)[:, None, None]
+    between = (1.0 - part) * at[:-1][both] + part * at[1:][both]
+    return np.concatenate([at[ours], between.reshape(-1, 2)])
+
+
+def _under(steps: Float[np.ndarray, "m 2"], reach: float, shape: tuple[int, ...]) -> Bool[np.ndarray, "nx ny"]:
+    """Return the cells whose middle is under a walker, to half a cell; all in units of cells."""
+    from scipy.ndimage import distance_transform_edt
+
+    away = np.ones(shape, np.bool_)
+    away[tuple(np.floor(steps).astype(np.int64).T)] = False
+    return np.zeros(shape, np.bool_) if not len(steps) else np.asarray(distance_transform_edt(away)) <= reach
+
+
 def _states(
-    cell: Int[np.ndarray, "8 n 2"], height_m: Float[np.ndarray, " n"], body: Body, ignored: Bool[np.ndarray, " n"]
+    cell: Int[np.ndarray, "8 n 2"],
+    size: Int[np.ndarray, "2"],
+    height_m: Float[np.ndarray, " n"],
+    body: Body,
+    ignored: Bool[np.ndarray, " n"],
 ) -> UInt8[np.ndarray, "nx ny"]:
     """Return the grid's states from the cells and the height over the floor of each voxel."""
-    size = cell.max(axis=(0, 1)) + 1
     if size.prod() > MOST_CELLS:
         raise MapError(
             f"A grid of {size[0]} x {size[1]} cells is too large; ask for larger cells, or fuse with a smaller depth."

@@ -17,6 +17,7 @@ from avlmaps.navigate.bodies import BASE, BodyShape
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
 
+_FAR_CELLS = 2.0**40  # farther off no grid reaches
 _HALF_DIAGONAL = np.sqrt(0.5)  # of a cell: what stands in one may stand in its nearest corner
 
 
@@ -54,6 +55,7 @@ class Costmap:
         occupied: the obstacles themselves.
         opaque: what blocks the view over the floor.
         free: where the floor was seen and nothing stands.
+        known: where it is known what is there, small holes counted in, and so far from what is not as is asked for.
     """
 
     origin_m: Float64[np.ndarray, "2"]
@@ -65,6 +67,7 @@ class Costmap:
     occupied: Bool[np.ndarray, "nx ny"]
     opaque: Bool[np.ndarray, "nx ny"]
     free: Bool[np.ndarray, "nx ny"]
+    known: Bool[np.ndarray, "nx ny"]
 
     def in_cells(self, xy: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
         """Return places in units of cells, from the corner of cell (0, 0)."""
@@ -72,7 +75,8 @@ class Costmap:
 
     def cell_of(self, xy: Float[np.ndarray, "*n 2"]) -> Int[np.ndarray, "*n 2"]:
         """Return the cell of each place, which may lie off the grid."""
-        return np.floor(self.in_cells(xy)).astype(np.int64)
+        cell = np.floor(self.in_cells(xy))
+        return np.where(np.abs(cell) < _FAR_CELLS, cell, -1.0).astype(np.int64)  # NaN is off the grid as well
 
     def middle_of(self, cell: Int[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
         """Return the level x and y of the middle of each cell."""
@@ -85,9 +89,37 @@ class Costmap:
 
     def is_passable(self, xy: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
         """Tell at which places the body's middle may be; nowhere off the grid."""
+        return self._at(self.passable, xy)
+
+    def is_known(self, xy: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
+        """Tell at which places it is known what is there; nowhere off the grid."""
+        return self._at(self.known, xy)
+
+    def known_ahead_m(
+        self, xy: Float[np.ndarray, "2"], heading_rad: float, distance_m: float, escape_m: float
+    ) -> float:
+        """Return how far straight ahead it is known what is there.
+
+        Args:
+            xy: level x and y.
+            heading_rad: which way is ahead.
+            distance_m: no farther than this is asked for.
+            escape_m: from where it is not known, so far leads out, if anything known comes then.
+        """
+        reach_m = float(np.hypot(*self.passable.shape)) * self.cell_size_m + escape_m  # no farther is anything known
+        at_m = np.linspace(0.0, min(distance_m, reach_m), int(5 * min(distance_m, reach_m) / self.cell_size_m) + 2)
+        known = self.is_known(xy + at_m[:, None] * [np.cos(heading_rad), np.sin(heading_rad)])
+        out = int(np.argmax(known))
+        if not known[out] or at_m[out] > escape_m:
+            return 0.0
+        unknown = np.flatnonzero(~known[out:])
+        return float(at_m[out + unknown[0] - 1]) if len(unknown) else float(at_m[-1])
+
+    def _at(self, mask: Bool[np.ndarray, "nx ny"], xy: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
         inside = self.holds(xy)
-        i, j = np.moveaxis(np.where(inside[..., None], self.cell_of(xy), 0), -1, 0)
-        return np.asarray(inside & self.passable[i, j])
+        held = np.zeros(inside.shape, np.bool_)
+        held[inside] = mask[tuple(self.cell_of(xy)[inside].T)]
+        return held
 
 
 def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE) -> Obstacles:
@@ -112,7 +144,8 @@ def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE) -> Obstacles:
             counting |= _voxels_called(avlmap, word)
         ignored |= ~counting
     body = Body(shape.radius_m, shape.height_m, shape.step_m, flies_m=shape.flies_m)
-    return find_obstacles(stored.voxels, stored.grid, stored.up_in_world, body, ignored=ignored)
+    walked = np.asarray(stored.keyframes.world_from_camera)[:, :3, 3]
+    return find_obstacles(stored.voxels, stored.grid, stored.up_in_world, body, ignored=ignored, walked=walked)
 
 
 def _voxels_called(avlmap: "AVLMap", word: str) -> Bool[np.ndarray, " n"]:
@@ -145,14 +178,17 @@ def costmap_of(
     cell_m = obstacles.cell_size_m
     room_m = np.maximum(_distance(occupied) - np.float32(_HALF_DIAGONAL), 0.0) * np.float32(cell_m)
     holes = _small_holes(free | occupied, settings.hole_m / cell_m) & ~free & ~occupied
-    passable = (free | holes) & (room_m >= radius_m)
+    known = free | holes | occupied
     if settings.unknown_room_m > 0.0:
-        known = np.pad(free | holes | occupied, 1)
-        passable &= _distance(~known)[1:-1, 1:-1] * np.float32(cell_m) > settings.unknown_room_m
+        known &= _distance(~np.pad(known, 1))[1:-1, 1:-1] * np.float32(cell_m) > settings.unknown_room_m
+    passable = (free | holes) & known & (room_m >= radius_m)
     lacking = np.clip(1.0 - (room_m - np.float32(radius_m)) / np.float32(settings.soft_m), 0.0, 1.0)
     cost = 1.0 + np.float32(settings.near_cost) * lacking * lacking
     cost[holes] += np.float32(settings.hole_cost)
     tall = obstacles.tall
+    opaque = occupied if tall is None else tall & (obstacles.states != CellState.FREE)
+    if met is not None:  # nobody knows how high it is
+        opaque = opaque | met
     return Costmap(
         np.asarray(obstacles.origin_m, np.float64),
         cell_m,
@@ -161,8 +197,9 @@ def costmap_of(
         cost.astype(np.float32),
         room_m,
         occupied,
-        occupied if tall is None else tall & (obstacles.states != CellState.FREE),
+        opaque,
         free,
+        known,
     )
 
 
