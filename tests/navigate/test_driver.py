@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core import poses
-from avlmaps.core.motion import TURN_RAD, Action, GroundPose, wrapped
-from avlmaps.maps.obstacles import CellState
+from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, wrapped
+from avlmaps.maps.obstacles import CellState, Obstacles
+from avlmaps.navigate.bodies import BodyShape
 from avlmaps.navigate.controller import bearing
 from avlmaps.navigate.driver import Driver, DriveSettings, MapDriver
 from avlmaps.sim.body import Building, MotionNoise, SimulatedBody
@@ -232,3 +233,142 @@ def _somewhere(obstacles, building, rng):
     largest = np.argmax(np.bincount(part[part > 0]))
     cells = planner.costmap.middle_of(np.argwhere(part == largest))
     return cells[rng.integers(len(cells))]
+
+
+def of_plan(states, cell_m=0.05):
+    return Obstacles(np.eye(3), np.zeros(2), cell_m, 0.0, np.asarray(states, np.uint8))
+
+
+class Free:
+    """A body in the open that may be wrong in many ways."""
+
+    def __init__(self, pose, ahead=1.0, turns=1.0, contact=False, noise_rad=0.0):
+        self.pose, self.ahead, self.turns, self.contact = pose, ahead, turns, contact
+        self.noise_rad, self.rng, self.time_s = noise_rad, np.random.default_rng(0), 0.0
+
+    def act(self, action):
+        sign = {Action.LEFT: 1, Action.RIGHT: -1}.get(action, 0)
+        return self._moved(FORWARD_M * (action is Action.FORWARD), sign * TURN_RAD)
+
+    def drive(self, speed_m_s, turn_rad_s, duration_s):
+        self.time_s += duration_s
+        return self._moved(speed_m_s * duration_s, turn_rad_s * duration_s)
+
+    def _moved(self, ahead_m, turn_rad):
+        turn_rad = self.turns * turn_rad + (self.noise_rad * self.rng.normal() if turn_rad else 0.0)
+        self.pose = self.pose.turned(turn_rad).ahead(self.ahead * ahead_m)
+        return Moved(self.pose, self.contact)
+
+
+FLOOR = of_plan(np.full((200, 100), CellState.FREE))
+
+
+@MODES
+@pytest.mark.parametrize("told_m, heading_rad, gone_m", [(4.0, 0.0, 2.0), (20.0, pi, 1.0), (1e5, pi / 2, 4.0)])
+def test_forward_stops_where_the_known_floor_ends(drive, told_m, heading_rad, gone_m):
+    states = np.full((120, 100), CellState.UNKNOWN)
+    states[:60] = CellState.FREE
+    states[30:34, 18:22] = CellState.UNKNOWN  # a small hole is no end
+    body = Free(GroundPose(1.0, 1.0, heading_rad))
+    arrival = MapDriver(of_plan(states), body, settings=drive).forward(told_m)
+    assert not arrival.reached
+    assert arrival.note.startswith("what lies ahead is not known after ")
+    gone = hypot(arrival.pose.x_m - 1.0, arrival.pose.y_m - 1.0)
+    assert gone_m - 0.15 <= gone <= gone_m + 0.01
+
+
+@MODES
+def test_from_unknown_ground_forward_leads_a_short_way_out_and_no_farther(drive):
+    states = np.full((200, 40), CellState.FREE)
+    states[:80] = CellState.UNKNOWN
+    out = MapDriver(of_plan(states), Free(GroundPose(3.5, 1.0)), settings=drive).forward(1.5)
+    assert out.reached
+    assert out.pose.x_m == pytest.approx(5.0, abs=0.1)
+    lost = MapDriver(of_plan(states), Free(GroundPose(1.0, 1.0)), settings=drive).forward(1.5)
+    assert not lost.reached
+    assert lost.pose == GroundPose(1.0, 1.0)
+
+
+@MODES
+@pytest.mark.parametrize("wrong", [{"turns": 0.0}, {"turns": -1.0}, {"turns": 0.1}, {"turns": 0.0, "contact": True}])
+def test_a_turn_that_does_not_come_about_is_not_reached(drive, wrong):
+    body = Free(GroundPose(2.0, 2.0), **wrong)
+    arrival = MapDriver(FLOOR, body, settings=drive).turn(1.0)
+    assert not arrival.reached
+    assert arrival.note.startswith("the turn ended ")
+    assert len(arrival.actions) <= 60
+    assert body.time_s <= 15.0
+    assert bool(arrival.contacts) == body.contact
+
+
+@MODES
+def test_a_turn_is_put_right_where_the_body_turns_inexactly(drive):
+    for seed in range(5):
+        body = Free(GroundPose(2.0, 2.0), turns=1.1, noise_rad=0.02)
+        body.rng = np.random.default_rng(seed)
+        arrival = MapDriver(FLOOR, body, settings=drive).turn(2.0)
+        assert arrival.reached
+        assert abs(arrival.pose.heading_rad - 2.0) <= TURN_RAD / 2 + 0.011
+
+
+def test_a_contact_in_a_turn_tells_of_nothing_ahead():
+    driver = MapDriver(FLOOR, Free(GroundPose(2.0, 2.0), contact=True))
+    assert driver.turn(1.0).contacts == 11
+    assert not driver.met.cells.any()
+
+
+@MODES
+@pytest.mark.parametrize("wrong", [{"ahead": -1.0}, {"turns": -1.0}])
+def test_a_body_that_moves_otherwise_than_told_is_stopped_soon(drive, wrong):
+    driver = MapDriver(FLOOR, Free(GroundPose(5.0, 2.5, 1.0), **wrong), settings=drive)
+    arrival = driver.go_to(place(9.0, 2.5))
+    assert not arrival.reached
+    assert "the body moves otherwise than it is told; check the frame of its pose" in arrival.note
+    assert hypot(arrival.pose.x_m - 5.0, arrival.pose.y_m - 2.5) < 2.5
+
+
+def test_a_body_that_stands_dead_is_given_up_in_seconds():
+    body = Free(GroundPose(2.0, 2.0, 2.0), ahead=0.0, turns=0.0)
+    arrival = MapDriver(FLOOR, body, settings=VELOCITY).go_to(place(8.0, 2.5))
+    assert not arrival.reached
+    assert "does not move though it is told to" in arrival.note
+    assert body.time_s < 30.0
+
+
+def test_what_is_too_small_for_an_action_is_told():
+    driver = driver_in(BUILDING)
+    for arrival in (driver.forward(0.04), driver.turn(np.radians(2.0))):
+        assert arrival.actions == ()
+        assert "at a time, so that it did not" in arrival.note
+    assert not driver.turn(0.001).note
+
+
+@MODES
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e300])
+def test_numbers_that_are_none_are_answered(drive, number):
+    driver = driver_in(BUILDING, drive)
+    assert not driver.turn(number).reached
+    assert not driver.forward(number).reached
+    assert not driver.go_to(place(number, 1.0)).reached
+    assert driver.pose == START
+    assert driver.go_to(place(1.0, 0.5), face=place(number, 0.0)).pose.x_m == pytest.approx(1.0, abs=0.15)
+
+
+@MODES
+def test_before_a_wall_that_nobody_knew_it_is_not_where_it_was_told(drive):
+    other = Building(hall(6.0, 4.0, [(3.5, 0.0, 0.0, 3.6, 4.0, 2.0)]))
+    driver = driver_in(other, drive, start=GroundPose(1.0, 1.0), obstacles=seen(hall(6.0, 4.0)))
+    arrival = driver.go_to(place(4.6, 1.0))
+    assert arrival.contacts > 0
+    assert arrival.pose.x_m < 3.5
+    assert not arrival.reached
+    assert arrival.note
+
+
+def test_just_beside_a_place_with_no_way_in_it_says_why():
+    states = np.full((100, 60), CellState.FREE)
+    states[60:70, 25:35] = CellState.OCCUPIED
+    states[61:69, 26:34] = CellState.FREE  # too narrow a pit for the body
+    driver = MapDriver(of_plan(states), Free(GroundPose(1.0, 1.5)), BodyShape(radius_m=0.1))
+    arrival = driver.go_to(place(3.25, 1.5))
+    assert "no way leads" in arrival.note

@@ -250,3 +250,42 @@ def test_a_closed_room_has_no_way_in():
     stop = planner.stop_for(inside, np.array([3.4, 1.0]))
     assert stop is not None
     assert not stop.seen
+
+
+@pytest.mark.parametrize("around", [(0,), (2, 1)])
+def test_a_coarse_way_that_leads_past_a_corner_never_hides_the_way(monkeypatch, around):
+    from avlmaps.navigate import planner as module
+
+    monkeypatch.setattr(module, "_AROUND", around)
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        states = rng.choice([CellState.FREE, CellState.OCCUPIED], rng.integers(10, 41, 2), p=[0.7, 0.3])
+        planner = Planner(costmap_of(of_states(states), 0.01), COARSE)
+        start, goal = two_places(planner, seed)
+        way = planner.way(start, goal)
+        parts = label(planner.costmap.passable)[0]
+        ends = (parts[tuple(planner.costmap.cell_of(place))] for place in (start, goal))
+        assert (way is not None) == (len(set(ends)) == 1)
+        if way is not None:
+            assert costs_along(planner.costmap, way.points) < np.inf
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("shape", [(0, 0), (0, 7), (7, 0)])
+def test_on_a_floor_without_cells_there_is_nowhere_to_go(shape):
+    obstacles = of_states(np.zeros(shape))
+    planner = Planner(costmap_of(obstacles, 0.2))
+    here, there = np.array([0.1, 0.1]), np.array([1.0, 1.0])
+    assert planner.way(here, there) is None
+    assert planner.stop_for(here, there) is None
+    assert obstacles.state_at(np.zeros((2, 3))).tolist() == [CellState.UNKNOWN] * 2
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e300])
+def test_what_is_no_place_is_answered_without_a_warning(number):
+    planner = Planner(costmap_of(of_states(np.full((30, 30), CellState.FREE)), 0.1))
+    here, nowhere = np.array([0.5, 0.5]), np.array([number, 0.5])
+    for ends in ((here, nowhere), (nowhere, here), (nowhere, nowhere)):
+        assert planner.way(*ends) is None
+        assert planner.stop_for(*ends) is None

@@ -15,6 +15,8 @@ Safe = Callable[[GroundPose, GroundPose], bool]
 
 # Nearer than this no further step forward brings it, even with a heading that is half a turn of 5 degrees off.
 CLOSE_M = 0.5 * FORWARD_M / cos(0.5 * TURN_RAD) + 1e-6
+_ASTRAY_M = 1.1  # nothing but a body that moves otherwise than told gets so far off its way
+_FARTHER_M, _MOST_IN_VAIN = 0.01, 150  # as does one that comes no farther in so many movements
 _LOOKAHEADS_M = (0.4, 0.25, 0.15)
 _SHORTER = (1.0, 0.6, 0.35, 0.15)  # parts of a lookahead
 _TURNS = round(pi / TURN_RAD)
@@ -63,6 +65,31 @@ class Route:
         """Return the straight distance from a pose to its end."""
         x, y = self.end
         return hypot(pose.x_m - x, pose.y_m - y)
+
+
+class Watch:
+    """Sees when a body does not do what it is told, however long it is told to."""
+
+    def __init__(self, route: Route) -> None:
+        """Watch a body that follows a route."""
+        self._route = route
+        self._farthest_m = -1.0
+        self._in_vain = 0
+
+    def fault(self, pose: GroundPose) -> str:
+        """Return what is wrong after another movement, ``""`` while nothing is."""
+        x_m, y_m = self._route.at(self._route.along_m)
+        self._in_vain += 1
+        if self._route.along_m > self._farthest_m + _FARTHER_M:
+            self._farthest_m, self._in_vain = self._route.along_m, 0
+        if hypot(pose.x_m - x_m, pose.y_m - y_m) <= _ASTRAY_M and self._in_vain <= _MOST_IN_VAIN:
+            return ""
+        return "the body moves otherwise than it is told; check the frame of its pose"
+
+
+def still(before: GroundPose, now: GroundPose) -> bool:
+    """Tell whether a body neither moved nor turned."""
+    return before.distance_m(now) <= 1e-4 and abs(wrapped(now.heading_rad - before.heading_rad)) <= 1e-3
 
 
 def _farthest(

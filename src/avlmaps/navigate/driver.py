@@ -8,17 +8,30 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.motion import FORWARD_M, Action, GroundPose, Moved, wrapped
+from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, wrapped
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate import grid_kernels
 from avlmaps.navigate.bodies import BASE, Body, BodyShape
-from avlmaps.navigate.controller import ActionController, VelocityController, VelocitySettings, bearing, turns_for
+from avlmaps.navigate.controller import (
+    ActionController,
+    VelocityController,
+    VelocitySettings,
+    Watch,
+    bearing,
+    still,
+    turns_for,
+)
 from avlmaps.navigate.costmap import CostSettings, costmap_of
 from avlmaps.navigate.met import Met
 from avlmaps.navigate.planner import Planner, PlanSettings, Stop
 
 _SAMPLE_M = 0.02  # places along a straight move that are looked at
 _STILL_M = 0.005  # a step that brings the body no farther was stopped
+_OPEN_M = 0.5  # beside a place in which it could stand, but to which no way leads, it stops no farther off
+_TURNED_RAD = 0.5 * TURN_RAD + 0.01  # a turn that is off by no more is done
+_EXTRA_TURNS = 36  # actions that a turn may take beyond what it was told
+_PATIENCE_S = 5.0  # so long a body may stand still though it is told to move
+_MOST_M, _MOST_RAD = 1e6, 1e3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,6 +118,7 @@ class _Trip:
     actions: list[Action] = field(default_factory=list)
     contacts: int = 0
     movements: int = 0
+    fault: str = ""  # what is wrong with the body, so that there is no use in going on
 
 
 class MapDriver:
@@ -158,33 +172,46 @@ class MapDriver:
             if self._follow(way.points, trip):
                 note = ""
                 break
-            if trip.movements >= self.settings.most_movements:
-                note = f"it gave up after {trip.movements} movements"
+            if trip.fault or trip.movements >= self.settings.most_movements:
+                note = trip.fault or f"it gave up after {trip.movements} movements"
                 break
-        if face is not None:
-            x_m, y_m = self._level(face)
-            self._turned(wrapped(bearing(self.pose, float(x_m), float(y_m)) - self.pose.heading_rad), trip)
+        if face is not None and np.isfinite(x_y := self._level(face)).all():
+            self._turned(wrapped(bearing(self.pose, *map(float, x_y)) - self.pose.heading_rad), trip)
         return self._at_stop(trip, stop, goal, note)
 
     def turn(self, angle_rad: float) -> Arrival:
         """Turn on the spot, to the left by a positive angle; by actions as nearly as 5 degrees allow."""
         trip = self._trip()
-        self._turned(angle_rad, trip)
-        return self._arrival(trip, True)
+        if not abs(angle_rad) <= _MOST_RAD:
+            return self._arrival(trip, False, f"{angle_rad} rad is no angle to turn by")
+        left_rad = self._turned(angle_rad, trip)
+        if abs(left_rad) > _TURNED_RAD:
+            return self._arrival(trip, False, f"the turn ended {np.rad2deg(abs(left_rad)):.0f}° off")
+        small = self.settings.mode == "actions" and not trip.actions and abs(angle_rad) > 0.01
+        return self._arrival(trip, True, "it turns by 5° at a time, so that it did not turn" if small else "")
 
     def forward(self, distance_m: float) -> Arrival:
         """Drive straight ahead, as far as nothing is in the way; for a negative distance it turns round first."""
         trip = self._trip()
-        if distance_m < 0.0:
-            self._turned(pi, trip)
+        if not abs(distance_m) <= _MOST_M:
+            return self._arrival(trip, False, f"{distance_m} m is no distance to drive")
+        if distance_m < 0.0 and abs(self._turned(pi, trip)) > _TURNED_RAD:
+            return self._arrival(trip, False, "it could not turn round")
         start, distance_m = self.pose, abs(distance_m)
         if self.settings.mode == "velocity":
-            end = start.ahead(distance_m)
-            arrived = distance_m == 0.0 or self._follow(np.array([self._xy, [end.x_m, end.y_m]]), trip)
+            known_m = self._known_m(distance_m)
+            end = start.ahead(known_m)
+            arrived = known_m == 0.0 or self._follow(np.array([self._xy, [end.x_m, end.y_m]]), trip)
+            arrived &= known_m >= distance_m
         else:
             arrived = self._stepped(round(distance_m / FORWARD_M), trip)
         gone_m = start.distance_m(self.pose)
-        return self._arrival(trip, arrived, "" if arrived else f"something is in the way after {gone_m:.2f} m")
+        if not arrived:
+            known = self._known_m(1.5 * FORWARD_M) >= 1.5 * FORWARD_M
+            why = trip.fault or ("something is in the way" if known else "what lies ahead is not known")
+            return self._arrival(trip, False, f"{why} after {gone_m:.2f} m")
+        small = self.settings.mode == "actions" and not trip.actions and distance_m > 0.01
+        return self._arrival(trip, True, "it drives 0.1 m at a time, so that it did not move" if small else "")
 
     def stop(self) -> Arrival:
         """Stand still."""
@@ -197,7 +224,8 @@ class MapDriver:
         return np.array([self.pose.x_m, self.pose.y_m])
 
     def _level(self, place: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"]:
-        return np.asarray(place, np.float64) @ self.obstacles.level_from_world[:2].T
+        with np.errstate(invalid="ignore"):  # what is no number lies off the map
+            return np.asarray(place, np.float64) @ self.obstacles.level_from_world[:2].T
 
     def _trip(self) -> _Trip:
         return _Trip([(self.pose.x_m, self.pose.y_m)])
@@ -218,8 +246,15 @@ class MapDriver:
             return self._arrival(
                 trip, False, f"no way leads to where the place can be seen; it stands {away_m:.2f} m away from it"
             )
-        beside = f"the robot cannot stand in the place itself; it stands {away_m:.2f} m beside it"
-        return self._arrival(trip, True, beside if stop.beside_m > 0.0 else "")
+        if not stop.beside_m:
+            return self._arrival(trip, True)
+        if not stop.open:
+            return self._arrival(
+                trip, True, f"the robot cannot stand in the place itself; it stands {away_m:.2f} m beside it"
+            )
+        return self._arrival(
+            trip, away_m <= _OPEN_M, f"no way leads to the place itself; it stands {away_m:.2f} m beside it"
+        )
 
     def _no_way(self, goal: Float[np.ndarray, "2"]) -> str:
         if not self.planner.costmap.holds(goal):
@@ -247,7 +282,11 @@ class MapDriver:
         if self.settings.mode == "velocity":
             return self._follow_smoothly(points, trip)
         controller = ActionController(points, self._safe)
+        watch = Watch(controller.route)
         while trip.movements < self.settings.most_movements:
+            trip.fault = watch.fault(self.pose)
+            if trip.fault:
+                return False
             action = controller.action(self.pose)
             if action is Action.STOP:
                 return True
@@ -260,7 +299,11 @@ class MapDriver:
     def _follow_smoothly(self, points: Float[np.ndarray, "n 2"], trip: _Trip) -> bool:
         settings = self.settings.velocities
         controller, idle = VelocityController(points, settings, self._safe), 0
-        while trip.movements < self.settings.most_movements and idle < 5 / settings.tick_s:
+        watch = Watch(controller.route)
+        while trip.movements < self.settings.most_movements and idle * settings.tick_s < _PATIENCE_S:
+            trip.fault = watch.fault(self.pose)
+            if trip.fault:
+                return False
             costmap = self.planner.costmap
             reach = (costmap.radius_m + settings.slow_room_m) / costmap.cell_size_m
             x, y = costmap.in_cells(self._xy)
@@ -276,29 +319,55 @@ class MapDriver:
             before = self.pose
             if not self._drive(*command, trip):
                 return False
-            idle = 0 if before.distance_m(self.pose) > 1e-4 or abs(command[1]) > 0.01 else idle + 1
+            idle = idle + 1 if still(before, self.pose) else 0
+            if idle * settings.tick_s >= _PATIENCE_S and max(command[0], abs(command[1])) > 0.01:
+                trip.fault = "the body does not move though it is told to"
         return controller.route.to_end_m(self.pose) <= self.settings.tolerance_m
 
     def _stepped(self, steps: int, trip: _Trip) -> bool:
-        for _ in range(steps):
+        for step in range(steps):
+            if self._known_m((steps - step) * FORWARD_M) < FORWARD_M:
+                return False
             if not self._safe(self.pose, self.pose.ahead(FORWARD_M)) or not self._take(Action.FORWARD, trip):
                 return False
         return True
 
-    def _turned(self, angle_rad: float, trip: _Trip) -> None:
-        if self.settings.mode == "actions":
-            for action in turns_for(angle_rad):
-                self._take(action, trip)
-            return
+    def _known_m(self, distance_m: float) -> float:
+        pose = self.pose
+        return self.planner.costmap.known_ahead_m(
+            self._xy, pose.heading_rad, distance_m, self.settings.planning.escape_m
+        )
+
+    def _turned(self, angle_rad: float, trip: _Trip) -> float:
+        """Turn, and return by how much it is still off."""
+        left_rad, heading_rad, idle = angle_rad, self.pose.heading_rad, 0
         controller = VelocityController(np.array([self._xy]), self.settings.velocities)
-        left_rad, heading_rad = angle_rad, self.pose.heading_rad
-        while trip.movements < self.settings.most_movements:
-            command = controller.turn(left_rad)
-            if command is None:
-                return
-            self._drive(*command, trip)
+        planned, most = turns_for(angle_rad), trip.movements + self._most_turns(angle_rad)
+        while trip.movements < most and idle * self.settings.velocities.tick_s <= _PATIENCE_S:
+            before = self.pose
+            if self.settings.mode == "actions":
+                # Those that were planned first, so that an exact body takes no other; then what is still off.
+                if not planned and abs(left_rad) > _TURNED_RAD:
+                    planned = turns_for(left_rad)[:1]
+                if not planned:
+                    break
+                self._take(planned.pop(), trip)
+            else:
+                command = controller.turn(left_rad)
+                if command is None:
+                    break
+                self._drive(*command, trip)
             left_rad -= wrapped(self.pose.heading_rad - heading_rad)
             heading_rad = self.pose.heading_rad
+            idle = idle + 1 if still(before, self.pose) else 0
+        return left_rad
+
+    def _most_turns(self, angle_rad: float) -> int:
+        """Return how many movements a turn may take, however the body turns."""
+        if self.settings.mode == "actions":
+            return len(turns_for(angle_rad)) + _EXTRA_TURNS
+        velocities = self.settings.velocities
+        return int((2.0 * abs(angle_rad) / velocities.turn_rad_s + _PATIENCE_S) / velocities.tick_s)
 
     def _take(self, action: Action, trip: _Trip) -> bool:
         """Take an action; return False where something stopped it."""
@@ -325,6 +394,7 @@ class MapDriver:
         if not stopped:
             return True
         trip.contacts += moved.contact
-        if self.met.touched(before, told, moved.pose):
+        # A turn has no direction in which it was stopped.
+        if meant_m and self.met.touched(before, told, moved.pose):
             self.__dict__.pop("planner", None)
         return False
