@@ -1,5 +1,6 @@
 """What every way from a command to a program has in common."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -35,12 +36,19 @@ class Translator(Protocol):
         """
         ...
 
-    def repair(self, command: str, program: str, error: str) -> Translation | None:
-        """Return another program for a command whose program failed, or None where there is no other.
+    def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:
+        """Return a program for what is left of a command whose program failed, or None where there is no other.
+
+        What was done stays done: the new program begins where the robot stands then.
 
         Args:
             command: what the person said.
             program: the program that failed.
             error: the sentence that says why.
+            done: the steps that were done before, over all programs of this command, one text each, such as
+                ``move_to(target="sofa")``.
+
+        Raises:
+            LanguageError: no usable answer came.
         """
         ...

@@ -1,6 +1,7 @@
 """The rules as a translator: from a command to a program, or to the sentence that says what was not understood."""
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 from avlmaps.core.errors import LanguageError
@@ -39,7 +40,7 @@ class RulesTranslator:
             raise LanguageError(f"The command is too deep to be understood; say it like: {_EXAMPLE}.") from None
         return Translation(program, tuple(dict.fromkeys([*names.notes, *notes])))
 
-    def repair(self, command: str, program: str, error: str) -> Translation | None:
+    def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:
         """Return None: the rules know no second way to say the same."""
         return None
 
