@@ -24,6 +24,7 @@ class KinematicDriver:
     pose: GroundPose
     level_from_world: np.ndarray = field(default_factory=lambda: np.eye(3))
     reaches: bool = True
+    turns: bool = True
     told: list[str] = field(default_factory=list)
 
     def go_to(self, place: np.ndarray, *, face: np.ndarray | None = None) -> Arrival:
@@ -41,8 +42,9 @@ class KinematicDriver:
     def turn(self, angle_rad: float) -> Arrival:
         self.told.append(f"turn {angle_rad:.6f}")
         start = self.pose
-        self.pose = start.turned(angle_rad)
-        return self._came(start, (Action.LEFT if angle_rad > 0 else Action.RIGHT,))
+        if self.turns:
+            self.pose = start.turned(angle_rad)
+        return self._came(start, (Action.LEFT if angle_rad > 0 else Action.RIGHT,), "" if self.turns else "it is stuck")
 
     def forward(self, distance_m: float) -> Arrival:
         self.told.append(f"forward {distance_m:.6f}")

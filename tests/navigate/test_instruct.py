@@ -11,6 +11,7 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.language.program import Budget
 from avlmaps.language.rules import RulesTranslator
 from avlmaps.language.translator import Translation
+from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.instruct import Outcome, instruct
 from avlmaps.navigate.trace_plot import draw_way, plot_way
 from avlmaps.query.avlmap import AVLMap
@@ -137,3 +138,23 @@ def test_the_way_is_drawn_with_start_goals_and_stops(tmp_path) -> None:
     lines = [line.get_xydata() for line in figure.axes[0].get_lines()]
     assert any(len(line) and np.allclose(np.asarray(line)[-1], outcome.subgoals[0].stop[:2]) for line in lines)
     assert plot_way(tmp_path / "way.png", asked.space, GroundPose(3.0, 2.0), outcome.moves).stat().st_size > 5000
+
+
+def test_a_program_that_moves_nothing_says_so() -> None:
+    outcome, lines = told("x", Scripted("x = 1"))
+    assert outcome.ok
+    assert "the program moved nothing" in outcome.notes
+    assert "note: the program moved nothing" in lines
+    assert "the program moved nothing" not in told("x", Scripted("robot.turn(90)"))[0].notes
+
+
+@pytest.mark.parametrize(("short_m", "told_of"), [(0.9, False), (1.3, True)])
+def test_a_stop_farther_than_the_paper_counts_is_noted_though_no_nearer_one_is(short_m: float, told_of: bool) -> None:
+    class Beside(KinematicDriver):
+        def go_to(self, place: np.ndarray, *, face: np.ndarray | None = None) -> Arrival:
+            return super().go_to(place + np.array([0.0, short_m, 0.0]), face=face)
+
+    outcome, _ = told("go to the table", Scripted('robot.move_to("table")'), Beside(GroundPose(3.0, 2.0)))
+    assert outcome.ok
+    assert outcome.subgoals[0].distance_m == pytest.approx(short_m)
+    assert any(f"{short_m:.2f} m from it" in note for note in outcome.notes) == told_of

@@ -71,6 +71,24 @@ def test_backward_turns_round_first_and_looks_where_it_goes() -> None:
     assert robot.moves[-1].goal == pytest.approx((-1.5, 0.0, 0.0))
 
 
+def test_backward_it_does_not_drive_on_where_it_could_not_turn_round() -> None:
+    robot = robot_among(GroundPose(0.0, 0.0, 0.0), RobotSettings(persist=True))
+    driver = driver_of(robot)
+    driver.turns = False
+    robot.move_forward(-1.5)
+    assert driver.told == [f"turn {pi:.6f}"]
+    assert not robot.moves[-1].reached
+    assert robot.moves[-1].goal == pytest.approx((-1.5, 0.0, 0.0))
+    assert robot.moves[-1].distance_m == pytest.approx(1.5)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    robot = robot_among(GroundPose(0.0, 0.0))
+    for number in (np.int64(2), np.float32(2.0), np.float64(2.0), 2):
+        robot.move_forward(number)  # pyright: ignore[reportArgumentType]
+        assert robot.moves[-1].distance_m == pytest.approx(0.0)
+
+
 def test_a_positive_turn_goes_to_the_right() -> None:
     robot = robot_among(GroundPose(0.0, 0.0, pi / 2))
     robot.turn(90)
@@ -216,6 +234,8 @@ def test_a_place_that_is_not_reached_stops_the_program_unless_it_is_to_go_on() -
         ("turn", (float("nan"),), "not nan"),
         ("turn_absolute", (True,), "turn_absolute takes a number"),
         ("move_forward", (1e9,), "at most 1000 metres"),
+        ("move_forward", (10**5000,), "at most 1000 metres, not a larger one"),
+        ("move_forward", (np.bool_(True),), "at most 1000 metres, not a bool"),
         ("move_north", ("a", -1.0), "takes a distance of 0 m or more, not -1; go to the other side"),
         ("get_max_pos_3d", ("a",), "takes a heatmap, such as get_major_map returns, not a str"),
     ],

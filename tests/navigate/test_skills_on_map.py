@@ -1,6 +1,8 @@
 """Which chair is meant, where it is and what it covers, asked of a map; which files a program may read."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -11,10 +13,12 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import GoalNotFoundError, ProgramError, QueryError
 from avlmaps.core.motion import GroundPose
 from avlmaps.language.vocabulary import Picture, Place
+from avlmaps.maps.grid import GridSpec
 from avlmaps.navigate.outline import Outline, middle_between
 from avlmaps.navigate.readable import Readable, named_files, offered_by
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.level import Space
 from helpers.kinematic import KinematicDriver
 from query.query_fakes import FakeViews, furnished_map, keyframes_at, sounds_of
 
@@ -69,7 +73,7 @@ def test_the_place_where_the_robot_stands_can_be_kept_and_come_back_to() -> None
     robot.move_to("chair")
     robot.move_to(home)
     assert robot.moves[-1].stop == pytest.approx((3.0, 2.0, 0.025))
-    assert robot.get_contour(home)[0].distance_m(home) == pytest.approx(0.0)
+    assert robot.get_contour(home) == [home]
 
 
 def test_between_two_of_a_kind_takes_two_and_never_one_twice() -> None:
@@ -92,6 +96,7 @@ def test_a_map_that_is_tilted_is_driven_on_its_level_ground() -> None:
     robot.move_to("table")
     assert (robot.driver.pose.x_m, robot.driver.pose.y_m) == pytest.approx(level[:2])
     assert robot.moves[-1].goal == pytest.approx((place.x, place.y, place.z))
+    assert robot.moves[-1].distance_m == pytest.approx(0.0, abs=1e-6)
     robot.move_north("table", 0.5)
     level_goal = asked.space.level(np.array(robot.moves[-1].goal))
     assert level_goal[1] > level[1] + 0.5
@@ -160,6 +165,9 @@ def test_a_program_reads_only_what_it_was_offered(tmp_path: Path) -> None:
         ("nothing.png", "is not there"),
         ("text.png", "cannot be read as an image"),
         (" ", "no name"),
+        ("a" * 300, r"a{100}\.\.\. is not there"),
+        ("a" * 5000, r"a{100}\.\.\. is not there|may not be read"),
+        ("../" + "a" * 5000, "may not be read"),
     ):
         with pytest.raises(QueryError, match=sentence):
             robot.load_image(name)
@@ -210,3 +218,16 @@ def test_between_a_thing_and_one_inside_its_u_is_never_inside_the_thing() -> Non
     middle = middle_between(u, thing)
     assert not u.contains(middle)
     assert not thing.contains(middle)
+
+
+def test_the_floor_is_sought_among_the_voxels_that_count() -> None:
+    robot = furnished_robot()
+    voxels = robot.asked.stored.voxels
+    speckle = np.array([[x, y, -30] for x in range(120) for y in range(80)], np.int32)
+    index = np.concatenate([voxels.index, speckle])
+    hits = np.concatenate([np.full(len(voxels), 9), np.ones(len(speckle), int)])
+    asked: Any = SimpleNamespace(
+        space=Space(GridSpec(0.05), index, np.array([0.0, 0.0, 1.0])),
+        stored=SimpleNamespace(voxels=SimpleNamespace(hits=hits)),
+    )
+    assert Robot(asked, KinematicDriver(GroundPose(0.0, 0.0))).floor_m == pytest.approx(robot.floor_m)

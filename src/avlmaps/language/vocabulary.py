@@ -6,7 +6,7 @@ Names are those of the paper and of VLMaps; angles in degrees and metres, since 
 """
 
 from dataclasses import dataclass
-from math import hypot, isfinite
+from math import isfinite
 from typing import Protocol, runtime_checkable
 
 
@@ -41,10 +41,6 @@ class Place:
 
     def __truediv__(self, divisor: float) -> "Place":
         return Place(self.x / divisor, self.y / divisor, self.z / divisor)
-
-    def distance_m(self, other: "Place") -> float:
-        """Return the distance over the ground to another place, the world's z being up."""
-        return hypot(self.x - other.x, self.y - other.y)
 
 
 @runtime_checkable

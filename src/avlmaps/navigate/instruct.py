@@ -5,7 +5,6 @@ The whole way in one function; a program is data all along, and nothing but the 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from inspect import signature
 from time import perf_counter
 from typing import Any
 
@@ -23,6 +22,7 @@ from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
 
 _MOST_PROGRAMS = 6
+_NEAR_M = 1.0  # within so much of it a goal counts as reached where the paper judges
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +154,7 @@ def instruct(
     robot = Robot(asked, driver, settings, readable or offered_by(command), lambda line: tell(f"  {line}"))
     run = _Run(command, translator, robot, budget, tell)
     run.through(translation)
+    run.judge()
     error, error_type = (None, None) if run.last is None else (run.last.error, run.last.error_type)
     return Outcome(
         command, tuple(run.programs), (*run.notes, *robot.seeker.notes), tuple(run.done), tuple(robot.moves), error,
@@ -205,14 +206,21 @@ class _Run:
 
     def repaired(self, program: str, trace: Trace) -> Translation | None:
         """Return the program that the translator writes instead; what was done is told to those who ask."""
-        repair: Any = self.translator.repair
         done = [one.step.text for one in self.done if one.step.error is None]
-        more = {"done": done} if "done" in signature(repair).parameters else {}
         try:
-            return repair(self.command, program, trace.error, **more)
+            return self.translator.repair(self.command, program, trace.error or "", done)
         except LanguageError as fault:
             self.note(f"no other program came: {fault}")
             return None
+
+    def judge(self) -> None:
+        """Note what a person might take for more than it is."""
+        if self.last is not None and self.last.error is None and not self.robot.moves:
+            self.note("the program moved nothing")
+        for move in self.robot.moves:
+            if move.reached and move.distance_m is not None and move.distance_m > _NEAR_M:
+                what = move.name or move.skill
+                self.note(f"{what}: the nearest place where the robot could stop is {move.distance_m:.2f} m from it")
 
     def note(self, note: str) -> None:
         self.notes.append(note)

@@ -22,6 +22,7 @@ class Move:
         name: of the thing that it went to; ``""`` for a turn or a place.
         goal: where it was to end, world, metres; None for a turn.
         stop: where it ended, world, on the floor.
+        distance_m: from the goal to where it ended, over the ground (the world need not be level); None for a turn.
         heading_rad: where it looks then, level frame, counter-clockwise from +x.
         reached: whether the driver reached what it was told to.
         actions: the discrete actions taken.
@@ -34,17 +35,13 @@ class Move:
     name: str
     goal: Triple | None
     stop: Triple
+    distance_m: float | None
     heading_rad: float
     reached: bool
     actions: tuple[Action, ...]
     path: Float[np.ndarray, "n 2"]
     note: str = ""
     contacts: int = 0
-
-    @property
-    def distance_m(self) -> float | None:
-        """Distance over the ground from the goal to where it ended, the world's z being up; None for a turn."""
-        return None if self.goal is None else float(np.hypot(*np.subtract(self.goal, self.stop)[:2]))
 
     def to_json(self) -> dict[str, Any]:
         """Return it as a subgoal or a step's result is printed."""
@@ -60,8 +57,8 @@ class Move:
         )
 
     def __str__(self) -> str:
-        x, y, _ = self.stop
-        where = f"stands at ({x:.2f}, {y:.2f}) m, heading {np.rad2deg(self.heading_rad):.0f}°"
+        x, y, z = self.stop
+        where = f"stands at ({x:.2f}, {y:.2f}, {z:.2f}) m, heading {np.rad2deg(self.heading_rad):.0f}°"
         away = "" if self.distance_m is None else f", {self.distance_m:.2f} m from the goal"
         return where + away + (f" ({self.note.rstrip('.')})" if self.note else "")
 

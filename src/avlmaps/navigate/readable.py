@@ -8,6 +8,7 @@ from pathlib import Path
 from avlmaps.core.errors import QueryError
 
 MOST_BYTES = 200_000_000
+_MOST_SHOWN = 100  # letters of a name in a sentence
 # A word of a command that is a file: quoted, or without spaces; pictures and sounds both end in a suffix.
 _QUOTED = re.compile(r"\"([^\"\n]+\.\w{2,5})\"|'([^'\n]+\.\w{2,5})'|“([^”\n]+\.\w{2,5})”")
 _PLAIN = re.compile(r"[^\s\"'“”,;()]+\.\w{2,5}(?!\w)")
@@ -41,14 +42,18 @@ class Readable:
         for root in self.roots or (Path(),):
             path = root / name
             inside = any(_is_within(path, other) for other in self.roots)
-            if (inside or offered) and path.is_file():
-                return _not_too_large(path, what)
+            if (inside or offered) and (size := _size_of(path)) is not None:
+                if size > MOST_BYTES:
+                    raise QueryError(
+                        f"The {what} {path} has {size:,} bytes, more than {MOST_BYTES:,}; give a smaller one."
+                    )
+                return path
         if offered or any(_is_within(root / name, other) for root in self.roots for other in self.roots):
-            raise QueryError(f"The {what} {name} is not there; check the name.")
+            raise QueryError(f"The {what} {_short(name)} is not there; check the name.")
         folders = ", ".join(str(root) for root in self.roots)
         raise QueryError(
-            f"The {what} {name} may not be read by a program: it lies outside of {folders or 'every folder'} and the "
-            "command does not name it; name it in the command, word for word."
+            f"The {what} {_short(name)} may not be read by a program: it lies outside of "
+            f"{folders or 'every folder'} and the command does not name it; name it in the command, word for word."
         )
 
 
@@ -72,12 +77,17 @@ def _is_within(path: Path, root: Path) -> bool:
     """Tell whether a path, with every link followed, lies in a folder."""
     try:
         return path.resolve().is_relative_to(root.resolve())
-    except OSError:  # a name too long, a loop of links
+    except (OSError, ValueError, RuntimeError):  # a name too long or that no file can have, a loop of links
         return False
 
 
-def _not_too_large(path: Path, what: str) -> Path:
-    size = path.stat().st_size
-    if size > MOST_BYTES:
-        raise QueryError(f"The {what} {path} has {size:,} bytes, more than {MOST_BYTES:,}; give a smaller one.")
-    return path
+def _size_of(path: Path) -> int | None:
+    """Return how many bytes a file has, None where there is none of that name."""
+    try:
+        return path.stat().st_size if path.is_file() else None
+    except (OSError, ValueError):  # a name that is too long, or that no file can have
+        return None
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= _MOST_SHOWN else f"{name[:_MOST_SHOWN]}..."

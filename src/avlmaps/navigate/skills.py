@@ -200,10 +200,11 @@ class Robot:
     def move_forward(self, distance_m: float) -> None:
         """Drive straight ahead; with a negative distance turn round first, so that the robot sees where it goes."""
         distance_m = number_of(distance_m, "move_forward", _MOST_M, "metres")
+        end = self.driver.pose.ahead(distance_m)
         arrivals = [self.driver.turn(pi)] if distance_m < 0.0 else []
-        ahead = self.driver.pose.ahead(abs(distance_m))
-        arrivals.append(self.driver.forward(abs(distance_m)))
-        self._done("move_forward", "", self._on_floor(np.array([ahead.x_m, ahead.y_m])), arrivals)
+        if all(arrival.reached for arrival in arrivals):  # half turned, it would drive somewhere else
+            arrivals.append(self.driver.forward(abs(distance_m)))
+        self._done("move_forward", "", self._on_floor(np.array([end.x_m, end.y_m])), arrivals)
 
     def with_object_on_left(self, target: Target) -> None:
         """Turn on the spot until the thing is straight to the left of the robot."""
@@ -226,10 +227,14 @@ class Robot:
     @cached_property
     def floor_m(self) -> float:
         """Level height of the map's floor."""
-        from avlmaps.maps.obstacles import floor_height
+        from avlmaps.maps.obstacles import Body, floor_height
 
         space = self.asked.space
-        return floor_height(space.level(space.centres)[:, 2], space.grid.voxel_size_m) if len(space) else 0.0
+        if not len(space):
+            return 0.0
+        height_m = space.level(space.centres)[:, 2]
+        sure = np.asarray(self.asked.stored.voxels.hits) >= Body().min_hits  # as where obstacles are sought
+        return floor_height(height_m[sure] if sure.any() else height_m, space.grid.voxel_size_m)
 
     @property
     def _here(self) -> Float[np.ndarray, "2"]:
@@ -280,11 +285,13 @@ class Robot:
         arrival = joined(arrivals)
         world = self.asked.space.world
         pose = arrival.pose
-        stop = _triple(world(self._on_floor(np.array([pose.x_m, pose.y_m]))))
+        here = np.array([pose.x_m, pose.y_m])
+        stop = _triple(world(self._on_floor(here)))
         target = None if goal is None else _triple(world(goal))
+        away_m = None if goal is None else float(np.hypot(*(goal[:2] - here)))
         move = Move(
-            skill, name, target, stop, pose.heading_rad, arrival.reached, arrival.actions, arrival.path, arrival.note,
-            arrival.contacts,
+            skill, name, target, stop, away_m, pose.heading_rad, arrival.reached, arrival.actions, arrival.path,
+            arrival.note, arrival.contacts,
         )  # fmt: skip
         self.moves.append(move)
         if not move.reached and not self.settings.persist:
