@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from avlmaps.navigate.driver import MapDriver
 
 _LEVEL_DEG = 2.0
-# Where the camera was, the scene must have room; a map of another building has it at half of the places at most.
-_LEAST_FREE, _CAMERA_M = 0.7, 0.05
+# Where the camera was, the scene must have room; a map of another home of the same size has it at up to four of five.
+_LEAST_FREE, _CAMERA_M = 0.95, 0.05
 _MARGIN_M = 0.05  # a start that is chosen has so much more room than the body needs
 _NEAR_M = 0.5
 
