@@ -9,7 +9,8 @@ from query_fakes import fake_map, fake_profile, furnished_map, keyframes_at, sou
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError, BackendError, QueryError
 from avlmaps.query import locate as locate_module
-from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.areas import AreaSettings
+from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.question import Modality, Part, Question, Role
 from avlmaps.recordings.audio import AudioTrack, Sound
 
@@ -165,9 +166,12 @@ def test_an_area_is_told_from_other_areas() -> None:
 
     places = np.array([[1.0, 1.0, 1.4], [5.0, 3.0, 1.4]])
     view = np.array([[1.0, 0.0], [0.0, 1.0]], np.float32)
-    m = AVLMap(furnished_map(keyframes=keyframes_at(places, view), views=FakeViews()))
+    stored = furnished_map(keyframes=keyframes_at(places, view), views=FakeViews())
+    m = AVLMap(stored)
     assert m.area("kitchen").found
-    assert m.area("kitchen", primary=True).goals()[0].position == pytest.approx((1.0, 1.0, 1.4))
+    assert m.area("kitchen", primary=True).goals()[0].position == pytest.approx(tuple(stored.keyframes.centre[0]))
+    from_camera = AVLMap(stored, QuerySettings(areas=AreaSettings(anchor="camera")))
+    assert from_camera.area("kitchen", primary=True).goals()[0].position == pytest.approx((1.0, 1.0, 1.4))
     nowhere = AVLMap(furnished_map(keyframes=keyframes_at(places[1:], view[1:]), views=FakeViews())).area("kitchen")
     assert not nowhere.found
     assert nowhere.factors[0].note.startswith("no view is like 'kitchen'; the best score is 0.0")
