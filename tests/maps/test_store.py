@@ -115,7 +115,7 @@ def test_a_map_comes_back_with_all_that_it_is_of(built: Path) -> None:
     assert stored.up_in_world.tolist() == [0.0, 0.0, 1.0]
     assert stored.profile.name == PROFILE and stored.grid.voxel_size_m == 0.05
     assert stored.info.models["place"].checksum and stored.info.models["place"].prompts == ("a {}",)
-    assert stored.info.settings == SETTINGS
+    assert stored.info.settings == SETTINGS.for_profile(0.6)
     for kind in (Kind.PIXELS, Kind.SOUNDS, Kind.LOCAL, Kind.PLACE):
         stored.require_model(kind)
 
