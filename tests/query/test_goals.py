@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 from query_fakes import UP, furnished_map, keyframes_at, sounds_of
 
 from avlmaps.maps.grid import GridSpec
-from avlmaps.query.areas import modes
-from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.areas import AreaSettings, modes
+from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.heatmap import Heatmap, NearAnchors
 from avlmaps.query.level import Space
 from avlmaps.query.question import Modality, Part, Role
@@ -135,7 +135,8 @@ def test_two_kitchens_are_two_goals() -> None:
     view = np.zeros((11, 2), np.float32)
     view[:, 1] = 1.0
     view[[1, 2, 8, 9]] = [1.0, 0.0]
-    m = AVLMap(furnished_map(keyframes=keyframes_at(places, view), views=FakeViews()))
+    from_cameras = QuerySettings(areas=AreaSettings(anchor="camera"))
+    m = AVLMap(furnished_map(keyframes=keyframes_at(places, view), views=FakeViews()), from_cameras)
     goals = m.area("kitchen", primary=True).goals(top=2)
     assert sorted(goal.position[0] for goal in goals) == pytest.approx([1.25, 4.75], abs=0.3)
     assert all(goal.position[2] == pytest.approx(1.4) for goal in goals)
