@@ -3,12 +3,13 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
+TORCH := .venv-foundation
 # Small matrices run many times slower on several BLAS threads when a machine is shared.
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help demo test lint format bench train lock clean
+.PHONY: help demo test test-foundation types-foundation lint format bench train lock clean
 
 help:  ## Show what can be made.
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -26,11 +27,25 @@ demo: $(READY)  ## Make a home, walk it, hear it, map it, ask it; pictures land 
 test: $(READY)  ## Run every test (offline, two cores, no GPU).
 	$(RUN)/python -m pytest -n 2 --dist loadfile
 
+test-foundation: $(TORCH)/.ready  ## Run the tests of the models on torch (in a virtual environment of their own, 1.5 GB).
+	$(TORCH)/bin/python -m pytest -n 2 --dist loadfile tests/foundation
+
+types-foundation: $(TORCH)/.ready  ## Check the types of the models on torch.
+	$(TORCH)/bin/basedpyright -p requirements/pyright-foundation.json
+
 lint: $(READY)  ## Check style, types and the order of imports.
 	$(RUN)/ruff check .
 	$(RUN)/ruff format --check .
 	$(RUN)/basedpyright
 	$(RUN)/lint-imports
+
+# torch is pinned without a hash, because each platform has its own build of a version.
+$(TORCH)/.ready: requirements/lock.txt requirements/foundation.txt pyproject.toml
+	$(PYTHON) -m venv $(TORCH)
+	$(TORCH)/bin/python -m pip install --quiet --require-hashes -r requirements/lock.txt
+	$(TORCH)/bin/python -m pip install --quiet -r requirements/foundation.txt
+	$(TORCH)/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	touch $@
 
 format: $(READY)  ## Put the code in order.
 	$(RUN)/ruff check --fix .

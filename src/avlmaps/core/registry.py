@@ -2,7 +2,8 @@
 
 Other packages add theirs through the entry point group ``avlmaps.backends``; an entry's name is
 ``kind:name`` (``sounds:my-clap``) and its value ``package.module:Class``. The class is called without
-arguments.
+arguments. A backend of ours that can run several models is called with the chosen one, which a name carries behind an
+``@``: ``views:clip@openai/clip-vit-large-patch14``.
 """
 
 import importlib
@@ -40,6 +41,9 @@ class Backend:
         target: ``package.module:Class``.
         extra: the optional install that it needs, or ``""``.
         needs: top-level packages that must be importable.
+        model: for a backend that can run several models, the one that it runs unless another is chosen: a hub's id or
+            the name of a file; its class is called with it. ``""`` where the class takes no argument.
+        licence: of that model's weights, for ``avlmaps profiles``; ``""`` where the class alone tells it.
     """
 
     kind: Kind
@@ -47,6 +51,8 @@ class Backend:
     target: str
     extra: str = ""
     needs: tuple[str, ...] = ()
+    model: str = ""
+    licence: str = ""
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -70,7 +76,78 @@ _BUILT_IN = (
     Backend(Kind.PLACE, "vlad", f"{_EMBEDDED}.vlad:Vlad"),
     Backend(Kind.MATCHER, "mutual-ratio", f"{_EMBEDDED}.matching:MutualRatio"),
 )
-_registered: dict[tuple[Kind, str], Backend] = {(b.kind, b.name): b for b in _BUILT_IN}
+
+
+def _with_torch(package: str, kind: Kind, name: str, target: str, model: str, licence: str, *needs: str) -> Backend:
+    """Return the entry of a backend that needs the extra called like its package."""
+    place = f"avlmaps.perception.{package}.{target}"
+    return Backend(kind, name, place, extra=package, needs=("torch", *needs), model=model, licence=licence)
+
+
+def _foundation(kind: Kind, name: str, target: str, model: str, licence: str, *needs: str) -> Backend:
+    return _with_torch("foundation", kind, name, target, model, licence, *needs)
+
+
+def _paper(kind: Kind, name: str, target: str, model: str, licence: str, *needs: str) -> Backend:
+    return _with_torch("paper", kind, name, target, model, licence, *needs)
+
+
+_OF_TORCH = (
+    _foundation(Kind.PIXELS, "tipsv2", "tipsv2:TipsPixels", "google/tipsv2-b14", "Apache-2.0", "transformers"),
+    _foundation(
+        Kind.PIXELS, "clip-patches", "clip_patches:ClipPatches", "openai/clip-vit-base-patch16", "MIT", "transformers"
+    ),
+    _foundation(
+        Kind.PIXELS,
+        "regions",
+        "regions:RegionPixels",
+        "openai/clip-vit-base-patch16",
+        "MIT (CLIP) and Apache-2.0 (SAM 2)",
+        "transformers",
+    ),
+    _foundation(
+        Kind.VIEWS, "siglip2", "siglip2:SiglipViews", "google/siglip2-base-patch16-224", "Apache-2.0", "transformers"
+    ),
+    _foundation(Kind.VIEWS, "clip", "clip:ClipViews", "openai/clip-vit-large-patch14", "MIT", "transformers"),
+    _foundation(
+        Kind.VIEWS, "open-clip", "open_clip_views:OpenClipViews", "timm/PE-Core-B-16", "Apache-2.0", "open_clip"
+    ),
+    _foundation(Kind.SOUNDS, "clap", "clap:ClapSounds", "laion/larger_clap_general", "Apache-2.0", "transformers"),
+    _foundation(
+        Kind.SOUNDS, "pe-a-frame", "pe_a_frame:FrameSounds", "facebook/pe-a-frame-base", "Apache-2.0", "transformers"
+    ),
+    _foundation(Kind.LOCAL, "disk", "disk:DiskKeypoints", "disk-depth", "Apache-2.0", "kornia"),
+    _foundation(Kind.LOCAL, "aliked", "aliked:AlikedKeypoints", "aliked-n16", "BSD-3-Clause", "kornia"),
+    _foundation(Kind.PLACE, "megaloc", "megaloc:MegaLoc", "gberton/MegaLoc", "MIT", "transformers"),
+    _foundation(Kind.PLACE, "eigenplaces", "eigenplaces:EigenPlaces", "eigenplaces-resnet50-2048", "MIT"),
+    _foundation(Kind.PLACE, "dinov2", "dinov2:DinoPlaces", "facebook/dinov2-small", "Apache-2.0", "transformers"),
+    _foundation(Kind.MATCHER, "lightglue-disk", "lightglue:LightGlue", "disk", "Apache-2.0", "kornia"),
+    _foundation(Kind.MATCHER, "lightglue-aliked", "lightglue:LightGlue", "aliked", "Apache-2.0", "kornia"),
+    _paper(Kind.PIXELS, "lseg", "lseg:LSegPixels", "demo_e200.ckpt", "MIT", "transformers"),
+    _paper(
+        Kind.VIEWS, "clip-paper", "clip_views:PaperClipViews", "openai/clip-vit-large-patch14", "MIT", "transformers"
+    ),
+    _paper(Kind.SOUNDS, "audioclip", "audioclip:AudioClipSounds", "AudioCLIP-Partial-Training.pt", "MIT"),
+    _paper(Kind.SOUNDS, "wav2clip", "wav2clip:Wav2ClipSounds", "wav2clip.pt", "MIT", "transformers"),
+    _paper(
+        Kind.LOCAL,
+        "superpoint",
+        "superpoint:SuperPointKeypoints",
+        "magic-leap-community/superpoint",
+        "Magic Leap, non-commercial",
+        "transformers",
+    ),
+    _paper(Kind.PLACE, "netvlad", "netvlad:NetVlad", "VGG16-NetVLAD-Pitts30K.mat", "research only"),
+    _paper(
+        Kind.MATCHER,
+        "superglue",
+        "superglue:SuperGlue",
+        "magic-leap-community/superglue_indoor",
+        "Magic Leap, non-commercial",
+        "transformers",
+    ),
+)
+_registered: dict[tuple[Kind, str], Backend] = {(b.kind, b.name): b for b in (*_BUILT_IN, *_OF_TORCH)}
 
 
 def register(backend: Backend) -> None:
@@ -92,20 +169,38 @@ def backends() -> list[Backend]:
 def load(kind: Kind, name: str) -> Any:
     """Return the backend of that kind and name, made once in a process.
 
+    Args:
+        kind: which module.
+        name: as in a profile; ``name@model`` chooses one of several models.
+
     Raises:
-        BackendError: there is none of that name, a package that it needs is missing, or it cannot be imported.
+        BackendError: there is none of that name, a package or the model that it needs is missing, it cannot be
+            imported, or it has no models to choose from.
     """
     return _load(kind, name)
 
 
-@cache
-def _load(kind: Kind, name: str) -> Any:
+def forget_loaded() -> None:
+    """Let go of all backends that were made; the next ``load`` makes them anew (other files, another device)."""
+    _load.cache_clear()
+
+
+def find(kind: Kind, name: str) -> Backend:
+    """Return the registry's entry of that kind and name (without ``@model``), or raise ``BackendError``."""
     known = {b.name: b for b in backends() if b.kind == kind}
     if name not in known:
         raise BackendError(
             f"There is no {kind} backend called {name!r}; known are: {', '.join(sorted(known)) or 'none'}."
         )
-    backend = known[name]
+    return known[name]
+
+
+@cache
+def _load(kind: Kind, name: str) -> Any:
+    name, _, model = name.partition("@")
+    backend = find(kind, name)
+    if model and not backend.model:
+        raise BackendError(f"The {kind} backend {name!r} has no models to choose from; leave @{model} out.")
     if backend.missing:
         missing = ", ".join(backend.missing)
         raise BackendError(f"The {kind} backend {name!r} needs {missing}; get it with: {backend.how_to_get}")
@@ -117,4 +212,5 @@ def _load(kind: Kind, name: str) -> Any:
             f"The {kind} backend {name!r} cannot be loaded from {backend.target} ({fault}); mend or remove the package "
             "that brings it."
         ) from fault
-    return made()
+    chosen = model or backend.model
+    return made(chosen) if chosen else made()

@@ -1,10 +1,11 @@
 """Profiles: which backend serves which module. A map keeps the name of its profile and every model's card."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import cast
 
 from avlmaps.core.errors import BackendError
-from avlmaps.core.registry import Kind, load
+from avlmaps.core.registry import Kind, find, load
 from avlmaps.perception.protocols import (
     LocalEncoder,
     Matcher,
@@ -42,6 +43,18 @@ class Profile:
     matcher: str = ""
     about: str = ""
     weight_variance_m2: float = 0.6
+
+    def choosing(self, choices: Mapping[Kind, str]) -> "Profile":
+        """Return the profile with other backends or models (``name``, ``name@model``) for some of its modules.
+
+        Raises:
+            BackendError: there is no such backend, or none of these modules is perceived by a profile.
+        """
+        for kind, name in choices.items():
+            if kind is Kind.WORDS:
+                raise BackendError("Words are read by each model's own text encoder; there is none to choose.")
+            find(kind, name.partition("@")[0])
+        return replace(self, **{kind.value: name for kind, name in choices.items()})
 
     def backend_name(self, kind: Kind) -> str:
         """Return the name of the backend for a module, ``""`` for none."""
@@ -131,5 +144,30 @@ register_profile(
         views="",
         weight_variance_m2=0.6,
         about="objects by their colour alone: the quickest, and no network for pictures",
+    )
+)
+register_profile(
+    Profile(
+        name="foundation",
+        pixels="tipsv2",
+        views="siglip2",
+        sounds="clap",
+        local="disk",
+        place="megaloc",
+        matcher="lightglue-disk",
+        about="today's open models under permissive licences; recommended where there is a network and better a GPU",
+        weight_variance_m2=50.0,
+    )
+)
+register_profile(
+    Profile(
+        name="paper",
+        pixels="lseg",
+        views="clip-paper",
+        sounds="audioclip",
+        local="superpoint",
+        place="netvlad",
+        matcher="superglue",
+        about="the models of the AVLMaps paper, to compare with; some of their weights are for research alone",
     )
 )

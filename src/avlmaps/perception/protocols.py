@@ -74,6 +74,20 @@ class PixelEncoder(Protocol):
 
 
 @runtime_checkable
+class BatchPixelEncoder(PixelEncoder, Protocol):
+    """A pixel encoder that is quicker with several frames at once (on a GPU)."""
+
+    @property
+    def batch(self) -> int:
+        """How many frames it likes to be given at once."""
+        ...
+
+    def encode_batch(self, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
+        """Return what ``encode`` returns for each frame (to rounding)."""
+        ...
+
+
+@runtime_checkable
 class NamedPixelEncoder(PixelEncoder, Protocol):
     """A pixel encoder that tells a closed set of names apart and can say how likely each of them is.
 
@@ -184,12 +198,16 @@ class LocalFeatures:
     Attributes:
         xy: image coordinates in pixels, sub-pixel, the centre of the first pixel at (0.5, 0.5).
         descriptors: one row a keypoint, unit length.
-        scale: size of each keypoint, pixels.
+        scale: size of each keypoint, pixels; empty where it is not known.
+        score: how sure the detector was of each keypoint, in [0, 1]; empty where it is not known.
+        size: (width, height) of the picture, pixels; (0, 0) where it is not known. Learned matchers need it.
     """
 
     xy: Float32[np.ndarray, "n 2"]
     descriptors: Float32[np.ndarray, "n d"]
     scale: Float32[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0, np.float32))
+    score: Float32[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0, np.float32))
+    size: tuple[int, int] = (0, 0)
 
 
 @runtime_checkable

@@ -1,0 +1,64 @@
+"""Where torch runs, and in which precision; the only module of this package that imports torch."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import torch
+from jaxtyping import Float32
+
+from avlmaps.core.errors import BackendError
+from avlmaps.perception.models.settings import model_settings
+
+_TYPES = {"float32": torch.float32, "float16": torch.float16, "bfloat16": torch.bfloat16}
+
+
+def chosen_device() -> torch.device:
+    """Return the device of the settings.
+
+    Raises:
+        BackendError: it is not there.
+    """
+    asked = model_settings().device
+    if asked == "auto":
+        if torch.cuda.is_available():
+            return torch.device("cuda")
+        return torch.device("mps" if torch.backends.mps.is_available() else "cpu")
+    try:
+        device = torch.device(asked)
+        torch.zeros(1, device=device)
+    except (RuntimeError, AssertionError) as fault:
+        here = "cuda" if torch.cuda.is_available() else "mps" if torch.backends.mps.is_available() else "cpu"
+        raise BackendError(f"The device {asked!r} cannot be used here ({fault}); choose --device {here}.") from fault
+    return device
+
+
+def chosen_type(device: torch.device) -> torch.dtype:
+    """Return the precision of the settings: by default float16 on CUDA, float32 elsewhere."""
+    asked = model_settings().precision
+    if asked == "auto":
+        return torch.float16 if device.type == "cuda" else torch.float32
+    return _TYPES[asked]
+
+
+def chosen_batch(on_gpu: int) -> int:
+    """Return how many pictures go through at once: the settings' number, else ``on_gpu`` on a GPU and 1 elsewhere."""
+    return model_settings().batch or (1 if chosen_device().type == "cpu" else on_gpu)
+
+
+@contextmanager
+def inference() -> Iterator[None]:
+    """Run without gradients."""
+    with torch.inference_mode():
+        yield
+
+
+def to_numpy(rows: torch.Tensor) -> Float32[np.ndarray, "..."]:
+    """Return a tensor as float32 on the CPU."""
+    return rows.detach().to("cpu", torch.float32).numpy()
+
+
+def unit_rows(rows: torch.Tensor) -> Float32[np.ndarray, "... d"]:
+    """Return rows scaled to unit length in float32; a row of zeros stays one."""
+    rows = rows.detach().to(torch.float32)
+    return to_numpy(rows / rows.norm(dim=-1, keepdim=True).clamp_min(1e-12))

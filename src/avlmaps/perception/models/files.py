@@ -1,0 +1,76 @@
+"""Finding a model's files: a path, the folder of models, the hub's cache, the hub; errors say what mends them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from avlmaps.core.errors import BackendError
+from avlmaps.perception.models.settings import model_settings
+
+# What a model's folder must hold for transformers or open_clip to load it; code and other formats stay where they are.
+_WANTED = ("*.json", "*.safetensors", "*.txt", "*.model", "*.jinja")
+
+
+def model_folder(model: str, wanted: Sequence[str] = _WANTED) -> Path:
+    """Return the local folder of a model: where it lies already, else fetched from the hub.
+
+    Args:
+        model: a hub's id (``google/tipsv2-b14``) or a local folder.
+        wanted: patterns of the files to fetch.
+
+    Raises:
+        BackendError: it is not here and cannot be fetched; the sentence says how to get it.
+    """
+    for place in _places(model):
+        if place.is_dir():
+            return place
+    return _fetched(model, wanted)
+
+
+def model_file(name: str, how_to_get: str) -> Path:
+    """Return a single checkpoint file that no hub holds under an id.
+
+    Args:
+        name: its published name, or a path.
+        how_to_get: the command or the page that brings it, for the error.
+
+    Raises:
+        BackendError: it is not here.
+    """
+    for place in _places(name):
+        if place.is_file():
+            return place
+    folder = model_settings().folder
+    looked = f"in {folder}" if folder else "in no folder: set --models DIR or AVLMAPS_MODELS"
+    raise BackendError(f"The checkpoint {name} is not here (looked {looked}); get it with: {how_to_get}")
+
+
+def _places(model: str) -> list[Path]:
+    """Return where a model may lie, the likeliest first."""
+    folder = model_settings().folder
+    inside = [folder / model, folder / model.replace("/", "--"), folder / Path(model).name] if folder else []
+    return [*inside, Path(model).expanduser()]
+
+
+def _fetched(model: str, wanted: Sequence[str]) -> Path:
+    settings = model_settings()
+    get = f"hf download {model}"
+    folder = f"{settings.folder or 'no folder of models (--models DIR, AVLMAPS_MODELS)'}"
+    try:
+        from huggingface_hub import snapshot_download
+    except ImportError as fault:
+        raise BackendError(
+            f"The model {model} is not in {folder}, and fetching it needs huggingface_hub; get it with: "
+            "pip install 'avlmaps[foundation]'"
+        ) from fault
+    try:
+        return Path(snapshot_download(model, allow_patterns=list(wanted), local_files_only=settings.offline))
+    except Exception as fault:
+        where = (
+            "offline is set"
+            if settings.offline
+            else f"{type(fault).__name__}: no network, no such id, or a licence to accept"
+        )
+        raise BackendError(
+            f"The model {model} is neither in {folder} nor in the hub's cache ({where}); get it on a machine with a "
+            f"network with: {get}"
+        ) from fault
