@@ -1,0 +1,1 @@
+"""Tiny random checkpoints in the published layouts, one module for each backend."""
