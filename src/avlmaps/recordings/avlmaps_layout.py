@@ -108,13 +108,13 @@ def open_avlmaps(path: Path, report: Report = stop_at_first) -> FileRecording:
     Raises:
         RecordingError: poses and pictures do not match, or a file is damaged.
     """
-    given, notices = _camera_file(path / "camera.json")
+    given, notices = read_camera_file(path / "camera.json")
     habitat_from_body = read_habitat_poses(path / "poses.txt", report)
     colour = _numbered(path / "rgb", (".png", ".jpg"))
     depth = _numbered(path / "depth", (".npy", ".png")) if (path / "depth").is_dir() else {}
     numbers, more = _complete(path, colour, depth, len(habitat_from_body), report)
     notices += more
-    world_from_camera, notice = _camera_poses(habitat_from_body[numbers], given)
+    world_from_camera, notice = camera_poses(habitat_from_body[numbers], given)
     shots = Shots(
         names=[f"{number:06d}" for number in numbers],
         colour=[f"rgb/{colour[number]}" for number in numbers],
@@ -161,7 +161,12 @@ def _numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, str]:
     return {int(stem): name for stem, name in stems if stem.isascii() and stem.isdigit()}
 
 
-def _camera_file(path: Path) -> tuple[CameraFile, list[str]]:
+def read_camera_file(path: Path) -> tuple[CameraFile, list[str]]:
+    """Return what ``camera.json`` says, or what is assumed where there is none, and what is to be told of that.
+
+    Raises:
+        RecordingError: the file is damaged.
+    """
     if not path.exists():
         return CameraFile(), [f"The stamps are counted at {RATE_HZ:g} frames/s, since poses.txt has none."]
     try:
@@ -173,10 +178,10 @@ def _camera_file(path: Path) -> tuple[CameraFile, list[str]]:
     return given, []
 
 
-def _camera_poses(
+def camera_poses(
     habitat_from_body: Float[np.ndarray, "n 4 4"], given: CameraFile
 ) -> tuple[Float[np.ndarray, "n 4 4"], str]:
-    """Turn poses as they stand in the file into the camera's poses in our world."""
+    """Turn poses as they stand in the file into the camera's poses in our world; tell what they were taken for."""
     pose_type, how = given.pose_type, "as camera.json says"
     if pose_type is None:
         upward = habitat_from_body[np.isfinite(habitat_from_body[:, 1, 1]), 1, 1]
