@@ -24,9 +24,11 @@ def heard() -> AVLMap:
     return AVLMap(furnished_map(sounds=sounds_of([HERE], [0.8])))
 
 
-def locating(monkeypatch: pytest.MonkeyPatch, pose: np.ndarray | None, inliers: int = 200) -> None:
-    located = SimpleNamespace(world_from_camera=pose, inliers=inliers)
-    monkeypatch.setattr(locate_module, "locate", lambda stored, rgb, camera, rng: located)
+def locating(
+    monkeypatch: pytest.MonkeyPatch, pose: np.ndarray | None, inliers: int = 200, guess: np.ndarray | None = None
+) -> None:
+    located = SimpleNamespace(world_from_camera=pose, inliers=inliers, guess=guess)
+    monkeypatch.setattr(locate_module, "locate", lambda stored, rgb, camera, rng, settings: located)
 
 
 def test_the_answer_has_the_keys_of_the_contract(heard: AVLMap) -> None:
@@ -148,6 +150,16 @@ def test_a_picture_that_is_not_located_is_not_found(heard: AVLMap, monkeypatch: 
     heat = heard.image(np.zeros((48, 64, 3), np.uint8))
     assert (heat.peak, heat.found, heat.goals()) == (0.0, False, [])
     assert heat.factors[0].note == "the picture could not be located (7 points agree)"
+
+
+def test_a_guess_heats_its_place_and_is_not_found(heard: AVLMap, monkeypatch: pytest.MonkeyPatch) -> None:
+    guess = np.eye(4)
+    guess[:3, 3] = [3.0, 2.0, 1.5]
+    locating(monkeypatch, None, inliers=7, guess=guess)
+    heat = heard.image(np.zeros((48, 64, 3), np.uint8), primary=True)
+    assert (heat.found, heat.goals()[0].position) == (False, (3.0, 2.0, 1.5))
+    told = "the picture could not be located (7 points agree); the heat is that of the best guess"
+    assert heat.factors[0].note == told
 
 
 def test_pictures_that_cannot_be_asked_with_are_refused(heard: AVLMap, tmp_path: Path) -> None:

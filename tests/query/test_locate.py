@@ -56,6 +56,23 @@ def test_a_keyframe_itself_is_located_where_it_was_taken(stored: MapOfPictures) 
     assert found.reference_stamp_s == frame.stamp_s
 
 
+def test_what_is_not_located_may_be_guessed(stored: MapOfPictures, photo: np.ndarray) -> None:
+    strict = LocateSettings(min_inliers=100_000)
+    assert locate(stored, photo, None, rng(), strict).guess is None
+    unsure = locate(stored, photo, None, rng(), replace(strict, guess_references=8))
+    assert unsure.world_from_camera is None and unsure.score < 0.5 and unsure.guess is not None
+    assert_at(replace(unsure, world_from_camera=unsure.guess), PHOTO_FROM, cm=5.0, deg=2.0)
+    # Where no pose is worth a guess, it is the place of a keyframe.
+    least = locate(stored, photo, None, rng(), replace(strict, guess_references=8, guess_inliers=100_000))
+    assert any(np.array_equal(least.guess, pose) for pose in stored.keyframes.world_from_camera)
+
+
+def test_a_located_picture_needs_no_guess(stored: MapOfPictures, photo: np.ndarray) -> None:
+    asked = locate(stored, photo, None, rng(), LocateSettings(guess_references=8))
+    assert asked.guess is None
+    assert_at(asked, PHOTO_FROM)
+
+
 def test_the_same_question_has_the_same_answer(stored: MapOfPictures, photo: np.ndarray) -> None:
     a, b = (locate(stored, photo, None, rng()) for _ in range(2))
     np.testing.assert_array_equal(a.world_from_camera, b.world_from_camera)

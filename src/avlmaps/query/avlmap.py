@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from avlmaps.query.locate import Located
 
 
+# Keyframes that are matched one by one for a picture that cannot be located: more of them guess no better (measured).
+_GUESS_FROM = 20
+
+
 @dataclass(frozen=True, slots=True)
 class QuerySettings:
     """Everything about a query that can be chosen."""
@@ -152,7 +156,7 @@ class AVLMap:
         intrinsics: Pinhole | None = None,
         primary: bool = False,
     ) -> Heatmap:
-        """Return the heat of where a picture was taken; zero everywhere where that could not be told.
+        """Return the heat of where a picture was taken; where that is not sure, of the best guess, and not ``found``.
 
         Args:
             picture: a file, or RGB uint8.
@@ -165,15 +169,21 @@ class AVLMap:
         is_array = isinstance(picture, np.ndarray)
         part = Part(Modality.IMAGE, "a picture" if is_array else str(picture), _role(primary), is_file=True)
         rgb = picture if is_array else read_picture(Path(picture).expanduser())
-        located = self.locate(rgb, intrinsics)
+        located = self._located(rgb, intrinsics, _GUESS_FROM)
         return Heatmap.of(image_factor(self.space, located, part, self.settings.heat))
 
     def locate(self, rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None = None) -> "Located":
         """Return the pose of the camera that took a picture, or that it could not be told."""
-        from avlmaps.query.locate import locate
+        return self._located(rgb, intrinsics)
+
+    def _located(
+        self, rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None, guess_references: int = 0
+    ) -> "Located":
+        from avlmaps.query.locate import LocateSettings, locate
 
         require_fitting(rgb, intrinsics)
-        return locate(self.stored, rgb, intrinsics, np.random.default_rng(self.settings.seed))
+        rng = np.random.default_rng(self.settings.seed)
+        return locate(self.stored, rgb, intrinsics, rng, LocateSettings(guess_references=guess_references))
 
     def heat(self, part: Part, intrinsics: Pinhole | None = None) -> Heatmap:
         """Return the heat of one part of a question."""

@@ -50,10 +50,16 @@ def require_fitting(rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None)
 
 
 def image_factor(space: Space, located: "Located", part: Part, heat: HeatSettings) -> NearAnchors:
-    """Return the heat of a picture: one anchor of score 1 at the camera, none where it was not located."""
-    pose = located.world_from_camera
+    """Return the heat of a picture: one anchor of score 1 at the camera.
+
+    Where it was not located, the anchor is at the best guess, if there is one, and the heat is not "found".
+    """
+    sure = located.world_from_camera is not None
+    pose = located.world_from_camera if sure else located.guess
     anchors = np.zeros((0, 3)) if pose is None else np.asarray(pose, np.float64)[None, :3, 3]
-    note = "" if pose is not None else f"the picture could not be located ({located.inliers} points agree)"
+    note = "" if sure else f"the picture could not be located ({located.inliers} points agree)"
+    if pose is not None and not sure:
+        note += "; the heat is that of the best guess"
     return NearAnchors(
         space,
         part,
@@ -61,7 +67,7 @@ def image_factor(space: Space, located: "Located", part: Part, heat: HeatSetting
         anchors,
         np.ones(len(anchors)),
         np.zeros(len(anchors), np.int64),
-        pose is not None,
+        sure,
         part.query,
         note,
     )
