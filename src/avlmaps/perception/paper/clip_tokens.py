@@ -1,0 +1,103 @@
+"""The tokens of OpenAI's CLIP: byte pairs merged in the order of a published list of 48,894 merges.
+
+The list is ``bpe_simple_vocab_16e6.txt.gz`` (released with CLIP and with AudioCLIP; open_clip's package holds it too)
+or, the same merges, ``merges.txt`` of any CLIP on the hub.
+"""
+
+import gzip
+import html
+from collections.abc import Sequence
+from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from tokenizers import Regex, Tokenizer, models, normalizers, pre_tokenizers
+
+from avlmaps.core.errors import BackendError
+from avlmaps.perception.models.files import model_file, model_folder
+
+MERGES = 48894
+BYTE_PAIRS = "bpe_simple_vocab_16e6.txt.gz"
+HOW_TO_GET = f"curl -LO https://github.com/AndreyGuzhov/AudioCLIP/releases/download/v0.1/{BYTE_PAIRS}"
+_HUB = "openai/clip-vit-base-patch32"
+_PIECES = r"'s|'t|'re|'ve|'m|'ll|'d|[\p{L}]+|[\p{N}]|[^\s\p{L}\p{N}]+"
+
+
+class ClipTokens:
+    """Turns phrases into tokens as CLIP did in training: lower case, white space folded, start and end marked.
+
+    Args:
+        merges: pairs of pieces, each two words in one line, the first to be merged first.
+    """
+
+    def __init__(self, merges: Sequence[str]) -> None:
+        pairs = [(first, second) for first, _, second in (line.partition(" ") for line in merges)]
+        letters = _byte_letters()
+        names = [*letters, *(letter + "</w>" for letter in letters), *(first + second for first, second in pairs)]
+        numbers = {name: number for number, name in enumerate(names)}
+        self.start, self.end = len(names), len(names) + 1
+        self._pieces = Tokenizer(models.BPE(vocab=numbers, merges=pairs, end_of_word_suffix="</w>"))
+        self._pieces.normalizer = normalizers.Sequence(
+            [normalizers.NFC(), normalizers.Replace(Regex(r"\s+"), " "), normalizers.Lowercase()]
+        )
+        self._pieces.pre_tokenizer = pre_tokenizers.Sequence(
+            [
+                pre_tokenizers.Split(Regex(_PIECES), behavior="removed", invert=True),
+                pre_tokenizers.ByteLevel(add_prefix_space=False, use_regex=False),
+            ]
+        )
+
+    def __len__(self) -> int:
+        return self.end + 1
+
+    def encode(self, phrases: Sequence[str], context: int = 77) -> list[list[int]]:
+        """Return each phrase's tokens, start and end among them; what is longer than the context is cut off."""
+        plain = [html.unescape(html.unescape(phrase)).strip() for phrase in phrases]
+        return [
+            [self.start, *coded.ids[: context - 2], self.end]
+            for coded in self._pieces.encode_batch(plain, add_special_tokens=False)
+        ]
+
+
+def clip_tokens() -> ClipTokens:
+    """Return CLIP's tokens by the first list of merges that is found: folder of models, open_clip, a CLIP on the hub.
+
+    Raises:
+        BackendError: none is here, or it is another list.
+    """
+    return _tokens(_merges_file())
+
+
+@lru_cache(maxsize=2)
+def _tokens(path: Path) -> ClipTokens:
+    raw = path.read_bytes()
+    try:
+        lines = (gzip.decompress(raw) if path.suffix == ".gz" else raw).decode("utf-8").split("\n")
+    except (OSError, EOFError, UnicodeDecodeError) as fault:
+        raise BackendError(f"{path} cannot be read ({type(fault).__name__}); get it with: {HOW_TO_GET}") from fault
+    merges = [line.strip() for line in lines[1 : 1 + MERGES]]
+    if len(merges) < MERGES or not all(line.count(" ") == 1 for line in merges):
+        raise BackendError(f"{path} is not CLIP's list of {MERGES} merges; get it with: {HOW_TO_GET}")
+    return ClipTokens(merges)
+
+
+def _merges_file() -> Path:
+    try:
+        return model_file(BYTE_PAIRS, HOW_TO_GET)
+    except BackendError as fault:
+        package = find_spec("open_clip")
+        if package is not None and package.origin and (kept := Path(package.origin).parent / BYTE_PAIRS).is_file():
+            return kept
+        try:
+            merges = model_folder(_HUB, ("merges.txt",)) / "merges.txt"
+        except BackendError:
+            raise fault from None
+        if not merges.is_file():
+            raise
+        return merges
+
+
+def _byte_letters() -> list[str]:
+    """Return the letter that stands for each byte, in the order of the vocabulary: first the bytes that print."""
+    plain = [*range(ord("!"), ord("~") + 1), *range(ord("¡"), ord("¬") + 1), *range(ord("®"), ord("ÿ") + 1)]
+    return [*map(chr, plain), *(chr(256 + i) for i in range(256 - len(plain)))]
