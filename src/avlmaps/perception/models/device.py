@@ -1,4 +1,4 @@
-"""Where torch runs, and in which precision; the only module of this package that imports torch."""
+"""Where torch runs, and in which precision; importing it makes torchvision importable, too (``models.operators``)."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,8 +8,10 @@ import torch
 from jaxtyping import Float32
 
 from avlmaps.core.errors import BackendError
+from avlmaps.perception.models.operators import declare_missing_operators
 from avlmaps.perception.models.settings import model_settings
 
+declare_missing_operators()
 _TYPES = {"float32": torch.float32, "float16": torch.float16, "bfloat16": torch.bfloat16}
 
 
