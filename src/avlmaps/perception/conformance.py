@@ -183,7 +183,12 @@ def _check_place_encoder(encoder: PlaceEncoder) -> None:
     rows = np.stack([encoder.encode(rgb, features, state) for features in local])
     _check_rows(rows, 4, rows.shape[1], "place descriptors")
     none = LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, dim), np.float32), np.zeros(0, np.float32))
-    _hold(not encoder.encode(rgb, none, state).any(), "a picture without keypoints must have descriptor zero")
+    blank = encoder.encode(rgb, none, state)
+    _check_rows(blank[None], 1, rows.shape[1], "the descriptor of a picture without keypoints", zero_allowed=True)
+    _hold(not (state and blank.any()), "what learns from keypoints must have descriptor zero where there are none")
+    _hold(
+        np.array_equal(rows[0], encoder.encode(rgb, local[0], state)), "the same picture must give the same descriptor"
+    )
 
 
 def _check_matcher(matcher: Matcher) -> None:

@@ -156,6 +156,20 @@ class NamedViewEncoder(ViewEncoder, Protocol):
 
 
 @runtime_checkable
+class ScaledEncoder(Protocol):
+    """A pixel or view encoder of an open vocabulary that learnt by how much its cosines count (CLIP, SigLIP).
+
+    The cosines of such a model differ by hundredths between a right and a wrong word; its softmax was trained with
+    them multiplied by this. An encoder without it says nothing of the kind.
+    """
+
+    @property
+    def logit_scale(self) -> float:
+        """A cosine higher by 1 / logit_scale makes a word e times as likely; about 100 for CLIP."""
+        ...
+
+
+@runtime_checkable
 class SoundEncoder(Protocol):
     """Gives a sound features that words and other sounds can be compared with."""
 

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from avlmaps.maps.types import Keyframes
-from avlmaps.perception.protocols import NamedViewEncoder, ViewEncoder
+from avlmaps.perception.protocols import NamedViewEncoder, ScaledEncoder, ViewEncoder
 from avlmaps.query.heatmap import HeatSettings, NearAnchors, normalised
 from avlmaps.query.level import Space
 from avlmaps.query.question import Part
@@ -17,6 +17,32 @@ AREA_NAMES = (
     "kitchen", "living room", "bedroom", "bathroom", "dining room", "office", "corridor", "staircase", "entrance hall",
     "laundry room", "storage room", "garage", "balcony", "garden", "gym", "library", "meeting room", "workshop",
     "laboratory", "classroom", "waiting area", "shop", "lounge", "children's room",
+)  # fmt: skip
+
+# For an encoder that does not tell by how much its cosines count.
+_UNKNOWN_TEMPERATURE = 0.05
+
+# Other words for one of them, or for one another: they name the same and do not compete. The features of such words are
+# not always close (two words of one sense lie as far apart as kitchen and dining room for some models).
+_SAME_PLACE = (
+    ("living room", "lounge", "sitting room", "family room"),
+    ("corridor", "hallway", "hall", "passage", "passageway"),
+    ("staircase", "stairs", "stairway", "stairwell"),
+    ("entrance hall", "hall", "entrance", "entryway", "foyer", "lobby", "vestibule"),
+    ("bathroom", "toilet", "restroom", "washroom", "shower room", "lavatory"),
+    ("bedroom", "sleeping room"),
+    ("children's room", "bedroom", "nursery", "playroom"),
+    ("dining room", "dining area", "dining hall"),
+    ("kitchen", "kitchenette", "cooking area"),
+    ("office", "study", "home office", "workroom"),
+    ("laundry room", "laundry", "utility room"),
+    ("storage room", "storage", "storeroom", "closet", "pantry"),
+    ("gym", "fitness room", "exercise room"),
+    ("meeting room", "conference room"),
+    ("laboratory", "lab"),
+    ("waiting area", "waiting room", "lobby", "lounge"),
+    ("balcony", "terrace", "patio"),
+    ("garden", "yard", "backyard"),
 )  # fmt: skip
 
 
@@ -29,10 +55,12 @@ class AreaSettings:
     found where they were asked for in 30 % of 191 tasks, with the camera's place in 21 %; docs/benchmarks.md)."""
     score: Literal["posterior", "min-max"] = "posterior"
     """``posterior`` asks how likely the name is among all area names; ``min-max`` stretches the cosines (the paper)."""
-    temperature: float = 0.05
-    """Of the posterior: a cosine higher by this makes a name e times as likely. To be calibrated for an encoder."""
+    temperature: float | None = None
+    """Of the posterior: a cosine higher by this makes a name e times as likely. By default what the encoder learnt
+    (1 / ``logit_scale``), and 0.05 for one that tells nothing of the kind."""
     same_word_cosine: float = 0.95
-    """Another name at least this close to the asked one names the same and does not compete with it."""
+    """Another name at least this close to the asked one names the same and does not compete with it. For an encoder
+    with a scale it is measured from the middle of all names: its phrases lie in a narrow cone, kitchen beside garage."""
     link_m: float = 1.0
     """Keyframes closer than this to a better one belong to its area."""
 
@@ -42,7 +70,8 @@ def area_scores(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return for each keyframe the posterior of the name among all area names, and its score in [0, 1].
 
-    An encoder that tells named kinds of room apart says itself how likely each is.
+    An encoder that tells named kinds of room apart says itself how likely each is. For one of an open vocabulary it is
+    the softmax over the names that it was trained with; names that mean the asked place as well do not compete.
 
     They are the same unless the settings ask for the paper's stretched cosines.
     """
@@ -50,14 +79,32 @@ def area_scores(
         share = np.square(np.asarray(view, np.float64).reshape(-1, encoder.codes.shape[1]) @ encoder.codes.T)
         likely = np.clip(share @ encoder.meant(name), 0.0, 1.0)
         return likely, likely if settings.score == "posterior" else normalised(likely)
-    others = [area for area in AREA_NAMES if area != name]
+    others = [area for area in AREA_NAMES if not same_place(area, name)]
     words = np.asarray(encoder.encode_words([name, *others]), np.float64)
-    competes = np.r_[True, words[1:] @ words[0] < settings.same_word_cosine]
-    cosine = np.asarray(view, np.float64) @ words[competes].T
-    logits = cosine / settings.temperature
+    apart = words - words.mean(axis=0) if isinstance(encoder, ScaledEncoder) else words
+    competes = np.r_[True, _cosine(apart[1:], apart[0]) < settings.same_word_cosine]
+    cosine = np.asarray(view, np.float64).reshape(-1, words.shape[1]) @ words[competes].T
+    logits = cosine / _temperature(encoder, settings)
     weight = np.exp(logits - logits.max(axis=1, keepdims=True, initial=-np.inf))
     posterior = weight[:, 0] / weight.sum(axis=1)
     return posterior, posterior if settings.score == "posterior" else normalised(cosine[:, 0])
+
+
+def same_place(one: str, other: str) -> bool:
+    """Return whether two phrases are words for the same kind of area."""
+    one, other = one.strip().casefold(), other.strip().casefold()
+    return one == other or any(one in names and other in names for names in _SAME_PLACE)
+
+
+def _cosine(rows: Float[np.ndarray, "n d"], row: Float[np.ndarray, " d"]) -> Float[np.ndarray, " n"]:
+    """Return the cosine of each row with one; 0 where either is zero."""
+    return rows @ row / np.maximum(np.linalg.norm(rows, axis=1) * np.linalg.norm(row), 1e-12)
+
+
+def _temperature(encoder: ViewEncoder, settings: AreaSettings) -> float:
+    if settings.temperature is not None:
+        return settings.temperature
+    return 1.0 / encoder.logit_scale if isinstance(encoder, ScaledEncoder) else _UNKNOWN_TEMPERATURE
 
 
 def modes(points: Float[np.ndarray, "a 2"], score: Float[np.ndarray, " a"], link_m: float) -> Int[np.ndarray, " a"]:
