@@ -60,7 +60,7 @@ class AreaSettings:
     (1 / ``logit_scale``), and 0.05 for one that tells nothing of the kind."""
     same_word_cosine: float = 0.95
     """Another name at least this close to the asked one names the same and does not compete with it. For an encoder
-    with a scale it is measured from the middle of all names: its phrases lie in a narrow cone, kitchen beside garage."""
+    with a scale it is measured from the middle of all names: its phrases lie in a cone, kitchen beside garage."""
     link_m: float = 1.0
     """Keyframes closer than this to a better one belong to its area."""
 
