@@ -9,6 +9,7 @@ from enum import Enum, auto
 from typing import Any
 
 from avlmaps.core.errors import ProgramError
+from avlmaps.language.program import syntax
 from avlmaps.language.program.budget import refused
 from avlmaps.language.program.calls import check_exactly_one, nearest, parameter_of
 from avlmaps.language.program.kinds import (
@@ -21,29 +22,6 @@ from avlmaps.language.program.kinds import (
     check_unpacked,
     check_walked,
     kind_of_result,
-)
-from avlmaps.language.program.syntax import (
-    Assign,
-    Binary,
-    BuiltinCall,
-    Collection,
-    Comparison,
-    Conditional,
-    Constant,
-    Element,
-    Expression,
-    For,
-    If,
-    Logical,
-    Name,
-    Perform,
-    SkillCall,
-    Statement,
-    Target,
-    Unary,
-    Update,
-    parts_of,
-    statements_of,
 )
 from avlmaps.language.program.table import SKILLS, Parameter, Skill
 
@@ -61,17 +39,17 @@ class Unsure(Enum):
 Guess = Kind | Unsure
 
 
-def check(statements: tuple[Statement, ...]) -> None:
+def check(statements: tuple[syntax.Statement, ...]) -> None:
     """Refuse a program that must fail wherever it gets to what is wrong with it.
 
     Raises:
         ProgramError: a name never has a value where it is used, or a value is of no kind that fits.
     """
-    every = {name for statement in statements_of(statements) for name in _names_given(statement)}
+    every = {name for statement in syntax.statements_of(statements) for name in _names_given(statement)}
     _check_names(statements, set(), every)
     kinds = _Kinds()
     if kinds.settle(statements):
-        for statement in statements_of(statements):
+        for statement in syntax.statements_of(statements):
             kinds.see(statement)
 
 
@@ -97,47 +75,47 @@ def kind_of_constant(value: object) -> Kind:
     return Kind.STRING if isinstance(value, str) else Kind.NUMBER
 
 
-def _names_given(statement: Statement) -> tuple[str, ...]:
+def _names_given(statement: syntax.Statement) -> tuple[str, ...]:
     match statement:
-        case Assign() | For():
+        case syntax.Assign() | syntax.For():
             return statement.target.names
-        case Update():
+        case syntax.Update():
             return (statement.name,)
     return ()
 
 
-def _check_names(block: tuple[Statement, ...], given: set[str], every: set[str]) -> None:
+def _check_names(block: tuple[syntax.Statement, ...], given: set[str], every: set[str]) -> None:
     """Go through a block in its order; what is given a value in it is added to ``given``."""
     for statement in block:
         match statement:
-            case If():
+            case syntax.If():
                 for branch in statement.branches:
                     _check_used(branch.test, given, every)
                     _check_names(branch.body, given, every)
                 _check_names(statement.otherwise, given, every)
-            case For():
+            case syntax.For():
                 _check_used(statement.through, given, every)
                 # Any round but the first may use what a later line of the body gave.
                 given.update(statement.target.names)
-                given.update(name for inner in statements_of(statement.body) for name in _names_given(inner))
+                given.update(name for inner in syntax.statements_of(statement.body) for name in _names_given(inner))
                 _check_names(statement.body, given, every)
-            case Assign():
+            case syntax.Assign():
                 _check_used(statement.value, given, every)
                 given.update(statement.target.names)
-            case Update():
-                _check_used(Name(statement.name, statement.line), given, every)
+            case syntax.Update():
+                _check_used(syntax.Name(statement.name, statement.line), given, every)
                 _check_used(statement.value, given, every)
-            case Perform():
+            case syntax.Perform():
                 _check_used(statement.call, given, every)
 
 
-def _check_used(top: Expression, given: set[str], every: set[str]) -> None:
-    for part in parts_of(top):
-        if isinstance(part, Name) and part.name not in given:
+def _check_used(top: syntax.Expression, given: set[str], every: set[str]) -> None:
+    for part in syntax.parts_of(top):
+        if isinstance(part, syntax.Name) and part.name not in given:
             raise _without_value(part, given, every)
 
 
-def _without_value(name: Name, given: set[str], every: set[str]) -> ProgramError:
+def _without_value(name: syntax.Name, given: set[str], every: set[str]) -> ProgramError:
     if name.name in every:
         return refused(name.line, f"`{name.name}` is used before it has a value; give it one on a line above")
     if name.name in ("true", "false", "none", "null"):
@@ -161,11 +139,11 @@ class _Kinds:
         self.names: dict[str, Guess] = {}
         self.settled = False
 
-    def settle(self, statements: tuple[Statement, ...]) -> bool:
+    def settle(self, statements: tuple[syntax.Statement, ...]) -> bool:
         """Find the kinds of all names; return whether they came to rest."""
         for _ in range(_MOST_PASSES):
             before = dict(self.names)
-            for statement in statements_of(statements):
+            for statement in syntax.statements_of(statements):
                 # With kinds that are not settled a fault may be none; what is one still is when all are seen again.
                 with suppress(ProgramError):
                     self.see(statement)
@@ -174,12 +152,12 @@ class _Kinds:
                 break
         return self.settled
 
-    def see(self, statement: Statement) -> None:
+    def see(self, statement: syntax.Statement) -> None:
         """Add what one statement tells of its names' kinds; refuse what cannot be."""
         match statement:
-            case Assign():
+            case syntax.Assign():
                 self._give(statement)
-            case Update():
+            case syntax.Update():
                 made = self.arithmetic(
                     statement.line, statement.operator, self.names.get(statement.name, Unsure.NOT_YET),
                     self.of(statement.value),
@@ -187,12 +165,12 @@ class _Kinds:
                 if self.settled and statement.operator == "+" and made is Kind.LIST:
                     raise grown(statement)
                 self._join(statement.name, made)
-            case Perform():
+            case syntax.Perform():
                 self.of(statement.call)
-            case If():
+            case syntax.If():
                 for branch in statement.branches:
                     self._truth(branch.test)
-            case For():
+            case syntax.For():
                 kind = self.of(statement.through)
                 if isinstance(kind, Kind):
                     check_walked(statement.line, kind)
@@ -200,7 +178,7 @@ class _Kinds:
                 for name in statement.target.names:
                     self._join(name, Kind.NUMBER if counts else Unsure.ANYTHING)
 
-    def _give(self, statement: Assign) -> None:
+    def _give(self, statement: syntax.Assign) -> None:
         target, value = statement.target, statement.value
         kind = self.of(value)
         if not target.unpacks:
@@ -208,7 +186,7 @@ class _Kinds:
             return
         if isinstance(kind, Kind):
             check_unpacked(statement.line, kind)
-        written = value.elements if isinstance(value, Collection) else None
+        written = value.elements if isinstance(value, syntax.Collection) else None
         if written is not None and len(written) != len(target.names):
             raise misfit(statement.line, target, len(written))
         for at, name in enumerate(target.names):
@@ -217,27 +195,27 @@ class _Kinds:
     def _join(self, name: str, kind: Guess) -> None:
         self.names[name] = _joined(self.names.get(name, Unsure.NOT_YET), kind)
 
-    def _truth(self, test: Expression) -> None:
+    def _truth(self, test: syntax.Expression) -> None:
         kind = self.of(test)
         if isinstance(kind, Kind):
             check_truth(test.line, kind)
 
-    def of(self, part: Expression) -> Guess:
+    def of(self, part: syntax.Expression) -> Guess:
         """Return the kind of an expression; refuse what cannot be."""
         return _GUESS[type(part)](self, part)
 
-    def constant(self, part: Constant) -> Guess:
+    def constant(self, part: syntax.Constant) -> Guess:
         return kind_of_constant(part.value)
 
-    def name(self, part: Name) -> Guess:
+    def name(self, part: syntax.Name) -> Guess:
         return self.names.get(part.name, Unsure.NOT_YET)
 
-    def collection(self, part: Collection) -> Guess:
+    def collection(self, part: syntax.Collection) -> Guess:
         for element in part.elements:
             self.of(element)
         return Kind.LIST if part.is_list else Kind.TUPLE
 
-    def unary(self, part: Unary) -> Guess:
+    def unary(self, part: syntax.Unary) -> Guess:
         if part.operator == "not":
             self._truth(part.operand)
             return Kind.TRUTH
@@ -246,17 +224,17 @@ class _Kinds:
             check_sign(part.line, part.operator, kind)
         return Kind.NUMBER
 
-    def binary(self, part: Binary) -> Guess:
+    def binary(self, part: syntax.Binary) -> Guess:
         return self.arithmetic(part.line, part.operator, self.of(part.left), self.of(part.right))
 
-    def comparison(self, part: Comparison) -> Guess:
+    def comparison(self, part: syntax.Comparison) -> Guess:
         kinds = [self.of(each) for each in (part.first, *part.rest)]
         for operator, left, right in zip(part.operators, kinds, kinds[1:], strict=False):
             if isinstance(left, Kind) and isinstance(right, Kind):
                 check_comparison(part.line, operator, left, right)
         return Kind.TRUTH
 
-    def logical(self, part: Logical) -> Guess:
+    def logical(self, part: syntax.Logical) -> Guess:
         joined: Guess = Unsure.NOT_YET
         for operand in part.operands:
             joined = _joined(joined, self.of(operand))
@@ -264,24 +242,24 @@ class _Kinds:
             self._truth(operand)
         return joined
 
-    def conditional(self, part: Conditional) -> Guess:
+    def conditional(self, part: syntax.Conditional) -> Guess:
         self._truth(part.test)
         return _joined(self.of(part.chosen), self.of(part.otherwise))
 
-    def element(self, part: Element) -> Guess:
+    def element(self, part: syntax.Element) -> Guess:
         of, index = self.of(part.of), self.of(part.index)
         if isinstance(of, Kind) and isinstance(index, Kind):
             check_indexed(part.line, of, index)
         return Unsure.ANYTHING
 
-    def function(self, call: BuiltinCall) -> Guess:
+    def function(self, call: syntax.BuiltinCall) -> Guess:
         kinds = tuple(self.of(argument) for argument in call.arguments)
         known = tuple(kind for kind in kinds if isinstance(kind, Kind))
         if len(known) == len(kinds):
             check_function(call.line, call.function, known)
         return Kind.RANGE if call.function == "range" else Kind.NUMBER
 
-    def skill(self, call: SkillCall) -> Guess:
+    def skill(self, call: syntax.SkillCall) -> Guess:
         skill = SKILLS[call.skill]
         kinds = [self.of(argument.value) for argument in call.arguments]
         for argument, kind in zip(call.arguments, kinds, strict=True):
@@ -300,26 +278,26 @@ class _Kinds:
 
 
 _GUESS: dict[type, Callable[[_Kinds, Any], Guess]] = {
-    Constant: _Kinds.constant,
-    Name: _Kinds.name,
-    Collection: _Kinds.collection,
-    Unary: _Kinds.unary,
-    Binary: _Kinds.binary,
-    Comparison: _Kinds.comparison,
-    Logical: _Kinds.logical,
-    Conditional: _Kinds.conditional,
-    Element: _Kinds.element,
-    BuiltinCall: _Kinds.function,
-    SkillCall: _Kinds.skill,
+    syntax.Constant: _Kinds.constant,
+    syntax.Name: _Kinds.name,
+    syntax.Collection: _Kinds.collection,
+    syntax.Unary: _Kinds.unary,
+    syntax.Binary: _Kinds.binary,
+    syntax.Comparison: _Kinds.comparison,
+    syntax.Logical: _Kinds.logical,
+    syntax.Conditional: _Kinds.conditional,
+    syntax.Element: _Kinds.element,
+    syntax.BuiltinCall: _Kinds.function,
+    syntax.SkillCall: _Kinds.skill,
 }
 
 
-def grown(statement: Update) -> ProgramError:
+def grown(statement: syntax.Update) -> ProgramError:
     """Return the refusal of `+=` on a list, which in Python changes it under all of its names."""
     name = statement.name
     return refused(statement.line, f"a list is not changed but made anew; write `{name} = {name} + [...]`")
 
 
-def misfit(line: int, target: Target, values: int) -> ProgramError:
+def misfit(line: int, target: syntax.Target, values: int) -> ProgramError:
     """Return the refusal of an assignment of more or fewer values than names."""
     return refused(line, f"{len(target.names)} names cannot take {values} values; give one value to each")

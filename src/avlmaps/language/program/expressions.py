@@ -1,24 +1,10 @@
 """From tokens to expressions, with the precedence that Python gives them."""
 
 from avlmaps.core.errors import ProgramError
+from avlmaps.language.program import syntax
 from avlmaps.language.program.budget import refused
 from avlmaps.language.program.calls import BUILTINS, RESERVED, bind_builtin, bind_skill, skill_named, unknown_function
 from avlmaps.language.program.lexer import Form, Token
-from avlmaps.language.program.syntax import (
-    Binary,
-    BuiltinCall,
-    Collection,
-    Comparison,
-    Conditional,
-    Constant,
-    Element,
-    Expression,
-    Logical,
-    Name,
-    SkillCall,
-    Unary,
-    depth_of,
-)
 from avlmaps.language.program.table import ROBOT, SKILLS
 
 DEEPEST = 50
@@ -67,15 +53,15 @@ class Expressions:
         if not self.took(text):
             raise refused(self.here.line, f"there should be `{text}` {where}, not {self.here.shown}")
 
-    def whole(self) -> Expression:
+    def whole(self) -> syntax.Expression:
         """Read one expression and see that it does not nest too deep."""
         line = self.here.line
         found = self.expression()
-        if depth_of(found) > DEEPEST:
+        if syntax.depth_of(found) > DEEPEST:
             raise _too_deep(line)
         return found
 
-    def listed(self, *ends: str) -> Expression:
+    def listed(self, *ends: str) -> syntax.Expression:
         """Read an expression, or several with commas between, which are a tuple, up to one of some signs."""
         line, first = self.here.line, self.whole()
         if not self.sees(","):
@@ -83,9 +69,9 @@ class Expressions:
         elements = [first]
         while self.took(",") and not self.sees(*ends) and self.here.form is not Form.LINE_END:
             elements.append(self.whole())
-        return Collection(tuple(elements), is_list=False, line=line)
+        return syntax.Collection(tuple(elements), is_list=False, line=line)
 
-    def expression(self, level: int = _TERNARY) -> Expression:
+    def expression(self, level: int = _TERNARY) -> syntax.Expression:
         """Read an expression of which each operator binds at least as tightly as a level."""
         self.deep += 1
         if self.deep > DEEPEST:
@@ -94,25 +80,25 @@ class Expressions:
         self.deep -= 1
         return found
 
-    def _infixes(self, left: Expression, level: int) -> Expression:
+    def _infixes(self, left: syntax.Expression, level: int) -> syntax.Expression:
         while True:
             line, word = self.here.line, self.here.text
             if word not in _INFIXES:
                 return left
             if _LEVELS.get(word, -1) >= level:
                 self.take()
-                left = Binary(word, left, self.expression(_LEVELS[word] + 1), line)
+                left = syntax.Binary(word, left, self.expression(_LEVELS[word] + 1), line)
             elif level <= _COMPARE and self._comparison_here():
                 left = self._comparison(left)
             elif (level <= _AND and self.sees("and")) or (level <= _OR and self.sees("or")):
                 operands = [left]
                 while self.took(word):
                     operands.append(self.expression(_NOT if word == "and" else _AND))
-                left = Logical(word, tuple(operands), line)
+                left = syntax.Logical(word, tuple(operands), line)
             elif level <= _TERNARY and self.took("if"):
                 test = self.expression(_OR)
                 self.need("else", "after the condition of a value")
-                left = Conditional(test, left, self.expression(_TERNARY), line)
+                left = syntax.Conditional(test, left, self.expression(_TERNARY), line)
             else:
                 return left
 
@@ -120,7 +106,7 @@ class Expressions:
         after = self.tokens[min(self.at + 1, len(self.tokens) - 1)]
         return self.here.text in _COMPARISONS or (self.sees("not") and after.text == "in")
 
-    def _comparison(self, first: Expression) -> Comparison:
+    def _comparison(self, first: syntax.Expression) -> syntax.Comparison:
         line, operators, rest = self.here.line, [], []
         while self._comparison_here():
             operator = self.take()
@@ -129,25 +115,25 @@ class Expressions:
                 text = "not in" if text == "not" else "is not"
             before = rest[-1] if rest else first
             rest.append(self.expression(_SUM))
-            nothing = Constant(None, line)
+            nothing = syntax.Constant(None, line)
             if text.startswith("is") and nothing not in (before, rest[-1]):
                 raise refused(operator.line, f"`{text}` compares with None alone; use `==` or `!=`")
             operators.append(text)
-        return Comparison(first, tuple(operators), tuple(rest), line)
+        return syntax.Comparison(first, tuple(operators), tuple(rest), line)
 
-    def _prefix(self, level: int) -> Expression:
+    def _prefix(self, level: int) -> syntax.Expression:
         token = self.here
         if self.sees("+", "-"):
             self.take()
-            return Unary(token.text, self.expression(_SIGN), token.line)
+            return syntax.Unary(token.text, self.expression(_SIGN), token.line)
         if self.sees("not"):
             if level > _NOT:
                 raise refused(token.line, "`not` cannot stand here by itself; put it and what follows in brackets")
             self.take()
-            return Unary("not", self.expression(_NOT), token.line)
+            return syntax.Unary("not", self.expression(_NOT), token.line)
         return self._after(self._atom())
 
-    def _after(self, found: Expression) -> Expression:
+    def _after(self, found: syntax.Expression) -> syntax.Expression:
         """Read what is written right after a value: elements picked, and what no program may ask."""
         while True:
             line = self.here.line
@@ -158,7 +144,7 @@ class Expressions:
                 if self.sees(":"):
                     raise _slice(line)
                 self.need("]", "after the number of the element")
-                found = Element(found, index, line)
+                found = syntax.Element(found, index, line)
             elif self.took("."):
                 raise _attribute(line, self.here)
             elif self.sees("("):
@@ -166,23 +152,23 @@ class Expressions:
             else:
                 return found
 
-    def _atom(self) -> Expression:
+    def _atom(self) -> syntax.Expression:
         token = self.take()
         if token.form in (Form.NUMBER, Form.STRING):
             if token.form is Form.STRING and self.here.form is Form.STRING:
                 raise refused(self.here.line, "two strings stand side by side; write them as one, or join with +")
-            return Constant(token.value, token.line)
+            return syntax.Constant(token.value, token.line)
         if token.form is Form.NAME:
             return self._named(token)
         if token.form is Form.WORD and token.text in _CONSTANTS:
-            return Constant(_CONSTANTS[token.text], token.line)
+            return syntax.Constant(_CONSTANTS[token.text], token.line)
         if token.form is Form.SIGN and token.text in ("(", "["):
             return self._bracketed(token)
         if token.form is Form.SIGN and token.text == "*":
             raise refused(token.line, "`*` before a value spreads it, which programs cannot; write each value")
         raise refused(token.line, f"there should be a value, not {token.shown}")
 
-    def _bracketed(self, opening: Token) -> Expression:
+    def _bracketed(self, opening: Token) -> syntax.Expression:
         closing, elements, comma = {"(": ")", "[": "]"}[opening.text], [], False
         while not self.sees(closing):
             elements.append(self.expression())
@@ -194,9 +180,9 @@ class Expressions:
         self.take()
         if opening.text == "(" and len(elements) == 1 and not comma:
             return elements[0]
-        return Collection(tuple(elements), opening.text == "[", opening.line)
+        return syntax.Collection(tuple(elements), opening.text == "[", opening.line)
 
-    def _named(self, token: Token) -> Expression:
+    def _named(self, token: Token) -> syntax.Expression:
         name = token.text
         if name == ROBOT:
             if not self.took("."):
@@ -210,13 +196,13 @@ class Expressions:
             return self._call(token, name)
         if self.sees("("):
             raise unknown_function(token.line, name)
-        return Name(name, token.line)
+        return syntax.Name(name, token.line)
 
-    def _call(self, token: Token, written: str) -> SkillCall | BuiltinCall:
+    def _call(self, token: Token, written: str) -> syntax.SkillCall | syntax.BuiltinCall:
         if not self.took("("):
             raise refused(token.line, f"`{written}` is called, not handed on; write `{written}(...)`")
-        positional: list[Expression] = []
-        named: list[tuple[str, Expression]] = []
+        positional: list[syntax.Expression] = []
+        named: list[tuple[str, syntax.Expression]] = []
         while not self.sees(")"):
             after = self.tokens[self.at + 1]
             if self.here.form is Form.NAME and after.form is Form.SIGN and after.text == "=":

@@ -6,6 +6,7 @@ from time import monotonic
 from typing import Any
 
 from avlmaps.core.errors import AvlmapsError, ProgramError
+from avlmaps.language.program import syntax
 from avlmaps.language.program.budget import Budget, refused
 from avlmaps.language.program.calls import check_exactly_one, parameter_of
 from avlmaps.language.program.check import check_argument, grown, misfit
@@ -18,29 +19,6 @@ from avlmaps.language.program.kinds import (
     check_truth,
     check_unpacked,
     check_walked,
-)
-from avlmaps.language.program.syntax import (
-    Assign,
-    Binary,
-    BuiltinCall,
-    Collection,
-    Comparison,
-    Conditional,
-    Constant,
-    Element,
-    Expression,
-    For,
-    If,
-    Logical,
-    Name,
-    Perform,
-    Program,
-    SkillCall,
-    Statement,
-    Target,
-    Unary,
-    Update,
-    Word,
 )
 from avlmaps.language.program.table import SKILLS
 from avlmaps.language.program.trace import Step, Trace, told
@@ -66,7 +44,7 @@ _STEPS_BETWEEN_LOOKS = 256
 
 
 def run_program(
-    program: Program,
+    program: syntax.Program,
     vocabulary: Vocabulary,
     budget: Budget | None = None,
     on_step: Callable[[Step], None] | None = None,
@@ -166,37 +144,37 @@ class _Run:
 
     # ---- statements
 
-    def block(self, statements: tuple[Statement, ...]) -> _Next:
+    def block(self, statements: tuple[syntax.Statement, ...]) -> _Next:
         for statement in statements:
             after = self.statement(statement)
             if after is not _Next.STATEMENT:
                 return after
         return _Next.STATEMENT
 
-    def statement(self, statement: Statement) -> _Next:
+    def statement(self, statement: syntax.Statement) -> _Next:
         self.step(statement.line)
         match statement:
-            case Assign():
+            case syntax.Assign():
                 self.give(statement.line, statement.target, self.value(statement.value))
-            case Update():
+            case syntax.Update():
                 self.update(statement)
-            case Perform():
+            case syntax.Perform():
                 self.value(statement.call)
-            case If():
+            case syntax.If():
                 return self.block(self.chosen_block(statement))
-            case For():
+            case syntax.For():
                 return self.loop(statement)
-            case Word():
+            case syntax.Word():
                 return _AFTER_WORD[statement.word]
         return _Next.STATEMENT
 
-    def chosen_block(self, statement: If) -> tuple[Statement, ...]:
+    def chosen_block(self, statement: syntax.If) -> tuple[syntax.Statement, ...]:
         for branch in statement.branches:
             if self.truth(branch.test):
                 return branch.body
         return statement.otherwise
 
-    def loop(self, statement: For) -> _Next:
+    def loop(self, statement: syntax.For) -> _Next:
         through = self.value(statement.through)
         check_walked(statement.line, kind_of(through))
         for element in through:
@@ -206,7 +184,7 @@ class _Run:
                 break
         return _Next.STATEMENT
 
-    def give(self, line: int, target: Target, value: Any) -> None:
+    def give(self, line: int, target: syntax.Target, value: Any) -> None:
         if not target.unpacks:
             self.names[target.names[0]] = value
             return
@@ -215,8 +193,8 @@ class _Run:
             raise misfit(line, target, len(value))
         self.names.update(zip(target.names, value, strict=True))
 
-    def update(self, statement: Update) -> None:
-        before = self.value(Name(statement.name, statement.line))
+    def update(self, statement: syntax.Update) -> None:
+        before = self.value(syntax.Name(statement.name, statement.line))
         value = self.value(statement.value)
         if statement.operator == "+" and kind_of(before) is kind_of(value) is Kind.LIST:
             raise grown(statement)
@@ -224,19 +202,19 @@ class _Run:
 
     # ---- expressions
 
-    def value(self, part: Expression) -> Any:
+    def value(self, part: syntax.Expression) -> Any:
         self.step(part.line)
         return _EVALUATE[type(part)](self, part)
 
-    def truth(self, part: Expression) -> bool:
+    def truth(self, part: syntax.Expression) -> bool:
         value = self.value(part)
         check_truth(part.line, kind_of(value))
         return bool(value)
 
-    def constant(self, part: Constant) -> Value:
+    def constant(self, part: syntax.Constant) -> Value:
         return part.value
 
-    def name(self, part: Name) -> Value:
+    def name(self, part: syntax.Name) -> Value:
         try:
             return self.names[part.name]
         except KeyError:
@@ -244,18 +222,18 @@ class _Run:
                 part.line, f"`{part.name}` has no value yet; give it one before, on every way that leads here"
             ) from None
 
-    def collection(self, part: Collection) -> Value:
+    def collection(self, part: syntax.Collection) -> Value:
         elements = [self.value(element) for element in part.elements]
         made = elements if part.is_list else tuple(elements)
         self.keep(part.line, size_of(part.line, made))
         return made
 
-    def unary(self, part: Unary) -> Value:
+    def unary(self, part: syntax.Unary) -> Value:
         if part.operator == "not":
             return not self.truth(part.operand)
         return signed(part.line, part.operator, self.value(part.operand))
 
-    def binary(self, part: Binary) -> Value:
+    def binary(self, part: syntax.Binary) -> Value:
         left = self.value(part.left)
         return self.arithmetic(part.line, part.operator, left, self.value(part.right))
 
@@ -273,7 +251,7 @@ class _Run:
             self.look_at_clock(line)
         return made
 
-    def comparison(self, part: Comparison) -> bool:
+    def comparison(self, part: syntax.Comparison) -> bool:
         left = self.value(part.first)
         for operator, operand in zip(part.operators, part.rest, strict=True):
             right = self.value(operand)
@@ -284,7 +262,7 @@ class _Run:
             left = right
         return True
 
-    def logical(self, part: Logical) -> Value:
+    def logical(self, part: syntax.Logical) -> Value:
         stops_at = part.operator == "or"
         for operand in part.operands[:-1]:
             value = self.value(operand)
@@ -293,15 +271,15 @@ class _Run:
                 return value
         return self.value(part.operands[-1])
 
-    def conditional(self, part: Conditional) -> Value:
+    def conditional(self, part: syntax.Conditional) -> Value:
         return self.value(part.chosen if self.truth(part.test) else part.otherwise)
 
-    def element(self, part: Element) -> Value:
+    def element(self, part: syntax.Element) -> Value:
         of, index = self.value(part.of), self.value(part.index)
         check_indexed(part.line, kind_of(of), kind_of(index))
         return element_of(part.line, of, index)
 
-    def builtin_call(self, part: BuiltinCall) -> Value:
+    def builtin_call(self, part: syntax.BuiltinCall) -> Value:
         arguments = [self.value(argument) for argument in part.arguments]
         kinds = tuple(kind_of(argument) for argument in arguments)
         check_function(part.line, part.function, kinds)
@@ -311,7 +289,7 @@ class _Run:
 
     # ---- skills
 
-    def skill_call(self, part: SkillCall) -> Value:
+    def skill_call(self, part: syntax.SkillCall) -> Value:
         skill = SKILLS[part.skill]
         arguments = {argument.parameter: self.value(argument.value) for argument in part.arguments}
         for name, value in arguments.items():
@@ -327,7 +305,7 @@ class _Run:
         self.keep(part.line, size_of_shown(seen))
         return self.perform(part, arguments, seen)
 
-    def perform(self, part: SkillCall, arguments: dict[str, Any], seen: dict[str, Any]) -> Value:
+    def perform(self, part: syntax.SkillCall, arguments: dict[str, Any], seen: dict[str, Any]) -> Value:
         """Call the skill, the one place where a program reaches anything."""
         skill, began = SKILLS[part.skill], self.clock()
         given = {name: handed_on(value) for name, value in arguments.items()}
@@ -349,17 +327,17 @@ class _Run:
 
 
 _EVALUATE: dict[type, Callable[[_Run, Any], Value]] = {
-    Constant: _Run.constant,
-    Name: _Run.name,
-    Collection: _Run.collection,
-    Unary: _Run.unary,
-    Binary: _Run.binary,
-    Comparison: _Run.comparison,
-    Logical: _Run.logical,
-    Conditional: _Run.conditional,
-    Element: _Run.element,
-    SkillCall: _Run.skill_call,
-    BuiltinCall: _Run.builtin_call,
+    syntax.Constant: _Run.constant,
+    syntax.Name: _Run.name,
+    syntax.Collection: _Run.collection,
+    syntax.Unary: _Run.unary,
+    syntax.Binary: _Run.binary,
+    syntax.Comparison: _Run.comparison,
+    syntax.Logical: _Run.logical,
+    syntax.Conditional: _Run.conditional,
+    syntax.Element: _Run.element,
+    syntax.SkillCall: _Run.skill_call,
+    syntax.BuiltinCall: _Run.builtin_call,
 }
 _COMPARE: dict[str, Callable[[Any, Any], bool]] = {
     "==": lambda left, right: left == right,
