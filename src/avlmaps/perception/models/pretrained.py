@@ -1,0 +1,102 @@
+"""Models of transformers from a local folder: loaded strictly, with one sentence for what does not fit."""
+
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import torch
+
+from avlmaps.core.errors import BackendError
+from avlmaps.perception.models.checksums import weights_in
+from avlmaps.perception.models.files import model_folder
+
+T = TypeVar("T")
+# Constants that transformers works out itself; old checkpoints hold them as if they were weights.
+_COMPUTED = ("position_ids", "token_type_ids", "relative_position_index", "num_batches_tracked", "inv_freq")
+_SMALL = ("*.json", "*.txt", "*.model", "*.jinja")
+
+
+def pretrained_folder(model: str) -> Path:
+    """Return the folder of a model, fetched from the hub if need be: safetensors where it has them, else its ``.bin``.
+
+    Raises:
+        BackendError: it is not here and cannot be fetched, or holds no weights.
+    """
+    folder = model_folder(model)
+    if not weights_in(folder):
+        folder = model_folder(model, (*_SMALL, "pytorch_model*.bin"))
+    if not weights_in(folder):
+        raise BackendError(f"{folder} holds no weights (*.safetensors or *.bin); get it with: hf download {model}")
+    return folder
+
+
+def load_pretrained(
+    kind: type[T],
+    folder: Path,
+    model: str,
+    device: torch.device,
+    precision: torch.dtype,
+    ignored: Collection[str] = (),
+) -> T:
+    """Return a model of transformers, ready for inference on a device, every weight from the checkpoint.
+
+    Nothing but tensors is read from a file, no code is run and no hub is asked.
+
+    Args:
+        kind: its class, such as ``ClapModel``.
+        folder: where its files lie.
+        model: what it is called, for the error.
+        device: where it shall run.
+        precision: of its weights.
+        ignored: beginnings of names in the checkpoint that this use of the model has no need of.
+
+    Raises:
+        BackendError: the checkpoint is of another model, damaged, or not whole.
+    """
+    load: Any = kind
+    try:
+        made, told = load.from_pretrained(
+            folder, output_loading_info=True, local_files_only=True, dtype=precision, weights_only=True
+        )
+    except Exception as fault:  # what transformers, safetensors and torch raise for damaged files is not told apart
+        raise BackendError(
+            f"{folder} cannot be loaded as {kind.__name__} ({type(fault).__name__}: {_short(fault)}); get it again "
+            f"with: hf download {model}"
+        ) from fault
+    missing = _uncomputed(told["missing_keys"])
+    unknown = [name for name in _uncomputed(told["unexpected_keys"]) if not name.startswith(tuple(ignored))]
+    sizes = [str(name) for name, *_ in told.get("mismatched_keys", ())]
+    faults = [
+        f"{what} {', '.join(names[:2])}{f' and {len(names) - 2} more' if len(names) > 2 else ''}"
+        for what, names in (("it lacks", missing), ("nothing takes", unknown), ("of another size is", sizes))
+        if names
+    ]
+    if faults:
+        raise BackendError(
+            f"{folder} is not a whole {kind.__name__}: {'; '.join(faults)}. Get it again with: hf download {model}"
+        )
+    return made.eval().to(device)
+
+
+def load_helper(kind: Any, folder: Path, model: str) -> Any:
+    """Return a tokenizer or feature extractor of transformers from a local folder.
+
+    Raises:
+        BackendError: its files are missing or damaged.
+    """
+    try:
+        return kind.from_pretrained(folder, local_files_only=True)
+    except Exception as fault:
+        raise BackendError(
+            f"{folder} has no {kind.__name__} that can be loaded ({type(fault).__name__}: {_short(fault)}); get all "
+            f"its files with: hf download {model}"
+        ) from fault
+
+
+def _uncomputed(names: Collection[str]) -> list[str]:
+    return sorted(name for name in names if name.rpartition(".")[2] not in _COMPUTED)
+
+
+def _short(fault: Exception, words: int = 24) -> str:
+    said: Sequence[str] = str(fault).split()
+    return " ".join(said[:words]) + (" ..." if len(said) > words else "")
