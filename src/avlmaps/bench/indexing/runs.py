@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
-from typing import Literal
 
 from avlmaps.bench.indexing.configurations import CONFIGURATIONS
 from avlmaps.bench.indexing.metrics import Answered, judged
 from avlmaps.bench.indexing.prepared import SceneJob, Workplace, kinds_of
-from avlmaps.bench.indexing.tasks import Recorded, Task, TaskError, TaskKind, TaskSet, load_tasks, save_tasks
+from avlmaps.bench.indexing.tasks import SceneSettings, Task, TaskError, TaskKind, TaskSet, load_tasks, save_tasks
 from avlmaps.core.progress import progress, say, silence
 from avlmaps.sim.scene import Scene
 from avlmaps.sim.scenes import open_scene
@@ -19,39 +18,17 @@ from avlmaps.sim.scenes import open_scene
 DEFAULT_SCENES = tuple(f"house:{seed}:held-out" for seed in range(1_000_000, 1_000_012))
 
 
-@dataclass(frozen=True, slots=True)
-class IndexingSettings:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IndexingSettings(SceneSettings):
     """What the benchmark is run on.
 
     Attributes:
-        scenes: names of scenes; held-out homes by default.
-        profile: which models map them.
-        hearing: how sounds reach the microphone; a sound's place is the robot's (``overlay``) or its source's.
-        sounds: folder of clips; made by rule if None.
-        sensor: whose faults colour and depth have.
-        frames: at most so many a scene.
-        sources: at most so many sounds a scene.
-        ambiguous: how many kinds of sound are heard in two places.
+        scenes: held-out homes by default.
         tasks_a_scene: at most so many a scene and table.
-        jobs: scenes side by side; 0 takes as many as there are cores.
-        seed: of walks, sounds and tasks.
-        load: tasks to ask instead of making some; how they were recorded comes from the file.
-        save: where to write the tasks.
     """
 
     scenes: tuple[str, ...] = DEFAULT_SCENES
-    profile: str = "embedded"
-    hearing: Literal["overlay", "acoustic"] = "overlay"
-    sounds: Path | None = None
-    sensor: Literal["clean", "kinect", "realsense"] = "clean"
-    frames: int = 600
-    sources: int = 14
-    ambiguous: int = 2
     tasks_a_scene: int = 20
-    jobs: int = 0
-    seed: int = 0
-    load: Path | None = None
-    save: Path | None = None
 
     def __post_init__(self) -> None:
         if self.frames < 20 or self.tasks_a_scene < 1 or self.jobs < 0:
@@ -59,14 +36,6 @@ class IndexingSettings:
                 f"The benchmark cannot run with {self.frames} frames, {self.tasks_a_scene} tasks a scene and "
                 f"{self.jobs} jobs; take at least 20 frames, 1 task, and 0 jobs for as many as there are cores."
             )
-
-    @property
-    def recorded(self) -> Recorded:
-        """How the scenes are recorded."""
-        sounds = "" if self.sounds is None else self.sounds.resolve().name
-        return Recorded(
-            self.hearing, self.frames, self.sources, self.ambiguous, self.sensor, sounds, self.seed
-        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import msgspec
 import numpy as np
@@ -122,6 +122,47 @@ class Recorded:
     sensor: str
     sounds: str
     seed: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneSettings:
+    """Which scenes a benchmark runs on, and how they are recorded and mapped.
+
+    Attributes:
+        scenes: names of scenes.
+        profile: which models map them.
+        hearing: how sounds reach the microphone; a sound's place is the robot's (``overlay``) or its source's.
+        sounds: folder of clips; made by rule if None.
+        sensor: whose faults colour and depth have.
+        frames: at most so many a scene.
+        sources: at most so many sounds a scene.
+        ambiguous: how many kinds of sound are heard in two places.
+        jobs: scenes side by side; 0 takes as many as there are cores.
+        seed: of walks, sounds and all that is asked.
+        load: what to ask instead of making it; how the scenes were recorded comes from the file.
+        save: where to write what is asked.
+    """
+
+    scenes: tuple[str, ...]
+    profile: str = "embedded"
+    hearing: Literal["overlay", "acoustic"] = "overlay"
+    sounds: Path | None = None
+    sensor: Literal["clean", "kinect", "realsense"] = "clean"
+    frames: int = 600
+    sources: int = 14
+    ambiguous: int = 2
+    jobs: int = 0
+    seed: int = 0
+    load: Path | None = None
+    save: Path | None = None
+
+    @property
+    def recorded(self) -> Recorded:
+        """How the scenes are recorded."""
+        sounds = "" if self.sounds is None else self.sounds.resolve().name
+        return Recorded(
+            self.hearing, self.frames, self.sources, self.ambiguous, self.sensor, sounds, self.seed
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,10 +64,11 @@ class Link:
         if find_spec("roslibpy") is None:
             raise BackendError("Driving a ROS robot needs roslibpy; get it with: pip install 'avlmaps[ros]'")
         try:
-            from avlmaps.navigate.ros.wire import Bridge, start_reactor
+            from avlmaps.navigate.ros.wire import Bridge, Listener, start_reactor
 
             start_reactor()
-            bridge = Bridge(self.url, headers, self._arrived, self._unreadable, self._stands, self._over, timeout_s)
+            listener = Listener(self._arrived, self._unreadable, self._stands, self._over)
+            bridge = Bridge(self.url, headers, listener, timeout_s)
         except RuntimeError as fault:
             raise NavigationError(
                 f"No connection to {self.url} can be made from this process ({shown(str(fault), 300)}); start a new "

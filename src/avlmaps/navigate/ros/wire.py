@@ -8,6 +8,7 @@ minutes late is a danger. Here a connection that is lost stays lost, and the dri
 
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from math import ceil
 from typing import Any
 
@@ -26,6 +27,23 @@ _PING_EVERY_S, _PING_WAIT_S = 5.0, 10.0
 _starting = threading.Lock()
 
 
+@dataclass(frozen=True, slots=True)
+class Listener:
+    """Who is told what happens on a connection; all are called in the network's thread.
+
+    Attributes:
+        incoming: a message came.
+        fault: what came is no message.
+        opened: messages can go.
+        over: the connection is lost, or nobody answered; it is told why.
+    """
+
+    incoming: Callable[[Incoming], None]
+    fault: Callable[[str], None]
+    opened: Callable[[], None]
+    over: Callable[[str], None]
+
+
 class _Protocol(AutobahnRosBridgeProtocol):
     """Reads what comes as data, and hands it on; what is no message is counted and left out."""
 
@@ -37,9 +55,9 @@ class _Protocol(AutobahnRosBridgeProtocol):
             if isBinary:
                 raise ValueError("binary")
             message = msgspec.json.decode(payload, type=Incoming)
-            self.factory.on_incoming(message)
+            self.factory.listener.incoming(message)
         except (ValueError, TypeError, RecursionError) as fault:
-            self.factory.on_fault(shown(str(fault)))
+            self.factory.listener.fault(shown(str(fault)))
 
     def onClose(self, wasClean: bool, code: int | None, reason: str | None) -> None:  # noqa: N802, N803
         """Keep why the connection ended."""
@@ -61,18 +79,9 @@ class _Factory(AutobahnRosBridgeClientFactory):
     maxRetries = 0  # noqa: N815 - twisted's name
     noisy = False
 
-    def __init__(
-        self,
-        url: str,
-        headers: Mapping[str, str],
-        on_incoming: Callable[[Incoming], None],
-        on_fault: Callable[[str], None],
-        on_open: Callable[[], None],
-        on_over: Callable[[str], None],
-        timeout_s: float,
-    ) -> None:
+    def __init__(self, url: str, headers: Mapping[str, str], listener: Listener, timeout_s: float) -> None:
         super().__init__(url, headers=dict(headers))
-        self.on_incoming, self.on_fault, self.on_open, self.on_over = on_incoming, on_fault, on_open, on_over
+        self.listener = listener
         self.timeout_s = timeout_s
         self.told = ""
         self.setProtocolOptions(
@@ -96,16 +105,16 @@ class _Factory(AutobahnRosBridgeClientFactory):
     def ready(self, proto: AutobahnRosBridgeProtocol) -> None:
         """Take note that messages can go."""
         super().ready(proto)
-        self.on_open()
+        self.listener.opened()
 
     def clientConnectionLost(self, connector: Any, reason: Any) -> None:  # noqa: N802 - twisted's name
         """Take note that it is over."""
         self._proto = None
-        self.on_over(self.told or shown(reason.getErrorMessage()))
+        self.listener.over(self.told or shown(reason.getErrorMessage()))
 
     def clientConnectionFailed(self, connector: Any, reason: Any) -> None:  # noqa: N802 - twisted's name
         """Take note that nobody answered."""
-        self.on_over(shown(reason.getErrorMessage()))
+        self.listener.over(shown(reason.getErrorMessage()))
 
     def drop(self) -> None:
         """End the connection in any state; from any thread."""
@@ -122,18 +131,9 @@ class _Factory(AutobahnRosBridgeClientFactory):
 class Bridge(roslibpy.Ros):
     """roslibpy's connection over the factory above; its topics work on it as on any other."""
 
-    def __init__(
-        self,
-        url: str,
-        headers: Mapping[str, str],
-        on_incoming: Callable[[Incoming], None],
-        on_fault: Callable[[str], None],
-        on_open: Callable[[], None],
-        on_over: Callable[[str], None],
-        timeout_s: float,
-    ) -> None:
-        """Begin to connect. All that is given is called in the network's thread."""
-        self._mine = _Factory(url, headers, on_incoming, on_fault, on_open, on_over, timeout_s)
+    def __init__(self, url: str, headers: Mapping[str, str], listener: Listener, timeout_s: float) -> None:
+        """Begin to connect."""
+        self._mine = _Factory(url, headers, listener, timeout_s)
         super().__init__(url)
 
     def connect(self) -> None:
