@@ -59,11 +59,11 @@ class ClipTextSizes:
 
 
 class _Attention(nn.Module):
-    """Self-attention in which a token sees itself and those before it."""
+    """Self-attention; a causal one lets a token see itself and those before it only."""
 
-    def __init__(self, width: int, heads: int) -> None:
+    def __init__(self, width: int, heads: int, causal: bool) -> None:
         super().__init__()
-        self.heads = heads
+        self.heads, self.causal = heads, causal
         self.in_proj_weight = nn.Parameter(torch.zeros(3 * width, width))
         self.in_proj_bias = nn.Parameter(torch.zeros(3 * width))
         self.out_proj = nn.Linear(width, width)
@@ -72,7 +72,7 @@ class _Attention(nn.Module):
         n, length, width = x.shape
         mixed = functional.linear(x, self.in_proj_weight, self.in_proj_bias)
         query, key, value = mixed.view(n, length, 3, self.heads, width // self.heads).permute(2, 0, 3, 1, 4)
-        seen = functional.scaled_dot_product_attention(query, key, value, is_causal=True)
+        seen = functional.scaled_dot_product_attention(query, key, value, is_causal=self.causal)
         return self.out_proj(seen.transpose(1, 2).reshape(n, length, width))
 
 
@@ -83,10 +83,12 @@ class _QuickGelu(nn.Module):
         return x * torch.sigmoid(1.702 * x)
 
 
-class _Block(nn.Module):
-    def __init__(self, width: int, heads: int) -> None:
+class ClipBlock(nn.Module):
+    """One layer of either tower: attention and two linear layers, each before its own residual."""
+
+    def __init__(self, width: int, heads: int, causal: bool = True) -> None:
         super().__init__()
-        self.attn = _Attention(width, heads)
+        self.attn = _Attention(width, heads, causal)
         self.ln_1 = nn.LayerNorm(width)
         self.mlp = nn.Sequential(
             OrderedDict(c_fc=nn.Linear(width, 4 * width), gelu=_QuickGelu(), c_proj=nn.Linear(4 * width, width))
@@ -107,7 +109,7 @@ class ClipTextTower(nn.Module):
         self.token_embedding = nn.Embedding(sizes.tokens, sizes.width)
         self.positional_embedding = nn.Parameter(torch.zeros(sizes.context, sizes.width))
         self.transformer = nn.Module()
-        self.transformer.resblocks = nn.Sequential(*(_Block(sizes.width, sizes.heads) for _ in range(sizes.layers)))
+        self.transformer.resblocks = nn.Sequential(*(ClipBlock(sizes.width, sizes.heads) for _ in range(sizes.layers)))
         self.ln_final = nn.LayerNorm(sizes.width)
         self.text_projection = nn.Parameter(torch.zeros(sizes.width, sizes.dim))
 
