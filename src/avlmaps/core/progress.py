@@ -3,7 +3,7 @@
 import os
 import sys
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
@@ -42,7 +42,13 @@ def _keep_lock_to_this_process(bar: type) -> None:
 
 
 def progress(
-    items: Iterable[T], label: str, *, total: int | None = None, done: int = 0, unit: str = "frame"
+    items: Iterable[T],
+    label: str,
+    *,
+    total: int | None = None,
+    done: int = 0,
+    unit: str = "frame",
+    note: Callable[[], str] | None = None,
 ) -> Iterator[T]:
     """Yield the items and show how far and how fast it goes.
 
@@ -52,6 +58,7 @@ def progress(
         total: how many there will be in all, where ``len`` cannot tell.
         done: how many were done before (a resumed run).
         unit: what one item is.
+        note: asked at each item for a few words to put behind the bar.
     """
     from tqdm import tqdm
 
@@ -71,7 +78,10 @@ def progress(
     )
     _open_bars.append(bar)
     try:
-        yield from bar
+        for item in bar:
+            if note is not None:
+                bar.set_postfix_str(note(), refresh=False)
+            yield item
     finally:
         bar.close()
         _open_bars.remove(bar)

@@ -18,31 +18,12 @@ def run_ahead(items: Iterable[T], depth: int = 2) -> Generator[T]:
     """Yield the items in their order, made by a background thread that is at most ``depth`` items ahead.
 
     An exception of the producer comes out here, where its item would have come. When the consumer stops early (an
-    exception, ``close``), the thread stops after the item at hand and is waited for.
+    exception, ``close``), the thread stops after the item at hand and is waited for; a generator that makes the items
+    is closed in that thread, so that producers may run ahead of one another in a row.
     """
     ready: queue.Queue[Any] = queue.Queue(maxsize=max(depth, 1))
     stop = threading.Event()
-
-    def hand_over(item: Any) -> None:
-        while not stop.is_set():
-            try:
-                ready.put(item, timeout=0.05)
-            except queue.Full:
-                continue
-            return
-
-    def produce() -> None:
-        fault: BaseException | None = None
-        try:
-            for item in items:
-                if stop.is_set():
-                    return
-                hand_over(item)
-        except BaseException as raised:  # noqa: BLE001 - raised again by the consumer
-            fault = raised
-        hand_over(_End(fault))
-
-    thread = threading.Thread(target=produce, name="avlmaps-ahead", daemon=True)
+    thread = threading.Thread(target=_produce, args=(items, ready, stop), name="avlmaps-ahead", daemon=True)
     thread.start()
     try:
         while not isinstance(item := ready.get(), _End):
@@ -52,3 +33,27 @@ def run_ahead(items: Iterable[T], depth: int = 2) -> Generator[T]:
     finally:
         stop.set()
         thread.join()
+
+
+def _produce(items: Iterable[Any], ready: queue.Queue[Any], stop: threading.Event) -> None:
+    fault: BaseException | None = None
+    try:
+        for item in items:
+            if stop.is_set():
+                return
+            _hand_over(item, ready, stop)
+    except BaseException as raised:  # noqa: BLE001 - raised again by the consumer
+        fault = raised
+    finally:
+        if isinstance(items, Generator):
+            items.close()
+    _hand_over(_End(fault), ready, stop)
+
+
+def _hand_over(item: Any, ready: queue.Queue[Any], stop: threading.Event) -> None:
+    while not stop.is_set():
+        try:
+            ready.put(item, timeout=0.05)
+        except queue.Full:
+            continue
+        return

@@ -11,18 +11,22 @@ from avlmaps.maps.plan import claim, make_plan
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.stages import commit, find_up, fuse, hear_sounds, merge, stand
 from avlmaps.maps.stored import StoredMap, describe, open_stored
+from avlmaps.perception.models.feature_store import DEFAULT_CACHE, CacheSettings
+from avlmaps.perception.models.remembering import remembering
+from avlmaps.perception.profiles import Profile
 from avlmaps.perception.profiles import profile as profile_of
 from avlmaps.recordings.types import Recording
 
-__all__ = ["BuildSettings", "build_map", "build_part", "describe", "merge_parts", "open_stored"]
+__all__ = ["BuildSettings", "CacheSettings", "build_map", "build_part", "describe", "merge_parts", "open_stored"]
 
 
 def build_map(
     recording: Recording,
     path: Path | str,
-    profile: str = "embedded",
+    profile: str | Profile = "embedded",
     settings: BuildSettings = DEFAULTS,
     *,
+    cache: CacheSettings = DEFAULT_CACHE,
     parts: Sequence[Path | str] = (),
     resume: bool = True,
     overwrite: bool = False,
@@ -36,8 +40,9 @@ def build_map(
     Args:
         recording: from ``open_recording``.
         path: the map's folder, by custom ``NAME.avlmap``.
-        profile: which models perceive.
+        profile: which models perceive: a profile's name, or a profile with others chosen (``Profile.choosing``).
         settings: all that can be chosen.
+        cache: whether features are kept, so that another build of the same frames encodes nothing again.
         parts: folders of ``build_part`` from other machines; their frames are not fused again.
         resume: go on with what a stopped build had finished; otherwise begin anew.
         overwrite: replace a finished map there that came from another recording, or with other settings.
@@ -48,7 +53,7 @@ def build_map(
         RecordingError: too many frames cannot be read, or none has depth.
         BackendError: the profile is not known, or a package for it is missing.
     """
-    plan = make_plan(recording, Path(path), profile_of(profile), settings)
+    plan = make_plan(recording, Path(path), remembering(profile_of(profile), cache), settings)
     with silenced(not progress), locked(plan.path):
         if claim(plan, resume, overwrite) is None:
             up = find_up(plan)

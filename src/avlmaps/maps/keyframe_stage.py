@@ -1,29 +1,34 @@
 """The build's keyframe stage: some keyframes at a time, each lot kept when it has been looked at."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from time import perf_counter
 
 import msgspec
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float32, Int
 
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
+from avlmaps.maps.ahead import run_ahead
 from avlmaps.maps.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
-from avlmaps.maps.checks import RAGGED, array_fields, assembled
+from avlmaps.maps.checks import RAGGED, ROWS_OR_NONE, array_fields, assembled
 from avlmaps.maps.keyframes import assembled as put_together
 from avlmaps.maps.keyframes import learn_places, see_keyframe, select_keyframes
 from avlmaps.maps.parts import BUILD_VERSION, Part
 from avlmaps.maps.plan import Plan
 from avlmaps.maps.types import Keyframes
-from avlmaps.perception.protocols import LocalFeatures
+from avlmaps.perception.models.remembering import came_from_store
+from avlmaps.perception.protocols import LocalFeatures, ViewEncoder
 from avlmaps.recordings.subset import Subset
-from avlmaps.recordings.types import Recording
+from avlmaps.recordings.types import Frame, Recording
 
 _RANDOMNESS = 2  # number of the stage as a source of randomness (gravity has 1)
+_VIEWS_ON_TORCH = 16  # so many views are handed to a large model at once
+_Viewed = tuple[int, Frame, Float32[np.ndarray, " dv"]]
 
 
 class _Facts(msgspec.Struct):
@@ -82,19 +87,50 @@ def _look(
     key: str,
 ) -> None:
     """Look at lots of keyframes and keep each in its folder."""
-    every = [int(index) for lot in lots.values() for index in lot]
-    ahead = progress(every, "seeing", total=total, done=total - len(every), unit="keyframe")
-    for folder, lot in lots.items():
-        begin = perf_counter()
-        seen = [
-            see_keyframe(good.frame(index), plan.used, place_state, plan.settings.keyframes, local.get(index))
-            for index in islice(ahead, len(lot))
-        ]
-        pieces = put_together(seen)
-        arrays = {name: getattr(pieces, name) for name in array_fields(Keyframes)}
-        save_checkpoint(folder, key, _Facts(perf_counter() - begin), arrays)
-    for _ in ahead:  # nothing is left; this completes the bar
-        pass
+    left = sum(map(len, lots.values()))
+    blind = replace(plan.used, views="")  # the views are encoded ahead, in batches
+    with closing(_viewed(plan, good, list(lots.values()))) as viewed:
+        ahead = progress(
+            viewed, "seeing", total=total, done=total - left, unit="keyframe", note=lambda: _from_store(plan)
+        )
+        for folder, lot in lots.items():
+            begin = perf_counter()
+            seen = [
+                replace(see_keyframe(frame, blind, place_state, plan.settings.keyframes, local.get(index)), view=view)
+                for index, frame, view in islice(ahead, len(lot))
+            ]
+            pieces = put_together(seen)
+            arrays = {name: getattr(pieces, name) for name in array_fields(Keyframes)}
+            save_checkpoint(folder, key, _Facts(perf_counter() - begin), arrays)
+        for _ in ahead:  # nothing is left; this completes the bar
+            pass
+
+
+def _viewed(plan: Plan, good: Recording, lots: Sequence[Int[np.ndarray, " k"]]) -> Generator[_Viewed]:
+    """Yield keyframes with their view features; decoding and encoding each run ahead in a thread."""
+    encoder = plan.used.view_encoder() if plan.used.views else None
+    size = _VIEWS_ON_TORCH if plan.used.on_torch(Kind.VIEWS) else 1
+    frames = ((int(index), good.frame(int(index))) for lot in lots for index in lot)
+    with closing(run_ahead(frames, max(2, size))) as decoded:
+        yield from run_ahead(_encoded(decoded, list(map(len, lots)), encoder, size), max(2, size))
+
+
+def _encoded(
+    decoded: Iterator[tuple[int, Frame]], lengths: Sequence[int], encoder: ViewEncoder | None, size: int
+) -> Generator[_Viewed]:
+    """Encode views, at most ``size`` at once; no batch reaches from one lot into the next."""
+    for length in lengths:
+        lot = islice(decoded, length)
+        while group := list(islice(lot, size)):
+            views = encoder.encode([frame for _, frame in group]) if encoder else np.zeros((len(group), 0), np.float32)
+            yield from ((index, frame, view) for (index, frame), view in zip(group, views, strict=True))
+
+
+def _from_store(plan: Plan) -> str:
+    """Tell how many keyframes need nothing new: whatever they have least of in the store."""
+    kinds = (Kind.VIEWS, Kind.LOCAL, Kind.PLACE)
+    told = [came_from_store(plan.used, kind) for kind in kinds if plan.used.backend_name(kind)]
+    return min((words for words in told if words), key=lambda words: int(words.split()[0]), default="")
 
 
 def fused_frames(parts: Sequence[Part]) -> Int[np.ndarray, " n"]:
@@ -112,4 +148,8 @@ def joined(pieces: Sequence[Keyframes]) -> Keyframes:
     for offsets, _ in RAGGED[Keyframes]:
         lengths = np.concatenate([np.diff(piece) for piece in arrays[offsets]])
         arrays[offsets] = [np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)]
-    return Keyframes(**{name: np.concatenate(values) for name, values in arrays.items()})
+    whole = {name: np.concatenate(values) for name, values in arrays.items()}
+    for some, rows in ROWS_OR_NONE[Keyframes]:
+        if len(whole[some]) != len(whole[rows]):  # not known of every piece
+            whole[some] = whole[some][:0]
+    return Keyframes(**whole)

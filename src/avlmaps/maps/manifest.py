@@ -12,6 +12,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.shards import FileInfo, writing_into
+from avlmaps.perception.models.names import public_choice, public_name
 from avlmaps.perception.protocols import ModelCard
 
 SCHEMA_VERSION = 1
@@ -23,7 +24,9 @@ Vector = tuple[float, float, float]
 class ModelInfo(msgspec.Struct, frozen=True, kw_only=True):
     """A model that made features of this map: its card, and the backend's name in the profile.
 
-    ``normalisation`` is that of the stored features; there is one as yet.
+    ``backend`` is ``name@model`` where a backend can run several. Of a model that was given as a path only the name is
+    kept, here and in ``id``: where it lay is nobody's business. ``normalisation`` is that of the stored features; there
+    is one as yet.
     """
 
     backend: str
@@ -39,8 +42,8 @@ class ModelInfo(msgspec.Struct, frozen=True, kw_only=True):
     def of(cls, backend: str, card: ModelCard) -> "ModelInfo":
         """Return the entry for a backend."""
         return cls(
-            backend=backend,
-            id=card.id,
+            backend=public_choice(backend, card.id),
+            id=public_name(card.id),
             dim=card.dim,
             licence=card.licence,
             checksum=card.checksum,

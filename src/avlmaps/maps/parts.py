@@ -5,7 +5,7 @@ A stopped build goes on from the parts that it had finished, and machines that s
 """
 
 import dataclasses
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import islice
@@ -14,25 +14,27 @@ from time import perf_counter
 
 import msgspec
 import numpy as np
-from jaxtyping import Float32
 
 from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.core.progress import progress
-from avlmaps.maps.ahead import run_ahead
+from avlmaps.core.registry import Kind
 from avlmaps.maps.checkpoints import Checkpoint, find_checkpoint, key_of, load_checkpoint, save_checkpoint
 from avlmaps.maps.fusion import VoxelAccumulator, VoxelSums
 from avlmaps.maps.gravity_stage import grounded
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.manifest import BadFrame
+from avlmaps.maps.perceiving import Perceived, perceived
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
-from avlmaps.perception.profiles import Profile, profile
+from avlmaps.perception.models.feature_store import DEFAULT_CACHE, CacheSettings
+from avlmaps.perception.models.remembering import came_from_store, remembering
+from avlmaps.perception.profiles import Profile
+from avlmaps.perception.profiles import profile as profile_of
 from avlmaps.perception.protocols import PixelEncoder
-from avlmaps.recordings.types import Frame, Recording
+from avlmaps.recordings.types import Recording
 
 BUILD_VERSION = 2  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
 
 Span = tuple[int, int, int]
-_Perceived = tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]
 
 
 class PartInfo(msgspec.Struct, frozen=True, kw_only=True):
@@ -113,8 +115,9 @@ def build_part(
     start: int,
     stop: int,
     out: Path | str,
-    profile_name: str = "embedded",
+    profile: str | Profile = "embedded",
     settings: BuildSettings = DEFAULTS,
+    cache: CacheSettings = DEFAULT_CACHE,
 ) -> Part:
     """Fuse the frames ``start`` to ``stop - 1`` and keep their sums in a folder, as one machine's part of a map.
 
@@ -123,13 +126,14 @@ def build_part(
         start: first frame, from 0.
         stop: one past the last frame.
         out: the part's folder; a part that is there already, of the same frames and settings, is returned.
-        profile_name: which models perceive.
+        profile: which models perceive.
         settings: the same on all machines.
+        cache: whether features are kept for another build.
 
     Raises:
         MapError: there are no such frames, or too many of them cannot be read.
     """
-    out, used = Path(out), profile(profile_name)
+    out, used = Path(out), remembering(profile_of(profile), cache)
     settings = settings.for_profile(used.weight_variance_m2)
     if not 0 <= start < stop <= len(recording):
         raise MapError(f"There are no frames {start} to {stop}; {recording.path} has frames 0 to {len(recording)}.")
@@ -239,7 +243,7 @@ def fuse_spans(
     known_bad: Sequence[BadFrame] = (),
     done: int = 0,
 ) -> None:
-    """Fuse stretches of frames, each into a part of its own; perception runs ahead of fusion in its own thread.
+    """Fuse stretches of frames, each into a part of its own; decoding and encoding run ahead of fusion.
 
     Args:
         recording: where the frames are.
@@ -257,9 +261,10 @@ def fuse_spans(
         return
     key, encoder = fusion_key(recording, settings, used), pixel_encoder_of(used)
     tolerance = Tolerance(recording, settings, known_bad)
-    every = [index for span, _ in jobs for index in range(*span)]
-    with closing(run_ahead(_perceived(recording, every, encoder))) as ahead:
-        seen = progress(ahead, "fusing", total=done + len(every), done=done)
+    stretches = [range(*span) for span, _ in jobs]
+    total_frames = done + sum(map(len, stretches))
+    with closing(perceived(recording, stretches, encoder)) as ahead:
+        seen = progress(ahead, "fusing", total=total_frames, done=done, note=lambda: came_from_store(used, Kind.PIXELS))
         for span, folder in jobs:
             begin = perf_counter()
             total = VoxelAccumulator(
@@ -278,7 +283,7 @@ def fuse_spans(
             pass
 
 
-def _fuse(seen: Iterable[_Perceived], total: VoxelAccumulator, tolerance: Tolerance) -> list[BadFrame]:
+def _fuse(seen: Iterable[Perceived], total: VoxelAccumulator, tolerance: Tolerance) -> list[BadFrame]:
     """Add frames up; return those that could not be read."""
     bad: list[BadFrame] = []
     for frame, features in seen:
@@ -288,21 +293,6 @@ def _fuse(seen: Iterable[_Perceived], total: VoxelAccumulator, tolerance: Tolera
         else:
             total.add(frame, features)
     return bad
-
-
-def _perceived(recording: Recording, frames: Sequence[int], encoder: PixelEncoder | None) -> Generator[_Perceived]:
-    for index in frames:
-        try:
-            frame = recording.frame(index)
-        except RecordingError as fault:
-            yield BadFrame(index=index, why=without_place(str(fault), recording)), None
-            continue
-        yield frame, None if encoder is None else encoder.encode(frame)
-
-
-def without_place(sentence: str, recording: Recording) -> str:
-    """Return a sentence about a recording without the folders that it lies in: a map may travel."""
-    return sentence.replace(str(recording.path), recording.path.name)
 
 
 def _arrays(sums: VoxelSums) -> dict[str, np.ndarray]:

@@ -61,7 +61,7 @@ def make_plan(recording: Recording, path: Path, used: Profile, settings: BuildSe
     if not is_map_or_free(path):
         raise MapError(f"{path} is there already and is no map; give another --out, nothing in it was touched.")
     settings = settings.for_profile(used.weight_variance_m2)
-    models = {kind.value: ModelInfo.of(used.backend_name(kind), card) for kind, card in used.cards().items()}
+    models = {kind.value: ModelInfo.of(used.chosen(kind), card) for kind, card in used.cards().items()}
     key = key_of("map", BUILD_VERSION, recording.fingerprint, audio_key(recording), used.name, models, settings)
     return Plan(recording, path, used, settings, models, key, fusion_key(recording, settings, used))
 

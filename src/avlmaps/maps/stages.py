@@ -29,8 +29,8 @@ from avlmaps.maps.parts import (
     fuse_spans,
     load_part,
     plan_spans,
-    without_place,
 )
+from avlmaps.maps.perceiving import without_place
 from avlmaps.maps.plan import Plan, audio_key
 from avlmaps.maps.store import MapContent, write_map
 from avlmaps.maps.types import HeardSounds, Voxels

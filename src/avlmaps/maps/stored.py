@@ -17,6 +17,7 @@ from avlmaps.maps.lock import is_locked
 from avlmaps.maps.manifest import MANIFEST, MapInfo, parse_manifest
 from avlmaps.maps.shards import FileInfo, checked_path, read_array
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
+from avlmaps.perception.models.names import public_choice, public_name
 from avlmaps.perception.profiles import Profile, profile
 
 PARTS = "parts"
@@ -66,12 +67,16 @@ class StoredMap:
             raise MapError(
                 f"{self.path} was built without a model for {kind.value}; build it with a profile that has one."
             )
-        card = self.profile.cards()[kind]
-        if (card.id, card.dim, card.checksum) != (made_by.id, made_by.dim, made_by.checksum):
+        card = self.profile.card(kind)
+        here = public_name(card.id)
+        # An imported map does not know its weights (checksum ""); what is known of them must still agree.
+        if (here, card.dim, card.checksum) != (made_by.id, made_by.dim, made_by.checksum or card.checksum):
+            instead = f"use avlmaps {self.info.avlmaps_version}"
+            if "@" in made_by.backend:
+                instead = f"name the folder that holds {made_by.id} as it was (--models DIR)"
             raise MapError(
-                f"{self.path} was built with {made_by.id} (checksum {made_by.checksum[:8]}), this avlmaps has "
-                f"{card.id} ({card.checksum[:8]}) for {kind.value}; build it again, or use avlmaps "
-                f"{self.info.avlmaps_version}."
+                f"{self.path} was built with {made_by.id} (checksum {made_by.checksum[:8] or 'unknown'}), this avlmaps has "
+                f"{here} ({card.checksum[:8]}) for {kind.value}; build it again, or {instead}."
             )
 
 
@@ -133,7 +138,10 @@ def _manifest_content(path: Path) -> bytes:
 
 def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
     try:
-        used_profile = profile(info.profile)
+        # The models that it was built with, whatever the profile of that name has come to hold since.
+        used_profile = profile(info.profile).remembered(
+            {kind: public_choice(model.backend) for kind, model in info.models.items()}
+        )
     except BackendError as fault:
         raise MapError(f"{path / MANIFEST} is of a profile that is not known here. {fault}") from fault
     try:

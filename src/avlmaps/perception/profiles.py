@@ -47,6 +47,8 @@ class Profile:
     def choosing(self, choices: Mapping[Kind, str]) -> "Profile":
         """Return the profile with other backends or models (``name``, ``name@model``) for some of its modules.
 
+        Other keypoints bring the matcher that was made for them, unless a matcher is chosen, too.
+
         Raises:
             BackendError: there is no such backend, or none of these modules is perceived by a profile.
         """
@@ -54,7 +56,29 @@ class Profile:
             if kind is Kind.WORDS:
                 raise BackendError("Words are read by each model's own text encoder; there is none to choose.")
             find(kind, name.partition("@")[0])
-        return replace(self, **{kind.value: name for kind, name in choices.items()})
+        chosen = {kind.value: name for kind, name in choices.items()}
+        if Kind.LOCAL in choices and Kind.MATCHER not in choices:
+            chosen[Kind.MATCHER.value] = _MATCHER_OF.get(choices[Kind.LOCAL].partition("@")[0], "mutual-ratio")
+        return replace(self, **chosen)
+
+    def remembered(self, backends: Mapping[str, str]) -> "Profile":
+        """Return the profile of exactly these backends (``name`` or ``name@model`` by module), as a map names them.
+
+        None of them need be installed until it is asked for something.
+        """
+        perceived = [kind for kind in Kind if kind is not Kind.WORDS]
+        return replace(self, **{kind.value: backends.get(kind.value, "") for kind in perceived})
+
+    def chosen(self, kind: Kind) -> str:
+        """Return a module's backend with its model: ``name@model``, the default one if no other is chosen."""
+        name, _, model = self.backend_name(kind).partition("@")
+        model = model or (find(kind, name).model if name else "")
+        return f"{name}@{model}" if model else name
+
+    def on_torch(self, kind: Kind) -> bool:
+        """Tell whether a module's backend is a large model on torch, as far as the registry knows."""
+        name = self.backend_name(kind).partition("@")[0]
+        return bool(name) and "torch" in find(kind, name).needs
 
     def backend_name(self, kind: Kind) -> str:
         """Return the name of the backend for a module, ``""`` for none."""
@@ -95,9 +119,15 @@ class Profile:
     def cards(self) -> dict[Kind, ModelCard]:
         """Return the card of every model in the profile."""
         kinds = [kind for kind in Kind if kind is not Kind.WORDS and self.backend_name(kind)]
-        return {kind: cast(ModelCard, self._require(kind).card) for kind in kinds}  # pyright: ignore[reportAttributeAccessIssue]
+        return {kind: self.card(kind) for kind in kinds}
+
+    def card(self, kind: Kind) -> ModelCard:
+        """Return one module's card; no other model is loaded for it. Raises ``BackendError`` where there is none."""
+        return cast(ModelCard, self._require(kind).card)  # pyright: ignore[reportAttributeAccessIssue]
 
 
+# What a matcher has learnt holds for the keypoints that it learnt on.
+_MATCHER_OF = {"disk": "lightglue-disk", "aliked": "lightglue-aliked", "superpoint": "superglue"}
 _PROFILES: dict[str, Profile] = {}
 
 
@@ -111,12 +141,15 @@ def profiles() -> list[Profile]:
     return list(_PROFILES.values())
 
 
-def profile(name: str) -> Profile:
-    """Return the profile of that name.
+def profile(name: str | Profile) -> Profile:
+    """Return the profile of that name; one that is given is made known where no other has its name.
 
     Raises:
         BackendError: there is none.
     """
+    if isinstance(name, Profile):
+        _PROFILES.setdefault(name.name, name)
+        return name
     if name not in _PROFILES:
         raise BackendError(f"There is no profile called {name!r}; known are: {', '.join(_PROFILES)}.")
     return _PROFILES[name]

@@ -1,4 +1,4 @@
-"""Where a person's own things are kept: the sounds they taught."""
+"""Where a person's own things are kept: the sounds they taught, and what can be worked out again."""
 
 import os
 import sys
@@ -20,4 +20,22 @@ def user_folder() -> Path:
         base = Path.home() / "Library" / "Application Support"
     else:
         base = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share")
+    return base / "avlmaps"
+
+
+def cache_folder() -> Path:
+    """Return the folder for what can be worked out again and may be deleted at any time; it need not exist yet.
+
+    ``cache`` in ``AVLMAPS_HOME`` where that is set; else ``%LOCALAPPDATA%`` on Windows, ``~/Library/Caches`` on macOS
+    and ``$XDG_CACHE_HOME`` (``~/.cache``) elsewhere, and ``avlmaps`` in it.
+    """
+    own = os.environ.get("AVLMAPS_HOME")
+    if own:
+        return Path(own).expanduser() / "cache"
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return base / "avlmaps"

@@ -4,11 +4,12 @@ What a map depends on (which model, its checksum) is in its cards; these say how
 """
 
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import forget_loaded
@@ -50,17 +51,36 @@ def from_environment() -> ModelSettings:
     Raises:
         BackendError: one of them is no such value.
     """
-    batch = os.environ.get("AVLMAPS_BATCH", "0")
+    batch = os.environ.get("AVLMAPS_BATCH") or "0"
     if not batch.isdecimal():
         raise BackendError(f"AVLMAPS_BATCH is {batch!r}; set a whole number, 0 for automatic.")
     folder = os.environ.get("AVLMAPS_MODELS")
     return ModelSettings(
         folder=Path(folder).expanduser() if folder else None,
-        device=os.environ.get("AVLMAPS_DEVICE", "auto"),
-        precision=os.environ.get("AVLMAPS_PRECISION", "auto"),  # pyright: ignore[reportArgumentType] - checked there
+        device=os.environ.get("AVLMAPS_DEVICE") or "auto",
+        precision=os.environ.get("AVLMAPS_PRECISION") or "auto",  # pyright: ignore[reportArgumentType] - checked there
         batch=int(batch),
         offline=os.environ.get("HF_HUB_OFFLINE", "").upper() in ("1", "TRUE", "YES", "ON"),
     )
+
+
+def environment_of(settings: ModelSettings) -> dict[str, str]:
+    """Return the environment variables that say the same, for processes that this one starts."""
+    return {
+        "AVLMAPS_MODELS": "" if settings.folder is None else str(settings.folder.absolute()),
+        "AVLMAPS_DEVICE": settings.device,
+        "AVLMAPS_PRECISION": settings.precision,
+        "AVLMAPS_BATCH": str(settings.batch),
+        "HF_HUB_OFFLINE": "1" if settings.offline else "0",
+    }
+
+
+def precision_in_force() -> str:
+    """Return the precision in which models on torch run here, ``auto`` resolved once one of them has been loaded."""
+    torch_side: Any = sys.modules.get("avlmaps.perception.models.device")  # this module stays without torch
+    if torch_side is None:
+        return model_settings().precision
+    return str(torch_side.chosen_type(torch_side.chosen_device())).removeprefix("torch.")
 
 
 @dataclass(slots=True)

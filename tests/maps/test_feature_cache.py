@@ -1,0 +1,367 @@
+"""Features are made once: what the store keeps, what it finds, what it lets go, and maps that are the same with it."""
+
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from build_fakes import SETTINGS, Corners, Ears, Pixels, Places, Walk, register_fakes, write_beeps
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as some
+
+from avlmaps.core.errors import BackendError
+from avlmaps.core.registry import Backend, Kind, register
+from avlmaps.maps.build import build_map, build_part
+from avlmaps.maps.settings import BuildSettings
+from avlmaps.perception.models.feature_store import CacheSettings, FeatureStore, key_of
+from avlmaps.perception.models.remembering import RememberingKeypoints, RememberingPixels, came_from_store, remembering
+from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.profiles import Profile, profile
+from avlmaps.perception.protocols import LocalFeatures
+from avlmaps.recordings.types import Frame, Ground
+
+register_fakes()
+CARD = Pixels.card
+COUNTS: dict[str, int] = {}
+
+
+def _count(what: str, how_many: int = 1) -> None:
+    COUNTS[what] = COUNTS.get(what, 0) + how_many
+
+
+class CountedPixels(Pixels):
+    def encode(self, frame: Frame) -> np.ndarray:
+        _count("pixels")
+        return super().encode(frame)
+
+
+class CountedViews:
+    card = CARD
+
+    def encode(self, frames: Sequence[Frame]) -> np.ndarray:
+        _count("views", len(frames))
+        rows = np.stack([frame.rgb[:2, :2, 0].reshape(4) + 1.0 for frame in frames])
+        return (rows / np.linalg.norm(rows, axis=1, keepdims=True)).astype(np.float32)
+
+
+class CountedCorners(Corners):
+    def encode(self, rgb: np.ndarray) -> LocalFeatures:
+        _count("local")
+        return super().encode(rgb)
+
+
+class CountedPlaces(Places):
+    def encode(self, rgb: np.ndarray, local: LocalFeatures, state: dict[str, np.ndarray]) -> np.ndarray:
+        _count("place")
+        return super().encode(rgb, local, state)
+
+
+class CountedEars(Ears):
+    def encode(self, sound: object) -> np.ndarray:
+        _count("sounds")
+        return super().encode(sound)
+
+
+MAKERS = {
+    Kind.PIXELS: CountedPixels,
+    Kind.VIEWS: CountedViews,
+    Kind.LOCAL: CountedCorners,
+    Kind.PLACE: CountedPlaces,
+    Kind.SOUNDS: CountedEars,
+}
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("AVLMAPS_HOME", str(tmp_path / "home"))
+    COUNTS.clear()
+    return tmp_path / "home"
+
+
+def counted(name: str, *needs: str) -> Profile:
+    """Return a profile of fakes that count; ``torch`` among the needs passes them off as large models."""
+    for kind, maker in MAKERS.items():
+        register(Backend(kind, name, f"{__name__}:{maker.__name__}", needs=needs))
+    return Profile(name, **{kind.value: name for kind in MAKERS})
+
+
+@pytest.fixture
+def torch_like(monkeypatch: pytest.MonkeyPatch) -> Profile:
+    monkeypatch.setattr(Backend, "missing", property(lambda self: ()))
+    return counted("counted-torch", "torch")
+
+
+def array_files(path: Path) -> dict[str, bytes]:
+    """Return all arrays of a map, by file."""
+    return {str(file.relative_to(path)): file.read_bytes() for file in path.rglob("*.npy")}
+
+
+# The store
+
+
+@given(array=some.arrays(st.sampled_from([np.float16, np.float32]), some.array_shapes(max_dims=3, max_side=5)))
+@settings(max_examples=20)
+def test_what_is_kept_comes_back_bit_by_bit(tmp_path_factory: pytest.TempPathFactory, array: np.ndarray) -> None:
+    store = FeatureStore(tmp_path_factory.mktemp("store"))
+    assert store.get(Kind.PIXELS, CARD, "k") is None
+    store.put(Kind.PIXELS, CARD, "k", array)
+    found = store.get(Kind.PIXELS, CARD, "k")
+    assert found is not None
+    assert found.dtype == array.dtype and found.tobytes() == array.tobytes() and found.shape == array.shape
+    assert store.get(Kind.VIEWS, CARD, "k") is None, "another module's"
+    assert store.get(Kind.PIXELS, replace(CARD, checksum="f" * 64), "k") is None, "another model's"
+
+
+def test_a_kept_file_is_a_plain_npy_in_a_folder_named_for_its_model(tmp_path: Path) -> None:
+    FeatureStore(tmp_path).put(Kind.PIXELS, replace(CARD, id="google/tips ../x"), "k", np.ones((2, 3), np.float16))
+    (file,) = tmp_path.rglob("*.npy")
+    assert file.parent.name == f"pixels-google-tips-..-x-{CARD.checksum[:16]}"
+    assert file.parent.parent == tmp_path
+    assert np.array_equal(np.load(file, allow_pickle=False), np.ones((2, 3)))
+
+
+@pytest.mark.parametrize("harm", ["cut", "flip", "empty"])
+def test_a_spoiled_file_counts_as_none_and_goes(tmp_path: Path, harm: str) -> None:
+    store = FeatureStore(tmp_path)
+    store.put(Kind.PIXELS, CARD, "k", np.arange(12, dtype=np.float16))
+    (file,) = tmp_path.rglob("*.npy")
+    whole = bytearray(file.read_bytes())
+    whole[-10] ^= 1
+    file.write_bytes({"cut": bytes(whole[:-6]), "flip": bytes(whole), "empty": b""}[harm])
+    assert store.get(Kind.PIXELS, CARD, "k") is None
+    assert not file.exists()
+
+
+def test_what_was_used_longest_ago_goes_first(tmp_path: Path) -> None:
+    one = np.zeros(2000, np.float16)  # 4 kB
+    earlier = FeatureStore(tmp_path, 4.5e6)
+    for i in range(5):
+        earlier.put(Kind.PIXELS, CARD, f"old{i}", one)
+    files = {file.stem: file for file in tmp_path.rglob("*.npy")}
+    size = files["old0"].stat().st_size
+    for age, name in enumerate(["old3", "old1", "old4", "old0", "old2"]):  # old3 was used last of all
+        os.utime(files[name], (time.time() - 1000 - age, time.time() - 1000 - age))
+    later = FeatureStore(tmp_path, 5.5 * size)
+    later._opened_s -= 10.0
+    assert later.get(Kind.PIXELS, CARD, "old2") is not None  # the oldest, but used now
+    import avlmaps.perception.models.feature_store as module
+
+    share, module._LARGEST_SHARE = module._LARGEST_SHARE, 1.0
+    try:
+        later.put(Kind.PIXELS, CARD, "new", one)
+    finally:
+        module._LARGEST_SHARE = share
+    left = {file.stem for file in tmp_path.rglob("*.npy")}
+    assert left == {"new", "old2", "old3", "old1"}, "90 % of the limit is left, the least recently used are gone"
+
+
+def test_a_build_that_is_larger_than_the_store_keeps_its_first_frames(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = FeatureStore(tmp_path, 1e6)
+    store._opened_s -= 10.0
+    for i in range(1200):
+        store.put(Kind.PIXELS, CARD, f"{i:04d}", np.zeros(450, np.float16))
+    kept = sorted(file.stem for file in tmp_path.rglob("*.npy"))
+    assert kept == [f"{i:04d}" for i in range(len(kept))]
+    assert 800 < len(kept) < 1000
+    assert capsys.readouterr().err.count("cache is full") == 1
+
+
+def test_too_large_features_are_told_once_and_not_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    store = FeatureStore(tmp_path, 1e6)
+    for key in "ab":
+        store.put(Kind.PIXELS, CARD, key, np.zeros(1000, np.float16))
+    said = capsys.readouterr().err
+    assert said.count("note: Features of fake/pixels are not cached") == 1
+    assert "--feature-cache-gb" in said
+    assert not list(tmp_path.rglob("*.npy"))
+
+
+def test_a_folder_that_cannot_be_written_is_a_note_and_no_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("no folder")
+    store = FeatureStore(tmp_path / "file")
+    store.put(Kind.PIXELS, CARD, "a", np.zeros(3, np.float16))
+    store.put(Kind.PIXELS, CARD, "b", np.zeros(3, np.float16))
+    assert capsys.readouterr().err.count("note: Features are not cached any longer") == 1
+    assert store.get(Kind.PIXELS, CARD, "a") is None
+
+
+def test_what_a_killed_build_left_half_written_goes_when_it_is_old(tmp_path: Path) -> None:
+    store = FeatureStore(tmp_path)
+    store.put(Kind.PIXELS, CARD, "a", np.zeros(3, np.float16))
+    (file,) = tmp_path.rglob("*.npy")
+    old, young = file.with_name("x.1-1.partial"), file.with_name("y.1-1.partial")
+    for path in (old, young):
+        path.write_bytes(b"half")
+    os.utime(old, (time.time() - 7200, time.time() - 7200))
+    FeatureStore(tmp_path).put(Kind.PIXELS, CARD, "b", np.zeros(3, np.float16))
+    assert not old.exists() and young.exists()
+
+
+def test_a_limit_of_nothing_is_refused() -> None:
+    with pytest.raises(BackendError, match="limit is 0 GB"):
+        CacheSettings(limit_gb=0)
+
+
+def test_keys_tell_types_shapes_and_order_apart() -> None:
+    a = np.arange(6, dtype=np.float32)
+    keys = [
+        key_of(a), key_of(a.reshape(2, 3)), key_of(a.astype(np.float64)), key_of(a.view(np.int32)), key_of(-a),
+        key_of(a, a), key_of("1", "2"), key_of("12"), key_of("2", "1"), key_of(1, 2), key_of(None), key_of("None"),
+    ]  # fmt: skip
+    assert len(set(keys)) == len(keys)
+    assert key_of(a[::2]) == key_of(a[::2].copy())
+
+
+# What an encoder sees
+
+
+def test_all_that_an_encoder_may_look_at_is_in_the_key_and_nothing_else(tmp_path: Path) -> None:
+    encoder = RememberingPixels(CountedPixels(), FeatureStore(tmp_path), half=False)
+
+    def encodes(frame: Frame) -> bool:
+        before = COUNTS.get("pixels", 0)
+        encoder.encode(frame)
+        return COUNTS.get("pixels", 0) > before
+
+    frame = Walk(2).frame(0)
+    ground = Ground(np.array([0.0, 0.0, 1.0]), np.array([1.0]), np.array([0.0]))
+    rig = replace(frame.rig, rgb=replace(frame.rig.rgb, fx=21.0))
+    moved = frame.world_from_camera.copy()
+    moved[2, 3] += 0.5
+    darker = frame.rgb.copy()
+    darker[0, 0, 0] ^= 1
+    deeper = frame.depth_m.copy()
+    deeper[0, 0] += 1.0
+    assert encodes(frame)
+    assert not encodes(frame)
+    assert not encodes(replace(frame, index=7, name="other", stamp_s=9.0))
+    for other in (
+        replace(frame, rgb=darker),
+        replace(frame, depth_m=deeper),
+        replace(frame, rig=rig),
+        replace(frame, world_from_camera=moved),
+        replace(frame, ground=ground),
+        replace(frame, ground=replace(ground, floor_m=np.array([0.1]))),
+    ):
+        assert encodes(other)
+        assert not encodes(other)
+    with using_models(ModelSettings(precision="bfloat16")):
+        assert encodes(frame), "another precision makes other features"
+
+
+@pytest.mark.parametrize("size", [(0, 0), (32, 24)])
+@pytest.mark.parametrize("scored", [False, True])
+@pytest.mark.parametrize("count", [0, 5])
+def test_keypoints_come_back_as_they_were(tmp_path: Path, size: tuple[int, int], scored: bool, count: int) -> None:
+    rng = np.random.default_rng(0)
+    local = LocalFeatures(
+        rng.uniform(0, 24, (count, 2)).astype(np.float32),
+        rng.normal(size=(count, 8)).astype(np.float32),
+        size=size,
+        **({"score": rng.uniform(size=count).astype(np.float32)} if scored else {}),
+    )
+
+    class Real:
+        card = Corners.card
+
+        def encode(self, rgb: np.ndarray) -> LocalFeatures:
+            _count("local")
+            return local
+
+    encoder, rgb = RememberingKeypoints(Real(), FeatureStore(tmp_path)), np.zeros((24, 32, 3), np.uint8)
+    first, second = encoder.encode(rgb), encoder.encode(rgb)
+    assert COUNTS["local"] == 1
+    for told in (first, second):
+        assert told.size == size
+        for name in ("xy", "descriptors", "scale", "score"):
+            assert np.array_equal(getattr(told, name), getattr(local, name)), name
+            assert getattr(told, name).shape == getattr(local, name).shape
+
+
+# Whole builds
+
+
+def test_a_second_build_with_another_voxel_size_encodes_nothing(
+    torch_like: Profile, tmp_path: Path, home: Path
+) -> None:
+    walk = Walk(audio=write_beeps(tmp_path / "beeps.flac"))
+    build_map(walk, tmp_path / "a", torch_like, SETTINGS)
+    assert set(COUNTS) == {"pixels", "views", "local", "place", "sounds"}
+    assert COUNTS["pixels"] == 22
+    assert (home / "cache" / "features").is_dir(), "on by default for large models"
+    COUNTS.clear()
+    build_map(walk, tmp_path / "b", torch_like, replace(SETTINGS, voxel_size_m=0.1))
+    assert COUNTS == {}
+
+
+def test_a_map_is_the_same_with_the_cache_and_without(torch_like: Profile, tmp_path: Path) -> None:
+    for name, cache in (
+        ("none", CacheSettings("off")),
+        ("filling", CacheSettings(tmp_path / "store")),
+        ("filled", CacheSettings(tmp_path / "store")),
+    ):
+        build_map(Walk(), tmp_path / name, torch_like, SETTINGS, cache=cache)
+    assert array_files(tmp_path / "none") == array_files(tmp_path / "filling") == array_files(tmp_path / "filled")
+
+
+def test_the_same_holds_for_small_models_whose_features_are_not_rounded(tmp_path: Path, home: Path) -> None:
+    small = counted("counted")
+    build_map(Walk(), tmp_path / "none", small, SETTINGS)
+    assert not home.exists(), "off by default: they are quick"
+    for name in ("filling", "filled"):
+        COUNTS.clear()
+        build_map(Walk(), tmp_path / name, small, SETTINGS, cache=CacheSettings(tmp_path / "store"))
+    assert COUNTS == {}
+    assert array_files(tmp_path / "none") == array_files(tmp_path / "filling") == array_files(tmp_path / "filled")
+
+
+def test_the_keys_of_builds_do_not_know_of_the_cache(torch_like: Profile, tmp_path: Path) -> None:
+    infos = [
+        build_map(Walk(), tmp_path / str(i), torch_like, SETTINGS, cache=cache).info
+        for i, cache in enumerate((CacheSettings("off"), CacheSettings()))
+    ]
+    assert infos[0].build_key == infos[1].build_key
+
+
+def test_a_part_on_another_machine_keeps_features_too(torch_like: Profile, tmp_path: Path) -> None:
+    build_part(Walk(), 0, 8, tmp_path / "p", torch_like, SETTINGS)
+    build_part(Walk(), 0, 8, tmp_path / "q", torch_like, SETTINGS)
+    assert COUNTS["pixels"] == 8
+
+
+def test_the_bar_says_how_many_came_from_the_cache(
+    torch_like: Profile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    build_map(Walk(), tmp_path / "a", torch_like, SETTINGS)
+    capsys.readouterr()
+    build_map(Walk(), tmp_path / "b", torch_like, replace(SETTINGS, voxel_size_m=0.1))
+    assert "22 from the cache" in capsys.readouterr().err
+
+
+def test_the_embedded_profile_is_left_as_it_is() -> None:
+    assert remembering(profile("embedded"), CacheSettings()) is profile("embedded")
+    assert came_from_store(profile("embedded"), Kind.PIXELS) == ""
+
+
+def test_a_stopped_build_goes_on_from_the_cache(torch_like: Profile, tmp_path: Path) -> None:
+    class Stopping(Walk):
+        def frame(self, index: int) -> Frame:
+            if index == 15 and COUNTS.get("pixels", 0) >= 12:
+                raise KeyboardInterrupt
+            return super().frame(index)
+
+    whole: BuildSettings = replace(SETTINGS, frames=replace(SETTINGS.frames, per_part=100))
+    with pytest.raises(KeyboardInterrupt):
+        build_map(Stopping(), tmp_path / "a", torch_like, whole)
+    met = COUNTS["pixels"]
+    build_map(Walk(), tmp_path / "a", torch_like, whole)
+    assert COUNTS["pixels"] == 22
+    assert met >= 12
