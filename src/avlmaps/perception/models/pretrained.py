@@ -13,6 +13,7 @@ from avlmaps.perception.models.files import model_folder
 T = TypeVar("T")
 # Constants that transformers works out itself; old checkpoints hold them as if they were weights.
 _COMPUTED = ("position_ids", "token_type_ids", "relative_position_index", "num_batches_tracked", "inv_freq")
+_TOKENS = ("tokenizer.json", "vocab.json", "vocab.txt", "*.model")
 _SMALL = ("*.json", "*.txt", "*.model", "*.jinja")
 
 
@@ -85,7 +86,11 @@ def load_helper(kind: Any, folder: Path, model: str) -> Any:
         BackendError: its files are missing or damaged.
     """
     try:
-        return kind.from_pretrained(folder, local_files_only=True)
+        made = kind.from_pretrained(folder, local_files_only=True)
+        # without its files, transformers makes up a tokenizer that knows no word
+        if hasattr(made, "convert_tokens_to_ids") and not any(path for name in _TOKENS for path in folder.glob(name)):
+            raise FileNotFoundError(f"none of {', '.join(_TOKENS)} is there")
+        return made
     except Exception as fault:
         raise BackendError(
             f"{folder} has no {kind.__name__} that can be loaded ({type(fault).__name__}: {_short(fault)}); get all "
