@@ -388,3 +388,25 @@ def test_an_array_of_another_type_than_the_map_says_is_damaged(tmp_path: Path) -
     info = msgspec.structs.replace(write_array(tmp_path, "a", np.zeros(3, np.float32)), dtype="nonsense")
     with pytest.raises(MapError, match=r"is damaged: it holds float32 of \(3,\), the map says nonsense of \(3,\);"):
         read_array(tmp_path, info)
+
+
+def test_a_map_written_before_there_were_scores_opens_without_them(copied: Path) -> None:
+    edit(copied, lambda content: content["files"].pop("keyframes/score"))
+    stored = verify_stored(copied)
+    assert stored.keyframes.score.shape == (0,) and stored.keyframes.score.dtype == np.float16
+    assert len(stored.keyframes.xy) > 0
+
+
+def test_scores_of_all_keypoints_come_back(copied: Path) -> None:
+    count = len(open_stored(copied).keyframes.xy)
+    score = np.linspace(0.0, 1.0, count).astype(np.float16)
+    replace(copied, "keyframes/score", score)
+    np.testing.assert_array_equal(open_stored(copied).keyframes.score, score)
+
+
+def test_scores_of_some_keypoints_only_are_a_damage(copied: Path) -> None:
+    count = len(open_stored(copied).keyframes.xy)
+    replace(copied, "keyframes/score", np.ones(count - 1, np.float16))
+    assert refused(copied) == (
+        f"{copied}/keyframes, score has {count - 1} rows; xy has {count}; build the map again with --overwrite."
+    )

@@ -16,6 +16,8 @@ RAGGED: dict[type, tuple[tuple[str, str], ...]] = {
     Keyframes: (("offsets", "xy"), ("thumbnail_offsets", "thumbnails")),
     HeardSounds: (("track_offsets", "track"), ("feature_offsets", "feature")),
 }
+# Arrays that are empty where nothing is known, and the field along whose rows they go where it is.
+ROWS_OR_NONE: dict[type, tuple[tuple[str, str], ...]] = {Keyframes: (("score", "xy"),)}
 _MEND = "build the map again with --overwrite"
 
 
@@ -29,7 +31,7 @@ def assembled(kind: type[T], values: Mapping[str, Any], where: str) -> T:
 
     Args:
         kind: ``Voxels``, ``Keyframes``, ``HeardSounds`` or another dataclass with jaxtyping annotations.
-        values: its fields.
+        values: its fields; one with a default may be missing, as maps written before it was thought of lack it.
         where: the file or folder that the error names.
 
     Raises:
@@ -37,6 +39,8 @@ def assembled(kind: type[T], values: Mapping[str, Any], where: str) -> T:
     """
     sizes: dict[str, int] = {}
     for field in dataclasses.fields(kind):  # pyright: ignore[reportArgumentType]
+        if field.name not in values and _has_default(field):
+            continue
         if field.name not in values:
             raise MapError(f"{where} is damaged: it has no {field.name}; {_MEND}.")
         if hasattr(field.type, "dim_str"):
@@ -44,7 +48,15 @@ def assembled(kind: type[T], values: Mapping[str, Any], where: str) -> T:
     whole = kind(**values)
     for offsets, rows in RAGGED.get(kind, ()):
         _check_offsets(f"{where}, {offsets}", getattr(whole, offsets), len(getattr(whole, rows)), len(whole))  # pyright: ignore[reportArgumentType]
+    for some, rows in ROWS_OR_NONE.get(kind, ()):
+        count, wanted = len(getattr(whole, some)), len(getattr(whole, rows))
+        if count not in (0, wanted):
+            raise MapError(f"{where}, {some} has {count} rows; {rows} has {wanted}; {_MEND}.")
     return whole
+
+
+def _has_default(field: "dataclasses.Field[Any]") -> bool:
+    return field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
 
 
 def _check_array(where: str, array: np.ndarray, declared: Any, sizes: dict[str, int]) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float32, Int, Int64, UInt8
+from jaxtyping import Float, Float16, Float32, Int, Int64, UInt8
 
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.progress import progress
@@ -233,7 +233,15 @@ def assembled(seen: Sequence[SeenKeyframe]) -> Keyframes:
         points_world=_joined([one.points_world for one in seen], (3,), np.float32),
         thumbnail_offsets=_offsets([len(one.thumbnail) for one in seen]),
         thumbnails=np.frombuffer(b"".join(one.thumbnail for one in seen), np.uint8),
+        score=_scores([one.local for one in seen]),
     )
+
+
+def _scores(local: Sequence[LocalFeatures]) -> Float16[np.ndarray, " m_or_0"]:
+    """Return the scores of all keypoints, none unless every keypoint has one."""
+    if any(len(one.score) != len(one.xy) for one in local):
+        return np.zeros(0, np.float16)
+    return _joined([one.score for one in local], (), np.float16)
 
 
 def _stacked(rows: Sequence[np.ndarray], shape: tuple[int, ...], dtype: type) -> np.ndarray:

@@ -1,6 +1,6 @@
 """What a map holds, in memory or memory-mapped: voxels, keyframes, heard sounds; all in the recording's world."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float16, Float32, Float64, Int32, Int64, UInt8
@@ -46,6 +46,8 @@ class Keyframes:
         points_world: the keypoints' 3D points, NaN where there was no depth.
         thumbnail_offsets: (k + 1,) into ``thumbnails``.
         thumbnails: JPEG files one after the other.
+        score: how sure the detector was of each keypoint, in [0, 1]; empty where it does not tell, and in maps written
+            before there was such an array.
     """
 
     stamp_s: Float64[np.ndarray, " k"]
@@ -59,6 +61,7 @@ class Keyframes:
     points_world: Float32[np.ndarray, "m 3"]
     thumbnail_offsets: Int64[np.ndarray, " k1"]
     thumbnails: UInt8[np.ndarray, " bytes"]
+    score: Float16[np.ndarray, " m_or_0"] = field(default_factory=lambda: np.zeros(0, np.float16))
 
     def __len__(self) -> int:
         return len(self.stamp_s)

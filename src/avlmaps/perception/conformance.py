@@ -5,6 +5,7 @@ sentence that says which promise of ``avlmaps.perception.protocols`` is broken.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import (
+    LearnedMatcher,
     LocalEncoder,
     LocalFeatures,
     Matcher,
@@ -159,7 +161,8 @@ def _example_local(encoder_dim: int, seed: int = 0, count: int = 40) -> LocalFea
     descriptors = np.abs(rng.standard_normal((count, encoder_dim))).astype(np.float32)
     descriptors /= np.linalg.norm(descriptors, axis=1, keepdims=True)
     xy = rng.uniform(0, 64, (count, 2)).astype(np.float32)
-    return LocalFeatures(xy, descriptors, np.ones(count, np.float32))
+    score = rng.uniform(0.1, 0.9, count).astype(np.float32)
+    return LocalFeatures(xy, descriptors, np.ones(count, np.float32), score, (64, 64))
 
 
 def _check_local_encoder(encoder: LocalEncoder) -> None:
@@ -168,6 +171,9 @@ def _check_local_encoder(encoder: LocalEncoder) -> None:
     _check_rows(found.descriptors, len(found.xy), encoder.card.dim, "local descriptors")
     _hold(found.xy.shape == (len(found.xy), 2), f"keypoints must have shape (n, 2), not {found.xy.shape}")
     _hold(((found.xy >= 0) & (found.xy <= (320, 240))).all(), "keypoints must lie in the picture")
+    if len(found.score):
+        _check_scores(found.score, (len(found.xy),), "keypoints' scores, where there are any,")
+    _hold(found.size in ((0, 0), (320, 240)), f"the picture's size must be (width, height) or (0, 0), not {found.size}")
     _hold(np.array_equal(found.xy, encoder.encode(frame.rgb).xy), "the same picture must give the same keypoints")
     blank = encoder.encode(np.full((240, 320, 3), 128, np.uint8))
     _hold(blank.descriptors.shape == (0, encoder.card.dim), "a blank picture has no keypoints, and descriptors (0, d)")
@@ -192,17 +198,35 @@ def _check_place_encoder(encoder: PlaceEncoder) -> None:
 
 
 def _check_matcher(matcher: Matcher) -> None:
-    a = _example_local(128, 0)
+    a, other = _example_local(matcher.card.dim, 0), _example_local(matcher.card.dim, 1, count=55)
     order = np.random.default_rng(1).permutation(len(a.xy))
-    b = LocalFeatures(a.xy[order], a.descriptors[order], a.scale[order])
+    b = _taken(a, order)
     pairs = matcher.match(a, b)
+    for found, count in ((pairs, len(b.xy)), (matcher.match(a, other), len(other.xy))):
+        _check_pairs(found, len(a.xy), count)
+    _hold(np.array_equal(pairs, matcher.match(a, b)), "the same keypoints must give the same matches")
+    as_before = {(i, order[j]) for i, j in pairs.tolist()} ^ {(i, j) for i, j in matcher.match(a, a).tolist()}
+    _hold(len(as_before) <= 0.1 * len(pairs) + 1, "the order of a picture's keypoints must not matter")
+    if not isinstance(matcher, LearnedMatcher):
+        _hold(len(pairs) >= len(a.xy) // 2, "a picture must match itself")
+        _hold(np.array_equal(order[pairs[:, 1]], pairs[:, 0]), "a picture's keypoints must match themselves")
+    none = _taken(a, order[:0])
+    for found in (matcher.match(a, none), matcher.match(none, a)):
+        _hold(found.shape == (0, 2), "matching with nothing must give no matches, shape (0, 2)")
+
+
+def _taken(local: LocalFeatures, rows: np.ndarray) -> LocalFeatures:
+    return replace(
+        local, xy=local.xy[rows], descriptors=local.descriptors[rows], scale=local.scale[rows], score=local.score[rows]
+    )
+
+
+def _check_pairs(pairs: np.ndarray, first: int, second: int) -> None:
     _hold(pairs.ndim == 2 and pairs.shape[1] == 2, f"matches must have shape (m, 2), not {pairs.shape}")
-    _hold(len(pairs) >= len(a.xy) // 2, "a picture must match itself")
-    _hold(np.array_equal(order[pairs[:, 1]], pairs[:, 0]), "a picture's keypoints must match themselves")
-    for column in pairs.T:
+    _hold(np.issubdtype(pairs.dtype, np.integer), f"matches must be whole numbers, not {pairs.dtype}")
+    for column, count in zip(pairs.T, (first, second), strict=True):
+        _hold(((column >= 0) & (column < count)).all(), f"matches must be numbers of keypoints below {count}")
         _hold(len(np.unique(column)) == len(column), "a keypoint may be matched at most once")
-    none = LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32), np.zeros(0, np.float32))
-    _hold(matcher.match(a, none).shape == (0, 2), "matching with nothing must give no matches, shape (0, 2)")
 
 
 _CHECKS: dict[Kind, Callable[[Any], None]] = {

@@ -219,8 +219,8 @@ class LocalFeatures:
 
     xy: Float32[np.ndarray, "n 2"]
     descriptors: Float32[np.ndarray, "n d"]
-    scale: Float32[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0, np.float32))
-    score: Float32[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0, np.float32))
+    scale: Float32[np.ndarray, " n_or_0"] = field(default_factory=lambda: np.zeros(0, np.float32))
+    score: Float32[np.ndarray, " n_or_none"] = field(default_factory=lambda: np.zeros(0, np.float32))
     size: tuple[int, int] = (0, 0)
 
 
@@ -260,6 +260,20 @@ class Matcher(Protocol):
 
     def match(self, a: LocalFeatures, b: LocalFeatures) -> Int[np.ndarray, "m 2"]:
         """Return rows (index in a, index in b); each index at most once."""
+        ...
+
+
+@runtime_checkable
+class LearnedMatcher(Matcher, Protocol):
+    """A matcher that is a network.
+
+    It reads scores and the sizes of the pictures as well, and takes only the keypoints that it was learnt on. What it
+    pairs hangs on its weights alone: with random ones it need not even pair a picture with itself, as others must.
+    """
+
+    @property
+    def learned(self) -> bool:
+        """True."""
         ...
 
 

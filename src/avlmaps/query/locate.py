@@ -153,6 +153,8 @@ def locate_features(
     settings: LocateSettings = LocateSettings(),
 ) -> Located:
     """Find where a picture was taken that has been through the encoders already; ``elapsed_ms`` stays 0."""
+    if local.size == (0, 0):
+        local = replace(local, size=(camera.width, camera.height))
     references = alike(stored.keyframes, place, settings.references)
     fit = _fit(stored, local, references[:1], camera, rng, settings)
     if fit is None or fit.inliers < settings.enough_inliers:
@@ -305,14 +307,23 @@ def _matched_points(stored: LocatableMap, local: LocalFeatures, references: Int[
     keypoint, keyframe, points = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros((0, 3), np.float32)]
     for reference in references:
         rows = slice(keyframes.offsets[reference], keyframes.offsets[reference + 1])
-        other = LocalFeatures(keyframes.xy[rows], keyframes.descriptors[rows].astype(np.float32))
-        match = matcher.match(local, other)
+        match = matcher.match(local, _kept_features(keyframes, rows, stored.rig.rgb))
         points_world = keyframes.points_world[rows][match[:, 1]]
         has_point = np.isfinite(points_world[:, 0])
         keypoint.append(match[has_point, 0])
         keyframe.append(np.full(int(has_point.sum()), reference))
         points.append(points_world[has_point])
     return _Pairs(np.concatenate(keypoint), np.concatenate(keyframe), np.concatenate(points))
+
+
+def _kept_features(keyframes: Keyframes, rows: slice, camera: Pinhole) -> LocalFeatures:
+    """Return a keyframe's keypoints as they were found: with scores where the map has any, and its picture's size."""
+    return LocalFeatures(
+        xy=keyframes.xy[rows],
+        descriptors=keyframes.descriptors[rows].astype(np.float32),
+        score=keyframes.score[rows].astype(np.float32),
+        size=(camera.width, camera.height),
+    )
 
 
 def _seen_from_the_same_side(

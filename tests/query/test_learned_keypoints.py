@@ -1,0 +1,161 @@
+"""Locating by keypoints and matchers of another kind than ours: what they are given, and that the answer is right."""
+
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from avlmaps.bench.locate import MapOfPictures, map_of
+from avlmaps.core.poses import inverse, rotation_angle_rad
+from avlmaps.maps.keyframe_stage import joined
+from avlmaps.maps.keyframes import KeyframeSettings, assembled, see_keyframe
+from avlmaps.perception.embedded.rootsift import RootSift
+from avlmaps.perception.profiles import profile
+from avlmaps.perception.protocols import LocalFeatures, ModelCard
+from avlmaps.query.locate import LocateSettings, locate, locate_features
+from helpers.picture_room import CAMERA, RoomWalk
+
+WALK = RoomWalk(frames=12)
+CARD = ModelCard("fake/learned", 4, "CC0-1.0", "0" * 64)
+
+
+def score_of(xy: np.ndarray) -> np.ndarray:
+    """Return a score that a keypoint's place tells, so that a test can tell whose it is."""
+    return ((xy[:, 0] + 2.0 * xy[:, 1]) / 1000.0).astype(np.float32)
+
+
+@dataclass
+class Scored:
+    """RootSIFT's keypoints with scores."""
+
+    card = RootSift().card
+    told: bool = True
+    finder: RootSift = field(default_factory=RootSift)
+
+    def encode(self, rgb: np.ndarray) -> LocalFeatures:
+        found = self.finder.encode(rgb)
+        if not self.told:
+            return found
+        return replace(found, score=score_of(found.xy), size=(rgb.shape[1], rgb.shape[0]))
+
+
+@dataclass
+class Watching:
+    """A matcher by RootSIFT that keeps what it was given."""
+
+    card = CARD
+    given: list[tuple[LocalFeatures, LocalFeatures]] = field(default_factory=list)
+
+    def match(self, a: LocalFeatures, b: LocalFeatures) -> np.ndarray:
+        self.given.append((a, b))
+        return profile("colours").keypoint_matcher().match(a, b)
+
+
+def profile_of(local: Any, matcher: Any) -> Any:
+    place = profile("colours").place_encoder()
+    return SimpleNamespace(
+        local="fake", place="fake", views="", matcher="fake",
+        local_encoder=lambda: local, place_encoder=lambda: place, keypoint_matcher=lambda: matcher,
+    )  # fmt: skip
+
+
+def stored_by(local: Any, matcher: Any) -> MapOfPictures:
+    return map_of(WALK, profile_of(local, matcher), np.random.default_rng(0))
+
+
+@pytest.fixture
+def watching() -> Watching:
+    return Watching()
+
+
+def test_a_matcher_is_given_the_scores_and_the_sizes_of_both_pictures(watching: Watching) -> None:
+    stored = stored_by(Scored(), watching)
+    large = WALK.room.render(WALK.world_from_camera[4], CAMERA.resized(480, 360))[0]
+    assert locate(stored, large, None, np.random.default_rng(0)).world_from_camera is not None
+    for asked, kept in watching.given:
+        assert (asked.size, kept.size) == ((480, 360), (320, 240))
+        np.testing.assert_array_equal(asked.score, score_of(asked.xy))
+        np.testing.assert_allclose(kept.score, score_of(kept.xy), atol=5e-4)
+        assert kept.score.dtype == np.float32 and len(kept.score) == len(kept.xy) > 100
+
+
+def test_keypoints_without_scores_reach_a_matcher_without_any_and_with_the_size_of_the_picture(
+    watching: Watching,
+) -> None:
+    stored = stored_by(Scored(told=False), watching)
+    assert stored.keyframes.score.shape == (0,)
+    locate(stored, WALK.frame(4).rgb, None, np.random.default_rng(0))
+    for asked, kept in watching.given:
+        assert (asked.size, kept.size) == ((320, 240), (320, 240))
+        assert len(asked.score) == len(kept.score) == 0
+
+
+def test_a_map_of_pictures_with_and_without_scores_has_none() -> None:
+    seen = [
+        see_keyframe(WALK.frame(i), profile_of(Scored(told=i > 0), None), {"centres": np.zeros((64, 128), np.float32)})
+        for i in range(3)
+    ]
+    assert assembled(seen).score.shape == (0,)
+    pieces = [assembled(seen[:1]), assembled(seen[1:])]
+    assert len(pieces[1].score) == len(pieces[1].xy) > 0
+    whole = joined(pieces)
+    assert whole.score.shape == (0,) and len(whole.xy) == sum(len(piece.xy) for piece in pieces)
+
+
+def test_scores_stay_with_their_keypoints_when_lots_are_joined() -> None:
+    seen = [
+        see_keyframe(WALK.frame(i), profile_of(Scored(), None), {"centres": np.zeros((64, 128), np.float32)})
+        for i in range(3)
+    ]
+    blank = replace(seen[0], local=LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32)))
+    blank = replace(blank, points_world=np.zeros((0, 3), np.float32))
+    whole = joined([assembled([seen[0]]), assembled([blank]), assembled(seen[1:])])
+    np.testing.assert_array_equal(whole.score, score_of(whole.xy).astype(np.float16))
+
+
+@dataclass
+class Planted:
+    """Any picture's keypoints are the same 3D points, seen from a pose; descriptors tell nothing but their number."""
+
+    card = CARD
+
+    def match(self, a: LocalFeatures, b: LocalFeatures) -> np.ndarray:
+        rows = np.arange(min(len(a.xy), len(b.xy)))
+        return np.stack([rows, rows], axis=1)
+
+
+@pytest.mark.parametrize("count, located", [(400, True), (40, True), (5, False)])
+def test_planted_matches_of_few_or_many_keypoints_are_believed_by_the_same_rules(count: int, located: bool) -> None:
+    """DISK and SuperPoint find twice as many keypoints as RootSIFT, or far fewer; one set of thresholds is for all."""
+    rng = np.random.default_rng(1)
+    frame = WALK.frame(4)
+    xy = rng.uniform((8, 8), (312, 232), (4 * count, 2)).astype(np.float32)
+    kept = LocalFeatures(xy, np.zeros((len(xy), 4), np.float32))
+    profile_ = profile_of(SimpleNamespace(encode=lambda rgb: kept), Planted())
+    profile_.place = ""
+    seen = see_keyframe(frame, profile_, {}, KeyframeSettings(max_depth_m=20.0))
+    good = np.flatnonzero(np.isfinite(seen.points_world[:, 0]))[:count]
+    seen = replace(
+        seen,
+        local=LocalFeatures(xy[good], kept.descriptors[good]),
+        points_world=seen.points_world[good],
+        place=np.ones(1, np.float32),
+    )
+    stored = MapOfPictures(assembled([seen]), {}, profile_, WALK.rig)
+    whole_pixels = np.floor(xy[good]) + 0.5  # as DISK and SuperPoint tell them
+    found = locate_features(
+        stored,
+        LocalFeatures(whole_pixels.astype(np.float32), kept.descriptors[good]),
+        np.ones(1, np.float32),
+        CAMERA,
+        np.random.default_rng(0),
+        LocateSettings(),
+    )
+    assert (found.world_from_camera is not None) == located
+    if found.world_from_camera is not None:
+        true = frame.world_from_camera @ inverse(WALK.rig.rgb_from_depth)
+        assert np.linalg.norm(found.world_from_camera[:3, 3] - true[:3, 3]) < 0.03
+        assert np.rad2deg(rotation_angle_rad(found.world_from_camera, true)) < 1.0
+        assert found.inliers > 0.9 * len(good)
