@@ -75,8 +75,8 @@ class StoredMap:
             if "@" in made_by.backend:
                 instead = f"name the folder that holds {made_by.id} as it was (--models DIR)"
             raise MapError(
-                f"{self.path} was built with {made_by.id} (checksum {made_by.checksum[:8] or 'unknown'}), this avlmaps has "
-                f"{here} ({card.checksum[:8]}) for {kind.value}; build it again, or {instead}."
+                f"{self.path} was built with {made_by.id} (checksum {made_by.checksum[:8] or 'unknown'}), this avlmaps "
+                f"has {here} ({card.checksum[:8]}) for {kind.value}; build it again, or {instead}."
             )
 
 

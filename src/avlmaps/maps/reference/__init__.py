@@ -1,0 +1,1 @@
+"""Maps that the published AVLMaps/VLMaps code wrote, read and converted into ours; ``convert`` is the whole of it."""
