@@ -1,0 +1,21 @@
+"""Half precision where it is worth it: on a GPU, with the weights and all coordinates in float32."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import torch
+
+from avlmaps.perception.models.device import chosen_type, inference
+
+
+@contextmanager
+def mixed_precision(device: torch.device) -> Iterator[None]:
+    """Run without gradients, and on a GPU in the chosen type wherever torch holds that to be safe (autocast).
+
+    Networks that tell places in a picture keep their weights in float32: a float16 holds no coordinate above 2048.
+    On a CPU half precision is slower and torch's sampling of it is not exact, so that everything stays float32 there.
+    """
+    kind = chosen_type(device)
+    half = device.type != "cpu" and kind is not torch.float32
+    with inference(), torch.autocast(device.type, dtype=kind if half else None, enabled=half):
+        yield

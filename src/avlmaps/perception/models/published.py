@@ -1,0 +1,108 @@
+"""Checkpoints that are published as single files of tensors: finding them, reading them safely, loading them strictly."""
+
+from collections.abc import Collection, Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import nn
+
+from avlmaps.core.errors import BackendError
+from avlmaps.perception.models.files import model_file
+
+
+def published_file(name: str, how_to_get: str, repository: str = "", cached: Sequence[str] = ()) -> Path:
+    """Return where a published file lies: the folder of models, else the caches of the hub and of torch.
+
+    Nothing is fetched: which copy of a file a program runs is for a person to choose, once.
+
+    Args:
+        name: the published name, or a path.
+        how_to_get: the command that brings it, for the error.
+        repository: the hub's id of the repository that holds it, if any does.
+        cached: its paths below ``torch.hub.get_dir()`` as other programs cache it.
+
+    Raises:
+        BackendError: it is not here.
+    """
+    try:
+        return model_file(name, how_to_get)
+    except BackendError:
+        places = [_in_hub_cache(repository, name), *(Path(torch.hub.get_dir()) / path for path in cached)]
+        for place in places:
+            if place is not None and place.is_file():
+                return place
+        raise
+
+
+def _in_hub_cache(repository: str, name: str) -> Path | None:
+    if not repository or find_spec("huggingface_hub") is None:
+        return None
+    from huggingface_hub import try_to_load_from_cache
+
+    found = try_to_load_from_cache(repository, name)
+    return Path(found) if isinstance(found, str) else None
+
+
+def read_tensors(path: Path, how_to_get: str) -> dict[str, Any]:
+    """Return what a ``.safetensors`` or a torch file holds, on the CPU; no code in it is ever run.
+
+    Raises:
+        BackendError: it is no such file, or holds more than tensors.
+    """
+    try:
+        if path.suffix == ".safetensors":
+            from safetensors.torch import load_file
+
+            return load_file(path)
+        held = torch.load(path, map_location="cpu", weights_only=True)
+    except Exception as fault:
+        reason = " ".join(str(fault).split())[:120]
+        raise BackendError(
+            f"{path} cannot be read as a file of weights ({type(fault).__name__}: {reason}); get it again with: "
+            f"{how_to_get}"
+        ) from fault
+    if not isinstance(held, dict):
+        raise BackendError(f"{path} holds {type(held).__name__} instead of named weights; get it with: {how_to_get}")
+    return held
+
+
+def load_strictly(
+    module: nn.Module, state: Mapping[str, Any], path: Path, how_to_get: str, computed: Collection[str] = ()
+) -> None:
+    """Put weights into a network: each of the network's is there, each of the file's has a place, all sizes agree.
+
+    Args:
+        module: the network.
+        state: the file's weights, by the network's names.
+        path: the file, for the error.
+        how_to_get: the command that brings the published one, for the error.
+        computed: names that the network works out itself; a file may lack them.
+
+    Raises:
+        BackendError: the file is of another network; the sentence names the first differences.
+    """
+    own = module.state_dict()
+    missing = [name for name in own if name not in state and name not in computed]
+    unknown = [name for name in state if name not in own]
+    sizes = [
+        f"{name} {_shape(state[name])} for {tuple(own[name].shape)}"
+        for name in own
+        if name in state and _shape(state[name]) != tuple(own[name].shape)
+    ]
+    faults = [
+        f"{what} {', '.join(names[:2])}{f' and {len(names) - 2} more' if len(names) > 2 else ''}"
+        for what, names in (("it lacks", missing), ("nothing takes", unknown), ("of another size is", sizes))
+        if names
+    ]
+    if faults:
+        raise BackendError(
+            f"{path} is not the checkpoint of {type(module).__name__}: {'; '.join(faults)}. Get the published one "
+            f"with: {how_to_get}"
+        )
+    module.load_state_dict(dict(state), strict=False)
+
+
+def _shape(held: Any) -> tuple[int, ...] | None:
+    return tuple(held.shape) if isinstance(held, torch.Tensor) else None
