@@ -1,0 +1,80 @@
+"""Pictures on their way into a transformer: how large, as which numbers, several at once."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import torch
+from jaxtyping import Float32, UInt8
+
+from avlmaps.core.errors import BackendError
+from avlmaps.recordings.types import Frame
+
+Size = tuple[int, int]
+# A panorama of 10:1 would else become thousands of patches, whose attention fills any memory.
+_MOST_PATCHES = 4096
+
+
+def working_size(height: int, width: int, short_side: int, patch: int, most_patches: int = _MOST_PATCHES) -> Size:
+    """Return (height, width) to resize a picture to: whole patches, its shape kept as nearly as they allow.
+
+    Args:
+        height: of the picture.
+        width: of the picture.
+        short_side: what the shorter side shall be, pixels.
+        patch: edge of a patch, pixels.
+        most_patches: of a picture; a very long one is looked at smaller.
+    """
+    scale = short_side / (patch * min(height, width))
+    scale = min(scale, (most_patches / (height * width)) ** 0.5)
+    rows, columns = max(1, round(height * scale)), max(1, round(width * scale))
+    # Rounding up must not pass the limit of a picture of one row.
+    return patch * min(rows, most_patches), patch * min(columns, most_patches // min(rows, most_patches))
+
+
+def stacked(
+    pictures: Sequence[UInt8[np.ndarray, "h w 3"]], size: Size, device: torch.device, precision: torch.dtype
+) -> torch.Tensor:
+    """Return pictures of one size as a tensor (b, 3, height, width) in [0, 1], resized bicubically without aliasing.
+
+    Args:
+        pictures: all of one shape.
+        size: (height, width) to resize to.
+        device: where the tensor goes; the resizing is done there.
+        precision: of the result; the resizing is done in float32.
+    """
+    picture = torch.from_numpy(np.ascontiguousarray(np.stack(pictures))).to(device)
+    picture = picture.permute(0, 3, 1, 2).to(torch.float32).div(255.0)
+    if picture.shape[-2:] != size:
+        picture = torch.nn.functional.interpolate(
+            picture, size=size, mode="bicubic", align_corners=False, antialias=True
+        )
+    return picture.clamp(0.0, 1.0).to(precision)
+
+
+def in_batches(
+    frames: Sequence[Frame],
+    batch: int,
+    encode: Callable[[list[UInt8[np.ndarray, "h w 3"]]], Float32[np.ndarray, "b hf wf d"]],
+) -> list[Float32[np.ndarray, "hf wf d"]]:
+    """Encode the frames' colour pictures, at most so many at once; those of one batch have the same shape."""
+    out: list[Float32[np.ndarray, "hf wf d"]] = []
+    start = 0
+    while start < len(frames):
+        stop = start + 1
+        while stop < min(start + batch, len(frames)) and frames[stop].rgb.shape == frames[start].rgb.shape:
+            stop += 1
+        out.extend(encode([frame.rgb for frame in frames[start:stop]]))
+        start = stop
+    return out
+
+
+def chosen_way(choice: str, ways: Sequence[str]) -> tuple[str, str]:
+    """Split a choice into a model and the way in which its features are taken: ``model#way``, by default the first.
+
+    Raises:
+        BackendError: there is no such way.
+    """
+    model, _, way = choice.partition("#")
+    if way and way not in ways:
+        raise BackendError(f"{model} gives no features of the kind {way!r}; choose one of: {', '.join(ways)}.")
+    return model, way or ways[0]

@@ -1,0 +1,98 @@
+"""Words for open-vocabulary encoders: what competes for a voxel, and the sentences that a word is put into.
+
+A word alone is not what these models saw in training; its feature is the mean of the features of some sentences with
+the word in them, each of unit length, scaled to unit length again (the reference implementation of AVLMaps forgets
+that, which favours words whose sentences agree).
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from jaxtyping import Float, Float32
+
+# The subset of seven of its ImageNet sentences that the authors of CLIP found to do as well as all eighty.
+CLIP_PROMPTS = (
+    "itap of a {}.",
+    "a bad photo of the {}.",
+    "a origami {}.",
+    "a photo of the large {}.",
+    "a {} in a video game.",
+    "art of the {}.",
+    "a photo of the small {}.",
+)
+# Those that the authors of TIPSv2 measure zero-shot segmentation with, taken over from the TCL paper.
+TIPS_PROMPTS = (
+    "itap of a {}.",
+    "a bad photo of a {}.",
+    "a origami {}.",
+    "a photo of the large {}.",
+    "a {} in a video game.",
+    "art of the {}.",
+    "a photo of the small {}.",
+    "a photo of many {}.",
+    "a photo of {}s.",
+)
+# Things of homes and offices, as the embedded encoder knows them.
+THINGS = (
+    "wall", "floor", "ceiling", "column", "stairs", "railing", "chair", "armchair", "office chair", "stool", "bench",
+    "sofa", "ottoman", "dining table", "coffee table", "desk", "side table", "console table", "bed", "crib", "bunk bed",
+    "nightstand", "wardrobe", "chest of drawers", "bookshelf", "cabinet", "tv cabinet", "shoe rack", "wall shelf",
+    "filing cabinet", "coat rack", "kitchen counter", "kitchen cabinet", "kitchen island", "refrigerator", "stove",
+    "microwave", "dishwasher", "range hood", "kettle", "toaster", "coffee machine", "sink", "toilet", "bathtub",
+    "shower", "mirror", "towel", "washing machine", "radiator", "air conditioner", "fan", "vacuum cleaner", "fireplace",
+    "ironing board", "water heater", "tv", "monitor", "laptop", "computer", "printer", "loudspeaker", "keyboard",
+    "telephone", "clock", "picture", "lamp", "chandelier", "curtain", "carpet", "plant", "vase", "cushion", "blinds",
+    "candle", "door", "window", "folding door", "book", "bottle", "cup", "bowl", "pot", "box", "basket", "trash can",
+    "bag", "toy", "shoes", "laundry basket", "tableware", "piano", "guitar", "fitness equipment", "dumbbell", "ball",
+    "bicycle", "pool table", "rocking horse", "baby stroller", "mat", "play tent", "aquarium", "pet bed", "whiteboard",
+    "partition", "locker", "water dispenser",
+)  # fmt: skip
+
+_REMEMBERED = 4096
+
+
+def clean(word: str) -> str:
+    """Return a phrase in small letters with single blanks, ``""`` for a blank one."""
+    return " ".join(word.lower().split())
+
+
+class Prompted:
+    """Features of words by a text encoder; each word's is worked out alone, and once.
+
+    Args:
+        encode_texts: returns a row for each sentence.
+        dim: length of a row.
+        prompts: sentences with ``{}`` for the word.
+    """
+
+    def __init__(
+        self, encode_texts: Callable[[list[str]], Float[np.ndarray, "n d"]], dim: int, prompts: Sequence[str]
+    ) -> None:
+        self._encode_texts, self._dim, self._prompts = encode_texts, dim, tuple(prompts)
+        self._known: dict[str, Float32[np.ndarray, " d"]] = {}
+
+    def encode(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each word; all zero for a blank one."""
+        rows = np.zeros((len(words), self._dim), np.float32)
+        for row, word in zip(rows, words, strict=True):
+            if phrase := clean(word):
+                row[:] = self._of(phrase)
+        return rows
+
+    def _of(self, phrase: str) -> Float32[np.ndarray, " d"]:
+        known = self._known.get(phrase)
+        if known is None:
+            # replace, not format: a brace in the phrase is a brace
+            texts = [prompt.replace("{}", phrase) for prompt in self._prompts]
+            known = mean_direction(self._encode_texts(texts))
+            if len(self._known) >= _REMEMBERED:
+                self._known.clear()
+            self._known[phrase] = known
+        return known
+
+
+def mean_direction(rows: Float[np.ndarray, "n d"]) -> Float32[np.ndarray, " d"]:
+    """Return the unit vector along the mean of the rows' directions."""
+    exact = np.asarray(rows, np.float64)
+    mean = (exact / np.maximum(np.linalg.norm(exact, axis=1, keepdims=True), 1e-12)).mean(axis=0)
+    return (mean / max(float(np.linalg.norm(mean)), 1e-12)).astype(np.float32)
