@@ -8,7 +8,7 @@ import pytest
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
-from avlmaps.query.heatmap import HeatSettings
+from avlmaps.query.heatmap import Heatmap, HeatSettings, NearAnchors
 from avlmaps.query.level import Space
 from avlmaps.query.objects import Asked, ObjectSettings, Rivals, object_factor
 from avlmaps.query.question import Modality, Part, Role
@@ -63,10 +63,10 @@ RGB = np.repeat(np.array([(200, 20, 20), (30, 30, 200), (200, 20, 20), (240, 240
 SPACE = Space(GridSpec(0.05), INDEX, np.array([0.0, 0.0, 1.0]))
 
 
-def ask(word: str, rgb: np.ndarray | None = None):
+def ask(word: str, rgb: np.ndarray | None = None, role: Role = Role.PRIMARY, least_confidence: float = 0.0):
     rivals = Rivals.of(FEATURE, ENCODER, ENCODER.vocabulary)
-    part = Part(Modality.OBJECT, word, Role.PRIMARY)
-    settings = ObjectSettings(least_confidence=0.0)
+    part = Part(Modality.OBJECT, word, role)
+    settings = ObjectSettings(least_confidence=least_confidence)
     return object_factor(SPACE, FEATURE, ENCODER, rivals, part, settings, HeatSettings(), rgb)
 
 
@@ -122,3 +122,32 @@ def test_colours_are_taken_out_of_a_phrase() -> None:
     tint = tint_of("dark red kitchen cabinet")
     assert tint is not None and tint.text == "dark red" and tint.thing == "kitchen cabinet"
     assert tint_of("kitchen cabinet") is None
+
+
+def near(clump: int) -> Heatmap:
+    """Heat of a sound beside a clump; clumps are 1 m apart."""
+    place = SPACE.centres[INDEX[:, 0] // 20 == clump].mean(axis=0)[None]
+    part = Part(Modality.SOUND, "a sound", Role.CONTEXT)
+    return Heatmap.of(NearAnchors(SPACE, part, 0.9, place, np.ones(1), np.zeros(1, np.int64), True))
+
+
+def test_what_it_is_near_tells_that_an_unsure_thing_is_meant() -> None:
+    chair = ask("chair", least_confidence=0.5)
+    assert clumps(chair) == {0}
+    alone, joined = Heatmap.of(chair), Heatmap.of(chair) * near(3)
+    assert [goal.score for goal in alone.goals(5)] == [pytest.approx(0.9, abs=2e-3)]
+    assert clumps(joined.factors[0]) == {0, 3}
+    best = joined.goals(1)[0]
+    assert INDEX[np.argmin(np.linalg.norm(SPACE.centres - best.position, axis=1)), 0] // 20 == 3
+    assert best.score == pytest.approx(0.45, abs=0.03)
+
+
+def test_a_product_is_the_same_in_whatever_order_and_brackets() -> None:
+    chair, one, two = Heatmap.of(ask("chair", least_confidence=0.5)), near(3), near(1)
+    np.testing.assert_array_equal(((chair * one) * two).values, (one * (two * chair)).values)
+    np.testing.assert_array_equal((chair * one).values, np.prod([f.values for f in (chair * one).factors], axis=0))
+
+
+def test_what_says_where_it_is_counts_only_where_it_is_sure() -> None:
+    chair = Heatmap.of(ask("chair", role=Role.CONTEXT, least_confidence=0.5))
+    assert clumps((chair * near(3)).factors[0]) == {0}

@@ -82,7 +82,7 @@ def find_goals(heat: Heatmap, top: int) -> list[Goal]:
     shares = _shares(heat, lead)
     goals: list[Goal] = []
     taken: list[np.ndarray] = []
-    score = np.round(shares.peak * lead.confidence, 2)  # more digits would be noise; of equals the larger leads
+    score = np.round(shares.peak * lead.confidence, 3)  # more digits would be noise; of equals the larger leads
     extent = np.bincount(lead.instance, minlength=len(score))
     for instance in np.lexsort((-extent, -score)):
         if len(goals) >= top or score[instance] <= 0.0:

@@ -6,7 +6,7 @@ falling with the horizontal distance). A ``Heatmap`` is the element-wise product
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -72,6 +72,10 @@ class Factor(ABC):
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat at any points."""
 
+    def in_company(self) -> "Factor":
+        """Return this factor as it counts in a product with others."""
+        return self
+
     @abstractmethod
     def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         """Return the anchor that each of these voxels has its heat from; they must have some."""
@@ -83,6 +87,8 @@ class NearThings(Factor):
 
     Attributes:
         mask: which voxels are the object; the anchors are their middles, in the same order.
+        with_unsure: makes the same with the instances, too, that are too unsure to count where nothing else is asked:
+            what they are near tells whether one of them is meant. None where there are no others.
     """
 
     space: Space
@@ -94,7 +100,17 @@ class NearThings(Factor):
     found: bool
     understood: str = ""
     note: str = ""
+    with_unsure: "Callable[[], NearThings] | None" = None
     flat: bool = field(default=False, init=False)
+
+    def in_company(self) -> "NearThings":
+        """Return what is sought with its unsure instances; what it is near stays what is sure."""
+        sought = self.part.role is Role.PRIMARY
+        return self._with_unsure if sought and self.with_unsure is not None else self
+
+    @cached_property
+    def _with_unsure(self) -> "NearThings":
+        return self.with_unsure() if self.with_unsure is not None else self
 
     @cached_property
     def anchors(self) -> Float[np.ndarray, "a 3"]:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -209,7 +225,12 @@ class Heatmap:
             return NotImplemented
         if self.space is not other.space:
             raise ValueError("two heatmaps of different maps cannot be multiplied; ask both of the same AVLMap")
-        return Heatmap(self.space, self.factors + other.factors, self.values * other.values)
+        one, two = self._in_company(), other._in_company()
+        return Heatmap(self.space, one.factors + two.factors, one.values * two.values)
+
+    def _in_company(self) -> "Heatmap":
+        """Return the heatmap as it counts in a product; that of several things is one already."""
+        return Heatmap.of(self.factors[0].in_company()) if len(self.factors) == 1 else self
 
     def __len__(self) -> int:
         return len(self.values)
