@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import OmitArgPrefixes, Positional
 
 from avlmaps.cli.output import emit, table_lines
-from avlmaps.cli.verbs import Verb
+from avlmaps.cli.verb import ModelVerb
 
 if TYPE_CHECKING:
     from avlmaps.bench.indexing import IndexingSettings
@@ -52,7 +52,7 @@ class Navigation:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bench(Verb):
+class Bench(ModelVerb):
     """Measure how good the parts are, with counts and 95 % intervals.
 
     words: household phrases kept out of training; needs nothing.

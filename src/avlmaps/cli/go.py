@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from avlmaps.cli.output import emit, place, table_lines
-from avlmaps.cli.verbs import Verb
+from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.errors import NavigationError
 
 
@@ -24,7 +24,7 @@ class Chat:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Go(Verb):
+class Go(ModelVerb):
     """Tell the robot where to go, in a sentence; it writes its program, drives, and tells how near it came.
 
     The map is all that the robot knows. Its body is simulated in --scene, which must be the scene that was recorded:

@@ -10,7 +10,9 @@ import tyro
 from avlmaps.cli.bench import Bench
 from avlmaps.cli.go import Go
 from avlmaps.cli.output import UsageError
-from avlmaps.cli.verbs import AddSounds, Build, Demo, Info, Locate, Profiles, Query, Record, TeachSound, Verb
+from avlmaps.cli.profiles import Profiles
+from avlmaps.cli.verb import Verb, models_in_force
+from avlmaps.cli.verbs import AddSounds, Build, Demo, Info, Locate, Query, Record, TeachSound
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.progress import end_bars
 
@@ -69,7 +71,8 @@ def _any_verb(shortly: bool) -> Any:
 
 def _run(verb: Verb) -> int:
     try:
-        verb.run()
+        with models_in_force(verb):
+            verb.run()
     except UsageError as error:
         return _complain(error, 2)
     except AvlmapsError as error:

@@ -5,12 +5,16 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from avlmaps.cli.output import UsageError
-from avlmaps.core.errors import AvlmapsError, BackendError
+from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from avlmaps.cli.verbs import Build, Query, Record
     from avlmaps.core.camera import Pinhole
+    from avlmaps.perception.models.feature_store import CacheSettings
+    from avlmaps.perception.profiles import Profile
     from avlmaps.query.question import Part
     from avlmaps.recordings.types import Recording
 
@@ -87,6 +91,10 @@ def build(verb: "Build") -> dict[str, Any]:
     begin = perf_counter()
     if verb.resume and verb.fresh:
         raise UsageError("--resume goes on with a stopped build and --fresh begins anew; choose one of them.")
+    used, cache = (
+        _chosen_profile(verb.profile, [word for words in verb.model for word in words]),
+        _cache(verb.feature_cache, verb.feature_cache_gb),
+    )
     recording = open_recording(verb.recording, format=verb.format, audio=verb.audio, topics=_topics(verb.topics))
     for notice in recording.notices:
         say(f"note: {notice}")
@@ -96,8 +104,44 @@ def build(verb: "Build") -> dict[str, Any]:
         fusion=FusionSettings(max_depth_m=verb.max_depth_m),
         seed=verb.seed,
     )
-    stored = build_map(recording, verb.out, verb.profile, settings, resume=not verb.fresh, overwrite=verb.overwrite)
+    stored = build_map(
+        recording,
+        verb.out,
+        used,
+        settings,
+        cache=cache,
+        resume=not verb.fresh,
+        overwrite=verb.overwrite,
+    )
     return {**describe(stored), "elapsed_s": round(perf_counter() - begin, 3)}
+
+
+def _chosen_profile(name: str, words: "Sequence[str]") -> "Profile":
+    """Return the profile with the backends and models that were chosen instead of its own."""
+    from avlmaps.core.registry import Kind
+    from avlmaps.perception.profiles import profile
+
+    perceived = {kind.value: kind for kind in Kind if kind is not Kind.WORDS}
+    choices: dict[Kind, str] = {}
+    for word in words:
+        module, _, backend = word.partition("=")
+        if module not in perceived or not backend.partition("@")[0]:
+            raise UsageError(
+                f"--model takes words like pixels=clip-patches@openai/clip-vit-large-patch14, not {word!r}; the "
+                f"modules are {', '.join(perceived)}."
+            )
+        if perceived[module] in choices:
+            raise UsageError(f"--model names {module} twice; choose one.")
+        choices[perceived[module]] = backend
+    return profile(name).choosing(choices)
+
+
+def _cache(place: str, limit_gb: float) -> "CacheSettings":
+    from avlmaps.perception.models.feature_store import CacheSettings
+
+    if place in ("auto", "off"):
+        return CacheSettings(place, limit_gb)
+    return CacheSettings(Path(place).expanduser(), limit_gb)
 
 
 def _topics(words: tuple[str, ...]) -> dict[str, str]:
@@ -267,48 +311,3 @@ def teach(name: str, clips: tuple[Path, ...]) -> dict[str, Any]:
     else:
         forget_sound(name)
     return {"name": name, "clips": len(clips), "taught": [sound.name for sound in taught_sounds()]}
-
-
-def list_profiles() -> dict[str, Any]:
-    """Tell every profile's backends, and every other backend that is known."""
-    from avlmaps.core.registry import Backend, Kind, backends, load
-    from avlmaps.perception.profiles import profiles
-
-    known = {(backend.kind, backend.name): backend for backend in backends()}
-
-    def state(kind: Kind, name: str) -> dict[str, Any]:
-        backend: Backend | None = known.get((kind, name))
-        entry = {"module": str(kind), "name": name or "-", "state": "none yet", "model": "", "licence": "", "note": ""}
-        if backend is None:
-            return entry
-        if backend.missing:
-            how = (
-                f"pip install 'avlmaps[{backend.extra}]'"
-                if backend.extra
-                else f"pip install {' '.join(backend.missing)}"
-            )
-            return {**entry, "state": "missing", "note": how}
-        try:
-            card = load(kind, name).card
-        except BackendError as error:  # one broken package must not hide the others
-            return {**entry, "state": "broken", "note": str(error)}
-        return {
-            **entry,
-            "state": "ready",
-            "model": card.id,
-            "dim": card.dim,
-            "licence": card.licence,
-            "note": card.note,
-        }
-
-    listed = [
-        {
-            "name": profile.name,
-            "about": profile.about,
-            "backends": [state(kind, profile.backend_name(kind)) for kind in Kind if kind is not Kind.WORDS],
-        }
-        for profile in profiles()
-    ]
-    in_profiles = {(b["module"], b["name"]) for entry in listed for b in entry["backends"]}
-    others = [state(b.kind, b.name) for b in known.values() if (str(b.kind), b.name) not in in_profiles]
-    return {"profiles": listed, "other_backends": others}

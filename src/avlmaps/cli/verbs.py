@@ -4,21 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from tyro.conf import Positional, arg
+from tyro.conf import Positional, UseAppendAction, arg
 
 from avlmaps.cli.output import UsageError, emit, place, size_of, table_lines
-
-
-@dataclass(frozen=True, kw_only=True)
-class Verb:
-    """What every verb takes."""
-
-    json: bool = False
-    """Print one JSON object on standard output, and nothing else there."""
-
-    def run(self) -> None:
-        """Do it."""
-        raise NotImplementedError
+from avlmaps.cli.verb import ModelVerb, Verb
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,10 +148,12 @@ class AddSounds(Verb):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Build(Verb):
+class Build(ModelVerb):
     """Build a map from a recording. A build that was stopped goes on where it ended, with the same map as result.
 
-    Example: avlmaps build REC --out kitchen.avlmap
+    Examples:
+    avlmaps build REC --out kitchen.avlmap
+    avlmaps build REC --out kitchen.avlmap --profile foundation --model pixels=clip-patches views=clip
     """
 
     recording: Positional[Path]
@@ -171,6 +162,15 @@ class Build(Verb):
     """The map's folder, by custom NAME.avlmap."""
     profile: str = "embedded"
     """Which models perceive (see `avlmaps profiles`)."""
+    model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
+    """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
+    batch: int | None = None
+    """Frames that go through a large model at once. Default: AVLMAPS_BATCH, or as the model likes (1 on a CPU)."""
+    feature_cache: Annotated[str, arg(metavar="auto|off|DIR")] = "auto"
+    """Keep features, so that another build of the same frames encodes nothing again: auto for large models in the
+    user's cache folder, off, or a folder for those of every model."""
+    feature_cache_gb: float = 20.0
+    """Room for them, GB; what was used longest ago goes first."""
     voxel_size_m: float = 0.05
     """Edge of a voxel, metres."""
     format: str = "auto"
@@ -224,7 +224,7 @@ class Info(Verb):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Query(Verb):
+class Query(ModelVerb):
     """Ask a map, in a sentence or part by part; the parts are fused into one heatmap.
 
     Examples:
@@ -264,7 +264,7 @@ class Query(Verb):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Locate(Verb):
+class Locate(ModelVerb):
     """Tell where a photo was taken: the 6-DoF pose of its camera in the map, or that it was not taken there."""
 
     map: Positional[Path]
@@ -304,29 +304,6 @@ class TeachSound(Verb):
             raise UsageError("teach-sound takes clips to learn from, or --forget, and not both.")
         answer = teach(self.name, self.clips)
         emit(answer, [f"{key}: {value}" for key, value in answer.items()], self.json)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Profiles(Verb):
-    """List the profiles and their backends: which are here, which are missing and how to get them."""
-
-    def run(self) -> None:
-        """List them."""
-        from avlmaps.cli.running import list_profiles
-
-        answer = list_profiles()
-        lines: list[str] = []
-        for entry in answer["profiles"]:
-            lines += [f"{entry['name']}: {entry['about']}"]
-            lines += _backend_lines(entry["backends"])
-        if answer["other_backends"]:
-            lines += ["in no profile:", *_backend_lines(answer["other_backends"])]
-        emit(answer, lines, self.json)
-
-
-def _backend_lines(backends: list[dict[str, Any]]) -> list[str]:
-    cells = [(b["module"], b["name"], b["state"], b["model"], b["note"]) for b in backends]
-    return ["  " + line for line in table_lines(("module", "backend", "state", "model", "note"), cells)]
 
 
 def info_lines(answer: dict[str, Any]) -> list[str]:

@@ -1,0 +1,62 @@
+"""`avlmaps profiles`: which models there are, which of them are here, and how to get the others."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from avlmaps.cli.output import emit, table_lines
+from avlmaps.cli.verb import ModelVerb
+
+
+@dataclass(frozen=True, kw_only=True)
+class Profiles(ModelVerb):
+    """List the profiles and their backends: which are here, and which command brings what another lacks.
+
+    Nothing is fetched, and no large model is opened: its files are looked for in --models and in the hub's cache.
+    """
+
+    def run(self) -> None:
+        """List them."""
+        answer = list_profiles()
+        lines: list[str] = []
+        for entry in answer["profiles"]:
+            lines += [f"{entry['name']}: {entry['about']}", *_backend_lines(entry["backends"])]
+        if answer["other_backends"]:
+            lines += ["in no profile:", *_backend_lines(answer["other_backends"])]
+        emit(answer, lines, self.json)
+
+
+def list_profiles() -> dict[str, Any]:
+    """Tell every profile's backends, and every other backend that is known."""
+    from avlmaps.core.registry import Kind, backends
+    from avlmaps.perception.models.availability import availability
+    from avlmaps.perception.profiles import profiles
+
+    known = {(backend.kind, backend.name): backend for backend in backends()}
+
+    def told(kind: Kind, choice: str) -> dict[str, Any]:
+        name, _, model = choice.partition("@")
+        entry = {"module": str(kind), "name": name or "-", "state": "none", "model": "", "licence": "", "note": ""}
+        backend = known.get((kind, name))
+        if backend is None:
+            return entry if not name else {**entry, "state": "broken", "note": f"no {kind} backend is called {name}"}
+        found = availability(backend, model)
+        entry |= {"state": found.state, "model": found.model, "licence": found.licence, "note": found.note}
+        return {**entry, "dim": found.dim} if found.dim else entry
+
+    listed = [
+        {
+            "name": profile.name,
+            "about": profile.about,
+            "backends": [told(kind, profile.backend_name(kind)) for kind in Kind if kind is not Kind.WORDS],
+        }
+        for profile in profiles()
+    ]
+    in_profiles = {(b["module"], b["name"]) for entry in listed for b in entry["backends"]}
+    others = [told(b.kind, b.name) for b in known.values() if (str(b.kind), b.name) not in in_profiles]
+    return {"profiles": listed, "other_backends": others}
+
+
+def _backend_lines(backends: list[dict[str, Any]]) -> list[str]:
+    columns = ("module", "backend", "state", "model", "licence", "note")
+    cells = [(b["module"], b["name"], b["state"], b["model"], b["licence"], b["note"]) for b in backends]
+    return ["  " + line for line in table_lines(columns, cells)]

@@ -1,0 +1,64 @@
+"""What every verb takes, and what every verb takes that runs models."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verb:
+    """What every verb takes."""
+
+    json: bool = False
+    """Print one JSON object on standard output, and nothing else there."""
+
+    def run(self) -> None:
+        """Do it."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelVerb(Verb):
+    """What every verb takes that runs models; the small ones that ship with the package heed none of it."""
+
+    models: Path | None = None
+    """Folder of models, looked through before the hub's cache. Default: AVLMAPS_MODELS."""
+    device: str | None = None
+    """Where large models run: auto, cpu, cuda, cuda:1, mps. Default: AVLMAPS_DEVICE, or a GPU where there is one."""
+    precision: Literal["auto", "float32", "float16", "bfloat16"] | None = None
+    """Of large models. Default: AVLMAPS_PRECISION, or float16 on CUDA and float32 elsewhere."""
+
+
+@contextmanager
+def models_in_force(verb: Verb) -> Iterator[None]:
+    """Load models as a verb's words say while it runs, here and in processes that it starts."""
+    given = {
+        "folder": getattr(verb, "models", None),
+        "device": getattr(verb, "device", None),
+        "precision": getattr(verb, "precision", None),
+        "batch": getattr(verb, "batch", None),
+    }
+    given = {name: value for name, value in given.items() if value is not None}
+    if not given:
+        yield
+        return
+    from avlmaps.perception.models.settings import environment_of, model_settings, using_models
+
+    if "folder" in given:
+        given["folder"] = given["folder"].expanduser().absolute()
+    settings = replace(model_settings(), **given)
+    told = environment_of(settings)
+    before = {name: os.environ.get(name) for name in told}
+    with using_models(settings):
+        os.environ.update(told)
+        try:
+            yield
+        finally:
+            for name, value in before.items():
+                if value is None:
+                    del os.environ[name]
+                else:
+                    os.environ[name] = value

@@ -1,0 +1,114 @@
+"""Which backends can run here, told without torch, without a network, and without opening a single weight.
+
+A model counts as here when its files lie where loading would look: in the folder of models, in the hub's cache, in
+torch's. Whether they are whole and the right ones is found out when they are loaded.
+"""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from avlmaps.core.errors import BackendError
+from avlmaps.core.registry import Backend, load
+from avlmaps.perception.models.published_models import PUBLISHED, Published
+from avlmaps.perception.models.settings import model_settings
+
+State = Literal["ready", "package missing", "weights missing", "broken"]
+
+
+@dataclass(frozen=True, slots=True)
+class Availability:
+    """What can be told of a backend.
+
+    Attributes:
+        state: ``ready`` says that it can be loaded (a small one: that it was).
+        model: which model it runs.
+        licence: of the weights.
+        note: what to do about it, or what to know of its limits.
+        dim: length of a feature; 0 where only loading would tell.
+    """
+
+    state: State
+    model: str = ""
+    licence: str = ""
+    note: str = ""
+    dim: int = 0
+
+
+def availability(backend: Backend, model: str = "") -> Availability:
+    """Tell the state of a backend.
+
+    Args:
+        backend: of the registry.
+        model: another model than its default.
+    """
+    model = model or backend.model
+    if backend.missing:
+        return Availability("package missing", model, backend.licence, backend.how_to_get)
+    if not model:
+        return _loaded(backend)
+    licence = backend.licence if model == backend.model else ""
+    missing = [name for name in (model, *_published(model).also) if not is_here(name)]
+    if not missing:
+        return Availability("ready", model, licence, _published(model).note)
+    return Availability("weights missing", model, licence, "; ".join(how_to_get(name) for name in missing))
+
+
+def _loaded(backend: Backend) -> Availability:
+    try:
+        card = load(backend.kind, backend.name).card
+    except BackendError as fault:  # one broken package must not hide the others
+        return Availability("broken", note=str(fault))
+    return Availability("ready", card.id, card.licence, card.note, card.dim)
+
+
+def is_here(model: str) -> bool:
+    """Tell whether a model's files lie where they would be loaded from."""
+    return any(place.exists() for place in _places(model))
+
+
+def how_to_get(model: str) -> str:
+    """Return the command that brings a model, and how much that is where it is known."""
+    known = _published(model)
+    command = known.get or f"hf download {model}"
+    return f"{command} ({_size(known.size_mb)})" if known.size_mb else command
+
+
+def _published(model: str) -> Published:
+    return PUBLISHED.get(model, Published())
+
+
+def _size(size_mb: float) -> str:
+    return f"{size_mb / 1000:.1f} GB" if size_mb >= 1000 else f"{size_mb:.0f} MB"
+
+
+def _places(model: str) -> Iterator[Path]:
+    known, folder = _published(model), model_settings().folder
+    names = known.files or (model,)
+    for name in names:
+        if folder is not None:
+            yield from (folder / name, folder / name.replace("/", "--"), folder / Path(name).name)
+        yield Path(name).expanduser()
+        yield _torch_cache() / "checkpoints" / Path(name).name
+    repository = known.repository or (model if not known.files and model.count("/") == 1 else "")
+    if not repository:
+        return
+    kept = _hub_cache() / f"models--{repository.replace('/', '--')}" / "snapshots"
+    for revision in sorted(kept.glob("*")) if kept.is_dir() else ():
+        # A snapshot of which only a configuration was ever fetched is no model.
+        yield from (revision / name for name in known.files) if known.files else revision.glob("*.safetensors")
+
+
+def _hub_cache() -> Path:
+    """Return where the hub's files are cached, by the environment variables that its own library obeys."""
+    if own := os.environ.get("HF_HUB_CACHE") or os.environ.get("HUGGINGFACE_HUB_CACHE"):
+        return Path(own).expanduser()
+    base = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache")
+    return Path(os.environ.get("HF_HOME") or base / "huggingface").expanduser() / "hub"
+
+
+def _torch_cache() -> Path:
+    base = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache")
+    return Path(os.environ.get("TORCH_HOME") or base / "torch").expanduser() / "hub"
