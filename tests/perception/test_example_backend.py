@@ -1,0 +1,103 @@
+"""A backend of somebody else's package: installed, found by its entry point, held to its protocol, used in a map."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).parent / "example_backend"
+USED = """
+import json, sys
+import numpy as np
+from pathlib import Path
+from avlmaps.core.registry import Kind, find, load
+from avlmaps.maps.build import build_map
+from avlmaps.maps.stored import open_stored
+from avlmaps.perception.conformance import check
+from avlmaps.perception.profiles import profile
+from avlmaps.recordings.open import open_recording
+
+backend = load(Kind.PLACE, "thumbnail")
+check(Kind.PLACE, backend)
+used = profile("colours").choosing({Kind.PLACE: "thumbnail"})
+build_map(open_recording(sys.argv[1]), sys.argv[2], used, progress=False)
+stored = open_stored(sys.argv[2])
+stored.require_model(Kind.PLACE)
+print(json.dumps({
+    "target": find(Kind.PLACE, "thumbnail").target,
+    "profile": [stored.profile.name, stored.profile.place, stored.profile.pixels],
+    "model": stored.info.models["place"].id,
+    "descriptors": list(stored.keyframes.place.shape),
+}))
+"""
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Install the package into a folder of its own, without a network."""
+    folder = tmp_path_factory.mktemp("installed")
+    source = folder / "source"
+    shutil.copytree(SOURCE, source, ignore=shutil.ignore_patterns("__pycache__"))
+    words = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
+    quiet = {**os.environ, "PIP_DISABLE_PIP_VERSION_CHECK": "1", "PIP_NO_CACHE_DIR": "1"}
+    subprocess.run([*words, "--target", str(folder / "site"), str(source)], check=True, env=quiet)
+    return folder / "site"
+
+
+def _run(installed: Path, *words: object) -> subprocess.CompletedProcess[str]:
+    there = {**os.environ, "PYTHONPATH": str(installed)}
+    command = [sys.executable, *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, env=there, check=False)
+
+
+def test_the_example_is_as_short_as_is_said() -> None:
+    assert len((SOURCE / "thumbnail_places.py").read_text().splitlines()) <= 30
+
+
+def test_it_is_found_held_to_its_protocol_and_makes_a_map_that_remembers_it(installed: Path, tmp_path: Path) -> None:
+    recording = tmp_path / "rec"
+    _write_recording(recording)
+    done = _run(installed, "-c", USED, recording, tmp_path / "map")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["target"] == "thumbnail_places:ThumbnailPlaces"
+    assert told["profile"] == ["colours", "thumbnail", "colours"]
+    assert told["model"] == "example/thumbnail-1"
+    assert told["descriptors"][1] == 144
+
+
+def test_the_command_line_lists_it_and_a_map_without_it_is_told_plainly(installed: Path, tmp_path: Path) -> None:
+    listed = json.loads(_run(installed, "-m", "avlmaps", "profiles", "--json").stdout)
+    (mine,) = [entry for entry in listed["other_backends"] if entry["name"] == "thumbnail"]
+    assert (mine["state"], mine["model"], mine["dim"]) == ("ready", "example/thumbnail-1", 144)
+    recording, out = tmp_path / "rec", tmp_path / "map"
+    _write_recording(recording)
+    words = ["-m", "avlmaps", "build", recording, "--out", out, "--profile", "colours", "--model", "place=thumbnail"]
+    assert _run(installed, *words).returncode == 0
+    without = tmp_path / "empty"
+    without.mkdir()
+    assert _run(without, "-m", "avlmaps", "info", out).returncode == 0, "what is in a map is told without its models"
+    refused = _run(without, "-m", "avlmaps", "locate", out, next((recording / "rgb").iterdir()))
+    assert refused.returncode == 1
+    assert refused.stderr.startswith("avlmaps: There is no place backend called 'thumbnail'; known are:")
+
+
+def _write_recording(path: Path) -> None:
+    import numpy as np
+
+    from avlmaps.core.camera import Pinhole, Rig
+    from avlmaps.recordings.types import Frame
+    from avlmaps.recordings.writer import RecordingWriter
+
+    rng, camera = np.random.default_rng(0), Pinhole(60.0, 60.0, 40.0, 30.0, 80, 60)
+    rig = Rig(camera, camera)
+    with RecordingWriter(path, rig, up_in_world=np.array([0.0, 0.0, 1.0])) as writer:
+        for index in range(4):
+            rgb = np.kron(rng.integers(0, 256, (12, 16, 3)), np.ones((5, 5, 1))).astype(np.uint8)
+            pose = np.array([[1, 0, 0, 0.3 * index], [0, 0, 1, 0], [0, -1, 0, 1.2], [0, 0, 0, 1]], float)
+            depth_m = np.full((60, 80), 2.0, np.float32)
+            writer.add(Frame(index, f"{index:06d}", 0.5 * index, rgb, depth_m, pose, rig))
