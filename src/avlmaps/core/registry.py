@@ -127,8 +127,8 @@ _OF_TORCH = (
     _paper(
         Kind.VIEWS, "clip-paper", "clip_views:PaperClipViews", "openai/clip-vit-large-patch14", "MIT", "transformers"
     ),
-    _paper(Kind.SOUNDS, "audioclip", "audioclip:AudioClipSounds", "AudioCLIP-Partial-Training.pt", "MIT"),
-    _paper(Kind.SOUNDS, "wav2clip", "wav2clip:Wav2ClipSounds", "wav2clip.pt", "MIT", "transformers"),
+    _paper(Kind.SOUNDS, "audioclip", "audioclip:AudioClipSounds", "AudioCLIP-Partial-Training.pt", "MIT", "tokenizers"),
+    _paper(Kind.SOUNDS, "wav2clip", "wav2clip:Wav2ClipSounds", "Wav2CLIP.pt", "MIT", "transformers"),
     _paper(
         Kind.LOCAL,
         "superpoint",

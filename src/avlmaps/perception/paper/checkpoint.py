@@ -59,7 +59,7 @@ def load_strictly(
     if any(wrong.values()):
         told = "; ".join(f"{len(keys)} keys {how} ({_some(keys)})" for how, keys in wrong.items() if keys)
         raise BackendError(f"{path} is not the checkpoint that is expected: {told}; get it with: {how_to_get}")
-    module.load_state_dict({key: state[key] for key in wanted}, strict=True, assign=False)
+    module.load_state_dict({key: state[key] for key in wanted}, strict=True)
 
 
 def _some(keys: list[str]) -> str:

@@ -1,0 +1,13 @@
+"""Cutting long sounds into windows that a model can take."""
+
+import numpy as np
+from jaxtyping import Float32
+
+
+def windows(samples: Float32[np.ndarray, " n"], length: int) -> Float32[np.ndarray, "w length"]:
+    """Return a sound in windows, one behind the other, the last one at its end; a shorter sound fills up with zeros."""
+    count = len(samples)
+    if count <= length:
+        return np.pad(samples, (0, length - count))[None]
+    starts = [*range(0, count - length, length), count - length]
+    return np.stack([samples[at : at + length] for at in starts])

@@ -1,0 +1,278 @@
+"""Sounds in the space of CLIP ViT-B/32 by Wav2CLIP, which the paper compares with (Wu et al., ICASSP 2022).
+
+Expected is ``Wav2CLIP.pt`` (47 MB, MIT) from the release v0.1.0-alpha of
+https://github.com/descriptinc/lyrebird-wav2clip, and for words ``openai/clip-vit-base-patch32`` (605 MB, MIT), whose
+features of pictures it learnt to imitate (arXiv 2110.11499). Features have 512 numbers. A sound goes in as 16 kHz mono,
+whole: the logarithm of its power spectrum, brought to mean 0 and deviation 1, through a ResNet-18 and two linear
+layers. The published code takes mean and deviation over a batch; here each window is alone, so that its feature does
+not depend on its company. Sounds above ten seconds, the length of those that it learnt from, are cut into windows of
+ten seconds, the last one at the end.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import Float32
+from torch import nn
+from torch.nn import functional
+
+from avlmaps.core.errors import BackendError
+from avlmaps.perception.foundation.clap import check_samples
+from avlmaps.perception.foundation.sound_scores import OTHERS, Contrast
+from avlmaps.perception.models.checksums import checksum_of, weights_in
+from avlmaps.perception.models.device import chosen_device, inference, unit_rows
+from avlmaps.perception.models.names import public_name
+from avlmaps.perception.models.precision import mixed_precision
+from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps.perception.models.published import published_file
+from avlmaps.perception.paper.checkpoint import load_strictly, read_state
+from avlmaps.perception.paper.sound_windows import windows
+from avlmaps.perception.protocols import ModelCard
+from avlmaps.recordings.audio import Sound
+from avlmaps.recordings.resample import resampled
+
+RATE_HZ = 16_000
+WORDS = "openai/clip-vit-base-patch32"
+PROMPT = "{}"
+# what training needed beside the two parts that hear: the pictures' side, the losses' scales, a classifier
+NOT_NEEDED = ("image_transform.", "loss_fn", "audio_encoder.fc.")
+_LONGEST_SAMPLES = 10 * RATE_HZ
+_HOP_SAMPLES = 353
+_LEAST_POWER = 1e-7
+_BLOCKS = (2, 2, 2, 2)
+_HOW_TO_GET = "curl -LO https://github.com/descriptinc/lyrebird-wav2clip/releases/download/v0.1.0-alpha/Wav2CLIP.pt"
+_MOST_TOKENS = 77
+_WORDS_AT_ONCE = 64
+
+
+class _Spectrogram(nn.Module):
+    """Power of each frequency; frames are centred, the ends mirrored."""
+
+    def __init__(self, length: int) -> None:
+        super().__init__()
+        self.register_buffer("window", torch.zeros(length))
+
+    def forward(self, samples: torch.Tensor) -> torch.Tensor:
+        """Return (n, 1, length / 2 + 1, frames) of (n, samples)."""
+        length = len(self.window)
+        spectrum = torch.stft(
+            samples,
+            length,
+            _HOP_SAMPLES,
+            window=self.window,
+            center=True,
+            pad_mode="reflect",
+            normalized=False,
+            onesided=True,
+            return_complex=True,
+        )
+        return spectrum.abs().square()[:, None]
+
+
+class _Block(nn.Module):
+    """Two convolutions beside the identity, as in ResNet-18."""
+
+    def __init__(self, channels: int, out_channels: int, stride: int) -> None:
+        super().__init__()
+        self.conv1 = nn.Conv2d(channels, out_channels, 3, stride, 1, bias=False)
+        self.bn1 = nn.BatchNorm2d(out_channels)
+        self.conv2 = nn.Conv2d(out_channels, out_channels, 3, 1, 1, bias=False)
+        self.bn2 = nn.BatchNorm2d(out_channels)
+        self.downsample = None
+        if stride != 1 or channels != out_channels:
+            self.downsample = nn.Sequential(
+                nn.Conv2d(channels, out_channels, 1, stride, bias=False), nn.BatchNorm2d(out_channels)
+            )
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        y = functional.relu(self.bn1(self.conv1(x)))
+        y = self.bn2(self.conv2(y))
+        return functional.relu(y + (x if self.downsample is None else self.downsample(x)))
+
+
+class _Encoder(nn.Module):
+    """ResNet-18 over one channel, without its classifier."""
+
+    def __init__(self, frame: int, stem: int) -> None:
+        super().__init__()
+        self.spectrogram = _Spectrogram(frame)
+        self.conv1 = nn.Conv2d(1, stem, 7, 2, 3, bias=False)
+        self.bn1 = nn.BatchNorm2d(stem)
+        widths = [stem, *(stem << stage for stage in range(4))]
+        self.layer1, self.layer2, self.layer3, self.layer4 = (
+            nn.Sequential(
+                _Block(channels, out, 1 if stage == 0 else 2), *(_Block(out, out, 1) for _ in range(count - 1))
+            )
+            for stage, ((channels, out), count) in enumerate(zip(pairwise(widths), _BLOCKS, strict=True))
+        )
+
+    def forward(self, spectrum: torch.Tensor) -> torch.Tensor:
+        """Return (n, 8·stem) of normalised spectra."""
+        x = functional.relu(self.bn1(self.conv1(spectrum)))
+        x = functional.max_pool2d(x, 3, 2, 1)
+        x = self.layer4(self.layer3(self.layer2(self.layer1(x))))
+        return functional.adaptive_avg_pool2d(x, 1).flatten(1)
+
+
+class _Transform(nn.Module):
+    """From what was heard to CLIP's space."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        # the place between is that of a dropout, which does nothing here
+        self.sequential = nn.Sequential(nn.Linear(width, width), nn.ReLU(), nn.Identity(), nn.Linear(width, width))
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return self.sequential(x)
+
+
+class Wav2ClipNetwork(nn.Module):
+    """The two parts of the published checkpoint that hear; sizes are read off it: frames of 512, 64 channels first."""
+
+    def __init__(self, frame: int = 512, stem: int = 64) -> None:
+        super().__init__()
+        self.audio_encoder = _Encoder(frame, stem)
+        self.audio_transform = _Transform(8 * stem)
+
+    @classmethod
+    def like(cls, state: Mapping[str, torch.Tensor]) -> "Wav2ClipNetwork":
+        """Return a network of a checkpoint's sizes, or raise ``KeyError`` where it has no such parts."""
+        return cls(len(state["audio_encoder.spectrogram.window"]), len(state["audio_encoder.conv1.weight"]))
+
+    def spectrum(self, samples: torch.Tensor) -> torch.Tensor:
+        """Return the normalised logarithm of a sound's power spectrum, of (1, samples)."""
+        power = torch.log(self.audio_encoder.spectrogram(samples) + _LEAST_POWER)
+        return (power - power.mean()) / (power.std() + 1e-9)
+
+    def forward(self, spectrum: torch.Tensor) -> torch.Tensor:
+        """Return (1, dim) of a normalised spectrum."""
+        return self.audio_transform(self.audio_encoder(spectrum))
+
+
+class Wav2ClipSounds:
+    """A feature for each sound, or for each ten seconds of a longer one, in the space of CLIP ViT-B/32.
+
+    Args:
+        model: name of the published file, or a path.
+
+    Raises:
+        BackendError: the file or CLIP is not here, or is of another model.
+    """
+
+    vocabulary: tuple[str, ...] = ()
+
+    def __init__(self, model: str = "Wav2CLIP.pt") -> None:
+        name = public_name(model)
+        path = published_file(model, _HOW_TO_GET, cached=(f"checkpoints/{name}",))
+        self._device = chosen_device()
+        self._network = _loaded(path).eval().to(self._device)
+        self._shortest = len(self._network.audio_encoder.spectrogram.window)
+        dim = self._network.audio_transform.sequential[-1].out_features  # pyright: ignore[reportAttributeAccessIssue]
+        folder = self._load_words(int(dim))
+        self.card = ModelCard(
+            id=name,
+            dim=int(dim),
+            licence="MIT",
+            checksum=checksum_of([path, *weights_in(folder)], f"{RATE_HZ} Hz, {_LONGEST_SAMPLES} samples", PROMPT),
+            prompts=(PROMPT,),
+            note=(
+                "the paper's baseline: it learnt from pictures of what sounds, never from words; a yes means likelier "
+                "than all of the everyday sounds that it is compared with, which was not fitted to recordings"
+            ),
+        )
+
+    def encode(self, sound: Sound) -> Float32[np.ndarray, "windows d"]:
+        """Return a unit vector for each window: one for a sound of up to ten seconds.
+
+        Raises:
+            AudioError: the sound has no samples, or some that are no finite numbers.
+        """
+        check_samples(sound)
+        samples = resampled(sound, RATE_HZ).samples
+        samples = np.pad(samples, (0, max(0, self._shortest - len(samples))))
+        return np.concatenate(
+            [self._encode_window(part) for part in windows(samples, min(len(samples), _LONGEST_SAMPLES))]
+        )
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return CLIP's unit vector for each phrase."""
+        texts = [PROMPT.replace("{}", word) for word in words]
+        parts = [np.zeros((0, self.card.dim), np.float32)]
+        for at in range(0, len(texts), _WORDS_AT_ONCE):
+            tokens = self._tokenizer(
+                texts[at : at + _WORDS_AT_ONCE],
+                padding=True,
+                truncation=True,
+                max_length=_MOST_TOKENS,
+                return_tensors="pt",
+            ).to(self._device)
+            with mixed_precision(self._device):
+                found = self._clip.get_text_features(
+                    input_ids=tokens["input_ids"], attention_mask=tokens["attention_mask"]
+                )
+            parts.append(unit_rows(found.pooler_output))
+        return np.concatenate(parts)
+
+    def score_words(
+        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], words: Sequence[str]
+    ) -> Float32[np.ndarray, "sounds words"]:
+        """Return how likely each sound holds what each phrase names, at CLIP's own scale of the cosines.
+
+        A sound's feature stands for the picture of what makes it; see ``sound_scores.Contrast``.
+        """
+        return self._contrast.words(sounds, self.encode_words(words))
+
+    def score_sounds(
+        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
+    ) -> Float32[np.ndarray, " sounds"]:
+        """Return how likely each sound is of the same kind as the asked one (``sound_scores.Contrast``)."""
+        return self._contrast.alike(sounds, asked)
+
+    @cached_property
+    def _contrast(self) -> Contrast:
+        return Contrast(self.encode_words((*OTHERS, "other")), float(self._clip.logit_scale.detach().exp()))
+
+    def _encode_window(self, samples: Float32[np.ndarray, " n"]) -> Float32[np.ndarray, "1 d"]:
+        with inference():
+            spectrum = self._network.spectrum(torch.from_numpy(samples)[None].to(self._device))
+        with mixed_precision(self._device):
+            return unit_rows(self._network(spectrum))
+
+    def _load_words(self, dim: int) -> Path:
+        from transformers import CLIPModel, CLIPTokenizer
+
+        folder = pretrained_folder(WORDS)
+        self._clip: Any = load_pretrained(CLIPModel, folder, WORDS, torch.device("cpu"), torch.float32)
+        self._tokenizer = load_helper(CLIPTokenizer, folder, WORDS)
+        if self._clip.config.projection_dim != dim:
+            raise BackendError(
+                f"{folder} has features of {self._clip.config.projection_dim} numbers, Wav2CLIP of {dim}; get the "
+                f"right one with: hf download {WORDS}"
+            )
+        del self._clip.vision_model, self._clip.visual_projection  # nothing is looked at here
+        self._clip.to(self._device)
+        return folder
+
+
+def _loaded(path: Path) -> Wav2ClipNetwork:
+    """Return the network with the weights of a file.
+
+    Raises:
+        BackendError: the file is of another model.
+    """
+    state = read_state(path, _HOW_TO_GET)
+    needed = {name: value for name, value in state.items() if not name.startswith(NOT_NEEDED)}
+    try:
+        network = Wav2ClipNetwork.like(needed)
+    except (KeyError, TypeError) as fault:
+        raise BackendError(
+            f"{path} is not a checkpoint of Wav2CLIP ({type(fault).__name__}: {fault}); get the published one with: "
+            f"{_HOW_TO_GET}"
+        ) from fault
+    load_strictly(network, needed, path, _HOW_TO_GET)
+    return network
