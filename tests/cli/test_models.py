@@ -1,0 +1,169 @@
+"""Choosing models on the command line, and what `avlmaps profiles` tells of them; no torch is needed for any of it."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from avlmaps.cli.verb import models_in_force
+from avlmaps.cli.verbs import Query
+from avlmaps.core.registry import Backend, Kind, find, forget_loaded
+from avlmaps.perception.models.availability import availability, how_to_get, is_here
+from avlmaps.perception.models.published_models import PUBLISHED
+from avlmaps.perception.models.settings import ModelSettings, from_environment, model_settings, using_models
+
+ON_MODELS = ("build", "query", "locate", "go", "bench", "profiles")
+
+
+@pytest.fixture(autouse=True)
+def empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty machine: no models folder, no caches of others; every package is there."""
+    for name in ("AVLMAPS_MODELS", "AVLMAPS_DEVICE", "AVLMAPS_PRECISION", "AVLMAPS_BATCH", "HF_HUB_CACHE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HF_HOME", str(tmp_path / "hf"))
+    monkeypatch.setenv("TORCH_HOME", str(tmp_path / "torch"))
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "models"
+    folder.mkdir()
+    yield folder
+    forget_loaded()
+
+
+@pytest.fixture
+def every_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Backend, "missing", property(lambda self: ()))
+
+
+def state_of(kind: Kind, name: str, folder: Path | None = None) -> tuple[str, str]:
+    with using_models(ModelSettings(folder=folder)):
+        told = availability(find(kind, name))
+    return told.state, told.note
+
+
+@pytest.mark.parametrize("verb", ON_MODELS)
+def test_every_verb_that_runs_models_takes_the_same_words(verb: str, run) -> None:
+    said = run(verb, "--help")[1]
+    assert all(option in said for option in ("--models", "--device", "--precision"))
+
+
+def test_the_words_hold_while_the_verb_runs_and_for_processes_that_it_starts(
+    empty: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("AVLMAPS_BATCH", "7")
+    with models_in_force(Query(map=Path("m"), models=empty, device="cpu", precision="float32")):
+        assert model_settings() == ModelSettings(empty, "cpu", "float32", 7, False)
+        code = (
+            "from avlmaps.perception.models.settings import *; s = model_settings(); print(s.folder, s.device, s.batch)"
+        )
+        there = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+        assert there.split() == [str(empty), "7"]
+    assert "AVLMAPS_MODELS" not in os.environ
+    assert model_settings() == from_environment() == ModelSettings(batch=7)
+
+
+def test_a_verb_that_names_nothing_changes_nothing(empty: Path) -> None:
+    given = ModelSettings(folder=empty, device="cpu")
+    with using_models(given), models_in_force(Query(map=Path("m"))):
+        assert model_settings() == given
+
+
+WRONG = (
+    (("--models", "nowhere"), 1, "The folder of models"),
+    (("--model", "pixels"), 2, "--model takes words like pixels="),
+    (("--model", "words=embedded"), 2, "the modules are pixels, views"),
+    (("--model", "pixels=nope"), 1, "There is no pixels backend called 'nope'"),
+    (("--model", "pixels=colours", "--model", "pixels=embedded"), 2, "--model names pixels twice"),
+    (("--model", "pixels=colours@large"), 1, "has no models to choose from; leave @large out"),
+    (("--feature-cache-gb", "0"), 1, "The feature cache's limit is 0.0 GB"),
+    (("--batch", "-1"), 1, "batch is -1"),
+    (("--profile", "best"), 1, "There is no profile called 'best'"),
+)
+
+
+@pytest.mark.parametrize(("words", "status", "sentence"), WRONG)
+def test_a_wrong_choice_is_one_sentence(words, status: int, sentence: str, walk: Path, run, tmp_path: Path) -> None:
+    told = run("build", walk, "--out", tmp_path / "m.avlmap", *words)
+    assert told[0] == status
+    assert sentence in told[2]
+    assert told[2].count("\n") == 1
+    assert not (tmp_path / "m.avlmap" / "map.json").exists()
+
+
+def test_chosen_backends_build_the_map_and_info_tells_them(walk: Path, answer, tmp_path: Path) -> None:
+    out, store = tmp_path / "m.avlmap", tmp_path / "store"
+    words = ("--voxel-size-m", 0.1, "--frame-step", 4, "--model", "pixels=colours", "--feature-cache", store)
+    told = answer("build", walk, "--out", out, *words)
+    assert told["models"]["pixels"] == "avlmaps/colour-words-1"
+    assert told["profile"] == "embedded"
+    assert answer("info", out)["models"] == told["models"]
+    assert {folder.name.partition("-")[0] for folder in store.iterdir()} >= {"pixels", "views", "local", "place"}
+
+
+def test_a_missing_package_is_told_with_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Backend, "missing", property(lambda self: self.needs))
+    assert state_of(Kind.PIXELS, "tipsv2") == ("package missing", "pip install 'avlmaps[foundation]'")
+    assert state_of(Kind.SOUNDS, "audioclip") == ("package missing", "pip install 'avlmaps[paper]'")
+
+
+LAYOUTS = ("org/name", "org--name", "name")
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_weights_in_the_folder_of_models_are_seen(empty: Path, every_package: None, layout: str) -> None:
+    assert state_of(Kind.PLACE, "dinov2", empty)[0] == "weights missing"
+    (empty / layout.replace("org", "facebook").replace("name", "dinov2-small")).mkdir(parents=True)
+    assert state_of(Kind.PLACE, "dinov2", empty)[0] == "ready"
+    assert state_of(Kind.PLACE, "dinov2")[0] == "weights missing", "another folder"
+
+
+def test_weights_in_the_hubs_cache_are_seen_without_its_library(tmp_path: Path, every_package: None) -> None:
+    state, how = state_of(Kind.PLACE, "dinov2")
+    assert state == "weights missing"
+    assert how.startswith("hf download facebook/dinov2-small")
+    snapshot = tmp_path / "hf" / "hub" / "models--facebook--dinov2-small" / "snapshots" / "abc"
+    snapshot.mkdir(parents=True)
+    (snapshot / "config.json").write_text("{}")
+    assert state_of(Kind.PLACE, "dinov2")[0] == "weights missing", "a configuration alone is no model"
+    (snapshot / "model.safetensors").write_bytes(b"")
+    assert state_of(Kind.PLACE, "dinov2")[0] == "ready"
+
+
+@pytest.mark.parametrize("model", [name for name, known in PUBLISHED.items() if known.files])
+def test_single_files_are_seen_where_others_keep_them(model: str, empty: Path, tmp_path: Path) -> None:
+    name = PUBLISHED[model].files[0]
+    assert not is_here(model)
+    assert name in how_to_get(model) or "hf download" in how_to_get(model) or "curl" in how_to_get(model)
+    cached = tmp_path / "torch" / "hub" / "checkpoints" / name
+    cached.parent.mkdir(parents=True)
+    cached.write_bytes(b"")
+    assert is_here(model)
+
+
+def test_every_model_of_a_profile_says_how_it_is_got() -> None:
+    from avlmaps.core.registry import backends
+
+    for backend in backends():
+        if backend.model and backend.target.startswith("avlmaps."):
+            assert " " in how_to_get(backend.model), backend.model
+            assert backend.licence, backend.model
+
+
+def test_profiles_prints_state_command_size_and_licence(empty: Path, every_package: None, answer, run) -> None:
+    told = answer("profiles", "--models", empty)
+    by_name = {entry["name"]: entry for entry in told["profiles"]}
+    assert list(by_name)[:4] == ["embedded", "colours", "foundation", "paper"]
+    pixels = by_name["foundation"]["backends"][0]
+    assert (pixels["name"], pixels["state"], pixels["licence"]) == ("tipsv2", "weights missing", "Apache-2.0")
+    assert "hf download google/tipsv2-b14" in pixels["note"]
+    licences = {entry["name"]: entry["licence"] for entry in by_name["paper"]["backends"]}
+    assert "non-commercial" in licences["superpoint"]
+    assert "non-commercial" in run("profiles")[1]
+
+
+def test_listing_the_profiles_loads_no_torch() -> None:
+    code = "import sys\nfrom avlmaps.cli.profiles import list_profiles\nlist_profiles()\nprint('torch' in sys.modules)"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert out.strip() == "False"
