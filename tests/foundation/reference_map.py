@@ -3,6 +3,7 @@
 Everything is written from the formulas of that code: a Python loop over points, ``int()`` for cells, its running mean.
 """
 
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -10,10 +11,12 @@ from typing import ClassVar
 import cv2
 import h5py
 import numpy as np
+import soundfile
 
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.perception.protocols import ModelCard
+from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.avlmaps_layout import WORLD_FROM_HABITAT, base_from_camera
 from avlmaps.recordings.types import Frame
 from avlmaps.sim.raycast import ROOM, View, render
@@ -162,3 +165,35 @@ class KnowsTheRoom:
 
     def understood(self, word: str) -> str:
         return word
+
+
+class HearsPitch:
+    """A sound model of two features: how low, and how high."""
+
+    card = ModelCard("tests/pitch-1", 2, "MIT", "fedcba9876543210")
+    vocabulary = ("low", "high")
+
+    def encode(self, sound: Sound) -> np.ndarray:
+        spectrum = np.abs(np.fft.rfft(sound.samples))
+        pitch = spectrum.argmax() * sound.rate_hz / len(sound.samples)
+        return np.array([[1.0, 0.0] if pitch < 1000.0 else [0.0, 1.0]], np.float32)
+
+    def encode_words(self, words: list[str]) -> np.ndarray:
+        return np.array([[word == "low", word == "high"] for word in words], np.float32)
+
+    def score_words(self, sounds: list[np.ndarray], words: list[str]) -> np.ndarray:
+        return np.array([sound.max(axis=0) for sound in sounds]) @ self.encode_words(words).T
+
+
+def write_walk(folder: Path, seen: list[Seen], beeps: dict[float, float], track: str, rate_hz: int = 22050) -> Path:
+    """Write a walk below audio_video/: 25 frames/s, and a track with a second of tone at each onset."""
+    write_scene(folder, seen)
+    shutil.rmtree(folder / "depth")
+    rng = np.random.default_rng(0)
+    samples = 0.0002 * rng.standard_normal(rate_hz * 6)
+    t = np.arange(rate_hz) / rate_hz
+    for onset_s, pitch_hz in beeps.items():
+        start = int(onset_s * rate_hz)
+        samples[start : start + rate_hz] += 0.3 * np.sin(2 * np.pi * pitch_hz * t)
+    soundfile.write(folder / track, samples, rate_hz)
+    return folder

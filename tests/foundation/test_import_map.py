@@ -22,6 +22,7 @@ from reference_map import (
     walk,
     write_h5,
     write_scene,
+    write_walk,
 )
 from scipy.spatial import KDTree
 
@@ -92,7 +93,7 @@ def test_the_map_is_whole_and_tells_what_it_is(imported: StoredMap, arrays: dict
         "pixels": ("demo_e200.ckpt", 512, ""),
         "views": ("openai/clip-vit-large-patch14", 768, ""),
     }
-    assert any("does not record from which weights" in notice for notice in stored.info.notices)
+    assert any("from which weights its features are is not recorded" in notice for notice in stored.info.notices)
     assert stored.info.recording.name == "5LpN3gDmAk7_1" and stored.info.recording.format == "vlmaps.h5df"
     norm = np.linalg.norm(stored.voxels.feature.astype(np.float64), axis=1)
     assert np.allclose(norm, 1.0, atol=2e-3)
@@ -390,6 +391,61 @@ def test_without_any_pose_the_sentence_says_what_to_give(scene: Path, tmp_path: 
     source = _copy(scene / "vlmap/vlmaps.h5df", tmp_path / "vlmaps.h5df")
     with pytest.raises(MapError, match=r"does not tell where its grid lies .* give it with --poses FILE"):
         import_reference_map(source, tmp_path / "m.avlmap", SETTINGS, progress=False)
+
+
+@pytest.fixture
+def with_walks(scene: Path, seen: list[Seen], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The scene, and two walks of seven seconds each below it: low, then high; low again."""
+    folder = tmp_path / "scene_1"
+    folder.mkdir()
+    for name in ("vlmap", "area_map", "poses.txt", "rgb"):
+        (folder / name).symlink_to(scene / name)
+    slowly = [one for one in seen for _ in range(12)]
+    write_walk(folder / "audio_video/000000", slowly, {1.0: 300.0, 4.0: 3000.0}, "output_level_1.wav")
+    write_walk(folder / "audio_video/000007", slowly[::-1], {2.0: 300.0}, "output_level_1.wav")
+    ears = Backend(Kind.SOUNDS, "pitch", "reference_map:HearsPitch")
+    monkeypatch.setitem(registry._registered, (Kind.SOUNDS, "pitch"), ears)
+    registry.forget_loaded()
+    return folder
+
+
+def test_the_walks_below_are_heard_anew_where_they_were_walked(
+    with_walks: Path, seen: list[Seen], tmp_path: Path
+) -> None:
+    settings = ImportSettings(CELL_M, track="output_level_1.wav", hear_with="pitch")
+    stored = import_reference_map(with_walks, tmp_path / "m.avlmap", settings, progress=False)
+    sounds = verify_stored(stored.path).sounds
+    begin_s = stored.info.recording.duration_s
+    second_s = begin_s + (14 * 12 - 1) / 25
+    assert np.allclose(sounds.onset_s, [begin_s + 1.0, begin_s + 4.0, second_s + 2.0], atol=0.1)
+    assert np.allclose(sounds.offset_s - sounds.onset_s, 1.0, atol=0.15)
+    assert sounds.feature.tolist() == [[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]]
+    assert len({stored.clip_path(i) for i in range(3)}) == 3 and all(stored.clip_path(i).is_file() for i in range(3))
+    assert not (stored.path / "parts").exists()
+    assert (stored.info.models["sounds"].backend, stored.info.models["sounds"].checksum) == (
+        "pitch",
+        "fedcba9876543210",
+    )
+    walked = avlmaps.open_recording(with_walks / "audio_video/000007").world_from_camera[:, :3, 3]
+    track = sounds.track[sounds.track_offsets[2] : sounds.track_offsets[3]]
+    assert np.allclose(track[0], walked[50], atol=0.3) and KDTree(walked).query(track)[0].max() < 0.3
+    heat = AVLMap(stored).sound("high")
+    assert heat.found
+    first = seen[4 * 25 // 12].habitat_from_base
+    expected = np.array([-first[2, 3], -first[0, 3]])
+    assert np.linalg.norm(np.subtract(heat.goals(top=1)[0].position[:2], expected)) < 3.0
+
+
+def test_a_track_that_is_not_there_is_one_sentence(with_walks: Path, tmp_path: Path) -> None:
+    for track, sentence in (
+        ("output_level_4.wav", "has a output_level_4.wav; there are: output_level_1.wav."),
+        ("../poses.txt", "is no file's name"),
+        ("*.wav", "No folder below"),
+    ):
+        settings = ImportSettings(CELL_M, track=track, hear_with="pitch")
+        with pytest.raises(MapError) as fault:
+            import_reference_map(with_walks, tmp_path / "m.avlmap", settings, progress=False)
+        assert sentence in str(fault.value)
 
 
 def test_the_command_tells_as_info_does_and_what_it_left(scene: Path, tmp_path: Path, capsys) -> None:

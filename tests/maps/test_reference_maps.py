@@ -113,19 +113,18 @@ def test_the_files_of_a_scene_are_found_from_its_folder_and_from_a_file(tmp_path
     for source in (tmp_path, voxels):
         scene = find_scene(source)
         assert (scene.folder, scene.voxels, scene.areas, scene.poses) == (tmp_path, voxels, areas, with_poses)
-        assert scene.notices == ()
+        assert not scene.has_sound_map and not scene.has_visual_map
     own = _touch(tmp_path / "elsewhere/poses.txt")
     assert find_scene(tmp_path, poses=own).poses == own
     assert find_scene(tmp_path, poses=own).camera == tmp_path / "elsewhere/camera.json"
 
 
-def test_what_is_left_behind_is_told(tmp_path: Path) -> None:
+def test_what_is_left_behind_is_noticed(tmp_path: Path) -> None:
     _touch(tmp_path / "vlmap/vlmaps.h5df")
     _touch(tmp_path / "audio_video/audio_data_manual_level_2.pkl")
     _touch(tmp_path / "visual_map/x_query_features.h5df")
-    sounds, pictures = find_scene(tmp_path).notices
-    assert sounds.startswith("The sound map (audio_data*.pkl) was not imported: a pickle can run any code")
-    assert "no keypoints" in pictures
+    scene = find_scene(tmp_path)
+    assert scene.has_sound_map and scene.has_visual_map
 
 
 @pytest.mark.parametrize(

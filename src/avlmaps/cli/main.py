@@ -9,6 +9,7 @@ import tyro
 
 from avlmaps.cli.bench import Bench
 from avlmaps.cli.go import Go
+from avlmaps.cli.import_map import ImportMap
 from avlmaps.cli.output import UsageError
 from avlmaps.cli.profiles import Profiles
 from avlmaps.cli.verb import Verb, models_in_force
@@ -26,6 +27,7 @@ VERBS: dict[str, type[Verb]] = {
     "record": Record,
     "add-sounds": AddSounds,
     "build": Build,
+    "import-map": ImportMap,
     "info": Info,
     "query": Query,
     "locate": Locate,

@@ -5,7 +5,7 @@ agree. The reference's grid is turned and shifted against ours by the first base
 voxel of ours that holds its middle, and where two meet they are averaged by their weights.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
@@ -16,7 +16,6 @@ from jaxtyping import Float
 from avlmaps.core.errors import MapError
 from avlmaps.core.progress import progress as shown
 from avlmaps.core.progress import say, silenced
-from avlmaps.core.registry import Kind, find
 from avlmaps.core.version import __version__
 from avlmaps.maps.checkpoints import key_of
 from avlmaps.maps.grid import GridSpec
@@ -26,27 +25,24 @@ from avlmaps.maps.manifest import (
     Box,
     Counts,
     MapInfo,
-    ModelInfo,
-    RecordingInfo,
     RigInfo,
     Timings,
     UpInfo,
     parse_manifest,
 )
-from avlmaps.maps.reference import areas_h5, voxels_h5
 from avlmaps.maps.reference.frames import Walk, read_walk
 from avlmaps.maps.reference.hdf5 import opened
-from avlmaps.maps.reference.scene import SceneFiles, find_scene
-from avlmaps.maps.reference.voxels_h5 import ReferenceVoxels, VoxelRows
+from avlmaps.maps.reference.scene import find_scene
+from avlmaps.maps.reference.source import PROFILE, Source
+from avlmaps.maps.reference.tracks import HEARING, Ears
+from avlmaps.maps.reference.voxels_h5 import DIM, ReferenceVoxels, VoxelRows
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store import MapContent, is_map_or_free, write_map
-from avlmaps.maps.stored import StoredMap, open_stored
-from avlmaps.maps.types import HeardSounds, Voxels
+from avlmaps.maps.stored import PARTS, StoredMap, open_stored
+from avlmaps.maps.types import Voxels
 from avlmaps.maps.voxel_sums import VoxelSums, VoxelTable
-from avlmaps.perception.profiles import profile
 
 IMPORT_VERSION = 1  # raise it when the conversion comes to make something else of the same files
-PROFILE = "paper"
 WEIGHT_VARIANCE_M2 = 0.6
 # Every hundredth pixel of a depth picture is fused by the reference (``depth_sample_rate``), so that a voxel of its map
 # stands for about as many pixels or more; how many it was is not kept.
@@ -62,6 +58,10 @@ class ImportSettings:
     """Edge of a cell of the reference's grid; the imported map has voxels of this size."""
     max_bad_share: float = 0.0
     """Stop when more than this share of the voxels holds NaN or infinity; fewer are left out and told."""
+    track: str = ""
+    """Name of the track in each walk below ``audio_video/`` whose sounds are heard anew; none by default."""
+    hear_with: str = "audioclip"
+    """Which sound model hears them."""
 
     def __post_init__(self) -> None:
         if not 0.001 <= self.cell_size_m <= 10.0:
@@ -101,20 +101,22 @@ def import_reference_map(
     scene = find_scene(Path(source), areas, poses)
     with silenced(not progress), opened(scene.voxels) as file:
         voxels = ReferenceVoxels(file)
-        walk = read_walk(scene, needs_first_pose=voxels.corner is None)
         settings = _with_own_cell_size(settings, voxels)
-        key = key_of("import", IMPORT_VERSION, voxels.fingerprint, walk.fingerprint(), settings.cell_size_m)
+        walk = read_walk(scene, needs_first_pose=voxels.corner is None)
+        ears = Ears.of(scene, settings.track, settings.hear_with, walk.duration_s)
+        source_key = (voxels.fingerprint, walk.fingerprint(), ears.ingredients())
+        key = key_of("import", IMPORT_VERSION, source_key, settings.cell_size_m)
         if _finished(path, key, overwrite):
             return open_stored(path)
         with locked(path):
-            _write(path, scene, voxels, walk, settings, key, begin)
+            _write(path, Source(scene, voxels, walk, ears), settings, key, begin)
     return open_stored(path)
 
 
 def _with_own_cell_size(settings: ImportSettings, voxels: ReferenceVoxels) -> ImportSettings:
     if voxels.corner is None:
         return settings
-    return ImportSettings(voxels.corner.cell_size_m, settings.max_bad_share)
+    return replace(settings, cell_size_m=voxels.corner.cell_size_m)
 
 
 def _finished(path: Path, key: str, overwrite: bool) -> bool:
@@ -132,18 +134,12 @@ def _finished(path: Path, key: str, overwrite: bool) -> bool:
     return True
 
 
-def _write(
-    path: Path,
-    scene: SceneFiles,
-    source: ReferenceVoxels,
-    walk: Walk,
-    settings: ImportSettings,
-    key: str,
-    begin: float,
-) -> None:
-    grid = GridSpec(settings.cell_size_m)
-    voxels, left_out = _converted(source, walk, settings, grid)
-    content = MapContent(voxels, walk.keyframes(grid.centre_of(voxels.index)), {}, _no_sounds(), path)
+def _write(path: Path, source: Source, settings: ImportSettings, key: str, begin: float) -> None:
+    grid, walk = GridSpec(settings.cell_size_m), source.walk
+    voxels, left_out = _converted(source.voxels, walk, settings, grid)
+    clips = path / PARTS / "clips"
+    heard = source.ears.hear(clips)
+    content = MapContent(voxels, walk.keyframes(grid.centre_of(voxels.index)), {}, heard, clips)
     elapsed_s = perf_counter() - begin
     finished = datetime.now(UTC).isoformat(timespec="seconds")
     corners = np.stack([voxels.index.min(axis=0), voxels.index.max(axis=0) + 1]) * grid.voxel_size_m
@@ -155,20 +151,15 @@ def _write(
         up=UpInfo.of(np.array([0.0, 0.0, 1.0]), "recording", 1.0),
         rig=RigInfo.of(walk.rig),
         profile=PROFILE,
-        models=_models(walk),
-        settings=BuildSettings(voxel_size_m=grid.voxel_size_m).for_profile(WEIGHT_VARIANCE_M2),
+        models=source.models(),
+        settings=BuildSettings(voxel_size_m=grid.voxel_size_m, hearing=HEARING).for_profile(WEIGHT_VARIANCE_M2),
         seed=0,
-        recording=RecordingInfo(
-            name=scene.folder.resolve().name,
-            format=source.path.name,
-            fingerprint=source.fingerprint,
-            frames=source.frames,
-            duration_s=walk.duration_s,
-            notices=(walk.notice,) if walk.notice else (),
+        recording=source.recording(),
+        counts=Counts(
+            frames=source.voxels.frames, keyframes=len(content.keyframes), voxels=len(voxels), sounds=len(heard)
         ),
-        counts=Counts(frames=source.frames, keyframes=len(content.keyframes), voxels=len(voxels), sounds=0),
         bounding_box_m=Box(low=low, high=high),  # pyright: ignore[reportArgumentType]
-        notices=_notices(scene, source, walk, len(voxels), left_out),
+        notices=tuple(source.notices(len(voxels), left_out)),
         timings=Timings(finished=finished, elapsed_s=elapsed_s, stages_s={"import": elapsed_s}),
     )
     write_map(path, content, info)
@@ -177,7 +168,7 @@ def _write(
 def _converted(source: ReferenceVoxels, walk: Walk, settings: ImportSettings, grid: GridSpec) -> tuple[Voxels, int]:
     """Return the voxels on our grid, and how many of the source's were left out."""
     index = grid.index_of(source.places(walk.first_habitat_from_base, settings.cell_size_m))
-    table = VoxelTable(voxels_h5.DIM)
+    table = VoxelTable(DIM)
     left_out, first_bad = 0, -1
     parts = source.parts()
     for part in source.read(shown(parts, "importing", unit="part")):
@@ -211,53 +202,3 @@ def _sums(part: VoxelRows, index: Float[np.ndarray, "n 3"], usable: np.ndarray) 
         hits=np.full(count, PIXELS_PER_VOXEL, np.int64),
         last_seen_s=np.zeros(count),
     )
-
-
-def _no_sounds() -> HeardSounds:
-    return HeardSounds(
-        onset_s=np.zeros(0),
-        offset_s=np.zeros(0),
-        track_offsets=np.zeros(1, np.int64),
-        track=np.zeros((0, 3), np.float32),
-        feature_offsets=np.zeros(1, np.int64),
-        feature=np.zeros((0, 0), np.float32),
-        clips=(),
-    )
-
-
-def _models(walk: Walk) -> dict[str, ModelInfo]:
-    """Return what is known of the models: which, and not from what weights."""
-    dims = {Kind.PIXELS: voxels_h5.DIM} | ({Kind.VIEWS: areas_h5.DIM} if walk.has_views else {})
-    used, models = profile(PROFILE), dict[str, ModelInfo]()
-    for kind, dim in dims.items():
-        backend = find(kind, used.backend_name(kind))
-        models[kind.value] = ModelInfo(
-            backend=f"{backend.name}@{backend.model}",
-            id=backend.model,
-            dim=dim,
-            licence=backend.licence,
-            checksum="",
-            prompts=(),
-            note="The reference code does not record from which weights its features are.",
-        )
-    return models
-
-
-def _notices(scene: SceneFiles, source: ReferenceVoxels, walk: Walk, kept: int, left_out: int) -> tuple[str, ...]:
-    used = profile(PROFILE)
-    names = {kind: find(kind, used.backend_name(kind)).model for kind in (Kind.PIXELS, Kind.VIEWS)}
-    notices = [
-        f"Imported from {source.path.name}, which does not record from which weights its features are; they are taken "
-        f"for those of {names[Kind.PIXELS]}" + (f" and {names[Kind.VIEWS]}." if walk.has_views else "."),
-        f"{len(source) - left_out} cells of the reference's grid fell into {kept} voxels: its grid is turned against "
-        "this one.",
-    ]
-    if left_out:
-        notices.append(f"{left_out} of {len(source)} voxels held NaN or infinity and were left out.")
-    if not source.has_colours:
-        notices.append("The file has no colours (grid_rgb), so that all voxels are black.")
-    if source.corner is None:
-        notices.append("The reference keeps nothing above the camera's height nor below the first pose's floor.")
-    if not walk.has_views:
-        notices.append("There is no area map (area_map/clip_sparse_map.h5df), so that areas cannot be asked.")
-    return (*notices, *scene.notices)

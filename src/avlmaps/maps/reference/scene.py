@@ -20,7 +20,8 @@ class SceneFiles:
         areas: ``clip_sparse_map.h5df``, if there is one.
         poses: ``poses.txt``, if there is one.
         camera: where ``camera.json`` would be (see ``avlmaps_layout``).
-        notices: a sentence for each part of the map that is there and is not imported.
+        has_sound_map: whether there is a pickled sound map.
+        has_visual_map: whether there is a visual map.
     """
 
     folder: Path
@@ -28,7 +29,8 @@ class SceneFiles:
     areas: Path | None
     poses: Path | None
     camera: Path
-    notices: tuple[str, ...]
+    has_sound_map: bool
+    has_visual_map: bool
 
 
 def find_scene(source: Path, areas: Path | None = None, poses: Path | None = None) -> SceneFiles:
@@ -65,7 +67,8 @@ def find_scene(source: Path, areas: Path | None = None, poses: Path | None = Non
         areas=areas or _if_there(folder / AREAS),
         poses=poses or _if_there(own_poses),
         camera=(poses or own_poses).with_name("camera.json"),
-        notices=tuple(_left_behind(folder)),
+        has_sound_map=any(folder.glob("audio_video/audio_data*.pkl")),
+        has_visual_map=any(folder.glob("visual_map/*_features.h5df")),
     )
 
 
@@ -81,18 +84,3 @@ def _is_placed(file: Path) -> bool:
 
 def _if_there(path: Path) -> Path | None:
     return path if path.is_file() else None
-
-
-def _left_behind(folder: Path) -> list[str]:
-    notices: list[str] = []
-    if any(folder.glob("audio_video/audio_data*.pkl")):
-        notices.append(
-            "The sound map (audio_data*.pkl) was not imported: a pickle can run any code when it is read, and it tells "
-            "neither when a sound was heard nor what it sounded like; the sequences below audio_video/ hold the tracks."
-        )
-    if any(folder.glob("visual_map/*_features.h5df")):
-        notices.append(
-            "The visual map (*_features.h5df) was not imported: it names its pictures by their path on the machine "
-            "that wrote it, and keeps no keypoints, so that photos cannot be located in this map."
-        )
-    return notices

@@ -1,0 +1,57 @@
+"""`avlmaps import-map`: a map of the published AVLMaps/VLMaps code becomes one of ours."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from tyro.conf import Positional, arg
+
+from avlmaps.cli.output import emit
+from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.verbs import info_lines
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportMap(ModelVerb):
+    """Convert a map that the published AVLMaps/VLMaps code wrote; it lies in the world of the scene's recording.
+
+    Voxels (vlmaps.h5df and its relatives) and areas (clip_sparse_map.h5df) are read. The sound map, a pickle, is not;
+    the tracks that it was made from are heard anew with --sounds. Needs pip install 'avlmaps[paper]'. Example:
+
+    avlmaps import-map avlmaps_dataset/5LpN3gDmAk7_1 --out 5LpN3gDmAk7_1.avlmap --sounds output_level_1.wav
+    """
+
+    source: Positional[Path]
+    """The scene's folder, with vlmap/vlmaps.h5df, area_map/ and poses.txt in it, or the .h5df file of the voxels."""
+    out: Path
+    """The new map's folder, by custom NAME.avlmap."""
+    cell_size_m: Annotated[float, arg(name="cell-size", metavar="M")] = 0.05
+    """Edge of a cell of the reference's grid, metres; multi-floor and camera maps tell theirs themselves."""
+    poses: Path | None = None
+    """poses.txt, whose first pose the grid lies round. Default: that of the scene."""
+    areas: Path | None = None
+    """clip_sparse_map.h5df. Default: that of the scene."""
+    sounds: Annotated[str, arg(metavar="FILE")] = ""
+    """Name of the track in each walk below audio_video/, such as output_level_1.wav. Default: no sounds."""
+    hear_with: Annotated[str, arg(metavar="BACKEND")] = "audioclip"
+    """Which sound model hears them (see `avlmaps profiles`)."""
+    max_bad_share: float = 0.0
+    """Stop when more than this share of the voxels holds NaN; fewer are left out and told."""
+    overwrite: bool = False
+    """Replace a finished map at --out that came from something else."""
+
+    def run(self) -> None:
+        """Convert it."""
+        answer = _imported(self)
+        emit(answer, info_lines(answer), self.json)
+
+
+def _imported(verb: ImportMap) -> dict[str, Any]:
+    from avlmaps.maps.reference.convert import ImportSettings, import_reference_map
+    from avlmaps.maps.stored import describe
+
+    settings = ImportSettings(verb.cell_size_m, verb.max_bad_share, verb.sounds, verb.hear_with)
+    stored = import_reference_map(
+        verb.source, verb.out, settings, areas=verb.areas, poses=verb.poses, overwrite=verb.overwrite
+    )
+    return describe(stored)
