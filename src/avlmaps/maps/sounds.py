@@ -2,7 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float32
@@ -11,8 +13,9 @@ from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.progress import progress, say
 from avlmaps.maps.denoise import denoised, noise_profile
 from avlmaps.maps.segmentation import Segment, SegmentationSettings, segment
+from avlmaps.maps.sound_changes import ChangeSettings, cut_at_changes, frames_of_track
 from avlmaps.maps.types import HeardSounds
-from avlmaps.perception.protocols import SoundEncoder
+from avlmaps.perception.protocols import FrameSoundEncoder, SoundEncoder
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.types import Recording
 
@@ -30,6 +33,11 @@ class HearingSettings:
     """The background is made quieter by at most this, dB, before a sound is encoded; 0 leaves it as it is."""
     quiet_s: float = 5.0
     """The background is learnt from so many seconds before a sound and after it, where nothing else sounds."""
+    cut: Literal["auto", "energy", "changes"] = "auto"
+    """energy: sounds are what stands out from the background; changes: the whole track is kept, divided where what
+    sounds changes; auto: changes where the sound model gives a feature every few hundredths of a second."""
+    changes: ChangeSettings = field(default_factory=ChangeSettings)
+    """Dividing the track where what sounds changes."""
 
     def __post_init__(self) -> None:
         for name in ("noise_reduction_db", "quiet_s"):
@@ -41,9 +49,12 @@ class HearingSettings:
 def hear(recording: Recording, encoder: SoundEncoder, settings: HearingSettings, clips_folder: Path) -> HeardSounds:
     """Find the sounds of a recording, encode each whole, and tell where the robot was while it heard them.
 
+    An encoder with a feature for each short step of time hears the whole track instead, which is then divided where the
+    features change (``maps.sound_changes``); only digital silence, samples that are all zero, is left out.
+
     Args:
         recording: the walk; without a track it has no sounds.
-        encoder: gives a sound one feature or more, one for each window of it.
+        encoder: gives a sound one feature or more, one for each window or step of it.
         settings: how.
         clips_folder: where each sound is written as FLAC, as it was heard, named by its onset; made if need be.
 
@@ -52,22 +63,52 @@ def hear(recording: Recording, encoder: SoundEncoder, settings: HearingSettings,
 
     Raises:
         AudioError: the track cannot be read.
-        BackendError: the encoder's features are not what its card says.
+        BackendError: the encoder's features are not what its card says, or it has none for each step and ``cut`` is
+            ``changes``.
     """
     if recording.audio is None:
         return _collected([], encoder.card.dim)
     clips_folder.mkdir(parents=True, exist_ok=True)
-    found = segment(recording.audio, settings.segmentation)
+    if isinstance(encoder, FrameSoundEncoder) and settings.cut != "energy":
+        pieces = _by_changes(recording.audio, encoder, settings.changes)
+    elif settings.cut == "changes":
+        raise BackendError(
+            f"The sound model {encoder.card.id} gives no feature for each step of time to cut a track by; choose "
+            "hearing.cut auto or energy, or another model."
+        )
+    else:
+        pieces = _by_energy(recording.audio, encoder, settings)
     heard: list[_Heard] = []
+    for found, sound, feature in pieces:
+        clip = f"{found.onset_s:010.3f}.flac"
+        write_flac(clips_folder / clip, sound)
+        heard.append(_Heard(found, track_of(recording, found), feature, clip))
+    _tell_outside(recording, [one.segment for one in heard])
+    return _collected(heard, encoder.card.dim)
+
+
+_Piece = tuple[Segment, Sound, Float32[np.ndarray, "windows d"]]
+
+
+def _by_energy(track: AudioTrack, encoder: SoundEncoder, settings: HearingSettings) -> Iterator[_Piece]:
+    """Yield what stands out from the background, as it was heard, and its features without the background."""
+    found = segment(track, settings.segmentation)
     each = range(len(found))
     for i in progress(each, "hearing", unit="sound") if found else each:
-        sound = recording.audio.read(found[i].onset_s, found[i].offset_s)
-        clip = f"{found[i].onset_s:010.3f}.flac"
-        write_flac(clips_folder / clip, sound)
-        feature = _encoded(encoder, _cleaned(sound, recording.audio, found, i, settings))
-        heard.append(_Heard(found[i], track_of(recording, found[i]), feature, clip))
-    _tell_outside(recording, found)
-    return _collected(heard, encoder.card.dim)
+        sound = track.read(found[i].onset_s, found[i].offset_s)
+        yield found[i], sound, _encoded(encoder, _cleaned(sound, track, found, i, settings))
+
+
+def _by_changes(track: AudioTrack, encoder: FrameSoundEncoder, settings: ChangeSettings) -> Iterator[_Piece]:
+    """Yield the stretches of the track between changes, and the features of their steps."""
+    features = frames_of_track(track, encoder)
+    edges = cut_at_changes(features, encoder.hop_s, settings)
+    for begin, end in pairwise(edges.tolist()):
+        offset_s = min(track.start_s + end * encoder.hop_s, track.end_s)
+        stretch = Segment(track.start_s + begin * encoder.hop_s, offset_s)
+        sound = track.read(stretch.onset_s, stretch.offset_s)
+        if sound.samples.any():
+            yield stretch, sound, features[begin:end]
 
 
 def track_of(recording: Recording, heard: Segment) -> Float32[np.ndarray, "places 3"]:

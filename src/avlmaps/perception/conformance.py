@@ -14,6 +14,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import (
+    FrameSoundEncoder,
     LearnedMatcher,
     LocalEncoder,
     LocalFeatures,
@@ -138,6 +139,11 @@ def _check_sound_encoder(encoder: SoundEncoder) -> None:
     _check_rows(long, len(long), encoder.card.dim, "sound features")
     _hold(len(short) >= 1, "any sound must have a window")
     _hold(len(long) > len(short), "a long sound must be encoded whole, by windows")
+    if isinstance(encoder, FrameSoundEncoder):
+        _hold(
+            abs(len(long) - 30.0 / encoder.hop_s - 0.5) <= 0.5 + 1e-6,
+            f"30 s must have a vector for each of its steps of {encoder.hop_s} s, not {len(long)}",
+        )
     _hold(np.array_equal(short, encoder.encode(example_sound())), "the same sound must give the same features")
     for bad in (np.zeros(0, np.float32), np.full(800, np.nan, np.float32)):
         try:

@@ -205,6 +205,16 @@ class SoundEncoder(Protocol):
         ...
 
 
+@runtime_checkable
+class FrameSoundEncoder(SoundEncoder, Protocol):
+    """A sound encoder that gives a vector for each short step of time: a track can be mapped whole, silence and all."""
+
+    @property
+    def hop_s(self) -> float:
+        """Seconds of a step: row i of ``encode`` is what sounds from i · hop_s on; a last, shorter step has its own."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class LocalFeatures:
     """Keypoints of one picture.

@@ -20,8 +20,9 @@ from jaxtyping import Float, Float32
 
 Windows = Float32[np.ndarray, "windows d"]
 
+QUIET = ("silence", "background noise", "white noise", "static hiss", "electrical hum")
 OTHERS = (
-    "silence", "background noise", "white noise", "static hiss", "electrical hum", "wind blowing",
+    *QUIET, "wind blowing",
     "a person talking", "a crowd of people talking", "a baby crying", "a person laughing", "a person coughing",
     "a person sneezing", "a person snoring", "a person singing", "a person screaming", "a person breathing",
     "footsteps", "hands clapping", "music", "a guitar", "a piano", "drums", "a television",
