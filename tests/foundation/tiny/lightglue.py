@@ -1,4 +1,4 @@
-"""LightGlue in the layout of the published ``disk_lightglue.pth``: random weights, or ones that match like with like."""
+"""LightGlue in the layout of ``disk_lightglue.pth``: random weights, or ones that match like with like."""
 
 from pathlib import Path
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import torch
 from safetensors.torch import save_file
-from tiny.superpoint import CONFIG as SUPERPOINT
 
 from avlmaps.perception.models.operators import declare_missing_operators
+from tiny.superpoint import CONFIG as SUPERPOINT
 
 FOLDER = "magic-leap-community/superglue_indoor"
 CONFIG = {

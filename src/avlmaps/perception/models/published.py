@@ -1,4 +1,4 @@
-"""Checkpoints that are published as single files of tensors: finding them, reading them safely, loading them strictly."""
+"""Checkpoints that are published as single files of tensors: found, read without running code, loaded strictly."""
 
 from collections.abc import Collection, Mapping, Sequence
 from importlib.util import find_spec

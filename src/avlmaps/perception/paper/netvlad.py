@@ -10,6 +10,7 @@ pixels alone and learns nothing on a map.
 the bit, and a map made with the one can be asked with the other.
 """
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeGuard, cast
 
@@ -87,7 +88,7 @@ class NetVladNetwork(nn.Module):
     def __init__(self, channels: list[int], clusters: int, dim: int) -> None:
         super().__init__()
         layers: list[nn.Module] = []
-        for number, (before, after) in enumerate(zip(channels[:-1], channels[1:], strict=True)):
+        for number, (before, after) in enumerate(pairwise(channels)):
             layers.append(nn.Conv2d(before, after, kernel_size=3, padding=1))
             if number < len(channels) - 2:
                 layers.append(nn.ReLU(inplace=True))
