@@ -127,13 +127,14 @@ def test_a_path_in_a_strangers_map_is_not_followed(tmp_path: Path) -> None:
 @given(st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._-]{0,20}(/[A-Za-z0-9][A-Za-z0-9._-]{0,20})?", fullmatch=True))
 def test_ids_and_file_names_stay_as_they_are(model: str) -> None:
     assert public_name(model) == model
-    assert public_choice(f"name@{model}", "other/id") == f"name@{model}"
+    assert public_choice(f"name@{model}") == f"name@{model}"
     assert public_name(f"/some/folder/{model}") == model.rpartition("/")[2]
 
 
-def test_a_path_is_called_by_the_models_own_name() -> None:
-    assert public_choice("clip@/data/me/clip", "openai/clip") == "clip@openai/clip"
-    assert public_choice("clip@/data/me/clip", "/data/me/clip") == "clip@clip"
+def test_a_path_is_called_by_its_last_name() -> None:
+    assert public_choice("clip@/data/me/clip/") == "clip@clip"
+    assert public_choice("clip@/data/me/clip#last") == "clip@clip#last"
+    assert public_choice("clip@openai/clip#a/b/c") == "clip@openai/clip#a/b/c"
     assert public_choice("clip") == "clip"
     assert ModelInfo.of("clip@/a/b/c", replace(Pixels.card, id="/a/b/c")).id == "c"
 

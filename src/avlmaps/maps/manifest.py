@@ -42,7 +42,7 @@ class ModelInfo(msgspec.Struct, frozen=True, kw_only=True):
     def of(cls, backend: str, card: ModelCard) -> "ModelInfo":
         """Return the entry for a backend."""
         return cls(
-            backend=public_choice(backend, card.id),
+            backend=public_choice(backend),
             id=public_name(card.id),
             dim=card.dim,
             licence=card.licence,

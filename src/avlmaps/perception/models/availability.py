@@ -7,6 +7,7 @@ torch's. Whether they are whole and the right ones is found out when they are lo
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
@@ -50,10 +51,11 @@ def availability(backend: Backend, model: str = "") -> Availability:
     if not model:
         return _loaded(backend)
     licence = backend.licence if model == backend.model else ""
-    missing = [name for name in (model, *_published(model).also) if not is_here(name)]
+    name = model.partition("#")[0]
+    missing = [needed for needed in (name, *_published(name).also) if not is_here(needed)]
     if not missing:
-        return Availability("ready", model, licence, _published(model).note)
-    return Availability("weights missing", model, licence, "; ".join(how_to_get(name) for name in missing))
+        return Availability("ready", model, licence)
+    return Availability("weights missing", model, licence, "; ".join(map(how_to_get, missing)))
 
 
 def _loaded(backend: Backend) -> Availability:
@@ -91,14 +93,17 @@ def _places(model: str) -> Iterator[Path]:
         if folder is not None:
             yield from (folder / name, folder / name.replace("/", "--"), folder / Path(name).name)
         yield Path(name).expanduser()
-        yield _torch_cache() / "checkpoints" / Path(name).name
+        yield from (_torch_cache() / place / Path(name).name for place in ("checkpoints", "netvlad"))
+        if known.package and (package := find_spec(known.package)) is not None and package.origin:
+            yield Path(package.origin).parent / name
     repository = known.repository or (model if not known.files and model.count("/") == 1 else "")
     if not repository:
         return
     kept = _hub_cache() / f"models--{repository.replace('/', '--')}" / "snapshots"
     for revision in sorted(kept.glob("*")) if kept.is_dir() else ():
         # A snapshot of which only a configuration was ever fetched is no model.
-        yield from (revision / name for name in known.files) if known.files else revision.glob("*.safetensors")
+        files = [revision / Path(name).name for name in known.files]
+        yield from files or (*revision.glob("*.safetensors"), *revision.glob("*.bin"))
 
 
 def _hub_cache() -> Path:

@@ -7,20 +7,17 @@ import posixpath
 def public_name(model: str) -> str:
     """Return a model's name without the folders of a path: ``/data/me/tips`` is ``tips``, ``google/tips`` stays.
 
-    A hub's id has at most one slash, so that anything with more, or that starts like a path, is one.
+    A hub's id has at most one slash, so that anything with more, or that starts like a path, is one. What some backends
+    take behind a ``#`` stays.
     """
-    is_path = model.startswith(("/", "~", ".")) or "\\" in model or model.count("/") > 1 or ntpath.splitdrive(model)[0]
-    return posixpath.basename(model.replace("\\", "/").rstrip("/")) if is_path else model
+    place, mark, way = model.partition("#")
+    is_path = place.startswith(("/", "~", ".")) or "\\" in place or place.count("/") > 1 or ntpath.splitdrive(place)[0]
+    if is_path:
+        place = posixpath.basename(place.replace("\\", "/").rstrip("/"))
+    return f"{place}{mark}{way}"
 
 
-def public_choice(choice: str, card_id: str = "") -> str:
-    """Return a backend's name (``name`` or ``name@model``) as a map remembers it.
-
-    Args:
-        choice: as in a profile.
-        card_id: the model's own name, which stands for a path.
-    """
-    name, _, model = choice.partition("@")
-    if not model or public_name(model) == model:
-        return choice
-    return f"{name}@{public_name(card_id) or public_name(model)}"
+def public_choice(choice: str) -> str:
+    """Return a backend's choice (``name`` or ``name@model``) as a map remembers it: found again by the model's name."""
+    name, at, model = choice.partition("@")
+    return f"{name}{at}{public_name(model)}"
