@@ -25,6 +25,8 @@ from reference_map import (
     write_walk,
 )
 from scipy.spatial import KDTree
+from tiny.lseg import Sizes as LSegSizes
+from tiny.lseg import lseg_layout, random_weights, write_checkpoint
 
 import avlmaps
 from avlmaps.cli.main import main
@@ -139,6 +141,21 @@ def test_goals_are_those_of_our_own_map(scene: Path, imported: StoredMap, room_w
         here, there = (asked.object(word, primary=True).goals(top=1)[0] for asked in (own, theirs))
         assert theirs.object(word, primary=True).found
         assert np.linalg.norm(np.subtract(here.position, there.position)[:2]) < 0.4, word
+
+
+@pytest.mark.parametrize("dim", [512, 32])
+def test_lseg_itself_is_taken_though_its_weights_are_not_known(dim: int, imported: StoredMap, models: Path) -> None:
+    layout = lseg_layout(LSegSizes(dim=dim))
+    write_checkpoint(models / "demo_e200.ckpt", random_weights(layout, half=("clip_pretrained.",)))
+    registry.forget_loaded()
+    stored = verify_stored(imported.path)
+    if dim == 512:
+        heat = AVLMap(stored).object("sofa", primary=True)
+        assert heat.values.min() >= 0.0 and np.isfinite(heat.values).all()
+    else:
+        with pytest.raises(MapError, match=r"was built with demo_e200.ckpt \(checksum unknown\), this avlmaps has"):
+            stored.require_model(Kind.PIXELS)
+    registry.forget_loaded()
 
 
 def test_colours_and_weights_are_those_of_the_file(imported: StoredMap, arrays: dict[str, np.ndarray]) -> None:
