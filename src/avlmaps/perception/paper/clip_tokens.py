@@ -19,7 +19,7 @@ from avlmaps.perception.models.files import model_file, model_folder
 MERGES = 48894
 BYTE_PAIRS = "bpe_simple_vocab_16e6.txt.gz"
 HOW_TO_GET = f"curl -LO https://github.com/AndreyGuzhov/AudioCLIP/releases/download/v0.1/{BYTE_PAIRS}"
-_HUB = "openai/clip-vit-base-patch32"
+_HUB = ("openai/clip-vit-base-patch32", "openai/clip-vit-large-patch14")
 _PIECES = r"'s|'t|'re|'ve|'m|'ll|'d|[\p{L}]+|[\p{N}]|[^\s\p{L}\p{N}]+"
 
 
@@ -88,13 +88,14 @@ def _merges_file() -> Path:
         package = find_spec("open_clip")
         if package is not None and package.origin and (kept := Path(package.origin).parent / BYTE_PAIRS).is_file():
             return kept
-        try:
-            merges = model_folder(_HUB, ("merges.txt",)) / "merges.txt"
-        except BackendError:
-            raise fault from None
-        if not merges.is_file():
-            raise
-        return merges
+        for hub_id in _HUB:
+            try:
+                merges = model_folder(hub_id, ("merges.txt",)) / "merges.txt"
+            except BackendError:
+                continue
+            if merges.is_file():
+                return merges
+        raise fault from None
 
 
 def _byte_letters() -> list[str]:
