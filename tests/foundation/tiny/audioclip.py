@@ -1,4 +1,4 @@
-"""A tiny random AudioCLIP in the layout of AudioCLIP-Partial-Training.pt: all of its names, small sizes, its pickling."""
+"""A tiny random AudioCLIP in the layout of AudioCLIP-Partial-Training.pt: all its names, small sizes, its pickling."""
 
 from pathlib import Path
 
