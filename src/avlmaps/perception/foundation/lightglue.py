@@ -87,7 +87,7 @@ def _file_name(model: str) -> str:
 
 
 def _present_name(key: str) -> str:
-    """Return today's name of a weight: what the published files call ``self_attn.0`` is ``transformers.0.self_attn``."""
+    """Return today's name of a weight: ``self_attn.0`` of the published files is ``transformers.0.self_attn``."""
     block, dot, rest = key.removeprefix("matcher.").partition(".")
     layer, dot, rest = rest.partition(".") if block in ("self_attn", "cross_attn") else ("", dot, rest)
     return f"transformers.{layer}.{block}.{rest}" if layer.isdecimal() else f"{block}{dot}{rest}"
