@@ -119,7 +119,9 @@ _OF_TORCH = (
     _foundation(Kind.LOCAL, "disk", "disk:DiskKeypoints", "disk-depth", "Apache-2.0", "kornia"),
     _foundation(Kind.LOCAL, "aliked", "aliked:AlikedKeypoints", "aliked-n16", "BSD-3-Clause", "kornia"),
     _foundation(Kind.PLACE, "megaloc", "megaloc:MegaLoc", "gberton/MegaLoc", "MIT", "transformers"),
-    _foundation(Kind.PLACE, "eigenplaces", "eigenplaces:EigenPlaces", "eigenplaces-resnet50-2048", "MIT"),
+    _foundation(
+        Kind.PLACE, "eigenplaces", "eigenplaces:EigenPlaces", "ResNet50_2048_eigenplaces.pth", "MIT", "torchvision"
+    ),
     _foundation(Kind.PLACE, "dinov2", "dinov2:DinoPlaces", "facebook/dinov2-small", "Apache-2.0", "transformers"),
     _foundation(Kind.MATCHER, "lightglue-disk", "lightglue:LightGlue", "disk", "Apache-2.0", "kornia"),
     _foundation(Kind.MATCHER, "lightglue-aliked", "lightglue:LightGlue", "aliked", "Apache-2.0", "kornia"),

@@ -3,8 +3,8 @@
 - Perception Encoder, core (Bolya et al., 2025; Apache-2.0): ``timm/PE-Core-T-16-384`` and ``-S-16-384`` (512 numbers a
   feature), ``-B-16`` and ``-L-14-336`` (1024), ``-bigG-14-448`` (1280); pictures squashed to the square, mean and
   deviation 0.5, texts of 32 tokens.
-- MobileCLIP 2 (Faghri et al., 2025), ``timm/MobileCLIP2-{S0,S2,B,S3,S4,L-14}-OpenCLIP``: small and quick, but the weights
-  are under Apple's own licence for research models (apple-amlr): research only. Apple's own folders
+- MobileCLIP 2 (Faghri et al., 2025), ``timm/MobileCLIP2-{S0,S2,B,S3,S4,L-14}-OpenCLIP``: small and quick, but the
+  weights are under Apple's own licence for research models (apple-amlr): research only. Apple's own folders
   (``apple/MobileCLIP2-S0``, a single ``.pt``) are read as well.
 - ``laion/CLIP-ViT-*``, ``timm/ViT-*-SigLIP2-*`` and whatever else has ``open_clip_config.json`` beside
   ``open_clip_model.safetensors``.
@@ -49,6 +49,8 @@ class OpenClipViews(OpenViews):
     def __init__(self, model: str = "timm/PE-Core-B-16") -> None:
         device = chosen_device()
         folder = model_folder(model, _WANTED)
+        if not weights_in(folder):  # older repositories have no safetensors
+            folder = model_folder(model, (*_WANTED, "open_clip_pytorch_model.bin"))
         network, self._prepare, self._tokens, weights = _loaded(folder, model)
         self._network: Any = network.to(device).eval().requires_grad_(False)
         with torch.inference_mode():
@@ -112,8 +114,8 @@ def _architecture(folder: Path, model: str) -> str:
         if called.lower() in known:
             return known[called.lower()]
     raise BackendError(
-        f"{folder} has no {_CONFIG} and is not called like a model that open_clip knows (MobileCLIP2-S0, ViT-B-16); get "
-        "a folder that has one, such as: hf download timm/PE-Core-B-16"
+        f"{folder} has no {_CONFIG} and is not called like a model that open_clip knows (MobileCLIP2-S0, ViT-B-16); "
+        "get a folder that has one, such as: hf download timm/PE-Core-B-16"
     )
 
 
