@@ -1,5 +1,6 @@
 """PE-A-Frame against transformers' own forward pass on a tiny random checkpoint, and what scores are made of it."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,11 @@ from transformers import PeAudioFrameLevelModel, PeAudioProcessor
 
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.registry import Kind
+from avlmaps.maps.sound_changes import cut_at_changes, frames_of_track
 from avlmaps.perception.conformance import check
 from avlmaps.perception.foundation.pe_a_frame import FrameSounds, _chunks, _Space
 from avlmaps.perception.protocols import FrameSoundEncoder
-from avlmaps.recordings.audio import Sound
+from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 
 RATE_HZ, HOP = 48_000, 1920
 
@@ -91,6 +93,17 @@ def test_a_long_sound_is_encoded_in_chunks_that_know_their_neighbours(framed: Fr
     assert features.shape == (802, framed.card.dim)
     np.testing.assert_allclose(np.linalg.norm(features, axis=1), 1.0, atol=1e-5)
     np.testing.assert_array_equal(features[:650], framed.encode(Sound(sound.samples[: 700 * HOP], RATE_HZ))[:650])
+
+
+def test_a_track_is_mapped_whole_and_asked_by_its_stretches(framed: FrameSounds, tmp_path: Path) -> None:
+    sound = noise(200 * HOP + 100)
+    write_flac(tmp_path / "a.flac", sound)
+    features = frames_of_track(AudioTrack.open(tmp_path / "a.flac"), framed)
+    assert features.shape == (201, framed.card.dim)
+    edges = cut_at_changes(features, framed.hop_s)
+    scores = framed.score_words([features[a:b] for a, b in pairwise(edges)], ["dog bark"])
+    assert scores.shape == (len(edges) - 1, 1)
+    assert len(edges) > 2
 
 
 @settings(max_examples=60, deadline=None)

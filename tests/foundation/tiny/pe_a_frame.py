@@ -33,7 +33,7 @@ def write_pe_a_frame(folder: Path, model: str = MODEL) -> None:
             "num_hidden_layers": 2,
             "num_attention_heads": 2,
             "head_dim": 16,
-            "dac_config": {"encoder_hidden_size": 2, "codebook_dim": 8, "sampling_rate": 48000},
+            "dac_config": {"encoder_hidden_size": 1, "codebook_dim": 8, "sampling_rate": 48000},
         },
     )
     made = PeAudioFrameLevelModel(config)

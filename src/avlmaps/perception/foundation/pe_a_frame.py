@@ -201,7 +201,7 @@ class _Space:
 
     def logits(self, rows: Float32[np.ndarray, "n d"], texts: Float32[np.ndarray, "m d"]) -> Float[np.ndarray, "n m"]:
         """Return the log-odds that each text (of ``texts``, not scaled) holds in each frame, 0 at the threshold."""
-        return (rows.astype(np.float64) @ texts.T.astype(np.float64)) * (self.r / rows[:, -1:])
+        return (rows @ texts.T).astype(np.float64) * (self.r / rows[:, -1:].astype(np.float64))
 
 
 def _likely_length(head: Any) -> float:
