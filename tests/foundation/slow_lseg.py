@@ -12,7 +12,7 @@ LONG, CROP, STRIDE = 520, 480, 320
 
 
 def corner_on_corner(known: int, wanted: int) -> torch.Tensor:
-    """Return the (wanted, known) matrix of linear interpolation that maps the first on the first, the last on the last."""
+    """Return the (wanted, known) matrix of linear interpolation, the first on the first, the last on the last."""
     matrix = torch.zeros(wanted, known, dtype=torch.float64)
     for i in range(wanted):
         place = i * (known - 1) / (wanted - 1) if wanted > 1 else 0.0
@@ -123,10 +123,7 @@ def picture_features(state: State, rgb: np.ndarray) -> torch.Tensor:
     """Return (dim, h, w) of a picture of any size, by the published windows."""
     exact = {key: value.double() for key, value in state.items()}
     height, width = rgb.shape[:2]
-    if height > width:
-        size = LONG, int(width * LONG / height + 0.5)
-    else:
-        size = int(height * LONG / width + 0.5), LONG
+    size = (LONG, int(width * LONG / height + 0.5)) if height > width else (int(height * LONG / width + 0.5), LONG)
     picture = torch.from_numpy(rgb).double().permute(2, 0, 1) / 127.5 - 1.0
     picture = resized(picture, *size)
     whole = pad(picture, (0, max(0, CROP - size[1]), 0, max(0, CROP - size[0])), value=-1.0)

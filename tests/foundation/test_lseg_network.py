@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 import torch
-
-from avlmaps.perception.paper.lseg_network import LSegNetwork, LSegSizes
 from slow_lseg import resized, tapped_tokens, window_features
 from tiny.lseg import PUBLISHED, Sizes, lseg_layout, random_weights
+
+from avlmaps.perception.paper.lseg_network import LSegNetwork, LSegSizes
 
 LAYOUT = Path(__file__).parent / "layouts" / "lseg.txt"
 
@@ -92,7 +92,8 @@ def test_tokens_and_features_are_those_of_slow_formulas(network: LSegNetwork, we
     picture = torch.rand(3, 96, 160, generator=torch.Generator().manual_seed(2)) * 2 - 1
     exact = {key: value.double() for key, value in weights.items()}
     with torch.no_grad():
-        for our, slow in zip(network.pretrained.model(picture[None]), tapped_tokens(exact, picture.double())):
+        slow_tokens = tapped_tokens(exact, picture.double())
+        for our, slow in zip(network.pretrained.model(picture[None]), slow_tokens, strict=True):
             torch.testing.assert_close(our[0].double(), slow, rtol=1e-4, atol=1e-4)
         ours = network(picture[None])[0].double()
     slow = window_features(exact, picture.double())

@@ -46,9 +46,10 @@ def read_weights(path: Path, how_to_get: str, prefix: str = "") -> dict[str, tor
         return _of_script(path, how_to_get)
     held = _read(path, how_to_get)
     state = held.get("state_dict", held) if isinstance(held, Mapping) else None
-    if not isinstance(state, Mapping) or not all(isinstance(value, torch.Tensor) for value in state.values()):
+    tensors = isinstance(state, Mapping) and all(isinstance(value, torch.Tensor) for value in state.values())
+    if not state or not tensors:
         raise BackendError(f"{path} holds no dictionary of tensors; get the published file: {how_to_get}")
-    if state and all(str(key).startswith(prefix) for key in state):
+    if all(str(key).startswith(prefix) for key in state):
         return {str(key).removeprefix(prefix): value for key, value in state.items()}
     return {str(key): value for key, value in state.items()}
 
