@@ -10,6 +10,7 @@ import pytest
 from reference_map import (
     CELL_M,
     CODES,
+    GRID,
     NAMES,
     ROOM_3D,
     WORDS,
@@ -38,6 +39,7 @@ from avlmaps.maps.reference.convert import ImportSettings, import_reference_map
 from avlmaps.maps.stored import StoredMap, verify_stored
 from avlmaps.perception.profiles import Profile, register_profile
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.recordings.avlmaps_layout import base_poses
 
 SETTINGS = ImportSettings(cell_size_m=CELL_M)
 # From a point to the middle of the reference's cell, from there to the middle of ours, and from the point to that of
@@ -89,7 +91,7 @@ def test_the_map_is_whole_and_tells_what_it_is(imported: StoredMap, arrays: dict
     stored = verify_stored(imported.path)
     counts = stored.info.counts
     assert (counts.frames, counts.keyframes, counts.sounds) == (14, 14, 0)
-    assert 0.8 * len(arrays["grid_pos"]) < counts.voxels <= len(arrays["grid_pos"])
+    assert len(arrays["grid_pos"]) < counts.voxels < 1.2 * len(arrays["grid_pos"])
     assert stored.profile.name == "paper" and stored.grid.voxel_size_m == CELL_M
     assert {kind: (m.id, m.dim, m.checksum) for kind, m in stored.info.models.items()} == {
         "pixels": ("demo_e200.ckpt", 512, ""),
@@ -158,12 +160,27 @@ def test_lseg_itself_is_taken_though_its_weights_are_not_known(dim: int, importe
     registry.forget_loaded()
 
 
-def test_colours_and_weights_are_those_of_the_file(imported: StoredMap, arrays: dict[str, np.ndarray]) -> None:
-    total = arrays["weight"].astype(np.float64).sum()
-    assert imported.voxels.weight.sum(dtype=np.float64) == pytest.approx(total, rel=1e-5)
-    mean = np.average(arrays["grid_rgb"], axis=0, weights=arrays["weight"])
-    assert np.allclose(np.average(imported.voxels.rgb, axis=0, weights=imported.voxels.weight), mean, atol=0.5)
-    assert imported.voxels.rgb.std() > 10.0
+def test_a_voxel_has_the_feature_colour_and_weight_of_the_cell_that_holds_its_middle(
+    imported: StoredMap, arrays: dict[str, np.ndarray], seen: list[Seen]
+) -> None:
+    """The published formulas again, from the middle of each of our voxels to the reference's cell."""
+    voxels, first = imported.voxels, base_poses(seen[0].habitat_from_base)
+    in_map = poses.apply(poses.inverse(first), imported.grid.centre_of(voxels.index)) / CELL_M
+    alike = held = 0
+    for i, (x, y, z) in enumerate(in_map.tolist()):
+        number = arrays["occupied_ids"][int(GRID / 2 - int(x)), int(GRID / 2 - int(y)), int(z)] if z >= 0.0 else -1
+        if number < 0 or int(z) == 0:
+            continue
+        held += 1
+        feature = arrays["grid_feat"][number] / np.linalg.norm(arrays["grid_feat"][number])
+        alike += (
+            np.allclose(voxels.feature[i], feature, atol=1e-3)
+            and np.array_equal(voxels.rgb[i], arrays["grid_rgb"][number])
+            and np.isclose(voxels.weight[i], max(arrays["weight"][number], 1e-30), rtol=1e-5)
+        )
+    layer = np.floor(in_map[:, 2])
+    assert held > 0.8 * (layer > 0).sum()  # the others hold the middle of a cell that held no middle of ours
+    assert alike > 0.9 * held  # the others hold such a cell besides
 
 
 def test_keyframes_have_the_cameras_poses_and_the_views(scene: Path, imported: StoredMap, seen: list[Seen]) -> None:
@@ -279,7 +296,7 @@ def test_features_of_nothing_stay_nothing(arrays: dict[str, np.ndarray], scene: 
     stored = import_reference_map(source, tmp_path / "m.avlmap", SETTINGS, poses=scene / "poses.txt", progress=False)
     norm = np.linalg.norm(stored.voxels.feature.astype(np.float64), axis=1)
     nothing = norm == 0.0
-    assert 0 < nothing.sum() <= 50 and np.allclose(norm[~nothing], 1.0, atol=2e-3)
+    assert 0 < nothing.sum() <= 80 and np.allclose(norm[~nothing], 1.0, atol=2e-3)
     assert (np.asarray(stored.voxels.weight)[nothing] == 0.0).all()
 
 

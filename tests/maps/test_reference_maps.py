@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError
+from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.reference.convert import ImportSettings, import_reference_map
-from avlmaps.maps.reference.places import places_from_corner, places_from_first_base
+from avlmaps.maps.reference.places import Cubes, cubes_from_corner, cubes_from_first_base, voxels_filled
 from avlmaps.maps.reference.scene import find_scene
 from avlmaps.maps.reference.views import middles_of_view, thinned
 from avlmaps.recordings.avlmaps_layout import WORLD_FROM_HABITAT, base_from_camera, reference_map_from_world
@@ -32,6 +33,13 @@ def _habitat_pose(yaw: float, place: tuple[float, float, float]) -> np.ndarray:
     return poses.from_quaternion(np.array(place), np.array([0.0, np.sin(yaw / 2), 0.0, np.cos(yaw / 2)]))
 
 
+def _nearest(cubes: Cubes, row: int, point_world: np.ndarray) -> np.ndarray:
+    """The offset along the grid's axes from the cube of a row that is nearest over the ground."""
+    point = poses.apply(poses.inverse(cubes.world_from_grid), point_world)
+    off = cubes.middle[cubes.row == row] - point
+    return off[np.abs(off[:, :2]).max(axis=1).argmin()]
+
+
 @settings(max_examples=25)
 @given(
     st.floats(-3.1, 3.1),
@@ -39,25 +47,26 @@ def _habitat_pose(yaw: float, place: tuple[float, float, float]) -> np.ndarray:
     st.sampled_from([(1000, 0.05), (300, 0.1), (401, 0.05)]),
     st.integers(0, 1000),
 )
-def test_a_points_cell_lies_within_half_a_cell_of_it(yaw, place, grid_of, seed) -> None:
+def test_a_point_lies_in_the_cubes_of_its_cell(yaw, place, grid_of, seed) -> None:
     grid, cell_m = grid_of
     first = _habitat_pose(yaw, place)
-    from_map = poses.inverse(reference_map_from_world(first))
-    points_map = np.random.default_rng(seed).uniform([-6.0, -6.0, 0.0], [6.0, 6.0, 1.5], (60, 3))
-    cell = _cells(points_map, grid, cell_m)
-    found = places_from_first_base(cell, grid, cell_m, first)
-    off = np.abs(poses.apply(poses.inverse(from_map), found) - points_map)
-    origin = np.stack([cell[:, 0] == grid // 2, cell[:, 1] == grid // 2, cell[:, 2] == 0], axis=1)
-    assert (off <= np.where(origin, 1.0, 0.5) * cell_m + 1e-9).all()
+    world_from_map = poses.inverse(reference_map_from_world(first))
+    points_map = np.random.default_rng(seed).uniform([-3.0, -3.0, 0.0], [3.0, 3.0, 1.5], (60, 3))
+    points_map[:10, :2] *= 0.02  # the wide cells at the origin
+    cubes = cubes_from_first_base(_cells(points_map, grid, cell_m), grid, cell_m, first)
+    for row, point in enumerate(poses.apply(world_from_map, points_map)):
+        wide = np.array([0.5, 0.5, 1.0 if points_map[row, 2] < cell_m else 0.5])
+        assert (np.abs(_nearest(cubes, row, point)) <= wide * cell_m + 1e-9).all()
 
 
-def test_places_are_not_shifted_against_the_points() -> None:
+def test_cells_are_not_shifted_against_the_points() -> None:
     rng = np.random.default_rng(1)
-    points_map = rng.uniform([-8.0, -8.0, 0.0], [8.0, 8.0, 1.5], (4000, 3))
+    points_map = rng.uniform([-8.0, -8.0, 0.05], [8.0, 8.0, 1.5], (3000, 3))
     first = _habitat_pose(0.6, (11.9, -1.3, -0.1))
-    found = places_from_first_base(_cells(points_map, 1000, 0.05), 1000, 0.05, first)
+    cubes = cubes_from_first_base(_cells(points_map, 1000, 0.05), 1000, 0.05, first)
     truth = poses.apply(poses.inverse(reference_map_from_world(first)), points_map)
-    assert np.abs((found - truth).mean(axis=0)).max() < 0.002
+    off = np.array([_nearest(cubes, row, point) for row, point in enumerate(truth)])
+    assert np.abs(off.mean(axis=0)).max() < 0.002
 
 
 def test_the_point_of_a_camera_reaches_its_own_cell_from_both_sides() -> None:
@@ -65,16 +74,47 @@ def test_the_point_of_a_camera_reaches_its_own_cell_from_both_sides() -> None:
     first, later = _habitat_pose(0.4, (1.0, -1.2, 3.0)), _habitat_pose(-1.1, (2.5, -1.2, 1.0))
     seen = np.array([[0.4, -0.2, 2.2], [-1.0, 0.9, 3.1]])
     ours = poses.apply(WORLD_FROM_HABITAT @ later @ base_from_camera(), seen)
-    cell = _cells(poses.apply(reference_map_from_world(first), ours), 1000, 0.05)
-    assert np.abs(places_from_first_base(cell, 1000, 0.05, first) - ours).max() < 0.05
+    cubes = cubes_from_first_base(
+        _cells(poses.apply(reference_map_from_world(first), ours), 1000, 0.05), 1000, 0.05, first
+    )
+    for row, point in enumerate(ours):
+        assert np.abs(_nearest(cubes, row, point)).max() <= 0.025 + 1e-9
 
 
 def test_cells_of_a_cloud_are_centred_where_they_were_rounded() -> None:
-    rng = np.random.default_rng(2)
-    points = rng.uniform(-4.0, 4.0, (500, 3))
+    points = np.random.default_rng(2).uniform(-4.0, 4.0, (500, 3))
     low = points.min(axis=0)
-    found = places_from_corner(np.round((points - low) / 0.05).astype(int), 0.05, low)
+    cubes = cubes_from_corner(np.round((points - low) / 0.05).astype(int), 0.05, low)
+    found = poses.apply(cubes.world_from_grid, cubes.middle)
     assert np.abs(found - poses.apply(WORLD_FROM_HABITAT, points)).max() <= 0.025 + 1e-9
+
+
+@settings(max_examples=10)
+@given(st.floats(-3.1, 3.1), st.tuples(*[st.floats(-20.0, 20.0)] * 3))
+def test_a_full_floor_has_no_holes_and_no_cell_is_lost(yaw, place) -> None:
+    side, first = 31, _habitat_pose(yaw, place)
+    row, column = (a.ravel() for a in np.meshgrid(np.arange(side), np.arange(side)))
+    cell = np.stack([row + 500 - side // 2, column + 500 - side // 2, np.full(side * side, 6)], axis=1)
+    cubes, grid = cubes_from_first_base(cell, 1000, 0.05, first), GridSpec(0.05)
+    rows, voxels = voxels_filled(cubes, grid)
+    assert (np.diff(rows) >= 0).all() and set(rows) == set(range(side * side))
+    filled = set(map(tuple, voxels.tolist()))
+    middle = grid.index_of(poses.apply(cubes.world_from_grid, np.array([[0.0, 0.0, 0.325]])))[0]
+    for i in range(-9, 10):
+        for j in range(-9, 10):
+            levels = [(middle[0] + i, middle[1] + j, middle[2] + k) in filled for k in (-1, 0, 1)]
+            assert any(levels), (i, j)
+    centres = poses.apply(poses.inverse(cubes.world_from_grid), grid.centre_of(voxels))
+    assert np.abs(centres[:, 2] - 0.325).max() <= 0.05
+
+
+def test_cells_along_our_axes_are_taken_one_for_one() -> None:
+    rng = np.random.default_rng(4)
+    cell = np.unique(rng.integers((1, 1, 1), (400, 400, 30), (5000, 3)), axis=0)  # none of the wide ones
+    cubes = cubes_from_first_base(cell, 1000, 0.05, _habitat_pose(np.pi / 2, (1.013, -1.28, 7.021)))
+    rows, voxels = voxels_filled(cubes, GridSpec(0.05))
+    assert rows.tolist() == list(range(len(cell)))
+    assert len(np.unique(voxels, axis=0)) == len(cell)
 
 
 def _room_pose(heading: float) -> np.ndarray:

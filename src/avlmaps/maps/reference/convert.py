@@ -1,8 +1,8 @@
 """From a map that the published AVLMaps/VLMaps code wrote to one of ours: `import_reference_map` is the whole of it.
 
 The imported map lies in the world of a recording of the same scene opened by us (``avlmaps_layout``), so that goals
-agree. The reference's grid is turned and shifted against ours by the first base pose; each of its voxels goes into the
-voxel of ours that holds its middle, and where two meet they are averaged by their weights.
+agree. The reference's grid is turned and shifted against ours by the first base pose; each of its voxels fills the
+voxels of ours whose middle it holds, and where two meet they are averaged by their weights.
 """
 
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Int, Int32
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.progress import progress as shown
@@ -32,6 +32,7 @@ from avlmaps.maps.manifest import (
 )
 from avlmaps.maps.reference.frames import Walk, read_walk
 from avlmaps.maps.reference.hdf5 import opened
+from avlmaps.maps.reference.places import voxels_filled
 from avlmaps.maps.reference.scene import find_scene
 from avlmaps.maps.reference.source import PROFILE, Source
 from avlmaps.maps.reference.tracks import HEARING, Ears
@@ -167,7 +168,7 @@ def _write(path: Path, source: Source, settings: ImportSettings, key: str, begin
 
 def _converted(source: ReferenceVoxels, walk: Walk, settings: ImportSettings, grid: GridSpec) -> tuple[Voxels, int]:
     """Return the voxels on our grid, and how many of the source's were left out."""
-    index = grid.index_of(source.places(walk.first_habitat_from_base, settings.cell_size_m))
+    rows, index = voxels_filled(source.cubes(walk.first_habitat_from_base, settings.cell_size_m), grid)
     table = VoxelTable(DIM)
     left_out, first_bad = 0, -1
     parts = source.parts()
@@ -176,7 +177,10 @@ def _converted(source: ReferenceVoxels, walk: Walk, settings: ImportSettings, gr
         if not usable.all() and first_bad < 0:
             first_bad = part.rows.start + int((~usable).argmax())
         left_out += int((~usable).sum())
-        table.add(_sums(part, index[part.rows], usable))
+        first, end = np.searchsorted(rows, (part.rows.start, part.rows.stop))
+        local = rows[first:end] - part.rows.start
+        kept = usable[local]
+        table.add(_sums(part, local[kept], index[first:end][kept]))
     if left_out > settings.max_bad_share * len(source) or left_out == len(source):
         raise MapError(
             f"{source.path}: {left_out} of {len(source)} voxels hold NaN, infinity or a colour or weight that is none "
@@ -186,19 +190,18 @@ def _converted(source: ReferenceVoxels, walk: Walk, settings: ImportSettings, gr
     return table.voxels(), left_out
 
 
-def _sums(part: VoxelRows, index: Float[np.ndarray, "n 3"], usable: np.ndarray) -> VoxelSums:
-    feature = part.feature[usable]
+def _sums(part: VoxelRows, rows: Int[np.ndarray, " p"], index: Int32[np.ndarray, "p 3"]) -> VoxelSums:
+    feature = part.feature[rows]
     norm = np.linalg.norm(feature.astype(np.float64), axis=1)
-    weight = np.maximum(part.weight[usable], LEAST_WEIGHT)
+    weight = np.maximum(part.weight[rows], LEAST_WEIGHT)
     scale = np.divide(weight, norm, out=np.zeros_like(weight), where=norm > 0.0)
-    coloured = np.isfinite(part.rgb[usable, 0])
-    count = len(feature)
+    coloured = np.isfinite(part.rgb[rows, 0])
     return VoxelSums(
-        index=index[usable],
+        index=index,
         feature_sum=(feature * scale[:, None]).astype(np.float32),
         weight=np.where(norm > 0.0, weight, 0.0),
-        rgb_sum=np.where(coloured[:, None], weight[:, None] * part.rgb[usable], 0.0),
+        rgb_sum=np.where(coloured[:, None], weight[:, None] * part.rgb[rows], 0.0),
         rgb_weight=np.where(coloured, weight, 0.0),
-        hits=np.full(count, PIXELS_PER_VOXEL, np.int64),
-        last_seen_s=np.zeros(count),
+        hits=np.full(len(rows), PIXELS_PER_VOXEL, np.int64),
+        last_seen_s=np.zeros(len(rows)),
     )

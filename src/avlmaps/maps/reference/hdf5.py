@@ -80,7 +80,7 @@ class Hdf5:
         """
         with _told(self.path):
             link, has = self._file.get(name, getlink=True), ", ".join(sorted(map(str, self._file))) or "nothing"
-            found = self._file[name] if isinstance(link, self._h5py.HardLink) else None
+            found: Any = self._file[name] if isinstance(link, self._h5py.HardLink) else None
         if link is None:
             raise MapError(f"{self.path} has no {name}, as a map of the reference code has (it holds: {has}).")
         # Links and external or virtual storage would read other files of this machine into the map.

@@ -61,7 +61,7 @@ class Source:
             f"Imported from {self.voxels.path.name}: from which weights its features are is not recorded there; they "
             f"are taken for those of {' and '.join(used)}."
         )
-        yield f"{total - left_out} cells of the reference's grid fell into {kept} voxels of this map's."
+        yield f"{total - left_out} cells of the reference's grid fill {kept} voxels of this one's."
         if left_out:
             yield f"{left_out} of {total} voxels held NaN or infinity and were left out."
         if not self.voxels.has_colours:

@@ -21,7 +21,7 @@ from jaxtyping import Float, Float32, Float64, Int64
 
 from avlmaps.core.errors import MapError
 from avlmaps.maps.reference.hdf5 import Hdf5, Numbers
-from avlmaps.maps.reference.places import places_from_corner, places_from_first_base
+from avlmaps.maps.reference.places import Cubes, cubes_from_corner, cubes_from_first_base
 
 DIM = 512  # LSeg's
 MOST_CELLS = 1 << 27  # the reference's own loader would need 256 GB for their features
@@ -111,16 +111,16 @@ class ReferenceVoxels:
                 f"of the grid of {self.grid_shape}."
             )
         flat = np.ravel_multi_index(tuple((self.cell - least).T), tuple((shape - least).tolist()))
-        if len(np.unique(flat)) < len(flat):
+        if np.unique(flat).size < len(self.cell):
             raise MapError(f"{self.path} is damaged: grid_pos names the same cell twice.")
 
-    def places(self, first_habitat_from_base: Float[np.ndarray, "4 4"], cell_size_m: float) -> Float[np.ndarray, "n 3"]:
-        """Return the middle of every voxel's cell, metres, our world; a corner tells its own cell size."""
+    def cubes(self, first_habitat_from_base: Float[np.ndarray, "4 4"], cell_size_m: float) -> Cubes:
+        """Return where the voxels' cells lie in our world; a corner tells its own cell size."""
         if self.corner is not None:
             cells = self.cell[:, list(self.corner.order)]
-            return places_from_corner(cells, self.corner.cell_size_m, self.corner.low)
+            return cubes_from_corner(cells, self.corner.cell_size_m, self.corner.low)
         cells = self.cell - np.array([0, 0, self._first_layer])
-        return places_from_first_base(cells, self.grid_shape[0], cell_size_m, first_habitat_from_base)
+        return cubes_from_first_base(cells, self.grid_shape[0], cell_size_m, first_habitat_from_base)
 
     def parts(self) -> list[slice]:
         """Return slices of rows that are to be read one at a time."""
