@@ -14,6 +14,7 @@ from avlmaps.core.errors import QueryError
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.heatmap import HeatSettings, NearThings
 from avlmaps.query.level import Space
+from avlmaps.query.open_words import fitting, is_a, is_open
 from avlmaps.query.question import Part
 from avlmaps.query.tints import Tint, is_tinted, tint_of, tinted_share
 
@@ -32,6 +33,8 @@ class ObjectSettings:
     """For an encoder that has no feature for "other": a voxel must score at least this."""
     margin_yes: float = 0.1
     """An instance that wins its voxels by this much on average is as likely right as wrong."""
+    margin_yes_logits: float = 1.0
+    """The same for an encoder that tells by how much its cosines count: the margin times its ``logit_scale``."""
     area_yes_m2: float = 0.01
     """Surface below which an instance is probably noise; a mug shows about 0.02 m²."""
     least_confidence: float = 0.3
@@ -115,6 +118,8 @@ class Rivals:
         close = np.linalg.norm(self.word_feature @ asked.span.T, axis=1) >= cosine
         same = [bool(asked.understood) and encoder.understood(word) == asked.understood for word in self.words]
         silent = close | np.array(same, bool)
+        if is_open(encoder):
+            silent |= np.array([is_a(word, asked.understood) for word in self.words], bool)
         if self.has_other:
             silent[-1] = False
         return silent
@@ -363,7 +368,7 @@ def pieces_of(
     def confidence_of(mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"]) -> Float32[np.ndarray, " i"]:
         if isinstance(encoder, NamedPixelEncoder):
             return named_confidence(encoder, asked, score[mask], instance, space.grid.voxel_size_m)
-        return instance_confidence(margin[mask], instance, space.grid.voxel_size_m, settings)
+        return instance_confidence(margin[mask], instance, space.grid.voxel_size_m, fitting(settings, encoder))
 
     mask = margin > 0.0
     won = int(mask.sum())
