@@ -71,6 +71,13 @@ class ClipTower:
         picture = stacked(pictures, size, self.device, torch.float32)
         return ((picture - self._mean) / self._deviation).to(self._type)
 
+    def whole(self, rgb: UInt8[np.ndarray, "h w 3"]) -> torch.Tensor:
+        """Return the middle square of a picture as CLIP was trained to see one (1, 3, side, side)."""
+        height, width = rgb.shape[:2]
+        side = min(height, width)
+        y, x = (height - side) // 2, (width - side) // 2
+        return self.pixels([rgb[y : y + side, x : x + side]], (self.image_size, self.image_size))
+
     def projected(self, tokens: torch.Tensor) -> torch.Tensor:
         """Return tokens of the picture tower in the space of words: final layer norm and visual projection."""
         return self._model.visual_projection(self.vision.post_layernorm(tokens))

@@ -1,6 +1,7 @@
 """Pictures on their way into a transformer: how large, as which numbers, several at once."""
 
 from collections.abc import Callable, Sequence
+from typing import Literal
 
 import numpy as np
 import torch
@@ -32,22 +33,25 @@ def working_size(height: int, width: int, short_side: int, patch: int, most_patc
 
 
 def stacked(
-    pictures: Sequence[UInt8[np.ndarray, "h w 3"]], size: Size, device: torch.device, precision: torch.dtype
+    pictures: Sequence[UInt8[np.ndarray, "h w 3"]],
+    size: Size,
+    device: torch.device,
+    precision: torch.dtype,
+    how: Literal["bicubic", "bilinear"] = "bicubic",
 ) -> torch.Tensor:
-    """Return pictures of one size as a tensor (b, 3, height, width) in [0, 1], resized bicubically without aliasing.
+    """Return pictures of one size as a tensor (b, 3, height, width) in [0, 1], resized without aliasing.
 
     Args:
         pictures: all of one shape.
         size: (height, width) to resize to.
         device: where the tensor goes; the resizing is done there.
         precision: of the result; the resizing is done in float32.
+        how: the resizing interpolates.
     """
     picture = torch.from_numpy(np.ascontiguousarray(np.stack(pictures))).to(device)
     picture = picture.permute(0, 3, 1, 2).to(torch.float32).div(255.0)
     if picture.shape[-2:] != size:
-        picture = torch.nn.functional.interpolate(
-            picture, size=size, mode="bicubic", align_corners=False, antialias=True
-        )
+        picture = torch.nn.functional.interpolate(picture, size=size, mode=how, align_corners=False, antialias=True)
     return picture.clamp(0.0, 1.0).to(precision)
 
 
