@@ -46,8 +46,8 @@ def _draw(axes: "Axes", outcome: Outcome, kind: TaskKind) -> None:
             score, row = scored(answers), len(names) - 1
             count = score.count
             near, far = 100 * score.recall(LIMITS_M[0]), 100 * score.recall(LIMITS_M[-1])
-            _bar(axes, row, near, far, _COLOURS[one.role])
             low, high = (100 * bound for bound in score.recall_interval(LIMITS_M[0]))
+            _bar(axes, row, near, far, _COLOURS[one.role], high)
             axes.plot([low, high], [row, row], color="#333333", linewidth=1.2)
     for paper in paper_figures()["tables"][str(kind)]:
         figures = paper["recall_percent"]
@@ -56,12 +56,13 @@ def _draw(axes: "Axes", outcome: Outcome, kind: TaskKind) -> None:
             _bar(axes, len(names) - 1, figures[0], figures[-1], _COLOURS["paper"])
     axes.set_yticks(np.arange(len(names)), names, fontsize=8)
     axes.invert_yaxis()
-    axes.set_xlim(0, 104)
+    axes.set_xlim(0, 108)
     axes.set_title(f"{NUMBER[kind]}: {kind}, {count} tasks", loc="left", fontsize=10, fontweight="bold")
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _bar(axes: "Axes", row: int, near: float, far: float, colour: str) -> None:
+def _bar(axes: "Axes", row: int, near: float, far: float, colour: str, high: float = 0.0) -> None:
+    """Draw one bar, and its figures right of it and of its interval's end."""
     axes.barh(row, far, color=colour, alpha=0.35, height=0.72)
     axes.barh(row, near, color=colour, height=0.72)
-    axes.text(far + 0.6, row, f"{near:.0f} / {far:.0f}", va="center", fontsize=7)
+    axes.text(max(far, high) + 0.6, row, f"{near:.0f} / {far:.0f}", va="center", fontsize=7)
