@@ -198,6 +198,12 @@ def test_keyframes_have_the_cameras_poses_and_the_views(scene: Path, imported: S
         assert (poses.inverse(pose) @ [*centre, 1.0])[2] > 0.3, "ahead of the camera"
 
 
+def test_photos_are_refused_in_a_sentence(imported: StoredMap, scene: Path) -> None:
+    with pytest.raises(MapError, match="was built without a model for local"):
+        AVLMap(imported).image(scene / "rgb/000003.png")
+    assert not AVLMap(imported).sound("dog").found
+
+
 def test_a_single_cell_goes_where_the_golden_vector_says(tmp_path: Path) -> None:
     """The first pose of the published scene; a cell 2 m ahead of it, 1 m to its left and 0.5 m up."""
     (tmp_path / "poses.txt").write_text("11.92911911 -1.28434992 -0.11747979 0 0 0 1\n")

@@ -182,6 +182,8 @@ class AVLMap:
         from avlmaps.query.locate import LocateSettings, locate
 
         require_fitting(rgb, intrinsics)
+        for kind in (Kind.LOCAL, Kind.PLACE):  # an imported map has neither
+            self.stored.require_model(kind)
         rng = np.random.default_rng(self.settings.seed)
         return locate(self.stored, rgb, intrinsics, rng, LocateSettings(guess_references=guess_references))
 
