@@ -1,5 +1,6 @@
 """A tiny random CLIP in the layout of openai/clip-vit-large-patch14."""
 
+import json
 from pathlib import Path
 
 import torch
@@ -11,7 +12,7 @@ WIDTH, LAYERS, HEADS, PATCH, IMAGE, PLACES, DIM, SCALE = 32, 2, 4, 14, 56, 77, 2
 
 def write_clip(folder: Path, model: str = "openai/clip-vit-large-patch14") -> None:
     """Write the checkpoint where ``model_folder`` finds it."""
-    from transformers import CLIPConfig, CLIPImageProcessorPil, CLIPModel
+    from transformers import CLIPConfig, CLIPModel
 
     place = folder / model
     place.mkdir(parents=True)
@@ -27,9 +28,13 @@ def write_clip(folder: Path, model: str = "openai/clip-vit-large-patch14") -> No
     with torch.no_grad():
         made.logit_scale.fill_(torch.log(torch.tensor(SCALE)))
     made.save_pretrained(place)
-    CLIPImageProcessorPil(
-        size={"shortest_edge": IMAGE}, crop_size={"height": IMAGE, "width": IMAGE}, resample=3, do_center_crop=True
-    ).save_pretrained(place)
+    # The published file is of an old release: other names, and sizes as single numbers.
+    prepared = {
+        "crop_size": IMAGE, "do_center_crop": True, "do_normalize": True, "do_resize": True,
+        "feature_extractor_type": "CLIPFeatureExtractor", "image_mean": [0.48145466, 0.4578275, 0.40821073],
+        "image_std": [0.26862954, 0.26130258, 0.27577711], "resample": 3, "size": IMAGE,
+    }  # fmt: skip
+    (place / "preprocessor_config.json").write_text(json.dumps(prepared), encoding="utf-8")
 
 
 def write_clip_tokens(place: Path) -> int:

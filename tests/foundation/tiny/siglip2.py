@@ -17,14 +17,7 @@ def write_siglip2(folder: Path, model: str = "google/siglip2-base-patch16-224", 
         model: hub id.
         naflex: keeps a picture's shape, as ``google/siglip2-base-patch16-naflex``.
     """
-    from transformers import (
-        Siglip2Config,
-        Siglip2ImageProcessorPil,
-        Siglip2Model,
-        SiglipConfig,
-        SiglipImageProcessorPil,
-        SiglipModel,
-    )
+    from transformers import Siglip2Config, Siglip2Model, SiglipConfig, SiglipModel
 
     place = folder / model
     place.mkdir(parents=True)
@@ -36,19 +29,22 @@ def write_siglip2(folder: Path, model: str = "google/siglip2-base-patch16-224", 
     if naflex:
         vision = {**sizes, "patch_size": PATCH, "num_patches": 16}
         made = Siglip2Model(Siglip2Config(text_config=text, vision_config=vision))
-        pictures = Siglip2ImageProcessorPil(patch_size=PATCH, max_num_patches=16)
+        kind = {"image_processor_type": "Siglip2ImageProcessorFast", "patch_size": PATCH, "max_num_patches": 16}
     else:
         vision = {**sizes, "patch_size": PATCH, "image_size": IMAGE}
         made = SiglipModel(SiglipConfig(text_config=text, vision_config=vision))
-        pictures = SiglipImageProcessorPil(
-            size={"height": IMAGE, "width": IMAGE}, resample=2, image_mean=[0.5] * 3, image_std=[0.5] * 3
-        )
+        kind = {"image_processor_type": "SiglipImageProcessor", "size": {"height": IMAGE, "width": IMAGE}}
     shake(made)
     with torch.no_grad():
         made.logit_scale.fill_(torch.log(torch.tensor(SCALE)))
         made.logit_bias.fill_(BIAS)
     made.save_pretrained(place)
-    pictures.save_pretrained(place)
+    prepared = {
+        **kind, "do_convert_rgb": None, "do_normalize": True, "do_rescale": True, "do_resize": True, "resample": 2,
+        "image_mean": [0.5] * 3, "image_std": [0.5] * 3, "processor_class": "SiglipProcessor",
+        "rescale_factor": 1 / 255,
+    }  # fmt: skip
+    (place / "preprocessor_config.json").write_text(json.dumps(prepared), encoding="utf-8")
 
 
 def shake(module: torch.nn.Module, seed: int = 5, amount: float = 0.2) -> None:

@@ -71,7 +71,7 @@ class DinoPlaces:
         self, rgb: UInt8[np.ndarray, "h w 3"], local: LocalFeatures, state: dict[str, np.ndarray]
     ) -> Float32[np.ndarray, " d"]:
         """Return a unit vector for any picture; its keypoints are not looked at."""
-        size = size_with_short_side(*rgb.shape[:2], self._short_side, self._patch)
+        size = size_with_short_side(rgb.shape[0], rgb.shape[1], self._short_side, self._patch)
         picture = imagenet_picture(rgb, size, self._device, "bicubic")
         with mixed_precision(self._device):
             tokens = self._network(pixel_values=picture).last_hidden_state.to(torch.float32)[0]

@@ -71,7 +71,7 @@ class EigenPlaces:
         self, rgb: UInt8[np.ndarray, "h w 3"], local: LocalFeatures, state: dict[str, np.ndarray]
     ) -> Float32[np.ndarray, " d"]:
         """Return a unit vector for any picture; its keypoints are not looked at."""
-        picture = imagenet_picture(rgb, _size(*rgb.shape[:2]), self._device)
+        picture = imagenet_picture(rgb, _size(rgb.shape[0], rgb.shape[1]), self._device)
         with mixed_precision(self._device):
             features = self._network.backbone(picture)
         with torch.inference_mode():
@@ -134,7 +134,7 @@ def backbone_of(state: Mapping[str, torch.Tensor], path: Path, get: str) -> nn.S
             "EigenPlaces needs torchvision; get it with: pip install 'avlmaps[foundation]' torchvision"
         ) from fault
     if "backbone.28.weight" in state:
-        return make_layers(cfgs["D"])[:-2]  # VGG-16 without its last ReLU and pooling
+        return nn.Sequential(*list(make_layers(cfgs["D"]))[:-2])  # VGG-16 without its last ReLU and pooling
     blocks = [len({key.split(".")[2] for key in state if key.startswith(f"backbone.{stage}.")}) for stage in _STAGES]
     if not all(blocks):
         raise BackendError(f"{path} holds no ResNet and no VGG-16 of EigenPlaces; get the published file with: {get}")

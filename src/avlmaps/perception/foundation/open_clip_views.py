@@ -84,10 +84,10 @@ def _loaded(folder: Path, model: str) -> tuple[Any, Any, Any, Path]:
         name, settings = _architecture(folder, model), {"pretrained": str(path)}
         settings |= _preparation(name)
     try:
-        network, prepare = open_clip.create_model_from_pretrained(
+        made: Any = open_clip.create_model_from_pretrained(
             name, device="cpu", precision="fp32", weights_only=True, **settings
         )
-        return network, prepare, open_clip.get_tokenizer(name), path
+        return *made, open_clip.get_tokenizer(name), path
     except Exception as fault:  # open_clip, timm, torch and safetensors raise a dozen kinds for a damaged folder
         said = " ".join(str(fault).split())
         raise BackendError(
