@@ -1,6 +1,7 @@
 """Models of transformers from a local folder: loaded strictly, with one sentence for what does not fit."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -56,9 +57,10 @@ def load_pretrained(
     """
     load: Any = kind
     try:
-        made, told = load.from_pretrained(
-            folder, output_loading_info=True, local_files_only=True, dtype=precision, weights_only=True
-        )
+        with _quietly():
+            made, told = load.from_pretrained(
+                folder, output_loading_info=True, local_files_only=True, dtype=precision, weights_only=True
+            )
     except Exception as fault:  # what transformers, safetensors and torch raise for damaged files is not told apart
         raise BackendError(
             f"{folder} cannot be loaded as {kind.__name__} ({type(fault).__name__}: {_short(fault)}); get it again "
@@ -86,7 +88,8 @@ def load_helper(kind: Any, folder: Path, model: str) -> Any:
         BackendError: its files are missing or damaged.
     """
     try:
-        made = kind.from_pretrained(folder, local_files_only=True)
+        with _quietly():
+            made = kind.from_pretrained(folder, local_files_only=True)
         # without its files, transformers makes up a tokenizer that knows no word
         if hasattr(made, "convert_tokens_to_ids") and not any(path for name in _TOKENS for path in folder.glob(name)):
             raise FileNotFoundError(f"none of {', '.join(_TOKENS)} is there")
@@ -96,6 +99,22 @@ def load_helper(kind: Any, folder: Path, model: str) -> Any:
             f"{folder} has no {kind.__name__} that can be loaded ({type(fault).__name__}: {_short(fault)}); get all "
             f"its files with: hf download {model}"
         ) from fault
+
+
+@contextmanager
+def _quietly() -> Iterator[None]:
+    """Keep transformers' bars and reports of loading off the terminal: what matters of them is told here."""
+    from transformers.utils import logging
+
+    bars, level = logging.is_progress_bar_enabled(), logging.get_verbosity()
+    logging.disable_progress_bar()
+    logging.set_verbosity_error()
+    try:
+        yield
+    finally:
+        logging.set_verbosity(level)
+        if bars:
+            logging.enable_progress_bar()
 
 
 def _uncomputed(names: Collection[str]) -> list[str]:
