@@ -1,5 +1,6 @@
 """SigLIP 2 for areas: the published computation on a tiny random checkpoint in the published layout."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -77,6 +78,25 @@ def test_texts_are_small_letters_with_an_end_padded_to_64(models: Path) -> None:
     end = int(np.flatnonzero(rows[0] == 1)[0])
     assert (rows[0, :end] > 4).all() and (rows[0, end + 1 :] == 0).all()
     assert rows[2, -1] == 1 and (rows[2, :-1] > 4).all(), "a text that is too long is cut and still ends"
+
+
+def test_texts_of_the_first_siglip_lose_their_punctuation_and_are_padded_with_their_end(tmp_path: Path) -> None:
+    """Its tokenizer is of another kind (unigrams), ``</s>`` being both end and padding, and the file adds no end."""
+    from tokenizers import Tokenizer, models, pre_tokenizers
+
+    pieces = [("<pad>", 0.0), ("</s>", 0.0), ("<unk>", 0.0), ("▁a", -1.0), ("▁kit", -1.0), ("▁", -2.0), (".", -3.0)]
+    tokenizer = Tokenizer(models.Unigram(pieces, unk_id=2))
+    tokenizer.pre_tokenizer = pre_tokenizers.Metaspace()
+    tokenizer.enable_truncation(3)
+    tokenizer.save(str(tmp_path / "tokenizer.json"))
+    config = {"eos_token": {"content": "</s>"}, "pad_token": "</s>", "do_lower_case": True}
+    (tmp_path / "tokenizer_config.json").write_text(json.dumps(config), encoding="utf-8")
+    rows = SiglipTokens(tmp_path, 6, "").encode(["A, Kit.", "a a a a a a a a"])
+    assert rows.tolist() == [[3, 4, 1, 1, 1, 1], [3, 3, 3, 3, 3, 1]]
+    config["pad_token"] = "<none>"
+    (tmp_path / "tokenizer_config.json").write_text(json.dumps(config), encoding="utf-8")
+    with pytest.raises(BackendError, match=r"has no token '<none>'; it is not the tokenizer of this model"):
+        SiglipTokens(tmp_path, 6, "")
 
 
 def test_words_are_the_mean_of_their_sentences_by_the_models_own_forward(models: Path) -> None:

@@ -104,6 +104,23 @@ def test_phrases_in_a_narrow_cone_still_compete() -> None:
     assert (area_scores(rows, views, "garage", AreaSettings())[0] < 0.5).all()
 
 
+@pytest.mark.parametrize(
+    ("area", "asked", "same"),
+    [
+        ("kitchen", "the Kitchen", True),
+        ("kitchen", "large old kitchen", True),
+        ("corridor", "hallway", True),
+        ("corridor", "entrance hall", False),
+        ("lounge", "living room", True),
+        ("dining room", "living room", False),
+        ("office", "post office building", False),
+        ("gym", "room", False),
+    ],
+)
+def test_which_words_mean_the_same_place(area: str, asked: str, same: bool) -> None:
+    assert same_place(area, asked) == same
+
+
 def test_without_the_scale_nothing_would_be_found() -> None:
     """What the scale is for: at the temperature that suits other encoders, all names look alike."""
     assert not _map(OpenViews(), ["kitchen", "bedroom"]).area("kitchen").found

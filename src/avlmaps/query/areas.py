@@ -90,10 +90,15 @@ def area_scores(
     return posterior, posterior if settings.score == "posterior" else normalised(cosine[:, 0])
 
 
-def same_place(one: str, other: str) -> bool:
-    """Return whether two phrases are words for the same kind of area."""
-    one, other = one.strip().casefold(), other.strip().casefold()
-    return one == other or any(one in names and other in names for names in _SAME_PLACE)
+def same_place(area: str, asked: str) -> bool:
+    """Return whether an area's name and an asked phrase mean the same kind of place, or the phrase one such place.
+
+    A "large kitchen" is a kitchen: the bare name would beat the phrase wherever it is right.
+    """
+    area, asked = area.casefold(), " ".join(word for word in asked.casefold().split() if word not in ("a", "an", "the"))
+    if area == asked or asked.endswith(f" {area}"):
+        return True
+    return any(area in names and asked in names for names in _SAME_PLACE)
 
 
 def _cosine(rows: Float[np.ndarray, "n d"], row: Float[np.ndarray, " d"]) -> Float[np.ndarray, " n"]:
