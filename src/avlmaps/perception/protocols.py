@@ -252,13 +252,16 @@ class PlaceEncoder(Protocol):
     card: ModelCard
 
     def fit(self, local: Sequence[LocalFeatures], rng: np.random.Generator) -> dict[str, np.ndarray]:
-        """Learn what it needs (VLAD: the visual words) from the map's own keyframes; arrays to be kept in the map."""
+        """Learn what it needs (VLAD: the visual words) from the map's own keyframes; arrays to be kept in the map.
+
+        What has learnt from others' pictures before returns none.
+        """
         ...
 
     def encode(
         self, rgb: UInt8[np.ndarray, "h w 3"], local: LocalFeatures, state: dict[str, np.ndarray]
     ) -> Float32[np.ndarray, " d"]:
-        """Return a unit vector (zero where the picture has no keypoints)."""
+        """Return a unit vector; zero where one that is made of keypoints has none (a network sees any picture)."""
         ...
 
 
