@@ -169,8 +169,11 @@ def test_another_list_is_refused(models, content):
         clip_tokens()
 
 
-def test_no_list_at_all_says_how_to_get_one(models, monkeypatch):
+@pytest.mark.parametrize("clip_without_merges", [False, True])
+def test_no_list_at_all_says_how_to_get_one(models, monkeypatch, clip_without_merges):
     monkeypatch.setattr(module, "find_spec", lambda name: None)
+    if clip_without_merges:
+        (models / "openai/clip-vit-base-patch32").mkdir(parents=True)
     monkeypatch.chdir(Path(models).parent)
     with pytest.raises(BackendError, match=f"{BYTE_PAIRS} is not here .* curl -LO"):
         clip_tokens()

@@ -39,7 +39,7 @@ from avlmaps.recordings.resample import resampled
 
 PROMPT = "{}"
 WINDOW_SAMPLES = 5 * RATE_HZ
-_FULL_SCALE = 32768.0
+_FULL_SCALE = np.float32(32768.0)
 _RELEASE = "https://github.com/AndreyGuzhov/AudioCLIP/releases/download/v0.1"
 _NO_BIAS = "audio.fbsp.bias"  # the published class keeps an empty tensor for the bias that it does not have
 _WINDOWS_ON_GPU = 16
@@ -96,8 +96,8 @@ class AudioClipSounds:
             AudioError: the sound has no samples, or some that are no finite numbers.
         """
         check_samples(sound)
-        heard = _FULL_SCALE * windows(resampled(sound, RATE_HZ).samples, WINDOW_SAMPLES)
-        size = max(1, chosen_batch(_WINDOWS_ON_GPU))
+        heard = windows(resampled(sound, RATE_HZ).samples, WINDOW_SAMPLES)
+        size = chosen_batch(_WINDOWS_ON_GPU)
         return np.concatenate([self._encode_windows(heard[at : at + size]) for at in range(0, len(heard), size)])
 
     def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
@@ -131,9 +131,9 @@ class AudioClipSounds:
     def _contrast(self) -> Contrast:
         return Contrast(self.encode_words((*OTHERS, "other")), self.logit_scale)
 
-    def _encode_windows(self, heard: Float32[np.ndarray, "b n"]) -> Float32[np.ndarray, "b d"]:
+    def _encode_windows(self, heard: Sequence[Float32[np.ndarray, " n"]]) -> Float32[np.ndarray, "b d"]:
         with inference():
-            decibels = self._front_end(torch.from_numpy(heard).to(self._device))
+            decibels = self._front_end(torch.from_numpy(_FULL_SCALE * np.stack(heard)).to(self._device))
         with mixed_precision(self._device):
             return unit_rows(self._network.audio(decibels))
 

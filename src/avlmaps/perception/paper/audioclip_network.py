@@ -102,7 +102,14 @@ class _Attention(nn.Module):
 
 
 class SoundTower(nn.Module):
-    """ESResNeXt: decibels of three bands to one feature a sound, not normalised."""
+    """ESResNeXt: decibels of three bands to one feature a sound, not normalised.
+
+    Attributes:
+        fbsp: the wavelets, which a ``FrontEnd`` is made of.
+        window: weights of a frame's samples.
+    """
+
+    window: torch.Tensor
 
     def __init__(self, sizes: SoundSizes) -> None:
         super().__init__()

@@ -53,6 +53,8 @@ _WORDS_AT_ONCE = 64
 class _Spectrogram(nn.Module):
     """Power of each frequency; frames are centred, the ends mirrored."""
 
+    window: torch.Tensor
+
     def __init__(self, length: int) -> None:
         super().__init__()
         self.register_buffer("window", torch.zeros(length))
@@ -138,6 +140,7 @@ class Wav2ClipNetwork(nn.Module):
         super().__init__()
         self.audio_encoder = _Encoder(frame, stem)
         self.audio_transform = _Transform(8 * stem)
+        self.frame, self.dim = frame, 8 * stem
 
     @classmethod
     def like(cls, state: Mapping[str, torch.Tensor]) -> "Wav2ClipNetwork":
@@ -171,12 +174,11 @@ class Wav2ClipSounds:
         path = published_file(model, _HOW_TO_GET, cached=(f"checkpoints/{name}",))
         self._device = chosen_device()
         self._network = _loaded(path).eval().to(self._device)
-        self._shortest = len(self._network.audio_encoder.spectrogram.window)
-        dim = self._network.audio_transform.sequential[-1].out_features  # pyright: ignore[reportAttributeAccessIssue]
-        folder = self._load_words(int(dim))
+        dim = self._network.dim
+        folder = self._load_words(dim)
         self.card = ModelCard(
             id=name,
-            dim=int(dim),
+            dim=dim,
             licence="MIT",
             checksum=checksum_of([path, *weights_in(folder)], f"{RATE_HZ} Hz, {_LONGEST_SAMPLES} samples", PROMPT),
             prompts=(PROMPT,),
@@ -194,7 +196,7 @@ class Wav2ClipSounds:
         """
         check_samples(sound)
         samples = resampled(sound, RATE_HZ).samples
-        samples = np.pad(samples, (0, max(0, self._shortest - len(samples))))
+        samples = np.pad(samples, (0, max(0, self._network.frame - len(samples))))
         return np.concatenate(
             [self._encode_window(part) for part in windows(samples, min(len(samples), _LONGEST_SAMPLES))]
         )
