@@ -15,6 +15,7 @@ from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.heatmap import HeatSettings, NearThings
 from avlmaps.query.level import Space
 from avlmaps.query.open_words import fitting, is_a, is_open
+from avlmaps.query.pieces import joined_pieces, without_specks
 from avlmaps.query.question import Part
 from avlmaps.query.tints import Tint, is_tinted, tint_of, tinted_share
 
@@ -301,7 +302,7 @@ def colour_factor(
     mask = is_tinted(np.asarray(rgb), tint)
     instance = instances_of(space, mask, settings.link_m)
     confidence = instance_confidence(np.ones(len(instance)), instance, space.grid.voxel_size_m, settings)
-    mask, instance, confidence = _without_specks(mask, instance, confidence, settings.least_confidence)
+    mask, instance, confidence = without_specks(mask, instance, confidence, settings.least_confidence)
     best = float(confidence.max(initial=0.0))
     note = "" if best >= 0.5 else f"nothing of some size is {tint.text}"
     falloff = heat.falloff_per_m(part.role)
@@ -377,7 +378,7 @@ def pieces_of(
     instance = instances_of(space, mask, settings.link_m)
     confidence = confidence_of(mask, instance)
     best = float(confidence.max(initial=0.0))
-    mask, instance, confidence = _without_specks(mask, instance, confidence, least)
+    mask, instance, confidence = without_specks(mask, instance, confidence, least)
     joined = joined_pieces(space.level(space.centres[mask]), instance, settings.link_m, settings.join_m)
     if len(confidence) > joined.max(initial=-1) + 1:
         instance = joined[instance]
@@ -386,44 +387,6 @@ def pieces_of(
     mean /= np.maximum(np.bincount(instance, minlength=len(confidence)), 1)
     best = max(best, float(confidence.max(initial=0.0)))
     return Pieces(mask, instance, mean.astype(np.float32), confidence, won, best)
-
-
-def _without_specks(
-    mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"], confidence: Float32[np.ndarray, " i"], least: float
-) -> tuple[Bool[np.ndarray, " n"], Int[np.ndarray, " b"], Float32[np.ndarray, " j"]]:
-    """Return the voxels, instances and confidences of the instances that are sure enough to count."""
-    kept = confidence >= least
-    stays = kept[instance]
-    thinned = np.zeros(len(mask), bool)
-    thinned[np.flatnonzero(mask)[stays]] = True
-    return thinned, (np.cumsum(kept) - 1)[instance[stays]], confidence[kept]
-
-
-def joined_pieces(
-    points_level: Float[np.ndarray, "a 3"], instance: Int[np.ndarray, " a"], cell_m: float, join_m: float
-) -> Int[np.ndarray, " i"]:
-    """Return for each instance the number of the thing that it is a piece of.
-
-    A thing of thin parts comes in pieces: the camera saw a chair's legs and its back and little between. Two
-    pieces are one thing where at least half of the smaller one's columns (of ``cell_m``, seen from above) hold the
-    other too, with nothing else between them and at most ``join_m`` in height.
-    """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    count = int(instance.max(initial=-1)) + 1
-    cell = np.unique(np.floor(points_level[:, :2] / cell_m), axis=0, return_inverse=True)[1].reshape(-1)
-    columns = np.bincount(np.unique(np.stack([instance, cell]), axis=1)[0], minlength=count)
-    order = np.lexsort((points_level[:, 2], cell))
-    below, above = order[:-1], order[1:]
-    near = (cell[below] == cell[above]) & (points_level[above, 2] - points_level[below, 2] <= join_m)
-    meeting = near & (instance[below] != instance[above])
-    a, b = np.sort(np.stack([instance[below], instance[above]])[:, meeting], axis=0)
-    met = np.unique(np.stack([a, b, cell[below][meeting]]), axis=1)[:2]
-    (a, b), times = np.unique(met, axis=1, return_counts=True)
-    same = 2 * times >= np.minimum(columns[a], columns[b])
-    links = coo_array((np.ones(int(same.sum()), bool), (a[same], b[same])), shape=(count, count))
-    return connected_components(links, directed=False)[1]
 
 
 def _absence(word: str, voxels: int, won: int, best: float) -> str:

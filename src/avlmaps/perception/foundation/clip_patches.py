@@ -86,7 +86,8 @@ class ClipPatches:
 
     def _encode_pictures(self, pictures: list[UInt8[np.ndarray, "h w 3"]]) -> Float32[np.ndarray, "b hf wf d"]:
         patch = self._clip.patch
-        size = working_size(*pictures[0].shape[:2], self._short_side, patch)
+        height, width = pictures[0].shape[:2]
+        size = working_size(height, width, self._short_side, patch)
         grid = size[0] // patch, size[1] // patch
         with inference():
             tokens = _before_the_last(self._clip.vision, self._clip.pixels(pictures, size))

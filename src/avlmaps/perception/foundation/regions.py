@@ -76,7 +76,8 @@ class RegionPixels:
 
     def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
         """Return a unit vector for each cell of a region, zero elsewhere."""
-        grid = working_size(*frame.rgb.shape[:2], self._short_side, 1, most_patches=self._short_side**2 * 8)
+        height, width = frame.rgb.shape[:2]
+        grid = working_size(height, width, self._short_side, 1, most_patches=self._short_side**2 * 8)
         found = self._proposer.find(frame.rgb, grid)
         features = np.zeros((*grid, self.card.dim), np.float32)
         if len(found.area):

@@ -103,7 +103,8 @@ class TipsPixels:
         return word.strip().lower()
 
     def _encode_pictures(self, pictures: list[UInt8[np.ndarray, "h w 3"]]) -> Float32[np.ndarray, "b hf wf d"]:
-        size = working_size(*pictures[0].shape[:2], self._short_side, self._patch)
+        height, width = pictures[0].shape[:2]
+        size = working_size(height, width, self._short_side, self._patch)
         with inference():
             pixels = stacked(pictures, size, self._device, self._type)
             vision = self._model.vision_model

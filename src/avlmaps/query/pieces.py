@@ -1,0 +1,42 @@
+"""Which connected voxels are too unsure to be a thing, and which are pieces of one."""
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int
+
+
+def without_specks(
+    mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"], confidence: Float32[np.ndarray, " i"], least: float
+) -> tuple[Bool[np.ndarray, " n"], Int[np.ndarray, " b"], Float32[np.ndarray, " j"]]:
+    """Return the voxels, instances and confidences of the instances that are sure enough to count."""
+    kept = confidence >= least
+    stays = kept[instance]
+    thinned = np.zeros(len(mask), bool)
+    thinned[np.flatnonzero(mask)[stays]] = True
+    return thinned, (np.cumsum(kept) - 1)[instance[stays]], confidence[kept]
+
+
+def joined_pieces(
+    points_level: Float[np.ndarray, "a 3"], instance: Int[np.ndarray, " a"], cell_m: float, join_m: float
+) -> Int[np.ndarray, " i"]:
+    """Return for each instance the number of the thing that it is a piece of.
+
+    A thing of thin parts comes in pieces: the camera saw a chair's legs and its back and little between. Two
+    pieces are one thing where at least half of the smaller one's columns (of ``cell_m``, seen from above) hold the
+    other too, with nothing else between them and at most ``join_m`` in height.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count = int(instance.max(initial=-1)) + 1
+    cell = np.unique(np.floor(points_level[:, :2] / cell_m), axis=0, return_inverse=True)[1].reshape(-1)
+    columns = np.bincount(np.unique(np.stack([instance, cell]), axis=1)[0], minlength=count)
+    order = np.lexsort((points_level[:, 2], cell))
+    below, above = order[:-1], order[1:]
+    near = (cell[below] == cell[above]) & (points_level[above, 2] - points_level[below, 2] <= join_m)
+    meeting = near & (instance[below] != instance[above])
+    a, b = np.sort(np.stack([instance[below], instance[above]])[:, meeting], axis=0)
+    met = np.unique(np.stack([a, b, cell[below][meeting]]), axis=1)[:2]
+    (a, b), times = np.unique(met, axis=1, return_counts=True)
+    same = 2 * times >= np.minimum(columns[a], columns[b])
+    links = coo_array((np.ones(int(same.sum()), bool), (a[same], b[same])), shape=(count, count))
+    return connected_components(links, directed=False)[1]
