@@ -46,7 +46,11 @@ class LocatableMap(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class LocateSettings:
-    """How a picture is located, and when it counts as located."""
+    """How a picture is located, and when it counts as located.
+
+    The measurements are of RootSIFT's thousand keypoints. Keypoints and matchers of other kinds are judged by the same
+    numbers: they count points that agree with one pose, parts of matches and of the picture, never likeness.
+    """
 
     references: int = 5
     """How many keyframes that look alike are matched where the most alike one alone does not tell enough."""

@@ -9,6 +9,8 @@ are each other's best with a probability above 0.2, as in the paper's code (the 
 coordinate is rounded.
 """
 
+from typing import Any
+
 import numpy as np
 import torch
 from jaxtyping import Float, Int
@@ -48,7 +50,7 @@ class SuperGlue:
         self._device = chosen_device()
         network = load_pretrained(SuperGlueForKeypointMatching, folder, model, self._device, torch.float32)
         del network.keypoint_detector  # the SuperPoint that came with it; the map's keypoints are found already
-        self._network = network
+        self._network: Any = network
         self.card = ModelCard(
             id=public_name(model),
             dim=int(network.config.hidden_size),
