@@ -1,5 +1,6 @@
 """Features are made once: what the store keeps, what it finds, what it lets go, and maps that are the same with it."""
 
+import inspect
 import os
 import time
 from collections.abc import Sequence
@@ -17,11 +18,26 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.build import build_map, build_part
 from avlmaps.maps.settings import BuildSettings
+from avlmaps.perception.conformance import check
 from avlmaps.perception.models.feature_store import CacheSettings, FeatureStore, key_of
-from avlmaps.perception.models.remembering import RememberingKeypoints, RememberingPixels, came_from_store, remembering
+from avlmaps.perception.models.remembering import (
+    RememberingFrameSounds,
+    RememberingKeypoints,
+    RememberingPixels,
+    came_from_store,
+    remembering,
+)
 from avlmaps.perception.models.settings import ModelSettings, using_models
 from avlmaps.perception.profiles import Profile, profile
-from avlmaps.perception.protocols import LocalFeatures
+from avlmaps.perception.protocols import (
+    BatchPixelEncoder,
+    FrameSoundEncoder,
+    LocalEncoder,
+    LocalFeatures,
+    PlaceEncoder,
+    SoundEncoder,
+    ViewEncoder,
+)
 from avlmaps.recordings.types import Frame, Ground
 
 register_fakes()
@@ -284,6 +300,34 @@ def test_keypoints_come_back_as_they_were(tmp_path: Path, size: tuple[int, int],
         for name in ("xy", "descriptors", "scale", "score"):
             assert np.array_equal(getattr(told, name), getattr(local, name)), name
             assert getattr(told, name).shape == getattr(local, name).shape
+
+
+def test_encoders_keep_their_protocols_whatever_way_they_are_asked(tmp_path: Path) -> None:
+    used = remembering(profile("embedded"), CacheSettings(tmp_path))
+    encoders = {
+        BatchPixelEncoder: used.pixel_encoder(),
+        ViewEncoder: used.view_encoder(),
+        SoundEncoder: used.sound_encoder(),
+        LocalEncoder: used.local_encoder(),
+        PlaceEncoder: used.place_encoder(),
+    }
+    for protocol, encoder in encoders.items():
+        assert isinstance(encoder, protocol)
+        for name in getattr(protocol, "__protocol_attrs__", ()) or dir(protocol):
+            if not name.startswith("_"):
+                inspect.getattr_static(encoder, name)  # as isinstance asks from Python 3.12 on
+    assert not isinstance(used.sound_encoder(), FrameSoundEncoder)
+    check(Kind.SOUNDS, used.sound_encoder())
+    check(Kind.VIEWS, used.view_encoder())
+    check(Kind.PLACE, used.place_encoder())
+
+
+def test_an_encoder_of_steps_stays_one(tmp_path: Path) -> None:
+    class Steps:
+        card, vocabulary, hop_s = CARD, (), 0.04
+        encode = encode_words = score_words = score_sounds = None
+
+    assert isinstance(RememberingFrameSounds(Steps(), FeatureStore(tmp_path)), FrameSoundEncoder)
 
 
 # Whole builds

@@ -13,7 +13,7 @@ from typing import Literal
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, load
-from avlmaps.perception.models.published_models import PUBLISHED, Published
+from avlmaps.perception.models.published_models import ALSO, PUBLISHED, Published
 from avlmaps.perception.models.settings import model_settings
 
 State = Literal["ready", "package missing", "weights missing", "broken"]
@@ -51,8 +51,8 @@ def availability(backend: Backend, model: str = "") -> Availability:
     if not model:
         return _loaded(backend)
     licence = backend.licence if model == backend.model else ""
-    name = model.partition("#")[0]
-    missing = [needed for needed in (name, *_published(name).also) if not is_here(needed)]
+    needed = (model.partition("#")[0], *ALSO.get(f"{backend.kind}:{backend.name}", ()))
+    missing = [one for one in needed if not is_here(one)]
     if not missing:
         return Availability("ready", model, licence)
     return Availability("weights missing", model, licence, "; ".join(map(how_to_get, missing)))

@@ -13,7 +13,6 @@ class Published:
         package: an installed package in whose folder such a file may lie.
         get: the command that brings it; ``hf download ID`` where it is ``""``.
         size_mb: about how much that is; 0 where it is not known.
-        also: other models that its backend needs.
     """
 
     files: tuple[str, ...] = ()
@@ -21,7 +20,6 @@ class Published:
     package: str = ""
     get: str = ""
     size_mb: float = 0.0
-    also: tuple[str, ...] = ()
 
 
 def _keypoints(repository: str, file: str, size_mb: float, *cached: str) -> Published:
@@ -34,6 +32,7 @@ _WAV2CLIP = "https://github.com/descriptinc/lyrebird-wav2clip/releases/download/
 _NETVLAD = "https://cvg-data.inf.ethz.ch/hloc/netvlad"
 _BYTE_PAIRS = "bpe_simple_vocab_16e6.txt.gz"
 _WORDS = "openai/clip-vit-base-patch32"
+_REGIONS = "facebook/sam2.1-hiera-tiny"
 _LIGHTGLUE = "kornia/lightglue"
 
 # By the name that a profile or the registry gives them. A model that is not here is looked for by its name.
@@ -43,6 +42,8 @@ PUBLISHED: dict[str, Published] = {
     "openai/clip-vit-large-patch14": Published(size_mb=1710),
     _WORDS: Published(size_mb=605),
     "laion/larger_clap_general": Published(size_mb=780),
+    "facebook/pe-a-frame-base": Published(size_mb=2240),
+    _REGIONS: Published(size_mb=156),
     "gberton/MegaLoc": Published(size_mb=915),
     "facebook/dinov2-small": Published(size_mb=88),
     "magic-leap-community/superpoint": Published(size_mb=5),
@@ -54,16 +55,11 @@ PUBLISHED: dict[str, Published] = {
     "ResNet50_2048_eigenplaces.pth": Published(
         ("ResNet50_2048_eigenplaces.pth",), get=f"curl -LO {_EIGENPLACES}/ResNet50_2048_eigenplaces.pth", size_mb=110
     ),
-    "demo_e200.ckpt": Published(
-        ("demo_e200.ckpt",),
-        get="gdown 1ayk6NXURI_vIPlym16f_RG3ffxBWHxvb -O demo_e200.ckpt",
-        also=(_BYTE_PAIRS,),
-    ),
+    "demo_e200.ckpt": Published(("demo_e200.ckpt",), get="gdown 1ayk6NXURI_vIPlym16f_RG3ffxBWHxvb -O demo_e200.ckpt"),
     "AudioCLIP-Partial-Training.pt": Published(
         ("AudioCLIP-Partial-Training.pt",),
         get=f"curl -LO {_AUDIOCLIP}/AudioCLIP-Partial-Training.pt",
         size_mb=537,
-        also=(_BYTE_PAIRS,),
     ),
     _BYTE_PAIRS: Published(
         (_BYTE_PAIRS, f"{_WORDS}/merges.txt", f"{_WORDS.replace('/', '--')}/merges.txt"),
@@ -72,10 +68,18 @@ PUBLISHED: dict[str, Published] = {
         get=f"curl -LO {_AUDIOCLIP}/{_BYTE_PAIRS}",
         size_mb=1.4,
     ),
-    "Wav2CLIP.pt": Published(("Wav2CLIP.pt",), get=f"curl -LO {_WAV2CLIP}/Wav2CLIP.pt", size_mb=47, also=(_WORDS,)),
+    "Wav2CLIP.pt": Published(("Wav2CLIP.pt",), get=f"curl -LO {_WAV2CLIP}/Wav2CLIP.pt", size_mb=47),
     "VGG16-NetVLAD-Pitts30K.mat": Published(
         ("VGG16-NetVLAD-Pitts30K.mat", "VGG16-NetVLAD-Pitts30K.safetensors"),
         get=f"curl -L -o VGG16-NetVLAD-Pitts30K.mat {_NETVLAD}/Pitts30K_struct.mat",
         size_mb=530,
     ),
+}
+
+# Models that a backend needs beside its own.
+ALSO: dict[str, tuple[str, ...]] = {
+    "pixels:regions": (_REGIONS,),
+    "pixels:lseg": (_BYTE_PAIRS,),
+    "sounds:audioclip": (_BYTE_PAIRS,),
+    "sounds:wav2clip": (_WORDS,),
 }

@@ -18,6 +18,7 @@ from avlmaps.perception.models.settings import precision_in_force
 from avlmaps.perception.profiles import Profile
 from avlmaps.perception.protocols import (
     BatchPixelEncoder,
+    FrameSoundEncoder,
     LocalEncoder,
     LocalFeatures,
     PixelEncoder,
@@ -46,27 +47,30 @@ class RememberingProfile(Profile):
         """Return the pixel encoder, or raise ``BackendError``."""
         store, half = self._store_of(Kind.PIXELS), self.on_torch(Kind.PIXELS)
         encoder = Profile.pixel_encoder(self)
-        return encoder if store is None and not half else cast(PixelEncoder, RememberingPixels(encoder, store, half))
+        return encoder if store is None and not half else RememberingPixels(encoder, store, half)
 
     def view_encoder(self) -> ViewEncoder:
         """Return the view encoder, or raise ``BackendError``."""
         store, encoder = self._store_of(Kind.VIEWS), Profile.view_encoder(self)
-        return encoder if store is None else cast(ViewEncoder, RememberingViews(encoder, store))
+        return encoder if store is None else RememberingViews(encoder, store)
 
     def sound_encoder(self) -> SoundEncoder:
         """Return the sound encoder, or raise ``BackendError``."""
         store, encoder = self._store_of(Kind.SOUNDS), Profile.sound_encoder(self)
-        return encoder if store is None else cast(SoundEncoder, RememberingSounds(encoder, store))
+        if store is None:
+            return encoder
+        made = RememberingFrameSounds if isinstance(encoder, FrameSoundEncoder) else RememberingSounds
+        return made(encoder, store)
 
     def local_encoder(self) -> LocalEncoder:
         """Return the keypoint encoder, or raise ``BackendError``."""
         store, encoder = self._store_of(Kind.LOCAL), Profile.local_encoder(self)
-        return encoder if store is None else cast(LocalEncoder, RememberingKeypoints(encoder, store))
+        return encoder if store is None else RememberingKeypoints(encoder, store)
 
     def place_encoder(self) -> PlaceEncoder:
         """Return the place encoder, or raise ``BackendError``."""
         store, encoder = self._store_of(Kind.PLACE), Profile.place_encoder(self)
-        return encoder if store is None else cast(PlaceEncoder, RememberingPlaces(encoder, store))
+        return encoder if store is None else RememberingPlaces(encoder, store)
 
     def _store_of(self, kind: Kind) -> FeatureStore | None:
         return self.store if kind in self.remembered_kinds else None
@@ -97,16 +101,16 @@ def came_from_store(used: Profile, kind: Kind) -> str:
 
 
 class _Remembering:
-    """An encoder in front of another one; whatever is not remembered goes straight to that."""
+    """An encoder in front of another one.
+
+    What is not remembered goes straight to that, written out for each protocol: ``isinstance`` sees no ``__getattr__``.
+    """
 
     kind: Kind
 
     def __init__(self, encoder: Any, store: FeatureStore | None) -> None:
         self._encoder, self._store = encoder, store
         self.card = encoder.card
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._encoder, name)
 
     def _key(self, *seen: np.ndarray | str | float | int | None) -> str:
         """Return the key of what is seen, by this model, in this precision, by this release's code."""
@@ -137,6 +141,19 @@ class RememberingPixels(_Remembering):
         self._kept_as = np.float16 if half else np.float32
 
     @property
+    def vocabulary(self) -> tuple[str, ...]:
+        """Names that compete with an asked word."""
+        return self._encoder.vocabulary
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each word, or zero."""
+        return self._encoder.encode_words(words)
+
+    def understood(self, word: str) -> str:
+        """Return the part of the phrase that the encoder can act on."""
+        return self._encoder.understood(word)
+
+    @property
     def batch(self) -> int:
         """How many frames it likes to be given at once."""
         return int(getattr(self._encoder, "batch", 1))
@@ -151,8 +168,9 @@ class RememberingPixels(_Remembering):
         kept = [self._known(key) for key in keys]
         missing = [i for i, features in enumerate(kept) if features is None]
         for i, features in zip(missing, encoded_together(self._encoder, [frames[i] for i in missing]), strict=True):
-            kept[i] = features.astype(self._kept_as)
-            self._put(keys[i], kept[i])
+            rounded = features.astype(self._kept_as)
+            self._put(keys[i], rounded)
+            kept[i] = rounded
         return [cast(np.ndarray, features).astype(np.float32, copy=False) for features in kept]
 
     def _known(self, key: str) -> np.ndarray | None:
@@ -177,6 +195,10 @@ class RememberingViews(_Remembering):
         rows = [cast(np.ndarray, row) for row in kept]
         return np.stack(rows) if rows else np.zeros((0, self.card.dim), np.float32)
 
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase."""
+        return self._encoder.encode_words(words)
+
 
 class RememberingSounds(_Remembering):
     """A sound encoder that encodes each sound once."""
@@ -192,11 +214,45 @@ class RememberingSounds(_Remembering):
             self._put(key, kept)
         return kept
 
+    @property
+    def vocabulary(self) -> tuple[str, ...]:
+        """The kinds of sound that it knows."""
+        return self._encoder.vocabulary
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase."""
+        return self._encoder.encode_words(words)
+
+    def score_words(
+        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], words: Sequence[str]
+    ) -> Float32[np.ndarray, "sounds words"]:
+        """Return how likely each sound is what each phrase names."""
+        return self._encoder.score_words(sounds, words)
+
+    def score_sounds(
+        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
+    ) -> Float32[np.ndarray, " sounds"]:
+        """Return how likely each sound is of the same kind as the asked one."""
+        return self._encoder.score_sounds(sounds, asked)
+
+
+class RememberingFrameSounds(RememberingSounds):
+    """The same for an encoder that gives a vector for each step of time."""
+
+    @property
+    def hop_s(self) -> float:
+        """Seconds of a step."""
+        return self._encoder.hop_s
+
 
 class RememberingPlaces(_Remembering):
     """A place encoder that encodes each picture once (with the same keypoints, after the same learning)."""
 
     kind = Kind.PLACE
+
+    def fit(self, local: Sequence[LocalFeatures], rng: np.random.Generator) -> dict[str, np.ndarray]:
+        """Learn what the encoder needs from the map's own keyframes."""
+        return self._encoder.fit(local, rng)
 
     def encode(
         self, rgb: UInt8[np.ndarray, "h w 3"], local: LocalFeatures, state: dict[str, np.ndarray]
