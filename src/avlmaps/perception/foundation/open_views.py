@@ -13,6 +13,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.perception.foundation.prompts import Prompted
 from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.device import chosen_batch, chosen_device, unit_rows
+from avlmaps.perception.models.kept_words import KeptWords
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
@@ -54,7 +55,7 @@ class OpenViews(ABC):
         self.card = card
         self.logit_scale = logit_scale
         self._device = chosen_device()
-        self._words = Prompted(self._text_rows, card.dim, card.prompts)
+        self._words = Prompted(self._text_rows, card.dim, card.prompts, KeptWords(card))
 
     def encode(self, frames: Sequence[Frame]) -> Float32[np.ndarray, "n d"]:
         """Return a unit vector for each frame."""

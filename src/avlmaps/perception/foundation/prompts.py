@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float, Float32
 
+from avlmaps.perception.models.kept_words import KeptWords
+
 # The subset of seven of its ImageNet sentences that the authors of CLIP found to do as well as all eighty.
 CLIP_PROMPTS = (
     "itap of a {}.",
@@ -63,12 +65,21 @@ class Prompted:
         encode_texts: returns a row for each sentence.
         dim: length of a row.
         prompts: sentences with ``{}`` for the word.
+        kept: where features of words outlive this process; None for none.
+
+    Attributes:
+        kept: the same; may be given later, once there is a card.
     """
 
     def __init__(
-        self, encode_texts: Callable[[list[str]], Float[np.ndarray, "n d"]], dim: int, prompts: Sequence[str]
+        self,
+        encode_texts: Callable[[list[str]], Float[np.ndarray, "n d"]],
+        dim: int,
+        prompts: Sequence[str],
+        kept: KeptWords | None = None,
     ) -> None:
         self._encode_texts, self._dim, self._prompts = encode_texts, dim, tuple(prompts)
+        self.kept = kept
         self._known: dict[str, Float32[np.ndarray, " d"]] = {}
 
     def encode(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
@@ -82,13 +93,21 @@ class Prompted:
     def _of(self, phrase: str) -> Float32[np.ndarray, " d"]:
         known = self._known.get(phrase)
         if known is None:
-            # replace, not format: a brace in the phrase is a brace
-            texts = [prompt.replace("{}", phrase) for prompt in self._prompts]
-            known = mean_direction(self._encode_texts(texts))
+            known = self.kept.get(phrase) if self.kept is not None else None
+            if known is None:
+                known = self._made(phrase)
             if len(self._known) >= _REMEMBERED:
                 self._known.clear()
             self._known[phrase] = known
         return known
+
+    def _made(self, phrase: str) -> Float32[np.ndarray, " d"]:
+        # replace, not format: a brace in the phrase is a brace
+        texts = [prompt.replace("{}", phrase) for prompt in self._prompts]
+        made = mean_direction(self._encode_texts(texts))
+        if self.kept is not None:
+            self.kept.put(phrase, made)
+        return made
 
 
 def mean_direction(rows: Float[np.ndarray, "n d"]) -> Float32[np.ndarray, " d"]:
