@@ -88,7 +88,7 @@ class Clip(ClipTextTower):
     def __init__(self, sizes: ClipSizes) -> None:
         super().__init__(sizes.text)
         self.side = sizes.side
-        self.visual = _ImageTower(sizes)
+        self.visual: nn.Module = _ImageTower(sizes)
         self.logit_scale = nn.Parameter(torch.zeros(()))
 
 

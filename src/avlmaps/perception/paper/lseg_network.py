@@ -134,8 +134,8 @@ class _VisionTransformer(nn.Module):
         self.cls_token = nn.Parameter(torch.zeros(1, 1, sizes.width))
         self.pos_embed = nn.Parameter(torch.zeros(1, 1 + sizes.grid**2, sizes.width))
         self.blocks = nn.ModuleList(_Block(sizes.width) for _ in range(sizes.layers))
-        self.norm = nn.LayerNorm(sizes.width, eps=1e-6)
-        self.head = nn.Linear(sizes.width, sizes.classes)
+        self.norm: nn.Module = nn.LayerNorm(sizes.width, eps=1e-6)
+        self.head: nn.Module = nn.Linear(sizes.width, sizes.classes)
 
     def forward(self, pictures: torch.Tensor) -> list[torch.Tensor]:
         patches = self.patch_embed.proj(pictures)
