@@ -166,6 +166,14 @@ def test_the_cache_of_torch_is_looked_through(name: str, models: Path, monkeypat
     assert load(Kind.LOCAL, name).card.id == f"{name}/{file}"
 
 
+def test_a_file_below_its_repositorys_name_is_found(name: str, models: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TORCH_HOME", str(models.parent / "torch"))
+    file = {"disk": "depth-save.pth", "aliked": "aliked-n16.pth"}[name]
+    (models / "kornia" / name).mkdir(parents=True)
+    (models / file).rename(models / "kornia" / name / file)
+    assert load(Kind.LOCAL, name).card.id == f"{name}/{file}"
+
+
 def test_the_card_hangs_on_the_weights(models: Path) -> None:
     write_disk(models)
     before = load(Kind.LOCAL, "disk").card

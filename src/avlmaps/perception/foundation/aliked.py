@@ -17,9 +17,8 @@ from kornia.feature import ALIKED
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.models.checksums import checksum_of
-from avlmaps.perception.models.device import chosen_device, to_numpy, unit_rows
+from avlmaps.perception.models.device import chosen_device, inference, to_numpy, unit_rows
 from avlmaps.perception.models.pictures import has_nothing, local_features, no_features, shrunk
-from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.published import load_strictly, published_file, read_tensors
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
 
@@ -67,13 +66,12 @@ class AlikedKeypoints:
         if min(seen.shape[:2]) < 8:  # a strip: its windows reach over both borders
             return no_features(self.card.dim, rgb)
         picture = torch.from_numpy(np.ascontiguousarray(seen.transpose(2, 0, 1)))[None].to(self._device)
-        with mixed_precision(self._device):
+        with inference():  # in float32: half precision makes neighbours equal, and then neither is a maximum
             features, scores = self._network.extract_dense_map(picture.float() / 255.0)
-            # The places are worked out in float32, whatever the network ran in.
-            places, found, _ = self._network.dkd(scores.float())
+            places, found, _ = self._network.dkd(scores)
             if not len(places[0]):
                 return no_features(self.card.dim, rgb)
-            descriptors, _ = self._network.desc_head(features.float(), places)
+            descriptors, _ = self._network.desc_head(features, places)
         last = np.array([seen.shape[1] - 1, seen.shape[0] - 1])
         index = (to_numpy(places[0]).astype(np.float64) + 1.0) / 2.0 * last
         return local_features(index, unit_rows(descriptors[0]), to_numpy(found[0]), seen, rgb)

@@ -17,9 +17,8 @@ from kornia.feature import DISK
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.models.checksums import checksum_of
-from avlmaps.perception.models.device import chosen_device, to_numpy, unit_rows
+from avlmaps.perception.models.device import chosen_device, inference, to_numpy, unit_rows
 from avlmaps.perception.models.pictures import has_nothing, local_features, no_features, shrunk
-from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.published import load_strictly, published_file, read_tensors
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
 
@@ -69,11 +68,11 @@ class DiskKeypoints:
             return no_features(DIM, rgb)
         seen = shrunk(rgb, MAX_SIDE_PX)
         picture = torch.from_numpy(np.ascontiguousarray(seen.transpose(2, 0, 1)))[None].to(self._device)
-        with mixed_precision(self._device):
+        with inference():  # in float32: half precision makes neighbours equal, and then neither is a maximum
             found = self._network(
                 picture.float() / 255.0, n=MAX_KEYPOINTS, window_size=WINDOW_PX, pad_if_not_divisible=True
             )[0]
-        score = to_numpy(torch.sigmoid(found.detection_scores.float()))
+        score = to_numpy(torch.sigmoid(found.detection_scores))
         return local_features(to_numpy(found.keypoints), unit_rows(found.descriptors), score, seen, rgb)
 
 

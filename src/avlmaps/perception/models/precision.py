@@ -12,8 +12,8 @@ from avlmaps.perception.models.device import chosen_type, inference
 def mixed_precision(device: torch.device) -> Iterator[None]:
     """Run without gradients, and on a GPU in the chosen type wherever torch holds that to be safe (autocast).
 
-    Networks that tell places in a picture keep their weights in float32: a float16 holds no coordinate above 2048.
-    On a CPU half precision is slower and torch's sampling of it is not exact, so that everything stays float32 there.
+    For networks that read places in a picture: a float16 holds no fraction of a pixel above 1024. On a CPU half
+    precision is slower, so that everything stays float32 there.
     """
     kind = chosen_type(device)
     half = device.type != "cpu" and kind is not torch.float32

@@ -10,6 +10,7 @@ from torch import nn
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.models.files import model_file
+from avlmaps.perception.models.settings import model_settings
 
 
 def published_file(name: str, how_to_get: str, repository: str = "", cached: Sequence[str] = ()) -> Path:
@@ -29,11 +30,21 @@ def published_file(name: str, how_to_get: str, repository: str = "", cached: Seq
     try:
         return model_file(name, how_to_get)
     except BackendError:
-        places = [_in_hub_cache(repository, name), *(Path(torch.hub.get_dir()) / path for path in cached)]
+        places = [
+            _below_models(repository, name),
+            _in_hub_cache(repository, name),
+            *(Path(torch.hub.get_dir()) / path for path in cached),
+        ]
         for place in places:
             if place is not None and place.is_file():
                 return place
         raise
+
+
+def _below_models(repository: str, name: str) -> Path | None:
+    """Return where ``hf download`` puts it when it is told the folder of models and the repository's name in it."""
+    folder = model_settings().folder
+    return folder / repository / name if folder and repository else None
 
 
 def _in_hub_cache(repository: str, name: str) -> Path | None:

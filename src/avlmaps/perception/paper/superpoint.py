@@ -14,11 +14,10 @@ import torch
 from jaxtyping import UInt8
 
 from avlmaps.perception.models.checksums import checksum_of, weights_in
-from avlmaps.perception.models.device import chosen_device, to_numpy, unit_rows
+from avlmaps.perception.models.device import chosen_device, inference, to_numpy, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.operators import declare_missing_operators
 from avlmaps.perception.models.pictures import has_nothing, local_features, no_features
-from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_pretrained, pretrained_folder
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
 
@@ -62,7 +61,7 @@ class SuperPointKeypoints:
         if has_nothing(rgb):
             return no_features(self.card.dim, rgb)
         grey = torch.from_numpy(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)).to(self._device)
-        with mixed_precision(self._device):
+        with inference():  # in float32: half precision makes neighbours equal, and then neither is a maximum
             found = self._network((grey.float() / 255.0)[None, None])
         height, width = grey.shape
         index = to_numpy(found.keypoints[0]).astype(np.float64) * (width, height)
