@@ -121,3 +121,14 @@ def test_letting_go_of_what_is_idle_changes_no_feature(weights: dict[str, torch.
         made.let_go_of_the_idle()
         assert torch.equal(made(pictures), before)
     assert sum(p.numel() for p in made.parameters()) < sum(v.numel() for v in weights.values())
+
+
+def test_half_precision_is_near_enough(network: LSegNetwork) -> None:
+    """As on a GPU, where autocast runs the network in half precision; a CPU has bfloat16, which is coarser still."""
+    pictures = torch.rand(1, 3, 96, 96, generator=torch.Generator().manual_seed(4)) * 2 - 1
+    with torch.no_grad():
+        exact = network(pictures)
+        with torch.autocast("cpu", torch.bfloat16):
+            coarse = network(pictures)
+    assert coarse.dtype == torch.float32
+    assert torch.cosine_similarity(exact, coarse, dim=1).mean() > 0.995

@@ -13,7 +13,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, find
 from avlmaps.perception.conformance import check, example_frame
 from avlmaps.perception.paper import archives
-from avlmaps.perception.paper.clip_network import clip_picture
+from avlmaps.perception.paper.clip_network import Clip, ClipSizes, clip_picture
 from avlmaps.perception.paper.clip_tokens import clip_tokens
 from avlmaps.perception.paper.clip_views import PaperClipViews
 from avlmaps.perception.protocols import ScaledEncoder
@@ -130,6 +130,18 @@ def test_the_middle_of_a_wide_picture_is_seen() -> None:
     seen = clip_picture(rgb, 50)
     assert (seen[:, :, 5:-5] > 1.0).all()
     assert clip_picture(rgb.transpose(1, 0, 2), 50).shape == (3, 50, 50)
+
+
+def test_the_real_network_has_exactly_the_keys_of_open_clip() -> None:
+    model = pytest.importorskip("open_clip.model")
+    with torch.device("meta"):
+        vision = model.CLIPVisionCfg(layers=24, width=1024, patch_size=14, image_size=224)
+        theirs = model.CLIP(768, vision, model.CLIPTextCfg(width=768, heads=12, layers=12), quick_gelu=True)
+        sizes = ClipSizes.of(theirs.state_dict())
+        ours = Clip(sizes)
+    assert (sizes.side, sizes.patch, sizes.width, sizes.layers, sizes.text.dim) == (224, 14, 1024, 24, 768)
+    expected = {key: value.shape for key, value in theirs.state_dict().items()}
+    assert {key: value.shape for key, value in ours.state_dict().items()} == expected
 
 
 def test_another_file_is_refused_in_a_sentence(models: Path) -> None:
