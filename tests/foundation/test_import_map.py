@@ -418,6 +418,14 @@ def test_flipped_bytes_never_escape_as_another_error(scene: Path, tmp_path: Path
     assert told > 5
 
 
+def test_a_grid_larger_than_any_building_is_one_sentence(scene: Path, tmp_path: Path) -> None:
+    source = write_h5(tmp_path / "vlmaps.h5df", {k: v for k, v in one_voxel().items() if k != "occupied_ids"})
+    with h5py.File(source, "a") as file:
+        file.create_dataset("occupied_ids", (10**7, 10**7, 10**7), "i4", chunks=(8, 8, 8))
+    with pytest.raises(MapError, match="than a building has"):
+        import_reference_map(source, tmp_path / "m.avlmap", poses=scene / "poses.txt", progress=False)
+
+
 def test_links_to_other_files_are_not_followed(arrays: dict[str, np.ndarray], scene: Path, tmp_path: Path) -> None:
     write_h5(tmp_path / "other.h5", {"weight": arrays["weight"]})
     source = write_h5(tmp_path / "vlmaps.h5df", _without(arrays, "weight"))

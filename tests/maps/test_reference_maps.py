@@ -184,6 +184,18 @@ def test_what_is_no_map_is_told(source: str, sentence: str, tmp_path: Path) -> N
         find_scene(tmp_path, areas=tmp_path / "none.h5df")
 
 
+def test_a_map_of_the_first_demonstration_is_refused_for_its_lost_heights(tmp_path: Path) -> None:
+    _touch(tmp_path / "map/grid_lseg_1.npy")
+    with pytest.raises(MapError, match=r"\(map/grid_lseg_1.npy\), seen from above: the heights in it are lost"):
+        find_scene(tmp_path)
+
+
+@pytest.mark.parametrize("where", [1e9, np.nan, np.inf])
+def test_voxels_beyond_the_horizon_are_refused(where: float) -> None:
+    with pytest.raises(MapError, match="m from the origin, farther than any building is wide"):
+        cubes_from_corner(np.zeros((1, 3), int), 0.05, np.array([0.0, where, 0.0]))
+
+
 def test_without_h5py_the_sentence_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     voxels = _touch(tmp_path / "vlmap/vlmaps.h5df")
     monkeypatch.setitem(sys.modules, "h5py", None)

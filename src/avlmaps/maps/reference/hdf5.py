@@ -4,7 +4,7 @@ h5py comes with the extra ``paper`` and is imported when a file is opened.
 """
 
 import importlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -79,23 +79,34 @@ class Hdf5:
             MapError: it is missing, no plain array, or of another shape or kind.
         """
         with _told(self.path):
-            link, has = self._file.get(name, getlink=True), ", ".join(sorted(map(str, self._file))) or "nothing"
-            found: Any = self._file[name] if isinstance(link, self._h5py.HardLink) else None
+            link, has = self._file.get(name, getlink=True), _listed(str(key) for key in self._file)
+            found = self._own_array(self._file[name]) if isinstance(link, self._h5py.HardLink) else None
         if link is None:
             raise MapError(f"{self.path} has no {name}, as a map of the reference code has (it holds: {has}).")
-        # Links and external or virtual storage would read other files of this machine into the map.
-        if not isinstance(found, self._h5py.Dataset) or found.is_virtual or found.external:
+        if found is None:
             raise MapError(f"{self.path}: {name} is not an array kept in this file; the reference code writes one.")
-        fits = len(found.shape) == len(shape) and all(
-            wanted in (None, size) for wanted, size in zip(shape, found.shape, strict=True)
+        array, has_shape, dtype = found
+        fits = len(has_shape) == len(shape) and all(
+            wanted in (None, size) for wanted, size in zip(shape, has_shape, strict=True)
         )
-        if not fits or found.dtype.kind not in kinds:
+        if not fits or dtype.kind not in kinds:
             wanted = " x ".join("n" if size is None else str(size) for size in shape) or "one number"
             raise MapError(
-                f"{self.path}: {name} is {found.dtype} of {found.shape}, and a map of the reference code has "
+                f"{self.path}: {name} is {dtype} of {has_shape}, and a map of the reference code has "
                 f"{'whole numbers' if kinds == 'iu' else 'numbers'} ({wanted}) there; this is another kind of map."
             )
-        return Numbers(self.path, found)
+        return Numbers(self.path, array, has_shape)
+
+    def _own_array(self, found: Any) -> tuple[Any, tuple[int, ...], np.dtype[Any]] | None:
+        """Return a dataset with its shape and type; None for what is none or would read other files of this machine."""
+        if not isinstance(found, self._h5py.Dataset) or found.is_virtual or found.external:
+            return None
+        return found, tuple(int(size) for size in found.shape or ()), found.dtype
+
+
+def _listed(names: Iterable[str]) -> str:
+    shown = sorted(name if name.isprintable() else repr(name) for name in names)
+    return ", ".join(shown[:12]) + (", ..." if len(shown) > 12 else "") or "nothing"
 
 
 class Numbers:
@@ -105,10 +116,10 @@ class Numbers:
         shape: of the whole.
     """
 
-    def __init__(self, path: Path, dataset: Any) -> None:
+    def __init__(self, path: Path, dataset: Any, shape: tuple[int, ...]) -> None:
         self._path = path
         self._dataset = dataset
-        self.shape: tuple[int, ...] = tuple(int(size) for size in dataset.shape)
+        self.shape = shape
 
     def rows(self, part: slice, dtype: type) -> np.ndarray:
         """Read some rows, as numbers of that type."""

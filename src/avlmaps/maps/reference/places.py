@@ -17,9 +17,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from avlmaps.core import poses
+from avlmaps.core.errors import MapError
 from avlmaps.maps.grid import GridSpec
 from avlmaps.recordings.avlmaps_layout import WORLD_FROM_HABITAT, base_poses
 
+FARTHEST_M = 1e6
 _CUBES_AT_ONCE = 1 << 16
 _NEIGHBOURS = np.stack(np.meshgrid(*[(-1, 0, 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 
@@ -42,6 +44,14 @@ class Cubes:
     middle: Float[np.ndarray, "c 3"]
     row: Int[np.ndarray, " c"]
     size_m: float
+
+    def __post_init__(self) -> None:
+        far_m = float(np.abs(self.middle).max(initial=0.0) + np.abs(self.world_from_grid[:3, 3]).max())
+        if not far_m <= FARTHEST_M:
+            raise MapError(
+                f"The voxels lie up to {far_m:.3g} m from the origin, farther than any building is wide; the first "
+                "pose or the grid's corner is damaged."
+            )
 
 
 def cubes_from_first_base(

@@ -8,6 +8,7 @@ from avlmaps.core.errors import MapError
 VOXELS = ("vlmap/vlmaps.h5df", "vlmap_multi_floor/vlmaps_multi_floor.h5df", "vlmap_cam/vlmaps_cam.h5df")
 AREAS = "area_map/clip_sparse_map.h5df"
 POSES = "poses.txt"
+TOP_DOWN = "map/grid_lseg_1.npy"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +52,11 @@ def find_scene(source: Path, areas: Path | None = None, poses: Path | None = Non
         folder, voxels = source, next((source / name for name in VOXELS if (source / name).is_file()), None)
     else:
         folder, voxels = _scene_of(source), source
+    if voxels is None and (folder / TOP_DOWN).is_file():
+        raise MapError(
+            f"{source} holds a map of the first demonstration ({TOP_DOWN}), seen from above: the heights in it are "
+            f"lost, so that it cannot become a 3D map; let newer code of the papers write {VOXELS[0]}."
+        )
     if voxels is None:
         raise MapError(
             f"{source} holds no map of the reference code ({VOXELS[0]} is what it writes); give the scene's folder, or "

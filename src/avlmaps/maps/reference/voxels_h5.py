@@ -24,7 +24,8 @@ from avlmaps.maps.reference.hdf5 import Hdf5, Numbers
 from avlmaps.maps.reference.places import Cubes, cubes_from_corner, cubes_from_first_base
 
 DIM = 512  # LSeg's
-MOST_CELLS = 1 << 27  # the reference's own loader would need 256 GB for their features
+MOST_VOXELS = 1 << 25  # the reference's own loader would need 64 GB for their features
+MOST_CELLS = 100_000  # along an axis
 ROWS_AT_ONCE = 4096  # 8 MB of features
 
 
@@ -85,8 +86,12 @@ class ReferenceVoxels:
             raise MapError(f"{file.path} holds no voxels; the map is empty.")
         occupied = file.numbers("occupied_ids", (None, None, None), kinds="iu")
         self.grid_shape = occupied.shape
-        if count > min(MOST_CELLS, int(np.prod(np.array(self.grid_shape, np.float64)))):
-            raise MapError(f"{file.path}: {count} voxels are more than its grid of {self.grid_shape} cells can hold.")
+        room = np.prod(np.array(self.grid_shape, np.float64))
+        if count > min(MOST_VOXELS, room) or max(self.grid_shape) > MOST_CELLS:
+            raise MapError(
+                f"{file.path}: {count} voxels in a grid of {self.grid_shape} cells are more than there is room for, or "
+                "than a building has; the file is damaged."
+            )
         self._feature = file.numbers("grid_feat", (count, DIM), kinds="f")
         self._weight = file.numbers("weight", (count,))
         self._rgb: Numbers | None = file.numbers("grid_rgb", (count, 3)) if "grid_rgb" in file else None
