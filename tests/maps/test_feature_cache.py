@@ -191,7 +191,7 @@ def test_a_build_that_is_larger_than_the_store_keeps_its_first_frames(
 def test_too_large_features_are_told_once_and_not_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     store = FeatureStore(tmp_path, 1e6)
     for key in "ab":
-        store.put(Kind.PIXELS, CARD, key, np.zeros(1000, np.float16))
+        store.put(Kind.PIXELS, CARD, key, np.zeros(10_000, np.float16))
     said = capsys.readouterr().err
     assert said.count("note: Features of fake/pixels are not cached") == 1
     assert "--feature-cache-gb" in said

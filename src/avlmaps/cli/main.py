@@ -52,6 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
         sys.stdout.write(f"avlmaps {__version__}\n")
         sys.exit(0)
+    if "OMP_NUM_THREADS" not in os.environ:  # models on torch are another matter: they set their threads by this
+        os.environ.setdefault("AVLMAPS_TORCH_THREADS", str(os.cpu_count() or 1))
     # One BLAS thread: small matrices, ours among them, run many times slower on several when a machine is busy.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")

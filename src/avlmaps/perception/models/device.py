@@ -1,7 +1,9 @@
 """Where torch runs, and in which precision; importing it makes torchvision importable, too (``models.operators``)."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 
 import numpy as np
 import torch
@@ -21,6 +23,7 @@ def chosen_device() -> torch.device:
     Raises:
         BackendError: it is not there.
     """
+    _use_cores()
     asked = model_settings().device
     if asked == "auto":
         if torch.cuda.is_available():
@@ -33,6 +36,14 @@ def chosen_device() -> torch.device:
         here = "cuda" if torch.cuda.is_available() else "mps" if torch.backends.mps.is_available() else "cpu"
         raise BackendError(f"The device {asked!r} cannot be used here ({fault}); choose --device {here}.") from fault
     return device
+
+
+@cache
+def _use_cores() -> None:
+    """Let large models on the CPU use all cores, as torch would, though the command line keeps all else to one."""
+    threads = os.environ.get("AVLMAPS_TORCH_THREADS", "")
+    if threads.isdecimal() and int(threads):
+        torch.set_num_threads(int(threads))
 
 
 def chosen_type(device: torch.device) -> torch.dtype:

@@ -25,7 +25,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import ModelCard
 
 _GB = 1e9
-_LARGEST_SHARE = 1e-3  # of the limit: at least a thousand frames find room
+_LARGEST_SHARE = 1e-2  # of the limit: at least a hundred frames find room
 _AFTER_SWEEPING = 0.9
 _ABANDONED_S = 3600.0
 _CRC_BYTES = 4
@@ -38,7 +38,7 @@ class CacheSettings:
     Attributes:
         place: ``auto`` keeps those of models on torch in the user's cache folder; a folder keeps those of every model
             there; ``off`` keeps none.
-        limit_gb: room on the disk; what was used longest ago goes first. Features of more than a thousandth of it for
+        limit_gb: room on the disk; what was used longest ago goes first. Features of more than a hundredth of it for
             one frame are not kept.
     """
 
@@ -97,7 +97,7 @@ class FeatureStore:
         if array.nbytes > _LARGEST_SHARE * self.limit_bytes:
             needed = array.nbytes / _LARGEST_SHARE / _GB
             self._tell(
-                f"Features of {card.id} are not cached: they take {array.nbytes / 1e6:.0f} MB a frame, and a thousand "
+                f"Features of {card.id} are not cached: they take {array.nbytes / 1e6:.0f} MB a frame, and a hundred "
                 f"frames must find room (--feature-cache-gb {needed:.0f})."
             )
             return

@@ -167,15 +167,17 @@ class RememberingPixels(_Remembering):
         keys = ["" if self._store is None else self._key(*_seen_in(frame)) for frame in frames]
         kept = [self._known(key) for key in keys]
         missing = [i for i, features in enumerate(kept) if features is None]
-        for i, features in zip(missing, encoded_together(self._encoder, [frames[i] for i in missing]), strict=True):
-            rounded = features.astype(self._kept_as)
+        fresh = encoded_together(self._encoder, [frames[i] for i in missing])
+        for i in reversed(missing):  # a frame's features can take 150 MB: none is held twice for long
+            rounded = fresh.pop().astype(self._kept_as)
             self._put(keys[i], rounded)
-            kept[i] = rounded
-        return [cast(np.ndarray, features).astype(np.float32, copy=False) for features in kept]
+            kept[i] = rounded.astype(np.float32, copy=False)
+        return [cast(np.ndarray, features) for features in kept]
 
-    def _known(self, key: str) -> np.ndarray | None:
+    def _known(self, key: str) -> Float32[np.ndarray, "hf wf d"] | None:
         found = self._get(key)
-        return found if found is not None and found.ndim == 3 and found.shape[2] == self.card.dim else None
+        fits = found is not None and found.ndim == 3 and found.shape[2] == self.card.dim
+        return found.astype(np.float32, copy=False) if fits else None
 
 
 class RememberingViews(_Remembering):
