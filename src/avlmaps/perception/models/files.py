@@ -54,13 +54,13 @@ def _places(model: str) -> list[Path]:
 def _fetched(model: str, wanted: Sequence[str]) -> Path:
     settings = model_settings()
     get = f"hf download {model}"
-    folder = f"{settings.folder or 'no folder of models (--models DIR, AVLMAPS_MODELS)'}"
+    looked = f"in {settings.folder}, " if settings.folder else "in a folder of models (--models DIR sets one), "
     try:
         from huggingface_hub import snapshot_download
     except ImportError as fault:
         raise BackendError(
-            f"The model {model} is not in {folder}, and fetching it needs huggingface_hub; get it with: "
-            "pip install 'avlmaps[foundation]'"
+            f"The model {model} is not here (looked {looked.rstrip(', ')}), and fetching it needs huggingface_hub; get "
+            "that with: pip install 'avlmaps[foundation]'"
         ) from fault
     try:
         return Path(snapshot_download(model, allow_patterns=list(wanted), local_files_only=settings.offline))
@@ -71,6 +71,6 @@ def _fetched(model: str, wanted: Sequence[str]) -> Path:
             else f"{type(fault).__name__}: no network, no such id, or a licence to accept"
         )
         raise BackendError(
-            f"The model {model} is neither in {folder} nor in the hub's cache ({where}); get it on a machine with a "
-            f"network with: {get}"
+            f"The model {model} is not here (looked {looked}in the hub's cache and on the hub: {where}); get it on a "
+            f"machine with a network with: {get}"
         ) from fault
