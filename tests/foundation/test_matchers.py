@@ -24,10 +24,13 @@ from avlmaps.bench.locate import map_of
 from avlmaps.core.errors import BackendError
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.registry import Kind, load
+from avlmaps.maps.build import build_map
+from avlmaps.maps.stored import open_stored
 from avlmaps.perception.conformance import check
 from avlmaps.perception.foundation import aliked, disk
 from avlmaps.perception.foundation.lightglue import LightGlue
 from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.paper import superglue
 from avlmaps.perception.paper.superglue import SuperGlue, mutual_best, transported
 from avlmaps.perception.profiles import Profile
 from avlmaps.perception.protocols import LearnedMatcher, LocalFeatures
@@ -185,6 +188,59 @@ def test_superglue_matches_as_transformers_does_for_as_many_keypoints_of_picture
     assert found > 10
 
 
+def by_formula(state: dict[str, np.ndarray], a: LocalFeatures, b: LocalFeatures) -> np.ndarray:
+    """Return SuperGlue's scores of all pairs, layer by layer and head by head in float64, for two layers of 4 heads."""
+
+    def linear(name: str, x: np.ndarray) -> np.ndarray:
+        return x @ state[f"{name}.weight"].T + state[f"{name}.bias"]
+
+    def block(name: str, x: np.ndarray) -> np.ndarray:
+        x, norm = linear(f"{name}.linear", x), f"{name}.batch_norm"
+        x = (x - state[f"{norm}.running_mean"]) / np.sqrt(state[f"{norm}.running_var"] + 1e-5)
+        return np.maximum(x * state[f"{norm}.weight"] + state[f"{norm}.bias"], 0.0)
+
+    def encoded(one: LocalFeatures) -> np.ndarray:
+        size = np.array(one.size, float)
+        x = np.concatenate([(one.xy - 0.5 - size / 2) / (0.7 * size.max()), one.score[:, None]], axis=1)
+        for number in range(4):
+            x = block(f"keypoint_encoder.encoder.{number}", x)
+        return one.descriptors + linear("keypoint_encoder.encoder.4", x)
+
+    def message(layer: str, x: np.ndarray, source: np.ndarray) -> np.ndarray:
+        heads = []
+        for head in np.split(np.arange(256), 4):
+            query, key, value = (
+                linear(f"{layer}.attention.self.{part}", given)[:, head]
+                for part, given in (("query", x), ("key", source), ("value", source))
+            )
+            weight = np.exp(query @ key.T / 8.0)
+            heads.append(weight / weight.sum(axis=1, keepdims=True) @ value)
+        told = linear(f"{layer}.attention.output.dense", np.concatenate(heads, axis=1))
+        return linear(f"{layer}.mlp.1", block(f"{layer}.mlp.0", np.concatenate([x, told], axis=1)))
+
+    x, y = encoded(a), encoded(b)
+    x, y = x + message("gnn.layers.0", x, x), y + message("gnn.layers.0", y, y)
+    x, y = x + message("gnn.layers.1", x, y), y + message("gnn.layers.1", y, x)
+    return linear("final_projection.final_proj", x) @ linear("final_projection.final_proj", y).T / 16.0
+
+
+def test_superglue_is_its_formula_for_pictures_of_two_sizes_and_any_numbers_of_keypoints(
+    put: Any, models: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from safetensors.torch import load_file
+
+    put("superglue", random=True)
+    state = {name: value.double().numpy() for name, value in load_file(models / FOLDER / "model.safetensors").items()}
+    seen = []
+    monkeypatch.setattr(superglue, "transported", lambda likeness, *rest: seen.append(likeness) or likeness.double())
+    own = load(Kind.MATCHER, "superglue")
+    for n, m, size in ((30, 45, (640, 400)), (1, 7, (100, 900)), (9, 1, (320, 240))):
+        a, b = features(n, 256, n), features(m, 256, m, size)
+        own.match(a, b)
+        expected = by_formula(state, a, b)
+        np.testing.assert_allclose(seen[-1].numpy(), expected, atol=2e-4 * np.abs(expected).max())
+
+
 def test_superglue_looks_at_the_places_and_the_scores(put: Any) -> None:
     put("superglue", random=True)
     own = load(Kind.MATCHER, "superglue")
@@ -326,3 +382,24 @@ def test_a_keyframe_is_located_where_it_was_taken(
     assert found.reference_stamp_s == frame.stamp_s
     blank = locate(stored, np.full_like(frame.rgb, 99), None, np.random.default_rng(0))
     assert (blank.world_from_camera, blank.inliers) == (None, 0)
+
+
+def test_a_map_on_the_disk_locates_by_superglue_and_says_so_where_it_has_no_scores(models: Path, put: Any) -> None:
+    """Built, closed, opened: what a matcher needs has been kept, and a map from before there were scores is honest."""
+    for write in (write_superpoint, write_netvlad):
+        write(models)
+    put("superglue")
+    walk = RoomWalk(frames=2)
+    used = Profile("kept", pixels="colours", local="superpoint", matcher="superglue", place="netvlad")
+    path = models.parent / "room.avlmap"
+    build_map(walk, path, used, progress=False)
+    stored = open_stored(path)
+    assert stored.keyframes.score.dtype == np.float16 and len(stored.keyframes.score) == len(stored.keyframes.xy) > 0
+    found = locate(stored, walk.frame(0).rgb, None, np.random.default_rng(0))
+    assert found.world_from_camera is not None
+    assert np.linalg.norm(found.world_from_camera[:3, 3] - walk.frame(0).world_from_camera[:3, 3]) < 0.01
+    before = replace(stored, keyframes=replace(stored.keyframes, score=np.zeros(0, np.float16)))
+    with pytest.raises(
+        BackendError, match=r"needs the score of each keypoint; these came without\. Build the map again"
+    ):
+        locate(before, walk.frame(0).rgb, None, np.random.default_rng(0))

@@ -12,6 +12,8 @@ from avlmaps.core.errors import BackendError
 from avlmaps.perception.models.files import model_file
 from avlmaps.perception.models.settings import model_settings
 
+_COUNTED = ".num_batches_tracked"  # of training; old files have no such number
+
 
 def published_file(name: str, how_to_get: str, repository: str = "", cached: Sequence[str] = ()) -> Path:
     """Return where a published file lies: the folder of models, else the caches of the hub and of torch.
@@ -95,7 +97,7 @@ def load_strictly(
         BackendError: the file is of another network; the sentence names the first differences.
     """
     own = module.state_dict()
-    missing = [name for name in own if name not in state and name not in computed]
+    missing = [name for name in own if name not in state and name not in computed and not name.endswith(_COUNTED)]
     unknown = [name for name in state if name not in own]
     sizes = [
         f"{name} {_shape(state[name])} for {tuple(own[name].shape)}"
