@@ -5,6 +5,7 @@ does not.
 """
 
 import json
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -31,8 +32,10 @@ from tiny.tipsv2 import write_tipsv2
 
 from avlmaps.cli import main
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.core.registry import Backend, Kind
+from avlmaps.core.errors import BackendError
+from avlmaps.core.registry import Backend, Kind, backends, load
 from avlmaps.maps.stored import open_stored
+from avlmaps.perception.models.availability import availability
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
@@ -267,6 +270,18 @@ def test_profiles_tells_what_is_here(name: str, folders: dict[str, Path], answer
     assert states() == {"weights missing"}
 
 
+@pytest.mark.parametrize("backend", [b for b in backends() if "torch" in b.needs], ids=lambda b: f"{b.kind}-{b.name}")
+def test_the_list_names_the_command_that_loading_names(backend: Backend, models: Path, monkeypatch) -> None:
+    for variable in ("HF_HOME", "TORCH_HOME"):
+        monkeypatch.setenv(variable, str(models))
+    told = availability(backend)
+    assert told.state == "weights missing"
+    with pytest.raises(BackendError) as stop:
+        load(backend.kind, backend.name)
+    command = told.note.partition(" (")[0]
+    assert command in str(stop.value)
+
+
 def test_a_device_that_is_not_there_is_one_sentence(walk: Path, folders: dict[str, Path], run, tmp_path: Path) -> None:
     words = ("--profile", "foundation", "--models", folders["foundation"], "--device", "cuda:77")
     status, _, err = run("build", walk, "--out", tmp_path / "m", *words)
@@ -274,7 +289,32 @@ def test_a_device_that_is_not_there_is_one_sentence(walk: Path, folders: dict[st
     assert "The device 'cuda:77' cannot be used here" in err and "choose --device" in err
 
 
+def test_large_models_have_all_cores_unless_threads_are_named(run, monkeypatch: pytest.MonkeyPatch) -> None:
+    import torch
+
+    from avlmaps.perception.models import device
+
+    for variable in ("AVLMAPS_TORCH_THREADS", "OMP_NUM_THREADS"):
+        monkeypatch.setenv(variable, "")
+        monkeypatch.delenv(variable)
+    assert run("profiles")[0] == 0
+    assert os.environ["AVLMAPS_TORCH_THREADS"] == str(os.cpu_count())
+    assert os.environ["OMP_NUM_THREADS"] == "1"
+    monkeypatch.setenv("AVLMAPS_TORCH_THREADS", "2")
+    device._use_cores.cache_clear()
+    try:
+        device.chosen_device()
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(1)
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    monkeypatch.delenv("AVLMAPS_TORCH_THREADS")
+    assert run("profiles")[0] == 0
+    assert "AVLMAPS_TORCH_THREADS" not in os.environ, "who sets threads for all means torch, too"
+
+
 @pytest.mark.shared
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROFILES)
 def test_the_red_kitchen_runs_through(
     name: str, shared_data: Path, folders: dict[str, Path], answer, tmp_path: Path
