@@ -37,6 +37,8 @@ _LIGHTGLUE = "kornia/lightglue"
 
 # By the name that a profile or the registry gives them. A model that is not here is looked for by its name.
 PUBLISHED: dict[str, Published] = {
+    "google/tipsv2-b14": Published(size_mb=750),
+    "timm/PE-Core-B-16": Published(size_mb=1800),
     "google/siglip2-base-patch16-224": Published(size_mb=1500),
     "openai/clip-vit-base-patch16": Published(size_mb=600),
     "openai/clip-vit-large-patch14": Published(size_mb=1710),
@@ -55,7 +57,9 @@ PUBLISHED: dict[str, Published] = {
     "ResNet50_2048_eigenplaces.pth": Published(
         ("ResNet50_2048_eigenplaces.pth",), get=f"curl -LO {_EIGENPLACES}/ResNet50_2048_eigenplaces.pth", size_mb=110
     ),
-    "demo_e200.ckpt": Published(("demo_e200.ckpt",), get="gdown 1ayk6NXURI_vIPlym16f_RG3ffxBWHxvb -O demo_e200.ckpt"),
+    "demo_e200.ckpt": Published(
+        ("demo_e200.ckpt",), get="gdown 1ayk6NXURI_vIPlym16f_RG3ffxBWHxvb -O demo_e200.ckpt", size_mb=2000
+    ),
     "AudioCLIP-Partial-Training.pt": Published(
         ("AudioCLIP-Partial-Training.pt",),
         get=f"curl -LO {_AUDIOCLIP}/AudioCLIP-Partial-Training.pt",
