@@ -151,3 +151,11 @@ def test_a_product_is_the_same_in_whatever_order_and_brackets() -> None:
 def test_what_says_where_it_is_counts_only_where_it_is_sure() -> None:
     chair = Heatmap.of(ask("chair", role=Role.CONTEXT, least_confidence=0.5))
     assert clumps((chair * near(3)).factors[0]) == {0}
+
+
+def test_who_must_guess_is_told_of_things_that_are_too_unsure_to_be_told() -> None:
+    nothing = Heatmap.of(ask("coffee table", least_confidence=0.6))
+    assert nothing.goals(5) == []
+    guessed = nothing.with_unsure()
+    assert clumps(guessed.factors[0]) == {1, 2}
+    assert [goal.score for goal in guessed.goals(5)] == [pytest.approx(0.5, abs=0.01), pytest.approx(0.3, abs=0.01)]

@@ -1,6 +1,6 @@
 """From what a program names to things on the ground: which instance is meant, where it is, and what it covers."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,19 +53,28 @@ def things_in(heat: Heatmap, guess: bool = False) -> list[Thing]:
 
     Args:
         heat: what is sought, and what it is near.
-        guess: take the best guess where the map is not sure that there is such a thing; where nothing comes together
-            with what it is near, the thing alone.
+        guess: take the best guess where the map is not sure that there is such a thing, however unsure that is; where
+            nothing comes together with what it is near, the thing alone.
 
     Raises:
         GoalNotFoundError: there is none.
     """
-    goals = heat.goals(_MOST_GOALS) if heat.found or guess else []
-    lead = lead_of(heat)
-    if not goals and guess and len(heat.factors) > 1:
-        goals = Heatmap.of(lead).goals(_MOST_GOALS)
-    if not goals:
-        raise GoalNotFoundError(why_not(heat, guess))
-    return [_thing(heat, lead, goal) for goal in goals]
+    tries = _guesses(heat) if guess else (heat,) if heat.found else ()
+    for tried in tries:
+        goals = tried.goals(_MOST_GOALS)
+        if goals:
+            return [_thing(tried, lead_of(tried), goal) for goal in goals]
+    raise GoalNotFoundError(why_not(heat, guess))
+
+
+def _guesses(heat: Heatmap) -> Iterator[Heatmap]:
+    """Yield what may be meant by a heatmap, the surest first."""
+    lead = Heatmap.of(lead_of(heat))
+    yield heat
+    yield heat.with_unsure()
+    if len(heat.factors) > 1:
+        yield lead
+        yield lead.with_unsure()
 
 
 def nearest(things: Sequence[Thing], xy: Float[np.ndarray, "2"]) -> Thing:

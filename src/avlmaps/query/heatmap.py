@@ -76,6 +76,10 @@ class Factor(ABC):
         """Return this factor as it counts in a product with others."""
         return self
 
+    def at_any_rate(self) -> "Factor":
+        """Return this factor with all that may be meant, however unsure."""
+        return self
+
     @abstractmethod
     def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         """Return the anchor that each of these voxels has its heat from; they must have some."""
@@ -105,8 +109,11 @@ class NearThings(Factor):
 
     def in_company(self) -> "NearThings":
         """Return what is sought with its unsure instances; what it is near stays what is sure."""
-        sought = self.part.role is Role.PRIMARY
-        return self._with_unsure if sought and self.with_unsure is not None else self
+        return self._with_unsure if self.part.role is Role.PRIMARY else self
+
+    def at_any_rate(self) -> "NearThings":
+        """Return the same with its unsure instances."""
+        return self._with_unsure
 
     @cached_property
     def _with_unsure(self) -> "NearThings":
@@ -227,6 +234,10 @@ class Heatmap:
             raise ValueError("two heatmaps of different maps cannot be multiplied; ask both of the same AVLMap")
         one, two = self._in_company(), other._in_company()
         return Heatmap(self.space, one.factors + two.factors, one.values * two.values)
+
+    def with_unsure(self) -> "Heatmap":
+        """Return the heatmap in which things count that are too unsure to be told: for who must guess."""
+        return fused([Heatmap.of(factor.at_any_rate()) for factor in self.factors])
 
     def _in_company(self) -> "Heatmap":
         """Return the heatmap as it counts in a product; that of several things is one already."""
