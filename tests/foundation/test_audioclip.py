@@ -160,16 +160,16 @@ def test_the_empty_bias_may_be_missing(models):
 
 
 CHANGES = {
-    "1 keys missing (audio.att3.bn.bias)": lambda state: state.pop("audio.att3.bn.bias"),
-    "1 keys missing (visual.layer2.1.bn1.running_var)": lambda state: state.pop("visual.layer2.1.bn1.running_var"),
-    "1 keys missing (logit_scale_ai)": lambda state: state.pop("logit_scale_ai"),
-    "1 keys not known (audio.att6.bn.bias)": lambda state: state.update({"audio.att6.bn.bias": torch.zeros(2)}),
-    "1 keys not known (audio.fbsp.bias)": lambda state: state.update({"audio.fbsp.bias": torch.zeros(129, 2)}),
-    "of another shape (audio.att1.conv_depth.weight)": lambda state: state.update(
+    "it lacks audio.att3.bn.bias. Get": lambda state: state.pop("audio.att3.bn.bias"),
+    "it lacks visual.layer2.1.bn1.running_var. Get": lambda state: state.pop("visual.layer2.1.bn1.running_var"),
+    "it lacks logit_scale_ai. Get": lambda state: state.pop("logit_scale_ai"),
+    "nothing takes audio.att6.bn.bias. Get": lambda state: state.update({"audio.att6.bn.bias": torch.zeros(2)}),
+    "nothing takes audio.fbsp.bias. Get": lambda state: state.update({"audio.fbsp.bias": torch.zeros(129, 2)}),
+    "of another size is audio.att1.conv_depth.weight": lambda state: state.update(
         {"audio.att1.conv_depth.weight": torch.zeros(8, 1, 1, 3)}
     ),
     "KeyError": lambda state: state.pop("audio.fbsp.m"),
-    "no dictionary of tensors": lambda state: state.update({"epoch": 3}),
+    "holds more than weights (epoch)": lambda state: state.update({"epoch": 3}),
     "made with 7 tokens": lambda state: state.update({"token_embedding.weight": torch.zeros(7, 32)}),
 }
 
@@ -202,7 +202,7 @@ def test_a_damaged_file_is_refused_and_code_in_it_is_not_run(models, content, mo
         "code": pickle.dumps(Harmful(), protocol=2),
     }
     (models / MODEL).write_bytes(held[content])
-    with pytest.raises(BackendError, match="cannot be read as a checkpoint"):
+    with pytest.raises(BackendError, match="cannot be read as a file of weights"):
         AudioClipSounds()
     assert not (models / "was-run").exists()
 

@@ -47,7 +47,7 @@ class AlikedKeypoints:
         get = f"hf download {_REPOSITORY} {variant}.pth"
         path = published_file(name, get, _REPOSITORY, [f"checkpoints/{Path(name).name}"])
         network = ALIKED(variant, max_num_keypoints=MAX_KEYPOINTS, detection_threshold=THRESHOLD)
-        load_strictly(network, read_tensors(path, get), path, get, _COMPUTED)
+        load_strictly(network, read_tensors(path, get), path, get, computed=_COMPUTED)
         self._device = chosen_device()
         self._network = network.eval().to(self._device)
         self.card = ModelCard(

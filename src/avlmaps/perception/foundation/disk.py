@@ -45,11 +45,8 @@ class DiskKeypoints:
         name = _file_name(model)
         get = f"hf download {_REPOSITORY} {name}"
         path = published_file(name, get, _REPOSITORY, [f"checkpoints/{Path(name).name}"])
-        held = read_tensors(path, get)
         # The published file keeps the network of its training's reward beside the extractor.
-        state = held.get("extractor", held)
-        if not isinstance(state, dict):
-            raise BackendError(f"{path} is not a checkpoint of DISK: its extractor is no table; get it with: {get}")
+        state = read_tensors(path, get, part="extractor")
         network = DISK(desc_dim=DIM)
         load_strictly(network, state, path, get)
         self._device = chosen_device()

@@ -49,7 +49,7 @@ class LightGlue:
         path = published_file(name, get, _REPOSITORY, cached)
         network = KorniaLightGlue(features=None, input_dim=DIM, filter_threshold=SCORE, n_layers=LAYERS)  # pyright: ignore[reportArgumentType]
         state = {_present_name(key): value for key, value in read_tensors(path, get).items()}
-        load_strictly(network, state, path, get, _COMPUTED)
+        load_strictly(network, state, path, get, computed=_COMPUTED)
         self._device = chosen_device()
         self._network = network.eval().to(self._device)
         self.card = ModelCard(

@@ -3,7 +3,6 @@
 from collections.abc import Collection, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import torch
 from torch import nn
@@ -13,6 +12,7 @@ from avlmaps.perception.models.files import model_file
 from avlmaps.perception.models.settings import model_settings
 
 _COUNTED = ".num_batches_tracked"  # of training; old files have no such number
+_SHOWN = 2
 
 
 def published_file(name: str, how_to_get: str, repository: str = "", cached: Sequence[str] = ()) -> Path:
@@ -58,8 +58,13 @@ def _in_hub_cache(repository: str, name: str) -> Path | None:
     return Path(found) if isinstance(found, str) else None
 
 
-def read_tensors(path: Path, how_to_get: str) -> dict[str, Any]:
-    """Return what a ``.safetensors`` or a torch file holds, on the CPU; no code in it is ever run.
+def read_tensors(path: Path, how_to_get: str, part: str = "") -> dict[str, torch.Tensor]:
+    """Return the tensors that a ``.safetensors`` or a torch file holds by name, on the CPU; no code in it is ever run.
+
+    Args:
+        path: the file.
+        how_to_get: the command that brings the published one, for the error.
+        part: the name under which the file may keep them, beside others.
 
     Raises:
         BackendError: it is no such file, or holds more than tensors.
@@ -73,16 +78,27 @@ def read_tensors(path: Path, how_to_get: str) -> dict[str, Any]:
     except Exception as fault:
         reason = " ".join(str(fault).split())[:120]
         raise BackendError(
-            f"{path} cannot be read as a file of weights ({type(fault).__name__}: {reason}); get it again with: "
-            f"{how_to_get}"
+            f"{path} cannot be read as a file of weights ({type(fault).__name__}: {reason}); it may be damaged or cut "
+            f"short: get it again with: {how_to_get}"
         ) from fault
-    if not isinstance(held, dict):
-        raise BackendError(f"{path} holds {type(held).__name__} instead of named weights; get it with: {how_to_get}")
-    return held
+    state = held.get(part, held) if isinstance(held, Mapping) else held
+    if not isinstance(state, Mapping):
+        raise BackendError(f"{path} holds {type(state).__name__} instead of named weights; get it with: {how_to_get}")
+    if others := [str(name) for name, value in state.items() if not isinstance(value, torch.Tensor)]:
+        raise BackendError(
+            f"{path} holds more than weights ({_some(others)}); get the published one with: {how_to_get}"
+        )
+    return dict(state)
 
 
 def load_strictly(
-    module: nn.Module, state: Mapping[str, Any], path: Path, how_to_get: str, computed: Collection[str] = ()
+    module: nn.Module,
+    state: Mapping[str, torch.Tensor],
+    path: Path,
+    how_to_get: str,
+    *,
+    computed: Collection[str] = (),
+    not_needed: Collection[str] = (),
 ) -> None:
     """Put weights into a network: each of the network's is there, each of the file's has a place, all sizes agree.
 
@@ -92,20 +108,22 @@ def load_strictly(
         path: the file, for the error.
         how_to_get: the command that brings the published one, for the error.
         computed: names that the network works out itself; a file may lack them.
+        not_needed: names that the file must have as well, and that this network knowingly does without.
 
     Raises:
         BackendError: the file is of another network; the sentence names the first differences.
     """
     own = module.state_dict()
-    missing = [name for name in own if name not in state and name not in computed and not name.endswith(_COUNTED)]
-    unknown = [name for name in state if name not in own]
+    needed = [name for name in own if name not in computed and not name.endswith(_COUNTED)]
+    missing = [name for name in (*needed, *sorted(not_needed)) if name not in state]
+    unknown = [name for name in state if name not in own and name not in not_needed]
     sizes = [
-        f"{name} {_shape(state[name])} for {tuple(own[name].shape)}"
+        f"{name} {tuple(state[name].shape)} for {tuple(own[name].shape)}"
         for name in own
-        if name in state and _shape(state[name]) != tuple(own[name].shape)
+        if name in state and state[name].shape != own[name].shape
     ]
     faults = [
-        f"{what} {', '.join(names[:2])}{f' and {len(names) - 2} more' if len(names) > 2 else ''}"
+        f"{what} {_some(names)}"
         for what, names in (("it lacks", missing), ("nothing takes", unknown), ("of another size is", sizes))
         if names
     ]
@@ -114,8 +132,8 @@ def load_strictly(
             f"{path} is not the checkpoint of {type(module).__name__}: {'; '.join(faults)}. Get the published one "
             f"with: {how_to_get}"
         )
-    module.load_state_dict(dict(state), strict=False)
+    module.load_state_dict({name: value for name, value in state.items() if name in own}, strict=False)
 
 
-def _shape(held: Any) -> tuple[int, ...] | None:
-    return tuple(held.shape) if isinstance(held, torch.Tensor) else None
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names[:_SHOWN]) + (f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else "")

@@ -26,9 +26,8 @@ from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.device import chosen_batch, chosen_device, inference, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
-from avlmaps.perception.models.published import published_file
+from avlmaps.perception.models.published import load_strictly, published_file, read_tensors
 from avlmaps.perception.paper.audioclip_network import NOT_NEEDED, AudioClipNetwork, SoundSizes
-from avlmaps.perception.paper.checkpoint import load_strictly, read_state
 from avlmaps.perception.paper.clip_text import ClipTextSizes, padded
 from avlmaps.perception.paper.clip_tokens import clip_tokens
 from avlmaps.perception.paper.fbsp import HOP_SAMPLES, RATE_HZ, FrontEnd
@@ -144,7 +143,7 @@ def _loaded(path: Path, how_to_get: str) -> AudioClipNetwork:
     Raises:
         BackendError: the file is of another model.
     """
-    state = read_state(path, how_to_get)
+    state = read_tensors(path, how_to_get)
     if _NO_BIAS in state and not state[_NO_BIAS].numel():
         state.pop(_NO_BIAS)
     try:
@@ -154,5 +153,5 @@ def _loaded(path: Path, how_to_get: str) -> AudioClipNetwork:
             f"{path} is not a checkpoint of AudioCLIP ({type(fault).__name__}: {fault}); get the published one with: "
             f"{how_to_get}"
         ) from fault
-    load_strictly(network, state, path, how_to_get, NOT_NEEDED)
+    load_strictly(network, state, path, how_to_get, not_needed=NOT_NEEDED)
     return network

@@ -22,8 +22,8 @@ from avlmaps.perception.models.device import chosen_device
 from avlmaps.perception.models.files import model_file
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.pretrained import load_helper
+from avlmaps.perception.models.published import load_strictly
 from avlmaps.perception.paper.archives import read_weights
-from avlmaps.perception.paper.checkpoint import load_strictly
 from avlmaps.perception.paper.clip_network import NO_WEIGHTS, Clip, ClipSizes, clip_picture
 from avlmaps.perception.paper.clip_text import padded
 from avlmaps.perception.paper.clip_tokens import clip_tokens

@@ -27,8 +27,8 @@ from avlmaps.perception.models.device import chosen_batch, chosen_device, infere
 from avlmaps.perception.models.files import model_file
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
+from avlmaps.perception.models.published import load_strictly
 from avlmaps.perception.paper.archives import read_weights
-from avlmaps.perception.paper.checkpoint import load_strictly
 from avlmaps.perception.paper.clip_text import padded
 from avlmaps.perception.paper.clip_tokens import clip_tokens
 from avlmaps.perception.paper.lseg_network import LSegNetwork, LSegSizes

@@ -29,8 +29,7 @@ from avlmaps.perception.models.device import chosen_device, inference, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
-from avlmaps.perception.models.published import published_file
-from avlmaps.perception.paper.checkpoint import load_strictly, read_state
+from avlmaps.perception.models.published import load_strictly, published_file, read_tensors
 from avlmaps.perception.paper.sound_windows import windows
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
@@ -267,7 +266,7 @@ def _loaded(path: Path) -> Wav2ClipNetwork:
     Raises:
         BackendError: the file is of another model.
     """
-    state = read_state(path, _HOW_TO_GET)
+    state = read_tensors(path, _HOW_TO_GET)
     needed = {name: value for name, value in state.items() if not name.startswith(NOT_NEEDED)}
     try:
         network = Wav2ClipNetwork.like(needed)
