@@ -121,6 +121,43 @@ def test_case_white_space_and_entities_do_not_matter():
     assert all(other == plain for other in others)
 
 
+@pytest.mark.parametrize(
+    ("typed", "meant"),
+    [
+        ("the kettle\u2019s \u201cwhistle\u201d", 'the kettle\'s "whistle"'),
+        ("&rsquo;s &amp;amp;", "'s &"),
+        ("\ufb01re, o\ufb03ce, \u0149", "fire, office, 'n"),
+        ("\uff44\uff4f\uff47\u3000\uff11", "dog 1"),
+        ("cafe\u0301", "caf\u00e9"),
+        ("\ufeffdog\x00s\x1f", "dogs"),
+        ("a\u00a0b\u2028c\u3000d", "a b c d"),
+        ("\u03a3\u0391\u03a3", "\u03c3\u03b1\u03c2"),  # a sigma at a word's end
+        ("\ud83d\ude00", "\U0001f600"),
+        ("a\udcff", "a\ufffd"),  # a byte of the command line that is no text
+    ],
+)
+def test_letters_in_another_form_are_those_that_are_meant(typed, meant):
+    """As ftfy makes them in the published code; a phone types curly quotes where training saw straight ones."""
+    tokens = ClipTokens(MERGES)
+    found, wanted = tokens.encode([typed, meant])
+    assert found == wanted
+
+
+INTERESTING = (
+    "dog bark's\"\u2018\u2019\u201a\u201c\u201d\u201f\u02bc\ufb00\ufb02\uff01\uff21\uff76\u3000\x07\ufeff\u2014\u2026"
+)
+
+
+@settings(max_examples=100, deadline=None)
+@given(text=st.text(INTERESTING, max_size=12))
+def test_phrases_are_prepared_as_the_published_library_does_it(text):
+    ftfy = pytest.importorskip("ftfy")
+    tokens = ClipTokens(MERGES)
+    found, wanted = tokens.encode([text, ftfy.fix_text(text)])
+    assert found == wanted
+    assert module._plain(text) == " ".join(ftfy.fix_text(text).split()).lower()
+
+
 def test_marks_and_digits_are_apart_and_letters_beyond_ascii_are_bytes():
     tokens = ClipTokens(MERGES)
     digits, marks, accent = tokens.encode(["12", "dog!!", "é"])

@@ -6,12 +6,13 @@ or, the same merges, ``merges.txt`` of any CLIP on the hub.
 
 import gzip
 import html
+import unicodedata
 from collections.abc import Sequence
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from tokenizers import Regex, Tokenizer, models, normalizers, pre_tokenizers
+from tokenizers import Regex, Tokenizer, models, pre_tokenizers
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.models.files import model_file, model_folder
@@ -24,7 +25,7 @@ _PIECES = r"'s|'t|'re|'ve|'m|'ll|'d|[\p{L}]+|[\p{N}]|[^\s\p{L}\p{N}]+"
 
 
 class ClipTokens:
-    """Turns phrases into tokens as CLIP did in training: lower case, white space folded, start and end marked.
+    """Turns phrases into tokens as CLIP did in training: plain lower case, white space folded, both ends marked.
 
     Args:
         merges: pairs of pieces, each two words in one line, the first to be merged first.
@@ -37,9 +38,6 @@ class ClipTokens:
         numbers = {name: number for number, name in enumerate(names)}
         self.start, self.end = len(names), len(names) + 1
         self._pieces = Tokenizer(models.BPE(vocab=numbers, merges=pairs, end_of_word_suffix="</w>"))
-        self._pieces.normalizer = normalizers.Sequence(
-            [normalizers.NFC(), normalizers.Replace(Regex(r"\s+"), " "), normalizers.Lowercase()]
-        )
         self._pieces.pre_tokenizer = pre_tokenizers.Sequence(
             [
                 pre_tokenizers.Split(Regex(_PIECES), behavior="removed", invert=True),
@@ -52,7 +50,7 @@ class ClipTokens:
 
     def encode(self, phrases: Sequence[str], context: int = 77) -> list[list[int]]:
         """Return each phrase's tokens, start and end among them; what is longer than the context is cut off."""
-        plain = [html.unescape(html.unescape(phrase)).strip() for phrase in phrases]
+        plain = [_plain(phrase) for phrase in phrases]
         return [
             [self.start, *coded.ids[: context - 2], self.end]
             for coded in self._pieces.encode_batch(plain, add_special_tokens=False)
@@ -96,6 +94,33 @@ def _merges_file() -> Path:
             if merges.is_file():
                 return merges
         raise fault from None
+
+
+def _plain(phrase: str) -> str:
+    """Return a phrase as CLIP's own preparation leaves it: straight quotes, single letters, no entities, lower case.
+
+    The published code has ftfy do most of it. Only the mending of text that was decoded wrongly and of terminals'
+    colours is left out here. Halves of letters, which the command line makes of bytes that are no text, become marks.
+    """
+    whole = phrase.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "replace")
+    letters = html.unescape(html.unescape(whole)).translate(_PLAIN_LETTERS)
+    return " ".join(unicodedata.normalize("NFC", letters).split()).lower()
+
+
+def _plain_letters() -> dict[int, str | None]:
+    """Return what stands for a letter in a joined, wide or curly form, and None for what is no letter, as in ftfy."""
+    joined = (0x132, 0x133, 0x149, *range(0x1C4, 0x1CD), *range(0x1F1, 0x1F4), *range(0xFB00, 0xFB07))
+    wide = (0x3000, *range(0xFF01, 0xFFF0))
+    quotes = {
+        **dict.fromkeys(map(ord, "\u02bc\u2018\u2019\u201a\u201b"), "'"),
+        **dict.fromkeys(range(0x201C, 0x2020), '"'),
+    }
+    letters = {code: unicodedata.normalize("NFKC", chr(code)).translate(quotes) for code in (*joined, *wide)}
+    none = (*range(0x09), 0x0B, *range(0x0E, 0x20), 0x7F, *range(0x206A, 0x2070), 0xFEFF, *range(0xFFF9, 0xFFFD))
+    return {**letters, **quotes, **dict.fromkeys(none)}
+
+
+_PLAIN_LETTERS = _plain_letters()
 
 
 def _byte_letters() -> list[str]:
