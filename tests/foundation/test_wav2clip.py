@@ -68,7 +68,7 @@ def by_hand(samples: np.ndarray) -> np.ndarray:
     return (x / x.norm())[0].numpy()
 
 
-@pytest.mark.parametrize("seconds", [0.3, 2.0, 10.0])
+@pytest.mark.parametrize("seconds", [257 / RATE_HZ, 300 / RATE_HZ, 511 / RATE_HZ, 0.3, 2.0, 10.0])
 def test_a_sound_goes_through_the_published_steps(encoder, seconds):
     sound = example_sound(3, seconds)
     found = encoder.encode(sound)
@@ -144,6 +144,18 @@ def test_a_checkpoint_of_another_model_is_refused_in_one_sentence(models, told):
     assert "curl -LO https://github.com/descriptinc/lyrebird-wav2clip/releases/download/v0.1.0-alpha/" in str(
         fault.value
     )
+
+
+def test_what_the_published_loader_does_not_look_at_may_be_there_or_not(models):
+    """Training's own tensors, whatever they are called, and the classifier; so may counters that evaluation ignores."""
+    write_clip(models, WORDS)
+    torch.save(tiny_state(), models / MODEL)
+    sound = example_sound(3, 1.0)
+    wanted = Wav2ClipSounds().encode(sound)
+    state = {key: value for key, value in tiny_state().items() if not key.endswith("num_batches_tracked")}
+    others = ("image_encoder.conv1.weight", "logit_scale", "audio_encoder.fc.weight", "audio_encoder.fc.bias")
+    torch.save({**state, **dict.fromkeys(others, torch.zeros(2))}, models / MODEL)
+    assert np.array_equal(Wav2ClipSounds().encode(sound), wanted)
 
 
 def test_a_clip_of_another_length_is_refused(models):

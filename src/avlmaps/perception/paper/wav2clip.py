@@ -38,8 +38,9 @@ from avlmaps.recordings.resample import resampled
 RATE_HZ = 16_000
 WORDS = "openai/clip-vit-base-patch32"
 PROMPT = "{}"
-# what training needed beside the two parts that hear: the pictures' side, the losses' scales, a classifier
-NOT_NEEDED = ("image_transform.", "loss_fn", "audio_encoder.fc.")
+# The two parts that hear, less a classifier. The published loader looks at nothing else, so that what training needed
+# beside them (the pictures' side, the losses' scales) may be in the file or not.
+_HEARING, _CLASSIFIER = ("audio_encoder.", "audio_transform."), "audio_encoder.fc."
 _LONGEST_SAMPLES = 10 * RATE_HZ
 _HOP_SAMPLES = 353
 _LEAST_POWER = 1e-7
@@ -195,7 +196,8 @@ class Wav2ClipSounds:
         """
         check_samples(sound)
         samples = resampled(sound, RATE_HZ).samples
-        samples = np.pad(samples, (0, max(0, self._network.frame - len(samples))))
+        # what is too short to be mirrored around half a frame; the published code fails there
+        samples = np.pad(samples, (0, max(0, self._network.frame // 2 + 1 - len(samples))))
         return np.concatenate(
             [self._encode_window(part) for part in windows(samples, min(len(samples), _LONGEST_SAMPLES))]
         )
@@ -267,7 +269,9 @@ def _loaded(path: Path) -> Wav2ClipNetwork:
         BackendError: the file is of another model.
     """
     state = read_tensors(path, _HOW_TO_GET)
-    needed = {name: value for name, value in state.items() if not name.startswith(NOT_NEEDED)}
+    needed = {
+        name: value for name, value in state.items() if name.startswith(_HEARING) and not name.startswith(_CLASSIFIER)
+    }
     try:
         network = Wav2ClipNetwork.like(needed)
     except (KeyError, TypeError) as fault:
