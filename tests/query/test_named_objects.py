@@ -153,9 +153,15 @@ def test_what_says_where_it_is_counts_only_where_it_is_sure() -> None:
     assert clumps((chair * near(3)).factors[0]) == {0}
 
 
+def test_where_nothing_is_sure_the_best_guess_is_told_and_not_found() -> None:
+    unsure = Heatmap.of(ask("chair", least_confidence=0.95))
+    assert clumps(unsure.factors[0]) == {0, 3}
+    assert [goal.score for goal in unsure.goals(5)] == [pytest.approx(0.9, abs=0.01), pytest.approx(0.45, abs=0.01)]
+    little = Heatmap.of(ask("coffee table", least_confidence=0.95))
+    assert [goal.score for goal in little.goals(5)] == [pytest.approx(0.5, abs=0.01), pytest.approx(0.3, abs=0.01)]
+
+
 def test_who_must_guess_is_told_of_things_that_are_too_unsure_to_be_told() -> None:
-    nothing = Heatmap.of(ask("coffee table", least_confidence=0.6))
-    assert nothing.goals(5) == []
-    guessed = nothing.with_unsure()
-    assert clumps(guessed.factors[0]) == {1, 2}
-    assert [goal.score for goal in guessed.goals(5)] == [pytest.approx(0.5, abs=0.01), pytest.approx(0.3, abs=0.01)]
+    table = Heatmap.of(ask("coffee table", least_confidence=0.45))
+    assert [goal.score for goal in table.goals(5)] == [pytest.approx(0.5, abs=0.01)]
+    assert [goal.score for goal in table.with_unsure().goals(5)][1:] == [pytest.approx(0.3, abs=0.01)]

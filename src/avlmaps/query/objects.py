@@ -15,7 +15,7 @@ from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.heatmap import HeatSettings, NearThings
 from avlmaps.query.level import Space
 from avlmaps.query.open_words import fitting, is_a, is_open
-from avlmaps.query.pieces import joined_pieces, without_specks
+from avlmaps.query.pieces import joined_pieces, likeliest, without_specks
 from avlmaps.query.question import Part
 from avlmaps.query.tints import Tint, is_tinted, tint_of, tinted_share
 
@@ -249,7 +249,7 @@ def object_factor(
     heat: HeatSettings,
     rgb: UInt8[np.ndarray, "n 3"] | None = None,
 ) -> NearThings:
-    """Return the heat of the object that a word asks for.
+    """Return the heat of the object that a word asks for; if none is sure enough, of the best guesses, not ``found``.
 
     With the voxels' colours, an encoder that knows things but no colours is helped out with those.
 
@@ -287,7 +287,8 @@ def object_factor(
             space, part, falloff, pieces.mask, pieces.instance, pieces.confidence, best >= 0.5, understood, note, alone
         )
 
-    return things(False)
+    alone = things(False)
+    return alone if len(alone.confidence) else likeliest(things(True))
 
 
 def colour_factor(

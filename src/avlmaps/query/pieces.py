@@ -1,7 +1,13 @@
 """Which connected voxels are too unsure to be a thing, and which are pieces of one."""
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
+
+from avlmaps.query.heatmap import NearThings
+
+_SPECK_M2 = 0.0199  # a guess shows at least as much surface as a mug
 
 
 def without_specks(
@@ -40,3 +46,12 @@ def joined_pieces(
     same = 2 * times >= np.minimum(columns[a], columns[b])
     links = coo_array((np.ones(int(same.sum()), bool), (a[same], b[same])), shape=(count, count))
     return connected_components(links, directed=False)[1]
+
+
+def likeliest(things: NearThings) -> NearThings:
+    """Return the best guesses among unsure instances: no specks, and at least half as sure as the surest."""
+    surface_m2 = np.bincount(things.instance, minlength=len(things.confidence)) * things.space.grid.voxel_size_m**2
+    solid = np.where(surface_m2 >= _SPECK_M2, things.confidence, 0.0).astype(np.float32)
+    least = max(float(np.max(solid, initial=0.0)) / 2, np.finfo(np.float32).tiny)
+    mask, instance, confidence = without_specks(things.mask, things.instance, solid, least)
+    return replace(things, mask=mask, instance=instance, confidence=confidence, with_unsure=lambda: things)
