@@ -14,9 +14,9 @@ from tiny.audioclip import DIM, MODEL, tiny_state, write_audioclip
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.conformance import check, example_sound
+from avlmaps.perception.foundation.open_sounds import windows
 from avlmaps.perception.paper.audioclip import AudioClipSounds
 from avlmaps.perception.paper.fbsp import FrontEnd
-from avlmaps.perception.paper.sound_windows import windows
 from avlmaps.recordings.audio import Sound
 
 RATE_HZ = 44_100
@@ -89,7 +89,7 @@ def test_silence_has_a_feature(encoder):
 @given(count=st.integers(1, 400), length=st.integers(1, 90))
 def test_windows_cover_a_sound_without_a_gap(count, length):
     samples = np.arange(1, count + 1, dtype=np.float32)
-    found = np.stack(windows(samples, length))
+    found = np.stack(windows(np.pad(samples, (0, max(0, length - count))), length, length))
     assert found.shape == (max(1, -(-count // length)), length)
     assert set(found[found > 0]) == set(samples)
     assert np.array_equal(found[0, : min(count, length)], samples[:length])

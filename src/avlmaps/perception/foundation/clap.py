@@ -13,27 +13,24 @@ at random, the second way).
 """
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 import torch
 from jaxtyping import Float32
 
-from avlmaps.core.errors import AudioError
-from avlmaps.perception.foundation.sound_scores import OTHERS, Contrast
+from avlmaps.perception.foundation.open_sounds import ContrastSounds, by_portions, usable_samples, windows
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import chosen_batch, chosen_device, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps.perception.models.texts import text_features
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resampled
 
 PROMPT = "This is a sound of {}"
 _MOST_TOKENS = 77
-_WORDS_AT_ONCE = 64
 _WINDOWS_ON_GPU = 16
 _SHARED = 0.5  # of a window, with the next one
 # settings of the spectrogram that a feature depends on
@@ -43,21 +40,18 @@ _SHAPING = (
 )  # fmt: skip
 
 
-class ClapSounds:
+class ClapSounds(ContrastSounds):
     """A feature for each ten seconds of a sound, in the space of CLAP's text encoder.
 
     Args:
         model: hub id or folder.
     """
 
-    vocabulary: tuple[str, ...] = ()
-
     def __init__(self, model: str = "laion/larger_clap_general") -> None:
         from transformers import AutoTokenizer, ClapFeatureExtractor, ClapModel
 
         folder = pretrained_folder(model)
-        self._device = chosen_device()
-        self._model: Any = load_pretrained(ClapModel, folder, model, self._device, torch.float32)
+        self._model: Any = load_pretrained(ClapModel, folder, model, chosen_device(), torch.float32)
         self._tokenizer = load_helper(AutoTokenizer, folder, model)
         self._spectrogram = load_helper(ClapFeatureExtractor, folder, model)
         self._rate_hz = int(self._spectrogram.sampling_rate)
@@ -65,7 +59,7 @@ class ClapSounds:
         # a fused network expects four spectrograms of a window and another mel scale, whatever the settings say
         self._truncation = "fusion" if self._model.config.audio_config.enable_fusion else "rand_trunc"
         described = [f"{name} {getattr(self._spectrogram, name)}" for name in _SHAPING]
-        self.card = ModelCard(
+        card = ModelCard(
             id=public_name(model),
             dim=int(self._model.config.projection_dim),
             licence="Apache-2.0",
@@ -76,6 +70,7 @@ class ClapSounds:
                 "with, which was not fitted to recordings"
             ),
         )
+        super().__init__(card, float(self._model.logit_scale_a.detach().exp()))
 
     def encode(self, sound: Sound) -> Float32[np.ndarray, "windows d"]:
         """Return a unit vector for each window of ten seconds, one every five seconds.
@@ -83,76 +78,18 @@ class ClapSounds:
         Raises:
             AudioError: the sound has no samples, or some that are no finite numbers.
         """
-        check_samples(sound)
-        samples = resampled(sound, self._rate_hz).samples
-        pieces = [samples[at : at + self._window] for at in _starts(len(samples), self._window)]
-        size = max(1, chosen_batch(_WINDOWS_ON_GPU))
-        parts = [self._encode_windows(pieces[at : at + size]) for at in range(0, len(pieces), size)]
-        return np.concatenate(parts)
+        pieces = windows(usable_samples(sound, self._rate_hz), self._window, round(self._window * (1.0 - _SHARED)))
+        return by_portions(pieces, max(1, chosen_batch(_WINDOWS_ON_GPU)), self.card.dim, self._encode_windows)
 
-    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each phrase, as the name of a sound."""
-        texts = [PROMPT.format(word) for word in words]
-        parts = [np.zeros((0, self.card.dim), np.float32)]
-        for at in range(0, len(texts), _WORDS_AT_ONCE):
-            tokens = self._tokenizer(
-                texts[at : at + _WORDS_AT_ONCE],
-                padding=True,
-                truncation=True,
-                max_length=_MOST_TOKENS,
-                return_tensors="pt",
-            ).to(self._device)
-            with mixed_precision(self._device):
-                found = self._model.get_text_features(
-                    input_ids=tokens["input_ids"], attention_mask=tokens["attention_mask"]
-                )
-            parts.append(unit_rows(found.pooler_output))
-        return np.concatenate(parts)
+    def _read(self, texts: Sequence[str]) -> torch.Tensor:
+        return text_features(self._model, self._tokenizer, texts, _MOST_TOKENS)
 
-    def score_words(
-        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], words: Sequence[str]
-    ) -> Float32[np.ndarray, "sounds words"]:
-        """Return how likely each sound holds what each phrase names (``sound_scores.Contrast``)."""
-        return self._contrast.words(sounds, self.encode_words(words))
-
-    def score_sounds(
-        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
-    ) -> Float32[np.ndarray, " sounds"]:
-        """Return how likely each sound is of the same kind as the asked one (``sound_scores.Contrast``)."""
-        return self._contrast.alike(sounds, asked)
-
-    @cached_property
-    def _contrast(self) -> Contrast:
-        return Contrast(self.encode_words(OTHERS), float(self._model.logit_scale_a.detach().exp()))
-
-    def _encode_windows(self, pieces: list[Float32[np.ndarray, " n"]]) -> Float32[np.ndarray, "b d"]:
-        heard = self._spectrogram(pieces, truncation=self._truncation, sampling_rate=self._rate_hz, return_tensors="pt")
+    def _encode_windows(self, pieces: Sequence[Float32[np.ndarray, " n"]]) -> Float32[np.ndarray, "b d"]:
+        heard = self._spectrogram(
+            list(pieces), truncation=self._truncation, sampling_rate=self._rate_hz, return_tensors="pt"
+        )
         mels = heard["input_features"].to(self._device, torch.float32)
         second_way = torch.zeros((len(pieces), 1), dtype=torch.bool, device=self._device)
         with mixed_precision(self._device):
             found = self._model.get_audio_features(input_features=mels, is_longer=second_way)
         return unit_rows(found.pooler_output)
-
-
-def check_samples(sound: Sound) -> None:
-    """Refuse what no feature can be worked out for.
-
-    Raises:
-        AudioError: the sound has no samples, or some that are no finite numbers.
-    """
-    if not len(sound.samples):
-        raise AudioError("The sound has no samples; give a sound of at least a few milliseconds.")
-    bad = int((~np.isfinite(sound.samples)).sum())
-    if bad:
-        raise AudioError(
-            f"The sound has {bad} samples of {len(sound.samples)} that are no finite numbers; convert it again from "
-            "its source."
-        )
-
-
-def _starts(count: int, window: int) -> list[int]:
-    """Return where windows begin: evenly, the last one at the sound's end."""
-    if count <= window:
-        return [0]
-    step = round(window * (1.0 - _SHARED))
-    return [*range(0, count - window, step), count - window]

@@ -19,6 +19,7 @@ from jaxtyping import UInt8
 from avlmaps.perception.foundation.open_views import OpenViews, hub_model, image_processor, views_card
 from avlmaps.perception.models.checksums import weights_in
 from avlmaps.perception.models.pretrained import load_helper
+from avlmaps.perception.models.texts import text_features
 
 _CLASSES = {"clip": "CLIPModel", "metaclip_2": "MetaClip2Model"}
 
@@ -49,8 +50,4 @@ class ClipViews(OpenViews):
         return self._network.get_image_features(pixel_values=pixels.to(self._device)).pooler_output
 
     def _read(self, texts: list[str]) -> torch.Tensor:
-        read = self._tokens(texts, padding=True, truncation=True, max_length=self._longest, return_tensors="pt")
-        read = read.to(self._device)
-        return self._network.get_text_features(
-            input_ids=read["input_ids"], attention_mask=read["attention_mask"]
-        ).pooler_output
+        return text_features(self._network, self._tokens, texts, self._longest)

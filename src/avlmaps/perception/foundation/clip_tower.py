@@ -14,6 +14,7 @@ from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import chosen_device, chosen_type, inference, to_numpy
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps.perception.models.texts import text_features
 
 # Of red, green and blue in [0, 1], as published with the weights.
 _MEAN = (0.48145466, 0.4578275, 0.40821073)
@@ -87,11 +88,5 @@ class ClipTower:
         return self._model.get_image_features(pixel_values=pixels).pooler_output
 
     def _encode_texts(self, texts: list[str]) -> Float[np.ndarray, "n d"]:
-        tokens = self._tokenizer(
-            texts, padding=True, truncation=True, max_length=self._most_tokens, return_tensors="pt"
-        ).to(self.device)
         with inference():
-            found = self._model.get_text_features(
-                input_ids=tokens["input_ids"], attention_mask=tokens["attention_mask"]
-            )
-        return to_numpy(found.pooler_output)
+            return to_numpy(text_features(self._model, self._tokenizer, texts, self._most_tokens))

@@ -25,19 +25,18 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32
 
-from avlmaps.perception.foundation.clap import check_samples
+from avlmaps.perception.foundation.open_sounds import WORDS_AT_ONCE, by_portions, usable_samples
 from avlmaps.perception.foundation.sound_scores import OTHERS, QUIET, joined, one_kind, sigmoid
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import chosen_device, to_numpy
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps.perception.models.texts import text_tokens
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resampled
 
 _MOST_TOKENS = 512
-_WORDS_AT_ONCE = 64
 _PUBLISHED_THRESHOLD = 0.3  # published code takes a description to hold where its probability is above this
 _CHUNK = 750  # frames that go through at once, 30 s
 _CONTEXT = 50  # frames of a chunk on either side that its neighbour gives the features of
@@ -91,8 +90,7 @@ class FrameSounds:
         Raises:
             AudioError: the sound has no samples, or some that are no finite numbers.
         """
-        check_samples(sound)
-        samples = resampled(sound, self._rate_hz).samples
+        samples = usable_samples(sound, self._rate_hz)
         parts = []
         for begin, end, kept in _chunks(-(-len(samples) // self._hop)):
             heard = self._framed(
@@ -154,21 +152,15 @@ class FrameSounds:
 
     def _texts(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
         """Return the homogeneous coordinates of descriptions, not scaled to unit length."""
-        parts = [np.zeros((0, self.card.dim - 1), np.float32)]
-        for at in range(0, len(words), _WORDS_AT_ONCE):
-            tokens = self._tokenizer(
-                list(words[at : at + _WORDS_AT_ONCE]),
-                padding=True,
-                truncation=True,
-                max_length=_MOST_TOKENS,
-                return_tensors="pt",
-            ).to(self._device)
-            with mixed_precision(self._device):
-                states = self._model.text_model(
-                    input_ids=tokens["input_ids"], attention_mask=tokens["attention_mask"], output_hidden_states=True
-                ).hidden_states
-                parts.append(to_numpy(self._model.text_audio_head(states[-1][:, 0])))
-        return self._space.texts(np.concatenate(parts))
+        return self._space.texts(by_portions(words, WORDS_AT_ONCE, self.card.dim - 1, self._text_rows))
+
+    def _text_rows(self, texts: Sequence[str]) -> Float32[np.ndarray, "n e"]:
+        tokens = text_tokens(self._tokenizer, texts, _MOST_TOKENS, self._device)
+        with mixed_precision(self._device):
+            states = self._model.text_model(
+                input_ids=tokens["input_ids"], attention_mask=tokens["attention_mask"], output_hidden_states=True
+            ).hidden_states
+            return to_numpy(self._model.text_audio_head(states[-1][:, 0]))
 
 
 @dataclass(frozen=True, slots=True)

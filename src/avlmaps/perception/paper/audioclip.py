@@ -5,14 +5,15 @@ release v0.1 of https://github.com/AndreyGuzhov/AudioCLIP, and CLIP's list of by
 have 1,024 numbers. A sound goes in as 44.1 kHz mono in units of 16-bit samples, five seconds at a time, a shorter one
 filled up with silence behind it: so the published system (AVLMaps) does it, which keeps the first five seconds of a
 sound and forgets the rest. Here a longer sound is encoded whole, one feature every five seconds, the last one at its
-end. Words go in bare, as there.
+end. Words go in bare, as there; each competes with a list of everyday sounds and with "other". The published system
+stretches the cosines over a map's sounds instead, so that one of them always fits; ``SoundSettings.normalise`` does
+that to these scores.
 
 The network is in ``audioclip_network`` and ``fbsp``; in evaluation, as the paper's code runs it (the demonstration
 published with AudioCLIP leaves it in training, where a sound's feature depends on those beside it).
 """
 
 from collections.abc import Sequence
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +21,8 @@ import torch
 from jaxtyping import Float32
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.foundation.clap import check_samples
-from avlmaps.perception.foundation.sound_scores import OTHERS, Contrast
+from avlmaps.perception.foundation.open_sounds import ContrastSounds, by_portions, usable_samples, windows
+from avlmaps.perception.foundation.sound_scores import OTHERS
 from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.device import chosen_batch, chosen_device, inference, unit_rows
 from avlmaps.perception.models.names import public_name
@@ -31,10 +32,8 @@ from avlmaps.perception.paper.audioclip_network import NOT_NEEDED, AudioClipNetw
 from avlmaps.perception.paper.clip_text import ClipTextSizes, padded
 from avlmaps.perception.paper.clip_tokens import clip_tokens
 from avlmaps.perception.paper.fbsp import HOP_SAMPLES, RATE_HZ, FrontEnd
-from avlmaps.perception.paper.sound_windows import windows
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resampled
 
 PROMPT = "{}"
 WINDOW_SAMPLES = 5 * RATE_HZ
@@ -42,10 +41,9 @@ _FULL_SCALE = np.float32(32768.0)
 _RELEASE = "https://github.com/AndreyGuzhov/AudioCLIP/releases/download/v0.1"
 _NO_BIAS = "audio.fbsp.bias"  # the published class keeps an empty tensor for the bias that it does not have
 _WINDOWS_ON_GPU = 16
-_WORDS_AT_ONCE = 64
 
 
-class AudioClipSounds:
+class AudioClipSounds(ContrastSounds):
     """A feature for each five seconds of a sound, in the space of the text tower that AudioCLIP learnt with.
 
     Args:
@@ -54,8 +52,6 @@ class AudioClipSounds:
     Raises:
         BackendError: the file is not here, or is of another model.
     """
-
-    vocabulary: tuple[str, ...] = ()
 
     def __init__(self, model: str = "AudioCLIP-Partial-Training.pt") -> None:
         name = public_name(model)
@@ -68,10 +64,10 @@ class AudioClipSounds:
                 f"{path} was made with {network.sizes.tokens} tokens, CLIP's list of byte pairs has "
                 f"{len(self._tokens)}; get the published file with: {how_to_get}"
             )
-        self._device = chosen_device()
-        self._network = network.eval().to(self._device)
-        self._front_end = FrontEnd.of(network.audio.fbsp, network.audio.window, self._device)
-        self.card = ModelCard(
+        device = chosen_device()
+        self._network = network.eval().to(device)
+        self._front_end = FrontEnd.of(network.audio.fbsp, network.audio.window, device)
+        card = ModelCard(
             id=name,
             dim=network.sizes.dim,
             licence="MIT",
@@ -82,11 +78,7 @@ class AudioClipSounds:
                 "everyday sounds that it is compared with, which was not fitted to recordings"
             ),
         )
-
-    @property
-    def logit_scale(self) -> float:
-        """By how much the cosine of a sound and a phrase counts in a softmax, between 1 and 100."""
-        return self._network.scale
+        super().__init__(card, network.scale, (*OTHERS, "other"))
 
     def encode(self, sound: Sound) -> Float32[np.ndarray, "windows d"]:
         """Return a unit vector for each window of five seconds.
@@ -94,41 +86,13 @@ class AudioClipSounds:
         Raises:
             AudioError: the sound has no samples, or some that are no finite numbers.
         """
-        check_samples(sound)
-        heard = windows(resampled(sound, RATE_HZ).samples, WINDOW_SAMPLES)
-        size = chosen_batch(_WINDOWS_ON_GPU)
-        return np.concatenate([self._encode_windows(heard[at : at + size]) for at in range(0, len(heard), size)])
+        samples = usable_samples(sound, RATE_HZ)
+        samples = np.pad(samples, (0, max(0, WINDOW_SAMPLES - len(samples))))
+        heard = windows(samples, WINDOW_SAMPLES, WINDOW_SAMPLES)
+        return by_portions(heard, chosen_batch(_WINDOWS_ON_GPU), self.card.dim, self._encode_windows)
 
-    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each phrase, as the name of a sound."""
-        texts = self._tokens.encode([PROMPT.replace("{}", word) for word in words], self._network.sizes.context)
-        parts = [np.zeros((0, self.card.dim), np.float32)]
-        for at in range(0, len(texts), _WORDS_AT_ONCE):
-            tokens = padded(texts[at : at + _WORDS_AT_ONCE]).to(self._device)
-            with mixed_precision(self._device):
-                parts.append(unit_rows(self._network(tokens)))
-        return np.concatenate(parts)
-
-    def score_words(
-        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], words: Sequence[str]
-    ) -> Float32[np.ndarray, "sounds words"]:
-        """Return how likely each sound holds what each phrase names, at the published scale of the cosines.
-
-        Each phrase competes with a list of everyday sounds and with "other" (``sound_scores.Contrast``), not with those
-        asked beside it. The published system stretches the cosines over a map's sounds, so that one of them always
-        fits; ``SoundSettings.normalise`` does that to these scores.
-        """
-        return self._contrast.words(sounds, self.encode_words(words))
-
-    def score_sounds(
-        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
-    ) -> Float32[np.ndarray, " sounds"]:
-        """Return how likely each sound is of the same kind as the asked one (``sound_scores.Contrast``)."""
-        return self._contrast.alike(sounds, asked)
-
-    @cached_property
-    def _contrast(self) -> Contrast:
-        return Contrast(self.encode_words((*OTHERS, "other")), self.logit_scale)
+    def _read(self, texts: Sequence[str]) -> torch.Tensor:
+        return self._network(padded(self._tokens.encode(texts, self._network.sizes.context)).to(self._device))
 
     def _encode_windows(self, heard: Sequence[Float32[np.ndarray, " n"]]) -> Float32[np.ndarray, "b d"]:
         with inference():

@@ -23,6 +23,7 @@ from avlmaps.perception.models.files import model_file
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.pretrained import load_helper
 from avlmaps.perception.models.published import load_strictly
+from avlmaps.perception.models.texts import text_features
 from avlmaps.perception.paper.archives import read_weights
 from avlmaps.perception.paper.clip_network import NO_WEIGHTS, Clip, ClipSizes, clip_picture
 from avlmaps.perception.paper.clip_text import padded
@@ -109,10 +110,7 @@ class _HubTowers(_Towers):
         return self._network.get_image_features(pixel_values=pixels).pooler_output
 
     def read(self, texts: list[str]) -> torch.Tensor:
-        tokens = self._tokens(texts, padding=True, truncation=True, max_length=self._longest, return_tensors="pt")
-        tokens = tokens.to(self._network.device)
-        mask = tokens["attention_mask"]
-        return self._network.get_text_features(input_ids=tokens["input_ids"], attention_mask=mask).pooler_output
+        return text_features(self._network, self._tokens, texts, self._longest)
 
 
 class _OpenAiTowers(_Towers):

@@ -10,7 +10,6 @@ ten seconds, the last one at the end.
 """
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,18 +21,17 @@ from torch import nn
 from torch.nn import functional
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.foundation.clap import check_samples
-from avlmaps.perception.foundation.sound_scores import OTHERS, Contrast
+from avlmaps.perception.foundation.open_sounds import ContrastSounds, usable_samples, windows
+from avlmaps.perception.foundation.sound_scores import OTHERS
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import chosen_device, inference, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
 from avlmaps.perception.models.published import load_strictly, published_file, read_tensors
-from avlmaps.perception.paper.sound_windows import windows
+from avlmaps.perception.models.texts import text_features
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resampled
 
 RATE_HZ = 16_000
 WORDS = "openai/clip-vit-base-patch32"
@@ -47,7 +45,6 @@ _LEAST_POWER = 1e-7
 _BLOCKS = (2, 2, 2, 2)
 _HOW_TO_GET = "curl -LO https://github.com/descriptinc/lyrebird-wav2clip/releases/download/v0.1.0-alpha/Wav2CLIP.pt"
 _MOST_TOKENS = 77
-_WORDS_AT_ONCE = 64
 
 
 class _Spectrogram(nn.Module):
@@ -157,8 +154,10 @@ class Wav2ClipNetwork(nn.Module):
         return self.audio_transform(self.audio_encoder(spectrum))
 
 
-class Wav2ClipSounds:
+class Wav2ClipSounds(ContrastSounds):
     """A feature for each sound, or for each ten seconds of a longer one, in the space of CLIP ViT-B/32.
+
+    It stands for the picture of what makes the sound; words and the scale of the cosines are CLIP's own.
 
     Args:
         model: name of the published file, or a path.
@@ -167,16 +166,14 @@ class Wav2ClipSounds:
         BackendError: the file or CLIP is not here, or is of another model.
     """
 
-    vocabulary: tuple[str, ...] = ()
-
     def __init__(self, model: str = "Wav2CLIP.pt") -> None:
         name = public_name(model)
         path = published_file(model, _HOW_TO_GET, cached=(f"checkpoints/{name}",))
-        self._device = chosen_device()
-        self._network = _loaded(path).eval().to(self._device)
+        device = chosen_device()
+        self._network = _loaded(path).eval().to(device)
         dim = self._network.dim
-        folder = self._load_words(dim)
-        self.card = ModelCard(
+        folder = self._load_words(dim, device)
+        card = ModelCard(
             id=name,
             dim=dim,
             licence="MIT",
@@ -187,6 +184,7 @@ class Wav2ClipSounds:
                 "than all of the everyday sounds that it is compared with, which was not fitted to recordings"
             ),
         )
+        super().__init__(card, float(self._clip.logit_scale.detach().exp()), (*OTHERS, "other"))
 
     def encode(self, sound: Sound) -> Float32[np.ndarray, "windows d"]:
         """Return a unit vector for each window: one for a sound of up to ten seconds.
@@ -194,51 +192,15 @@ class Wav2ClipSounds:
         Raises:
             AudioError: the sound has no samples, or some that are no finite numbers.
         """
-        check_samples(sound)
-        samples = resampled(sound, RATE_HZ).samples
+        samples = usable_samples(sound, RATE_HZ)
         # what is too short to be mirrored around half a frame; the published code fails there
         samples = np.pad(samples, (0, max(0, self._network.frame // 2 + 1 - len(samples))))
         return np.concatenate(
-            [self._encode_window(part) for part in windows(samples, min(len(samples), _LONGEST_SAMPLES))]
+            [self._encode_window(part) for part in windows(samples, _LONGEST_SAMPLES, _LONGEST_SAMPLES)]
         )
 
-    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return CLIP's unit vector for each phrase."""
-        texts = [PROMPT.replace("{}", word) for word in words]
-        parts = [np.zeros((0, self.card.dim), np.float32)]
-        for at in range(0, len(texts), _WORDS_AT_ONCE):
-            tokens = self._tokenizer(
-                texts[at : at + _WORDS_AT_ONCE],
-                padding=True,
-                truncation=True,
-                max_length=_MOST_TOKENS,
-                return_tensors="pt",
-            ).to(self._device)
-            with mixed_precision(self._device):
-                found = self._clip.get_text_features(
-                    input_ids=tokens["input_ids"], attention_mask=tokens["attention_mask"]
-                )
-            parts.append(unit_rows(found.pooler_output))
-        return np.concatenate(parts)
-
-    def score_words(
-        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], words: Sequence[str]
-    ) -> Float32[np.ndarray, "sounds words"]:
-        """Return how likely each sound holds what each phrase names, at CLIP's own scale of the cosines.
-
-        A sound's feature stands for the picture of what makes it; see ``sound_scores.Contrast``.
-        """
-        return self._contrast.words(sounds, self.encode_words(words))
-
-    def score_sounds(
-        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
-    ) -> Float32[np.ndarray, " sounds"]:
-        """Return how likely each sound is of the same kind as the asked one (``sound_scores.Contrast``)."""
-        return self._contrast.alike(sounds, asked)
-
-    @cached_property
-    def _contrast(self) -> Contrast:
-        return Contrast(self.encode_words((*OTHERS, "other")), float(self._clip.logit_scale.detach().exp()))
+    def _read(self, texts: Sequence[str]) -> torch.Tensor:
+        return text_features(self._clip, self._tokenizer, texts, _MOST_TOKENS)
 
     def _encode_window(self, samples: Float32[np.ndarray, " n"]) -> Float32[np.ndarray, "1 d"]:
         with inference():
@@ -246,7 +208,7 @@ class Wav2ClipSounds:
         with mixed_precision(self._device):
             return unit_rows(self._network(spectrum))
 
-    def _load_words(self, dim: int) -> Path:
+    def _load_words(self, dim: int, device: torch.device) -> Path:
         from transformers import CLIPModel, CLIPTokenizer
 
         folder = pretrained_folder(WORDS)
@@ -258,7 +220,7 @@ class Wav2ClipSounds:
                 f"right one with: hf download {WORDS}"
             )
         del self._clip.vision_model, self._clip.visual_projection  # nothing is looked at here
-        self._clip.to(self._device)
+        self._clip.to(device)
         return folder
 
 

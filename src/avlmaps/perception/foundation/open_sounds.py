@@ -1,0 +1,112 @@
+"""What the sound encoders of an open vocabulary share: samples that can be used, windows, phrases, and yes or no."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+import torch
+from jaxtyping import Float32
+
+from avlmaps.core.errors import AudioError
+from avlmaps.perception.foundation.sound_scores import OTHERS, Contrast
+from avlmaps.perception.models.device import chosen_device, unit_rows
+from avlmaps.perception.models.precision import mixed_precision
+from avlmaps.perception.protocols import ModelCard
+from avlmaps.recordings.audio import Sound
+from avlmaps.recordings.resample import resampled
+
+T = TypeVar("T")
+WORDS_AT_ONCE = 64
+
+
+class ContrastSounds(ABC):
+    """A sound encoder whose sounds and phrases lie in one space, where the cosine of what fits is higher.
+
+    Args:
+        card: of the model; its first prompt is put round a phrase.
+        logit_scale: by how much its cosines count in a softmax.
+        others: what an asked phrase competes with.
+    """
+
+    vocabulary: tuple[str, ...] = ()
+
+    def __init__(self, card: ModelCard, logit_scale: float, others: Sequence[str] = OTHERS) -> None:
+        self.card = card
+        self.logit_scale = logit_scale
+        self._others = tuple(others)
+        self._device = chosen_device()
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase, as the name of a sound."""
+        # replace, not format: a brace in the phrase is a brace
+        texts = [self.card.prompts[0].replace("{}", word) for word in words]
+        return by_portions(texts, WORDS_AT_ONCE, self.card.dim, self._text_rows)
+
+    def score_words(
+        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], words: Sequence[str]
+    ) -> Float32[np.ndarray, "sounds words"]:
+        """Return how likely each sound holds what each phrase names, at the model's own scale of the cosines.
+
+        Each phrase competes with a list of everyday sounds (``sound_scores.Contrast``), not with those asked beside it.
+        """
+        return self._contrast.words(sounds, self.encode_words(words))
+
+    def score_sounds(
+        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
+    ) -> Float32[np.ndarray, " sounds"]:
+        """Return how likely each sound is of the same kind as the asked one (``sound_scores.Contrast``)."""
+        return self._contrast.alike(sounds, asked)
+
+    @cached_property
+    def _contrast(self) -> Contrast:
+        return Contrast(self.encode_words(self._others), self.logit_scale)
+
+    def _text_rows(self, texts: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        with mixed_precision(self._device):
+            return unit_rows(self._read(texts))
+
+    @abstractmethod
+    def encode(self, sound: Sound) -> Float32[np.ndarray, "windows d"]:
+        """Return a unit vector for each window of a sound."""
+
+    @abstractmethod
+    def _read(self, texts: Sequence[str]) -> torch.Tensor:
+        """Return a feature for each text."""
+
+
+def usable_samples(sound: Sound, rate_hz: int) -> Float32[np.ndarray, " n"]:
+    """Return a sound's samples at a rate, at least one of them.
+
+    Raises:
+        AudioError: the sound has no samples, or some that are no finite numbers.
+    """
+    if not len(sound.samples):
+        raise AudioError("The sound has no samples; give a sound of at least a few milliseconds.")
+    bad = int((~np.isfinite(sound.samples)).sum())
+    if bad:
+        raise AudioError(
+            f"The sound has {bad} samples of {len(sound.samples)} that are no finite numbers; convert it again from "
+            "its source."
+        )
+    return resampled(sound, rate_hz).samples
+
+
+def windows(samples: Float32[np.ndarray, " n"], length: int, step: int) -> list[Float32[np.ndarray, " m"]]:
+    """Return a sound in windows, evenly, the last one at its end; a sound that is no longer than one is left whole.
+
+    They are views of the sound, which is not copied.
+    """
+    count = len(samples)
+    starts = [*range(0, count - length, step), count - length] if count > length else [0]
+    return [samples[at : at + length] for at in starts]
+
+
+def by_portions(
+    items: Sequence[T], size: int, dim: int, encode: Callable[[Sequence[T]], Float32[np.ndarray, "n d"]]
+) -> Float32[np.ndarray, "n d"]:
+    """Return a row of ``dim`` numbers for each item, some of them going through at once."""
+    parts = [np.zeros((0, dim), np.float32)]
+    parts.extend(encode(items[at : at + size]) for at in range(0, len(items), size))
+    return np.concatenate(parts)
