@@ -16,7 +16,6 @@ What the last block does, chosen by ``model#way``; then follow the final layer n
   likeness of their keys and a Gaussian of five patches (NACLIP: Hajimiri et al., WACV 2025).
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,11 +23,11 @@ import torch
 from jaxtyping import Float32, UInt8
 
 from avlmaps.perception.foundation.clip_tower import ClipTower
-from avlmaps.perception.foundation.pictures import chosen_way, in_batches, working_size
-from avlmaps.perception.foundation.prompts import CLIP_PROMPTS, THINGS
-from avlmaps.perception.models.device import chosen_batch, inference, unit_rows
+from avlmaps.perception.foundation.open_pixels import OpenPixels
+from avlmaps.perception.foundation.pictures import chosen_way, working_size
+from avlmaps.perception.foundation.prompts import CLIP_PROMPTS
+from avlmaps.perception.models.device import inference, unit_rows
 from avlmaps.perception.protocols import ModelCard
-from avlmaps.recordings.types import Frame
 
 _WAYS = ("value", "maskclip", "neighbours")
 _BATCH_ON_GPU = 32
@@ -36,7 +35,7 @@ _BATCH_ON_GPU = 32
 _NEAR_PATCHES = 5.0
 
 
-class ClipPatches:
+class ClipPatches(OpenPixels):
     """A feature for every patch of the working size, in the space of CLIP.
 
     Args:
@@ -48,8 +47,7 @@ class ClipPatches:
         name, way = chosen_way(model, _WAYS)
         self._clip = ClipTower(name)
         self._way, self._short_side = way, short_side
-        self.logit_scale = self._clip.logit_scale
-        self.card = ModelCard(
+        card = ModelCard(
             id=self._clip.name + ("" if way == _WAYS[0] else f"#{way}"),
             dim=self._clip.dim,
             licence=self._clip.licence,
@@ -57,32 +55,7 @@ class ClipPatches:
             prompts=CLIP_PROMPTS,
             note="CLIP was trained on whole pictures: its patches are noisier than those of tipsv2",
         )
-
-    @property
-    def vocabulary(self) -> tuple[str, ...]:
-        """Things of homes and offices that compete with an asked word, without ``other``."""
-        return THINGS
-
-    @property
-    def batch(self) -> int:
-        """How many frames it likes to be given at once."""
-        return chosen_batch(_BATCH_ON_GPU)
-
-    def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
-        """Return a unit vector for each patch."""
-        return self.encode_batch([frame])[0]
-
-    def encode_batch(self, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
-        """Return what ``encode`` returns for each frame (to rounding)."""
-        return in_batches(frames, max(self.batch, 1), self._encode_pictures)
-
-    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each phrase; all zero for a blank one."""
-        return self._clip.words.encode(words)
-
-    def understood(self, word: str) -> str:
-        """Return the phrase: any word is taken."""
-        return word.strip().lower()
+        super().__init__(card, self._clip.words, self._clip.logit_scale, _BATCH_ON_GPU)
 
     def _encode_pictures(self, pictures: list[UInt8[np.ndarray, "h w 3"]]) -> Float32[np.ndarray, "b hf wf d"]:
         patch = self._clip.patch

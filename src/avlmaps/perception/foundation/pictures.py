@@ -1,6 +1,6 @@
 """Pictures on their way into a transformer: how large, as which numbers, several at once."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Literal
 
 import numpy as np
@@ -58,7 +58,7 @@ def stacked(
 def in_batches(
     frames: Sequence[Frame],
     batch: int,
-    encode: Callable[[list[UInt8[np.ndarray, "h w 3"]]], Float32[np.ndarray, "b hf wf d"]],
+    encode: Callable[[list[UInt8[np.ndarray, "h w 3"]]], Iterable[Float32[np.ndarray, "hf wf d"]]],
 ) -> list[Float32[np.ndarray, "hf wf d"]]:
     """Encode the frames' colour pictures, at most so many at once; those of one batch have the same shape."""
     out: list[Float32[np.ndarray, "hf wf d"]] = []

@@ -15,26 +15,24 @@ CLIP is never retrained, so that rare things keep their names; but it is slow: o
 each of some fifty regions a frame. Another pair of models is chosen by ``CLIP+SAM``.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 import torch
 from jaxtyping import Float32, UInt8
 
 from avlmaps.perception.foundation.clip_tower import ClipTower
+from avlmaps.perception.foundation.open_pixels import OpenPixels
 from avlmaps.perception.foundation.pictures import working_size
-from avlmaps.perception.foundation.prompts import CLIP_PROMPTS, THINGS
+from avlmaps.perception.foundation.prompts import CLIP_PROMPTS
 from avlmaps.perception.foundation.proposals import Proposals, ProposalSettings, Sam2Proposals
 from avlmaps.perception.models.device import chosen_batch, inference, to_numpy, unit_rows
 from avlmaps.perception.protocols import ModelCard
-from avlmaps.recordings.types import Frame
 
 _PROPOSER = "facebook/sam2.1-hiera-tiny"
 _CUTOUTS_ON_GPU = 64
 _CUTOUTS_ON_CPU = 8
 
 
-class RegionPixels:
+class RegionPixels(OpenPixels):
     """A feature for every cell of a grid, the same for all cells of a region.
 
     Args:
@@ -53,9 +51,8 @@ class RegionPixels:
         self._clip = ClipTower(clip)
         self._proposer = Sam2Proposals(proposer or _PROPOSER, settings)
         self._short_side = short_side
-        self.logit_scale = self._clip.logit_scale
         same = self._clip.licence == "Apache-2.0"
-        self.card = ModelCard(
+        card = ModelCard(
             id=f"{self._clip.name}+{self._proposer.name}",
             dim=self._clip.dim,
             licence=self._clip.licence if same else f"{self._clip.licence} AND Apache-2.0",
@@ -63,39 +60,24 @@ class RegionPixels:
             prompts=CLIP_PROMPTS,
             note="what lies in no region (some walls and floors) has no feature; slow: a GPU is needed in practice",
         )
-
-    @property
-    def vocabulary(self) -> tuple[str, ...]:
-        """Things of homes and offices that compete with an asked word, without ``other``."""
-        return THINGS
+        super().__init__(card, self._clip.words, self._clip.logit_scale)
 
     @property
     def batch(self) -> int:
         """How many frames it likes to be given at once: a frame's regions fill a batch by themselves."""
         return 1
 
-    def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
+    def _encode_pictures(self, pictures: list[UInt8[np.ndarray, "h w 3"]]) -> Float32[np.ndarray, "b hf wf d"]:
         """Return a unit vector for each cell of a region, zero elsewhere."""
-        height, width = frame.rgb.shape[:2]
+        height, width = pictures[0].shape[:2]
         grid = working_size(height, width, self._short_side, 1, most_patches=self._short_side**2 * 8)
-        found = self._proposer.find(frame.rgb, grid)
-        features = np.zeros((*grid, self.card.dim), np.float32)
-        if len(found.area):
-            for mask, row in zip(found.mask, self._features(frame.rgb, found), strict=True):
-                features[mask] = row
+        features = np.zeros((len(pictures), *grid, self.card.dim), np.float32)
+        for rgb, cells in zip(pictures, features, strict=True):
+            found = self._proposer.find(rgb, grid)
+            if len(found.area):
+                for mask, row in zip(found.mask, self._features(rgb, found), strict=True):
+                    cells[mask] = row
         return features
-
-    def encode_batch(self, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
-        """Return what ``encode`` returns for each frame."""
-        return [self.encode(frame) for frame in frames]
-
-    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each phrase; all zero for a blank one."""
-        return self._clip.words.encode(words)
-
-    def understood(self, word: str) -> str:
-        """Return the phrase: any word is taken."""
-        return word.strip().lower()
 
     def _features(self, rgb: UInt8[np.ndarray, "h w 3"], found: Proposals) -> Float32[np.ndarray, "n d"]:
         """Return the mixed feature of each region."""

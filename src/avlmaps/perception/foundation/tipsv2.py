@@ -15,18 +15,17 @@ Both are compared with the text tower's mean over tokens. The two class tokens i
 token that learnt from synthetic captions) are left out.
 """
 
-from collections.abc import Sequence
 from typing import Any, Literal, cast
 
 import numpy as np
 import torch
 from jaxtyping import Float32, UInt8
 
-from avlmaps.perception.foundation.pictures import chosen_way, in_batches, stacked, working_size
-from avlmaps.perception.foundation.prompts import THINGS, TIPS_PROMPTS, Prompted
+from avlmaps.perception.foundation.open_pixels import OpenPixels
+from avlmaps.perception.foundation.pictures import chosen_way, stacked, working_size
+from avlmaps.perception.foundation.prompts import TIPS_PROMPTS, Prompted
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import (
-    chosen_batch,
     chosen_device,
     chosen_type,
     inference,
@@ -35,15 +34,15 @@ from avlmaps.perception.models.device import (
 )
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps.perception.models.texts import text_features
 from avlmaps.perception.protocols import ModelCard
-from avlmaps.recordings.types import Frame
 
 Way = Literal["values", "last"]
 _WAYS: tuple[Way, ...] = ("values", "last")
 _BATCH_ON_GPU = 16
 
 
-class TipsPixels:
+class TipsPixels(OpenPixels):
     """A feature for every 14 x 14 pixels of the working size, in the space of TIPSv2's text encoder.
 
     Args:
@@ -64,10 +63,8 @@ class TipsPixels:
         vision = self._model.config.vision_config
         self._patch, self._front = int(vision.patch_size), 1 + int(vision.num_register_tokens)
         self._most_tokens = int(self._model.config.text_config.max_position_embeddings)
-        self.logit_scale = 1.0 / float(self._model.temperature.detach())
         dim = int(vision.hidden_size)
-        self._words = Prompted(self._encode_texts, dim, TIPS_PROMPTS)
-        self.card = ModelCard(
+        card = ModelCard(
             id=public_name(name) + ("" if way == _WAYS[0] else f"#{way}"),
             dim=dim,
             licence="Apache-2.0",
@@ -75,32 +72,8 @@ class TipsPixels:
             prompts=TIPS_PROMPTS,
             note="what is smaller than a patch (1/32 of the picture's height) is mixed with what is round it",
         )
-
-    @property
-    def vocabulary(self) -> tuple[str, ...]:
-        """Things of homes and offices that compete with an asked word, without ``other``."""
-        return THINGS
-
-    @property
-    def batch(self) -> int:
-        """How many frames it likes to be given at once."""
-        return chosen_batch(_BATCH_ON_GPU)
-
-    def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
-        """Return a unit vector for each patch."""
-        return self.encode_batch([frame])[0]
-
-    def encode_batch(self, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
-        """Return what ``encode`` returns for each frame (to rounding)."""
-        return in_batches(frames, max(self.batch, 1), self._encode_pictures)
-
-    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each phrase; all zero for a blank one."""
-        return self._words.encode(words)
-
-    def understood(self, word: str) -> str:
-        """Return the phrase: any word is taken."""
-        return word.strip().lower()
+        words = Prompted(self._encode_texts, dim, TIPS_PROMPTS)
+        super().__init__(card, words, 1.0 / float(self._model.temperature.detach()), _BATCH_ON_GPU)
 
     def _encode_pictures(self, pictures: list[UInt8[np.ndarray, "h w 3"]]) -> Float32[np.ndarray, "b hf wf d"]:
         height, width = pictures[0].shape[:2]
@@ -113,14 +86,8 @@ class TipsPixels:
         return patches.reshape(len(pictures), size[0] // self._patch, size[1] // self._patch, -1)
 
     def _encode_texts(self, texts: list[str]) -> Float32[np.ndarray, "n d"]:
-        tokens = self._tokenizer(
-            texts, padding=True, truncation=True, max_length=self._most_tokens, return_tensors="pt"
-        ).to(self._device)
         with inference():
-            found = self._model.get_text_features(
-                input_ids=tokens["input_ids"], attention_mask=tokens["attention_mask"]
-            )
-        return to_numpy(found.pooler_output)
+            return to_numpy(text_features(self._model, self._tokenizer, texts, self._most_tokens))
 
 
 def _of_values(vision: Any, pixels: torch.Tensor) -> torch.Tensor:

@@ -21,9 +21,10 @@ import torch
 from jaxtyping import Float32, UInt8
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.foundation.prompts import Prompted, clean
+from avlmaps.perception.foundation.open_pixels import OpenPixels
+from avlmaps.perception.foundation.prompts import Prompted
 from avlmaps.perception.models.checksums import checksum_of
-from avlmaps.perception.models.device import chosen_batch, chosen_device, inference, to_numpy, unit_rows
+from avlmaps.perception.models.device import chosen_device, inference, to_numpy, unit_rows
 from avlmaps.perception.models.files import model_file
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
@@ -35,7 +36,6 @@ from avlmaps.perception.paper.lseg_network import LSegNetwork, LSegSizes
 from avlmaps.perception.paper.lseg_windows import Windows, cut_into_windows, every_nth, joined
 from avlmaps.perception.paper.prompts import THING_PROMPTS, VOCABULARY
 from avlmaps.perception.protocols import ModelCard
-from avlmaps.recordings.types import Frame
 
 PUBLISHED = "demo_e200.ckpt"
 HOW_TO_GET = "gdown 1ayk6NXURI_vIPlym16f_RG3ffxBWHxvb -O demo_e200.ckpt (github.com/isl-org/lang-seg links it)"
@@ -46,7 +46,7 @@ _ON_GPU = 8
 _WINDOWS_AT_ONCE_ON_CPU = 1
 
 
-class LSegPixels:
+class LSegPixels(OpenPixels):
     """A feature for every second pixel of a picture 520 pixels long, in the space of CLIP ViT-B/32's texts.
 
     Args:
@@ -69,9 +69,7 @@ class LSegPixels:
                 f"{len(self._tokens)}; get the published file: {HOW_TO_GET}"
             )
         self._every = every
-        self._words = Prompted(self._encode_texts, sizes.dim, THING_PROMPTS)
-        self.logit_scale = 1.0 / 0.07
-        self.card = ModelCard(
+        card = ModelCard(
             id=public_name(model),
             dim=sizes.dim,
             licence="MIT",
@@ -79,31 +77,21 @@ class LSegPixels:
             prompts=THING_PROMPTS,
             note="knows best the names of the segmentation data sets that it was trained on; others it knows less well",
         )
+        super().__init__(card, Prompted(self._encode_texts, sizes.dim, THING_PROMPTS), 1.0 / 0.07, _ON_GPU)
 
     @property
     def vocabulary(self) -> tuple[str, ...]:
         """Matterport3D's classes, with which the paper's maps are asked, without ``other``."""
         return VOCABULARY
 
-    @property
-    def batch(self) -> int:
-        """How many frames it likes to be given at once."""
-        return chosen_batch(_ON_GPU)
-
-    def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
+    def _encode_pictures(self, pictures: list[UInt8[np.ndarray, "h w 3"]]) -> list[Float32[np.ndarray, "hf wf d"]]:
         """Return a unit vector for each cell of a grid about 260 cells long."""
-        return self.encode_batch([frame])[0]
-
-    def encode_batch(self, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
-        """Return what ``encode`` returns for each frame (to rounding)."""
-        found: list[Float32[np.ndarray, "hf wf d"]] = []
-        batch = max(1, self.batch)
-        for start in range(0, len(frames), batch):
-            with mixed_precision(self._device):
-                cut = [cut_into_windows(frame.rgb, self._device) for frame in frames[start : start + batch]]
-                for windows, features in zip(cut, self._features(cut), strict=True):
-                    found.append(unit_rows(joined(windows, features, *every_nth(windows.size, self._every))))
-        return found
+        with mixed_precision(self._device):
+            cut = [cut_into_windows(rgb, self._device) for rgb in pictures]
+            return [
+                unit_rows(joined(windows, features, *every_nth(windows.size, self._every)))
+                for windows, features in zip(cut, self._features(cut), strict=True)
+            ]
 
     def published(self, rgb: UInt8[np.ndarray, "h w 3"]) -> Float32[np.ndarray, "d hf wf"]:
         """Return what the published code returns for a picture: all pixels, about 14.3 long and not of unit length."""
@@ -111,14 +99,6 @@ class LSegPixels:
             windows = cut_into_windows(rgb, self._device)
             features = joined(windows, self._features([windows])[0], *every_nth(windows.size, 1))
             return to_numpy(features.permute(2, 0, 1))
-
-    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each word, the mean over its sentences; all zero for a blank one."""
-        return self._words.encode(words)
-
-    def understood(self, word: str) -> str:
-        """Return the phrase: any word is taken."""
-        return clean(word)
 
     def _features(self, pictures: Sequence[Windows]) -> list[torch.Tensor]:
         """Return the features (n, d, 240, 240) of each picture's windows."""
