@@ -13,8 +13,8 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-_HEAD_WIDTH = 64
-_EPSILON = 1e-6
+from avlmaps.perception.models.transformer import EPSILON, Block
+
 # The published code makes the grid's scale a tenth of a patch larger, so that rounding never loses a row. It moves
 # every interpolated embedding a little, and so belongs to the model.
 _OFFSET = 0.1
@@ -66,8 +66,8 @@ class DinoNetwork(nn.Module):
         self.pos_embed = nn.Parameter(torch.zeros(1, 1 + sizes.grid**2, sizes.width))
         self.patch_embed = nn.Module()
         self.patch_embed.proj = nn.Conv2d(3, sizes.width, sizes.patch, stride=sizes.patch)
-        self.blocks = nn.ModuleList(_Block(sizes.width, sizes.hidden) for _ in range(sizes.depth))
-        self.norm = nn.LayerNorm(sizes.width, eps=_EPSILON)
+        self.blocks = nn.ModuleList(Block(sizes.width, sizes.hidden, scaled=True) for _ in range(sizes.depth))
+        self.norm = nn.LayerNorm(sizes.width, eps=EPSILON)
 
     def forward(self, pictures: torch.Tensor) -> torch.Tensor:
         """Return (n, 1 + rows·columns, width): the class token, then the patches row by row.
@@ -92,51 +92,3 @@ class DinoNetwork(nn.Module):
         scale = ((rows + _OFFSET) / grid, (columns + _OFFSET) / grid)
         wide = functional.interpolate(own, scale_factor=scale, mode="bicubic", align_corners=False)
         return torch.cat([self.pos_embed[:, :1], wide.permute(0, 2, 3, 1).flatten(1, 2)], dim=1)
-
-
-class _Attention(nn.Module):
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.heads = max(1, width // _HEAD_WIDTH)
-        self.qkv = nn.Linear(width, 3 * width)
-        self.proj = nn.Linear(width, width)
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        n, count, width = x.shape
-        query, key, value = self.qkv(x).view(n, count, 3, self.heads, width // self.heads).permute(2, 0, 3, 1, 4)
-        seen = functional.scaled_dot_product_attention(query, key, value)
-        return self.proj(seen.transpose(1, 2).reshape(n, count, width))
-
-
-class _Mlp(nn.Module):
-    def __init__(self, width: int, hidden: int) -> None:
-        super().__init__()
-        self.fc1 = nn.Linear(width, hidden)
-        self.fc2 = nn.Linear(hidden, width)
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        return self.fc2(functional.gelu(self.fc1(x)))
-
-
-class _Scale(nn.Module):
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.gamma = nn.Parameter(torch.ones(width))
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        return x * self.gamma
-
-
-class _Block(nn.Module):
-    def __init__(self, width: int, hidden: int) -> None:
-        super().__init__()
-        self.norm1 = nn.LayerNorm(width, eps=_EPSILON)
-        self.attn = _Attention(width)
-        self.ls1 = _Scale(width)
-        self.norm2 = nn.LayerNorm(width, eps=_EPSILON)
-        self.mlp = _Mlp(width, hidden)
-        self.ls2 = _Scale(width)
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        x = x + self.ls1(self.attn(self.norm1(x)))
-        return x + self.ls2(self.mlp(self.norm2(x)))

@@ -15,10 +15,10 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from avlmaps.perception.models.transformer import EPSILON, Block
 from avlmaps.perception.paper.clip_network import Clip, ClipSizes
 from avlmaps.perception.paper.clip_text import ClipTextSizes
 
-_HEAD_WIDTH = 64
 _LEVELS = (1, 2, 3, 4)
 _CLIP, _VIT = "clip_pretrained.", "pretrained.model."
 _TEMPERATURE = 0.07
@@ -81,43 +81,6 @@ class LSegSizes:
         )
 
 
-class _Attention(nn.Module):
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.heads = max(1, width // _HEAD_WIDTH)
-        self.qkv = nn.Linear(width, 3 * width)
-        self.proj = nn.Linear(width, width)
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        n, length, width = x.shape
-        query, key, value = self.qkv(x).view(n, length, 3, self.heads, width // self.heads).permute(2, 0, 3, 1, 4)
-        seen = functional.scaled_dot_product_attention(query, key, value)
-        return self.proj(seen.transpose(1, 2).reshape(n, length, width))
-
-
-class _Mlp(nn.Module):
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.fc1 = nn.Linear(width, 4 * width)
-        self.fc2 = nn.Linear(4 * width, width)
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        return self.fc2(functional.gelu(self.fc1(x)))
-
-
-class _Block(nn.Module):
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.norm1 = nn.LayerNorm(width, eps=1e-6)
-        self.attn = _Attention(width)
-        self.norm2 = nn.LayerNorm(width, eps=1e-6)
-        self.mlp = _Mlp(width)
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        x = x + self.attn(self.norm1(x))
-        return x + self.mlp(self.norm2(x))
-
-
 class _PatchEmbed(nn.Module):
     def __init__(self, width: int, patch: int) -> None:
         super().__init__()
@@ -133,8 +96,8 @@ class _VisionTransformer(nn.Module):
         self.patch_embed = _PatchEmbed(sizes.width, sizes.patch)
         self.cls_token = nn.Parameter(torch.zeros(1, 1, sizes.width))
         self.pos_embed = nn.Parameter(torch.zeros(1, 1 + sizes.grid**2, sizes.width))
-        self.blocks = nn.ModuleList(_Block(sizes.width) for _ in range(sizes.layers))
-        self.norm: nn.Module = nn.LayerNorm(sizes.width, eps=1e-6)
+        self.blocks = nn.ModuleList(Block(sizes.width, 4 * sizes.width, scaled=False) for _ in range(sizes.layers))
+        self.norm: nn.Module = nn.LayerNorm(sizes.width, eps=EPSILON)
         self.head: nn.Module = nn.Linear(sizes.width, sizes.classes)
 
     def forward(self, pictures: torch.Tensor) -> list[torch.Tensor]:
