@@ -9,7 +9,7 @@ arguments. A backend of ours that can run several models is called with the chos
 import importlib
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from typing import Any
@@ -84,14 +84,7 @@ def _with_torch(package: str, kind: Kind, name: str, target: str, model: str, li
     return Backend(kind, name, place, extra=package, needs=("torch", *needs), model=model, licence=licence)
 
 
-def _foundation(kind: Kind, name: str, target: str, model: str, licence: str, *needs: str) -> Backend:
-    return _with_torch("foundation", kind, name, target, model, licence, *needs)
-
-
-def _paper(kind: Kind, name: str, target: str, model: str, licence: str, *needs: str) -> Backend:
-    return _with_torch("paper", kind, name, target, model, licence, *needs)
-
-
+_foundation, _paper = partial(_with_torch, "foundation"), partial(_with_torch, "paper")
 _OF_TORCH = (
     _foundation(Kind.PIXELS, "tipsv2", "tipsv2:TipsPixels", "google/tipsv2-b14", "Apache-2.0", "transformers"),
     _foundation(
