@@ -4,10 +4,13 @@ Without article and verb any word could be a verb that is not known, so only the
 of are taken as things to go to; "dance" stays what is not understood.
 """
 
+import json
 import re
 from functools import cache
+from importlib.resources import files
 
 from avlmaps.language.rules import words
+from avlmaps.language.rules.sounds import SOUND_NOUNS, SOUND_VERBS
 from avlmaps.language.sentence import AREA_WORDS
 
 _THINGS = (
@@ -36,18 +39,16 @@ _KINDS = (
     "metal", "plastic", "old", "new", "left", "right", "front", "back", "double", "single", "empty", "open",
     "nearest", "closest",
 )  # fmt: skip
-_NAME = (
-    rf"(?:(?:{'|'.join(_KINDS)}) )*"
-    rf"(?:{'|'.join(_PAIRS)}|(?:{'|'.join([*_THINGS, *sorted(AREA_WORDS - {'area', 'zone', 'room', 'shop'})])}))"
-)
+_AREAS = sorted(AREA_WORDS - {"area", "zone", "room", "shop"})
 _PLACES = r"(?= (?:near|next to|by|beside|close to|in|inside|on|at|under|where|behind|between)\b|$)"
 
 
 @cache
 def _forms() -> tuple[re.Pattern[str], re.Pattern[str], re.Pattern[str]]:
-    listed = rf"{_NAME}(?:(?:\s*,\s*(?:and )?| and ){_NAME})+"
+    name = _name()
+    listed = rf"{name}(?:(?:\s*,\s*(?:and )?| and ){name})+"
     patterns = (
-        rf"(?:and )?({_NAME}){_PLACES}(.*)",
+        rf"(?:and )?((?:{words.GO}) )?({name}){_PLACES}(.*)",
         rf"((?:{words.MOVE})(?: (?:over )?to)? |to )?({listed})",
         r"\s*,\s*(?:and )?| and ",
     )
@@ -62,4 +63,39 @@ def with_articles(clause: str) -> str:
     if found:
         return (found[1] or "") + ", ".join(f"the {name}" for name in comma.split(found[2]))
     found = alone.fullmatch(clause)
-    return f"the {found[1]}{found[2]}" if found else clause
+    if found:
+        return f"{found[1]}to the {found[2]}{found[3]}" if found[1] else f"the {found[2]}{found[3]}"
+    found = _sounds().fullmatch(clause)
+    return f"the {clause}" if found else clause
+
+
+def is_bare_name(text: str) -> bool:
+    """Return whether a text ends in the name of a thing or a room that is known without article."""
+    return re.search(rf"(?:^|\s){_name()}$", text, re.IGNORECASE) is not None
+
+
+@cache
+def _name() -> str:
+    """Return the pattern of a known name, with what may stand before it."""
+    names = sorted({*_THINGS, *_PAIRS, *_AREAS, *_seen()}, key=lambda name: (-len(name), name))
+    return rf"(?:(?:{'|'.join([*_KINDS, *_AREAS])}) )*(?:{'|'.join(map(re.escape, names))})"
+
+
+@cache
+def _seen() -> frozenset[str]:
+    """Return the names of things and rooms that the pixel encoder which ships knows, from its notes alone."""
+    notes = json.loads(files("avlmaps.perception.embedded").joinpath("weights/rooms.json").read_text(encoding="utf-8"))
+    called = [name for other in notes["called"].values() for name in other]
+    return frozenset({*notes["categories"], *notes["rooms"], *called, *notes["kinds"]} - {"other", "picture", "light"})
+
+
+@cache
+def _sounds() -> re.Pattern[str]:
+    """Return the pattern of a sound without article: "sound of rain", "dog barking", "footsteps"."""
+    heard = "|".join([rf"(?:{'|'.join(SOUND_VERBS)})[a-z]?ing", *sorted(SOUND_NOUNS)])
+    alone = "applause|footsteps|laughter|music|thunder|siren|explosion|conversation|doorbell"
+    return re.compile(
+        rf"(?:sounds?|noises?) (?:of|like|made by) .+|{alone}|(?!(?:{words.MOVE}|{words.TURN}|{words.FACE}|{words.DETERMINER}|"
+        rf"{words.MANIPULATE}|where|i|you|we|it)\b)[\w'-]+ (?:[\w'-]+ )?(?:{heard})(?: sound| noise)?",
+        re.IGNORECASE,
+    )

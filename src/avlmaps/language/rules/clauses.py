@@ -18,6 +18,11 @@ _FILE = re.compile(
     re.IGNORECASE,
 )
 
+_MARKS = {
+    "⟦both⟧": "the two", "⟦inside⟧": "there", "⟦heading⟧": "heading", "⟦and⟧": "and", "⟦ahead⟧": "in front of you",
+    "⟦shuttle⟧": "back and forth",
+}  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True)
 class Clause:
@@ -47,6 +52,8 @@ class Clauses:
     def shown(self, text: str) -> str:
         """Return a text of a clause with its files in place again."""
         spoken = re.sub(r"⟦said⟧ ?|(?<=toilet)-room", "", text)
+        for mark, meant in _MARKS.items():
+            spoken = spoken.replace(mark, meant)
         return re.sub(r"⟦[ic](\d+)⟧", lambda found: self.files[int(found[1])], spoken)
 
 
@@ -54,6 +61,8 @@ def split_clauses(command: str) -> Clauses:
     """Cut a command into clauses."""
     text = re.sub(r"[‘’`´]", "'", re.sub(r"[“”«»]", '"', command)).replace("⟦", "(").replace("⟧", ")")
     text, files = _without_files(text)
+    # A capital at the start of a sentence is no part of a name.
+    text = re.sub(r"(?:^|(?<=[.!?] ))[A-Z](?=[a-z'-]*\b)(?!')(?! [A-Z])", _lowered, text)
     text = text.replace('"', " ")
     text = re.sub(r"(?<=\d)\s*°", " degrees", text)
     text = re.sub(r"(?:^|(?<=\n))\s*[-*•]\s+", "; ", text)
@@ -64,6 +73,10 @@ def split_clauses(command: str) -> Clauses:
     text = rewritten(re.sub(r"\s+", " ", text.replace("&", " and ")))
     pieces = [piece.strip(" ,") for piece in re.split(r"\s*;[\s;,]*", text)]
     return Clauses(tuple(_in_order([with_articles(piece) for piece in pieces if piece])), tuple(files))
+
+
+def _lowered(found: re.Match[str]) -> str:
+    return found[0].lower()
 
 
 def _without_files(text: str) -> tuple[str, list[str]]:

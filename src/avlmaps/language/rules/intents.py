@@ -34,6 +34,10 @@ class Target:
     context: tuple[Named | None, ...] = ()
 
 
+# Of the things that were named: where "there" is, inside the area that was gone to last.
+INSIDE = Named(Modality.AREA, "")
+
+
 class Relation(StrEnum):
     """How a place lies to the things that it is told by."""
 
@@ -59,7 +63,7 @@ class Goal:
 
     Attributes:
         relation: how it lies to the targets.
-        targets: one, two for between, none for `THERE` and `START`.
+        targets: one, two for between (none for "between the two"), none for `THERE` and `START`.
         distance_m: how far from the thing, or None where nothing was said.
     """
 
@@ -135,9 +139,9 @@ class Viewpoints:
 
 @dataclass(frozen=True, slots=True)
 class Shuttle:
-    """Go back and forth between two things."""
+    """Go back and forth between two things, the two that were named last if there are no ends."""
 
-    ends: tuple[Target, Target]
+    ends: tuple[Target, ...]
     count: int | None = None
 
 
@@ -170,9 +174,9 @@ class Stay:
 
 @dataclass(frozen=True, slots=True)
 class Mention:
-    """A thing was named, to be spoken of as "it"; nothing is to be done."""
+    """Things were named, to be spoken of as "it" or "the two"; nothing is to be done."""
 
-    target: Target
+    targets: tuple[Target, ...]
 
 
 Intent = (

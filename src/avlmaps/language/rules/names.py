@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 from avlmaps.core.errors import LanguageError
-from avlmaps.language.rules.intents import Named, Target
+from avlmaps.language.rules.intents import INSIDE, Named, Target
 from avlmaps.language.rules.sounds import NOISES, PAST_TENSES, SOUND_NOUNS, SOUND_VERBS, SOUNDING_THINGS
 from avlmaps.language.sentence import AREA_WORDS
 from avlmaps.query.question import Modality
@@ -17,7 +17,7 @@ _NEVER_NAMED = frozenset({
     "anywhere", "everywhere", "here", "quick", "quickly", "please", "over", "across", "along", "about", "with", "again",
     "whoever", "whatever", "came", "comes", "coming", "heard", "said", "someone", "somebody", "something", "anything",
     "everything", "everyone", "just", "okay", "ok", "might", "may", "also", "too", "very", "my", "your", "its", "away",
-    "toward", "towards", "during", "while", "since", "though", "although", "everybody", "another", "both", "each",
+    "go", "toward", "towards", "during", "while", "since", "though", "although", "everybody", "another", "both", "each",
     "either", "lots", "around", "onto", "upon", "maybe", "really", "actually", "first", "lastly", "finally",
 })  # fmt: skip
 _POINTED_AT = frozenset(
@@ -62,6 +62,7 @@ class Names:
     def __init__(self, files: tuple[str, ...]) -> None:
         self.files = files
         self.notes: list[str] = []
+        self._last: Named | None = None
 
     def target(self, node: Any) -> Target:
         """Return the target of a `target`, `near_target` or `item` node, or of a node that holds the parts of one."""
@@ -69,6 +70,7 @@ class Names:
         named, context = self._item(children[0])
         for place in children[1:]:
             context += self._context(place)
+        self._last = named or self._last
         return Target(named, tuple(context))
 
     def target_of(self, parts: list[Any]) -> Target:
@@ -87,6 +89,8 @@ class Names:
             named, context = self._item(inner[0])
             if named is not None and re.match(r"any\b|one of", article, re.IGNORECASE):
                 named = Named(named.modality, _singular(named.words), named.is_file)
+            if named is not None and named == self._last and re.match(r"that\b|those\b", article, re.IGNORECASE):
+                return None, context
             return named, context
         return self._core(node)
 
@@ -97,6 +101,8 @@ class Names:
             if is_rule(child, "heard"):
                 named, more = self._core(child)
                 context += [named, *more]
+            if is_token(child, "INSIDE"):
+                context.append(INSIDE)
             if is_token(child, "FRONT_OF", "BEHIND", "SIDE_OF", "AHEAD"):
                 self._note_side(child)
             if is_rule(child, "item", "near_item", "near_target"):
@@ -146,6 +152,9 @@ class Names:
         kept = [word for word in spoken if word.lower() not in ("was", "were", "is", "are", "being", "has", "been")]
         if not told and len(kept) > 2 and f"{kept[-2]} {kept[-1]}".lower() in ("went off", "goes off"):
             kept = [*kept[:-2], "going", "off"]
+        on = next((at for at, word in enumerate(kept) if at and word.lower() in ("on", "at", "against")), None)
+        if on is not None and not told and kept[on + 1 :] and _sounding(kept[on - 1]) != kept[on - 1]:
+            return Named(Modality.SOUND, " ".join([*kept[: on - 1], _sounding(kept[on - 1]), *kept[on:]])), []
         being = len(kept) < len(spoken) and kept[-1:] and kept[-1].lower().endswith("ing")
         sounding = [*kept[:-1], _sounding(kept[-1])] if kept and not told else kept
         if not told and not being and not _is_sound(sounding) and sounding[-2:] != ["going", "off"]:

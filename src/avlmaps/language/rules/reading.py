@@ -83,8 +83,7 @@ class _Reader:
         if self.count is None or isinstance(intent, Shuttle | Again | Mention | Stay):
             return intent
         if self.count > 1 and isinstance(intent, Go) and intent.goals[0].relation is Relation.BETWEEN:
-            first, second = intent.goals[0].targets
-            return Shuttle((first, second), self.count)
+            return Shuttle(intent.goals[0].targets, self.count)
         return intent if self.count == 1 else Repeated((intent,), self.count)
 
     # Going.
@@ -128,7 +127,7 @@ class _Reader:
 
     def _leave(self, node: Any) -> Intent:
         self.names.notes.append(f"{str(node.children[0])!r} is left to the next way to go.")
-        return Mention(self._targets(node)[0])
+        return Mention(tuple(self._targets(node)))
 
     def _front_goal(self, node: Any) -> Intent:
         inner = next(child for child in node.children if hasattr(child, "data"))
@@ -167,9 +166,9 @@ class _Reader:
         told = next(str(child) for child in node.children if is_token(child, "SIDE_OF", "POSS_SIDE", "ITS_SIDE"))
         return Goal(_side_relation(told), targets or (Target(None),), distance_m)
 
-    def _pair(self, node: Any) -> tuple[Target, Target]:
-        first, second = self._targets(node)
-        return first, second
+    def _pair(self, node: Any) -> tuple[Target, ...]:
+        """Return the two targets of a pair, none for "the two", which were named before."""
+        return tuple(self._targets(node))
 
     def _targets(self, node: Any) -> list[Target]:
         rules = ("target", "near_target", "item", "heard")
@@ -258,6 +257,9 @@ class _Reader:
         turn = Turn(-angle if words.side_of(side) == "left" else angle)
         return Repeated((Go((_at(self._targets(node)[0]),)), turn), 1)
 
+    def _heading(self, node: Any) -> Intent:
+        return TurnTo(words.angle_of(next(str(child) for child in node.children if is_token(child, "ANGLE"))) % 360)
+
     def _face(self, node: Any) -> Intent:
         return Face(self._targets(node)[0])
 
@@ -303,7 +305,7 @@ class _Reader:
         return Following(count)
 
     def _mention(self, node: Any) -> Intent:
-        return Mention(self._targets(node)[0])
+        return Mention(tuple(self._targets(node)))
 
 
 def _at(target: Target) -> Goal:

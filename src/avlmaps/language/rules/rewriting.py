@@ -7,7 +7,7 @@ Each entry is a pattern, matched without regard to case, and what stands instead
 import re
 from functools import cache
 
-from avlmaps.language.rules import spoken, words
+from avlmaps.language.rules import remarks, spoken, terse, words
 
 _DETERMINER = words.DETERMINER
 _SHOT = (
@@ -342,6 +342,7 @@ _ABOUT_ACTIONS = [
 
 # "and in the kitchen" goes on telling where the thing is.
 _ABOUT_ENDS = [
+    (r"(\b(?:between|middle of|mid-?point of) [^;]*?)\band (?=where\b)", r"\1⟦and⟧ "),
     (rf"((?:near|next to|by|beside|to) {_DETERMINER} [\w ]+?) there(?=\s*(?:;|$))", r"\1"),
     (r",?\s*\b(?:and|but) (?=(?:near|next to|beside|by|close to|at|around|alongside|in|inside|within|where)\b)", " "),
     (r"(?:(?<=;)|^)\s*(?:and|but|or|so|also|again)\b,?(?! )", " "),
@@ -355,7 +356,7 @@ _ABOUT_ENDS = [
 def _all() -> tuple[tuple[re.Pattern[str], str], ...]:
     fillers = [(filler, " ") for filler in words.FILLERS]
     tidy = [(r"\s+", " "), (r"\s+(?=[,;])", ""), (r"^[\s,]+", ""), (r";[\s,]+", "; ")]
-    listed = [*spoken.PATTERNS, *tidy, *_ABOUT_FILES, *_ABOUT_PLACES, *fillers, *tidy]
+    listed = [(r"\s+", " "), *terse.PATTERNS, *remarks.BEFORE, *spoken.PATTERNS, *remarks.AFTER, *tidy, *_ABOUT_FILES, *_ABOUT_PLACES, *fillers, *tidy]
     listed += [*_ABOUT_ORDER, *fillers, *_ABOUT_ACTIONS, *_ABOUT_ENDS, *tidy]
     return tuple((re.compile(pattern, re.IGNORECASE), instead) for pattern, instead in listed)
 

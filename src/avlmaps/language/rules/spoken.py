@@ -268,7 +268,7 @@ _STATEMENTS = [
     (rf"{_BEGINS}where(?:'s| is| are| was| were) ({_DETERMINER}[^.;!?,]+?)\s*\?", r" ; ⟦said⟧ \1 ;"),
     (
         rf"{_BEGINS}({_THING}|{_SOMEONE}){_WAS} (?:\w+ly |just |still |now |again )?({_SOUNDING})\b(?: (?:the|an?|"
-        rf"his|her|my))?",
+        rf"his|her|my)\b)?",
         r" ; ⟦said⟧ the sound of \1 \2",
     ),
     (

@@ -2,12 +2,14 @@
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.rules import words
 from avlmaps.language.rules.clauses import Clause, Clauses, split_clauses
 from avlmaps.language.rules.intents import Go, Intent
+from avlmaps.language.rules.leaving_out import shorter_commands
 from avlmaps.language.rules.names import Names
 from avlmaps.language.rules.reading import parser, read_clause
 from avlmaps.language.rules.writing import write_program
@@ -31,6 +33,18 @@ class RulesTranslator:
             LanguageError: a part of the command is not understood; the sentence quotes it and says what would be.
         """
         _check(command)
+        try:
+            return self._read(command)
+        except LanguageError:
+            for shorter, left_out in shorter_commands(command):
+                with suppress(LanguageError):
+                    read = self._read(shorter)
+                    notes = [f"{part!r} was not understood and left out." for part in left_out]
+                    return Translation(read.program, (*read.notes, *notes))
+            raise
+
+    def _read(self, command: str) -> Translation:
+        """Return the program for a command of which everything is understood."""
         clauses = split_clauses(command)
         names = Names(clauses.files)
         try:
@@ -121,5 +135,5 @@ def _example(text: str) -> str:
 
 
 def _shown(clauses: Clauses, text: str) -> str:
-    shown = re.sub(r"⟦shuttle⟧", "back and forth", re.sub(r"⟦ahead⟧", "in front of you", clauses.shown(text)))
+    shown = clauses.shown(text)
     return shown if len(shown) <= 80 else shown[:77] + "..."

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.rules.intents import (
+    INSIDE,
     Again,
     Beside,
     Face,
@@ -56,6 +57,8 @@ def _with_fronts_resolved(intents: Sequence[Intent]) -> list[Intent]:
     for at, intent in enumerate(intents):
         if isinstance(intent, Following):
             return [*resolved, Repeated(tuple(_with_fronts_resolved(intents[at + 1 :])), intent.count)]
+        if held is not None and isinstance(intent, Go) and any(_of_the_two(goal) for goal in intent.goals):
+            raise LanguageError("'the two' could be meant otherwise; say it like: stop between the sofa and the TV.")
         if held is not None and held.near and _plain_thing(intent):
             resolved.append(_with_context(intent, held))
             held = None
@@ -71,6 +74,10 @@ def _with_fronts_resolved(intents: Sequence[Intent]) -> list[Intent]:
 def _is_it(goal: Goal) -> bool:
     """Return whether a goal is only "it", as in "the sofa, go to it": one way, not two."""
     return goal.relation is Relation.AT and goal.targets[0] == Target(None)
+
+
+def _of_the_two(goal: Goal) -> bool:
+    return goal.relation is Relation.BETWEEN and not goal.targets
 
 
 def _plain_thing(intent: Intent) -> bool:
@@ -100,7 +107,9 @@ class _Writer:
         before: lines that must stand before all others: maps and places that are used more than once.
         notes: how something was taken.
         returns: whether the program must remember where it started.
-        last: how the thing that was named last is written.
+        last: the thing that was named last, which "it" is.
+        last_two: the last two things that were named or gone to, which "the two" are.
+        area: the area that was gone to last.
         last_goal: the lines of the last way to a place, while nothing else was done since.
     """
 
@@ -109,6 +118,8 @@ class _Writer:
     notes: list[str] = field(default_factory=list)
     returns: bool = False
     last: Target | None = None
+    last_two: tuple[Target, ...] = ()
+    area: Named | None = None
     last_goal: list[str] | None = None
     names: dict[str, str] = field(default_factory=dict)
     loops: int = 0
@@ -133,8 +144,8 @@ class _Writer:
             case Again(count=count):
                 self._again(count)
             case _:
-                if isinstance(intent, Mention):
-                    self._target(intent.target)
+                for target in intent.targets if isinstance(intent, Mention) else ():
+                    self._target(target)
 
     def _do(self, call: str) -> None:
         self.lines.append(f"robot.{call}")
@@ -159,10 +170,13 @@ class _Writer:
             if self.last is None:
                 raise LanguageError("'there' refers to no place that was named; name one, like: go to the sofa.")
             return [] if self.last_goal else self._lines_to(Goal(Relation.AT, (self.last,)))
-        targets = [self._target(target) for target in goal.targets]
+        targets = [self._target(target) for target in goal.targets or self._the_two()]
         how_far = "" if goal.distance_m is None else f", {_number(goal.distance_m)}"
         match goal.relation:
             case Relation.AT:
+                assert self.last is not None
+                if self.last.sought is not None and self.last.sought.modality is Modality.AREA:
+                    self.area = self.last.sought
                 return [self._move_to(goal.targets[0], targets[0])]
             case Relation.BETWEEN:
                 return [f"robot.move_in_between({targets[0]}, {targets[1]})"]
@@ -206,13 +220,21 @@ class _Writer:
         """Return how a target is written: a plain thing as its name, anything else as its map."""
         sought, *around = [named for part in (target.sought, *target.context) for named in self._meant(part)]
         self.last = Target(sought, tuple(around))
+        self.last_two = (*(target for target in self.last_two[-2:] if target != self.last), self.last)[-2:]
         if sought.modality is Modality.OBJECT and not around:
             return _quoted(sought.words)
         maps = [self._map(sought, "get_major_map"), *(self._map(named, "get_map") for named in around)]
         return self._kept("heat", " * ".join(maps))
 
+    def _the_two(self) -> tuple[Target, ...]:
+        if len(self.last_two) < 2:
+            raise LanguageError("'the two' refers to nothing that was named; say it like: stop between the sofa and the TV.")
+        return self.last_two
+
     def _meant(self, part: Named | None) -> list[Named]:
         """Return what a part of a target stands for: itself, or for "it" all that was named last."""
+        if part is INSIDE:
+            return [] if self.area is None else [self.area]
         if part is not None:
             return [part]
         if self.last is None:
@@ -261,10 +283,10 @@ class _Writer:
 
     # Loops.
 
-    def _shuttle(self, ends: tuple[Target, Target], count: int | None) -> None:
+    def _shuttle(self, ends: tuple[Target, ...], count: int | None) -> None:
         if count is None:
             self.notes.append("Not said how often to go back and forth: once.")
-        first, second = (self._place(self._target(end)) for end in ends)
+        first, second = (self._place(self._target(end)) for end in ends or self._the_two())
         self._block(count or 1, [f"robot.move_to({first})", f"robot.move_to({second})"])
 
     def _viewpoints(self, intent: Viewpoints) -> None:
