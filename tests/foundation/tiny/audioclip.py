@@ -16,17 +16,17 @@ def layout(name: str = "audioclip") -> dict[str, tuple[int, ...]]:
     return {key: () if shape == "()" else tuple(map(int, shape.split("x"))) for key, shape in pairs}
 
 
-def write_audioclip(folder: Path, name: str = MODEL) -> None:
-    """Write the checkpoint where ``model_file`` finds it."""
-    torch.save(tiny_state(), folder / name)
+def write_audioclip(folder: Path, name: str = MODEL, tiny: bool = True) -> None:
+    """Write the checkpoint where ``model_file`` finds it; of the published sizes unless ``tiny``."""
+    torch.save(tiny_state(tiny), folder / name)
 
 
-def tiny_state() -> dict[str, torch.Tensor]:
+def tiny_state(tiny: bool = True) -> dict[str, torch.Tensor]:
     """Return a checkpoint with the published names; parameters are pickled as parameters, as in the published file."""
     generator = torch.Generator().manual_seed(5)
     state = {}
     for key, published in layout().items():
-        shape = _small(key, published)
+        shape = _small(key, published) if tiny else published
         values = _values(key, shape, generator)
         is_buffer = key.endswith(("window", "running_mean", "running_var", "num_batches_tracked"))
         state[key] = values if is_buffer else torch.nn.Parameter(values)
@@ -60,9 +60,9 @@ def _values(key: str, shape: tuple[int, ...], generator: torch.Generator) -> tor
     if key == "audio.window":
         from scipy.signal import get_window
 
-        return torch.from_numpy(get_window("blackmanharris", WINDOW)).float()
+        return torch.from_numpy(get_window("blackmanharris", shape[0])).float()
     if key == "audio.fbsp.fc":
-        return torch.arange(BINS, dtype=torch.float32) + 0.1 * noise
+        return torch.arange(shape[0], dtype=torch.float32) + 0.1 * noise
     if key.startswith("audio.fbsp."):
         return (1.0 + 0.3 * noise).abs()  # orders and bandwidths are positive
     if key == "audio.bn1.running_mean":

@@ -110,9 +110,9 @@ def write_checkpoint(path: Path, state: dict[str, torch.Tensor]) -> None:
     )
 
 
-def write_lseg(folder: Path) -> None:
-    """Write a tiny ``demo_e200.ckpt``."""
-    state = random_weights(lseg_layout(Sizes()), half=("clip_pretrained.",))
+def write_lseg(folder: Path, sizes: Sizes | None = None) -> None:
+    """Write a ``demo_e200.ckpt``, a tiny one unless other sizes are given."""
+    state = random_weights(lseg_layout(sizes or Sizes()), half=("clip_pretrained.",))
     write_checkpoint(folder / "demo_e200.ckpt", state)
 
 

@@ -8,6 +8,7 @@ from scipy.io import savemat
 
 CHANNELS = (8, 8, 8, 8, 16, 16, 16, 16, 16, 16, 16, 16, 16)
 CLUSTERS, DIM = 6, 24
+PUBLISHED_CHANNELS = (64, 64, 128, 128, 256, 256, 256, 512, 512, 512, 512, 512, 512)
 MEAN = (123.68, 116.779, 103.939)
 
 
@@ -36,9 +37,10 @@ def netvlad_net(channels: tuple[int, ...] = CHANNELS, clusters: int = CLUSTERS, 
     return {"layers": cell, "meta": {"normalization": {"averageImage": np.tile(np.float32(MEAN), (224, 224, 1))}}}
 
 
-def write_netvlad(folder: Path) -> None:
-    """Write the file under its published name."""
-    savemat(folder / "VGG16-NetVLAD-Pitts30K.mat", {"net": netvlad_net()})
+def write_netvlad(folder: Path, tiny: bool = True) -> None:
+    """Write the file under its published name; of the published sizes unless ``tiny``."""
+    net = netvlad_net() if tiny else netvlad_net(PUBLISHED_CHANNELS, 64, 4096)
+    savemat(folder / "VGG16-NetVLAD-Pitts30K.mat", {"net": net})
 
 
 def _layer(kind: str, *weights: np.ndarray) -> dict[str, Any]:

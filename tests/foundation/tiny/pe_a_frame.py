@@ -45,10 +45,10 @@ def write_pe_a_frame(folder: Path, model: str = MODEL) -> None:
         made.text_audio_logit_scale.fill_(0.7)
         made.text_audio_logit_bias.fill_(-2.0)
     made.save_pretrained(place)
-    PeAudioProcessor(PeAudioFeatureExtractor(), _letters()).save_pretrained(place)
+    PeAudioProcessor(PeAudioFeatureExtractor(), letters()).save_pretrained(place)
 
 
-def _letters() -> Any:
+def letters() -> Any:
     """Return a byte-level tokenizer without merges, with ModernBERT's special tokens."""
     from tokenizers import Tokenizer, decoders, models, pre_tokenizers, processors
     from transformers import PreTrainedTokenizerFast

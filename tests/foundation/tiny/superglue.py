@@ -24,21 +24,23 @@ CONFIG = {
 }
 
 
-def write_superglue(folder: Path, random: bool = False) -> None:
+def write_superglue(folder: Path, random: bool = False, layers: int = 2) -> None:
     """Write ``config.json`` and ``model.safetensors``, the SuperPoint within it included.
 
     Args:
         folder: of models.
         random: leave all weights at random; else places and attention add nothing, and pairs are as likely as alike.
+        layers: of attention; the published one has eighteen.
     """
     declare_missing_operators()
     from transformers import SuperGlueConfig, SuperGlueForKeypointMatching
 
     home = folder / FOLDER
     home.mkdir(parents=True)
-    (home / "config.json").write_text(json.dumps(CONFIG))
+    kinds = ["self", "cross"] * (layers // 2)
+    (home / "config.json").write_text(json.dumps({**CONFIG, "gnn_layers_types": kinds}))
     torch.manual_seed(5)
-    config = SuperGlueConfig(gnn_layers_types=["self", "cross"], attn_implementation="eager")
+    config = SuperGlueConfig(gnn_layers_types=kinds, attn_implementation="eager")
     network = SuperGlueForKeypointMatching(config)
     for module in network.modules():
         if isinstance(module, torch.nn.BatchNorm1d):  # as after training: not the identity

@@ -32,8 +32,8 @@ def write_tipsv2(folder: Path, model: str = "google/tipsv2-b14", swiglu: bool = 
     place = folder / model
     place.mkdir(parents=True)
     made.save_pretrained(place)
-    _without_temperature(place / "model.safetensors")
-    _write_tokenizer(place)
+    without_temperature(place / "model.safetensors")
+    write_tips_tokens(place)
 
 
 def shake(module: torch.nn.Module, seed: int, amount: float = 0.3) -> None:
@@ -47,7 +47,7 @@ def shake(module: torch.nn.Module, seed: int, amount: float = 0.3) -> None:
                 values.copy_(1.0 + 0.2 * noise if is_scale else amount * noise)
 
 
-def _without_temperature(path: Path) -> None:
+def without_temperature(path: Path) -> None:
     """Take out the one weight that the published files do not have."""
     from safetensors.torch import load_file, save_file
 
@@ -56,7 +56,8 @@ def _without_temperature(path: Path) -> None:
     save_file(weights, path, metadata={"format": "pt"})
 
 
-def _write_tokenizer(place: Path) -> None:
+def write_tips_tokens(place: Path) -> None:
+    """Write a small tokenizer as the published one is built."""
     from transformers.models.tipsv2.tokenization_tipsv2 import Tipsv2Tokenizer
 
     pieces = [*_PIECES, "▁t", "▁th", "▁o"]

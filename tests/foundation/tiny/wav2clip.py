@@ -10,20 +10,27 @@ from tiny.clip import DIM, write_clip
 MODEL, WORDS = "Wav2CLIP.pt", "openai/clip-vit-base-patch32"
 
 
-def write_wav2clip(folder: Path) -> None:
-    """Write both where they are looked for; training's own tensors are in the file, too."""
-    state = tiny_state()
-    state["image_transform.sequential.0.weight"] = torch.zeros(DIM, DIM)
+def write_wav2clip(folder: Path, tiny: bool = True) -> None:
+    """Write both where they are looked for; training's own tensors are in the file, too.
+
+    Args:
+        folder: of models.
+        tiny: else the published sizes; a CLIP must lie there already then.
+    """
+    state = tiny_state(tiny)
+    dim = DIM if tiny else 512
+    state["image_transform.sequential.0.weight"] = torch.zeros(dim, dim)
     state["loss_fn_a.logit_scale"] = torch.tensor(2.66)
     torch.save(state, folder / MODEL)
     if not (folder / WORDS).exists():
         write_clip(folder, WORDS)
 
 
-def tiny_state() -> dict[str, torch.Tensor]:
+def tiny_state(tiny: bool = True) -> dict[str, torch.Tensor]:
     """Return the two parts that hear, with the published names."""
     generator = torch.Generator().manual_seed(6)
-    return {key: _values(key, _small(key, shape), generator) for key, shape in layout("wav2clip").items()}
+    shapes = layout("wav2clip").items()
+    return {key: _values(key, _small(key, shape) if tiny else shape, generator) for key, shape in shapes}
 
 
 def _small(key: str, shape: tuple[int, ...]) -> tuple[int, ...]:
