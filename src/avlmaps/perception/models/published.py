@@ -1,8 +1,9 @@
 """Checkpoints that are published as single files of tensors: found, read without running code, loaded strictly."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TypeVar
 
 import torch
 from torch import nn
@@ -11,6 +12,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.perception.models.files import model_file
 from avlmaps.perception.models.settings import model_settings
 
+N = TypeVar("N", bound=nn.Module)
 _COUNTED = ".num_batches_tracked"  # of training; old files have no such number
 _SHOWN = 2
 
@@ -133,6 +135,41 @@ def load_strictly(
             f"with: {how_to_get}"
         )
     module.load_state_dict({name: value for name, value in state.items() if name in own}, strict=False)
+
+
+def network_from(
+    make: Callable[[], N],
+    what: str,
+    state: Mapping[str, torch.Tensor],
+    path: Path,
+    how_to_get: str,
+    not_needed: Collection[str] = (),
+) -> N:
+    """Return a network with all the weights of a file, on the CPU, ready for inference.
+
+    Args:
+        make: returns the network with what sizes the weights have, or raises ``KeyError``, ``ValueError`` or
+            ``IndexError`` where they are not its own; its tensors take no memory before the file fills them, so that
+            it may hold nothing that it works out itself.
+        what: the network, for the error.
+        state: the file's weights, by the network's names.
+        path: the file, for the error.
+        how_to_get: the command that brings the published one, for the error.
+        not_needed: names that the file must have as well, and that this network knowingly does without.
+
+    Raises:
+        BackendError: the file is of another network.
+    """
+    try:
+        with torch.device("meta"):
+            network = make()
+    except (KeyError, ValueError, IndexError) as fault:
+        raise BackendError(
+            f"{path} is no checkpoint of {what} (it lacks {fault}); get the published one with: {how_to_get}"
+        ) from fault
+    network = network.to_empty(device="cpu")
+    load_strictly(network, state, path, how_to_get, not_needed=not_needed)
+    return network.eval().requires_grad_(False)
 
 
 def _some(names: Sequence[str]) -> str:

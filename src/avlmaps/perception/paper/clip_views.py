@@ -22,7 +22,7 @@ from avlmaps.perception.models.device import chosen_device
 from avlmaps.perception.models.files import model_file
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.pretrained import load_helper
-from avlmaps.perception.models.published import load_strictly
+from avlmaps.perception.models.published import network_from
 from avlmaps.perception.models.texts import text_features
 from avlmaps.perception.paper.archives import read_weights
 from avlmaps.perception.paper.clip_network import NO_WEIGHTS, Clip, ClipSizes, clip_picture
@@ -138,15 +138,6 @@ class _OpenAiTowers(_Towers):
 
 def _network_of(path: Path) -> Clip:
     state = read_weights(path, _GET)
-    try:
-        sizes = ClipSizes.of(state)
-    except (KeyError, ValueError, IndexError) as fault:
-        raise BackendError(
-            f"{path} is no CLIP with a vision transformer in OpenAI's layout (it lacks {fault}); get the published "
-            f"file: {_GET}"
-        ) from fault
-    with torch.device("meta"):
-        network = Clip(sizes)
-    network = network.to_empty(device="cpu")
-    load_strictly(network, state, path, _GET, not_needed=[key for key in NO_WEIGHTS if key in state])
-    return network.eval().requires_grad_(False)
+    idle = [key for key in NO_WEIGHTS if key in state]
+    what = "a CLIP with a vision transformer in OpenAI's layout"
+    return network_from(lambda: Clip(ClipSizes.of(state)), what, state, path, _GET, idle)

@@ -28,7 +28,7 @@ from avlmaps.perception.models.device import chosen_device, inference, to_numpy,
 from avlmaps.perception.models.files import model_file
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
-from avlmaps.perception.models.published import load_strictly
+from avlmaps.perception.models.published import network_from
 from avlmaps.perception.paper.archives import read_weights
 from avlmaps.perception.paper.clip_text import padded
 from avlmaps.perception.paper.clip_tokens import clip_tokens
@@ -121,17 +121,8 @@ def read_network(path: Path) -> LSegNetwork:
         BackendError: the file is damaged, or another network's.
     """
     state = read_weights(path, HOW_TO_GET, _PREFIX)
-    try:
-        sizes = LSegSizes.of(state)
-    except (KeyError, ValueError, IndexError) as fault:
-        raise BackendError(
-            f"{path} is no checkpoint of LSeg with the backbone clip_vitl16_384 (it lacks {fault}); get the published "
-            f"one: {HOW_TO_GET}"
-        ) from fault
-    with torch.device("meta"):
-        network = LSegNetwork(sizes)
-    network = network.to_empty(device="cpu")
     idle = [key for key in state if key.startswith(_HEAD_FOR_LOGITS)]
-    load_strictly(network, state, path, HOW_TO_GET, not_needed=idle)
+    what = "LSeg with the backbone clip_vitl16_384"
+    network = network_from(lambda: LSegNetwork(LSegSizes.of(state)), what, state, path, HOW_TO_GET, idle)
     network.let_go_of_the_idle()
-    return network.eval().requires_grad_(False)
+    return network
