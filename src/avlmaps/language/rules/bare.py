@@ -95,7 +95,8 @@ def _sounds() -> re.Pattern[str]:
     heard = "|".join([rf"(?:{'|'.join(SOUND_VERBS)})[a-z]?ing", *sorted(SOUND_NOUNS)])
     alone = "applause|footsteps|laughter|music|thunder|siren|explosion|conversation|doorbell"
     return re.compile(
-        rf"(?:sounds?|noises?) (?:of|like|made by) .+|{alone}|(?!(?:{words.MOVE}|{words.TURN}|{words.FACE}|{words.DETERMINER}|"
+        rf"(?:sounds?|noises?) (?:of|like|made by) .+|{alone}|(?!(?:{words.MOVE}|{words.TURN}|{words.FACE}|"
+        rf"{words.DETERMINER}|"
         rf"{words.MANIPULATE}|where|i|you|we|it)\b)[\w'-]+ (?:[\w'-]+ )?(?:{heard})(?: sound| noise)?",
         re.IGNORECASE,
     )

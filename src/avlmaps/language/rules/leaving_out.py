@@ -1,8 +1,8 @@
 """What may be left out of a command that is not understood as a whole: whom it speaks to, and remarks around the order.
 
-"Sweetheart, dinner is ready, so go to the dining room" is an order with a name that nobody knows in front, and a remark.
-Nothing is left out that could be an order, a place or what a later word means: no number, no file, no negation, no word
-of the robot's own doing, nothing that "it" or "there" would refer to. What is left out is said in the notes.
+"Sweetheart, dinner is ready, so go to the dining room" is an order after an unknown name and a remark. Nothing
+is left out that could be an order, a place or what a later word means: no number, no file, no negation, no word of the
+robot's own doing, nothing that "it" or "there" would refer to. What is left out is said in the notes.
 """
 
 import re
@@ -19,27 +19,47 @@ _MOST_TRIES = 10
 _WORD = re.compile(r"[a-z][\w'-]*", re.IGNORECASE)
 
 _PARTS = re.compile(
-    r"[.!?;:,]+(?=\s|$)|\n+|\s+[-–—]+\s+|\s+(?=(?:(?:and )?so (?!that you|as)|(?:because|since|cause|'cause|cuz|coz|therefore|hence)\b|which is why|"
-    r"that's why|that is why|until (?:i|we|he|she|they|someone|somebody|further)\b|while (?:i|we)\b|as (?:i|we)\b|so that (?:i|we)\b))",
+    r"[.!?;:,]+(?=\s|$)|\n+|\s+[-–—]+\s+|\s+(?=(?:(?:and )?so (?!that you|as)|(?:because|since|cause|"
+    r"'cause|cuz|coz|therefore|hence)\b|which is why|"
+    r"that's why|that is why|until (?:i|we|he|she|they|someone|somebody|further)\b|while (?:i|we)\b|"
+    r"as (?:i|we)\b|so that (?:i|we)\b))",
     re.IGNORECASE,
 )
 _LINK = re.compile(
-    r"^\s*(?:and )?(?:so(?: that)?|therefore|hence|thus|which is why|that's why|that is why|because of that|for that reason|"
+    r"^\s*(?:and )?(?:so(?: that)?|therefore|hence|thus|which is why|that's why|that is why|"
+    r"because of that|for that reason|"
     r"that means|this means|that being said|then)\b,?\s*(?:please\b)?",
     re.IGNORECASE,
 )
-_ORDER = rf"(?:{words.MOVE}|{words.RETURN}|{words.TURN}|{words.FACE}|{words.BACK_UP}|{words.MANIPULATE}|circle|patrol|repeat|monitor|use|make|do|let)"
+_ORDER = (
+    rf"(?:{words.MOVE}|{words.RETURN}|{words.TURN}|{words.FACE}|{words.BACK_UP}|{words.MANIPULATE}|"
+    r"circle|patrol|repeat|monitor|use|make|do|let)"
+)
 _NEVER = re.compile(
-    rf"\d|⟦|\.(?:png|jpe?g|bmp|webp|tiff?|wav|flac|ogg|mp3|m4a)\b|n't\b|\b(?:{words.NEGATIONS}|no|nope|nah|none|wrong|correction|scratch|cancel|forget|"
-    r"undo|rather|instead|sorry|mean|meant|ones?|left|right|north|south|east|west|between|behind|forwards?|backwards?|"
-    r"towards?|degrees?|met(?:re|er)s?|steps?|front|ahead|around|halfway|middle|must|should|shall|ought|please|let's|"
-    r"let us|robot|when|whenever|after|before|then|first|second|twice|times|again|only|always|both|careful|"
+    rf"\d|⟦|\.(?:png|jpe?g|bmp|webp|tiff?|wav|flac|ogg|mp3|m4a)\b|n't\b|\b(?:{words.NEGATIONS}|no|nope|"
+    r"nah|none|wrong|correction|scratch|cancel|forget|"
+    r"undo|rather|instead|sorry|mean|meant|ones?|left|right|north|south|east|west|between|behind|"
+    r"forwards?|backwards?|"
+    r"towards?|degrees?|met(?:re|er)s?|steps?|front|ahead|around|halfway|middle|must|should|shall|ought|"
+    r"please|let's|"
+    r"let us|robot|when|whenever|after|before|then|first|second|twice|times|again|only|always|both|"
+    r"careful|"
     rf"{words.SPELLED.replace('|an|a|', '|').replace('|a|', '|')})\b",
     re.IGNORECASE,
 )
-_PERSON = r"(?:i|we|he|she|they|it|this|that|there|these|those|everyone|everybody|somebody|someone|everything|something|here)"
-_BEING = r"(?:is|are|was|were|am|has|have|had|will|'s|'re|'m|'ve|'ll|'d|does|did|looks?|seems?|feels?|smells?|tastes?|needs?|wants?|likes?|loves?|hates?|got|gets?|goes|[a-z]+ed)"
-_CAUSE = r"(?:(?:and|but|so|because|since|as|cause|'cause|cuz|coz|while|until|for|that's because|it's because|oh|well|now|hey|you know|look|so that|i think|i guess|i believe) )*"
+_PERSON = (
+    r"(?:i|we|he|she|they|it|this|that|there|these|those|everyone|everybody|somebody|someone|everything|"
+    r"something|here)"
+)
+_BEING = (
+    r"(?:is|are|was|were|am|has|have|had|will|'s|'re|'m|'ve|'ll|'d|does|did|looks?|seems?|feels?|"
+    r"smells?|tastes?|needs?|wants?|likes?|loves?|hates?|got|gets?|goes|hurts?|aches?|stinks?|leaks?|"
+    r"waits?|sleeps?|works?|broke|fell|began|came|left|[a-z]+ed)"
+)
+_CAUSE = (
+    r"(?:(?:and|but|so|because|since|as|cause|'cause|cuz|coz|while|until|for|that's because|"
+    r"it's because|oh|well|now|hey|you know|look|so that|i think|i guess|i believe) )*"
+)
 _STATEMENT = re.compile(
     rf"^{_CAUSE}(?:{_PERSON}(?:'\w+)?\b.*|(?:[\w'-]+ ){{0,4}}?[\w-]+(?:'s|'re| {_BEING})\b.*)$", re.IGNORECASE
 )
@@ -47,29 +67,38 @@ _EXCLAMATION = re.compile(r"^(?:oh )?(?:what an?|how|such an?|so|too) (?!about\b
 _QUESTION = re.compile(r"^(?:is|are|was|were|does|did|has|isn't|who|what|how)\b(?! about| if).*$", re.IGNORECASE)
 # A remark may tell what a person does; what it says after one of these is for the robot.
 _ORDERED = re.compile(
-    rf"\b(?:and|then|you|your|yourself|u|to) (?:(?:to|now|just|have to|will|can|could|are to) )*(?:{_ORDER})\b|^(?:and |so |now )*(?:{_ORDER})\b(?! (?:is|are|was|were)\b)",
+    r"\b(?:and|then|you|your|yourself|u|to) (?:(?:to|now|just|have to|will|can|could|"
+    rf"are to) )*(?:{_ORDER})\b|^(?:and |so |now )*(?:{_ORDER})\b(?! (?:is|are|was|were)\b)",
     re.IGNORECASE,
 )
 _OWN_PURPOSE = re.compile(rf"^{_CAUSE}(?:i|we|he|she|they)(?:'\w+)? .*$", re.IGNORECASE)
-_SOMEWHERE = re.compile(r"\b(?:in|inside|on|at|near|by|next|under|beside|below|above|where|from|with|close)\b", re.IGNORECASE)
+_SOMEWHERE = re.compile(
+    r"\b(?:in|inside|on|at|near|by|next|under|beside|below|above|where|from|with|close)\b", re.IGNORECASE
+)
 _REFERRING = re.compile(
-    r"\b(?:it|its|them|him|there|here)\b(?!'s| is| are)|\bher(?=\s*(?:[.,;!?]|$))|\b(?:that|this|those|these)(?! (?:is|one)\b)(?=\s*(?:[.,;!?]|$)| \w)",
+    r"\b(?:it|its|them|him|there|here)\b(?!'s| is| are)|\bher(?=\s*(?:[.,;!?]|$))|\b(?:that|this|those|"
+    r"these)(?! (?:is|one)\b)(?=\s*(?:[.,;!?]|$)| \w)",
     re.IGNORECASE,
 )
 _NAMED = re.compile(r"\b(?:the|an?|my|our|your)\s+\w+|\bto \w+", re.IGNORECASE)
 _ENDEARING = re.compile(
-    r"^(?:my |you |dear |little |old )*(?:sweet(?:ie|heart)|honey|hon|darling|dear(?:ie|est)?|love|babe|baby|dude|man|bro|pal|champ|"
-    r"chief|boss|captain|sir|madam|ma'am|miss|mister|mate|friend|kiddo|buddy|genius|angel|hero|machine|bot|robo\w*|\w+bot|"
+    r"^(?:my |you |dear |little |old )*(?:sweet(?:ie|heart)|honey|hon|darling|dear(?:ie|est)?|love|babe|"
+    r"baby|dude|man|bro|pal|champ|"
+    r"chief|boss|captain|sir|madam|ma'am|miss|mister|mate|friend|kiddo|buddy|genius|angel|hero|machine|"
+    r"bot|robo\w*|\w+bot|"
     r"folks|guys|everyone|team|everybody)$",
     re.IGNORECASE,
 )
 _NO_NAME_OF_ANYBODY = re.compile(
-    rf"\b(?:{_ORDER}|the|an?|this|that|and|or|of|to|in|on|at|by|near|with|back|away|home|here|up|down|slow\w*|fast|"
-    r"it|me|who|what|where|why|how|which|goal|target|destination|sound|noise|image|photo|picture|object|area)\b",
+    rf"\b(?:{_ORDER}|the|an?|this|that|and|or|of|to|in|on|at|by|near|with|back|away|home|here|up|down|"
+    r"slow\w*|fast|"
+    r"it|me|who|what|where|why|how|which|goal|target|destination|sound|noise|image|photo|picture|object|"
+    r"area)\b",
     re.IGNORECASE,
 )
 _BEGINS_ORDER = re.compile(
-    rf"^\s*(?:(?:please|now|so|just|quickly|kindly|can|could|would|will|i|we|let's|let|there|you|may|might|it's|it|where|do|is) ?)*\b(?:{_ORDER}|you|need|want|mind|like|there|is|are|the)\b",
+    r"^\s*(?:(?:please|now|so|just|quickly|kindly|can|could|would|will|i|we|let's|let|there|you|may|"
+    rf"might|it's|it|where|do|is) ?)*\b(?:{_ORDER}|you|need|want|mind|like|there|is|are|the)\b",
     re.IGNORECASE,
 )
 
@@ -160,8 +189,12 @@ def _tells_where(said: str, others: str) -> bool:
     """Return whether a remark says where something of the order is: that is no mere remark."""
     if not _SOMEWHERE.search(said):
         return False
-    if re.match(r"(?:it|they|he|she|that|this|there|which|i think it|i left|i put)\b", said, re.IGNORECASE) and not re.match(
-        r"(?:it|this|that)(?:'s| is| was) (?:\w+ )?\w+ (?:in here|out here|at all|outside|in there)$", said, re.IGNORECASE
+    if re.match(
+        r"(?:it|they|he|she|that|this|there|which|i think it|i left|i put)\b", said, re.IGNORECASE
+    ) and not re.match(
+        r"(?:it|this|that)(?:'s| is| was) (?:\w+ )?\w+ (?:in here|out here|at all|outside|in there)$",
+        said,
+        re.IGNORECASE,
     ):
         return True
     small = {"the", "and", "are", "was", "were", "for", "you", "with", "near", "next", "has", "have", "where"}

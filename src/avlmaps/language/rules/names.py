@@ -17,7 +17,9 @@ _NEVER_NAMED = frozenset({
     "anywhere", "everywhere", "here", "quick", "quickly", "please", "over", "across", "along", "about", "with", "again",
     "whoever", "whatever", "came", "comes", "coming", "heard", "said", "someone", "somebody", "something", "anything",
     "everything", "everyone", "just", "okay", "ok", "might", "may", "also", "too", "very", "my", "your", "its", "away",
-    "go", "toward", "towards", "during", "while", "since", "though", "although", "everybody", "another", "both", "each",
+    "hurt", "hurts", "aches", "arrived", "spilled", "spilt", "escaped", "stinks", "smells", "leaks", "waits", "sleeps",
+    "rings", "breaks", "sings", "cries", "drips", "wakes", "arrives", "go",
+    "toward", "towards", "during", "while", "since", "though", "although", "everybody", "another", "both", "each",
     "either", "lots", "around", "onto", "upon", "maybe", "really", "actually", "first", "lastly", "finally",
 })  # fmt: skip
 _POINTED_AT = frozenset(

@@ -154,6 +154,8 @@ class _Reader:
             return _at(self.names.target(node))
         targets = tuple(self._targets(node))
         distance_m = self._distance(node)
+        if node.data == "middle":
+            return Goal(Relation.BETWEEN)
         if node.data in ("between", "between_path"):
             return Goal(Relation.BETWEEN, self._pair(node if node.data == "between_path" else node.children[0]))
         if node.data == "sideways":

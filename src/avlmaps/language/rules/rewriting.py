@@ -7,7 +7,7 @@ Each entry is a pattern, matched without regard to case, and what stands instead
 import re
 from functools import cache
 
-from avlmaps.language.rules import remarks, spoken, terse, words
+from avlmaps.language.rules import mentions, remarks, spoken, terse, words
 
 _DETERMINER = words.DETERMINER
 _SHOT = (
@@ -356,7 +356,8 @@ _ABOUT_ENDS = [
 def _all() -> tuple[tuple[re.Pattern[str], str], ...]:
     fillers = [(filler, " ") for filler in words.FILLERS]
     tidy = [(r"\s+", " "), (r"\s+(?=[,;])", ""), (r"^[\s,]+", ""), (r";[\s,]+", "; ")]
-    listed = [(r"\s+", " "), *terse.PATTERNS, *remarks.BEFORE, *spoken.PATTERNS, *remarks.AFTER, *tidy, *_ABOUT_FILES, *_ABOUT_PLACES, *fillers, *tidy]
+    listed = [(r"\s+", " "), *terse.PATTERNS, *remarks.BEFORE, *mentions.PATTERNS, *spoken.PATTERNS, *remarks.AFTER]
+    listed += [*tidy, *_ABOUT_FILES, *_ABOUT_PLACES, *fillers, *tidy]
     listed += [*_ABOUT_ORDER, *fillers, *_ABOUT_ACTIONS, *_ABOUT_ENDS, *tidy]
     return tuple((re.compile(pattern, re.IGNORECASE), instead) for pattern, instead in listed)
 

@@ -39,5 +39,6 @@ PAST_TENSES = {
     "burst": "bursting", "spoke": "speaking", "crew": "crowing", "wept": "weeping", "shattered": "shattering",
     "slammed": "slamming", "dripped": "dripping", "hummed": "humming", "clapped": "clapping", "popped": "popping",
     "cried": "crying", "cries": "crying", "smashed": "smashing", "rung": "ringing", "blew": "blowing",
+    "drips": "dripping", "hums": "humming", "slams": "slamming", "claps": "clapping",
     "sung": "singing", "went off": "going off",
 }  # fmt: skip

@@ -30,6 +30,8 @@ from avlmaps.query.question import Modality
 
 _ARGUMENTS = {Modality.OBJECT: "obj", Modality.SOUND: "sound", Modality.AREA: "area", Modality.IMAGE: "img"}
 
+_SAY_BETWEEN = "say it like: stop between the sofa and the TV"
+
 
 def write_program(intents: Sequence[Intent]) -> tuple[str, list[str]]:
     """Return the program for what a command asks for in order, and notes on how it was taken.
@@ -58,7 +60,7 @@ def _with_fronts_resolved(intents: Sequence[Intent]) -> list[Intent]:
         if isinstance(intent, Following):
             return [*resolved, Repeated(tuple(_with_fronts_resolved(intents[at + 1 :])), intent.count)]
         if held is not None and isinstance(intent, Go) and any(_of_the_two(goal) for goal in intent.goals):
-            raise LanguageError("'the two' could be meant otherwise; say it like: stop between the sofa and the TV.")
+            raise LanguageError(f"'the two' could be meant otherwise; {_SAY_BETWEEN}.")
         if held is not None and held.near and _plain_thing(intent):
             resolved.append(_with_context(intent, held))
             held = None
@@ -170,14 +172,11 @@ class _Writer:
             if self.last is None:
                 raise LanguageError("'there' refers to no place that was named; name one, like: go to the sofa.")
             return [] if self.last_goal else self._lines_to(Goal(Relation.AT, (self.last,)))
-        targets = [self._target(target) for target in goal.targets or self._the_two()]
+        targets = self._written(goal)
         how_far = "" if goal.distance_m is None else f", {_number(goal.distance_m)}"
         match goal.relation:
             case Relation.AT:
-                assert self.last is not None
-                if self.last.sought is not None and self.last.sought.modality is Modality.AREA:
-                    self.area = self.last.sought
-                return [self._move_to(goal.targets[0], targets[0])]
+                return [self._move_to(targets[0])]
             case Relation.BETWEEN:
                 return [f"robot.move_in_between({targets[0]}, {targets[1]})"]
             case Relation.HALFWAY:
@@ -191,14 +190,17 @@ class _Writer:
             case _:
                 return self._before(goal, targets[0])
 
-    def _move_to(self, target: Target, written: str) -> str:
+    def _move_to(self, written: str) -> str:
+        """Return the way to what was named last."""
+        if self.last is not None and self.last.sought is not None and self.last.sought.modality is Modality.AREA:
+            self.area = self.last.sought
         if written.startswith('"'):
             return f"robot.move_to_object({written})"
         return f"robot.move_to(robot.get_max_pos_3d({written}))"
 
     def _before(self, goal: Goal, written: str) -> list[str]:
         """Return the way to the near side of a thing, and back from it if so far is asked for."""
-        lines = [self._move_to(goal.targets[0], written)]
+        lines = [self._move_to(written)]
         if goal.relation is Relation.FRONT or goal.distance_m is not None:
             lines.append(f"robot.face({written})")
         if goal.distance_m is not None:
@@ -226,9 +228,12 @@ class _Writer:
         maps = [self._map(sought, "get_major_map"), *(self._map(named, "get_map") for named in around)]
         return self._kept("heat", " * ".join(maps))
 
+    def _written(self, goal: Goal) -> list[str]:
+        return [self._target(target) for target in goal.targets or self._the_two()]
+
     def _the_two(self) -> tuple[Target, ...]:
         if len(self.last_two) < 2:
-            raise LanguageError("'the two' refers to nothing that was named; say it like: stop between the sofa and the TV.")
+            raise LanguageError(f"'the two' refers to nothing that was named; {_SAY_BETWEEN}.")
         return self.last_two
 
     def _meant(self, part: Named | None) -> list[Named]:
