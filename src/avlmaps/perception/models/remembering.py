@@ -176,8 +176,9 @@ class RememberingPixels(_Remembering):
 
     def _known(self, key: str) -> Float32[np.ndarray, "hf wf d"] | None:
         found = self._get(key)
-        fits = found is not None and found.ndim == 3 and found.shape[2] == self.card.dim
-        return found.astype(np.float32, copy=False) if fits else None
+        if found is None or found.ndim != 3 or found.shape[2] != self.card.dim:
+            return None
+        return found.astype(np.float32, copy=False)
 
 
 class RememberingViews(_Remembering):
