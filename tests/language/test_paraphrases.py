@@ -1,9 +1,9 @@
 """How many free paraphrases the rules understand, written by others than the writer of the grammar.
 
-The first set is the development set: the grammar was mended by what failed in it, so its count only holds what was
-reached. The second was written blind afterwards and was never looked at by who mends the grammar; it measures. The
-failing ones of the development set are listed by ``python tests/language/test_paraphrases.py``; a grammar that was
-mended by the second set is to be measured on new paraphrases.
+The first two are development sets: each was blind once (45 of 60 and 53 of 80 were right when they were first asked),
+then the grammar was mended by what failed in it, so that its count only holds what was reached. The third measures: it
+is written blind and never looked at by who mends the grammar. The failing ones of the development sets are listed by
+``python tests/language/test_paraphrases.py``; a grammar that was mended by the third set is to be measured on new ones.
 """
 
 import json
@@ -18,12 +18,12 @@ from avlmaps.language.program import parse_program
 from avlmaps.language.rules import command_to_program
 
 COMMANDS = Path(__file__).parent / "commands"
-DEVELOPMENT = COMMANDS / "paraphrases.jsonl"
-BLIND = COMMANDS / "paraphrases_2.jsonl"
-SETS = [path for path in (DEVELOPMENT, BLIND) if path.exists()]
-REACHED = 60
-# Of the 80 blind ones 53 were right when they were first asked (66 %; 90 % are asked for): this holds what there is.
-BLIND_REACHED = 53
+# The development sets: how many commands there are, and how many are right.
+DEVELOPMENT = {COMMANDS / "paraphrases.jsonl": (60, 60), COMMANDS / "paraphrases_2.jsonl": (80, 79)}
+BLIND = COMMANDS / "paraphrases_3.jsonl"
+SETS = [path for path in (*DEVELOPMENT, BLIND) if path.exists()]
+# How many of the blind ones were right when they were first asked (90 % are asked for): this holds what there is.
+BLIND_REACHED = 0
 
 
 @pytest.mark.parametrize("path", SETS, ids=lambda path: path.stem)
@@ -36,16 +36,18 @@ def test_every_paraphrase_is_asked_once_and_its_programs_are_programs(path: Path
             assert same_program(program, program), command
 
 
-def test_the_development_set_stays_understood() -> None:
-    paraphrases = _paraphrases(DEVELOPMENT)
-    assert len(paraphrases) == 60
-    assert len(paraphrases) - len(wrong_answers(paraphrases, command_to_program)) >= REACHED
+@pytest.mark.parametrize("path", DEVELOPMENT, ids=lambda path: path.stem)
+def test_the_development_sets_stay_understood(path: Path) -> None:
+    asked, reached = DEVELOPMENT[path]
+    paraphrases = _paraphrases(path)
+    assert len(paraphrases) == asked
+    assert len(paraphrases) - len(wrong_answers(paraphrases, command_to_program)) >= reached
 
 
 @pytest.mark.skipif(not BLIND.exists(), reason="no blind set has been written")
 def test_blind_paraphrases_are_understood_as_often_as_when_they_were_first_asked() -> None:
     paraphrases = _paraphrases(BLIND)
-    assert len(paraphrases) == 80
+    assert len(paraphrases) >= 50
     assert len(paraphrases) - len(wrong_answers(paraphrases, command_to_program)) >= BLIND_REACHED
 
 
@@ -76,7 +78,7 @@ def _paraphrases(path: Path) -> dict[str, list[str]]:
 if __name__ == "__main__":
     import sys
 
-    asked = _paraphrases(DEVELOPMENT)
+    asked = {command: programs for path in DEVELOPMENT for command, programs in _paraphrases(path).items()}
     failing = wrong_answers(asked, command_to_program)
     for command, answer in failing.items():
         sys.stdout.write(f"{command}\n  came:   {answer!r}\n  wanted: {asked[command][0]!r}\n")

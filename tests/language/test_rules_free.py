@@ -56,10 +56,44 @@ NEVER_GUESSED = [
     "go to where it came from and",
     "go there",
     "check it out",
+    "dance to the kitchen",
+    "kill the lights",
+    "sing a song near the piano",
+    "Wait until the phone rings, then go to the door",
+]
+
+# What stands around an order is left out only where it is none itself and nothing hangs on it.
+NEVER_LEFT_OUT = [
+    "Sweetheart, dance",
+    "Honey, open the door",
+    "Sweetheart, don't go to the kitchen",
+    "I think you should not go to the kitchen, so go to the sofa",
+    "The battery is low so do not go to the kitchen",
+    "The printer is broken, so turn it off and go to the desk",
+    "I am tired, sing a song and go to the sofa",
+    "The kids are asleep, be quiet and go to the crib",
+    "Everyone left the office, so lock the door and go to the hallway",
+    "Mom is in the kitchen, tell her dinner is ready",
+    "He is hungry, feed him, go to the kitchen",
+    "Water the plants, then go to the kitchen",
+    "Feed the cat, go to the kitchen",
+    "Paint the wall. Go to the sofa.",
+    "Clean the table. Go to the sofa.",
+    "frobnicate, then go to the sofa",
+    "Go to the mug, it is on the kitchen table",
+    "Go to the chair, I mean the red one",
+    "Go to the sofa, no, the bed",
+    "Go to the kitchen. Wait, that was wrong.",
+    "The red one is nice, go to it",
+    "The big lamp is broken, so go to the small one",
+    "Go 3 steps, it is about 2 metres, and turn left",
+    "Go to the sofa if I clap",
+    "go to the sofa but not the red one",
+    "go to the sofa until the phone rings",
 ]
 
 
-@pytest.mark.parametrize("command", NEVER_GUESSED)
+@pytest.mark.parametrize("command", [*NEVER_GUESSED, *NEVER_LEFT_OUT])
 def test_what_is_no_order_is_refused(command: str) -> None:
     with pytest.raises(LanguageError) as caught:
         written = command_to_program(command)
@@ -87,6 +121,47 @@ def test_asides_change_nothing(order: str, aside: str) -> None:
 @pytest.mark.parametrize("order", ["turn left", "go to the sofa, then face the window", "stop 2 m left of the bed"])
 def test_preambles_change_nothing(order: str, preamble: str) -> None:
     assert same_program(command_to_program(preamble + order), command_to_program(order))
+
+
+@pytest.mark.parametrize(
+    ("command", "left_out"),
+    [
+        ("Sweetheart, {}", "Sweetheart"),
+        ("Captain! {}", "Captain"),
+        ("I think dinner is ready, so {}", "I think dinner is ready"),
+        ("The guests are coming, that's why you should {}", "The guests are coming"),
+        ("It is cold in here. {}", "It is cold in here"),
+        ("We want to watch a movie, please {}", "We want to watch a movie"),
+        ("{}, the laundry is done.", "the laundry is done"),
+        ("{} because I want to throw this away", "because I want to throw this away"),
+    ],
+)
+@pytest.mark.parametrize("order", ["go to the sofa", "go to the table near the window, then turn left"])
+def test_what_is_no_order_is_left_out_and_that_is_told(command: str, left_out: str, order: str) -> None:
+    translation = RulesTranslator().program_for(command.format(order))
+    assert same_program(translation.program, command_to_program(order))
+    assert translation.notes == (f"'{left_out}' was not understood and left out.",)
+
+
+def test_words_of_operators_are_taken_as_whole_words_are() -> None:
+    for short, long in {
+        "goto printer": "go to the printer",
+        "4x: fwd 1m, right 90": "do this four times: go forward 1 m, turn right 90 degrees",
+        "set heading 270 degrees": "turn west",
+        "turn 90 deg ccw": "turn left 90 degrees",
+        "target pose: 1.5 m north of the dining table": "stand 1.5 m north of the dining table",
+        "go to sink turn right go forward one meter": "go to the sink, turn right, go forward one meter",
+    }.items():
+        assert same_program(command_to_program(short), command_to_program(long)), short
+
+
+def test_the_two_and_there_are_what_was_named() -> None:
+    between = 'move_in_between("desk", "lamp")'
+    assert same_program(command_to_program("I see a desk and a lamp, go between them."), between)
+    in_the_office = "move_to(get_major_map(area='office'))\nface(get_major_map(obj='monitor') * get_map(area='office'))"
+    assert same_program(command_to_program("Go to the office and face the monitor there."), in_the_office)
+    with pytest.raises(LanguageError, match="'the two' refers to nothing"):
+        command_to_program("stop between them")
 
 
 def test_a_thing_that_sounds_is_a_sound_and_that_is_told() -> None:

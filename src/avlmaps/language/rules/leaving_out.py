@@ -44,7 +44,8 @@ _NEVER = re.compile(
     r"please|let's|"
     r"let us|robot|when|whenever|after|before|then|first|second|twice|times|again|only|always|both|"
     r"careful|"
-    rf"{words.SPELLED.replace('|an|a|', '|').replace('|a|', '|')})\b",
+    r"two|three|four|five|six|seven|eight|nine|ten|twenty|thirty|forty|fifty|sixty|ninety|hundred|half|"
+    r"quarter|dozen)\b",
     re.IGNORECASE,
 )
 _PERSON = (
@@ -72,8 +73,14 @@ _ORDERED = re.compile(
     re.IGNORECASE,
 )
 _OWN_PURPOSE = re.compile(rf"^{_CAUSE}(?:i|we|he|she|they)(?:'\w+)? .*$", re.IGNORECASE)
+# "We want to watch a movie" is nobody's order; "I want to be at the sofa" is one.
+_OWN_WISH = re.compile(
+    rf"^{_CAUSE}(?:i|we)(?:'d| would)?(?: really)? (?:want|need|like|love|have)(?:ed)? to "
+    rf"(?!(?:{words.MOVE}|{words.TURN}|{words.RETURN}|face|look)\b)(?!.*\b(?:you|and|then)\b)",
+    re.IGNORECASE,
+)
 _SOMEWHERE = re.compile(
-    r"\b(?:in|inside|on|at|near|by|next|under|beside|below|above|where|from|with|close)\b", re.IGNORECASE
+    r"\b(?:in|inside|on|at|to|into|onto|near|by|next|under|beside|below|above|where|from|with|close)\b", re.IGNORECASE
 )
 _REFERRING = re.compile(
     r"\b(?:it|its|them|him|there|here)\b(?!'s| is| are)|\bher(?=\s*(?:[.,;!?]|$))|\b(?:that|this|those|"
@@ -163,8 +170,9 @@ def _may_be_left_out(parts: list[_Part], at: int) -> bool:
         or (mark.startswith("?") and _QUESTION.match(said))
     ):
         return False
-    wish = _OWN_PURPOSE.match(said) and (at > 0 or re.match(r"(?:because|since|as)\b", said, re.IGNORECASE))
-    if _ORDERED.search(said) and not (wish and not re.search(r"\byou\b", said, re.IGNORECASE)):
+    purpose = _OWN_PURPOSE.match(said) and (at > 0 or re.match(r"(?:because|since|as)\b", said, re.IGNORECASE))
+    own = _OWN_WISH.match(said) or (purpose and not re.search(r"\byou\b", said, re.IGNORECASE))
+    if _ORDERED.search(said) and not own:
         return False
     others = " ".join(part.text for part in parts if part is not parts[at])
     return not _tells_where(said, others) and not _is_meant_later(following)

@@ -70,10 +70,22 @@ _WHEN = (
     r"with my (?:phone|camera)|for you|somewhere|there|before|once|recently|in here))*"
 )
 _PICTURED = [
-    (rf"\bwhere (?:this|that|it|the (?:{_SHOT})) (?:was|is|got) (?:recorded|taken|shot|heard|made|captured)[:,]? ?(?=⟦)", "to "),
-    (rf"\bto to (?=⟦)", "to "),
-    (rf"{BEGINS}do you (?:recogni[sz]e|know|remember|see|like) (?:(?:{_DETERMINER}) )?(?:\w+ )?(?:{_SHOT} )?(⟦[ic]\d+⟧)\s*\?", r" ; ⟦said⟧ \1 ; "),
-    (rf"(?:the {_SPOT} (?:in|of|on|from|shown in|seen in) )?(⟦[ic]\d+⟧) (?:is|will be|should be|shows) (?:your|the|our) (?:next |new |final )?(?:stop|goal|target|destination|waypoint)", r"go to \1"),
+    (
+        rf"\bwhere (?:this|that|it|the (?:{_SHOT})) (?:was|is|got) (?:recorded|taken|shot|heard|made|"
+        r"captured)[:,]? ?(?=⟦)",
+        "to ",
+    ),
+    (r"\bto to (?=⟦)", "to "),
+    (
+        rf"{BEGINS}do you (?:recogni[sz]e|know|remember|see|like) (?:(?:{_DETERMINER}) )?(?:\w+ )?(?:{_SHOT} "
+        r")?(⟦[ic]\d+⟧)\s*\?",
+        r" ; ⟦said⟧ \1 ; ",
+    ),
+    (
+        rf"(?:the {_SPOT} (?:in|of|on|from|shown in|seen in) )?(⟦[ic]\d+⟧) (?:is|will be|should be|"
+        r"shows) (?:your|the|our) (?:next |new |final )?(?:stop|goal|target|destination|waypoint)",
+        r"go to \1",
+    ),
     (
         rf"{BEGINS}(?:(?:yesterday|today|this morning|earlier|last (?:night|week)|just now|once),? )?(?:i|"
         rf"we|you|he|she|they|someone|somebody|{PERSON})(?: have| has|'ve| had)?(?: just| also)? (?:took|"
@@ -137,11 +149,25 @@ _PICTURED = [
 ]
 
 _SOUNDS = [
-    (rf"\b(?:sound|noise) source[: ]+(?:of |is )?(?=\w)(?!(?:is|was|and|then)\b)", "the sound of "),
-    (rf"{BEGINS}((?!(?:the|a|an|my|that|this)\b){NO_SUBJECT}[a-z]+) (?:is|was|are|were|keeps?|kept) ({SOUNDING})\b", r" ; ⟦said⟧ the sound of \1 \2"),
-    (rf"{BEGINS}it(?:'s| is| was) (?:an? |the )?([\w -]+? (?:pounding|{SOUNDING}))(?=\s*[.,;!])", r" ; ⟦said⟧ the sound of \1"),
-    (rf"\bwhere(?:ver)? (?:that|the|all that|this) ([\w -]+?)(?: noise| sound)? (is|was) coming from", r"where the \1 \2 coming from"),
-    (rf"{BEGINS}({_DETERMINER} [\w-]+(?: [\w-]+)?) (?:was|has been|got|is) (broken|smashed|shattered|slammed)(?=\s*[.,;!])", r" ; ⟦said⟧ where \1 \2"),
+    (r"\b(?:sound|noise) source[: ]+(?:of |is )?(?=\w)(?!(?:is|was|and|then)\b)", "the sound of "),
+    (
+        rf"{BEGINS}((?!(?:the|a|an|my|that|this)\b){NO_SUBJECT}[a-z]+) (?:is|was|are|were|keeps?|"
+        rf"kept) ({SOUNDING})\b",
+        r" ; ⟦said⟧ the sound of \1 \2",
+    ),
+    (
+        rf"{BEGINS}it(?:'s| is| was) (?:an? |the )?([\w -]+? (?:pounding|{SOUNDING}))(?=\s*[.,;!])",
+        r" ; ⟦said⟧ the sound of \1",
+    ),
+    (
+        r"\bwhere(?:ver)? (?:that|the|all that|this) ([\w -]+?)(?: noise| sound)? (is|was) coming from",
+        r"where the \1 \2 coming from",
+    ),
+    (
+        rf"{BEGINS}((?:an?|some|another) [\w-]+(?: [\w-]+)?) (?:was|has been|got) (broken|smashed|shattered|"
+        r"slammed)(?=\s*[.,;!])",
+        r" ; ⟦said⟧ where \1 \2",
+    ),
     (rf"\b(?:to )?(?:the \w+ )?where (?:that|this|it) (?:happened|occurred|took place){NEXT}", "to it"),
     (
         rf"{BEGINS}(?:(?:somewhere|someplace),? )?((?:(?:{_DETERMINER}) (?!{_DETERMINER})[\w-]+(?: [\w-]+)?|"
@@ -207,14 +233,24 @@ _SOUNDS = [
 ]
 
 _TWO = [
-    (r"(?<=\w) (?:that |which )?(?:you|we|i) (?:can|will|could|would|may|should|'ll)? ?(?:find|see|spot|have|notice) (?=(?:in|on|at|near|next|by|beside|under|behind|where)\b)(?<!do you see )", " "),
-    (rf"{BEGINS}({_DETERMINER} [\w-]+(?: [\w-]+)?) (?:is|are) the ones? (?=(?:near|next|by|beside|in|on|at|close|under|behind|where)\b)", r" ; ⟦said⟧ \1 "),
     (
-        rf"(?:^|(?<=[.;!?]))\s*({_DETERMINER} [\w-]+(?: [\w-]+)?) (?=(?:to|on|at) your (?:left|right)(?:[- ]hand)?(?: side)?(?:,? please)?\s*[.!]*$)",
+        r"(?<=\w) (?:that |which )?(?:you|we|i) (?:can|will|could|would|may|should|'ll)? ?(?:find|see|spot|"
+        r"have|notice) (?=(?:in|on|at|near|next|by|beside|under|behind|where)\b)(?<!do you see )",
+        " ",
+    ),
+    (
+        rf"{BEGINS}({_DETERMINER} [\w-]+(?: [\w-]+)?) (?:is|are) the ones? (?=(?:near|next|by|beside|in|on|"
+        r"at|close|under|behind|where)\b)",
+        r" ; ⟦said⟧ \1 ",
+    ),
+    (
+        rf"(?:^|(?<=[.;!?]))\s*({_DETERMINER} [\w-]+(?: [\w-]+)?) (?=(?:to|on|at) your (?:left|"
+        r"right)(?:[- ]hand)?(?: side)?(?:,? please)?\s*[.!]*$)",
         r" have \1 ",
     ),
     (
-        rf"(?:^|(?<=[.;!?]))\s*(?:i (?:need|want) )?({_DETERMINER} [\w-]+(?: [\w-]+)?) (?:(?:must|should|has to|needs to|ought to|shall) be )(?=(?:right |directly )?(?:in front of|behind|ahead of) you)",
+        rf"(?:^|(?<=[.;!?]))\s*(?:i (?:need|want) )?({_DETERMINER} [\w-]+(?: [\w-]+)?) (?:(?:must|should|"
+        r"has to|needs to|ought to|shall) be )(?=(?:right |directly )?(?:in front of|behind|ahead of) you)",
         r" have \1 ",
     ),
     (

@@ -122,22 +122,47 @@ _LOGS = [
 ]
 
 _PATIENCE = [
-    (r"\s*>+\s*(?=[a-z])", " ; "),
-    (rf"{_BEGINS}(find|visit|approach|face|seek|locate|reach|turn|rotate|move|go to|drive to) ?[:=] ?(?=\w)", r" \1 "),
     (
-        r"\b(?:move|get|bring|haul|drag|shift|drive|put|park|take|roll) (?:your|that|its) (?:butt|self|behind|wheels|metal|"
-        r"body|tin|lazy|shiny|little|big| )+(?= (?:over |right |straight )*(?:to|into|in|at|next|near|by|beside|between))",
+        rf"{_BEGINS}((?:{_DETERMINER}) [\w-]+(?: [\w-]+)?) (?:must|should|has to|needs to|ought to|shall) be "
+        r"(?=(?:right |directly )?(?:in front of|behind|ahead of) you\b)",
+        r" have \1 ",
+    ),
+    (
+        rf"{_BEGINS}(?:i|we)(?:'d| would)? (?:want|need|like|have) to (?:look at|see|inspect|"
+        rf"check) ((?:{_DETERMINER}) [^.;!?,]+?)(?: again| up close)?,? (?:so|and so|that's why|"
+        r"therefore)(?: please)? (?=[^.;]*\bit\b)",
+        r" ⟦said⟧ \1 ; ",
+    ),
+    (r"\s*>+\s*(?=[a-z])", " ; "),
+    (
+        rf"{_BEGINS}(find|visit|approach|face|seek|locate|reach|turn|rotate|move|go to|" r"drive to) ?[:=] ?(?=\w)",
+        r" \1 ",
+    ),
+    (
+        r"\b(?:move|get|bring|haul|drag|shift|drive|put|park|take|roll) (?:your|that|its) (?:butt|self|"
+        r"behind|wheels|metal|"
+        r"body|tin|lazy|shiny|little|big| )+(?= (?:over |right |straight )*(?:to|into|in|at|next|near|by|"
+        r"beside|between))",
         "go",
     ),
     (r"\b(?:give|do|make) (?:me|us|yourself) (?=an? )", "make "),
-    (r"\b(?:hang out|hang around|chill|camp|loiter|live|lurk|hide|crouch|squat|land) (?=(?:in|at|near|next|by|beside|between|on)\b)", "stop "),
+    (
+        r"\b(?:hang out|hang around|chill|camp|loiter|live|lurk|hide|crouch|squat|land) (?=(?:in|at|near|"
+        r"next|by|beside|between|on)\b)",
+        "stop ",
+    ),
     (r"\bright (?=in (?:the middle|between))", ""),
     (r"\b(?:arrange|align|angle|adjust|set) yourself,? (?=so|such|with)", "turn "),
     (
-        r"\b(?:it|that) would (?:really )?(?:help|mean|please|make)[\w' ]*? if you (?:went|drove|could go|would go|moved|came|go|got)",
+        r"\b(?:it|that) would (?:really )?(?:help|mean|please|make)[\w' ]*? if you (?:went|drove|could go|"
+        r"would go|moved|came|go|got)",
         "go",
     ),
-    (rf"\b({words.GO}) so (?:that )?you(?:'re| are| end up| stand| stop)? (?=(?:on|to|at) (?:the|your)|left|right|between)", r"\1 "),
+    (
+        rf"\b({words.GO}) so (?:that )?you(?:'re| are| end up| stand| stop)? (?=(?:on|to|at) (?:the|your)|"
+        r"left|right|between)",
+        r"\1 ",
+    ),
     (
         rf"\b(wait|stop|stay|pause|rest|stand|halt|remain)((?: there| here)?) {_AWAIT}(?=\s*(?:[.;!?,]|$)|"
         r" (?:and|then)\b)",
