@@ -199,7 +199,7 @@ def test_merges_of_a_clip_on_the_hub_do_as_well(models, monkeypatch):
     assert clip_tokens().encode(phrases) == wanted
 
 
-@pytest.mark.parametrize("content", [b"no zip", gzip.compress(b"#version\na b\n")])
+@pytest.mark.parametrize("content", [b"no zip", gzip.compress(b"#version\na b\n")], ids=["no zip", "too short"])
 def test_another_list_is_refused(models, content):
     (models / BYTE_PAIRS).write_bytes(content)
     with pytest.raises(BackendError, match="curl -LO"):
