@@ -122,6 +122,23 @@ _LOGS = [
 ]
 
 _PATIENCE = [
+    (r"\b(where|what|who|there|that)s\b", r"\1's"),
+    (r"\b(go|drive|come|get|move) 2 (?=where\b)", r"\1 to "),
+    (r"(?:,| for (?:me|us)) (?:dear|hon(?:ey)?|sweetie|love|darling|over|copy|mate|pal)(?=\s*[.!?]*$)", ""),
+    (r"\breport (?=to (?:the|my)\b)", "go "),
+    (r"\bcome (?:right|straight|directly) back\b", "come back"),
+    (rf"{_BEGINS}(?:then |and )*back here{_ENDS}", " come back"),
+    (
+        rf"\b(?:i|we)(?:'d| would)? (?:want|need|like) ((?:{_DETERMINER}) [\w -]+?) to be "
+        r"(?=(?:on|to|at) (?:your|the) (?:left|right)\b|behind you|in front of you)",
+        r"have \1 ",
+    ),
+    (
+        rf"{_BEGINS}(?:i|we) (?:have|need|want) to find ((?:{_DETERMINER}) [^.;!?,]+?)[,.;!] "
+        r"(?=[^.;]*\b(?:it|there|them)\b)",
+        r" ⟦said⟧ \1 ; ",
+    ),
+    (r"\b(?:the (?:source|origin) of )?the (?:sound|noise) (?:in|of|from|on) (?=⟦c)", ""),
     (
         rf"{_BEGINS}((?:{_DETERMINER}) [\w-]+(?: [\w-]+)?) (?:must|should|has to|needs to|ought to|shall) be "
         r"(?=(?:right |directly )?(?:in front of|behind|ahead of) you\b)",
