@@ -23,7 +23,7 @@ DEVELOPMENT = {COMMANDS / "paraphrases.jsonl": (60, 60), COMMANDS / "paraphrases
 BLIND = COMMANDS / "paraphrases_3.jsonl"
 SETS = [path for path in (*DEVELOPMENT, BLIND) if path.exists()]
 # How many of the blind ones were right when they were first asked (90 % are asked for): this holds what there is.
-BLIND_REACHED = 0
+BLIND_REACHED = 58
 
 
 @pytest.mark.parametrize("path", SETS, ids=lambda path: path.stem)
