@@ -52,6 +52,6 @@ def likeliest(things: NearThings) -> NearThings:
     """Return the best guesses among unsure instances: no specks, and at least half as sure as the surest."""
     surface_m2 = np.bincount(things.instance, minlength=len(things.confidence)) * things.space.grid.voxel_size_m**2
     solid = np.where(surface_m2 >= _SPECK_M2, things.confidence, 0.0).astype(np.float32)
-    least = max(float(np.max(solid, initial=0.0)) / 2, np.finfo(np.float32).tiny)
+    least = max(float(np.max(solid, initial=0.0)) / 2, float(np.finfo(np.float32).tiny))
     mask, instance, confidence = without_specks(things.mask, things.instance, solid, least)
     return replace(things, mask=mask, instance=instance, confidence=confidence, with_unsure=lambda: things)
