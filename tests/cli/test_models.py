@@ -53,6 +53,7 @@ def test_the_words_hold_while_the_verb_runs_and_for_processes_that_it_starts(
     empty: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("AVLMAPS_BATCH", "7")
+    monkeypatch.delenv("HF_HUB_OFFLINE", raising=False)
     with models_in_force(Query(map=Path("m"), models=empty, device="cpu", precision="float32")):
         assert model_settings() == ModelSettings(empty, "cpu", "float32", 7, False)
         code = "from avlmaps.perception.models.settings import model_settings as s; print(s().folder, s().batch)"
