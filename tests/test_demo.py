@@ -227,6 +227,7 @@ def test_an_answer_is_right_when_it_is_found_within_reach(
     step = Step(asks[0], {"found": found, "goals": [{"position": goal, "score": 0.5}]}, "p.png")
     assert step.off_m == pytest.approx(away_m)
     assert step.right is right
+    assert step.verdict == ("right" if right else "WRONG" if found else "unsure")
     assert REACH_M == 1.0
 
 
@@ -235,6 +236,7 @@ def test_saying_that_there_is_none_is_right_only_where_there_is_none(tmp_path: P
     nothing = {"found": False, "goals": []}
     assert Step(asks[-1], nothing, "p.png").right
     assert not Step(asks[0], nothing, "p.png").right
+    assert Step(asks[0], nothing, "p.png").verdict == "WRONG"
     assert not Step(asks[-1], {"found": True, "goals": [{"position": [0, 0, 0], "score": 1.0}]}, "p.png").right
 
 

@@ -219,9 +219,9 @@ def _verdict(report: "DemoReport") -> str:
     right = sum(step.right for step in report.steps)
     return (
         f"<h2>What it answered: {right} of {len(report.steps)} right</h2><p>The questions were chosen by rule from "
-        "what stands in the home, before the map was asked. An answer is right when its first goal lies "
-        "within 1 m of a "
-        "true place, seen from above, or when the map says truly that there is none.</p>"
+        "what stands in the home, before the map was asked. An answer is right when its first goal lies within 1 m of "
+        "a true place, seen from above, or when the map says truly that there is none; unsure when it says that there is "
+        "none, and its best guess is right.</p>"
         '<p class="key"><span><svg viewBox="0 0 40 40"><g class="goal"><circle cx="20" cy="20" r="17"/></g></svg>'
         'goals, best first</span><span><svg viewBox="0 0 40 40"><circle class="truth" cx="20" cy="20" r="15"/></svg>'
         'the truth</span><span><svg viewBox="0 0 40 40"><circle class="other" cx="20" cy="20" '
@@ -231,7 +231,7 @@ def _verdict(report: "DemoReport") -> str:
 
 
 def _question(number: int, step: "Step", answer: "Answer", sheet: Sheet, photo: "PhotoView | None") -> str:
-    verdict = '<span class="verdict right">right</span>' if step.right else '<span class="verdict wrong">WRONG</span>'
+    verdict = f'<span class="verdict {step.verdict.lower()}">{step.verdict}</span>'
     return (
         f'<article class="card question"><div class="head"><h3>{number}. “{escape(step.ask.title)}”</h3>{verdict}</div>'
         f"<p>{escape(step.ask.why)}</p>{_panels(step, answer, sheet, photo)}"
@@ -249,7 +249,8 @@ def _panels(step: "Step", answer: "Answer", sheet: Sheet, photo: "PhotoView | No
     ground = '<use href="#ground"/>'
     seen = sheet.camera(photo.world_from_camera) if photo else ""
     truth = sheet.band(ask.truth[1:]) if ask.kind == "clip" else sheet.rings(ask.truth, "truth")
-    goals = sheet.goals([goal.position for goal in answer.goals]) if answer.found else ""
+    told = answer.found or ask.truth  # where there is nothing, a guess is no goal
+    goals = sheet.goals([goal.position for goal in answer.goals]) if told else ""
     layers = [ground, _layer(sheet, heat_from_above(heat.space, heat.values)), sheet.rings(ask.others, "other")]
     large = _figure(
         sheet, [*layers, truth, seen, goals], "all together" if len(heat.factors) > 1 else _label(answer, 0)
@@ -300,7 +301,8 @@ def _said(step: "Step") -> str:
     if not step.answer["found"]:
         notes = "; ".join(_without_folder(part["note"], step) for part in step.answer["parts"] if part["note"])
         told = "The map says that there is none here" + (f" ({escape(notes)})" if notes else "")
-        return f"{told}, and so it is." if not step.ask.truth else f"{told}, but there is."
+        guess = "" if step.off_m is None else f" Its best guess is {step.off_m:.2f} m from the true one."
+        return f"{told}, and so it is." if not step.ask.truth else f"{told}, but there is.{guess}"
     goal = step.answer["goals"][0]
     place = ", ".join(f"{value:.1f}" for value in goal["position"])
     told = f"First goal at ({place}) m, score {goal['score']:.2f}"

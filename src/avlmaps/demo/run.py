@@ -81,10 +81,19 @@ class Step:
         return bool(self.answer["found"]) and self.off_m is not None and self.off_m <= REACH_M
 
     @property
+    def verdict(self) -> str:
+        """``right``, ``WRONG``, or ``unsure``: not found, and yet the best guess is right."""
+        if self.right:
+            return "right"
+        guessed = not self.answer["found"] and self.off_m is not None and self.off_m <= REACH_M
+        return "unsure" if guessed else "WRONG"
+
+    @property
     def said(self) -> str:
         """The answer in words, and how far off it is."""
         if not self.answer["found"]:
-            return "not here"
+            guess = "" if self.off_m is None else f"; its best guess is {self.off_m:.2f} m from the true one"
+            return f"not here, it thinks{guess}"
         place = ", ".join(f"{value:.2f}" for value in self.answer["goals"][0]["position"])
         return f"({place})" + ("" if self.off_m is None else f", {self.off_m:.2f} m from the true one")
 
@@ -131,7 +140,7 @@ class DemoReport:
 
     def lines(self) -> list[str]:
         """Return it as a person reads it."""
-        lines = [f"{'right' if step.right else 'WRONG'}  {step.ask.title}  ->  {step.said}" for step in self.steps]
+        lines = [f"{step.verdict:6} {step.ask.title}  ->  {step.said}" for step in self.steps]
         if self.located is not None:
             lines.append(f"photo located within {self.located[0]:.1f} cm and {self.located[1]:.2f} degrees")
         lines += [] if self.drive is None else self.drive.lines()
