@@ -220,8 +220,8 @@ def _verdict(report: "DemoReport") -> str:
     return (
         f"<h2>What it answered: {right} of {len(report.steps)} right</h2><p>The questions were chosen by rule from "
         "what stands in the home, before the map was asked. An answer is right when its first goal lies within 1 m of "
-        "a true place, seen from above, or when the map says truly that there is none; unsure when it says that there is "
-        "none, and its best guess is right.</p>"
+        "a true place, seen from above, or when the map says truly that there is none; unsure when it says that there "
+        "is none, and its best guess is right.</p>"
         '<p class="key"><span><svg viewBox="0 0 40 40"><g class="goal"><circle cx="20" cy="20" r="17"/></g></svg>'
         'goals, best first</span><span><svg viewBox="0 0 40 40"><circle class="truth" cx="20" cy="20" r="15"/></svg>'
         'the truth</span><span><svg viewBox="0 0 40 40"><circle class="other" cx="20" cy="20" '
