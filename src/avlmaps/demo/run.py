@@ -78,15 +78,18 @@ class Step:
         """Whether the answer is right: the place, or that there is none."""
         if not self.ask.truth:
             return not self.answer["found"]
-        return bool(self.answer["found"]) and self.off_m is not None and self.off_m <= REACH_M
+        return bool(self.answer["found"]) and self._near
+
+    @property
+    def _near(self) -> bool:
+        return self.off_m is not None and self.off_m <= REACH_M
 
     @property
     def verdict(self) -> str:
         """``right``, ``WRONG``, or ``unsure``: not found, and yet the best guess is right."""
         if self.right:
             return "right"
-        guessed = not self.answer["found"] and self.off_m is not None and self.off_m <= REACH_M
-        return "unsure" if guessed else "WRONG"
+        return "unsure" if self._near and not self.answer["found"] else "WRONG"
 
     @property
     def said(self) -> str:

@@ -6,20 +6,15 @@ becomes "⟦said⟧ where the phone was ringing, drive to it".
 """
 
 from avlmaps.language.rules import words
-from avlmaps.language.rules.sounds import PAST_TENSES, SOUND_VERBS
+from avlmaps.language.rules.remarks import BEGINS, ENDS, SOUNDED, SOUNDING
 
 _DETERMINER = words.DETERMINER
-_BEGINS = r"(?:^|(?<=[.;!?,:]))\s*(?:(?:and|but|so|well|look|hey|now|listen),? )?"
-_ENDS = r"(?=\s*(?:[.;!?,:)]|$))"
-_GOING = rf"(?:{words.MOVE}|{words.RETURN}|{words.TURN}|{words.FACE})"
 _NO_NAME = r"(?:and|or|it|one|that|which|who|where|is|are|was|were|robot|then|goal|target|destination|task)"
 # A thing with its article and up to five words, none of which can be a verb or a connective.
 _THING = rf"(?:{_DETERMINER}(?: (?!(?:{_NO_NAME}|{words.GO})\b)[\w-]+){{1,5}}?)"
 _AT_A_PLACE = (
     r"(?=(?:near|next to|beside|by|close to|in|inside|within|on|at|under|behind|against|between|opposite|where) [\w⟦])"
 )
-_SOUNDING = rf"(?:(?:{'|'.join(SOUND_VERBS)})[a-z]?ing|going off)"
-_SOUNDED = rf"(?:(?:{'|'.join(SOUND_VERBS)})[a-z]?ed|{'|'.join(PAST_TENSES)})"
 _WAS = r"(?:'s| is| was| are| were| has been| have been|'s been| keeps?| started| has started)"
 _SOMEONE = r"(?:someone|somebody|something)"
 _SHOT = r"(?:photo(?:graph)?|picture|pic|image|snap(?:shot)?|shot|screenshot|frame)"
@@ -36,7 +31,7 @@ _ASIDES = [
     (
         r",\s*(?:would you|will you|could you|can you|won't you|would ya|yeah|if you please|please and thank you|"
         r"(?:there's|like|be) a (?:good|dear|love|nice|clever) ?\w*|you know|dear|pal|ok(?:ay)?|got it|right(?=\s*\?))"
-        rf"{_ENDS}",
+        rf"{ENDS}",
         "",
     ),
     (rf"(?:\s*[,;.!]|\s+and)\s*(?:and )?{_HASTE}(?=\s*(?:[.;!?,]|$))", ""),
@@ -45,7 +40,7 @@ _ASIDES = [
     (r"\bif you(?:'d| would) be so (?:kind|good)\b", " "),
     (r",? should you (?:choose|wish|decide) to accept(?: it)?,?", " "),
     (
-        rf"{_BEGINS}(?:i'm|i am|we're|we are|it's|it is|they're) (?:(?:very|so|really|quite|a bit|getting|too) )*"
+        rf"{BEGINS}(?:i'm|i am|we're|we are|it's|it is|they're) (?:(?:very|so|really|quite|a bit|getting|too) )*"
         rf"(?!(?:{_DETERMINER}|in|at|on|near|by|where|next|{words.COMPASS})\b)[\w-]+(?<!ing)"
         rf"(?: (?:in|at) {_DETERMINER} \w+)?\s*[.,;!] (?=\w)",
         " ",
@@ -65,7 +60,7 @@ _ASIDES = [
         " ",
     ),
     (r"\bwhy (?:don't|do not|not)(?: you| we)?\b", " "),
-    (rf"{_BEGINS}(?:how|what) about (?:you )?", " "),
+    (rf"{BEGINS}(?:how|what) about (?:you )?", " "),
     (r"\b(?:is there )?any chance (?:that )?(?:you|of you|of)(?: could| can| would| might)?\b", " "),
     (r"\b(?:would|is) it (?:be )?possible(?: for you)? to\b", " "),
     (r"\b(?:do|could you do|would you do) (?:me|us) a favou?r(?: and|:|,)?", " "),
@@ -137,10 +132,10 @@ _STATEMENTS = [
     (r"\b(you|we|they|i)'ve\b", r"\1 have"),
     (r"\bi (?:think|believe|guess|suppose|reckon|am sure|'m (?:pretty )?sure)(?: that)?,? (?=\w)", ""),
     (r"\ball (?=(?:that|this|the) )", ""),
-    (rf",? \b(?:earlier|just now|a (?:moment|minute|while|second) ago|yesterday|this morning|last night){_ENDS}", ""),
-    (rf"{_BEGINS}(?:do you |did you |can you )?(?:hear|see) (?:that|it)\s*\?", " "),
+    (rf",? \b(?:earlier|just now|a (?:moment|minute|while|second) ago|yesterday|this morning|last night){ENDS}", ""),
+    (rf"{BEGINS}(?:do you |did you |can you )?(?:hear|see) (?:that|it)\s*\?", " "),
     (
-        rf"{_BEGINS}(?:it is|it must be|that must be|sounds like) (?={_DETERMINER} [^.;!?,]+[.;!?,] \w)"
+        rf"{BEGINS}(?:it is|it must be|that must be|sounds like) (?={_DETERMINER} [^.;!?,]+[.;!?,] \w)"
         rf"(?!.*\b(?:i (?:want|need|would)|you (?:should|must|need|are to))\b)",
         " ; ⟦said⟧ ",
     ),
@@ -151,37 +146,37 @@ _STATEMENTS = [
         "i want you ",
     ),
     (
-        rf"{_BEGINS}where (?:do|did|can|could|have) (?:you|i|we) (?:last |just )?hear(?:d)? ({_DETERMINER}|)"
+        rf"{BEGINS}where (?:do|did|can|could|have) (?:you|i|we) (?:last |just )?hear(?:d)? ({_DETERMINER}|)"
         rf"([^.;!?,]+?)\s*\?",
         r" ; ⟦said⟧ the sound of \2 ;",
     ),
     (
-        rf"{_BEGINS}where (?:do|did|can|could|have) (?:you|i|we) (?:last |just )?(?:see|seen|find) ({_DETERMINER} "
+        rf"{BEGINS}where (?:do|did|can|could|have) (?:you|i|we) (?:last |just )?(?:see|seen|find) ({_DETERMINER} "
         rf"[^.;!?,]+?)\s*\?",
         r" ; ⟦said⟧ \1 ;",
     ),
-    (rf"(?<=\w )(?:its|the) (?:source|origin){_ENDS}", "it"),
+    (rf"(?<=\w )(?:its|the) (?:source|origin){ENDS}", "it"),
     (rf"\b(?:track|trace|chase|pursue|investigate|check) (?=(?:{_DETERMINER} )?(?:sounds?|noises?)\b)", "find "),
     (
         rf"[,;.]?\s*\b(?:and )?on the way(?: there)?,? (?=(?:{words.MOVE})\b)",
         " ; ⟦after⟧ ",
     ),
     (
-        rf"[,;.]\s*(?:and |but )?((?:{words.MOVE})\b[^,;.!?]*?) on the way(?: there)?{_ENDS}",
+        rf"[,;.]\s*(?:and |but )?((?:{words.MOVE})\b[^,;.!?]*?) on the way(?: there)?{ENDS}",
         r" ; ⟦after⟧ \1",
     ),
     (r"\bhaving arrived(?: there)?\b", "then"),
     (r"\bfirst off (?=to\b)", "go "),
     (r"\b(?:look|turn|check) behind (?:you|yourself)\b", "turn around"),
-    (rf"\b(?:the )?(?:thing|one|object|device) (?:(?:that|which)(?:'s| is| was) )(?={_SOUNDING}\b)", "the sound of "),
+    (rf"\b(?:the )?(?:thing|one|object|device) (?:(?:that|which)(?:'s| is| was) )(?={SOUNDING}\b)", "the sound of "),
     (
-        rf"({_THING}) (?:that|which|who)(?:'s| is| was| are| were)(?: just| still| now)? ({_SOUNDING})\b(?! (?:in|"
+        rf"({_THING}) (?:that|which|who)(?:'s| is| was| are| were)(?: just| still| now)? ({SOUNDING})\b(?! (?:in|"
         rf"on|at|to) (?:the|a)\b)",
         r"\1 \2",
     ),
     (r"\b(?:the|an?) (?:area|zone|room|place|spot|location) with (?=(?:the|an?) (?:sounds?|noises?)\b)", ""),
-    (rf"({_BEGINS})what(?:'s| is| was) (?={_DETERMINER} [\w -]+\?)", r"\1 ; ⟦said⟧ "),
-    (rf"\b(?:go|drive|come|run|head|move|walk) (?:over|across){_ENDS}", "go there"),
+    (rf"({BEGINS})what(?:'s| is| was) (?={_DETERMINER} [\w -]+\?)", r"\1 ; ⟦said⟧ "),
+    (rf"\b(?:go|drive|come|run|head|move|walk) (?:over|across){ENDS}", "go there"),
     (r"\b(you|we|they)'re\b", r"\1 are"),
     (rf"({_SHOT}|{_RECORDING}|file)\s*[,:]\s*(?=⟦)", r"\1 "),
     # "where it was taken": of the picture that was named.
@@ -204,27 +199,27 @@ _STATEMENTS = [
         r"\1",
     ),
     (
-        rf"{_BEGINS}(?:take a look at|have a look at|look at|see|consider|take|check|listen to|play) "
+        rf"{BEGINS}(?:take a look at|have a look at|look at|see|consider|take|check|listen to|play) "
         rf"(?=(?:{_DETERMINER} (?:\w+ )?)?"
         rf"(?:(?:{_SHOT}|{_RECORDING})\b[^⟦.;]*)?⟦[^.;,!?]*[.;,!?].*\b(?:it|there)\b)",
         " ; ⟦said⟧ ",
     ),
     # "I heard a crash, go and see where that came from".
-    (rf"\b{_LOOK_INTO} (?:where|what|who) {_IT_WAS}{_ENDS}", "go to it"),
+    (rf"\b{_LOOK_INTO} (?:where|what|who) {_IT_WAS}{ENDS}", "go to it"),
     (
         rf"\b{_LOOK_INTO} (?:what(?:'s| is| was)? (?:happened|happening|going on|wrong|up|the matter)|what made "
-        rf"(?:it|that)(?: noise| sound)?)(?: there)?{_ENDS}",
+        rf"(?:it|that)(?: noise| sound)?)(?: there)?{ENDS}",
         "go to it",
     ),
     (
         rf"\b(?:go(?: and)? )?(?:check (?:it|that|this) out|investigate(?: it| that| this)?|look into (?:it|that)|"
         rf"see to (?:it|that)|check on it|track (?:it|that) down|find (?:its|the) (?:source|origin)(?: of (?:it|"
-        rf"that))?|have a look there){_ENDS}",
+        rf"that))?|have a look there){ENDS}",
         "go to it",
     ),
     (
         rf"\b(?:go|drive|come|run|head)(?: over)?(?: and|,)? (?:see|look|check|have a look|take a look|find out)"
-        rf"{_ENDS}",
+        rf"{ENDS}",
         "go to it",
     ),
     (rf"(?<!back )\bto where {_IT_CAME}", "to it"),
@@ -236,66 +231,66 @@ _STATEMENTS = [
         r"\b(?! heard)",
         "there is",
     ),
-    (rf"{_BEGINS}(?:is|are|isn't|aren't) there (?=(?:an?|any|some|the|my)\b)", " ; there is "),
+    (rf"{BEGINS}(?:is|are|isn't|aren't) there (?=(?:an?|any|some|the|my)\b)", " ; there is "),
     (
-        rf"{_BEGINS}(?:(?:do|did|can|could) )?(?:you|we|i)(?:'ve| have)?(?: (?:can|could|just|still|now))*(?: be)"
+        rf"{BEGINS}(?:(?:do|did|can|could) )?(?:you|we|i)(?:'ve| have)?(?: (?:can|could|just|still|now))*(?: be)"
         rf"? (?:hear(?:d|ing)?)(?: (?:an?|the|this|that|my|your|some))?(?: (?:sounds?|noises?) of(?: (?:an?|the|"
         rf"this|that|my|your))?)? (?=[\w⟦])(?!it\b)",
         " ; ⟦said⟧ the sound of ",
     ),
     (
-        rf"{_BEGINS}(?:(?:do|can|did|could) )?(?:you|i|we)(?:'ve| have)?(?: (?:can|could|may|might|just|still))* "
+        rf"{BEGINS}(?:(?:do|can|did|could) )?(?:you|i|we)(?:'ve| have)?(?: (?:can|could|may|might|just|still))* "
         rf"(?:see|saw|know|knew|remember|recall|noticed?|seen|spot|spotted|lost|left|misplaced|forgot|have|have "
         rf"got) (?={_DETERMINER}\b|⟦)",
         " ; ⟦said⟧ ",
     ),
-    (rf"{_BEGINS}(?:remember|recall) (?={_DETERMINER}\b|⟦)", " ; ⟦said⟧ "),
-    (rf"{_BEGINS}(?:here(?:'s| is| are)|this is|that's|that is|these are) (?={_DETERMINER}\b|⟦)", " ; ⟦said⟧ "),
+    (rf"{BEGINS}(?:remember|recall) (?={_DETERMINER}\b|⟦)", " ; ⟦said⟧ "),
+    (rf"{BEGINS}(?:here(?:'s| is| are)|this is|that's|that is|these are) (?={_DETERMINER}\b|⟦)", " ; ⟦said⟧ "),
     (
-        rf"{_BEGINS}i(?:'m| am| was|'ve been| have been) (?:looking for|searching for|after|hunting for|trying to "
+        rf"{BEGINS}i(?:'m| am| was|'ve been| have been) (?:looking for|searching for|after|hunting for|trying to "
         rf"find|in search of)\b",
         " find ",
     ),
     (
-        rf"{_BEGINS}where(?:'s| is| are| was| were) ({_DETERMINER}[^.;!?,]+?|music|{_SOMEONE} [^.;!?,]+?) "
+        rf"{BEGINS}where(?:'s| is| are| was| were) ({_DETERMINER}[^.;!?,]+?|music|{_SOMEONE} [^.;!?,]+?) "
         rf"(?:coming|heard)(?: from)?\s*\?",
         r" ; ⟦said⟧ the sound of \1 ;",
     ),
     (
-        rf"{_BEGINS}where(?: does| did| do) ({_DETERMINER}[^.;!?,]+?) (?:come|originate|sound) from\s*\?",
+        rf"{BEGINS}where(?: does| did| do) ({_DETERMINER}[^.;!?,]+?) (?:come|originate|sound) from\s*\?",
         r" ; ⟦said⟧ the sound of \1 ;",
     ),
-    (rf"{_BEGINS}where(?:'s| is| are| was| were) ({_DETERMINER}[^.;!?,]+?)\s*\?", r" ; ⟦said⟧ \1 ;"),
+    (rf"{BEGINS}where(?:'s| is| are| was| were) ({_DETERMINER}[^.;!?,]+?)\s*\?", r" ; ⟦said⟧ \1 ;"),
     (
-        rf"{_BEGINS}({_THING}|{_SOMEONE}){_WAS} (?:\w+ly |just |still |now |again )?({_SOUNDING})\b(?: (?:the|an?|"
+        rf"{BEGINS}({_THING}|{_SOMEONE}){_WAS} (?:\w+ly |just |still |now |again )?({SOUNDING})\b(?: (?:the|an?|"
         rf"his|her|my)\b)?",
         r" ; ⟦said⟧ the sound of \1 \2",
     ),
     (
-        rf"{_BEGINS}({_THING}|{_SOMEONE})(?: has| have)?(?: just)? ({_SOUNDED})\b(?=[^.;!?,]*(?:[.;!?,]|\band\b))",
+        rf"{BEGINS}({_THING}|{_SOMEONE})(?: has| have)?(?: just)? ({SOUNDED})\b(?=[^.;!?,]*(?:[.;!?,]|\band\b))",
         r" ; ⟦said⟧ where \1 \2",
     ),
     (
-        rf"{_BEGINS}({_THING})(?:'s| is| are| stands?| sits?| hangs?| lies| lives?)(?: (?:located|somewhere|right|"
+        rf"{BEGINS}({_THING})(?:'s| is| are| stands?| sits?| hangs?| lies| lives?)(?: (?:located|somewhere|right|"
         rf"just|over|standing|sitting|lying|placed|situated|up|out|back|there))* (?!where\b)"
         rf"{_AT_A_PLACE}(?=[^.;!?,]*[.;!?,])",
         r" ; ⟦said⟧ \1 ",
     ),
     (
-        rf"{_BEGINS}({_THING}) (?:is|are|looks?|seems?|needs?|has|have) (?!(?:near|next|by|in|on|at|under|behind|"
+        rf"{BEGINS}({_THING}) (?:is|are|looks?|seems?|needs?|has|have) (?!(?:near|next|by|in|on|at|under|behind|"
         rf"between) \w)(?:(?!(?:where|what|you|your|that|to)\b)[\w-]+ ?){{1,4}}[.;!?,] (?=[^.;]*\b(?:it|there|"
         rf"them)\b)",
         r" ; ⟦said⟧ \1 ; ",
     ),
     # "the big lamp: face it": named, not yet gone to.
     (
-        rf"{_BEGINS}({_DETERMINER} [^,;.:!?]+)[,:.?!] (?=(?:(?:please|now|could you|can you|would you|just) )"
+        rf"{BEGINS}({_DETERMINER} [^,;.:!?]+)[,:.?!] (?=(?:(?:please|now|could you|can you|would you|just) )"
         rf"*(?:{words.FACE}|{words.TURN}|stop|stand|park|wait|go|move|drive|position yourself)\b[^,;.:!?]*\b(?:it|"
         rf"its|it's)\b)",
         r" ; ⟦said⟧ \1 ; ",
     ),
     (
-        rf"\b(?:the )?(?:sound of )?(?:whoever|whatever|who|what)(?:'s| is| was)(?: making)? (?={_SOUNDING}\b)",
+        rf"\b(?:the )?(?:sound of )?(?:whoever|whatever|who|what)(?:'s| is| was)(?: making)? (?={SOUNDING}\b)",
         "the sound of ",
     ),
 ]
@@ -316,7 +311,7 @@ _PLACES = [
         r"right|just|around|round) )*(?:here|there)\b(?!['’])(?! (?:is|are|was|to)\b)",
         r"\1",
     ),
-    (rf"({_THING}|there is [\w -]+?) (?:somewhere|someplace|nearby|some place|somewhere or other){_ENDS}", r"\1"),
+    (rf"({_THING}|there is [\w -]+?) (?:somewhere|someplace|nearby|some place|somewhere or other){ENDS}", r"\1"),
     (rf"({_THING}) (?:just |right )?outside(?: of)? (?={_DETERMINER}\b)", r"\1 near "),
     (rf"({_THING})(?: (?:that|which)(?:'s| is))?(?: {_ADVERB})+ {_AT_A_PLACE}", r"\1 "),
     (
@@ -346,7 +341,7 @@ _MOTION = [
         rf"{_ABOUT}(?:{_MEASURE}|\d))",
         " ; ",
     ),
-    (rf"(?:^|(?<=[;,.]))\s*((?:left|right) \d+){_ENDS}", r" \1 degrees"),
+    (rf"(?:^|(?<=[;,.]))\s*((?:left|right) \d+){ENDS}", r" \1 degrees"),
     (
         rf"\b(?:a (?:little )?bit|a little|slightly|a tad|a short (?:way|distance))(?: more| further)?,? "
         rf"{_ABOUT}(?={_MEASURE})",

@@ -10,6 +10,7 @@ import torch
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.models.checksums import weights_in
 from avlmaps.perception.models.files import model_folder
+from avlmaps.perception.models.published import differences
 
 T = TypeVar("T")
 # Constants that transformers works out itself; old checkpoints hold them as if they were weights.
@@ -69,15 +70,8 @@ def load_pretrained(
     missing = _uncomputed(told["missing_keys"])
     unknown = [name for name in _uncomputed(told["unexpected_keys"]) if not name.startswith(tuple(ignored))]
     sizes = [str(name) for name, *_ in told.get("mismatched_keys", ())]
-    faults = [
-        f"{what} {', '.join(names[:2])}{f' and {len(names) - 2} more' if len(names) > 2 else ''}"
-        for what, names in (("it lacks", missing), ("nothing takes", unknown), ("of another size is", sizes))
-        if names
-    ]
-    if faults:
-        raise BackendError(
-            f"{folder} is not a whole {kind.__name__}: {'; '.join(faults)}. Get it again with: hf download {model}"
-        )
+    if faults := differences(missing, unknown, sizes):
+        raise BackendError(f"{folder} is not a whole {kind.__name__}: {faults}. Get it again with: hf download {model}")
     return made.eval().to(device)
 
 

@@ -124,15 +124,10 @@ def load_strictly(
         for name in own
         if name in state and state[name].shape != own[name].shape
     ]
-    faults = [
-        f"{what} {_some(names)}"
-        for what, names in (("it lacks", missing), ("nothing takes", unknown), ("of another size is", sizes))
-        if names
-    ]
-    if faults:
+    if faults := differences(missing, unknown, sizes):
         raise BackendError(
-            f"{path} is not the checkpoint of {type(module).__name__}: {'; '.join(faults)}. Get the published one "
-            f"with: {how_to_get}"
+            f"{path} is not the checkpoint of {type(module).__name__}: {faults}. Get the published one with: "
+            f"{how_to_get}"
         )
     module.load_state_dict({name: value for name, value in state.items() if name in own}, strict=False)
 
@@ -170,6 +165,12 @@ def network_from(
     network = network.to_empty(device="cpu")
     load_strictly(network, state, path, how_to_get, not_needed=not_needed)
     return network.eval().requires_grad_(False)
+
+
+def differences(missing: Sequence[str], unknown: Sequence[str], sizes: Sequence[str]) -> str:
+    """Return in words how a checkpoint differs from its network, ``""`` where it does not."""
+    told = (("it lacks", missing), ("nothing takes", unknown), ("of another size is", sizes))
+    return "; ".join(f"{what} {_some(names)}" for what, names in told if names)
 
 
 def _some(names: Sequence[str]) -> str:
