@@ -16,6 +16,8 @@ FEWEST_PIXELS = 160
 EVENNESS = 0.45
 # Share of windows that are drawn from anywhere.
 ANY_FRAME = 0.1
+# Share of colour pictures whose channels are shuffled: leaves are mostly green and basins white, but not always.
+STRANGE_COLOURS = 0.15
 
 
 @dataclass(frozen=True)
@@ -181,7 +183,7 @@ def _with_holes(depth: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 def _other_light(rgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Return the picture as another camera under another light might show it, (3, h, w)."""
     x = rgb.astype(np.float32) / 255.0
-    if rng.random() < 0.5:  # any colour of things is as likely as another
+    if rng.random() < STRANGE_COLOURS:
         x = x[..., rng.permutation(3)]
     grey = x.mean(axis=2, keepdims=True)
     x = grey + (x - grey) * rng.uniform(0.0, 1.4)

@@ -41,7 +41,7 @@ class Options:
     """What turns gradients into steps."""
     threads: int = 2
     """CPU threads."""
-    colour_kept: float = 0.5
+    colour_kept: float = 0.8
     """Share of pictures in colour that keep it; shape has to do for the others."""
     seed: int = 0
     """Of windows and of the first weights."""

@@ -47,7 +47,7 @@ class Options:
     """Distance of the seeds, for several processes side by side."""
     which: Families = "training"
     """Families of shapes."""
-    lit: float = 0.35
+    lit: float = 0.7
     """Share of homes rendered in colour; of the others only shape is learnt."""
     once: bool = False
     """Stop when there are enough shards instead of replacing old ones."""
