@@ -23,6 +23,7 @@ SPEED = {
     "Locating a photo": "locate.py",
     "Keeping a map": "store.py",
     "Drawing views": "render.py",
+    "Looking with the embedded encoders": "embedded.py",
 }
 SUITES = {
     "words": "Words",

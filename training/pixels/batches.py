@@ -9,7 +9,11 @@ from training.pixels.labels import CATEGORIES, UNLABELLED
 from avlmaps.core.camera import Pinhole
 from avlmaps.perception.embedded.geometry import channels
 
-WIDTH, HEIGHT = 160, 128
+# A window's size. Twice as many pixels each way cost four times as much, and the network is short of training, not of
+# detail (README.md): it is better shown four windows than one of twice the detail.
+WIDTH, HEIGHT = 80, 64
+# It is cut from a rendered picture of 320x240 with so many of its pixels across, or more.
+FIELD_PX = 160
 # A frame shows a category with at least so many of its 320x240 pixels.
 FEWEST_PIXELS = 160
 # How evenly categories are drawn: 0 each as often as any other, 1 as often as frames show it.
@@ -128,7 +132,7 @@ def _sample(
     frames: Frames, index: int, category: int, rng: np.random.Generator, colour_kept: float
 ) -> tuple[np.ndarray, ...]:
     h, w = frames.depth.shape[1:]
-    wide = rng.uniform(WIDTH, w * 0.9999) if rng.random() < 0.8 else WIDTH * rng.uniform(0.75, 1.0)
+    wide = rng.uniform(FIELD_PX, w * 0.9999) if rng.random() < 0.8 else FIELD_PX * rng.uniform(0.75, 1.0)
     wide = min(wide, h * WIDTH / HEIGHT)
     tall = wide * HEIGHT / WIDTH
     left, top = rng.uniform(0, w - wide), rng.uniform(0, h - tall)
@@ -174,8 +178,8 @@ def _with_holes(depth: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     if rng.random() < 0.5:  # a sensor that sees less far
         depth[depth > rng.uniform(2.5, 6.0)] = 0.0
     for _ in range(rng.integers(1, 5)):
-        h, w = rng.integers(4, 40, 2)
-        r, c = rng.integers(0, HEIGHT - 4), rng.integers(0, WIDTH - 4)
+        h, w = rng.integers(WIDTH // 40, WIDTH // 4, 2)
+        r, c = rng.integers(0, HEIGHT - 2), rng.integers(0, WIDTH - 2)
         depth[r : r + h, c : c + w] = 0.0
     return depth
 

@@ -13,7 +13,7 @@ from training.pixels.batches import Shards
 from training.pixels.export import load_network, write_onnx, write_start
 from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED
 from training.pixels.lexicon import CALLED, KINDS
-from training.pixels.whole import whole_frame
+from training.pixels.whole import WIDTH, whole_frame
 
 from avlmaps.perception.embedded.scene_network import Notes
 
@@ -147,6 +147,7 @@ def calibrate(options: Options) -> dict[str, float]:
         room_temperature=round(fit_rooms(scores), 4),
         called={name: phrases for name, phrases in CALLED.items() if name in known},
         kinds={word: names for word, names in KINDS.items() if set(names) <= known},
+        width_px=WIDTH,
     )
     (options.out / "rooms.json").write_bytes(msgspec.json.format(msgspec.json.encode(notes), indent=1) + b"\n")
     for name, value in told.items():

@@ -7,7 +7,8 @@ from training.pixels.batches import Frames
 from avlmaps.core.camera import Pinhole
 from avlmaps.perception.embedded.geometry import channels
 
-WIDTH, HEIGHT = 240, 180
+# Larger than things are in most windows of the training: of several sizes the one that held-out frames like best.
+WIDTH, HEIGHT = 160, 120
 _MULTIPLE = 16
 
 

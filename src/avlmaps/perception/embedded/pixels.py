@@ -36,7 +36,7 @@ class EmbeddedPixels(NamedEncoder):
         return tuple(name for name in self.names if name != "other")
 
     def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
-        """Return features on a grid of about 120x90; zero where there is no depth."""
+        """Return features on a grid of half the size that the network looks at; zero where there is no depth."""
         seen = self._network.see(frame)
         return np.where(seen.known[..., None], features_of(seen.category, self.codes), np.float32(0.0))
 

@@ -1,7 +1,7 @@
 """The network behind the embedded pixel and view encoders: what each pixel shows, and what kind of room it is.
 
 It looks at geometry in the frame of gravity, and at colour through a small late branch. It runs in onnxruntime at
-about 240x180, whatever the recording's size; ``training/pixels`` makes its weights.
+a small size (``Notes.width_px``), whatever the recording's; ``training/pixels`` makes its weights.
 """
 
 import json
@@ -23,9 +23,6 @@ from avlmaps.perception.embedded.geometry import channels
 from avlmaps.recordings.registration import depth_in_colour
 from avlmaps.recordings.types import Frame
 
-# The network was trained on pictures whose focal length is up to so many pixels; a longer one is looked at smaller.
-_LONGEST_FOCAL_PX = 240.0
-_WIDTH = 240
 _MULTIPLE = 16
 # Without ground a camera is taken to be upright and as high as people and robots mostly hold it.
 _USUAL_HEIGHT_M = 1.3
@@ -64,6 +61,8 @@ class Notes(msgspec.Struct, frozen=True):
         room_temperature: divides the rooms' scores.
         called: for a category other phrases for it.
         kinds: wider words and the categories that they take in.
+        width_px: how wide the pictures are that the network looks at; their focal length is no longer than this
+            either, since it was trained on none longer.
         instances: how instances are told from noise.
     """
 
@@ -76,6 +75,7 @@ class Notes(msgspec.Struct, frozen=True):
     room_temperature: float
     called: dict[str, tuple[str, ...]]
     kinds: dict[str, tuple[str, ...]]
+    width_px: int = 240
     instances: InstanceNotes = InstanceNotes()
 
 
@@ -111,7 +111,7 @@ class SceneNetwork:
 
     def see(self, frame: Frame) -> Seen:
         """Look at a frame; its ``ground`` says which way is up, where it is known."""
-        camera, depth_m, rgb = at_working_size(frame)
+        camera, depth_m, rgb = at_working_size(frame, self.notes.width_px)
         up, height_m = _ground_of(frame)
         geometry = _padded(channels(depth_m, camera, up, height_m))
         colour = _padded(rgb.astype(np.float32).transpose(2, 0, 1) / 127.5 - 1.0)
@@ -147,11 +147,11 @@ def load_network() -> SceneNetwork:
 
 
 def at_working_size(
-    frame: Frame,
+    frame: Frame, width_px: int
 ) -> tuple[Pinhole, Float32[np.ndarray, "h w"], UInt8[np.ndarray, "h w 3"]]:
     """Return the colour camera, the depth as it sees it, and its picture, at the size that the network looks at."""
     camera, depth_m = depth_in_colour(frame.depth_m, frame.rig)
-    width = min(_WIDTH, round(_LONGEST_FOCAL_PX / camera.fx * camera.width))
+    width = min(width_px, round(width_px / camera.fx * camera.width))
     height = max(1, round(width * camera.height / camera.width))
     small = camera.resized(width, height)
     # Nearest: a mean over an edge would be a place where nothing is.
