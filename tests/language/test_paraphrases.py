@@ -1,9 +1,10 @@
 """How many free paraphrases the rules understand, written by others than the writer of the grammar.
 
-The first two are development sets: each was blind once (45 of 60 and 53 of 80 were right when they were first asked),
-then the grammar was mended by what failed in it, so that its count only holds what was reached. The third measures: it
-is written blind and never looked at by who mends the grammar. The failing ones of the development sets are listed by
-``python tests/language/test_paraphrases.py``; a grammar that was mended by the third set is to be measured on new ones.
+The first three are development sets: each was blind once (45 of 60, 53 of 80 and 58 of 80 were right when they were
+first asked), then the grammar was mended by what failed in it, so that its count only holds what was reached. The
+fourth measures: it is written blind and never looked at by who mends the grammar. The failing ones of the development
+sets are listed by ``python tests/language/test_paraphrases.py``; a grammar that was mended by the fourth set is to be
+measured on new ones.
 """
 
 import json
@@ -19,11 +20,16 @@ from avlmaps.language.rules import command_to_program
 
 COMMANDS = Path(__file__).parent / "commands"
 # The development sets: how many commands there are, and how many are right.
-DEVELOPMENT = {COMMANDS / "paraphrases.jsonl": (60, 60), COMMANDS / "paraphrases_2.jsonl": (80, 79)}
-BLIND = COMMANDS / "paraphrases_3.jsonl"
+DEVELOPMENT = {
+    COMMANDS / "paraphrases.jsonl": (60, 60),
+    COMMANDS / "paraphrases_2.jsonl": (80, 79),
+    COMMANDS / "paraphrases_3.jsonl": (80, 80),
+}
+BLIND = COMMANDS / "paraphrases_4.jsonl"
 SETS = [path for path in (*DEVELOPMENT, BLIND) if path.exists()]
-# How many of the blind ones were right when they were first asked (90 % are asked for): this holds what there is.
-BLIND_REACHED = 58
+# How many of the blind ones are right (90 % are asked for); 63 were before the grammar was mended by the third list.
+# What is wrong among them was counted and not looked at.
+BLIND_REACHED = 65
 
 
 @pytest.mark.parametrize("path", SETS, ids=lambda path: path.stem)

@@ -74,6 +74,11 @@ def is_bare_name(text: str) -> bool:
     return re.search(rf"(?:^|\s){_name()}$", text, re.IGNORECASE) is not None
 
 
+def is_name_alone(text: str) -> bool:
+    """Return whether a text is such a name and nothing else."""
+    return re.fullmatch(_name(), text, re.IGNORECASE) is not None
+
+
 @cache
 def _name() -> str:
     """Return the pattern of a known name, with what may stand before it."""

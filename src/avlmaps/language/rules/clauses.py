@@ -8,6 +8,10 @@ import re
 from dataclasses import dataclass
 
 from avlmaps.language.rules.bare import with_articles
+from avlmaps.language.rules.figures import in_figures
+from avlmaps.language.rules.motions import plain_motions
+from avlmaps.language.rules.purposes import without_purposes
+from avlmaps.language.rules.retelling import retold, with_places_of_it
 from avlmaps.language.rules.rewriting import rewritten
 
 _PICTURES = r"png|jpe?g|bmp|webp|tiff?"
@@ -44,10 +48,12 @@ class Clauses:
     Attributes:
         clauses: in the order of doing.
         files: the paths that were named; a clause has `⟦i0⟧` for the first if it is a picture, `⟦c0⟧` if a clip.
+        left_out: what was left out, since it is nothing to be done.
     """
 
     clauses: tuple[Clause, ...]
     files: tuple[str, ...]
+    left_out: tuple[str, ...] = ()
 
     def shown(self, text: str) -> str:
         """Return a text of a clause with its files in place again."""
@@ -57,8 +63,8 @@ class Clauses:
         return re.sub(r"⟦[ic](\d+)⟧", lambda found: self.files[int(found[1])], spoken)
 
 
-def split_clauses(command: str) -> Clauses:
-    """Cut a command into clauses."""
+def split_clauses(command: str, *, plainer: bool = False) -> Clauses:
+    """Cut a command into clauses; `plainer` tells it again in plainer words before (`retelling`)."""
     text = re.sub(r"[‘’`´]", "'", re.sub(r"[“”«»]", '"', command)).replace("⟦", "(").replace("⟧", ")")
     text, files = _without_files(text)
     # A capital at the start of a sentence is no part of a name.
@@ -70,9 +76,14 @@ def split_clauses(command: str) -> Clauses:
     text = re.sub(r"\s*(?:[—–]|\s-+\s|\.\.\.|…)\s*", ", ", text)
     text = re.sub(r"(?:^|(?<=[;\n.!?]))\s*(?:\d+|[a-h])[.)]\s+", "; ", text)
     text = re.sub(r"\s*\n\s*", "; ", text.strip())
-    text = rewritten(re.sub(r"\s+", " ", text.replace("&", " and ")))
+    text, left_out = without_purposes(in_figures(re.sub(r"\s+", " ", text.replace("&", " and "))))
+    text = plain_motions(with_places_of_it(text))
+    if plainer:
+        told = retold(text)
+        text, left_out = told.text, [*left_out, *told.left_out]
+    text = rewritten(text)
     pieces = [piece.strip(" ,") for piece in re.split(r"\s*;[\s;,]*", text)]
-    return Clauses(tuple(_in_order([with_articles(piece) for piece in pieces if piece])), tuple(files))
+    return Clauses(tuple(_in_order([with_articles(piece) for piece in pieces if piece])), tuple(files), tuple(left_out))
 
 
 def _lowered(found: re.Match[str]) -> str:

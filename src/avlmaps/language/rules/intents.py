@@ -130,10 +130,10 @@ class Beside:
 
 @dataclass(frozen=True, slots=True)
 class Viewpoints:
-    """Go to so many points around a thing, and look at it from each if asked."""
+    """Go to so many points around a thing (None: along all of its outline), and look at it from each if asked."""
 
     target: Target
-    count: int
+    count: int | None
     face: bool
 
 

@@ -12,6 +12,7 @@ from itertools import combinations
 
 from avlmaps.language.rules import words
 from avlmaps.language.rules.bare import is_bare_name
+from avlmaps.language.rules.subjects import all_told
 
 # More parts than this are not left out: so much that is not understood is another command.
 _MOST_PARTS = 4
@@ -99,7 +100,8 @@ _ENDEARING = re.compile(
 _NO_NAME_OF_ANYBODY = re.compile(
     rf"\b(?:{_ORDER}|the|an?|this|that|and|or|of|to|in|on|at|by|near|with|back|away|home|here|up|down|"
     r"slow\w*|fast|"
-    r"it|me|who|what|where|why|how|which|goal|target|destination|sound|noise|image|photo|picture|object|"
+    r"for|from|off|out|about|"
+    r"it|me|him|her|them|us|you|who|what|where|why|how|which|goal|target|destination|sound|noise|image|photo|picture|object|"
     r"area)\b",
     re.IGNORECASE,
 )
@@ -155,6 +157,11 @@ def _without(parts: list[_Part], chosen: tuple[int, ...]) -> str:
     return text
 
 
+def is_remark(said: str, following: str) -> bool:
+    """Return whether a statement before an order is a mere remark, of which the order means nothing."""
+    return _may_be_left_out([_Part(said, "."), *([_Part(following, ".")] if following else [])], 0)
+
+
 def _may_be_left_out(parts: list[_Part], at: int) -> bool:
     said, mark = parts[at].text.strip(), parts[at].mark.strip()
     following = " ".join(part.text.strip() + part.mark for part in parts[at + 1 :])
@@ -173,6 +180,8 @@ def _may_be_left_out(parts: list[_Part], at: int) -> bool:
     purpose = _OWN_PURPOSE.match(said) and (at > 0 or re.match(r"(?:because|since|as)\b", said, re.IGNORECASE))
     own = _OWN_WISH.match(said) or (purpose and not re.search(r"\byou\b", said, re.IGNORECASE))
     if _ORDERED.search(said) and not own:
+        return False
+    if not all_told(said):
         return False
     others = " ".join(part.text for part in parts if part is not parts[at])
     return not _tells_where(said, others) and not _is_meant_later(following)

@@ -212,7 +212,7 @@ class Names:
 
 def _refuse_words_of_no_name(spoken: list[str]) -> None:
     """Refuse what is no name, such as "the place" or "chair over": it would be sought on the map as it stands."""
-    words = [word.lower() for word in spoken]
+    words = " ".join(spoken).lower().replace("first aid", "aid").split()
     known = ("someone", "somebody", "something") if _is_sound(spoken) else ()
     odd = next(
         (

@@ -283,7 +283,8 @@ class _Reader:
         return Shuttle(self._pair(held), self.count)
 
     def _circle(self, node: Any) -> Intent:
-        return Viewpoints(self._targets(node)[0], _ROUND, face=False)
+        told = next(str(child) for child in node.children if is_token(child, "CIRCLE")).lower()
+        return Viewpoints(self._targets(node)[0], None if told.endswith("along") else _ROUND, face=False)
 
     def _viewpoints(self, node: Any) -> Intent:
         told = next(str(child) for child in node.children if is_token(child, "VIEWS")).lower()

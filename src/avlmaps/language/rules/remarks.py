@@ -29,7 +29,8 @@ PERSON = (
     r"somebody|someone|"
     r"everyone|everybody|he|she|they|nurse|doctor|patient|customer|student|teacher|uncle|aunt|cousin|"
     r"roommate|"
-    r"flatmate|partner|girlfriend|boyfriend|delivery|postman|mailman|team)"
+    r"flatmate|parents|grandparents|grandson|granddaughter|grandchildren|nephew|niece|family|twins|baby|plumber|"
+    r"partner|girlfriend|boyfriend|delivery|postman|mailman|team)"
 )
 _PLACED = r"(?:in|inside|at|by|near|next to|on|beside|close to)"
 
@@ -130,7 +131,7 @@ _REPORTED = [
     # Where somebody is, is where "there" is.
     (
         rf"{BEGINS}(?:{PERSON}|i)(?:'s|'m|'re|'ll be| will be| is| am| are| was| were)(?: just| still| now|"
-        rf" already| also| always)*(?: (?!{SOUNDING}\b)[a-z]+ing)?"
+        rf" already| also| always| here| home| back| all| both)*(?: (?!{SOUNDING}\b)[a-z]+ing)?"
         rf"(?: for you| for me)? {_PLACED} ((?:{_DETERMINER}) [^.;!?,]+?|my [\w ]+?)(?=\s*[.;!?,]|"
         r" and (?:needs?|wants?)\b)"
         rf"(?: and (?:needs?|wants?)[^.;!?,]*)?(?=[^⟦]*\b(?:there|him|her|them|me|us|here|it)\b)",

@@ -278,7 +278,8 @@ _STATEMENTS = [
     ),
     (
         rf"{BEGINS}({_THING}) (?:is|are|looks?|seems?|needs?|has|have) (?!(?:near|next|by|in|on|at|under|behind|"
-        rf"between) \w)(?:(?!(?:where|what|you|your|that|to)\b)[\w-]+ ?){{1,4}}[.;!?,] (?=[^.;]*\b(?:it|there|"
+        rf"between) \w)(?:(?!(?:where|what|you|your|that|to|in|near|next|by|on|at|under|behind|between|inside)\b)"
+        rf"[\w-]+ ?){{1,4}}[.;!?,] (?=[^.;]*\b(?:it|there|"
         rf"them)\b)",
         r" ; ⟦said⟧ \1 ; ",
     ),

@@ -12,6 +12,7 @@ from avlmaps.language.rules.intents import Go, Intent
 from avlmaps.language.rules.leaving_out import shorter_commands
 from avlmaps.language.rules.names import Names
 from avlmaps.language.rules.reading import parser, read_clause
+from avlmaps.language.rules.retelling import can_be_retold
 from avlmaps.language.rules.writing import write_program
 from avlmaps.language.translator import Translation
 
@@ -36,23 +37,24 @@ class RulesTranslator:
         try:
             return self._read(command)
         except LanguageError:
-            for shorter, left_out in shorter_commands(command):
+            shorter = list(shorter_commands(command))
+            retold = [(text, left_out, True) for text, left_out in [(command, ()), *shorter] if can_be_retold(text)]
+            for text, left_out, plainer in [*((*said, False) for said in shorter), *retold]:
                 with suppress(LanguageError):
-                    read = self._read(shorter)
-                    notes = [f"{part!r} was not understood and left out." for part in left_out]
-                    return Translation(read.program, (*read.notes, *notes))
+                    read = self._read(text, plainer=plainer)
+                    return Translation(read.program, (*read.notes, *map(_left_out, left_out)))
             raise
 
-    def _read(self, command: str) -> Translation:
+    def _read(self, command: str, *, plainer: bool = False) -> Translation:
         """Return the program for a command of which everything is understood."""
-        clauses = split_clauses(command)
+        clauses = split_clauses(command, plainer=plainer)
         names = Names(clauses.files)
         try:
             intents = [_read(clause, clauses, names) for clause in clauses.clauses]
             program, notes = write_program(intents)
         except RecursionError:
             raise LanguageError(f"The command is too deep to be understood; say it like: {_EXAMPLE}.") from None
-        return Translation(program, tuple(dict.fromkeys([*names.notes, *notes])))
+        return Translation(program, tuple(dict.fromkeys([*names.notes, *notes, *map(_left_out, clauses.left_out)])))
 
     def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:
         """Return None: the rules know no second way to say the same."""
@@ -69,6 +71,10 @@ def command_to_program(command: str) -> str:
         LanguageError: a part of the command is not understood; the sentence quotes it and says what would be.
     """
     return RulesTranslator().program_for(command).program
+
+
+def _left_out(part: str) -> str:
+    return f"{part!r} was not understood and left out."
 
 
 def _check(command: str) -> None:

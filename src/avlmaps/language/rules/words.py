@@ -212,14 +212,14 @@ _LITTLE = (
 
 _ONE = "|".join(_ONES[::-1])
 _TEN = "|".join(_TENS)
-_WHOLE = (
+WHOLE = (
     rf"(?:(?:an?|one|two|three) hundred(?: and)?(?: (?:{_TEN})(?:[ -](?:{_ONE}))?| (?:{_ONE}))?|"
     rf"(?:{_TEN})(?:[ -](?:{_ONE}))?|{_ONE})"
 )
 _POINT = rf"(?: point (?:{_ONE}))?"
 _FIGURES = r"\d+(?:[.,]\d+)?"
 _AND_PART = r"(?: and (?:a half|half|a quarter|three quarters))?"
-SPELLED = rf"(?:{_WHOLE}{_POINT}{_AND_PART}|{'|'.join(sorted(_SOME, key=len, reverse=True))})"
+SPELLED = rf"(?:{WHOLE}{_POINT}{_AND_PART}|{'|'.join(sorted(_SOME, key=len, reverse=True))})"
 # "2m" needs no space, "two metres" does: "am" is no metre.
 _MEASURED = rf"(?:({_FIGURES})[ -]?|({SPELLED})[ -])"
 UNIT = "|".join(_UNITS_M)
@@ -235,7 +235,7 @@ ANGLE = (
     rf"{_LITTLE}|(?:a )?half[ -]?way)"
 )
 COUNT = (
-    rf"(?:once|twice|thrice|(?:for )?(?:(?:{_FIGURES}|{_WHOLE}|a couple of|a few|several) (?:more )?(?:times?|"
+    rf"(?:once|twice|thrice|(?:for )?(?:(?:{_FIGURES}|{WHOLE}|a couple of|a few|several) (?:more )?(?:times?|"
     r"rounds?|laps?|loops?|trips?|round trips?|"
     r"rotations?|repetitions|cycles)))(?: in a row| in total| over| more)?"
 )
@@ -304,7 +304,7 @@ def count_of(text: str) -> int:
     for name, count in (("once", 1), ("twice", 2), ("thrice", 3)):
         if words.startswith(name):
             return count
-    found = re.search(rf"({_FIGURES}|{_WHOLE}|a couple of|a few|several) ", words)
+    found = re.search(rf"({_FIGURES}|{WHOLE}|a couple of|a few|several) ", words)
     return int(number_of(found[1])) if found else 1
 
 

@@ -60,6 +60,10 @@ def _with_fronts_resolved(intents: Sequence[Intent]) -> list[Intent]:
         if isinstance(intent, Following):
             return [*resolved, Repeated(tuple(_with_fronts_resolved(intents[at + 1 :])), intent.count)]
         if held is not None and isinstance(intent, Go) and any(_of_the_two(goal) for goal in intent.goals):
+            if not held.near and len(held.goals) == 2 and len(intent.goals) == 1 and _plain_thing(Go(held.goals)):
+                resolved.append(Go((Goal(Relation.BETWEEN, tuple(goal.targets[0] for goal in held.goals)),)))
+                held = None
+                continue
             raise LanguageError(f"'the two' could be meant otherwise; {_SAY_BETWEEN}.")
         if held is not None and held.near and _plain_thing(intent):
             resolved.append(_with_context(intent, held))
@@ -298,6 +302,10 @@ class _Writer:
         written = self._target(intent.target)
         outline = self._kept("outline", f"robot.get_contour({written})")
         index = self._index()
+        if intent.count is None:
+            self.lines += [f"for {index} in {outline}:", f"    robot.move_to({index})"]
+            self.last_goal = None
+            return
         self.lines.append(f"for {index} in range({intent.count}):")
         self.lines.append(f"    robot.move_to({outline}[{index} * len({outline}) // {intent.count}])")
         if intent.face:
