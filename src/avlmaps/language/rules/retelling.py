@@ -134,11 +134,12 @@ def retold(text: str) -> Retold:
         if not order:
             continue
         if refers_back(order):
-            found = next((found for said in reversed(held) if (found := mentioned(said, order))), None)
+            named = [mentioned(said, order) for said in held]
+            found = next((one for one in reversed(named) if one), None)
             if found is not None:
                 meant = found
                 told.append(f"⟦said⟧ {found.text}")
-                held = [said for said in held if mentioned(said, order) != found]
+                held = [said for said, one in zip(held, named, strict=True) if one != found]
         kept, dropped = _remarks(held, order)
         told += kept
         left_out += dropped
@@ -166,13 +167,12 @@ def _cut(sentence: str) -> tuple[str, str]:
 
 def _order_at(sentence: str, at: int) -> bool:
     """Return whether an order begins there: a verb, with nothing but courtesy before it."""
+    return _verb_after(sentence, at) is not None
+
+
+def _verb_after(sentence: str, at: int) -> int | None:
+    """Return where the verb of an order that begins there stands, or None."""
     frame = _FRAME.match(sentence, at)
-    verb = _verb_after(sentence, at, frame)
-    return verb is not None
-
-
-def _verb_after(sentence: str, at: int, frame: re.Match[str] | None) -> int | None:
-    """Return where the verb of an order begins, or None."""
     begins = {at}
     if frame is not None:
         begins |= {at + gap.end() for gap in re.finditer(r",? ", frame[0])}
@@ -212,8 +212,7 @@ def _commands(before: str, verb: str) -> bool:
 
 def _plain(order: str) -> str:
     """Return an order without the courtesy before its verb, in the present."""
-    frame = _FRAME.match(order)
-    begin = _verb_after(order, 0, frame)
+    begin = _verb_after(order, 0)
     if not begin:
         return order
     kept = patterns.match(r"(?:.*\b)?(first|then|next|again)\b", order[:begin])
