@@ -18,7 +18,8 @@ _NEVER_NAMED = frozenset({
     "whoever", "whatever", "came", "comes", "coming", "heard", "said", "someone", "somebody", "something", "anything",
     "everything", "everyone", "just", "okay", "ok", "might", "may", "also", "too", "very", "my", "your", "its", "away",
     "hurt", "hurts", "aches", "arrived", "spilled", "spilt", "escaped", "stinks", "smells", "leaks", "waits", "sleeps",
-    "rings", "breaks", "sings", "cries", "drips", "wakes", "arrives", "go",
+    "rings", "breaks", "sings", "cries", "drips", "wakes", "arrives", "boils", "begins", "finishes", "opens", "closes",
+    "go",
     "toward", "towards", "during", "while", "since", "though", "although", "everybody", "another", "both", "each",
     "either", "lots", "around", "onto", "upon", "maybe", "really", "actually", "first", "lastly", "finally",
 })  # fmt: skip

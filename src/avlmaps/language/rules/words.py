@@ -84,7 +84,8 @@ MANIPULATE = (
 NEGATIONS = (
     r"don't|do not|dont|doesn't|never|not|avoid|avoiding|without|except|unless|if|instead|rather than|or|either|"
     r"neither|"
-    r"cannot|can't|whichever|unlike"
+    r"cannot|can't|whichever|unlike|provided|providing|assuming|supposing|suppose it|in case|in the event|as long as|"
+    r"so long as|depending on|on condition"
 )
 
 # What may stand after a direction; before anything else it begins a name, as in "the left lamp".
@@ -125,8 +126,9 @@ FILLERS = (
     r"^(?:hey|hi|hello|ok|okay|alright|robot|so|well)(?: there)?\b",
     r", ?(?:robot|buddy|my friend|mate)\b(?=\s*[,.;!?]|\s*$)",
     r"\b(?:if (?:you|it)(?: (?:do not|don't|would not|wouldn't|would|wouldn't|please|could|can|are able to|'re "
-    r"able to|have time|is|"
-    r"'s))*(?: (?:mind|like|possible|please|okay|ok|not too much trouble|manage|do that|do so))?)(?=\s*[,.;!?]|\s*$)",
+    r"able to|have time))*(?: (?:mind|like|possible|please|okay|ok|manage|do that|do so))?)(?=\s*[,.;!?]|\s*$)",
+    r"\bif it(?: is|'s) (?:possible|okay|ok|alright|all right|fine|no trouble|not too much trouble)(?: (?:with|for|by) "
+    r"you)?(?=\s*[,.;!?]|\s*$)",
     r"\b(?:if (?:you (?:do not|don't|wouldn't|would not) mind|possible|you (?:can|could|please|like|would)|you "
     r"would be so kind))\b",
     r"\b(?:thank you|thanks|thx|cheers)(?: (?:very much|so much|a lot|in advance|a million))?\b",
