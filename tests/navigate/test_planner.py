@@ -85,6 +85,20 @@ def test_searching_coarse_to_fine_costs_at_most_a_tenth_more(seed):
         assert other.cost <= 1.1 * way.cost + 1e-9
 
 
+def test_across_a_large_open_floor_the_way_is_the_straight_line_and_past_a_wall_it_is_not():
+    hall = np.full((120, 160), CellState.FREE)
+    start, goal = np.array([1.0, 1.0]), np.array([5.0, 7.0])
+    way = Planner(costmap_of(of_states(hall), 0.1), COARSE).way(start, goal)
+    assert way is not None
+    np.testing.assert_allclose(way.points, [start, goal])
+    hall[60:63, 10:] = CellState.OCCUPIED
+    costmap = costmap_of(of_states(hall), 0.1)
+    around = Planner(costmap, COARSE).way(start, goal)
+    assert around is not None
+    assert len(around.points) > 2
+    assert costs_along(costmap, around.points) < np.inf
+
+
 @given(seed=st.integers(0, 100_000))
 def test_pulling_it_straight_never_makes_a_way_dearer(seed):
     planner = Planner(costmap_of(of_states(clutter(seed)), 0.1))
@@ -252,7 +266,7 @@ def test_a_closed_room_has_no_way_in():
     assert not stop.seen
 
 
-@pytest.mark.parametrize("around", [(0,), (2, 1)])
+@pytest.mark.parametrize("around", [(0,), (2, 1), (2, 1, 0)])
 def test_a_coarse_way_that_leads_past_a_corner_never_hides_the_way(monkeypatch, around):
     from avlmaps.navigate import planner as module
 

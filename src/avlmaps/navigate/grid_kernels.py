@@ -273,9 +273,9 @@ def shortcuts(points, passable, cost, window):  # pragma: no cover - compiled
     for b in range(1, count):
         for back in range(1, min(window, b) + 1):
             a = b - back
-            if best[a] >= best[b]:
-                continue
             most = best[b] - best[a]
+            if np.hypot(points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]) >= most - 1e-9:
+                continue  # a cell costs at least 1, so this line costs at least its length
             piece = line_cost(points[a, 0], points[a, 1], points[b, 0], points[b, 1], passable, cost, most)
             if back == 1 and not np.isfinite(piece) and not np.isfinite(best[b]):
                 piece = 1e6 + np.hypot(points[a, 0] - points[b, 0], points[a, 1] - points[b, 1])

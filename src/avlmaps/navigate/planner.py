@@ -19,7 +19,7 @@ from avlmaps.navigate.costmap import Costmap
 
 _EVERY = 8  # cells of a straight run of a path from which shortcuts may begin
 _WINDOW = 24  # such points that a shortcut may leap
-_AROUND = (2, 1)  # blocks around the coarse way that are searched: fewer where they hold too many cells
+_AROUND = (2, 1, 0)  # blocks around the coarse way that are searched: fewer where they hold too many cells
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +28,9 @@ class PlanSettings:
 
     exact_cells: int = 100_000
     """Floors with no more cells that can be passed are searched at once; larger ones coarse to fine."""
+    direct: float = 1.05
+    """On a larger floor a straight line is taken unsearched where it costs at most so many times the least that any
+    way of its length can."""
     escape_m: float = 1.0
     """How far a body that stands where the map lets none stand may go straight to get out."""
     beside_m: float = 2.0
@@ -114,9 +117,11 @@ class Planner:
         out = self.entry(start, int(self._part[tuple(self.costmap.cell_of(goal))]))
         if out is None:
             return None
-        first, last = self.costmap.cell_of(out), self.costmap.cell_of(goal)
-        cells = self._search(first, last)
-        corners = np.concatenate([[self.costmap.in_cells(out)], cells[1:-1] + 0.5, [self.costmap.in_cells(goal)]])
+        ends = np.array([self.costmap.in_cells(out), self.costmap.in_cells(goal)])
+        between = np.zeros((0, 2))
+        if self._is_small or not self._is_direct(*ends):
+            between = self._search(self.costmap.cell_of(out), self.costmap.cell_of(goal))[1:-1] + 0.5
+        corners = np.concatenate([ends[:1], between, ends[1:]])
         return self._measured(self._straightened(corners), None if out is start else start)
 
     def entry(self, start: Float[np.ndarray, "2"], part: int | None = None) -> Float64[np.ndarray, "2"] | None:
@@ -180,6 +185,11 @@ class Planner:
         order = order[distance_m[order] <= reach_m]
         return cells[order], distance_m[order]
 
+    def _is_direct(self, one: Float[np.ndarray, "2"], other: Float[np.ndarray, "2"]) -> bool:
+        """Return whether the straight line between two places, in cells, costs hardly more than any way must."""
+        most = self.settings.direct * float(np.hypot(*(other - one)))  # a cell costs at least 1
+        return bool(grid_kernels.line_cost(*one, *other, self.costmap.passable, self.costmap.cost, most) <= most)
+
     def _search(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "n 2"]:
         """Return the cells of the cheapest way between two cells of one connected part."""
         for corridor in () if self._is_small else self._corridors(first, last):
@@ -200,6 +210,8 @@ class Planner:
         nx, ny = passable.shape
         way = np.zeros((-(-nx // size), -(-ny // size)), np.uint8)
         way[tuple(blocks.T)] = 1
+        # A step to a block at a corner also needs the cells beside that corner, which lie in two other blocks.
+        way[blocks[1:, 0], blocks[:-1, 1]] = way[blocks[:-1, 0], blocks[1:, 1]] = 1
         masks: list[Bool[np.ndarray, "nx ny"]] = []
         for around in _AROUND:
             wide = cv2.dilate(way, np.ones((2 * around + 1, 2 * around + 1), np.uint8))
