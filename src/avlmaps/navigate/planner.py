@@ -187,8 +187,10 @@ class Planner:
 
     def _is_direct(self, one: Float[np.ndarray, "2"], other: Float[np.ndarray, "2"]) -> bool:
         """Return whether the straight line between two places, in cells, costs hardly more than any way must."""
-        most = self.settings.direct * float(np.hypot(*(other - one)))  # a cell costs at least 1
-        return bool(grid_kernels.line_cost(*one, *other, self.costmap.passable, self.costmap.cost, most) <= most)
+        (ax, ay), (bx, by) = one, other
+        most = self.settings.direct * float(np.hypot(bx - ax, by - ay))  # a cell costs at least 1
+        passable, cost = self.costmap.passable, self.costmap.cost
+        return bool(grid_kernels.line_cost(ax, ay, bx, by, passable, cost, most) <= most)
 
     def _search(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "n 2"]:
         """Return the cells of the cheapest way between two cells of one connected part."""

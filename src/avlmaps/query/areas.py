@@ -61,33 +61,80 @@ class AreaSettings:
     same_word_cosine: float = 0.95
     """Another name at least this close to the asked one names the same and does not compete with it. For an encoder
     with a scale it is measured from the middle of all names: its phrases lie in a cone, kitchen beside garage."""
+    pool_m: float = 0.8
+    """Views whose anchors are about so close speak together (``pooled``): one odd view is outvoted. 0 leaves each for
+    itself, as the paper does."""
     link_m: float = 1.0
     """Keyframes closer than this to a better one belong to its area."""
 
 
 def area_scores(
-    view: Float32[np.ndarray, "k d"], encoder: ViewEncoder, name: str, settings: AreaSettings
+    view: Float32[np.ndarray, "k d"],
+    encoder: ViewEncoder,
+    name: str,
+    settings: AreaSettings,
+    places: Float[np.ndarray, "k 3"] | None = None,
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return for each keyframe the posterior of the name among all area names, and its score in [0, 1].
 
     An encoder that tells named kinds of room apart says itself how likely each is. For one of an open vocabulary it is
     the softmax over the names that it was trained with; names that mean the asked place as well do not compete.
 
-    They are the same unless the settings ask for the paper's stretched cosines.
+    The scores are the posteriors, pooled over what looked at about the same place; they are stretched and each view
+    speaks for itself where the settings ask for the paper's score.
+
+    Args:
+        view: features.
+        encoder: that made them.
+        name: of the area.
+        settings: how.
+        places: what each looked at, metres; None leaves every view for itself.
     """
     if isinstance(encoder, NamedViewEncoder):
         share = np.square(np.asarray(view, np.float64).reshape(-1, encoder.codes.shape[1]) @ encoder.codes.T)
-        likely = np.clip(share @ encoder.meant(name), 0.0, 1.0)
-        return likely, likely if settings.score == "posterior" else normalised(likely)
-    others = [area for area in AREA_NAMES if not same_place(area, name)]
-    words = np.asarray(encoder.encode_words([name, *others]), np.float64)
-    apart = words - words.mean(axis=0) if isinstance(encoder, ScaledEncoder) else words
-    competes = np.r_[True, _cosine(apart[1:], apart[0]) < settings.same_word_cosine]
-    cosine = np.asarray(view, np.float64).reshape(-1, words.shape[1]) @ words[competes].T
-    logits = cosine / _temperature(encoder, settings)
-    weight = np.exp(logits - logits.max(axis=1, keepdims=True, initial=-np.inf))
-    posterior = weight[:, 0] / weight.sum(axis=1)
-    return posterior, posterior if settings.score == "posterior" else normalised(cosine[:, 0])
+        meant = np.asarray(encoder.meant(name), np.float64)
+        raw = np.clip(share @ meant, 0.0, 1.0)
+    else:
+        others = [area for area in AREA_NAMES if not same_place(area, name)]
+        words = np.asarray(encoder.encode_words([name, *others]), np.float64)
+        apart = words - words.mean(axis=0) if isinstance(encoder, ScaledEncoder) else words
+        competes = np.r_[True, _cosine(apart[1:], apart[0]) < settings.same_word_cosine]
+        cosine = np.asarray(view, np.float64).reshape(-1, words.shape[1]) @ words[competes].T
+        logits = cosine / _temperature(encoder, settings)
+        weight = np.exp(logits - logits.max(axis=1, keepdims=True, initial=-np.inf))
+        share, meant, raw = weight / weight.sum(axis=1, keepdims=True), np.eye(1, weight.shape[1])[0], cosine[:, 0]
+    posterior = np.clip(share @ meant, 0.0, 1.0)
+    if settings.score == "min-max":
+        return posterior, normalised(raw)
+    if places is None or not settings.pool_m > 0.0 or not len(share):
+        return posterior, posterior
+    return posterior, np.clip(pooled(share, places, settings.pool_m) @ meant, 0.0, 1.0)
+
+
+def pooled(
+    share: Float[np.ndarray, "k n"], places: Float[np.ndarray, "k 3"], pool_m: float
+) -> Float[np.ndarray, "k n"]:
+    """Return what views say together with those that looked at about the same place.
+
+    That is their mean, weighted by exp(−d² / 2·pool_m²), d the 3D distance: one odd view is outvoted. An average is
+    less sure than views that agree should be; so, where the weights add up to two views or more, it is squared and
+    rescaled, the product of two independent views that say the same. A lone view stays as it is.
+
+    Args:
+        share: distributions over names.
+        places: what each view looked at, metres.
+        pool_m: over 0.
+    """
+    from scipy.sparse import csr_array
+    from scipy.spatial import KDTree
+
+    tree = KDTree(places)
+    near = tree.sparse_distance_matrix(tree, 3.0 * pool_m, output_type="coo_matrix")
+    weight = np.exp(-np.square(near.data) / (2.0 * pool_m**2))
+    total = csr_array((weight, (near.row, near.col)), shape=near.shape) @ np.c_[share, np.ones(len(share))]
+    mean, views = total[:, :-1] / total[:, -1:], total[:, -1:]
+    sharp = mean ** np.clip(views, 1.0, 2.0)
+    return sharp * (mean.sum(axis=1, keepdims=True) / np.maximum(sharp.sum(axis=1, keepdims=True), 1e-12))
 
 
 def same_place(area: str, asked: str) -> bool:
@@ -145,9 +192,9 @@ def area_factor(
     space: Space, keyframes: Keyframes, encoder: ViewEncoder, part: Part, settings: AreaSettings, heat: HeatSettings
 ) -> NearAnchors:
     """Return the heat of an area: one anchor a keyframe."""
-    posterior, scores = area_scores(np.asarray(keyframes.view), encoder, part.query, settings)
     places = keyframes.world_from_camera[:, :3, 3] if settings.anchor == "camera" else keyframes.centre
     anchors = np.asarray(places, np.float64).reshape(-1, 3)
+    posterior, scores = area_scores(np.asarray(keyframes.view), encoder, part.query, settings, anchors)
     best = float(posterior.max(initial=0.0))
     note = "" if best >= 0.5 else f"no view is like {part.query!r}; the best score is {best:.2f}, below 0.50"
     if isinstance(encoder, NamedViewEncoder) and not encoder.meant(part.query).any():

@@ -1,7 +1,7 @@
 """One scene as it is asked: its map, its truth, and every source of heat that a configuration may join."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -14,7 +14,7 @@ from avlmaps.bench.indexing.tasks import Task
 from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import apply
 from avlmaps.core.registry import Kind
-from avlmaps.query.areas import AreaSettings, area_factor, area_scores
+from avlmaps.query.areas import area_factor, area_scores
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.level import Space
@@ -98,9 +98,8 @@ class AskedScene:
             part, _ = self._part(Modality.AREA, task.context, role)
             stored, settings = self.asked.stored, self.asked.settings
             encoder = stored.profile.view_encoder()
-            areas = AreaSettings(
-                anchor, settings.areas.score, settings.areas.temperature, settings.areas.same_word_cosine
-            )  # fmt: skip
+            alone = {"pool_m": 0.0} if anchor == "camera" else {}  # the paper's views speak each for itself
+            areas = replace(settings.areas, anchor=anchor, **alone)
             return Heatmap.of(area_factor(self.space, stored.keyframes, encoder, part, areas, settings.heat))
 
         return self._once(("area", task.context, role, anchor), make)
