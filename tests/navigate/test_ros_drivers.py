@@ -1,6 +1,7 @@
 """Nav2 and move_base, driven over a websocket: a robot of the test's own obeys, fails, hangs, lies and vanishes."""
 
 import _thread
+import signal
 import threading
 import time
 from math import pi
@@ -374,6 +375,15 @@ def test_stopping_from_another_thread_ends_a_drive(robot):
         assert driver.go_to(PLACE).reached
 
 
+@pytest.fixture
+def heeds_interrupts():
+    """A process that a shell began in the background ignores SIGINT; this one heeds it meanwhile."""
+    usual = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, usual)
+
+
+@pytest.mark.usefixtures("heeds_interrupts")
 def test_an_interrupt_cancels_the_goal_and_goes_on_up(robot):
     robot.does[""] = "drive on"
     with opened(robot) as driver:
