@@ -19,6 +19,7 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.ros.wire import start_reactor
 
 reactor: Any = _reactor
+_SPEED_M_S = 0.67
 
 
 class _Client(WebSocketServerProtocol):
@@ -79,7 +80,7 @@ class FakeRobot:
     def published(self, topic: str) -> list[dict[str, Any]]:
         return [message["msg"] for message in self.ops("publish") if message["topic"] == topic]
 
-    def soon(self, holds: Callable[[], bool], within_s: float = 5.0) -> bool:
+    def soon(self, holds: Callable[[], bool], within_s: float = 20.0) -> bool:
         until_s = monotonic() + within_s
         while not holds() and monotonic() < until_s:
             sleep(0.01)
@@ -107,6 +108,7 @@ class FakeRobot:
         self._factory = factory
         self._listener = reactor.listenTCP(0, factory, interface="127.0.0.1")
         self.port = self._listener.getHost().port
+        self._ticked_s = monotonic()
         self._ticks = LoopingCall(self._tick)
         self._ticks.start(0.03)
 
@@ -117,8 +119,10 @@ class FakeRobot:
         return self._listener.stopListening()
 
     def _tick(self) -> None:
+        now_s = monotonic()
         if self.moves_on:
-            self.pose = self.pose.ahead(0.02)
+            self.pose = self.pose.ahead(_SPEED_M_S * (now_s - self._ticked_s))  # by the clock: ticks may be late
+        self._ticked_s = now_s
         if self.tf_on:
             self._tell_transforms()
         if self.ros == 1:
@@ -169,9 +173,9 @@ class FakeRobot:
         if does == "deaf":
             self.does[action] = "succeed"  # the first message of a new topic is lost
             return
-        goal = {"client": client, "action": action, "args": args, "does": does, "status": 1, "listed": does != "silent"}
+        goal = {"client": client, "action": action, "args": args, "does": does, "status": 1, "listed": does not in ("silent", "mute")}
         self.goals[name] = goal
-        if does not in ("lie", "reject", "no server", "silent"):
+        if does not in ("lie", "reject", "no server", "silent", "mute"):
             self._feed(name)
         later = {
             "succeed": (self._arrive, name),
@@ -182,7 +186,10 @@ class FakeRobot:
             "cancelled elsewhere": (self._end, name, 5 if self.ros == 2 else 2),
             "disconnect": (client.transport.abortConnection,),
             "malformed": (self._arrive, name),
+            "arrive unseen": (self._arrive, name),
         }
+        if does == "arrive unseen":
+            self.tf_on = False
         if does == "malformed":
             for payload in MALFORMED:
                 client.sendMessage(payload)
@@ -246,7 +253,7 @@ class FakeRobot:
 
     def _called_off(self, name: str, everything: bool = False) -> None:
         goal = self.goals.get(name)
-        if goal is None or goal["status"] not in (0, 1) or goal["does"] == "stubborn":
+        if goal is None or goal["status"] not in (0, 1) or goal["does"] in ("stubborn", "mute"):
             return
         if goal["does"] == "deaf to ids" and not everything:
             return
@@ -255,7 +262,7 @@ class FakeRobot:
             reactor.callLater(0.05, self._end, name, 5 if self.ros == 2 else 2)
 
     def _serve(self, client: _Client, message: dict[str, Any]) -> None:
-        agreed = self.does[""] != "stubborn" and message["service"].endswith("/_action/cancel_goal")
+        agreed = self.does[""] not in ("stubborn", "mute") and message["service"].endswith("/_action/cancel_goal")
         action = message["service"].removesuffix("/_action/cancel_goal")
         for name, goal in list(self.goals.items()):
             if goal["action"] == action:

@@ -2,8 +2,6 @@
 
 import _thread
 import signal
-import threading
-import time
 from math import pi
 from time import monotonic
 
@@ -24,8 +22,14 @@ from avlmaps.navigate.ros import Frames, GroundTransform, RosSettings, open_ros_
 pytestmark = pytest.mark.timeout(60)
 
 KINDS = [(2, "nav2"), (1, "move_base")]
+# Patience that no test uses up where all goes well, though the machine may stand still for seconds beneath it.
 QUICK = RosSettings(
-    goal_timeout_s=20.0, answer_timeout_s=5.0, cancel_timeout_s=2.0, connect_timeout_s=10.0, pose_timeout_s=10.0
+    goal_timeout_s=20.0,
+    answer_timeout_s=20.0,
+    cancel_timeout_s=10.0,
+    connect_timeout_s=20.0,
+    pose_timeout_s=20.0,
+    pose_max_age_s=10.0,
 )
 PLACE = np.array([2.0, 1.0, 0.4])
 
@@ -50,7 +54,8 @@ def robot(request):
 def goals(robot: FakeRobot) -> list[dict]:
     if robot.ros == 2:
         return [sent["args"] for sent in robot.ops("send_action_goal")]
-    return [sent["goal"] for sent in robot.published("/move_base/goal")]
+    sent = {said["goal_id"]["id"]: said["goal"] for said in robot.published("/move_base/goal")}  # some are said twice
+    return list(sent.values())
 
 
 def cancels(robot: FakeRobot) -> int:
@@ -136,22 +141,31 @@ def test_an_action_server_that_is_not_there_is_told_at_once():
 
 def test_silence_is_no_answer(robot):
     robot.does[""] = "silent"
-    with opened(robot, settings=quick(answer_timeout_s=0.5, cancel_timeout_s=0.5)) as driver:
+    with opened(robot, settings=quick(answer_timeout_s=0.5, cancel_timeout_s=1.0)) as driver:
         begun_s = monotonic()
         arrival = driver.go_to(PLACE)
         assert monotonic() - begun_s < 10.0
         assert not arrival.reached
         assert "Nothing answers" in arrival.note
-        assert cancels(robot)
+        assert robot.soon(lambda: cancels(robot) > 0)
+
+
+def test_a_goal_that_times_out_unanswered_is_not_taken_for_one_that_nobody_took():
+    with FakeRobot(2, "mute") as robot:
+        with opened(robot, settings=quick(goal_timeout_s=0.3, cancel_timeout_s=0.5)) as driver:
+            arrival = driver.go_to(PLACE)
+            assert not arrival.reached
+            assert "may still be driving" in arrival.note
+            assert not driver._absent
 
 
 def test_a_goal_that_takes_too_long_is_cancelled(robot):
     robot.does[""] = "drive on"
-    with opened(robot, settings=quick(goal_timeout_s=0.5)) as driver:
+    with opened(robot, settings=quick(goal_timeout_s=2.0)) as driver:
         robot.moves_on = True
         arrival = driver.go_to(np.array([50.0, 0.0, 0.0]))
         assert not arrival.reached
-        assert "not done within 0.5 s" in arrival.note
+        assert "not done within 2 s" in arrival.note
         assert "may still be driving" not in arrival.note
         assert not robot.moves_on
         assert len(arrival.path) > 2  # it is told how far it came
@@ -160,19 +174,16 @@ def test_a_goal_that_takes_too_long_is_cancelled(robot):
 
 def test_a_goal_that_ignores_its_cancelling_is_cancelled_with_all_others(robot):
     robot.does[""] = "deaf to ids"
-    with opened(robot, settings=quick(goal_timeout_s=0.3, cancel_timeout_s=0.5)) as driver:
+    with opened(robot, settings=quick(goal_timeout_s=0.3, cancel_timeout_s=2.0)) as driver:
         arrival = driver.go_to(PLACE)
         assert not arrival.reached
         assert "may still be driving" not in arrival.note
-        until = time.monotonic() + 5.0  # the robot tells of it a moment later
-        while time.monotonic() < until and not all(goal["status"] in (2, 5) for goal in robot.goals.values()):
-            time.sleep(0.02)
-        assert all(goal["status"] in (2, 5) for goal in robot.goals.values()), robot.goals
+        assert robot.soon(lambda: all(goal["status"] in (2, 5) for goal in robot.goals.values())), robot.goals
 
 
 def test_a_robot_that_will_not_stop_is_told_of(robot):
     robot.does[""] = "stubborn"
-    with opened(robot, settings=quick(goal_timeout_s=0.3, cancel_timeout_s=0.5)) as driver:
+    with opened(robot, settings=quick(goal_timeout_s=0.5, cancel_timeout_s=1.0)) as driver:
         robot.moves_on = True
         assert "may still be driving" in driver.go_to(PLACE).note
         stopped = driver.stop()
@@ -193,7 +204,7 @@ def test_a_connection_lost_on_the_way_calls_the_goal_off_and_is_made_again_for_t
 
 
 def test_a_robot_that_is_gone_is_an_ordinary_result_and_its_last_pose_is_kept(robot):
-    settings = quick(connect_timeout_s=1.0, goal_timeout_s=5.0)
+    settings = quick(connect_timeout_s=5.0, goal_timeout_s=5.0)
     robot.pose = GroundPose(3.0, 4.0, 1.0)
     driver = opened(robot, settings=settings)
     robot.__exit__()
@@ -236,12 +247,25 @@ def test_a_robot_whose_pose_is_no_number_is_not_driven(robot, spoiled):
 
 def test_a_robot_that_loses_its_way_is_stopped(robot):
     robot.does[""] = "drive on"
-    with opened(robot, settings=quick(pose_max_age_s=0.2)) as driver:
-        threading.Timer(0.3, setattr, (robot, "tf_on", False)).start()
+    with opened(robot, settings=quick(pose_max_age_s=0.5)) as driver:
+
+        def lose_its_way() -> None:
+            robot.soon(lambda: bool(goals(robot)))
+            robot.tf_on = False
+
+        in_thread(lose_its_way)
         arrival = driver.go_to(PLACE)
         assert not arrival.reached
         assert "is not known any more" in arrival.note
-        assert cancels(robot)
+        assert robot.soon(lambda: cancels(robot) > 0)
+
+
+def test_a_robot_that_arrives_without_telling_where_has_not_arrived(robot):
+    with opened(robot, settings=quick(pose_max_age_s=1.0)) as driver:
+        robot.does[""] = "arrive unseen"
+        arrival = driver.go_to(PLACE)
+        assert not arrival.reached
+        assert "says that it arrived, but where it is is not told any more: its transforms are" in arrival.note
 
 
 @pytest.mark.parametrize(
@@ -253,7 +277,7 @@ def test_a_robot_that_loses_its_way_is_stopped(robot):
 )
 def test_a_robot_that_never_tells_its_pose_cannot_be_opened(robot, frames, says):
     with pytest.raises(NavigationError, match=says) as error:
-        opened(robot, frames=frames, settings=quick(pose_timeout_s=0.4))
+        opened(robot, frames=frames, settings=quick(pose_timeout_s=1.0))
     assert "base_link, laser, map, odom" in str(error.value)
     assert robot.soon(lambda: not robot.clients)  # and the connection is not left behind
 
@@ -307,7 +331,7 @@ def test_nav2_turns_and_drives_by_its_behaviours():
 def test_nav2_without_its_behaviours_turns_by_goals_and_remembers(absent):
     with FakeRobot(2) as robot:
         robot.does["/spin"] = absent
-        with opened(robot, settings=quick(answer_timeout_s=0.5)) as driver:
+        with opened(robot, settings=quick(answer_timeout_s=1.5)) as driver:
             assert driver.turn(1.0).reached
             assert driver.turn(1.0).reached
         actions = [message["action"] for message in robot.ops("send_action_goal")]
@@ -357,6 +381,12 @@ def test_stopping_cancels_what_others_sent_and_sees_that_it_stands(robot):
             assert "/navigate_to_pose/_action/cancel_goal" in services
 
 
+def test_a_robot_that_tells_nothing_is_not_seen_to_stand(robot):
+    with opened(robot, settings=quick(cancel_timeout_s=1.0)) as driver:
+        robot.tf_on = False
+        assert "not seen to stand" in driver.stop().note
+
+
 def test_stopping_from_another_thread_ends_a_drive(robot):
     robot.does[""] = "drive on"
     with opened(robot) as driver:
@@ -367,7 +397,7 @@ def test_stopping_from_another_thread_ends_a_drive(robot):
         assert not busy.reached
         assert "another movement" in busy.note
         assert driver.stop().reached
-        thread.join(10.0)
+        thread.join(20.0)
         (arrival,) = results
         assert not arrival.reached
         assert not robot.moves_on
@@ -396,7 +426,7 @@ def test_an_interrupt_cancels_the_goal_and_goes_on_up(robot):
         thread, _ = in_thread(interrupt)
         with pytest.raises(KeyboardInterrupt):
             driver.go_to(np.array([50.0, 0.0, 0.0]))
-        thread.join(5.0)
+        thread.join(20.0)
         assert robot.soon(lambda: cancels(robot) == 1)
         assert not robot.moves_on
 
@@ -407,7 +437,7 @@ def test_closing_calls_off_what_is_under_way(robot):
     thread, _ = in_thread(lambda: driver.go_to(PLACE))
     assert robot.soon(lambda: bool(goals(robot)))
     driver.close()
-    thread.join(10.0)
+    thread.join(20.0)
     assert not thread.is_alive()
     assert robot.soon(lambda: all(goal["status"] in (2, 5) for goal in robot.goals.values()))
 

@@ -191,8 +191,12 @@ class RosDriver(ABC):
             self._absent.add(task.action)
         if end is not End.SUCCEEDED:
             return self._arrival(False, track, note or f"{self.called} did not do it")
-        track.passed(self._contact.pose_from_now(min(1.0, self.settings.pose_max_age_s)))
-        off = plan.off(self.pose)
+        now = self._contact.pose_from_now(self.settings.pose_max_age_s)
+        if now is None:
+            why = f"{self.called} says that it arrived, but where it is is not told any more: {self._contact.unseen()}"
+            return self._arrival(False, track, why)
+        track.passed(now)
+        off = plan.off(now)
         if off:
             why = "its goal tolerance is loose, or the frames are wrong"
             return self._arrival(False, track, f"{self.called} says that it arrived, but {off}; {why}")
@@ -203,9 +207,9 @@ class RosDriver(ABC):
         goal = self._goal = Goal(task)
         try:
             self._send(goal)
-            why = self._watch(goal, track)
+            why, absent = self._watch(goal, track)
             if goal.end is None:
-                self._give_up(goal, why)
+                self._give_up(goal, why, absent)
         except BaseException:  # above all KeyboardInterrupt: nobody watches the robot any more
             self._cancel(goal)
             self._ended_within(goal, self.settings.cancel_timeout_s)
@@ -214,26 +218,26 @@ class RosDriver(ABC):
             self._goal = None
         return goal
 
-    def _watch(self, goal: Goal, track: Track) -> str:
-        """Wait for a goal's end; else return why it is to be given up."""
+    def _watch(self, goal: Goal, track: Track) -> tuple[str, bool]:
+        """Wait for a goal's end; else return why it is to be given up, and whether nobody is there to take it."""
         watch, settings = Watch(), self.settings
         while not self._ended_within(goal, _LOOK_EVERY_S):
             track.passed(self.pose)
             if self._contact.link.lost is not None:
-                return self._contact.loss()
+                return self._contact.loss(), False
             if self._halted.is_set():
-                return "The robot was told to stop"
+                return "The robot was told to stop", False
             if not goal.answered and watch.took_s > settings.answer_timeout_s:
                 within = f"within {settings.answer_timeout_s:g} s; is {self.called} running?"
-                return f"Nothing answers at {goal.task.action} {within}"
+                return f"Nothing answers at {goal.task.action} {within}", True
             if watch.took_s > goal.task.limit_s:
-                return f"{self.called} was not done within {goal.task.limit_s:g} s"
+                return f"{self.called} was not done within {goal.task.limit_s:g} s", False
             if self._contact.is_unseen_for(3 * settings.pose_max_age_s):
-                return f"Where the robot is is not known any more: {self._contact.unseen()}"
+                return f"Where the robot is is not known any more: {self._contact.unseen()}", False
             self._remind(goal)
-        return ""
+        return "", False
 
-    def _give_up(self, goal: Goal, why: str) -> None:
+    def _give_up(self, goal: Goal, why: str, absent: bool) -> None:
         """Call a goal off, by every way there is, and say how it went."""
         link = self._contact.link
         if link.lost is not None:
@@ -242,7 +246,6 @@ class RosDriver(ABC):
             told = "it was reached again and told to stop" if agreed else "it may still be driving: use its own stop"
             goal.note = f"{why}; {told}"
             return
-        absent = not goal.answered and not self._halted.is_set()
         self._cancel(goal)
         wait_s = self.settings.cancel_timeout_s
         agreed = self._ended_within(goal, min(wait_s, 1.0) if absent else wait_s)

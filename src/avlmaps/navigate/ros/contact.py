@@ -104,26 +104,33 @@ class Contact:
             sleep(_LOOK_EVERY_S)
         return self._last
 
-    def pose_from_now(self, wait_s: float) -> GroundPose:
-        """Return a pose that was told after this call; the last one where none is by then."""
+    def pose_from_now(self, wait_s: float) -> GroundPose | None:
+        """Return a pose that was told after this call; None where none is within that time."""
         now_s = monotonic()
         while monotonic() < now_s + wait_s and self.link.lost is None:
             seen = self.sighting()
-            if seen is not None and seen.age_s < monotonic() - now_s:
-                break
+            if seen is not None and seen.heard_s > now_s:
+                self._last = self.frames.to_level(seen.pose)
+                return self._last
             sleep(_LOOK_EVERY_S)
-        return self.pose
+        return None
 
     def stands_still(self, wait_s: float) -> bool:
-        """Tell whether the robot comes to stand within that time."""
-        until_s, since_s, at = monotonic() + wait_s, monotonic(), self.pose
-        while monotonic() < until_s and self.link.lost is None:
+        """Tell whether the robot comes to stand within that time.
+
+        Only what it tells from now on counts: two poses some time apart, and no other place between them. A robot that
+        tells nothing is not seen to stand.
+        """
+        begun_s = monotonic()
+        since_s, at = begun_s, None
+        while monotonic() < begun_s + wait_s and self.link.lost is None:
             sleep(_LOOK_EVERY_S)
-            seen, now = self.sighting(), self.pose
-            told = seen is not None and seen.age_s < _STILL_S
-            if not told or now.distance_m(at) > _STILL_M or abs(wrapped(now.heading_rad - at.heading_rad)) > _STILL_RAD:
-                since_s, at = monotonic(), now
-            elif monotonic() - since_s >= _STILL_S:
+            seen = self.sighting()
+            if seen is None or seen.heard_s <= begun_s:
+                continue
+            if at is None or _is_elsewhere(at, seen.pose):
+                since_s, at = seen.heard_s, seen.pose
+            elif seen.heard_s - since_s >= _STILL_S:
                 return True
         return False
 
@@ -156,3 +163,8 @@ class Contact:
             return False
         self._last = self.frames.to_level(seen.pose)
         return True
+
+
+def _is_elsewhere(before: GroundPose, now: GroundPose) -> bool:
+    turned_rad = abs(wrapped(now.heading_rad - before.heading_rad))
+    return now.distance_m(before) > _STILL_M or turned_rad > _STILL_RAD

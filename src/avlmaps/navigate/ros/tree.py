@@ -31,10 +31,13 @@ class Sighting:
 
     Attributes:
         pose: of the body on the ground, in the fixed frame.
-        age_s: since the oldest of the moving transforms that it is made of was heard.
+        heard_s: when the oldest of the moving transforms that it is made of was heard, by the tree's clock.
+        age_s: since then, at the moment of looking. To tell what came before what, compare ``heard_s``: a process may
+            stand still between two looks at a clock.
     """
 
     pose: GroundPose
+    heard_s: float
     age_s: float
 
 
@@ -83,7 +86,9 @@ class LiveTree:
         if max(abs(x_m), abs(y_m)) > _FAR_M:
             return None
         pose = GroundPose(x_m, y_m, atan2(ahead_y, ahead_x))
-        return Sighting(pose, self._clock() - min(heard_s) if heard_s else 0.0)
+        now_s = self._clock()
+        oldest_s = min(heard_s, default=now_s)
+        return Sighting(pose, oldest_s, now_s - oldest_s)
 
     def why_not(self, fixed: str, body: str) -> str:
         """Return what is missing between two frames, in part of a sentence."""
