@@ -31,10 +31,10 @@ def test_photos_of_other_places_can_be_given() -> None:
 
 @pytest.mark.shared
 def test_half_of_the_red_kitchen_locates_the_other_half(shared_data: Path) -> None:
-    """The issue's figures, on every eighth photo of those that are not in the map."""
+    """The issue's figures, in the first half of the walk; `avlmaps bench locate` asks everywhere."""
     recording = open_recording(shared_data / "data" / "redkitchen")
-    stored = map_of(Subset(recording, np.arange(0, 500, 2)), profile("embedded"), np.random.default_rng(0))
-    asked = np.arange(1, 500, 16)
+    stored = map_of(Subset(recording, np.arange(0, 250, 2)), profile("embedded"), np.random.default_rng(0))
+    asked = np.arange(1, 250, 12)
     errors = errors_of(stored, recording, asked, 0)
     assert np.median(errors.cm) <= 1.0
     assert np.median(errors.deg) <= 0.4

@@ -349,10 +349,10 @@ def test_a_copy_takes_its_sound_track_along(tmp_path: Path):
     assert audio is not None and audio.start_s == -0.25 and audio.duration_s == pytest.approx(0.5)
 
 
-def test_opening_twenty_thousand_frames_opens_no_picture_and_takes_little_memory(
+def test_opening_five_thousand_frames_opens_no_picture_and_takes_little_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    count = 20_000
+    count = 5_000
     path = write_folder(tmp_path / "walk", count=1)
     picture = path / "depth/000000.png"
     for folder in ("rgb", "depth"):
@@ -370,7 +370,7 @@ def test_opening_twenty_thousand_frames_opens_no_picture_and_takes_little_memory
     tracemalloc.stop()
     assert len(recording) == count
     assert [file.name for file in opened] == ["recording.json"]
-    assert peak < 40e6
+    assert peak < 2000 * count
     monkeypatch.undo()
     assert picture.exists()
     assert recording.frame(count - 1).world_from_camera[0, 3] == pytest.approx((count - 1) / 100)

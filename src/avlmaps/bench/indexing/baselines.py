@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from avlmaps.bench.indexing.factors import true_places
-from avlmaps.bench.indexing.weak_sounds import WeakSounds
+from avlmaps.bench.indexing.weak_sounds import weak_ear
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.question import Modality, Part, Role
@@ -28,16 +28,12 @@ class WeakHearing:
     def heat(self, name: str, role: Role) -> Heatmap:
         """Return the heat of a kind of sound."""
         asked = self._asked
-        scores = self._ear.scores(self._clips, name)
+        scores = weak_ear(self._seed).scores(self._clips, name)
         part = Part(Modality.SOUND, name, role)
         factor = sound_factor(
             asked.space, asked.stored.sounds, scores, part, SoundSettings(), asked.settings.heat
         )  # fmt: skip
         return Heatmap.of(factor)
-
-    @cached_property
-    def _ear(self) -> WeakSounds:
-        return WeakSounds.learnt(np.random.default_rng([self._seed, 1]))
 
     @cached_property
     def _clips(self) -> list[Sound]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float, Float32
@@ -47,6 +48,12 @@ class WeakSounds:
         off = (((features[:, None] - self.mean) / self.scale) ** 2).mean(axis=2)
         weight = np.exp(-(off - off.min(axis=1, keepdims=True)) / _SOFTNESS)
         return (weight / weight.sum(axis=1, keepdims=True))[:, self.names.index(name)]
+
+
+@lru_cache(maxsize=1)
+def weak_ear(seed: int) -> WeakSounds:
+    """Return the ear of a seed; synthesising its examples takes longer than a scene's questions, so it learns once."""
+    return WeakSounds.learnt(np.random.default_rng([seed, 1]))
 
 
 def _feature(sound: Sound) -> Float32[np.ndarray, " d"]:

@@ -5,11 +5,14 @@ the same for every server: one deadline holds all attempts, nothing endless is r
 carry the command elsewhere), no proxy stands before this very machine, and a key appears in no message.
 """
 
+import os
 import re
 from collections.abc import Iterator
 from concurrent.futures import Future
 from dataclasses import replace
+from functools import lru_cache
 from importlib import import_module
+from ssl import SSLContext
 from threading import Thread
 from time import monotonic, sleep
 from typing import Any
@@ -47,7 +50,8 @@ class Endpoint:
         self._settings = settings
         self._most_tokens_word = "max_completion_tokens" if settings.hosted else "max_tokens"
         self._deadline = 0.0
-        self._openai, self._http_error = _client_library()
+        self._openai, self._http = _client_library()
+        self._http_error: type[Exception] = self._http.HTTPError
 
     def complete(self, request: Request) -> Answer:
         """Return the server's answer to a request.
@@ -140,12 +144,14 @@ class Endpoint:
         def on_response(response: Any) -> None:
             self._on_response(response, deadline)
 
+        trust_env = not self._settings.on_this_machine
         return self._openai.OpenAI(
             api_key=self._settings.api_key or NO_KEY,
             base_url=self._settings.base_url,
             max_retries=0,
             http_client=self._openai.DefaultHttpxClient(
-                trust_env=not self._settings.on_this_machine,
+                verify=_trusted(self._http, trust_env, os.environ.get("SSL_CERT_FILE"), os.environ.get("SSL_CERT_DIR")),
+                trust_env=trust_env,
                 follow_redirects=False,
                 event_hooks={"request": [self._on_request], "response": [on_response]},
             ),
@@ -201,14 +207,19 @@ class Endpoint:
         return text.replace(key, "…") if len(key) >= _SHORTEST_KEY else text
 
 
-def _client_library() -> tuple[Any, type[Exception]]:
-    """Return the official client and the base of its HTTP library's errors, which differs between its versions."""
+def _client_library() -> tuple[Any, Any]:
+    """Return the official client and its HTTP library, which differs between its versions."""
     try:
         import openai
     except ImportError:
         raise LanguageError("The chat models need the openai client: pip install 'avlmaps[chat]'.") from None
-    http_library = openai.DefaultHttpxClient.__mro__[1].__module__.partition(".")[0]
-    return openai, import_module(http_library).HTTPError
+    return openai, import_module(openai.DefaultHttpxClient.__mro__[1].__module__.partition(".")[0])
+
+
+@lru_cache(maxsize=4)
+def _trusted(http_library: Any, trust_env: bool, *_environment: str | None) -> SSLContext:
+    """Return the certificates that the HTTP library trusts, read once: reading them takes longer than a request."""
+    return http_library.create_ssl_context(trust_env=trust_env)
 
 
 def _read(chunks: Iterator[bytes], most: int, deadline: float) -> bytes:
