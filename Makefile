@@ -25,7 +25,7 @@ demo: $(READY)  ## Make a home, walk it, hear it, map it, ask it; pictures land 
 	$(RUN)/avlmaps demo --out demo_out
 
 test: $(READY)  ## Run every test (offline, two cores, no GPU).
-	$(RUN)/python -m pytest -n 2 --dist loadfile
+	$(RUN)/python -m pytest -n 3 --dist loadfile
 
 test-foundation: $(TORCH)/.ready  ## Run the tests of the models on torch (in a virtual environment of their own, 1.5 GB).
 	$(TORCH)/bin/python -m pytest -n 2 --dist loadfile tests/foundation
