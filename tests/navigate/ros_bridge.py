@@ -173,7 +173,8 @@ class FakeRobot:
         if does == "deaf":
             self.does[action] = "succeed"  # the first message of a new topic is lost
             return
-        goal = {"client": client, "action": action, "args": args, "does": does, "status": 1, "listed": does not in ("silent", "mute")}
+        told = does not in ("silent", "mute")
+        goal = {"client": client, "action": action, "args": args, "does": does, "status": 1, "listed": told}
         self.goals[name] = goal
         if does not in ("lie", "reject", "no server", "silent", "mute"):
             self._feed(name)

@@ -151,12 +151,12 @@ def test_silence_is_no_answer(robot):
 
 
 def test_a_goal_that_times_out_unanswered_is_not_taken_for_one_that_nobody_took():
-    with FakeRobot(2, "mute") as robot:
-        with opened(robot, settings=quick(goal_timeout_s=0.3, cancel_timeout_s=0.5)) as driver:
-            arrival = driver.go_to(PLACE)
-            assert not arrival.reached
-            assert "may still be driving" in arrival.note
-            assert not driver._absent
+    settings = quick(goal_timeout_s=0.3, cancel_timeout_s=0.5)
+    with FakeRobot(2, "mute") as robot, opened(robot, settings=settings) as driver:
+        arrival = driver.go_to(PLACE)
+        assert not arrival.reached
+        assert "may still be driving" in arrival.note
+        assert not driver._absent
 
 
 def test_a_goal_that_takes_too_long_is_cancelled(robot):
