@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ from avlmaps.core.errors import AudioError, BackendError, QueryError
 from avlmaps.query import locate as locate_module
 from avlmaps.query.areas import AreaSettings
 from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.query.photometric import Panoramas, Start
 from avlmaps.query.question import Modality, Part, Question, Role
 from avlmaps.recordings.audio import AudioTrack, Sound
 
@@ -27,7 +29,8 @@ def heard() -> AVLMap:
 def locating(
     monkeypatch: pytest.MonkeyPatch, pose: np.ndarray | None, inliers: int = 200, guess: np.ndarray | None = None
 ) -> None:
-    located = SimpleNamespace(world_from_camera=pose, inliers=inliers, guess=guess)
+    camera = Pinhole(50.0, 50.0, 32.0, 24.0, 64, 48)
+    located = locate_module.Located(pose, inliers, None, 0.0 if pose is None else 1.0, 0.0, camera, guess)
     monkeypatch.setattr(locate_module, "locate", lambda stored, rgb, camera, rng, settings: located)
 
 
@@ -160,6 +163,26 @@ def test_a_guess_heats_its_place_and_is_not_found(heard: AVLMap, monkeypatch: py
     assert (heat.found, heat.goals()[0].position) == (False, (3.0, 2.0, 1.5))
     told = "the picture could not be located (7 points agree); the heat is that of the best guess"
     assert heat.factors[0].note == told
+
+
+@pytest.mark.parametrize("by_colour", [True, False])
+def test_what_keypoints_cannot_locate_is_guessed_by_its_colours(
+    heard: AVLMap, monkeypatch: pytest.MonkeyPatch, by_colour: bool
+) -> None:
+    guess, better = np.eye(4), np.eye(4)
+    guess[:3, 3], better[:3, 3] = [3.0, 2.0, 1.5], [1.0, 2.0, 1.5]
+    locating(monkeypatch, None, inliers=7, guess=guess)
+    started: list[list[Start]] = []
+
+    def likeliest(panoramas: Panoramas, rgb: np.ndarray, camera: Pinhole, starts: list[Start]) -> np.ndarray:
+        started.append(starts)
+        return better
+
+    monkeypatch.setattr(Panoramas, "likeliest", likeliest)
+    asked = AVLMap(heard.stored, replace(heard.settings, by_colour=by_colour))
+    heat = asked.image(np.zeros((48, 64, 3), np.uint8), primary=True)
+    assert (heat.found, heat.goals()[0].position) == (False, (1.0, 2.0, 1.5) if by_colour else (3.0, 2.0, 1.5))
+    assert [start.world_from_camera.tolist() for starts in started for start in starts] == [guess.tolist()] * by_colour
 
 
 def test_pictures_that_cannot_be_asked_with_are_refused(heard: AVLMap, tmp_path: Path) -> None:

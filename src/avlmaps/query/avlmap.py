@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,6 +24,7 @@ from avlmaps.recordings.audio import Sound
 if TYPE_CHECKING:
     from avlmaps.maps.stored import StoredMap
     from avlmaps.query.locate import Located
+    from avlmaps.query.photometric import Panoramas
 
 
 # Keyframes that are matched one by one for a picture that cannot be located: more of them guess no better (measured).
@@ -42,6 +43,8 @@ class QuerySettings:
     """From a sound's scores to heat."""
     areas: AreaSettings = field(default_factory=AreaSettings)
     """From views to heat."""
+    by_colour: bool = True
+    """A picture that keypoints cannot locate is guessed by its colours; else by the few keypoints that there are."""
     seed: int = 0
     """Seed of what is drawn at random when a picture is located."""
 
@@ -170,7 +173,23 @@ class AVLMap:
         part = Part(Modality.IMAGE, "a picture" if is_array else str(picture), _role(primary), is_file=True)
         rgb = picture if is_array else read_picture(Path(picture).expanduser())
         located = self._located(rgb, intrinsics, _GUESS_FROM)
+        if located.world_from_camera is None and self.settings.by_colour:
+            located = self._guessed_by_colour(rgb, located)
         return Heatmap.of(image_factor(self.space, located, part, self.settings.heat))
+
+    def _guessed_by_colour(self, rgb: UInt8[np.ndarray, "h w 3"], located: "Located") -> "Located":
+        from avlmaps.query.photometric import Start
+
+        starts = [] if located.guess is None else [Start(located.guess, located.guess_inliers)]
+        guess = self._panoramas.likeliest(rgb, located.camera, starts)
+        return located if guess is None else replace(located, guess=guess)
+
+    @cached_property
+    def _panoramas(self) -> "Panoramas":
+        from avlmaps.query.photometric import Panoramas
+
+        stored = self.stored
+        return Panoramas(stored.voxels, stored.grid.voxel_size_m, stored.keyframes, stored.up_in_world)
 
     def locate(self, rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None = None) -> "Located":
         """Return the pose of the camera that took a picture, or that it could not be told."""

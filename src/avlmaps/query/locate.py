@@ -107,6 +107,7 @@ class Located:
         elapsed_ms: how long it took.
         camera: the camera that the pose holds for; another than the given one where its focal length was refined.
         guess: where it was not located, the likeliest pose all the same, if one was asked for: not to be relied on.
+        guess_inliers: keypoints that agree with the guess; 0 where it is only the place of a keyframe.
     """
 
     world_from_camera: Float[np.ndarray, "4 4"] | None
@@ -116,6 +117,7 @@ class Located:
     elapsed_ms: float
     camera: Pinhole
     guess: Float[np.ndarray, "4 4"] | None = None
+    guess_inliers: int = 0
 
 
 def locate(
@@ -165,11 +167,13 @@ def locate_features(
         fit = _fit(stored, local, references, camera, rng, settings) or fit
     if fit is not None and fit.score >= 0.5:
         fit = _from_the_nearest(stored, local, fit, rng, settings)
-        guess = None
+        guess, guess_inliers = None, 0
     else:
-        guess = _guess(stored, local, alike(stored.keyframes, place, settings.guess_references), camera, rng, settings)
+        guess, guess_inliers = _guess(
+            stored, local, alike(stored.keyframes, place, settings.guess_references), camera, rng, settings
+        )
     if fit is None:
-        return Located(None, 0, None, 0.0, 0.0, camera, guess)
+        return Located(None, 0, None, 0.0, 0.0, camera, guess, guess_inliers)
     return Located(
         world_from_camera=fit.world_from_camera if fit.score >= 0.5 else None,
         inliers=fit.inliers,
@@ -178,6 +182,7 @@ def locate_features(
         elapsed_ms=0.0,
         camera=fit.camera,
         guess=guess,
+        guess_inliers=guess_inliers,
     )
 
 
@@ -188,17 +193,17 @@ def _guess(
     camera: Pinhole,
     rng: np.random.Generator,
     settings: LocateSettings,
-) -> Float[np.ndarray, "4 4"] | None:
-    """Return the pose on which most keypoints of any one keyframe agree, else that of the most alike keyframe."""
+) -> tuple[Float[np.ndarray, "4 4"] | None, int]:
+    """Return the pose on which most keypoints of one keyframe agree, and how many; else of the most alike, and 0."""
     if not len(references):
-        return None
+        return None, 0
     settings = replace(settings, refine_focal=False)
     fits = [_fit(stored, local, references[i : i + 1], camera, rng, settings) for i in range(len(references))]
     best = max((fit for fit in fits if fit is not None), key=lambda fit: fit.inliers, default=None)
     if best is not None and best.inliers >= settings.guess_inliers:
-        return best.world_from_camera
+        return best.world_from_camera, best.inliers
     likeliest = references[0] if best is None else best.keyframe
-    return np.asarray(stored.keyframes.world_from_camera[likeliest], np.float64)
+    return np.asarray(stored.keyframes.world_from_camera[likeliest], np.float64), 0
 
 
 def alike(keyframes: Keyframes, place: Float32[np.ndarray, " d"], count: int) -> Int[np.ndarray, " k"]:

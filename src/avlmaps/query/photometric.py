@@ -1,0 +1,343 @@
+"""Where a picture was taken, by its colours: the picture is compared with what the coloured voxels would look like.
+
+Keypoints fail where there is little texture (a bare wall, a plain sofa), though anybody would know the room by its
+colours. From places all over the map a panorama is drawn; the picture is laid on each at every heading and pitch, and
+the best of these poses are moved until the drawn view is most alike (direct image alignment, as by Lucas and Kanade
+1981, without derivatives). The measure is a correlation, so that exposure does not matter.
+
+What comes out is a guess: rooms may look alike. It answers where keypoints do not, and is never told as sure.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int32, UInt8
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.core.poses import rotation_to_level
+from avlmaps.maps.types import Keyframes, Voxels
+from avlmaps.query.kernels import share
+from avlmaps.query.photometric_kernels import compare_panoramas, compare_view, draw_panoramas
+
+_BIN_RAD = np.deg2rad(3.0)
+_COLUMNS, _ROWS = 120, 50
+_LOWEST_RAD = np.deg2rad(-80.0)
+_STEPS = (  # sides of the picture in pixels, steps in metres and radians
+    (40, ((0.2, np.deg2rad(5.0)), (0.1, np.deg2rad(2.5)))),
+    (80, ((0.05, np.deg2rad(1.5)), (0.02, np.deg2rad(0.6)))),
+)
+_MOST_ROUNDS = 4  # of moves at one step
+_FIRST_SIDE = 20  # of the picture in pixels when it is laid on panoramas
+_TURN = 2  # columns of a panorama from one heading that is tried to the next
+
+_Ranked = tuple[Float[np.ndarray, "4 4"], float]  # a pose, level frame, and what speaks for it beside its likeness
+
+
+@dataclass(frozen=True, slots=True)
+class PhotometricSettings:
+    """How a picture is sought by its colours. Chosen on homes 1000000 to 1000004 of the indexing benchmark."""
+
+    spacing_m: float = 0.5
+    """From one place to look from to the next; wider where there would be more than ``most_eyes``."""
+    most_eyes: int = 4000
+    """So many panoramas at most; each takes 24 kB."""
+    reach_m: float = 1.2
+    """A picture was taken so near to where the robot has been."""
+    heights_m: tuple[float, ...] = (-0.65, -0.15, 0.3)
+    """From the height of the camera of the nearest keyframe."""
+    far_m: float = 8.0
+    """What is farther from an eye is not drawn."""
+    pitches_rad: tuple[float, ...] = tuple(np.deg2rad(np.arange(-32.0, 17.0, 8.0)))
+    """Above the horizon, of the pictures that are looked for first."""
+    candidates: int = 40
+    """So many poses are moved to fit better."""
+    finalists: int = 6
+    """And so many of these to fit best."""
+    least_seen: float = 0.5
+    """The map must show this part of the picture."""
+    colour_weight: float = 2.0
+    """Of the two channels of colour, against brightness."""
+    inlier_worth: float = 0.015
+    """What a keypoint that agrees with a given pose adds to its likeness..."""
+    most_inliers: int = 12
+    """...up to so many of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """A pose that something else proposes, with the keypoints that agree with it."""
+
+    world_from_camera: Float[np.ndarray, "4 4"]
+    inliers: int = 0
+
+
+class Panoramas:
+    """A map's colours as seen from all over it, and the search for a picture among them.
+
+    Attributes:
+        settings: how it is sought.
+        eyes_level: (e, 3) where was looked from, level frame, metres.
+    """
+
+    def __init__(
+        self,
+        voxels: Voxels,
+        voxel_size_m: float,
+        keyframes: Keyframes,
+        up_in_world: Float[np.ndarray, "3"],
+        settings: PhotometricSettings = PhotometricSettings(),
+    ) -> None:
+        """Draw the panoramas.
+
+        Args:
+            voxels: the map's.
+            voxel_size_m: their side.
+            keyframes: say where the robot has been.
+            up_in_world: which way is up.
+            settings: how to seek.
+        """
+        self.settings = settings
+        self._level_from_world = rotation_to_level(np.asarray(up_in_world, np.float64))
+        index, rgb = np.asarray(voxels.index), np.asarray(voxels.rgb)
+        turn = self._level_from_world.T.astype(np.float32)
+        points = ((index + 0.5) * voxel_size_m).astype(np.float32) @ turn
+        coarse = _halved(index, points, rgb)
+        self._surfaces = (_Surface(*coarse, 2 * voxel_size_m), _Surface(points, rgb, voxel_size_m))
+        cameras = np.asarray(keyframes.world_from_camera)[:, :3, 3] @ self._level_from_world.T
+        self.eyes_level = _eyes(cameras, settings)
+        self._drawn = np.zeros((len(self.eyes_level), _ROWS, _COLUMNS, 4), np.uint8)
+
+        def draw(start: int, stop: int) -> None:
+            depth = np.zeros((_ROWS, _COLUMNS), np.float32)
+            draw_panoramas(
+                *coarse, 2 * voxel_size_m, self.eyes_level[start:stop], settings.far_m, _LOWEST_RAD, _BIN_RAD,
+                self._drawn[start:stop], depth,
+            )  # fmt: skip
+
+        share(draw, len(self.eyes_level))
+
+    def likeliest(
+        self, rgb: UInt8[np.ndarray, "h w 3"], camera: Pinhole, starts: Sequence[Start] = ()
+    ) -> Float[np.ndarray, "4 4"] | None:
+        """Return the pose from which the map looks most like a picture, world; None where it is like no place.
+
+        Args:
+            rgb: the picture.
+            camera: that took it.
+            starts: poses to try beside those that are found.
+        """
+        worth, most = self.settings.inlier_worth, self.settings.most_inliers
+        level_from_world = np.eye(4)
+        level_from_world[:3, :3] = self._level_from_world
+        found = [(pose, 0.0) for pose in self._candidates(rgb, camera)]
+        found += [(level_from_world @ s.world_from_camera, worth * min(s.inliers, most)) for s in starts]
+        for rank, (side, steps) in enumerate(_STEPS):
+            picture = _Shrunk.of(rgb, camera, side, self.settings.colour_weight)
+            moved = self._all_moved(found, picture, self._surfaces[rank], steps)
+            found = moved[: 1 if rank else self.settings.finalists]
+        return level_from_world.T @ found[0][0] if found else None
+
+    def _all_moved(
+        self, found: list["_Ranked"], picture: "_Shrunk", surface: "_Surface", steps: Sequence[tuple[float, float]]
+    ) -> list["_Ranked"]:
+        """Return poses moved to where the map looks most like a picture, the best first; none that is like nothing."""
+        moved = [(np.eye(4), -1.0)] * len(found)
+
+        def move(start: int, stop: int) -> None:
+            for i in range(start, stop):
+                moved[i] = self._moved(found[i][0], picture, surface, steps)
+
+        share(move, len(found))
+        ranked = [(pose, alike, extra) for (pose, alike), (_, extra) in zip(moved, found, strict=True) if alike > 0.0]
+        ranked.sort(key=lambda one: -one[1] - one[2])
+        return [(pose, extra) for pose, _, extra in ranked]
+
+    def _candidates(self, rgb: UInt8[np.ndarray, "h w 3"], camera: Pinhole) -> list[Float[np.ndarray, "4 4"]]:
+        """Return the best poses on the grid of places, headings and pitches, no two of them alike; level frame."""
+        settings = self.settings
+        picture = _Shrunk.of(rgb, camera, _FIRST_SIDE, settings.colour_weight)
+        ray = picture.camera.rays()
+        directions = [ray @ _level_from_camera(0.0, pitch).T for pitch in settings.pitches_rad]
+        azimuth = np.array([np.arctan2(one[..., 1], one[..., 0]).ravel() for one in directions])
+        elevation = np.array(
+            [np.arctan2(one[..., 2], np.hypot(one[..., 0], one[..., 1])).ravel() for one in directions]
+        )
+        row = np.floor((elevation - _LOWEST_RAD) / _BIN_RAD).astype(np.int32)
+        column = np.floor(azimuth / _BIN_RAD + 0.5).astype(np.int32) % _COLUMNS
+        score = np.full((len(self._drawn), len(directions), _COLUMNS // _TURN), -1.0, np.float32)
+        flat = picture.channels.reshape(-1, 3)
+
+        def compare(start: int, stop: int) -> None:
+            compare_panoramas(
+                self._drawn[start:stop], flat, row, column, _TURN, settings.least_seen, settings.colour_weight,
+                score[start:stop],
+            )  # fmt: skip
+
+        share(compare, len(score))
+        return self._apart(score)
+
+    def _apart(self, score: Float32[np.ndarray, "e p h"]) -> list[Float[np.ndarray, "4 4"]]:
+        """Return the poses of the best scores, no two of them from about the same place in about the same direction."""
+        settings, heading_of = self.settings, _TURN * _BIN_RAD
+        chosen: list[tuple[int, int, int]] = []
+        places = np.zeros((0, 3))
+        headings = np.zeros(0)
+        ranked = score.ravel()
+        order = np.argsort(-ranked, kind="stable")
+        for flat_index in order[ranked[order] > 0.0]:
+            eye, pitch, heading = (int(i) for i in np.unravel_index(flat_index, score.shape))
+            near = np.linalg.norm(places - self.eyes_level[eye], axis=1) < 0.9 * settings.spacing_m
+            apart = np.abs((headings - heading * heading_of + np.pi) % (2 * np.pi) - np.pi)
+            if (near & (apart < np.deg2rad(25.0))).any():
+                continue
+            chosen.append((eye, pitch, heading))
+            places = np.concatenate([places, self.eyes_level[eye][None]])
+            headings = np.append(headings, heading * heading_of)
+            if len(chosen) >= settings.candidates:
+                break
+        return [self._pose(eye, heading * heading_of, settings.pitches_rad[pitch]) for eye, pitch, heading in chosen]
+
+    def _pose(self, eye: int, heading_rad: float, pitch_rad: float) -> Float[np.ndarray, "4 4"]:
+        pose = np.eye(4)
+        pose[:3, :3] = _level_from_camera(heading_rad, pitch_rad)
+        pose[:3, 3] = self.eyes_level[eye]
+        return pose
+
+    def _moved(
+        self,
+        pose: Float[np.ndarray, "4 4"],
+        picture: "_Shrunk",
+        surface: "_Surface",
+        steps: Sequence[tuple[float, float]],
+    ) -> tuple[Float[np.ndarray, "4 4"], float]:
+        """Move a pose, level frame, until no step along or about an axis of the camera makes the view more alike."""
+        small = picture.camera
+        sight = self._in_sight(pose, small, surface.points)
+        points, channels = surface.points[sight], _channels(surface.rgb[sight], self.settings.colour_weight)
+        numbers = np.array([small.fx, small.fy, small.cx, small.cy])
+        size = picture.channels.shape[:2]
+        depth, drawn = np.zeros(size, np.float32), np.zeros(size, np.int64)
+
+        def likeness(tried: Float[np.ndarray, "4 4"]) -> float:
+            return compare_view(
+                points,
+                channels,
+                surface.side_m,
+                numbers,
+                tried,
+                picture.channels,
+                self.settings.least_seen,
+                depth,
+                drawn,
+            )
+
+        best, most = pose, likeness(pose)
+        for step_m, step_rad in steps:
+            motions = _motions(step_m, step_rad)
+            for _ in range(_MOST_ROUNDS):
+                before = most
+                for motion in motions:
+                    tried = best @ motion
+                    alike = likeness(tried)
+                    if alike > most + 1e-4:
+                        best, most = tried, alike
+                if most == before:
+                    break
+        return best, most
+
+    def _in_sight(
+        self, pose: Float[np.ndarray, "4 4"], camera: Pinhole, points: Float32[np.ndarray, "n 3"]
+    ) -> Bool[np.ndarray, " n"]:
+        """Return the voxels that the camera can come to see while it is moved."""
+        away = points - pose[:3, 3].astype(np.float32)
+        distance = np.linalg.norm(away, axis=1)
+        corner = np.linalg.norm(camera.rays()[[0, 0, -1, -1], [0, -1, 0, -1]], axis=1).max()
+        cosine = np.cos(min(np.arccos(1.0 / corner) + np.deg2rad(12.0), np.pi))
+        ahead = away @ pose[:3, 2].astype(np.float32)
+        return (distance < self.settings.far_m) & (ahead > cosine * distance - 0.5)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Surface:
+    """Coloured voxels of one size: their middles, level frame, their colours, their side."""
+
+    points: Float32[np.ndarray, "n 3"]
+    rgb: UInt8[np.ndarray, "n 3"]
+    side_m: float
+
+
+def _channels(rgb: UInt8[np.ndarray, "*n 3"], colour_weight: float) -> Float32[np.ndarray, "*n 3"]:
+    """Return brightness, red against green, and both against blue, the latter two weighted."""
+    r, g, b = np.moveaxis(rgb.astype(np.float32), -1, 0)
+    channels = [(r + g + b) / 3, colour_weight * (r - g), colour_weight * ((r + g) / 2 - b)]
+    return np.stack(channels, axis=-1).astype(np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shrunk:
+    """A picture made small, as channels, and its camera."""
+
+    channels: Float32[np.ndarray, "h w 3"]
+    camera: Pinhole
+
+    @classmethod
+    def of(cls, rgb: UInt8[np.ndarray, "h w 3"], camera: Pinhole, side: int, colour_weight: float) -> "_Shrunk":
+        """Make the longer side so many pixels."""
+        factor = side / max(camera.width, camera.height)
+        size = max(1, round(camera.width * factor)), max(1, round(camera.height * factor))
+        small = cv2.resize(np.ascontiguousarray(rgb), size, interpolation=cv2.INTER_AREA)
+        return cls(_channels(small, colour_weight), camera.resized(*size))
+
+
+def _level_from_camera(heading_rad: float, pitch_rad: float) -> Float[np.ndarray, "3 3"]:
+    """Return the rotation of an upright camera: z ahead, x to the right, y down."""
+    c, s, cp, sp = np.cos(heading_rad), np.sin(heading_rad), np.cos(pitch_rad), np.sin(pitch_rad)
+    ahead, right = np.array([c * cp, s * cp, sp]), np.array([s, -c, 0.0])
+    return np.stack([right, np.cross(ahead, right), ahead], axis=1)
+
+
+def _motions(step_m: float, step_rad: float) -> list[Float[np.ndarray, "4 4"]]:
+    """Return small motions of a camera, each way along and about each of its axes."""
+    motions = []
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            shift, turn = np.eye(4), np.eye(4)
+            shift[axis, 3] = sign * step_m
+            turn[:3, :3] = cv2.Rodrigues(sign * step_rad * np.eye(3)[axis])[0]
+            motions += [shift, turn]
+    return motions
+
+
+def _eyes(cameras: Float[np.ndarray, "k 3"], settings: PhotometricSettings) -> Float32[np.ndarray, "e 3"]:
+    """Return places on a grid near to where the camera has been, at several heights; level frame."""
+    from scipy.spatial import KDTree
+
+    if not len(cameras):
+        return np.zeros((0, 3), np.float32)
+    low, high = cameras[:, :2].min(axis=0) - settings.reach_m, cameras[:, :2].max(axis=0) + settings.reach_m
+    most = settings.most_eyes / len(settings.heights_m)
+    spacing_m = settings.spacing_m
+    tree = KDTree(cameras[:, :2])
+    while True:
+        axes = [np.arange(a, b, spacing_m) for a, b in zip(low, high, strict=True)]
+        xy = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        away_m, nearest = tree.query(xy)
+        near = away_m < settings.reach_m
+        if near.sum() <= most:
+            break
+        spacing_m *= 1.25
+    floor = cameras[nearest[near], 2]
+    eyes = [np.column_stack([xy[near], floor + height_m]) for height_m in settings.heights_m]
+    return np.concatenate(eyes).astype(np.float32)
+
+
+def _halved(
+    index: Int32[np.ndarray, "n 3"], points: Float32[np.ndarray, "n 3"], rgb: UInt8[np.ndarray, "n 3"]
+) -> tuple[Float32[np.ndarray, "m 3"], UInt8[np.ndarray, "m 3"]]:
+    """Return voxels of twice the side: where the smaller ones lie on average, and their mean colours."""
+    _, voxel, count = np.unique(np.floor_divide(index, 2), axis=0, return_inverse=True, return_counts=True)
+    voxel = voxel.reshape(-1)
+    columns = [np.bincount(voxel, column, len(count)) / count for column in (*points.T, *rgb.T)]
+    return np.stack(columns[:3], axis=1).astype(np.float32), np.stack(columns[3:], axis=1).round().astype(np.uint8)
