@@ -323,7 +323,7 @@ def _eyes(cameras: Float[np.ndarray, "k 3"], settings: PhotometricSettings) -> F
     while True:
         axes = [np.arange(a, b, spacing_m) for a, b in zip(low, high, strict=True)]
         xy = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-        away_m, nearest = tree.query(xy)
+        away_m, nearest = (np.asarray(told) for told in tree.query(xy))
         near = away_m < settings.reach_m
         if near.sum() <= most:
             break
