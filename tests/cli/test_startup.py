@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from time import perf_counter
+from resource import RUSAGE_CHILDREN, getrusage
 
 import pytest
 
@@ -40,12 +40,15 @@ def test_help_loads_no_heavy_library(words: list[str]) -> None:
 
 
 def test_help_comes_within_half_a_second() -> None:
-    def seconds() -> float:
-        begin = perf_counter()
-        subprocess.run([sys.executable, "-m", "avlmaps", "--help"], capture_output=True, check=True)
-        return perf_counter() - begin
+    """Of the processor's time: other work on the machine makes nobody's help slow."""
 
-    assert min(seconds() for _ in range(5)) < 0.5
+    def seconds() -> float:
+        begin = getrusage(RUSAGE_CHILDREN)
+        subprocess.run([sys.executable, "-m", "avlmaps", "--help"], capture_output=True, check=True)
+        end = getrusage(RUSAGE_CHILDREN)
+        return end.ru_utime + end.ru_stime - begin.ru_utime - begin.ru_stime
+
+    assert 0.0 < min(seconds() for _ in range(5)) < 0.5
 
 
 def test_every_public_name_can_be_had() -> None:

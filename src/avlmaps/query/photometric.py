@@ -165,7 +165,7 @@ class Panoramas:
             [np.arctan2(one[..., 2], np.hypot(one[..., 0], one[..., 1])).ravel() for one in directions]
         )
         row = np.floor((elevation - _LOWEST_RAD) / _BIN_RAD).astype(np.int32)
-        column = np.floor(azimuth / _BIN_RAD + 0.5).astype(np.int32) % _COLUMNS
+        column = np.floor(azimuth / _BIN_RAD).astype(np.int32) % _COLUMNS
         score = np.full((len(self._drawn), len(directions), _COLUMNS // _TURN), -1.0, np.float32)
         flat = picture.channels.reshape(-1, 3)
 
