@@ -1,5 +1,6 @@
 """Finding a picture by its colours: the measure against its definition, and rooms that keypoints know nothing of."""
 
+from copy import copy
 from dataclasses import replace
 
 import cv2
@@ -11,7 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.poses import apply, inverse, rotation_angle_rad
+from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Keyframes, Voxels
+from avlmaps.query.level import Space
 from avlmaps.query.photometric import Panoramas, PhotometricSettings, Start
 from avlmaps.query.photometric_kernels import compare_panoramas, compare_view, draw_panoramas
 from helpers.picture_room import CAMERA, RoomWalk, looking
@@ -48,6 +51,10 @@ def keyframes_at(poses: np.ndarray) -> Keyframes:
     )  # fmt: skip
 
 
+def drawn(voxels: Voxels, keyframes: Keyframes, up: np.ndarray = UP, **given: PhotometricSettings) -> Panoramas:
+    return Panoramas(Space(GridSpec(SIZE_M), voxels.index, up), voxels.rgb, keyframes, **given)
+
+
 def seen_from(walk: RoomWalk, tilt: np.ndarray) -> Panoramas:
     """Map a walk, in a world that is tilted."""
     points, colours, poses = [], [], []
@@ -58,7 +65,7 @@ def seen_from(walk: RoomWalk, tilt: np.ndarray) -> Panoramas:
         colours.append(plain(frame.rgb)[::2, ::2].reshape(-1, 3))
         poses.append(tilt @ frame.world_from_camera)
     voxels = voxels_of(np.concatenate(points), np.concatenate(colours))
-    return Panoramas(voxels, SIZE_M, keyframes_at(np.array(poses)), tilt[:3, :3] @ UP)
+    return drawn(voxels, keyframes_at(np.array(poses)), tilt[:3, :3] @ UP)
 
 
 @pytest.fixture(scope="module")
@@ -108,9 +115,8 @@ def test_a_tilted_world_changes_nothing(photo: np.ndarray) -> None:
 def test_a_pose_that_enough_keypoints_agree_with_wins(room: Panoramas, photo: np.ndarray) -> None:
     elsewhere = looking((1.0, 2.0, 1.3), (3.5, 0.5, 1.0))
     assert_near(room.likeliest(photo, CAMERA, [Start(elsewhere)]), PHOTO_FROM)
-    sure = replace(room.settings, inlier_worth=1.0)
-    trusting = object.__new__(Panoramas)
-    trusting.__dict__.update(room.__dict__, settings=sure)
+    trusting = copy(room)
+    trusting.settings = replace(room.settings, inlier_worth=1.0)
     assert_near(trusting.likeliest(photo, CAMERA, [Start(elsewhere, inliers=9)]), elsewhere, metres=1.5, degrees=60.0)
 
 
@@ -121,9 +127,9 @@ def test_what_is_of_one_colour_is_no_place(room: Panoramas) -> None:
 def test_an_empty_map_and_one_without_keyframes_show_no_place(photo: np.ndarray) -> None:
     nothing = voxels_of(np.zeros((0, 3)), np.zeros((0, 3)))
     poses = np.stack([WALK.frame(i).world_from_camera for i in range(3)])
-    assert Panoramas(nothing, SIZE_M, keyframes_at(poses), UP).likeliest(photo, CAMERA) is None
+    assert drawn(nothing, keyframes_at(poses)).likeliest(photo, CAMERA) is None
     some = voxels_of(np.random.default_rng(0).uniform(0, 3, (500, 3)), np.full((500, 3), 9))
-    assert Panoramas(some, SIZE_M, keyframes_at(np.zeros((0, 4, 4))), UP).likeliest(photo, CAMERA) is None
+    assert drawn(some, keyframes_at(np.zeros((0, 4, 4)))).likeliest(photo, CAMERA) is None
 
 
 def test_there_are_never_more_panoramas_than_allowed() -> None:
@@ -131,7 +137,7 @@ def test_there_are_never_more_panoramas_than_allowed() -> None:
     poses[:, :2, 3] = np.random.default_rng(0).uniform(0, 60, (400, 2))
     few = PhotometricSettings(most_eyes=300)
     some = voxels_of(np.random.default_rng(0).uniform(0, 3, (500, 3)), np.full((500, 3), 9))
-    eyes = Panoramas(some, SIZE_M, keyframes_at(poses), UP, few).eyes_level
+    eyes = drawn(some, keyframes_at(poses), settings=few).eyes_level
     assert 100 < len(eyes) <= 300
 
 

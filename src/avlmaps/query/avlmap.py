@@ -189,7 +189,7 @@ class AVLMap:
         from avlmaps.query.photometric import Panoramas
 
         stored = self.stored
-        return Panoramas(stored.voxels, stored.grid.voxel_size_m, stored.keyframes, stored.up_in_world)
+        return Panoramas(self.space, stored.voxels.rgb, stored.keyframes)
 
     def locate(self, rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None = None) -> "Located":
         """Return the pose of the camera that took a picture, or that it could not be told."""

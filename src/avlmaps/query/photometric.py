@@ -10,15 +10,16 @@ What comes out is a guess: rooms may look alike. It answers where keypoints do n
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int32, UInt8
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.core.poses import rotation_to_level
-from avlmaps.maps.types import Keyframes, Voxels
+from avlmaps.maps.types import Keyframes
 from avlmaps.query.kernels import share
+from avlmaps.query.level import Space
 from avlmaps.query.photometric_kernels import compare_panoramas, compare_view, draw_panoramas
 
 _BIN_RAD = np.deg2rad(3.0)
@@ -83,36 +84,33 @@ class Panoramas:
 
     def __init__(
         self,
-        voxels: Voxels,
-        voxel_size_m: float,
+        space: Space,
+        rgb: UInt8[np.ndarray, "n 3"],
         keyframes: Keyframes,
-        up_in_world: Float[np.ndarray, "3"],
         settings: PhotometricSettings = PhotometricSettings(),
     ) -> None:
         """Draw the panoramas.
 
         Args:
-            voxels: the map's.
-            voxel_size_m: their side.
+            space: the places of the map's voxels.
+            rgb: their colours.
             keyframes: say where the robot has been.
-            up_in_world: which way is up.
             settings: how to seek.
         """
         self.settings = settings
-        self._level_from_world = rotation_to_level(np.asarray(up_in_world, np.float64))
-        index, rgb = np.asarray(voxels.index), np.asarray(voxels.rgb)
-        turn = self._level_from_world.T.astype(np.float32)
-        points = ((index + 0.5) * voxel_size_m).astype(np.float32) @ turn
-        coarse = _halved(index, points, rgb)
-        self._surfaces = (_Surface(*coarse, 2 * voxel_size_m), _Surface(points, rgb, voxel_size_m))
-        cameras = np.asarray(keyframes.world_from_camera)[:, :3, 3] @ self._level_from_world.T
+        self._level_from_world = space.level_from_world
+        side_m, colours = space.grid.voxel_size_m, np.asarray(rgb)
+        points = space.level(space.centres).astype(np.float32)
+        coarse = _halved(np.asarray(space.index), points, colours)
+        self._surfaces = (_Surface(*coarse, 2 * side_m), _Surface(points, colours, side_m))
+        cameras = space.level(keyframes.world_from_camera[:, :3, 3])
         self.eyes_level = _eyes(cameras, settings)
         self._drawn = np.zeros((len(self.eyes_level), _ROWS, _COLUMNS, 4), np.uint8)
 
         def draw(start: int, stop: int) -> None:
             depth = np.zeros((_ROWS, _COLUMNS), np.float32)
             draw_panoramas(
-                *coarse, 2 * voxel_size_m, self.eyes_level[start:stop], settings.far_m, _LOWEST_RAD, _BIN_RAD,
+                *coarse, 2 * side_m, self.eyes_level[start:stop], settings.far_m, _LOWEST_RAD, _BIN_RAD,
                 self._drawn[start:stop], depth,
             )  # fmt: skip
 
@@ -298,6 +296,7 @@ def _level_from_camera(heading_rad: float, pitch_rad: float) -> Float[np.ndarray
     return np.stack([right, np.cross(ahead, right), ahead], axis=1)
 
 
+@cache
 def _motions(step_m: float, step_rad: float) -> list[Float[np.ndarray, "4 4"]]:
     """Return small motions of a camera, each way along and about each of its axes."""
     motions = []
