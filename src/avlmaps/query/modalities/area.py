@@ -1,5 +1,6 @@
 """Where a kind of area is: keyframes whose view is closer to its name than to those of other areas."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -109,6 +110,33 @@ def area_scores(
     if places is None or not settings.pool_m > 0.0 or not len(share):
         return posterior, posterior
     return posterior, np.clip(pooled(share, places, settings.pool_m) @ meant, 0.0, 1.0)
+
+
+def area_distribution(
+    view: Float32[np.ndarray, "k d"],
+    encoder: ViewEncoder,
+    names: Sequence[str],
+    settings: AreaSettings,
+    places: Float[np.ndarray, "k 3"],
+) -> Float[np.ndarray, "k n"]:
+    """Return for each keyframe how likely each kind of area is; rows add up to 1.
+
+    Args:
+        view: features.
+        encoder: that made them.
+        names: kinds of area; those of the encoder, where it has names of its own.
+        settings: temperature and pooling.
+        places: middle of what each keyframe saw, metres.
+    """
+    view = np.asarray(view, np.float64)
+    if isinstance(encoder, NamedViewEncoder):
+        share = np.square(view.reshape(-1, encoder.codes.shape[1]) @ encoder.codes.T)
+    else:
+        words = np.asarray(encoder.encode_words(list(names)), np.float64)
+        logits = view.reshape(-1, words.shape[1]) @ words.T / _temperature(encoder, settings)
+        share = np.exp(logits - logits.max(axis=1, keepdims=True, initial=-np.inf))
+    share = share / np.maximum(share.sum(axis=1, keepdims=True), 1e-12)
+    return pooled(share, places, settings.pool_m) if settings.pool_m > 0.0 and len(share) else share
 
 
 def pooled(
