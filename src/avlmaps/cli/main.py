@@ -8,10 +8,12 @@ from typing import Annotated, Any, Union
 import tyro
 
 from avlmaps.cli.bench import Bench
+from avlmaps.cli.export import Export
 from avlmaps.cli.go import Go
 from avlmaps.cli.import_map import ImportMap
 from avlmaps.cli.output import UsageError
 from avlmaps.cli.profiles import Profiles
+from avlmaps.cli.things import Things
 from avlmaps.cli.verb import Verb, models_in_force
 from avlmaps.cli.verbs import AddSounds, Build, Demo, Info, Locate, Query, Record, TeachSound
 from avlmaps.core.errors import AvlmapsError
@@ -30,6 +32,8 @@ VERBS: dict[str, type[Verb]] = {
     "import-map": ImportMap,
     "info": Info,
     "query": Query,
+    "things": Things,
+    "export": Export,
     "locate": Locate,
     "go": Go,
     "teach-sound": TeachSound,

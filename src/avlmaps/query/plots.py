@@ -8,8 +8,9 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.question import Modality
 from avlmaps.query.heatmap import Factor, Heatmap, NearAnchors
-from avlmaps.query.question import Goal, Modality
+from avlmaps.query.question import Goal
 from avlmaps.query.topdown import TopDown, walked
 from avlmaps.query.voxel_space import Space
 

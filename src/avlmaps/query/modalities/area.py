@@ -7,10 +7,10 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Float32, Int
 
+from avlmaps.core.question import Part
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.protocols import NamedViewEncoder, ScaledEncoder, ViewEncoder
 from avlmaps.query.heatmap import HeatSettings, NearAnchors, normalised
-from avlmaps.query.question import Part
 from avlmaps.query.voxel_space import Space
 
 # What a place may be, if it is not what was asked for.
