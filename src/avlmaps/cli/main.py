@@ -17,6 +17,7 @@ from avlmaps.cli.things import Things
 from avlmaps.cli.verb import Verb, models_in_force
 from avlmaps.cli.verbs import AddSounds, Build, Demo, Info, Locate, Query, Record, TeachSound
 from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars
 
 _DESCRIPTION = """Audio-Visual-Language Maps: what a robot saw and heard, as one 3D map that can be asked.
@@ -106,5 +107,5 @@ def _sentence(error: OSError) -> str:
 
 def _complain(what: object, status: int) -> int:
     end_bars()
-    sys.stderr.write(f"avlmaps: {what}\n")
+    sys.stderr.write(f"avlmaps: {printable(what)}\n")
     return status
