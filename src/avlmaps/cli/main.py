@@ -91,7 +91,9 @@ def _run(verb: Verb) -> int:
         return 0
     except OSError as error:
         return _complain(_sentence(error), 1)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
+        if (status := getattr(stop, "status", None)) is not None:  # of a robot that was driving
+            return _complain(stop, status)
         return _complain("stopped; the same command goes on where this one ended, where it can", 130)
     return 0
 
