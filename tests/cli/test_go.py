@@ -142,8 +142,8 @@ def test_a_real_robot_is_driven_over_rosbridge_and_let_go_at_the_end(
         def close(self) -> None:
             asked.append(("closed",))
 
-    def connect(kind: str, url: str, frames: object, obstacles: object, *, settings: object) -> Far:
-        asked.append((kind, url, frames is not None, obstacles is not None and settings is not None))
+    def connect(kind: str, url: str, frames: object, obstacles: object, *, settings: object, guarded: bool) -> Far:
+        asked.append((kind, url, frames is not None, obstacles is not None and settings is not None and guarded))
         return Far(GroundPose(4.4, 3.2))
 
     monkeypatch.setattr("avlmaps.navigate.ros.open_ros_driver", connect)

@@ -140,5 +140,5 @@ def _real(verb: "Go", asked: "AVLMap") -> _Ready:
     settings = None if given is None else RosSettings.read(given)
     obstacles = obstacles_for(asked, SHAPES[verb.body])
     kind = "nav2" if verb.robot == "nav2" else "move_base"
-    driver = open_ros_driver(kind, verb.ros, frames, obstacles, settings=settings)
+    driver = open_ros_driver(kind, verb.ros, frames, obstacles, settings=settings, guarded=True)
     return _Ready(driver, driver.pose, obstacles, lambda: None, driver.halt, driver.close)

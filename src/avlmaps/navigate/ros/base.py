@@ -19,6 +19,7 @@ from avlmaps.navigate.interrupts import Halt
 from avlmaps.navigate.ros.contact import Contact
 from avlmaps.navigate.ros.frames import Frames
 from avlmaps.navigate.ros.goals import End, Goal, Plan, Task, Track, Watch
+from avlmaps.navigate.ros.guard import Guard
 from avlmaps.navigate.ros.link import Link
 from avlmaps.navigate.ros.plans import LEAST_M, LONGEST_M, Standing, ahead_of, place_to_stand, turned_from
 from avlmaps.navigate.ros.settings import RosSettings
@@ -34,6 +35,7 @@ class RosDriver(ABC):
     Attributes:
         frames: the robot's frames, and how they lie to the map.
         settings: names, patience, tolerances.
+        guard: a second process that cancels when this one dies; None where nobody started one.
     """
 
     called: ClassVar[str]
@@ -77,6 +79,7 @@ class RosDriver(ABC):
         self._goal: Goal | None = None
         self._halt = _IDLE
         self._clock = clock
+        self.guard: Guard | None = None
         self._absent: set[str] = set()
         self._contact = Contact(url, token, self.frames, self.settings, self.tf_kind, self._greeted, clock)
 
@@ -175,6 +178,8 @@ class RosDriver(ABC):
         if goal is not None and link.lost is None:
             self._called_off(goal)
         link.close()
+        if self.guard is not None:
+            self.guard.close()
 
     def __enter__(self) -> Self:
         return self
@@ -237,6 +242,7 @@ class RosDriver(ABC):
         """Send one goal and see it to its end, whatever it is."""
         goal = self._goal = Goal(task)
         try:
+            self._beat(goal)
             self._send(goal)
             why, absent = self._watch(goal, track)
             if goal.end is None:
@@ -248,13 +254,14 @@ class RosDriver(ABC):
             raise
         finally:
             self._goal = None
+            if self.guard is not None and goal.end is not None:
+                self.guard.rest()
         return goal
 
     def _watch(self, goal: Goal, track: Track) -> tuple[str, bool]:
         """Wait for a goal's end; else return why it is to be given up, and whether nobody is there to take it."""
         watch, settings = Watch(), self.settings
         looked_s = beaten_s = self._clock()
-        self._beat(goal)
         while not self._ended_within(goal, _LOOK_EVERY_S):
             now_s = self._clock()
             stood_s, looked_s = now_s - looked_s, now_s
@@ -297,6 +304,8 @@ class RosDriver(ABC):
 
     def _beat(self, goal: Goal) -> None:
         """Publish that this loop runs and wants the goal to go on."""
+        if self.guard is not None:
+            self.guard.beat()
         if self._contact.link.lost is None:
             self._contact.link.publish(self._heartbeat_topic, {"data": goal.id})
 
