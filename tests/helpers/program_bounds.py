@@ -152,7 +152,9 @@ def main(count: int, seed: int) -> dict[str, Any]:
     random, told, worst_s, worst = Random(seed), Counter[str](), 0.0, ""
     run_program(parse_program("robot.move_to('chair')"), RecordingRobot())  # all that is loaded once is there now
     before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    for _ in range(count):
+    for number in range(count):
+        if number and number % 1000 == 0:  # a run of hours says how far it is
+            sys.stderr.write(f"{number} programs, worst {worst_s:.3f} s of processor time\n")
         text, trace = bounded_program(random), None
         began = process_time()
         try:
