@@ -9,7 +9,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help demo test bounds test-foundation types-foundation lint format bench train lock clean
+.PHONY: help demo test bounds test-foundation types-foundation lint format docs bench train lock clean
 
 help:  ## Show what can be made.
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -53,6 +53,14 @@ $(TORCH)/.ready: requirements/lock.txt requirements/foundation.txt pyproject.tom
 format: $(READY)  ## Put the code in order.
 	$(RUN)/ruff check --fix .
 	$(RUN)/ruff format .
+
+docs: $(VENV)-docs/.ready  ## Build the documentation site into build/site (links are checked).
+	NO_MKDOCS_2_WARNING=1 $(VENV)-docs/bin/mkdocs build --quiet
+
+$(VENV)-docs/.ready: requirements/docs.txt
+	$(PYTHON) -m venv $(VENV)-docs
+	$(VENV)-docs/bin/python -m pip install --quiet -r requirements/docs.txt
+	touch $@
 
 bench: $(READY)  ## Measure speed and quality; writes docs/benchmarks.md.
 	$(RUN)/python benchmarks/report.py --out docs/benchmarks.md
