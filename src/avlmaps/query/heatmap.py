@@ -23,6 +23,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+# Scores are products of float32 vectors of unit length. Their last digits depend on the order of summation, which
+# depends on the processor and on how many vectors are multiplied at once; a difference below this means nothing.
+_ROUNDING = 1e-6
+
+
 @dataclass(frozen=True, slots=True)
 class HeatSettings:
     """How fast heat falls with distance (the paper's 0.1 and 0.01 a voxel of 5 cm)."""
@@ -301,8 +306,8 @@ def fused(heatmaps: Sequence[Heatmap]) -> Heatmap:
 def normalised(scores: Float[np.ndarray, " a"]) -> Float[np.ndarray, " a"]:
     """Stretch scores to [0, 1] as the paper does, lowest to 0 and highest to 1.
 
-    Where all are equal (or there is one only) no anchor is better than another, and all become 1; that of
-    nothing is nothing. Only order survives: use it for scores that are not calibrated.
+    Where all are equal within rounding (or there is one only) no anchor is better than another, and all become 1;
+    that of nothing is nothing. Only order survives: use it for scores that are not calibrated.
 
     Raises:
         ValueError: a score is NaN or infinite.
@@ -310,7 +315,7 @@ def normalised(scores: Float[np.ndarray, " a"]) -> Float[np.ndarray, " a"]:
     if not np.isfinite(scores).all():
         raise ValueError("a score is NaN or infinite")
     low, high = np.min(scores, initial=np.inf), np.max(scores, initial=-np.inf)
-    if high <= low:
+    if high - low <= _ROUNDING * max(1.0, abs(low), abs(high)):
         return np.ones(len(scores))
     return np.clip((scores - low) / (high - low), 0.0, 1.0)
 
