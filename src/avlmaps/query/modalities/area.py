@@ -11,6 +11,7 @@ from avlmaps.core.question import Part
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.protocols import NamedViewEncoder, ScaledEncoder, ViewEncoder
 from avlmaps.query.heatmap import HeatSettings, NearAnchors, normalised
+from avlmaps.query.question import FOUND_AT
 from avlmaps.query.voxel_space import Space
 
 # What a place may be, if it is not what was asked for.
@@ -224,11 +225,12 @@ def area_factor(
     anchors = np.asarray(places, np.float64).reshape(-1, 3)
     posterior, scores = area_scores(np.asarray(keyframes.view), encoder, part.query, settings, anchors)
     best = float(posterior.max(initial=0.0))
-    note = "" if best >= 0.5 else f"no view is like {part.query!r}; the best score is {best:.2f}, below 0.50"
+    missed = f"no view is like {part.query!r}; the best score is {best:.2f}, below {FOUND_AT:.2f}"
+    note = "" if best >= FOUND_AT else missed
     if isinstance(encoder, NamedViewEncoder) and not encoder.meant(part.query).any():
         note = f"the view encoder knows no room like {part.query!r}; it knows: {', '.join(encoder.names)}"
     if not len(keyframes):
         note = "the map holds no keyframes"
     group = modes(space.level(anchors)[:, :2], scores, settings.link_m)
     falloff = heat.falloff_per_m(part.role)
-    return NearAnchors(space, part, falloff, anchors, scores, group, best >= 0.5, part.query, note)
+    return NearAnchors(space, part, falloff, anchors, scores, group, best >= FOUND_AT, part.query, note)
