@@ -6,15 +6,15 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from avlmaps.maps.fusion_kernels import GREATEST_EXPONENT
-from avlmaps.maps.fusion_settings import PAPERS_VARIANCE_M2
-from avlmaps.query.objects import ObjectSettings
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.poses import MAX_ROTATION_FAULT
+from avlmaps.maps.fusion.measure_kernels import GREATEST_EXPONENT
+from avlmaps.maps.fusion.settings import PAPERS_VARIANCE_M2
 from avlmaps.perception.profiles import profile
 from avlmaps.query.goals import LEAST_TOGETHER
 from avlmaps.query.heatmap import ROUNDING, HeatSettings
+from avlmaps.query.modalities.object import ObjectSettings
 from avlmaps.query.question import FOUND_AT
 from avlmaps.recordings.layout import Description
 

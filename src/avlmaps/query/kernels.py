@@ -65,7 +65,7 @@ def _half_to_float(typing_context, bits):
     return types.float32(types.uint16), generate
 
 
-def _moved_bits(builder: ir.IRBuilder, half: ir.Value) -> ir.Value:
+def _moved_bits(builder: ir.IRBuilder, half: ir.Value) -> Any:
     """Return the code of a float16's widening without float16: exact, for subnormals, infinities and NaN as well."""
     whole, single = ir.IntType(32), ir.FloatType()
     bits = builder.zext(half, whole)
