@@ -10,12 +10,12 @@ from matplotlib.text import Text
 from query_fakes import UP, box, fake_map, furnished_map, keyframes_at, sounds_of, voxels_of
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap, HeatSettings, NearThings
 from avlmaps.query.modalities.image import image_factor
 from avlmaps.query.plots import HEAT_LABEL, plot_map
-from avlmaps.query.question import Modality, Part, Role
 from avlmaps.query.topdown import TopDown
 from avlmaps.query.voxel_space import Space
 
