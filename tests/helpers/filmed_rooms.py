@@ -6,7 +6,7 @@ import numpy as np
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.recordings.types import Frame
-from avlmaps.sim.raycast import Scene, render
+from helpers.raycast import Scene, render
 
 CAMERA = Pinhole(130.0, 130.0, 80.0, 60.0, 160, 120)
 RIG = Rig(CAMERA, CAMERA)
