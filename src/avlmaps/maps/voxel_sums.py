@@ -26,6 +26,7 @@ class VoxelSums:
         rgb_sum: sum of weight times colour (0 to 255).
         rgb_weight: sum of the weights of the pixels with a colour.
         hits: how many pixels fell into it, with a feature and a colour or without.
+        views: how many frames have a pixel in it.
         last_seen_s: when a pixel last fell into it.
     """
 
@@ -35,6 +36,7 @@ class VoxelSums:
     rgb_sum: Float64[np.ndarray, "n 3"]
     rgb_weight: Float64[np.ndarray, " n"]
     hits: Int64[np.ndarray, " n"]
+    views: Int32[np.ndarray, " n"]
     last_seen_s: Float64[np.ndarray, " n"]
 
     def __post_init__(self) -> None:
@@ -46,6 +48,7 @@ class VoxelSums:
             "rgb_sum": (np.float64, (count, 3)),
             "rgb_weight": (np.float64, (count,)),
             "hits": (np.int64, (count,)),
+            "views": (np.int32, (count,)),
             "last_seen_s": (np.float64, (count,)),
         }
         for name, (dtype, shape) in expected.items():
@@ -79,12 +82,13 @@ class VoxelTable:
         self.rgb_sum = np.zeros((SMALLEST_ROOM, 3))
         self.rgb_weight = np.zeros(SMALLEST_ROOM)
         self.hits = np.zeros(SMALLEST_ROOM, np.int64)
+        self.views = np.zeros(SMALLEST_ROOM, np.int32)
         self.last_seen_s = np.zeros(SMALLEST_ROOM)
 
     @property
     def geometry(self) -> tuple[np.ndarray, ...]:
         """All sums but the features', as the kernels take them."""
-        return self.index, self.rgb_sum, self.rgb_weight, self.hits, self.last_seen_s
+        return self.index, self.rgb_sum, self.rgb_weight, self.hits, self.views, self.last_seen_s
 
     def reserve(self, extra: int) -> None:
         """Make room for so many new voxels."""
@@ -110,8 +114,9 @@ class VoxelTable:
             )
         for rows in blocks(len(part), self.dim):
             # Copies: of a bounded size, and never read-only (which would compile the kernel a second time).
-            arrays = (part.index, part.rgb_sum, part.rgb_weight, part.hits, part.last_seen_s, part.feature_sum)
-            block = tuple(np.array(array[rows], order="C") for array in (*arrays, part.weight))
+            arrays = (part.index, part.rgb_sum, part.rgb_weight, part.hits, part.views, part.last_seen_s)
+            every = (*arrays, part.feature_sum, part.weight)
+            block = tuple(np.array(array[rows], order="C") for array in every)
             self.reserve(len(block[0]))
             self.count = kernels.add_rows(block, self.slots, self.geometry, self.feature_sum, self.weight, self.count)
 
@@ -140,6 +145,7 @@ class VoxelTable:
             rgb_sum=self.rgb_sum[rows],
             rgb_weight=self.rgb_weight[rows],
             hits=self.hits[rows],
+            views=self.views[rows],
             last_seen_s=self.last_seen_s[rows],
         )
 

@@ -1,0 +1,127 @@
+"""The compiled loops over one depth picture: which pixels are used, and how far the camera sees freely."""
+
+import numpy as np
+from numba import njit
+
+OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}}
+CLEAR_UNITS_PER_M = 1000.0
+_FARTHEST_UNITS = 65535.0
+
+
+@njit(**OPTIONS)
+def _between(z, a, b, c, d, once, twice):
+    """Return whether z lies between a nearer and a farther depth on either side (a, b: 1 and 2 pixels off; c, d)."""
+    near_1 = (a > 0.0) & (a < z - once) | (b > 0.0) & (b < z - twice)
+    far_1 = (a > z + once) | (b > z + twice)
+    near_2 = (c > 0.0) & (c < z - once) | (d > 0.0) & (d < z - twice)
+    far_2 = (c > z + once) | (d > z + twice)
+    return (near_1 & far_2) | (near_2 & far_1)
+
+
+@njit(**OPTIONS)
+def drop_flying(depth, steps, noise, edge_sigmas, slope, farthest, out):
+    """Copy the depths that are used; the rest becomes 0.
+
+    Args:
+        depth: (h, w) float32, metres.
+        steps: (width, height) of a pixel at 1 m, metres.
+        noise: (σ at 0 m, its growth with z²).
+        edge_sigmas: a neighbour is on another surface when it is this many σ off.
+        slope: tangent of the most grazing angle.
+        farthest: greatest depth.
+        out: (h, w) filled in.
+
+    Returns:
+        Count of depths that were left out.
+    """
+    height, width = depth.shape
+    dropped = 0
+    for v in range(height):
+        up_1, up_2 = max(v - 1, 0), max(v - 2, 0)
+        down_1, down_2 = min(v + 1, height - 1), min(v + 2, height - 1)
+        for u in range(width):
+            z = depth[v, u]
+            out[v, u] = z
+            if not z > 0.0:
+                continue
+            sigma = edge_sigmas * (noise[0] + noise[1] * z * z)
+            wide, high = sigma + slope * steps[0] * z, sigma + slope * steps[1] * z
+            left_1, left_2 = max(u - 1, 0), max(u - 2, 0)
+            right_1, right_2 = min(u + 1, width - 1), min(u + 2, width - 1)
+            flies = _between(
+                z, depth[v, left_1], depth[v, left_2], depth[v, right_1], depth[v, right_2],
+                wide, 2 * wide - sigma,
+            ) or _between(
+                z, depth[up_1, u], depth[up_2, u], depth[down_1, u], depth[down_2, u],
+                high, 2 * high - sigma,
+            )  # fmt: skip
+            if flies or z > farthest:
+                out[v, u] = 0.0
+                dropped += 1
+    return dropped
+
+
+@njit(**OPTIONS)
+def clear_blocks(depth, size, noise, clear_sigmas, out):
+    """Write how far every ray of each block of pixels is free: 0 where a pixel of it has no depth.
+
+    Args:
+        depth: (h, w) float32, metres.
+        size: edge of a block, pixels.
+        noise: (σ at 0 m, its growth with z²).
+        clear_sigmas: how many σ before its depth a ray is free.
+        out: (ceil(h / size), ceil(w / size)) uint16, thousandths of a metre, rounded down.
+    """
+    height, width = depth.shape
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            least = _FARTHEST_UNITS
+            for v in range(i * size, min((i + 1) * size, height)):
+                for u in range(j * size, min((j + 1) * size, width)):
+                    z = np.float64(depth[v, u])
+                    free = (z - clear_sigmas * (noise[0] + noise[1] * z * z)) * CLEAR_UNITS_PER_M if z > 0.0 else 0.0
+                    least = min(least, free)
+            out[i, j] = np.uint16(max(least, 0.0))
+
+
+@njit(**OPTIONS)
+def count_through(index, voxel_size, clear, size, camera, pose, through):
+    """Add 1 to each voxel that a view sees through: all rays that meet it go on for more than a voxel behind it.
+
+    Args:
+        index: (n, 3) int32.
+        voxel_size: metres.
+        clear: (rows, columns) as `clear_blocks` wrote it.
+        size: edge of a block, pixels.
+        camera: (fx, fy, cx, cy, width, height).
+        pose: (4, 4) world_from_camera.
+        through: (n,) int32, added to.
+    """
+    fx, fy, cx, cy, width, height = camera
+    radius = 0.5 * np.sqrt(3.0) * voxel_size
+    behind = radius + voxel_size
+    for n in range(index.shape[0]):
+        x = (index[n, 0] + 0.5) * voxel_size - pose[0, 3]
+        y = (index[n, 1] + 0.5) * voxel_size - pose[1, 3]
+        z = (index[n, 2] + 0.5) * voxel_size - pose[2, 3]
+        depth = pose[0, 2] * x + pose[1, 2] * y + pose[2, 2] * z
+        if depth <= 2.0 * radius:
+            continue
+        right = pose[0, 0] * x + pose[1, 0] * y + pose[2, 0] * z
+        down = pose[0, 1] * x + pose[1, 1] * y + pose[2, 1] * z
+        a, b = right / depth, down / depth
+        u, v = fx * a + cx, fy * b + cy
+        # The sphere round the voxel, seen as a rectangle that surely holds it.
+        wide = fx * radius * (1.0 + abs(a)) / (depth - radius)
+        high = fy * radius * (1.0 + abs(b)) / (depth - radius)
+        if u - wide < 0.0 or v - high < 0.0 or u + wide >= width or v + high >= height:
+            continue
+        far = np.int64((depth + behind) * CLEAR_UNITS_PER_M) + 1
+        if clear[np.int64(v) // size, np.int64(u) // size] < far:
+            continue
+        free = True
+        for i in range(np.int64(v - high) // size, np.int64(v + high) // size + 1):
+            for j in range(np.int64(u - wide) // size, np.int64(u + wide) // size + 1):
+                free = free and clear[i, j] >= far
+        if free:
+            through[n] += 1
