@@ -19,16 +19,15 @@ def _between(z, a, b, c, d, once, twice):
 
 
 @njit(**OPTIONS)
-def drop_flying(depth, steps, noise, edge_sigmas, slope, farthest, out):
-    """Copy the depths that are used; the rest becomes 0.
+def drop_flying(depth, steps, noise, edge_sigmas, out):
+    """Copy a depth picture without the pixels that lie between a nearer and a farther surface; those become 0.
 
     Args:
         depth: (h, w) float32, metres.
-        steps: (width, height) of a pixel at 1 m, metres.
+        steps: by how much the depth changes from one column, and from one row, to the next on the most grazing surface
+            at 1 m, metres.
         noise: (σ at 0 m, its growth with z²).
         edge_sigmas: a neighbour is on another surface when it is this many σ off.
-        slope: tangent of the most grazing angle.
-        farthest: greatest depth.
         out: (h, w) filled in.
 
     Returns:
@@ -45,7 +44,7 @@ def drop_flying(depth, steps, noise, edge_sigmas, slope, farthest, out):
             if not z > 0.0:
                 continue
             sigma = edge_sigmas * (noise[0] + noise[1] * z * z)
-            wide, high = sigma + slope * steps[0] * z, sigma + slope * steps[1] * z
+            wide, high = sigma + steps[0] * z, sigma + steps[1] * z
             left_1, left_2 = max(u - 1, 0), max(u - 2, 0)
             right_1, right_2 = min(u + 1, width - 1), min(u + 2, width - 1)
             flies = _between(
@@ -55,7 +54,7 @@ def drop_flying(depth, steps, noise, edge_sigmas, slope, farthest, out):
                 z, depth[up_1, u], depth[up_2, u], depth[down_1, u], depth[down_2, u],
                 high, 2 * high - sigma,
             )  # fmt: skip
-            if flies or z > farthest:
+            if flies:
                 out[v, u] = 0.0
                 dropped += 1
     return dropped

@@ -27,6 +27,7 @@ class VoxelSums:
         rgb_weight: sum of the weights of the pixels with a colour.
         hits: how many pixels fell into it, with a feature and a colour or without.
         views: how many frames have a pixel in it.
+        sharp: sum over its pixels of how exact their depths are, 1 / (1 + (σ / half a voxel)²), in units of 1/256.
         last_seen_s: when a pixel last fell into it.
     """
 
@@ -37,6 +38,7 @@ class VoxelSums:
     rgb_weight: Float64[np.ndarray, " n"]
     hits: Int64[np.ndarray, " n"]
     views: Int32[np.ndarray, " n"]
+    sharp: Int64[np.ndarray, " n"]
     last_seen_s: Float64[np.ndarray, " n"]
 
     def __post_init__(self) -> None:
@@ -49,6 +51,7 @@ class VoxelSums:
             "rgb_weight": (np.float64, (count,)),
             "hits": (np.int64, (count,)),
             "views": (np.int32, (count,)),
+            "sharp": (np.int64, (count,)),
             "last_seen_s": (np.float64, (count,)),
         }
         for name, (dtype, shape) in expected.items():
@@ -83,12 +86,13 @@ class VoxelTable:
         self.rgb_weight = np.zeros(SMALLEST_ROOM)
         self.hits = np.zeros(SMALLEST_ROOM, np.int64)
         self.views = np.zeros(SMALLEST_ROOM, np.int32)
+        self.sharp = np.zeros(SMALLEST_ROOM, np.int64)
         self.last_seen_s = np.zeros(SMALLEST_ROOM)
 
     @property
     def geometry(self) -> tuple[np.ndarray, ...]:
         """All sums but the features', as the kernels take them."""
-        return self.index, self.rgb_sum, self.rgb_weight, self.hits, self.views, self.last_seen_s
+        return self.index, self.rgb_sum, self.rgb_weight, self.hits, self.views, self.sharp, self.last_seen_s
 
     def reserve(self, extra: int) -> None:
         """Make room for so many new voxels."""
@@ -114,8 +118,8 @@ class VoxelTable:
             )
         for rows in blocks(len(part), self.dim):
             # Copies: of a bounded size, and never read-only (which would compile the kernel a second time).
-            arrays = (part.index, part.rgb_sum, part.rgb_weight, part.hits, part.views, part.last_seen_s)
-            every = (*arrays, part.feature_sum, part.weight)
+            arrays = (part.index, part.rgb_sum, part.rgb_weight, part.hits, part.views, part.sharp)
+            every = (*arrays, part.last_seen_s, part.feature_sum, part.weight)
             block = tuple(np.array(array[rows], order="C") for array in every)
             self.reserve(len(block[0]))
             self.count = kernels.add_rows(block, self.slots, self.geometry, self.feature_sum, self.weight, self.count)
@@ -146,6 +150,7 @@ class VoxelTable:
             rgb_weight=self.rgb_weight[rows],
             hits=self.hits[rows],
             views=self.views[rows],
+            sharp=self.sharp[rows],
             last_seen_s=self.last_seen_s[rows],
         )
 

@@ -41,6 +41,7 @@ from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store import MapContent, is_map_or_free, write_map
 from avlmaps.maps.stored import PARTS, StoredMap, open_stored
 from avlmaps.maps.types import Voxels
+from avlmaps.maps.fusion_kernels import SHARP_UNITS
 from avlmaps.maps.voxel_sums import VoxelSums, VoxelTable
 
 IMPORT_VERSION = 1  # raise it when the conversion comes to make something else of the same files
@@ -203,5 +204,7 @@ def _sums(part: VoxelRows, rows: Int[np.ndarray, " p"], index: Int32[np.ndarray,
         rgb_sum=np.where(coloured[:, None], weight[:, None] * part.rgb[rows], 0.0),
         rgb_weight=np.where(coloured, weight, 0.0),
         hits=np.full(len(rows), PIXELS_PER_VOXEL, np.int64),
+        views=np.ones(len(rows), np.int32),
+        sharp=np.full(len(rows), PIXELS_PER_VOXEL * SHARP_UNITS, np.int64),
         last_seen_s=np.zeros(len(rows)),
     )
