@@ -7,7 +7,7 @@ parts of a recording add up to the map of the whole.
 """
 
 import numpy as np
-from jaxtyping import Float, Float16, Float32
+from jaxtyping import Bool, Float, Float16, Float32
 
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import BackendError, MapError, RecordingError
@@ -19,7 +19,7 @@ from avlmaps.maps.pixel_lookup import PixelLookup, look_up
 from avlmaps.maps.sensor import NONE, SensorModel
 from avlmaps.maps.sensor_kernels import drop_flying
 from avlmaps.maps.types import Voxels
-from avlmaps.maps.voxel_sums import VoxelSums, VoxelTable
+from avlmaps.maps.voxel_sums import Evidence, VoxelSums, VoxelTable
 from avlmaps.recordings.types import Frame
 
 FARTHEST_VOXEL = (1 << 31) - 2 * kernels.REACH_VOXELS  # indices are int32
@@ -123,13 +123,20 @@ class VoxelAccumulator:
         """
         return self._table.sums(feature_out)
 
-    def voxels(self, feature_out: Float16[np.ndarray, "n d"] | None = None) -> Voxels:
+    def evidence(self) -> Evidence:
+        """Return what is known of each voxel's surface, sorted by index: what `cleaning.clean` decides on."""
+        return self._table.evidence()
+
+    def voxels(
+        self, feature_out: Float16[np.ndarray, "k d"] | None = None, kept: Bool[np.ndarray, " n"] | None = None
+    ) -> Voxels:
         """Return the means, sorted by index: features of unit length, colours.
 
         Args:
+            kept: which voxels of `evidence` to return; all by default.
             feature_out: where to write the features, such as a memory-mapped file; by default a new array.
         """
-        return self._table.voxels(feature_out)
+        return self._table.voxels(feature_out, kept)
 
     def _limits(self) -> tuple[float, ...]:
         """Return what `fusion_kernels.trace` takes as limits."""
@@ -147,7 +154,7 @@ class VoxelAccumulator:
         kept = np.empty_like(depth)
         slope = np.tan(np.deg2rad(sensor.steepest_deg))
         steps = slope / camera.fx, slope / camera.fy
-        drop_flying(depth, steps, (sensor.noise_m, sensor.noise_per_m), sensor.edge_sigmas, kept)
+        drop_flying(depth, steps, sensor.noise, sensor.edge_sigmas, kept)
         return kept
 
     def _cells(self, features: np.ndarray | None) -> tuple[Float32[np.ndarray, "cells d"], tuple[int, int]]:

@@ -37,19 +37,29 @@ class SensorModel:
     clear_sigmas: float = 3.0
     """A ray is free up to this many σ before its depth."""
     carve: bool = True
-    """Remove voxels that frames see through, and specks."""
+    """Remove voxels that frames see through."""
+    smear_sigmas: float = 0.0
+    """Remove a voxel when another, up to this many of its own σ away, is much better seen; 0 removes none."""
+    smear_ratio: float = 4.0
+    """Much better: this many times the sum of how exact the hits are."""
+    speck_voxels: int = 0
+    """Remove groups of up to this many voxels that stand alone and that no more than 2 frames hit."""
 
     def __post_init__(self) -> None:
-        finite = np.isfinite([self.noise_m, self.noise_per_m, self.clear_sigmas]).all()
-        positive = min(self.worst_voxels, self.edge_sigmas, self.steepest_deg) > 0.0
-        if not (finite and positive and min(self.noise_m, self.noise_per_m, self.clear_sigmas) >= 0.0):
+        finite = np.isfinite([self.noise_m, self.noise_per_m, self.clear_sigmas, self.smear_sigmas]).all()
+        positive = min(self.worst_voxels, self.edge_sigmas, self.steepest_deg, self.smear_ratio) > 0.0
+        errors = self.noise_m, self.noise_per_m, self.clear_sigmas, self.smear_sigmas, self.speck_voxels
+        if not (finite and positive and min(errors) >= 0.0):
             raise MapError(
-                f"A sensor's error of {self.noise_m} m + {self.noise_per_m} z² with limits of {self.worst_voxels} voxels, "
-                f"{self.edge_sigmas} sigmas and {self.steepest_deg} degrees is none; errors must be finite and not "
-                "negative, and limits greater than 0."
+                f"The sensor model {self} is not usable; choose finite errors of 0 or more and limits greater than 0."
             )
         if self.steepest_deg > 90.0:
             raise MapError(f"steepest_deg is {self.steepest_deg}; choose an angle up to 90 degrees.")
+
+    @property
+    def noise(self) -> tuple[float, float]:
+        """σ at 0 m and its growth with the square of the depth, as the kernels take them."""
+        return self.noise_m, self.noise_per_m
 
     def sigma_m(self, depth_m: float) -> float:
         """Return the standard deviation of a depth, metres."""
@@ -64,8 +74,12 @@ class SensorModel:
 
 
 PERFECT = SensorModel()
-KINECT = SensorModel(0.0012, 0.0019, worst_voxels=1.25, edge_sigmas=4.0, steepest_deg=85.0)
-REALSENSE = SensorModel(0.001, 0.0038, worst_voxels=1.5, edge_sigmas=4.0, steepest_deg=85.0)
+KINECT = SensorModel(
+    0.0012, 0.0019, worst_voxels=1.25, edge_sigmas=4.0, steepest_deg=85.0, smear_sigmas=2.0, speck_voxels=4
+)
+REALSENSE = SensorModel(
+    0.001, 0.0038, worst_voxels=1.5, edge_sigmas=4.0, steepest_deg=85.0, smear_sigmas=2.0, speck_voxels=4
+)
 NONE = SensorModel(carve=False)
 
 MODELS: dict[SensorName, SensorModel] = {

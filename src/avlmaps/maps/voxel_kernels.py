@@ -33,6 +33,19 @@ def find_or_insert(i, j, k, table, index, count):
 
 
 @njit(**OPTIONS)
+def find_row(i, j, k, table, index):
+    """Return the row of a voxel, -1 where it is not in the table."""
+    mask = table.shape[0] - 1
+    slot = _hash(i, j, k) & mask
+    while table[slot] >= 0:
+        row = table[slot]
+        if index[row, 0] == i and index[row, 1] == j and index[row, 2] == k:
+            return row
+        slot = (slot + 1) & mask
+    return np.int32(-1)
+
+
+@njit(**OPTIONS)
 def rehash(table, index, count):
     """Enter the first ``count`` voxels into an empty (all -1) table."""
     mask = table.shape[0] - 1

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int32, Int64
+from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 from avlmaps.core.errors import MapError
 from avlmaps.maps import voxel_kernels as kernels
@@ -61,6 +61,23 @@ class VoxelSums:
 
     def __len__(self) -> int:
         return len(self.index)
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """How well each voxel was seen; the fields are those of `VoxelSums`."""
+
+    index: Int32[np.ndarray, "n 3"]
+    hits: Int64[np.ndarray, " n"]
+    views: Int32[np.ndarray, " n"]
+    sharp: Int64[np.ndarray, " n"]
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def only(self, kept: Bool[np.ndarray, " n"]) -> "Evidence":
+        """Return some of the voxels."""
+        return Evidence(self.index[kept], self.hits[kept], self.views[kept], self.sharp[kept])
 
 
 class VoxelTable:
@@ -154,18 +171,24 @@ class VoxelTable:
             last_seen_s=self.last_seen_s[rows],
         )
 
-    def voxels(self, feature_out: np.ndarray | None = None) -> Voxels:
+    def evidence(self) -> Evidence:
+        """Return what is known of each voxel's surface, sorted."""
+        rows = self.sorted_rows()
+        return Evidence(self.index[rows], self.hits[rows], self.views[rows], self.sharp[rows])
+
+    def voxels(self, feature_out: np.ndarray | None = None, kept: Bool[np.ndarray, " n"] | None = None) -> Voxels:
         """Return the means, sorted; see `VoxelAccumulator.voxels`."""
         rows = self.sorted_rows()
-        feature = feature_array(feature_out, (self.count, self.dim), np.float16)
-        parts = blocks(self.count, self.dim)
+        rows = rows if kept is None else rows[kept]
+        feature = feature_array(feature_out, (len(rows), self.dim), np.float16)
+        parts = blocks(len(rows), self.dim)
         buffer = np.empty((parts[0].stop if parts else 0, self.dim), np.float32)
         for block in parts:
             unit = buffer[: block.stop - block.start]
             kernels.unit_rows(self.feature_sum, rows[block], unit)
             feature[block] = unit
         rgb_weight = self.rgb_weight[rows, None]
-        rgb = np.divide(self.rgb_sum[rows], rgb_weight, out=np.zeros((self.count, 3)), where=rgb_weight > 0.0)
+        rgb = np.divide(self.rgb_sum[rows], rgb_weight, out=np.zeros((len(rows), 3)), where=rgb_weight > 0.0)
         return Voxels(
             index=self.index[rows],
             feature=feature,
