@@ -101,7 +101,7 @@ def build(verb: "Build") -> dict[str, Any]:
     settings = BuildSettings(
         voxel_size_m=verb.voxel_size_m,
         frames=FrameSettings(step=verb.frame_step, max_bad_share=verb.max_bad_share),
-        fusion=FusionSettings(max_depth_m=verb.max_depth_m),
+        fusion=FusionSettings(max_depth_m=verb.max_depth_m, sensor=verb.sensor),
         seed=verb.seed,
     )
     stored = build_map(

@@ -185,6 +185,8 @@ class Build(ModelVerb):
     """Stop when more than this share of the frames cannot be read; fewer are left out and told."""
     max_depth_m: float = 10.0
     """Ignore depth beyond this, metres."""
+    sensor: Literal["auto", "kinect", "realsense", "perfect", "none"] = "auto"
+    """Depth camera: its error decides which depths are used. auto measures it; none uses all, as the paper does."""
     resume: bool = False
     """Go on with a stopped build. This is what happens anyway; the flag is for scripts that say so."""
     fresh: bool = False

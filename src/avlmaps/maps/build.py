@@ -8,6 +8,7 @@ from avlmaps.maps.keyframe_stage import keep_keyframes
 from avlmaps.maps.lock import locked
 from avlmaps.maps.parts import build_part, merge_parts
 from avlmaps.maps.plan import claim, make_plan
+from avlmaps.maps.sensor_stage import find_sensor
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.stages import commit, find_up, fuse, hear_sounds, merge, stand
 from avlmaps.maps.stored import StoredMap, describe, open_stored
@@ -58,9 +59,10 @@ def build_map(
         if claim(plan, resume, overwrite) is None:
             up = find_up(plan)
             plan = stand(plan, up[0])
-            fused = fuse(plan, parts)
+            sensor = find_sensor(plan.recording, plan.settings)
+            fused = fuse(plan, parts, sensor)
             pictures = keep_keyframes(plan, fused)
             heard = hear_sounds(plan)
-            voxels = merge(plan, fused)  # late, because it fills the memory
-            commit(plan, up, fused, pictures, heard, voxels)
+            merged = merge(plan, fused, sensor)  # late, because it fills the memory
+            commit(plan, up, fused, pictures, heard, merged)
     return open_stored(plan.path)

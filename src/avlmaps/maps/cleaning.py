@@ -6,7 +6,6 @@ the same map.
 
 from collections.abc import Sequence
 
-import msgspec
 import numpy as np
 from jaxtyping import Bool, Float64, Int32
 
@@ -15,6 +14,7 @@ from avlmaps.maps import carving_kernels
 from avlmaps.maps.free_space import FreeViews, count_through
 from avlmaps.maps.fusion_kernels import SHARP_UNITS
 from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.manifest import Removed
 from avlmaps.maps.sensor import SensorModel
 from avlmaps.maps.voxel_kernels import rehash
 from avlmaps.maps.voxel_sums import Evidence
@@ -23,20 +23,6 @@ FEWEST_THROUGH = 2  # frames: one may have a wrong pose
 THROUGH_SHARE = 0.5  # a voxel goes when more frames see through it than this share of those that hit it
 SPECK_VIEWS = 2  # a group of which a voxel is hit by more frames is no speck
 MOST_REACH = 4.0  # voxels: a smear is looked for no farther
-
-
-class Removed(msgspec.Struct, frozen=True, kw_only=True):
-    """How many voxels were removed.
-
-    Attributes:
-        seen_through: frames see through them.
-        smeared: a much better seen voxel is within their error.
-        specks: in small groups that stand alone and that hardly a frame hit.
-    """
-
-    seen_through: int = 0
-    smeared: int = 0
-    specks: int = 0
 
 
 def clean(

@@ -104,7 +104,5 @@ def count_through(
                 yield np.array(clear), np.array(pose)
 
     for clear, pose in progress(every(), "carving", total=sum(map(len, parts))):
-        carving_kernels.count_through(
-            index, grid.voxel_size_m, clear, block_size(camera), intrinsics, pose, through
-        )
+        carving_kernels.count_through(index, grid.voxel_size_m, clear, block_size(camera), intrinsics, pose, through)
     return through

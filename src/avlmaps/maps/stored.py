@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from jaxtyping import Float
 
@@ -206,6 +207,10 @@ def describe(stored: StoredMap) -> dict[str, Any]:
         "up_in_world": list(info.up.direction),
         "up_known_from": info.up.known_from,
         "up_support": info.up.support,
+        "sensor": None if info.sensor is None else info.sensor.name,
+        "sensor_known_from": None if info.sensor is None else info.sensor.known_from,
+        "sensor_noise_per_m": None if info.sensor is None else info.sensor.noise_per_m,
+        "voxels_removed": msgspec.structs.asdict(info.removed),
         "bounding_box_m": [list(info.bounding_box_m.low), list(info.bounding_box_m.high)],
         "duration_s": info.recording.duration_s,
         "recording": info.recording.name,
