@@ -36,12 +36,12 @@ _EXPONENTIALS = np.exp(-np.arange(STEPS * (int(GREATEST_EXPONENT) + 1) + 1) / ST
 class Scratch(NamedTuple):
     """What the kernels keep between their steps, for pictures of one size; only the touched part costs memory.
 
-    Of each pixel of a row: ``key`` (of its voxel), ``weight``, ``sharp`` (how exact its depth is), ``picture`` (its
-    colour pixel), ``cell`` (its cell of the feature map), the latter two linear indices, -1 outside. Of the frame's voxels: a hash table (``slot_key``,
-    ``slot_voxel``), ``voxel_key``, ``voxel_sum`` (what the frame adds), ``voxel_row`` (where in the map),
-    ``voxel_start`` (where their pairs begin in ``grouped_cell`` and ``grouped_weight``). Of each pair, as they are
-    met: ``pair_voxel``, ``pair_cell``, ``pair_weight``; ``recent`` remembers those used last. Of one voxel:
-    ``live_cell`` and ``live_weight``, the pairs that have a feature.
+    Of each pixel of a row: ``key`` (of its voxel), ``weight``, ``sharp`` (how exact its depth is), ``picture``
+    (its colour pixel), ``cell`` (its cell of the feature map), the latter two linear indices, -1 outside. Of the
+    frame's voxels: a hash table (``slot_key``, ``slot_voxel``), ``voxel_key``, ``voxel_sum`` (what the frame
+    adds), ``voxel_row`` (where in the map), ``voxel_start`` (where their pairs begin in ``grouped_cell`` and
+    ``grouped_weight``). Of each pair, as they are met: ``pair_voxel``, ``pair_cell``, ``pair_weight``; ``recent``
+    remembers those used last. Of one voxel: ``live_cell`` and ``live_weight``, the pairs that have a feature.
     """
 
     key: np.ndarray

@@ -1,4 +1,4 @@
-"""How wrong a depth camera is, and which of its depths are used; apart from the kernels, so that help needs no compiler.
+"""How wrong a depth camera is, and which of its depths are used; apart from the kernels: help needs no compiler.
 
 The error of a camera that measures depth as a shift between two views (structured light, stereo) grows with the square
 of the depth: σ(z) = noise_m + noise_per_m · z².
@@ -78,7 +78,14 @@ KINECT = SensorModel(
     0.0012, 0.0019, worst_voxels=1.25, edge_sigmas=4.0, steepest_deg=85.0, smear_sigmas=2.0, speck_voxels=4
 )
 REALSENSE = SensorModel(
-    0.001, 0.0038, worst_voxels=1.5, edge_sigmas=4.0, steepest_deg=85.0, smear_sigmas=2.0, speck_voxels=4
+    0.001,
+    0.0038,
+    worst_voxels=1.5,
+    edge_sigmas=4.0,
+    steepest_deg=85.0,
+    smear_sigmas=2.0,
+    smear_ratio=6.0,
+    speck_voxels=4,
 )
 NONE = SensorModel(carve=False)
 

@@ -18,6 +18,7 @@ from avlmaps.core.progress import progress as shown
 from avlmaps.core.progress import say, silenced
 from avlmaps.core.version import __version__
 from avlmaps.maps.checkpoints import key_of
+from avlmaps.maps.fusion_kernels import SHARP_UNITS
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.lock import locked
 from avlmaps.maps.manifest import (
@@ -41,7 +42,6 @@ from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store import MapContent, is_map_or_free, write_map
 from avlmaps.maps.stored import PARTS, StoredMap, open_stored
 from avlmaps.maps.types import Voxels
-from avlmaps.maps.fusion_kernels import SHARP_UNITS
 from avlmaps.maps.voxel_sums import VoxelSums, VoxelTable
 
 IMPORT_VERSION = 1  # raise it when the conversion comes to make something else of the same files
