@@ -5,13 +5,18 @@ import numpy as np
 import pytest
 from query_fakes import UP, box, fake_map, furnished_map, keyframes_at, sounds_of, voxels_of
 
+from avlmaps.cli.output import place
+from avlmaps.cli.verbs import query_lines
 from avlmaps.core.errors import QueryError
+from avlmaps.core.poses import rotation_to_level
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.level import Space
-from avlmaps.query.plots import plot_map
+from avlmaps.query.plots import draw_heat, plot_map, recording_axis
+from avlmaps.query.question import Modality, Part, Question
 from avlmaps.query.topdown import TopDown
 
+CHAIR = Part(Modality.OBJECT, "chair")
 WALK = np.stack([np.linspace(1, 5, 20), 1 + np.sin(np.linspace(0, 3, 20)), np.full(20, 1.4)], axis=1)
 
 
@@ -67,3 +72,46 @@ def test_without_a_path_a_plot_is_a_figure_for_a_notebook() -> None:
     figure = (m.object("chair", primary=True) * m.sound("dog")).plot()
     assert isinstance(figure, Figure)
     assert len(figure.axes) >= 3
+
+
+def turned_map(up):
+    """Return the furnished map in a recording whose world has another way up."""
+    stored = furnished_map()
+    level_from_world = rotation_to_level(np.asarray(up, np.float64))
+    middle = stored.grid.centre_of(stored.voxels.index)
+    index, first = np.unique(stored.grid.index_of(middle @ level_from_world), axis=0, return_index=True)
+    stored.voxels = voxels_of(index, np.asarray(stored.voxels.feature, np.float32)[first])
+    stored.up_in_world = np.asarray(up, np.float64)
+    return stored
+
+
+@pytest.mark.parametrize("up", [(0, 0, 1), (0, -1, 0), (0, 1, 0), (1, 0, 0), (0, 0, -1), (0.1, -0.9, 0.3)])
+def test_text_json_and_picture_say_the_same_place(up) -> None:
+    answer = AVLMap(turned_map(np.array(up) / np.linalg.norm(up))).ask(Question.of([CHAIR]), top=1)
+    (goal,), told = answer.goals, answer.to_json()
+    assert told["frame"] == "recording"
+    position = told["goals"][0]["position"]
+    printed = place(position)
+    assert printed in "\n".join(query_lines(told))
+
+    ax = draw_heat(answer.heat, [goal]).axes[0]
+    (legend,) = [text.get_text() for text in ax.get_legend().get_texts() if text.get_text().startswith("1:")]
+    assert printed in legend
+    (marker,) = [line for line in ax.lines if line.get_marker() == "o" and len(line.get_xdata()) == 1]
+    level = np.array(told["level_from_recording"]) @ [*position, 1.0]
+    np.testing.assert_allclose([marker.get_xdata()[0], marker.get_ydata()[0]], level[:2])
+    for axis, value in ((ax.xaxis, level[0]), (ax.yaxis, level[1])):
+        label = axis.get_label_text()
+        if "level frame" in label:
+            assert up == (0.1, -0.9, 0.3)
+        else:  # the number at the marker is the position's own
+            text = axis.get_major_formatter()(round(value, 6), 0)  # empty: the axis prints its own numbers
+            shown = float(text) if text else value
+            assert label == f"{label[0]} (m), frame: recording"
+            assert shown == pytest.approx(position["xyz".index(label[0])], abs=1e-5)
+
+
+def test_an_axis_is_named_only_where_its_numbers_are_true() -> None:
+    assert recording_axis(np.array([0.0, 0.0, -1.0])) == ("z", -1)
+    assert recording_axis(np.array([1.0, 0.0, 0.0])) == ("x", 1)
+    assert recording_axis(np.array([np.cos(0.01), np.sin(0.01), 0.0])) is None

@@ -283,6 +283,7 @@ def _camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":
 
 def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[str, Any]:
     """Locate a photo."""
+    from avlmaps.core.poses import FRAME
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.images import read_picture
 
@@ -296,6 +297,7 @@ def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[
         "world_from_camera": None if pose is None else [[float(value) for value in row] for row in pose],
         "inliers": int(found.inliers),
         "reference": found.reference_stamp_s,
+        "frame": FRAME,
         "score": found.score,
         "intrinsics": [camera.fx, camera.fy, camera.cx, camera.cy],
         "elapsed_ms": found.elapsed_ms,

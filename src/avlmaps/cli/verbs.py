@@ -319,6 +319,10 @@ def info_lines(answer: dict[str, Any]) -> list[str]:
             lines += [f"{key}:", *[f"  {line}" for line in value]]
         elif key == "bytes" and isinstance(value, int):
             lines.append(f"size: {size_of(value)}")
+        elif key == "voxels_removed":
+            lines.append("voxels removed: " + ", ".join(f"{n} {why.replace('_', ' ')}" for why, n in value.items()))
+        elif key == "level_from_recording":
+            lines += ["level from recording:", *["  " + " ".join(f"{v:7.4f}" for v in row) for row in value]]
         elif value not in (None, [], {}):
             lines.append(f"{key.replace('_', ' ')}: {value}")
     return lines
@@ -334,7 +338,7 @@ def query_lines(answer: dict[str, Any]) -> list[str]:
         for i, goal in enumerate(answer["goals"], start=1)
     ]
     lines.append("found" if answer["found"] else "not found here" + (": the best guesses are" if rows else ""))
-    return lines + (table_lines(("", "place", "score", "size in m"), rows) if rows else [])
+    return lines + (table_lines(("", f"place ({answer['frame']} frame)", "score", "size in m"), rows) if rows else [])
 
 
 def locate_lines(answer: dict[str, Any]) -> list[str]:
@@ -343,4 +347,4 @@ def locate_lines(answer: dict[str, Any]) -> list[str]:
     if pose is None:
         return [f"not located: {answer['inliers']} points agree, too few to tell a place"]
     rows = ["  " + " ".join(f"{value:9.4f}" for value in row) for row in pose]
-    return [f"located, {answer['inliers']} points agree; world_from_camera:", *rows]
+    return [f"located, {answer['inliers']} points agree; world_from_camera (frame: {answer['frame']}):", *rows]

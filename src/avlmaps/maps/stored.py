@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import BackendError, MapError
+from avlmaps.core.poses import FRAME, rotation_to_level
 from avlmaps.core.registry import Kind
 from avlmaps.maps.checks import array_fields, assembled, check_order
 from avlmaps.maps.grid import GridSpec
@@ -186,6 +187,8 @@ def describe(stored: StoredMap) -> dict[str, Any]:
     """
     info, sounds = stored.info, stored.sounds
     tracks = np.split(np.asarray(sounds.track, np.float64), sounds.track_offsets[1:-1]) if len(sounds) else []
+    level_from_recording = np.eye(4)
+    level_from_recording[:3, :3] = rotation_to_level(info.up.vector())
     return {
         "path": str(stored.path),
         "frames": info.counts.frames,
@@ -222,4 +225,6 @@ def describe(stored: StoredMap) -> dict[str, Any]:
         "avlmaps_version": info.avlmaps_version,
         "seed": info.seed,
         "finished": info.timings.finished,
+        "frame": FRAME,
+        "level_from_recording": level_from_recording.tolist(),
     }

@@ -6,6 +6,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.poses import FRAME
 
 if TYPE_CHECKING:
     from avlmaps.query.heatmap import Heatmap
@@ -172,10 +173,12 @@ class Answer:
     heat: "Heatmap | None" = field(default=None, repr=False, compare=False)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the answer with exactly the keys of the contract."""
+        """Return the answer with exactly the keys of the contract; positions are in the frame that ``frame`` names."""
         return {
             "goals": [goal.to_json() for goal in self.goals],
             "found": self.found,
             "parts": [part.to_json() for part in self.parts],
             "elapsed_ms": self.elapsed_ms,
+            "frame": FRAME,
+            "level_from_recording": None if self.heat is None else self.heat.space.level_from_recording.tolist(),
         }
