@@ -71,6 +71,7 @@ def record(verb: "Record") -> dict[str, Any]:
         "hearing": verb.hearing,
         "sounds": len(events),
         "events": events,
+        "floor": made.floor.to_json(),
         "elapsed_s": round(perf_counter() - begin, 3),
     }
 

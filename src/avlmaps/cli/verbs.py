@@ -82,6 +82,9 @@ class Record(Verb):
         ]
         lines = table_lines(("onset_s", "offset_s", "category", "sounds at", "made by"), rows) if rows else []
         said = f"wrote {self.out}: {answer['frames']} frames, {answer['duration_s']:.1f} s"
+        floor = answer["floor"]
+        shares = ", ".join(f"{floor[f'{name}_share']:.0%} {name}" for name in ("reached", "driven", "seen"))
+        lines.append(f"of {floor['walkable_m2']:.1f} m² of walkable floor: {shares}")
         emit(answer, [*lines, f"{said}, in {answer['elapsed_s']:.1f} s"], self.json)
 
 

@@ -8,9 +8,8 @@ from avlmaps.maps.keyframe_stage import keep_keyframes
 from avlmaps.maps.lock import locked
 from avlmaps.maps.parts import build_part, merge_parts
 from avlmaps.maps.plan import claim, make_plan
-from avlmaps.maps.sensor_stage import find_sensor
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
-from avlmaps.maps.stages import commit, find_up, fuse, hear_sounds, merge, stand
+from avlmaps.maps.stages import commit, find_up, fuse, hear_sounds, merge, sense, stand
 from avlmaps.maps.stored import StoredMap, describe, open_stored
 from avlmaps.perception.models.feature_store import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.models.remembering import remembering
@@ -59,7 +58,7 @@ def build_map(
         if claim(plan, resume, overwrite) is None:
             up = find_up(plan)
             plan = stand(plan, up[0])
-            sensor = find_sensor(plan.recording, plan.settings)
+            sensor = sense(plan)
             fused = fuse(plan, parts, sensor)
             pictures = keep_keyframes(plan, fused)
             heard = hear_sounds(plan)

@@ -33,6 +33,7 @@ from avlmaps.maps.parts import (
 )
 from avlmaps.maps.perceiving import without_place
 from avlmaps.maps.plan import Plan, audio_key
+from avlmaps.maps.sensor_stage import find_sensor
 from avlmaps.maps.store import MapContent, write_map
 from avlmaps.maps.types import HeardSounds, Voxels
 from avlmaps.recordings.types import Ground, Recording
@@ -44,6 +45,10 @@ _GUESS = 0.1
 class _UpFacts(msgspec.Struct):
     up: UpInfo
     elapsed_s: float
+
+
+class _SensorFacts(msgspec.Struct):
+    sensor: SensorInfo
 
 
 class _Facts(msgspec.Struct):
@@ -87,6 +92,19 @@ def stand(plan: Plan, up: UpInfo) -> Plan:
         save_checkpoint(folder, key, _Facts(perf_counter() - begin), arrays)
         found = load_checkpoint(folder, _Facts, key)
     return replace(plan, recording=GroundedRecording(plan.recording, Ground(**found.arrays)))
+
+
+def sense(plan: Plan) -> SensorInfo:
+    """Return the depth camera, as the settings name it or as the frames show it."""
+    if plan.settings.fusion.sensor != "auto":
+        return find_sensor(plan.recording, plan.settings)
+    key = key_of("sensor", BUILD_VERSION, plan.recording.fingerprint)
+    folder = plan.folder("sensor", key)
+    found = find_checkpoint(folder, _SensorFacts, key)
+    if found is None:
+        save_checkpoint(folder, key, _SensorFacts(find_sensor(plan.recording, plan.settings)), {})
+        found = load_checkpoint(folder, _SensorFacts, key)
+    return found.facts.sensor
 
 
 def fuse(plan: Plan, given: Sequence[Path | str], sensor: SensorInfo) -> list[Part]:
