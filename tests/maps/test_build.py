@@ -197,7 +197,7 @@ def test_a_stopped_build_reads_no_finished_frame_again(tmp_path: Path) -> None:
 def stop_after_four_parts(path: Path) -> None:
     """Leave a half-built map of 20 frames."""
     with pytest.raises(RecordingError):
-        build(Walk(20, bad=(16,)), path, replace(SETTINGS, frames=replace(SETTINGS.frames, on_bad="stop")))
+        build(Walk(20, bad=(18,)), path, replace(SETTINGS, frames=replace(SETTINGS.frames, on_bad="stop")))
 
 
 def test_without_resume_all_is_done_anew(tmp_path: Path) -> None:

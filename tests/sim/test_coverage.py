@@ -80,7 +80,7 @@ def test_a_building_that_lies_on_its_side_is_refused(tmp_path: Path) -> None:
 def test_a_building_without_floor_or_walls_to_stand_on_says_to_check_the_axis(tmp_path: Path) -> None:
     plane = {"slab": FLOOR["floor"], "post": ((0, 0, 0), (0.1, 0.1, 2.6))}
     scene_of(tmp_path / "side.glb", plane, z_up=True)
-    with pytest.raises(RecordingError, match="no floor to speak of.* check the scale .* and the up axis"):
+    with pytest.raises(RecordingError, match=r"no floor to speak of.* check the scale .* and the up axis"):
         require_floor(load_scene(tmp_path / "side.glb", up_axis="y"), WALK)
 
 

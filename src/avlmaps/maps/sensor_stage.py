@@ -29,6 +29,7 @@ def find_sensor(recording: Recording, settings: BuildSettings) -> SensorInfo:
     if chosen != "auto":
         return SensorInfo(name=chosen, known_from="settings", noise_per_m=None, model=MODELS[chosen])
     noise = measure_noise(spread_frames(recording, FRAMES))
+    noise = None if noise is None else float(f"{noise:.2g}")  # as far as it is known, and alike on every machine
     name = nearest_model(noise)
     return SensorInfo(name=name, known_from="frames", noise_per_m=noise, model=MODELS[name])
 
