@@ -96,9 +96,9 @@ def row(name: str, found: Made, surface: cKDTree, seen: np.ndarray, frames: int)
     return {
         "map": name,
         "voxels": len(off),
-        "accuracy": round(float((off <= WITHIN_M).mean()), 4),
+        "accuracy_percent": round(100 * float((off <= WITHIN_M).mean()), 2),
         "voxels_over_20_cm_off": int((off > FAR_OFF_M).sum()),
-        "completeness": round(float(near.mean()), 4),
+        "completeness_percent": round(100 * float(near.mean()), 2),
         "ms_a_frame": round(1e3 * found.seconds / frames, 2),
     }
 
