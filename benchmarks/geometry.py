@@ -22,7 +22,7 @@ from scipy.spatial import cKDTree  # noqa: E402
 
 from avlmaps.maps.cleaning import clean  # noqa: E402
 from avlmaps.maps.free_space import FreeViewCollector  # noqa: E402
-from avlmaps.maps.fusion import VoxelAccumulator  # noqa: E402
+from avlmaps.maps.fusion.accumulator import VoxelAccumulator  # noqa: E402
 from avlmaps.maps.grid import GridSpec  # noqa: E402
 from avlmaps.maps.sensor import NONE, SensorModel  # noqa: E402
 from avlmaps.maps.sensor_stage import find_sensor  # noqa: E402

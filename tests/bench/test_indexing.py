@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.bench.indexing.asked_scene import AskedScene
 from avlmaps.bench.indexing.configurations import CONFIGURATIONS, configurations
 from avlmaps.bench.indexing.factors import near_polygon, true_regions
 from avlmaps.bench.indexing.metrics import LIMITS_M, Answered, bootstrapped_mean, judged, scored
@@ -26,13 +25,14 @@ from avlmaps.bench.indexing.rules import (
     sound_tasks,
 )
 from avlmaps.bench.indexing.runs import IndexingSettings, run
+from avlmaps.bench.indexing.scene_queries import AskedScene
 from avlmaps.bench.indexing.tables import tables
 from avlmaps.bench.indexing.tasks import Box, Recorded, Task, TaskError, TaskKind, TaskSet, load_tasks, save_tasks
 from avlmaps.bench.indexing.true_voxels import TrueVoxels
 from avlmaps.bench.indexing.weak_sounds import WeakSounds
+from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.question import Modality, Part
 from avlmaps.sim.hearing import Synthesised
 from avlmaps.sim.mesh import Material
 from avlmaps.sim.scene import Area, Scene, SceneBuilder

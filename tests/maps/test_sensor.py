@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
-from avlmaps.maps.fusion import FusionSettings, VoxelAccumulator
+from avlmaps.maps.fusion.accumulator import FusionSettings, VoxelAccumulator
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.sensor import KINECT, NONE, PERFECT, REALSENSE, SensorModel
 from avlmaps.maps.sensor_kernels import drop_flying

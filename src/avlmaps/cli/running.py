@@ -13,9 +13,10 @@ if TYPE_CHECKING:
 
     from avlmaps.cli.verbs import Build, Query, Record
     from avlmaps.core.camera import Pinhole
-    from avlmaps.perception.models.feature_store import CacheSettings
+    from avlmaps.core.question import Part
+    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.perception.cache.feature_store import CacheSettings
     from avlmaps.perception.profiles import Profile
-    from avlmaps.query.question import Part
     from avlmaps.recordings.types import Recording
 
 MAP_MANIFEST = "map.json"
@@ -114,7 +115,7 @@ def build(verb: "Build") -> dict[str, Any]:
         resume=not verb.fresh,
         overwrite=verb.overwrite,
     )
-    return {**describe(stored), "elapsed_s": round(perf_counter() - begin, 3)}
+    return {**with_sound_names(describe(stored), stored), "elapsed_s": round(perf_counter() - begin, 3)}
 
 
 def _chosen_profile(name: str, words: "Sequence[str]") -> "Profile":
@@ -138,7 +139,7 @@ def _chosen_profile(name: str, words: "Sequence[str]") -> "Profile":
 
 
 def _cache(place: str, limit_gb: float) -> "CacheSettings":
-    from avlmaps.perception.models.feature_store import CacheSettings
+    from avlmaps.perception.cache.feature_store import CacheSettings
 
     if place in ("auto", "off"):
         return CacheSettings(place, limit_gb)
@@ -173,14 +174,33 @@ def describe_path(path: Path, format: str, verify: bool, plot: Path | None) -> d
 
 
 def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]:
-    from avlmaps.maps.stored import describe, open_stored
+    from avlmaps.maps.store.reader import describe, open_stored
 
     stored = open_stored(path, verify=verify)
+    told = with_sound_names(describe(stored), stored)
     if plot is not None:
         from avlmaps.query.plots import plot_map
 
-        plot_map(stored, plot)
-    return describe(stored)
+        told["plot"] = str(plot_map(stored, plot))
+    return told
+
+
+def with_sound_names(told: dict[str, Any], stored: "StoredMap") -> dict[str, Any]:
+    """Return what is told of a map, each sound with the names that fit it best, where its sound model is here."""
+    from avlmaps.query.avlmap import AVLMap
+
+    if not told["sounds"]:
+        return told
+    try:
+        heard = AVLMap(stored).sounds()
+    except AvlmapsError as error:
+        say(f"note: the sounds have no names here. {error}")
+        return told
+    sounds = [
+        {**sound, "names": list(event.names), "confidences": list(event.confidences)}
+        for sound, event in zip(told["sounds"], heard, strict=True)
+    ]
+    return {**told, "sounds": sounds}
 
 
 def _describe_recording(recording: "Recording") -> dict[str, Any]:
@@ -198,6 +218,7 @@ def _describe_recording(recording: "Recording") -> dict[str, Any]:
             for name, camera in (("rgb", rig.rgb), ("depth", rig.depth))
         },
         "up_in_world": None if up is None else [float(value) for value in up],
+        "topics": dict(recording.topics),
         "audio": None
         if audio is None
         else {
@@ -213,8 +234,8 @@ def _describe_recording(recording: "Recording") -> dict[str, Any]:
 
 def ask(verb: "Query") -> dict[str, Any]:
     """Ask a map a question in a sentence or in parts."""
+    from avlmaps.core.question import Modality, Question
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.question import Modality, Question
 
     parts = _parts(verb)
     if bool(verb.sentence.strip()) == bool(parts):
@@ -234,13 +255,14 @@ def ask(verb: "Query") -> dict[str, Any]:
             question = Question.of(question.parts, Modality(verb.primary))
     camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
     answer = AVLMap.open(verb.map).ask(question, top=verb.top, intrinsics=camera)
+    told = answer.to_json()
     if verb.plot is not None and answer.heat is not None:
-        answer.heat.plot(verb.plot, top=verb.top)
-    return answer.to_json()
+        told["plot"] = str(answer.heat.plot(verb.plot, top=verb.top))
+    return told
 
 
 def _parts(verb: "Query") -> list["Part"]:
-    from avlmaps.query.question import Modality, Part
+    from avlmaps.core.question import Modality, Part
 
     named = (
         (Modality.OBJECT, verb.object, False),
@@ -253,7 +275,7 @@ def _parts(verb: "Query") -> list["Part"]:
 
 
 def _first_image(parts: "tuple[Part, ...]") -> Path | None:
-    from avlmaps.query.question import Modality
+    from avlmaps.core.question import Modality
 
     return next((Path(part.query) for part in parts if part.modality is Modality.IMAGE), None)
 
@@ -264,7 +286,7 @@ def _camera_for(picture: Path | None, intrinsics: str | None) -> "Pinhole | None
         return None
     if picture is None:
         raise UsageError("--intrinsics belongs to a photo (--image); there is none.")
-    from avlmaps.query.images import read_picture
+    from avlmaps.query.modalities.image import read_picture
 
     height, width = read_picture(picture).shape[:2]
     return _camera_of(intrinsics, width, height)
@@ -286,7 +308,7 @@ def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[
     """Locate a photo."""
     from avlmaps.core.poses import FRAME
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.images import read_picture
+    from avlmaps.query.modalities.image import read_picture
 
     rgb = read_picture(picture)
     given = None if intrinsics is None else _camera_of(intrinsics, rgb.shape[1], rgb.shape[0])
@@ -307,7 +329,7 @@ def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[
 
 def teach(name: str, clips: tuple[Path, ...]) -> dict[str, Any]:
     """Teach a kind of sound from clips, or forget it where there are none."""
-    from avlmaps.perception.taught import forget_sound, taught_sounds, teach_sound
+    from avlmaps.perception.enrolment import forget_sound, taught_sounds, teach_sound
 
     if clips:
         teach_sound(name, list(clips))

@@ -125,7 +125,7 @@ def _home(sheet: Sheet, home: Plan, evidence: "Evidence") -> str:
 def _strip(recording: "Recording", asked: "AVLMap", moments: int) -> Strip:
     """Look again at some moments of the walk, as the map's own pixel encoder does."""
     from avlmaps.core.progress import progress
-    from avlmaps.maps.gravity_stage import grounded
+    from avlmaps.maps.gravity.stage import grounded
     from avlmaps.maps.settings import DEFAULTS
     from avlmaps.perception.embedded.pixels import EmbeddedPixels
 
@@ -251,12 +251,12 @@ def _panels(step: "Step", answer: "Answer", sheet: Sheet, photo: "PhotoView | No
     truth = sheet.band(ask.truth[1:]) if ask.kind == "clip" else sheet.rings(ask.truth, "truth")
     told = answer.found or ask.truth  # where there is nothing, a guess is no goal
     goals = sheet.goals([goal.position for goal in answer.goals]) if told else ""
-    layers = [ground, _layer(sheet, heat_from_above(heat.space, heat.values)), sheet.rings(ask.others, "other")]
+    layers = [ground, _layer(sheet, heat_from_above(heat.space, heat.shown)), sheet.rings(ask.others, "other")]
     large = _figure(
         sheet, [*layers, truth, seen, goals], "all together" if len(heat.factors) > 1 else _label(answer, 0)
     )
     small = [
-        _figure(sheet, [ground, _layer(sheet, heat_from_above(heat.space, factor.values)), seen], _label(answer, i))
+        _figure(sheet, [ground, _layer(sheet, heat_from_above(heat.space, factor.shown)), seen], _label(answer, i))
         for i, factor in enumerate(heat.factors)
         if len(heat.factors) > 1
     ]
@@ -290,7 +290,7 @@ def _label(answer: "Answer", part: int) -> str:
 
 
 def _read(step: "Step", name: str) -> np.ndarray:
-    from avlmaps.query.images import read_picture
+    from avlmaps.query.modalities.image import read_picture
 
     path = next(Path(part.query) for part in step.ask.question.parts if part.query.endswith(name))
     return read_picture(path)

@@ -8,7 +8,7 @@ from importlib.resources import files
 from typing import Any
 
 from avlmaps.core.errors import QueryError
-from avlmaps.query.question import MOST_CHARACTERS, Modality, Part, Question
+from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
 
 # A phrase that ends in one of these is an area; "kitchen table" ends in a thing. A toilet is a thing, as in VLMaps, and
 # a room only where something is in it ("the mirror in the toilet") or as "toilet room".

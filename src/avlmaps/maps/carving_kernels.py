@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from avlmaps.maps.voxel_kernels import OPTIONS, find_row
+from avlmaps.maps.fusion.voxel_kernels import OPTIONS, find_row
 
 
 @njit(**OPTIONS)

@@ -4,10 +4,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from avlmaps.maps.gravity_stage import spread_frames
-from avlmaps.maps.manifest import SensorInfo
+from avlmaps.maps.gravity.stage import spread_frames
 from avlmaps.maps.sensor import MODELS, SensorModel, SensorName
 from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.store.manifest import SensorInfo
 from avlmaps.recordings.types import Frame, Recording
 
 FRAMES = 12  # looked at, spread evenly

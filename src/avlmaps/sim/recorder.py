@@ -135,7 +135,9 @@ class _Trip:
     duration_s: float
 
 
-def record_scene(scene: Scene, out: Path, settings: RecordSettings | None = None, seed: int = 0) -> SceneRecording:
+def record_scene(
+    scene: Scene, out: Path | str, settings: RecordSettings | None = None, seed: int = 0
+) -> SceneRecording:
     """Drive through a scene and write a recording in our folder format, with its truth beside it.
 
     The same scene, settings and seed give the same bytes, on however many processes.
@@ -150,7 +152,7 @@ def record_scene(scene: Scene, out: Path, settings: RecordSettings | None = None
         RecordingError: the folder is not empty, or the scene has no floor to speak of, or is none in metres.
         AudioError: the folder of clips cannot be used.
     """
-    settings = settings or RecordSettings()
+    settings, out = settings or RecordSettings(), Path(out)
     if (out / DESCRIPTION).exists():  # told before the work is done, not after
         raise RecordingError(f"{out} holds a recording already; choose another folder or remove it.")
     space = require_floor(scene, settings.walk)
