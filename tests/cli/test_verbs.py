@@ -46,7 +46,8 @@ def test_another_map_is_not_built_over_a_finished_one(built: Path, walk: Path, r
 
 def test_a_query_by_words_finds_the_cabinet(built: Path, answer) -> None:
     told = answer("query", built, "the red cabinet", "--top", 2)
-    assert {"goals", "found", "parts", "elapsed_ms"} == told.keys()
+    assert {"goals", "found", "parts", "elapsed_ms", "frame", "level_from_recording"} == told.keys()
+    assert told["frame"] == "recording"
     assert told["found"] is True
     goal = told["goals"][0]
     assert {"position", "score", "size", "parts"} == goal.keys()
@@ -124,7 +125,7 @@ def test_a_photo_is_located_to_the_contract(built: Path, answer, tmp_path: Path)
     photo = tmp_path / "photo.png"
     cv2.imwrite(str(photo), view.rgb[..., ::-1])
     told = answer("locate", built, photo)
-    assert {"world_from_camera", "inliers", "reference", "elapsed_ms"} <= told.keys()
+    assert {"world_from_camera", "inliers", "reference", "frame", "elapsed_ms"} <= told.keys()
     pose = np.array(told["world_from_camera"])
     assert np.linalg.norm(pose[:3, 3] - truth[:3, 3]) < 0.05
     assert np.rad2deg(rotation_angle_rad(pose, truth)) < 1.0

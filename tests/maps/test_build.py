@@ -179,13 +179,13 @@ def test_the_first_bad_frame_stops_a_strict_build_with_its_own_sentence(tmp_path
 def test_a_stopped_build_reads_no_finished_frame_again(tmp_path: Path) -> None:
     walk, read = Walk(20), []
 
-    def frame_until_the_second_14(index: int):  # the first reading looks for the ground
+    def frame_until_the_third_14(index: int):  # the first two look for the ground and at the depth's error
         read.append(index)
-        if index == 14 and read.count(14) == 2:
+        if index == 14 and read.count(14) == 3:
             raise KeyboardInterrupt
         return Walk.frame(walk, index)
 
-    walk.frame = frame_until_the_second_14
+    walk.frame = frame_until_the_third_14
     with pytest.raises(KeyboardInterrupt):
         build(walk, tmp_path / "a")
     walk.frame = lambda index: read.append(index) or Walk.frame(walk, index)
@@ -197,7 +197,7 @@ def test_a_stopped_build_reads_no_finished_frame_again(tmp_path: Path) -> None:
 def stop_after_four_parts(path: Path) -> None:
     """Leave a half-built map of 20 frames."""
     with pytest.raises(RecordingError):
-        build(Walk(20, bad=(16,)), path, replace(SETTINGS, frames=replace(SETTINGS.frames, on_bad="stop")))
+        build(Walk(20, bad=(18,)), path, replace(SETTINGS, frames=replace(SETTINGS.frames, on_bad="stop")))
 
 
 def test_without_resume_all_is_done_anew(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from avlmaps.query.plots import HEAT_LABEL, plot_map
 from avlmaps.query.topdown import TopDown
 from avlmaps.query.voxel_space import Space
 
+CHAIR = Part(Modality.OBJECT, "chair")
 WALK = np.stack([np.linspace(1, 5, 20), 1 + np.sin(np.linspace(0, 3, 20)), np.full(20, 1.4)], axis=1)
 
 

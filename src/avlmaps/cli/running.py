@@ -72,6 +72,7 @@ def record(verb: "Record") -> dict[str, Any]:
         "hearing": verb.hearing,
         "sounds": len(events),
         "events": events,
+        "floor": made.floor.to_json(),
         "elapsed_s": round(perf_counter() - begin, 3),
     }
 
@@ -102,7 +103,7 @@ def build(verb: "Build") -> dict[str, Any]:
     settings = BuildSettings(
         voxel_size_m=verb.voxel_size_m,
         frames=FrameSettings(step=verb.frame_step, max_bad_share=verb.max_bad_share),
-        fusion=FusionSettings(max_depth_m=verb.max_depth_m),
+        fusion=FusionSettings(max_depth_m=verb.max_depth_m, sensor=verb.sensor),
         gravity=GravitySettings(camera_height_m=verb.camera_height_m),
         seed=verb.seed,
     )
@@ -306,6 +307,7 @@ def _camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":
 
 def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[str, Any]:
     """Locate a photo."""
+    from avlmaps.core.poses import FRAME
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.modalities.image import read_picture
 
@@ -319,6 +321,7 @@ def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[
         "world_from_camera": None if pose is None else [[float(value) for value in row] for row in pose],
         "inliers": int(found.inliers),
         "reference": found.reference_stamp_s,
+        "frame": FRAME,
         "score": found.score,
         "intrinsics": [camera.fx, camera.fy, camera.cx, camera.cy],
         "elapsed_ms": found.elapsed_ms,

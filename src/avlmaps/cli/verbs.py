@@ -1,5 +1,6 @@
 """The verbs. Each field's docstring is its help; heavy imports happen when a verb runs."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -89,6 +90,9 @@ class Record(Verb):
         ]
         lines = table_lines(("onset_s", "offset_s", "category", "sounds at", "made by"), rows) if rows else []
         said = f"wrote {self.out}: {answer['frames']} frames, {answer['duration_s']:.1f} s"
+        floor = answer["floor"]
+        shares = ", ".join(f"{floor[f'{name}_share']:.0%} {name}" for name in ("reached", "driven", "seen"))
+        lines.append(f"of {floor['walkable_m2']:.1f} m² of walkable floor: {shares}")
         emit(answer, [*lines, f"{said}, in {answer['elapsed_s']:.1f} s"], self.json)
 
 
@@ -197,6 +201,8 @@ class Build(ModelVerb):
     camera_height_m: Annotated[float | None, arg(aliases=("--floor-height",), metavar="METRES")] = None
     """Height of the depth camera over the floor in the first frame, metres. Default: found from the frames; give it
     where `build` reports the floor with a low confidence."""
+    sensor: Literal["auto", "kinect", "realsense", "perfect", "none"] = "auto"
+    """Depth camera: its error decides which depths are used. auto measures it; none uses all, as the paper does."""
     resume: bool = False
     """Go on with a stopped build. This is what happens anyway; the flag is for scripts that say so."""
     fresh: bool = False
@@ -323,28 +329,39 @@ class TeachSound(Verb):
 
 
 def info_lines(answer: dict[str, Any]) -> list[str]:
-    """Lay out what `build` and `info` tell."""
+    """Lay out what `build` and `info` report; entries without a layout of their own are printed as they are."""
     lines: list[str] = []
     for key, value in answer.items():
-        if key == "sounds":
-            lines.append(f"sounds: {len(value)}")
-            lines += [
-                f"  {s['onset_s']:8.2f} - {s['offset_s']:.2f} s at {place(s['position'])}{_names_of(s)}" for s in value
-            ]
-        elif key == "topics" and value:
-            lines += ["topics:", *[f"  {use}: {topic}" for use, topic in value.items()]]
-        elif key == "plot":
-            lines.append(f"wrote {value}")
-        elif isinstance(value, list) and value and isinstance(value[0], str):
+        if value in (None, [], {}) and key != "sounds":
+            continue
+        if key in _LAYOUTS:
+            lines += _LAYOUTS[key](value)
+        elif isinstance(value, list) and isinstance(value[0], str):
             lines += [f"{key}:", *[f"  {line}" for line in value]]
-        elif key == "ground" and isinstance(value, dict):
-            lines += ground_lines(value)
-        elif key == "bytes" and isinstance(value, int):
-            lines.append(f"size: {size_of(value)}")
-        elif value not in (None, [], {}):
-            shown = f"{value:.6g}" if isinstance(value, float) else value
-            lines.append(f"{key.replace('_', ' ')}: {shown}")
+        else:
+            lines.append(f"{key.replace('_', ' ')}: {f'{value:.6g}' if isinstance(value, float) else value}")
     return lines
+
+
+def _sound_lines(sounds: list[dict[str, Any]]) -> list[str]:
+    rows = [f"  {s['onset_s']:8.2f} - {s['offset_s']:.2f} s at {place(s['position'])}{_names_of(s)}" for s in sounds]
+    return [f"sounds: {len(sounds)}", *rows]
+
+
+# How the entries of `info` are laid out, where a plain line would not do.
+_LAYOUTS: dict[str, Callable[[Any], list[str]]] = {
+    "sounds": _sound_lines,
+    "topics": lambda topics: ["topics:", *[f"  {use}: {topic}" for use, topic in topics.items()]],
+    "plot": lambda path: [f"wrote {path}"],
+    "ground": ground_lines,
+    "bytes": lambda count: [f"size: {size_of(count)}"],
+    "voxels_removed": lambda removed: [
+        "voxels removed: " + ", ".join(f"{count} {why.replace('_', ' ')}" for why, count in removed.items())
+    ],
+    "level_from_recording": lambda rows: [
+        "level from recording:", *["  " + " ".join(f"{value:7.4f}" for value in row) for row in rows]
+    ],
+}  # fmt: skip
 
 
 def _names_of(sound: dict[str, Any]) -> str:
@@ -364,7 +381,7 @@ def query_lines(answer: dict[str, Any]) -> list[str]:
         for i, goal in enumerate(answer["goals"], start=1)
     ]
     lines.append("found" if answer["found"] else "not found here" + (": the best guesses are" if rows else ""))
-    lines += table_lines(("", "place", "score", "size in m"), rows) if rows else []
+    lines += table_lines(("", f"place ({answer['frame']} frame)", "score", "size in m"), rows) if rows else []
     return [*lines, f"wrote {answer['plot']}"] if "plot" in answer else lines
 
 
@@ -374,4 +391,4 @@ def locate_lines(answer: dict[str, Any]) -> list[str]:
     if pose is None:
         return [f"not located: {answer['inliers']} points agree, too few to tell a place"]
     rows = ["  " + " ".join(f"{value:9.4f}" for value in row) for row in pose]
-    return [f"located, {answer['inliers']} points agree; world_from_camera:", *rows]
+    return [f"located, {answer['inliers']} points agree; world_from_camera (frame: {answer['frame']}):", *rows]

@@ -17,6 +17,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.progress import progress as shown
 from avlmaps.core.progress import say, silenced
 from avlmaps.core.version import __version__
+from avlmaps.maps.fusion.measure_kernels import SHARP_UNITS
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.import_reference.frames import Walk, read_walk
@@ -203,5 +204,7 @@ def _sums(part: VoxelRows, rows: Int[np.ndarray, " p"], index: Int32[np.ndarray,
         rgb_sum=np.where(coloured[:, None], weight[:, None] * part.rgb[rows], 0.0),
         rgb_weight=np.where(coloured, weight, 0.0),
         hits=np.full(len(rows), PIXELS_PER_VOXEL, np.int64),
+        views=np.ones(len(rows), np.int32),
+        sharp=np.full(len(rows), PIXELS_PER_VOXEL * SHARP_UNITS, np.int64),
         last_seen_s=np.zeros(len(rows)),
     )

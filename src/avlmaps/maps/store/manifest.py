@@ -10,6 +10,7 @@ from jaxtyping import Float
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import write_bytes_atomically
+from avlmaps.maps.sensor import SensorModel
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.array_files import FileInfo, writing_into
 from avlmaps.perception.models.names import public_choice, public_name
@@ -188,6 +189,36 @@ class GroundInfo(msgspec.Struct, frozen=True, kw_only=True):
         return max(self.floors, key=lambda floor: floor.cameras)
 
 
+class SensorInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """Which depth camera was assumed.
+
+    Attributes:
+        name: of the model; ``custom`` for one that was given.
+        known_from: the settings, or what the frames show.
+        noise_per_m: measured growth of the error with the square of the depth, 1/m; None where it was not measured.
+        model: all its numbers.
+    """
+
+    name: str
+    known_from: Literal["settings", "frames"]
+    noise_per_m: float | None
+    model: SensorModel
+
+
+class Removed(msgspec.Struct, frozen=True, kw_only=True):
+    """How many voxels were removed.
+
+    Attributes:
+        seen_through: frames see through them.
+        smeared: a much better seen voxel is within their error.
+        specks: in small groups that stand alone and that hardly a frame hit.
+    """
+
+    seen_through: int = 0
+    smeared: int = 0
+    specks: int = 0
+
+
 class BadFrame(msgspec.Struct, frozen=True, kw_only=True):
     """A frame that could not be read and was left out, with the sentence that told why."""
 
@@ -242,6 +273,8 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
         models: their cards, by module.
         settings: resolved, defaults included.
         seed: of everything that was drawn at random.
+        sensor: which depth camera was assumed; None in maps that use every depth as it is.
+        removed: voxels that were no surface.
         recording: what was recorded.
         counts: how much there is.
         bounding_box_m: where the voxels are.
@@ -272,6 +305,8 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
     files: dict[str, FileInfo] = {}
     bytes: int = 0
     timings: Timings
+    sensor: SensorInfo | None = None
+    removed: Removed = Removed()
 
 
 class _Ident(msgspec.Struct):

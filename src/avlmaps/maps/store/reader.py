@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import BackendError, MapError
+from avlmaps.core.poses import FRAME, rotation_to_level
 from avlmaps.core.registry import Kind
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.array_files import FileInfo, checked_path, read_array
@@ -186,6 +187,8 @@ def describe(stored: StoredMap) -> dict[str, Any]:
     """
     info, sounds = stored.info, stored.sounds
     tracks = np.split(np.asarray(sounds.track, np.float64), sounds.track_offsets[1:-1]) if len(sounds) else []
+    level_from_recording = np.eye(4)
+    level_from_recording[:3, :3] = rotation_to_level(info.up.vector())
     return {
         "path": str(stored.path),
         "frames": info.counts.frames,
@@ -208,6 +211,10 @@ def describe(stored: StoredMap) -> dict[str, Any]:
         "up_known_from": info.up.known_from,
         "up_support": info.up.support,
         "ground": None if info.ground is None else _describe_ground(info.ground),
+        "sensor": None if info.sensor is None else info.sensor.name,
+        "sensor_known_from": None if info.sensor is None else info.sensor.known_from,
+        "sensor_noise_per_m": None if info.sensor is None else info.sensor.noise_per_m,
+        "voxels_removed": msgspec.structs.asdict(info.removed),
         "bounding_box_m": [list(info.bounding_box_m.low), list(info.bounding_box_m.high)],
         "duration_s": info.recording.duration_s,
         "recording": info.recording.name,
@@ -219,6 +226,8 @@ def describe(stored: StoredMap) -> dict[str, Any]:
         "avlmaps_version": info.avlmaps_version,
         "seed": info.seed,
         "finished": info.timings.finished,
+        "frame": FRAME,
+        "level_from_recording": level_from_recording.tolist(),
     }
 
 
