@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache, cached_property
 from importlib.resources import files
-from types import MappingProxyType
 from typing import Any, Literal
 
 from avlmaps.core.inflection import plural_of, singulars_of
@@ -88,27 +87,24 @@ class Lexicon:
     Attributes:
         colours: names of colours.
         materials: adjectives that say what a thing is made of.
-        ambiguous: words that name several entries of one kind, each with the kind and the names, the likeliest first.
+        ambiguous: spellings that name several entries of a kind, squeezed, with the names, the likeliest first.
     """
 
     def __init__(self, source: Mapping[str, Any]) -> None:
         self.colours = _listed(source.get("colours", ""))
         self.materials = _listed(source.get("materials", ""))
-        self.ambiguous: Mapping[tuple[Kind, str], tuple[str, ...]] = MappingProxyType(
-            {
-                (kind, squeezed(word)): _listed(names)
-                for kind in Kind
-                for word, names in source.get("ambiguous", {}).get(kind.value, {}).items()
-            }
-        )
-        made = _sounds_of(source.get("sound", {}))
-        self._entries = tuple(entry for kind in Kind for entry in _entries(kind, source.get(kind.value, {}), made))
-        self._named = {(entry.kind, squeezed(entry.name)): entry for entry in self._entries}
-        self._index = self._indexed()
+        self.ambiguous: dict[Kind, dict[str, tuple[str, ...]]] = {
+            kind: {squeezed(word): _listed(names) for word, names in source.get("ambiguous", {}).get(kind, {}).items()}
+            for kind in Kind
+        }
+        self._said = {kind: dict(_flat(source.get(kind, {}))) for kind in Kind}
+        self._index = {kind: self._indexed(kind) for kind in Kind}
+        self._known: dict[Kind, dict[str, Entry]] = {kind: {} for kind in Kind}
 
     def entries(self, kind: Kind | None = None) -> tuple[Entry, ...]:
         """Return the entries, or those of one kind, in the order of the file."""
-        return self._entries if kind is None else tuple(entry for entry in self._entries if entry.kind is kind)
+        kinds = Kind if kind is None else (kind,)
+        return tuple(self._entry(each, name) for each in kinds for name in self._said[each])
 
     def find(self, phrase: str, kind: Kind | None = None) -> Entry | None:
         """Return the entry that a phrase names exactly, by any of its spellings; None where there is none.
@@ -121,8 +117,8 @@ class Lexicon:
         """
         for key in (squeezed(phrase), *(squeezed(single) for single in singulars_of(phrase))):
             for each in Kind if kind is None else (kind,):
-                if found := self._index[each].get(key):
-                    return found
+                if (name := self._index[each].get(key)) is not None:
+                    return self._entry(each, name)
         return None
 
     def senses(self, phrase: str, kind: Kind | None = None) -> tuple[Entry, ...]:
@@ -132,9 +128,8 @@ class Lexicon:
             if (found := self.find(phrase, each)) is not None:
                 out[f"{each} {found.name}"] = found
             for single in (phrase, *singulars_of(phrase)):
-                for name in self.ambiguous.get((each, squeezed(single)), ()):
-                    entry = self._named[each, squeezed(name)]
-                    out.setdefault(f"{each} {entry.name}", entry)
+                for name in self.ambiguous[each].get(squeezed(single), ()):
+                    out.setdefault(f"{each} {name}", self._entry(each, name))
         return tuple(out.values())
 
     def head(self, phrase: str, kind: Kind | None = None) -> Entry | None:
@@ -161,7 +156,7 @@ class Lexicon:
         out: dict[str, Entry] = {}
         todo = [entry] if entry is not None else []
         for each in todo:
-            for parent in (self._named[each.kind, squeezed(wide)] for wide in each.wider):
+            for parent in (self._entry(each.kind, wide) for wide in each.wider):
                 if parent.name not in out:
                     out[parent.name] = parent
                     todo.append(parent)
@@ -209,33 +204,79 @@ class Lexicon:
     @cached_property
     def _words(self) -> frozenset[str]:
         phrases = [*self.colours, *self.materials]
-        for entry in self._entries:
+        for entry in self.entries():
             phrases += [*entry.spellings, entry.plural]
         return frozenset(word for phrase in phrases for word in phrase.lower().replace("-", " ").split())
 
     @cached_property
     def _spellers(self) -> "dict[Kind | None, Speller]":
-        of_kind = {kind: Speller(word for e in self.entries(kind) for word in e.spellings) for kind in Kind}
-        return {None: Speller(word for entry in self._entries for word in entry.spellings), **of_kind}
+        # What encoders were trained to tell is what people mostly ask for; it wins where two words are as near.
+        entries = sorted(self.entries(), key=lambda entry: entry.split != "training")
+        kinds: tuple[Kind | None, ...] = (None, *Kind)
+        return {
+            kind: Speller(word for entry in entries if kind in (None, entry.kind) for word in entry.spellings)
+            for kind in kinds
+        }
 
     @cached_property
     def _members(self) -> dict[Kind, dict[str, tuple[Entry, ...]]]:
         out: dict[Kind, dict[str, tuple[Entry, ...]]] = {kind: {} for kind in Kind}
-        for entry in self._entries:
+        for entry in self.entries():
             for parent in self.wider(entry.name, entry.kind):
                 out[entry.kind][parent.name] = (*out[entry.kind].get(parent.name, ()), entry)
         return out
 
-    def _indexed(self) -> dict[Kind, dict[str, Entry]]:
-        index: dict[Kind, dict[str, Entry]] = {kind: {} for kind in Kind}
-        for kind, key in self._named:
-            index[kind][key] = self._named[kind, key]
-        for (kind, key), names in self.ambiguous.items():
-            index[kind].setdefault(key, self._named[kind, squeezed(names[0])])
-        for entry in self._entries:
-            for spelling in (entry.plural, *entry.synonyms, *entry.compounds):
-                index[entry.kind].setdefault(squeezed(spelling), entry)
+    def _indexed(self, kind: Kind) -> dict[str, str]:
+        """Return the name of the entry that each spelling means, by the squeezed spelling.
+
+        Names come first, then what the file calls ambiguous, then other spellings, then what encoders take for it.
+        """
+        said = self._said[kind]
+        index = {squeezed(name): name for name in said}
+        for key, names in self.ambiguous[kind].items():
+            index.setdefault(key, names[0])
+        for words in (("plural",), ("also", "such_as"), ("learnt",)):
+            for name, own in said.items():
+                for word in words:
+                    for key in squeezed(own.get(word, "")).split(","):
+                        index.setdefault(key, name)
+        index.pop("", None)
         return index
+
+    def _entry(self, kind: Kind, name: str) -> Entry:
+        if (known := self._known[kind].get(name)) is None:
+            known = self._known[kind][name] = self._made(kind, name, self._said[kind][name])
+        return known
+
+    def _made(self, kind: Kind, name: str, said: Mapping[str, Any]) -> Entry:
+        learnt = _listed(said.get("learnt", ""))
+        # An encoder may take other things for one of its own: a tap for a sink. They are no synonyms.
+        same = (word for word in learnt if self._index[kind][squeezed(word)] == name)
+        return Entry(
+            name=name,
+            kind=kind,
+            plural=said.get("plural") or (name if kind is Kind.SOUND else plural_of(name)),
+            synonyms=(*same, *_listed(said.get("also", ""))),
+            learnt=learnt,
+            wider=_listed(said.get("wider", "")),
+            compounds=_listed(said.get("such_as", "")),
+            mount=said.get("mount", "floor"),
+            size_m=_size(said["size"]) if "size" in said else None,
+            soft=said.get("soft", False),
+            sounds=self._sounds_of.get(name, ()) if kind is Kind.THING else (),
+            makers=_listed(said.get("makers", "")),
+            rooms=_listed(said.get("rooms", "")),
+            split="training" if said.get("trained", False) else "held out",
+        )
+
+    @cached_property
+    def _sounds_of(self) -> dict[str, tuple[str, ...]]:
+        """The sounds that each thing makes, from what makes each sound."""
+        out: dict[str, tuple[str, ...]] = {}
+        for name, said in self._said[Kind.SOUND].items():
+            for maker in _listed(said.get("makers", "")):
+                out[maker] = (*out.get(maker, ()), name)
+        return out
 
 
 @cache
@@ -245,56 +286,17 @@ def lexicon() -> Lexicon:
     return Lexicon(tomllib.loads(text))
 
 
-def _entries(kind: Kind, groups: Mapping[str, Any], made: Mapping[str, tuple[str, ...]]) -> Iterable[Entry]:
-    own = {squeezed(word) for said in _own(groups) for word in said}
+def _flat(groups: Mapping[str, Any]) -> Iterable[tuple[str, Mapping[str, Any]]]:
+    """Return each entry's name with what its group and itself say of it."""
     for group in groups.values():
         usual = group.get(_DEFAULTS, {})
         for name, said in group.items():
             if name != _DEFAULTS:
-                yield _entry(name, kind, {**usual, **said}, own, made.get(name, ()) if kind is Kind.THING else ())
-
-
-def _own(groups: Mapping[str, Any]) -> Iterable[tuple[str, ...]]:
-    """Return what each entry of a kind says that it is called."""
-    for group in groups.values():
-        for name, said in group.items():
-            yield (name, *_listed(said.get("also", "")))
-
-
-def _entry(name: str, kind: Kind, said: Mapping[str, Any], own: set[str], sounds: tuple[str, ...]) -> Entry:
-    learnt = _listed(said.get("learnt", ""))
-    # An encoder may take other things for one of its own: a tap for a sink. They are no synonyms.
-    same = (word for word in learnt if squeezed(word) not in own)
-    return Entry(
-        name=name,
-        kind=kind,
-        plural=said.get("plural") or (name if kind is Kind.SOUND else plural_of(name)),
-        synonyms=(*same, *_listed(said.get("also", ""))),
-        learnt=learnt,
-        wider=_listed(said.get("wider", "")),
-        compounds=_listed(said.get("such_as", "")),
-        mount=said.get("mount", "floor"),
-        size_m=_size(said["size"]) if "size" in said else None,
-        soft=said.get("soft", False),
-        sounds=sounds,
-        makers=_listed(said.get("makers", "")),
-        rooms=_listed(said.get("rooms", "")),
-        split="training" if said.get("trained", False) else "held out",
-    )
-
-
-def _sounds_of(groups: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """Return for each thing the sounds that it makes, from what makes each sound."""
-    out: dict[str, tuple[str, ...]] = {}
-    for group in groups.values():
-        for name, said in group.items():
-            for maker in _listed(said.get("makers", "")):
-                out[maker] = (*out.get(maker, ()), name)
-    return out
+                yield name, {**usual, **said}
 
 
 def _listed(text: str) -> tuple[str, ...]:
-    return tuple(part for part in (each.strip() for each in text.split(",")) if part)
+    return tuple(text.split(", ")) if text else ()
 
 
 def _size(text: str) -> tuple[Range, Range, Range]:

@@ -1,9 +1,8 @@
 """Words alike in spelling: which known word a misspelt one was meant to be."""
 
-import re
 from collections.abc import Iterable
 
-_JOINTS = re.compile(r"[\s\-_'’.]+")
+_JOINTS = str.maketrans("", "", " \t\n\r\v\f\u00a0-_'’.")
 # Of the letters of the longer word; beyond, two words are not alike.
 _MOST_CHANGED = 0.34
 _DOUBLED = 0.5
@@ -11,7 +10,7 @@ _DOUBLED = 0.5
 
 def squeezed(phrase: str) -> str:
     """Return a phrase in small letters without blanks, hyphens, dots and apostrophes: "Arm-chair" is "armchair"."""
-    return _JOINTS.sub("", phrase.casefold())
+    return phrase.casefold().translate(_JOINTS)
 
 
 def distance(one: str, other: str, most: float = float("inf")) -> float:
