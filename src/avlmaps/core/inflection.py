@@ -12,12 +12,13 @@ _IRREGULAR = {
 _SINGULAR = {many: one for one, many in _IRREGULAR.items()}
 # Nouns that have one form only, by their last word.
 _SAME = frozenset({
-    "furniture", "luggage", "equipment", "clothing", "scissors", "binoculars", "headphones", "earphones", "glasses",
-    "sunglasses", "trousers", "jeans", "pants", "shorts", "tights", "pyjamas", "pajamas", "tongs", "pliers",
-    "tweezers", "scales", "stairs", "steps", "blinds", "drapes", "drawers", "shoes", "clothes", "goods", "sheep", "fish",
-    "series", "cutlery", "crockery", "tableware", "cookware", "glassware", "laundry", "bedding", "linen", "mail", "money",
-    "jewellery", "jewelry", "makeup", "toilet paper", "stationery", "hardware", "software", "decor", "lighting",
-    "wallpaper", "flooring", "plumbing", "wiring", "premises", "stationary", "bread", "food", "fruit",
+    "furniture", "luggage", "equipment", "clothing", "scissors", "binoculars", "headphones", "earphones",
+    "glasses", "sunglasses", "trousers", "jeans", "pants", "shorts", "tights", "pyjamas", "pajamas", "tongs",
+    "pliers", "tweezers", "scales", "stairs", "steps", "blinds", "drapes", "drawers", "shoes", "clothes",
+    "goods", "sheep", "fish", "series", "cutlery", "crockery", "tableware", "cookware", "glassware", "laundry",
+    "bedding", "linen", "mail", "money", "jewellery", "jewelry", "makeup", "toilet paper", "stationery",
+    "hardware", "software", "decor", "lighting", "wallpaper", "flooring", "plumbing", "wiring", "premises",
+    "stationary", "bread", "food", "fruit",
 })  # fmt: skip
 _LINKS = frozenset({"of", "with", "for", "on", "in", "at", "to", "from", "under", "and", "without"})
 _ES = ("s", "x", "z", "ch", "sh")

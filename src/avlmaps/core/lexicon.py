@@ -5,7 +5,7 @@ plural, so "Arm-chairs" is an armchair. How to add a thing stands in ``docs/guid
 """
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache, cached_property
@@ -21,7 +21,11 @@ Split = Literal["training", "held out"]
 
 _DEFAULTS = "all"
 # After one of these a phrase describes; what is named stands before it: "a bottle of wine" is a bottle.
-_LINKS = frozenset({"of", "with", "without", "for", "on", "in", "at", "from", "under", "to", "that", "which"})
+_LINKS = frozenset({
+    "of", "with", "without", "for", "on", "in", "at", "from", "under", "to", "that", "which", "where", "beside", "next",
+    "near", "above", "below", "behind", "by", "over", "between", "full", "made", "used", "like", "when", "inside",
+    "against", "opposite", "across", "who",
+})  # fmt: skip
 
 
 class Kind(StrEnum):
@@ -51,6 +55,8 @@ class Entry:
         sounds: names of the sounds that it makes, for a thing.
         makers: names of the things that make it, the likeliest first, for a sound.
         rooms: names of the rooms where it usually is; for a sound, where it is also heard without its makers.
+        like: what an encoder that does not know it may take it for, since they look alike: a freezer, a refrigerator.
+        generic: whether it says too little to look for: an object, an appliance; what it is stands beside it.
         split: ``training`` where an encoder which ships was trained to tell it; ``held out`` for all others.
     """
 
@@ -67,6 +73,8 @@ class Entry:
     sounds: tuple[str, ...] = ()
     makers: tuple[str, ...] = ()
     rooms: tuple[str, ...] = ()
+    like: tuple[str, ...] = ()
+    generic: bool = False
     split: Split = "held out"
 
     @property
@@ -143,7 +151,7 @@ class Lexicon:
             kind: only entries of this kind.
         """
         words = phrase.split()
-        link = next((at for at, word in enumerate(words) if at and word.lower() in _LINKS), len(words))
+        link = _link(words)
         for end in (len(words), link) if link < len(words) else (link,):
             for start in range(link):
                 if (found := self.find(" ".join(words[start:end]), kind)) is not None:
@@ -266,6 +274,8 @@ class Lexicon:
             sounds=self._sounds_of.get(name, ()) if kind is Kind.THING else (),
             makers=_listed(said.get("makers", "")),
             rooms=_listed(said.get("rooms", "")),
+            like=_listed(said.get("like", "")),
+            generic=said.get("generic", False),
             split="training" if said.get("trained", False) else "held out",
         )
 
@@ -284,6 +294,17 @@ def lexicon() -> Lexicon:
     """Return the lexicon that ships, read once."""
     text = files("avlmaps.core").joinpath("lexicon.toml").read_text(encoding="utf-8")
     return Lexicon(tomllib.loads(text))
+
+
+def noun_of(phrase: str) -> str:
+    """Return the word that says what a phrase is about, known or not: "blue zebra in a cage" is a zebra."""
+    words = phrase.split()
+    return words[_link(words) - 1] if words else ""
+
+
+def _link(words: Sequence[str]) -> int:
+    """Return the index of the word at which the description after the noun begins."""
+    return next((at for at, word in enumerate(words) if at and word.lower() in _LINKS), len(words))
 
 
 def _flat(groups: Mapping[str, Any]) -> Iterable[tuple[str, Mapping[str, Any]]]:

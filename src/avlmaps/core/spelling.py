@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 _JOINTS = str.maketrans("", "", " \t\n\r\v\f\u00a0-_'’.")
 # Of the letters of the longer word; beyond, two words are not alike.
-_MOST_CHANGED = 0.34
+_MOST_CHANGED = 0.28
 _DOUBLED = 0.5
 
 
