@@ -36,11 +36,13 @@ def plural_of(phrase: str) -> str:
 
 def singulars_of(phrase: str) -> tuple[str, ...]:
     """Return what a phrase may be the plural of, the likeliest first; not all of them are words."""
-    words = phrase.lower().replace("-", " ").split()
-    at = _head(words)
-    if at < 0:
-        return ()
-    return tuple(" ".join([*words[:at], single, *words[at + 1 :]]) for single in _singular_words(words[at]))
+    out: dict[str, None] = {}
+    for text in (phrase.lower(), phrase.lower().replace("-", " ")):
+        words = text.split()
+        at = _head(words)
+        if at >= 0:
+            out |= {" ".join([*words[:at], single, *words[at + 1 :]]): None for single in _singular_words(words[at])}
+    return tuple(out)
 
 
 def _head(words: list[str]) -> int:
@@ -68,8 +70,8 @@ def _singular_words(word: str) -> tuple[str, ...]:
         out.append(f"{word[:-3]}y")
     if word.endswith("ves"):
         out += [f"{word[:-3]}f", f"{word[:-3]}fe"]
-    if word.endswith("es"):
-        out.append(word[:-2])
     if word.endswith("s") and not word.endswith("ss"):
         out.append(word[:-1])
+    if word.endswith("es"):
+        out.append(word[:-2])
     return tuple(dict.fromkeys(single for single in out if single))
