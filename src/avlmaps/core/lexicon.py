@@ -174,21 +174,20 @@ class Lexicon:
         """Return all entries that a wider kind takes in, in the order of the file: "seat" takes in chair and sofa."""
         return tuple(entry for each in self.senses(wider) for entry in self._members[each.kind].get(each.name, ()))
 
-    def is_a(self, other: str, wanted: str) -> bool:
+    def is_a(self, other: str, wanted: str, kind: Kind | None = None) -> bool:
         """Return whether what one phrase names is what another wants.
 
         Args:
             other: ``red office chair``; its head counts.
             wanted: ``chair``, ``chairs`` or ``seat``; a chair is no office chair.
+            kind: compare only entries of this kind.
         """
-        wants = self.senses(wanted)
-        if not wants:
-            return _ends_with(other, wanted)
-        for kind in {entry.kind for entry in wants}:
-            named = self.senses(other, kind) or tuple(filter(None, (self.head(other, kind),)))
-            for entry in named:
-                if any(want is entry or want in self.wider(entry.name, kind) for want in wants):
-                    return True
+        for want in self.senses(wanted, kind):
+            named = self.senses(other, want.kind) or tuple(filter(None, (self.head(other, want.kind),)))
+            # A dining chair is a chair; an armchair is a chair too, and no dining chair.
+            wide = squeezed(wanted) not in map(squeezed, want.compounds)
+            if any(want is entry or (wide and want in self.wider(entry.name, want.kind)) for entry in named):
+                return True
         return _ends_with(other, wanted)
 
     def suggest(self, word: str, kind: Kind | None = None, most: int = 3) -> tuple[str, ...]:
@@ -259,7 +258,8 @@ class Lexicon:
     def _made(self, kind: Kind, name: str, said: Mapping[str, Any]) -> Entry:
         learnt = _listed(said.get("learnt", ""))
         # An encoder may take other things for one of its own: a tap for a sink. They are no synonyms.
-        same = (word for word in learnt if self._index[kind][squeezed(word)] == name)
+        special = _listed(said.get("such_as", ""))
+        same = (word for word in learnt if self._index[kind][squeezed(word)] == name and word not in special)
         return Entry(
             name=name,
             kind=kind,
@@ -267,7 +267,7 @@ class Lexicon:
             synonyms=(*same, *_listed(said.get("also", ""))),
             learnt=learnt,
             wider=_listed(said.get("wider", "")),
-            compounds=_listed(said.get("such_as", "")),
+            compounds=special,
             mount=said.get("mount", "floor"),
             size_m=_size(said["size"]) if "size" in said else None,
             soft=said.get("soft", False),
