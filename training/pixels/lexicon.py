@@ -1,7 +1,8 @@
 """Other phrases for the categories, and wider words that take several of them in, from the project's lexicon."""
 
-from avlmaps.core.lexicon import Kind, lexicon
 from training.pixels.labels import CATEGORIES, ROOMS
+
+from avlmaps.core.lexicon import Kind, lexicon
 
 # The wider words that notes carry; everything else is left to the nearness of words.
 _WIDE = {
@@ -13,8 +14,8 @@ _NAMES = {Kind.THING: CATEGORIES, Kind.ROOM: ROOMS}
 
 
 def _called() -> dict[str, tuple[str, ...]]:
-    entries = {(kind, name): lexicon().find(name, kind) for kind, names in _NAMES.items() for name in names}
-    return {name: entry.learnt for (_, name), entry in entries.items() if entry is not None and entry.learnt}
+    entries = [lexicon().named(name, kind) for kind, names in _NAMES.items() for name in names if name != "other"]
+    return {entry.name: entry.learnt for entry in entries if entry.learnt}
 
 
 def _kinds() -> dict[str, tuple[str, ...]]:

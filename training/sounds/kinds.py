@@ -28,9 +28,7 @@ _UNSPOKEN = frozenset({"fan or air conditioner", "television or music", "drinkin
 
 
 def _called(name: str) -> tuple[str, ...]:
-    entry = lexicon().find(name, Kind.SOUND)
-    if entry is None or entry.name != name:
-        raise ValueError(f"the lexicon has no sound {name!r}; add it to core/lexicon.toml")
+    entry = lexicon().named(name, Kind.SOUND)
     return entry.learnt if name in _UNSPOKEN else (name, *entry.learnt)
 
 

@@ -57,6 +57,9 @@ class Entry:
         rooms: names of the rooms where it usually is; for a sound, where it is also heard without its makers.
         like: what an encoder that does not know it may take it for, since they look alike: a freezer, a refrigerator.
         generic: whether it says too little to look for: an object, an appliance; what it is stands beside it.
+        wet: of a room, whether its walls get wet.
+        tiled: of a room, whether its floor is hard.
+        spoken: what people mostly say for it where that is not the name, else ``""``.
         split: ``training`` where an encoder which ships was trained to tell it; ``held out`` for all others.
     """
 
@@ -75,6 +78,9 @@ class Entry:
     rooms: tuple[str, ...] = ()
     like: tuple[str, ...] = ()
     generic: bool = False
+    wet: bool = False
+    tiled: bool = False
+    spoken: str = ""
     split: Split = "held out"
 
     @property
@@ -113,6 +119,16 @@ class Lexicon:
         """Return the entries, or those of one kind, in the order of the file."""
         kinds = Kind if kind is None else (kind,)
         return tuple(self._entry(each, name) for each in kinds for name in self._said[each])
+
+    def named(self, name: str, kind: Kind) -> Entry:
+        """Return the entry of exactly this name.
+
+        Raises:
+            KeyError: there is none; whoever lists names of entries finds out at once.
+        """
+        if name not in self._said[kind]:
+            raise KeyError(f"the lexicon has no {kind} {name!r}; add it to core/lexicon.toml")
+        return self._entry(kind, name)
 
     def find(self, phrase: str, kind: Kind | None = None) -> Entry | None:
         """Return the entry that a phrase names exactly, by any of its spellings; None where there is none.
@@ -242,12 +258,11 @@ class Lexicon:
         index = {squeezed(name): name for name in said}
         for key, names in self.ambiguous[kind].items():
             index.setdefault(key, names[0])
-        for words in (("plural",), ("also", "such_as"), ("learnt",)):
+        for field in ("plural", "also", "such_as", "learnt"):
             for name, own in said.items():
-                for word in words:
-                    for key in squeezed(own.get(word, "")).split(","):
+                if field in own:
+                    for key in squeezed(own[field]).split(","):
                         index.setdefault(key, name)
-        index.pop("", None)
         return index
 
     def _entry(self, kind: Kind, name: str) -> Entry:
@@ -276,6 +291,9 @@ class Lexicon:
             rooms=_listed(said.get("rooms", "")),
             like=_listed(said.get("like", "")),
             generic=said.get("generic", False),
+            wet=said.get("wet", False),
+            tiled=said.get("tiled", False),
+            spoken=said.get("spoken", ""),
             split="training" if said.get("trained", False) else "held out",
         )
 
