@@ -9,7 +9,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help demo test test-foundation types-foundation lint format bench train lock clean
+.PHONY: help demo test bounds test-foundation types-foundation lint format bench train lock clean
 
 help:  ## Show what can be made.
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -26,6 +26,9 @@ demo: $(READY)  ## Make a home, walk it, hear it, map it, ask it; pictures land 
 
 test: $(READY)  ## Run every test (offline, two cores, no GPU).
 	$(RUN)/python -m pytest -n 3 --dist loadfile
+
+bounds: $(READY)  ## Run 100,000 random programs; print the worst processor time and the memory (20 minutes).
+	$(RUN)/python tests/helpers/program_bounds.py 100000 1
 
 test-foundation: $(TORCH)/.ready  ## Run the tests of the models on torch (in a virtual environment of their own, 1.5 GB).
 	$(TORCH)/bin/python -m pytest -n 2 --dist loadfile tests/foundation

@@ -136,11 +136,14 @@ def test_a_real_robot_is_driven_over_rosbridge_and_let_go_at_the_end(
     asked: list[tuple[object, ...]] = []
 
     class Far(KinematicDriver):
+        def halt(self) -> None:
+            asked.append(("halted",))
+
         def close(self) -> None:
             asked.append(("closed",))
 
-    def connect(kind: str, url: str, frames: object, obstacles: object) -> Far:
-        asked.append((kind, url, frames is not None, obstacles is not None))
+    def connect(kind: str, url: str, frames: object, obstacles: object, *, settings: object, guarded: bool) -> Far:
+        asked.append((kind, url, frames is not None, obstacles is not None and settings is not None and guarded))
         return Far(GroundPose(4.4, 3.2))
 
     monkeypatch.setattr("avlmaps.navigate.ros.open_ros_driver", connect)

@@ -3,8 +3,8 @@ import re
 import pytest
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.question import Role
 from avlmaps.language.sentence import parse_sentence
-from avlmaps.query.question import Role
 
 UNDERSTOOD = {
     "the chair": [("object", "chair")],

@@ -4,9 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.heatmap import Heatmap, HeatSettings, NearAnchors, anchor_heat, fused, normalised, object_heat
-from avlmaps.query.question import Modality, Part, Role
 from avlmaps.query.voxel_space import Space
 
 SIZE_M = 0.05

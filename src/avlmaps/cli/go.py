@@ -50,7 +50,7 @@ class Go(ModelVerb):
     ros: str = "ws://localhost:9090"
     """Address of rosbridge, for --robot nav2 and move_base."""
     ros_frames: Path | None = None
-    """A JSON file that tells how the robot's frames lie to the map's (docs/robots.md)."""
+    """A JSON file of the robot's frames and settings: namespace, radius, speed, timeouts (docs/robots.md)."""
     start: Annotated[str | None, arg(metavar="X,Y,HEADING")] = None
     """Where the simulated robot starts: metres, degrees counter-clockwise from +x. Default: where the walk began."""
     guess: bool = False
@@ -63,8 +63,14 @@ class Go(ModelVerb):
     def run(self) -> None:
         """Drive."""
         from avlmaps.cli.going import go
+        from avlmaps.navigate.interrupts import Interrupted
 
-        answer = go(self)
+        try:
+            answer = go(self)
+        except Interrupted as stop:
+            if self.json:
+                emit(stop.to_json(), (), as_json=True)
+            raise
         emit(answer, go_lines(answer), self.json)
         if not answer["ok"]:
             raise NavigationError(answer["error"])

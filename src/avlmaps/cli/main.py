@@ -8,13 +8,16 @@ from typing import Annotated, Any, Union
 import tyro
 
 from avlmaps.cli.bench import Bench
+from avlmaps.cli.export import Export
 from avlmaps.cli.go import Go
 from avlmaps.cli.import_map import ImportMap
 from avlmaps.cli.output import UsageError
 from avlmaps.cli.profiles import Profiles
+from avlmaps.cli.things import Things
 from avlmaps.cli.verb import Verb, models_in_force
 from avlmaps.cli.verbs import AddSounds, Build, Demo, Info, Locate, Query, Record, TeachSound
 from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars
 
 _DESCRIPTION = """Audio-Visual-Language Maps: what a robot saw and heard, as one 3D map that can be asked.
@@ -30,6 +33,8 @@ VERBS: dict[str, type[Verb]] = {
     "import-map": ImportMap,
     "info": Info,
     "query": Query,
+    "things": Things,
+    "export": Export,
     "locate": Locate,
     "go": Go,
     "teach-sound": TeachSound,
@@ -86,7 +91,9 @@ def _run(verb: Verb) -> int:
         return 0
     except OSError as error:
         return _complain(_sentence(error), 1)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
+        if (status := getattr(stop, "status", None)) is not None:  # of a robot that was driving
+            return _complain(stop, status)
         return _complain("stopped; the same command goes on where this one ended, where it can", 130)
     return 0
 
@@ -102,5 +109,5 @@ def _sentence(error: OSError) -> str:
 
 def _complain(what: object, status: int) -> int:
     end_bars()
-    sys.stderr.write(f"avlmaps: {what}\n")
+    sys.stderr.write(f"avlmaps: {printable(what)}\n")
     return status

@@ -5,6 +5,8 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from avlmaps.core.printable import printable, printable_json
+
 
 class UsageError(Exception):
     """The words of a command do not fit together; exit status 2."""
@@ -13,15 +15,15 @@ class UsageError(Exception):
 def emit(answer: Mapping[str, Any], lines: Iterable[str], as_json: bool) -> None:
     """Print the answer as one JSON object, or as lines."""
     if as_json:
-        sys.stdout.write(json.dumps(answer, allow_nan=False, ensure_ascii=False) + "\n")
+        sys.stdout.write(printable_json(json.dumps(answer, allow_nan=False, ensure_ascii=False)) + "\n")
     else:
         for line in lines:
-            sys.stdout.write(line + "\n")
+            sys.stdout.write(printable(line) + "\n")
 
 
 def table_lines(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
     """Lay out rows under columns, padded with spaces."""
-    cells = [[str(column) for column in columns], *[[str(cell) for cell in row] for row in rows]]
+    cells = [[str(column) for column in columns], *[[printable(cell) for cell in row] for row in rows]]
     widths = [max(len(row[i]) for row in cells) for i in range(len(columns))]
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in cells]
 

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
     from avlmaps.cli.verbs import Build, Query, Record
     from avlmaps.core.camera import Pinhole
+    from avlmaps.core.question import Part
     from avlmaps.perception.cache.feature_store import CacheSettings
     from avlmaps.perception.profiles import Profile
-    from avlmaps.query.question import Part
     from avlmaps.recordings.types import Recording
 
 MAP_MANIFEST = "map.json"
@@ -212,8 +212,8 @@ def _describe_recording(recording: "Recording") -> dict[str, Any]:
 
 def ask(verb: "Query") -> dict[str, Any]:
     """Ask a map a question in a sentence or in parts."""
+    from avlmaps.core.question import Modality, Question
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.question import Modality, Question
 
     parts = _parts(verb)
     if bool(verb.sentence.strip()) == bool(parts):
@@ -239,7 +239,7 @@ def ask(verb: "Query") -> dict[str, Any]:
 
 
 def _parts(verb: "Query") -> list["Part"]:
-    from avlmaps.query.question import Modality, Part
+    from avlmaps.core.question import Modality, Part
 
     named = (
         (Modality.OBJECT, verb.object, False),
@@ -252,7 +252,7 @@ def _parts(verb: "Query") -> list["Part"]:
 
 
 def _first_image(parts: "tuple[Part, ...]") -> Path | None:
-    from avlmaps.query.question import Modality
+    from avlmaps.core.question import Modality
 
     return next((Path(part.query) for part in parts if part.modality is Modality.IMAGE), None)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Kind, lexicon, undescribed
-from avlmaps.query.question import MOST_CHARACTERS, Modality, Part, Question
+from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
 
 _EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
 

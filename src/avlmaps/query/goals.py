@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from avlmaps.core.question import Role
 from avlmaps.query.heatmap import Factor, Heatmap, NearThings
-from avlmaps.query.question import Goal, Role
+from avlmaps.query.question import Goal
 
 # Where everything asked for is in the map, but nowhere together by at least this much heat, the whole is not found.
 LEAST_TOGETHER = 0.1

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from avlmaps.query.question import Goal, Modality, Part, Role
+from avlmaps.core.question import Modality, Part, Role
+from avlmaps.query.question import Goal
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:

@@ -8,8 +8,10 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.printable import plot_text
+from avlmaps.core.question import Modality
 from avlmaps.query.heatmap import Factor, Heatmap, NearAnchors
-from avlmaps.query.question import Goal, Modality
+from avlmaps.query.question import Goal
 from avlmaps.query.topdown import TopDown, walked
 from avlmaps.query.voxel_space import Space
 
@@ -52,7 +54,7 @@ def draw_heat(heat: Heatmap, goals: Sequence[Goal]) -> "Figure":
         _draw_heat(ax, view, factor.values)
         _draw_anchors(ax, factor)
         note = "" if factor.found else " · not found"
-        ax.set_title(f"{_asked(factor)} ({factor.part.role}){note}", fontsize=10, color=INK, loc="left")
+        ax.set_title(f"{plot_text(_asked(factor))} ({factor.part.role}){note}", fontsize=10, color=INK, loc="left")
     if count > 1:
         draw_ground(axes[-1], view, heat.space)
         _draw_heat(axes[-1], view, heat.values)
@@ -80,7 +82,7 @@ def plot_map(stored: "StoredMap", path: Path | str) -> Path:
         mark(axes[0], track.mean(axis=0), f"{sounds.onset_s[k]:.0f} s", _SOUND)
     if len(sounds):
         axes[0].plot([], [], color=_SOUND, linewidth=5, alpha=0.45, label="where a sound was heard, and when")
-    title = f"{Path(stored.path).name}: {len(space):,} voxels, {len(sounds)} sounds"
+    title = f"{plot_text(Path(stored.path).name)}: {len(space):,} voxels, {len(sounds)} sounds"
     axes[0].set_title(title, fontsize=10, color=INK, loc="left", fontweight="bold")
     finish(figure, axes, with_heat=False)
     return save(figure, Path(path))

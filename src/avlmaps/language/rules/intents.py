@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-from avlmaps.query.question import Modality
+from avlmaps.core.question import Modality
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,10 +6,10 @@ from itertools import pairwise
 from typing import Any
 
 from avlmaps.core.errors import LanguageError
+from avlmaps.core.question import Modality
 from avlmaps.language.rules.intents import INSIDE, Named, Target
 from avlmaps.language.rules.sounds import NOISES, PAST_TENSES, SOUND_NOUNS, SOUND_VERBS, SOUNDING_THINGS
 from avlmaps.language.sentence import AREA_WORDS
-from avlmaps.query.question import Modality
 
 # Words that no name has: what holds one was not understood, and is refused rather than sought on the map.
 _NEVER_NAMED = frozenset({

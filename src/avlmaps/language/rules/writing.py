@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from avlmaps.core.errors import LanguageError
+from avlmaps.core.question import Modality
 from avlmaps.language.rules.intents import (
     INSIDE,
     Again,
@@ -26,7 +27,6 @@ from avlmaps.language.rules.intents import (
     TurnTo,
     Viewpoints,
 )
-from avlmaps.query.question import Modality
 
 _ARGUMENTS = {Modality.OBJECT: "obj", Modality.SOUND: "sound", Modality.AREA: "area", Modality.IMAGE: "img"}
 

@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.question import Part
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.protocols import NamedViewEncoder, ScaledEncoder, ViewEncoder
 from avlmaps.query.heatmap import HeatSettings, NearAnchors, normalised
-from avlmaps.query.question import Part
 from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.voxel_space import Space
 

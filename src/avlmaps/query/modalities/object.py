@@ -12,11 +12,11 @@ from jaxtyping import Bool, Float, Float16, Float32, Int, UInt8
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.question import Part
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.colour_filter import Tint, is_tinted, tint_of, tinted_share
 from avlmaps.query.heatmap import HeatSettings, NearThings
 from avlmaps.query.instance_merging import joined_pieces, likeliest, without_specks
-from avlmaps.query.question import Part
 from avlmaps.query.synonyms import fitting, is_a, is_open
 from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.voxel_space import Space

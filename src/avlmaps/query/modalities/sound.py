@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import AudioError, QueryError
+from avlmaps.core.question import Part
 from avlmaps.maps.types import HeardSounds
 from avlmaps.query.heatmap import HeatSettings, NearAnchors, normalised
-from avlmaps.query.question import Part
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import Sound
 
