@@ -71,8 +71,9 @@ class Meanings:
         if head is None:  # the words round it would make a sofa of a "sofa elephant"
             return self._nearest(noun_of(clean), self.names, self.sure_cosine)
         if head.generic:
+            near = self._nearest(clean, self.names, self.least_cosine)
             fitting = [entry.name for entry in known.members(head.name) if entry.name in self.names]
-            return self._nearest(clean, fitting or self.names, self.least_within if fitting else self.least_cosine)
+            return near if near.any() else self._nearest(clean, fitting, self.least_within)
         return self._described(clean, head)
 
     def names_of(self, entry: Entry) -> tuple[str, ...]:
