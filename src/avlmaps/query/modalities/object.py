@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Float16, Float32, Int, UInt8
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Part
+from avlmaps.core.spelling import squeezed
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.colour_filter import Tint, is_tinted, tint_of, tinted_share
 from avlmaps.query.heatmap import HeatSettings, NearThings
@@ -283,7 +284,7 @@ def object_factor(
             pieces = replace(pieces, confidence=pieces.confidence * share)
         best = float(pieces.confidence.max(initial=0.0)) if tint else pieces.best
         note = "" if best >= 0.5 else _absence(part.query, len(pieces.mask), pieces.won, best)
-        if understood and understood != part.query.strip().lower():
+        if understood and squeezed(understood) != squeezed(part.query):
             note = f"understood only {understood!r} of {part.query!r}" + ("; " + note if note else "")
         falloff, alone = heat.falloff_per_m(part.role), None if in_company else lambda: things(True)
         return NearThings(
