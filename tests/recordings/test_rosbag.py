@@ -160,6 +160,14 @@ def test_a_bag_opens_with_interpolated_poses_of_the_camera(tmp_path: Path, kind:
     assert recording.up_in_world == pytest.approx((0.0, 0.0, 1.0))
 
 
+def test_a_bag_names_the_topics_that_were_chosen(tmp_path: Path) -> None:
+    images = {"rgb": "/camera/color/image_raw", "depth": "/camera/depth/image_raw"}
+    by_tf = open_rosbag(write_bag(tmp_path / "a", "ros2", sound=True))
+    assert by_tf.topics == {**images, "pose": "/tf", "audio": "/audio/audio"}
+    by_odometry = open_rosbag(write_bag(tmp_path / "b", "ros2", "odometry"))
+    assert by_odometry.topics == {**images, "pose": "/odom"}
+
+
 def test_a_single_mcap_file_opens_like_its_folder(tmp_path: Path) -> None:
     folder = write_bag(tmp_path, "mcap")
     assert len(open_rosbag(next(folder.glob("*.mcap")))) == 5

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from avlmaps.cli.verbs import Build, Query, Record
     from avlmaps.core.camera import Pinhole
     from avlmaps.core.question import Part
+    from avlmaps.maps.store.reader import StoredMap
     from avlmaps.perception.cache.feature_store import CacheSettings
     from avlmaps.perception.profiles import Profile
     from avlmaps.recordings.types import Recording
@@ -113,7 +114,7 @@ def build(verb: "Build") -> dict[str, Any]:
         resume=not verb.fresh,
         overwrite=verb.overwrite,
     )
-    return {**describe(stored), "elapsed_s": round(perf_counter() - begin, 3)}
+    return {**with_sound_names(describe(stored), stored), "elapsed_s": round(perf_counter() - begin, 3)}
 
 
 def _chosen_profile(name: str, words: "Sequence[str]") -> "Profile":
@@ -175,11 +176,30 @@ def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]
     from avlmaps.maps.store.reader import describe, open_stored
 
     stored = open_stored(path, verify=verify)
+    told = with_sound_names(describe(stored), stored)
     if plot is not None:
         from avlmaps.query.plots import plot_map
 
-        plot_map(stored, plot)
-    return describe(stored)
+        told["plot"] = str(plot_map(stored, plot))
+    return told
+
+
+def with_sound_names(told: dict[str, Any], stored: "StoredMap") -> dict[str, Any]:
+    """Return what is told of a map, each sound with the names that fit it best, where its sound model is here."""
+    from avlmaps.query.avlmap import AVLMap
+
+    if not told["sounds"]:
+        return told
+    try:
+        heard = AVLMap(stored).sounds()
+    except AvlmapsError as error:
+        say(f"note: the sounds have no names here. {error}")
+        return told
+    sounds = [
+        {**sound, "names": list(event.names), "confidences": list(event.confidences)}
+        for sound, event in zip(told["sounds"], heard, strict=True)
+    ]
+    return {**told, "sounds": sounds}
 
 
 def _describe_recording(recording: "Recording") -> dict[str, Any]:
@@ -197,6 +217,7 @@ def _describe_recording(recording: "Recording") -> dict[str, Any]:
             for name, camera in (("rgb", rig.rgb), ("depth", rig.depth))
         },
         "up_in_world": None if up is None else [float(value) for value in up],
+        "topics": dict(recording.topics),
         "audio": None
         if audio is None
         else {
@@ -233,9 +254,10 @@ def ask(verb: "Query") -> dict[str, Any]:
             question = Question.of(question.parts, Modality(verb.primary))
     camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
     answer = AVLMap.open(verb.map).ask(question, top=verb.top, intrinsics=camera)
+    told = answer.to_json()
     if verb.plot is not None and answer.heat is not None:
-        answer.heat.plot(verb.plot, top=verb.top)
-    return answer.to_json()
+        told["plot"] = str(answer.heat.plot(verb.plot, top=verb.top))
+    return told
 
 
 def _parts(verb: "Query") -> list["Part"]:

@@ -2,17 +2,22 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
 from avlmaps.cli.output import UsageError, emit, place, size_of, table_lines
 from avlmaps.cli.verb import ModelVerb, Verb
 
+# Further names of a sound are shown from this score on.
+_LIKELY = 0.1
+
 
 @dataclass(frozen=True, kw_only=True)
 class Demo(Verb):
     """Drive through a home, hear it, map it, ask it: the whole system in one command, with a report.html."""
+
+    compiles: ClassVar[bool] = True
 
     out: Path = Path("demo_out")
     """Folder for the recording, the map, the pictures and report.html."""
@@ -35,6 +40,8 @@ class Record(Verb):
 
     avlmaps record --scene house:7 --out REC --hearing acoustic
     """
+
+    compiles: ClassVar[bool] = True
 
     scene: str
     """house:SEED or office:SEED, made by rule, or a file: .glb, or Matterport3D's .glb with its _semantic.ply."""
@@ -156,6 +163,8 @@ class Build(ModelVerb):
     avlmaps build REC --out kitchen.avlmap --profile foundation --model pixels=clip-patches views=clip
     """
 
+    compiles: ClassVar[bool] = True
+
     recording: Positional[Path]
     """Our folder, 7-Scenes/3DMatch, AVLMaps/VLMaps, TUM RGB-D, Replica, ScanNet, a ROS 1 or 2 bag, MCAP."""
     out: Path
@@ -232,6 +241,8 @@ class Query(ModelVerb):
     avlmaps query MAP --object "red cabinet" --sound-clip bark.ogg --plot heat.png
     """
 
+    compiles: ClassVar[bool] = True
+
     map: Positional[Path]
     """The map."""
     sentence: Positional[str] = ""
@@ -266,6 +277,8 @@ class Query(ModelVerb):
 @dataclass(frozen=True, kw_only=True)
 class Locate(ModelVerb):
     """Tell where a photo was taken: the 6-DoF pose of its camera in the map, or that it was not taken there."""
+
+    compiles: ClassVar[bool] = True
 
     map: Positional[Path]
     """The map."""
@@ -312,14 +325,28 @@ def info_lines(answer: dict[str, Any]) -> list[str]:
     for key, value in answer.items():
         if key == "sounds":
             lines.append(f"sounds: {len(value)}")
-            lines += [f"  {s['onset_s']:8.2f} - {s['offset_s']:.2f} s at {place(s['position'])}" for s in value]
+            lines += [
+                f"  {s['onset_s']:8.2f} - {s['offset_s']:.2f} s at {place(s['position'])}{_names_of(s)}" for s in value
+            ]
+        elif key == "topics" and value:
+            lines += ["topics:", *[f"  {use}: {topic}" for use, topic in value.items()]]
+        elif key == "plot":
+            lines.append(f"wrote {value}")
         elif isinstance(value, list) and value and isinstance(value[0], str):
             lines += [f"{key}:", *[f"  {line}" for line in value]]
         elif key == "bytes" and isinstance(value, int):
             lines.append(f"size: {size_of(value)}")
         elif value not in (None, [], {}):
-            lines.append(f"{key.replace('_', ' ')}: {value}")
+            shown = f"{value:.6g}" if isinstance(value, float) else value
+            lines.append(f"{key.replace('_', ' ')}: {shown}")
     return lines
+
+
+def _names_of(sound: dict[str, Any]) -> str:
+    """Lay out the best names of a sound; those that are hardly likely only where there is no better one."""
+    names = list(zip(sound.get("names", []), sound.get("confidences", []), strict=True))
+    shown = [pair for pair in names if pair[1] >= _LIKELY] or names[:1]
+    return ": " + ", ".join(f"{name} {confidence:.2f}" for name, confidence in shown) if shown else ""
 
 
 def query_lines(answer: dict[str, Any]) -> list[str]:
@@ -332,7 +359,8 @@ def query_lines(answer: dict[str, Any]) -> list[str]:
         for i, goal in enumerate(answer["goals"], start=1)
     ]
     lines.append("found" if answer["found"] else "not found here" + (": the best guesses are" if rows else ""))
-    return lines + (table_lines(("", "place", "score", "size in m"), rows) if rows else [])
+    lines += table_lines(("", "place", "score", "size in m"), rows) if rows else []
+    return [*lines, f"wrote {answer['plot']}"] if "plot" in answer else lines
 
 
 def locate_lines(answer: dict[str, Any]) -> list[str]:

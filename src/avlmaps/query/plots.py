@@ -11,7 +11,7 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.printable import plot_text
 from avlmaps.core.question import Modality
 from avlmaps.query.heatmap import Factor, Heatmap, NearAnchors
-from avlmaps.query.question import Goal
+from avlmaps.query.question import FOUND_AT, Goal
 from avlmaps.query.topdown import TopDown, walked
 from avlmaps.query.voxel_space import Space
 
@@ -26,12 +26,16 @@ INK = "#26292e"
 _PATH = "#2f6fb0"
 _SOUND = "#0b7a75"
 _COLOURMAP = "inferno"
+HEAT_LABEL = "heat × confidence"
 _PANEL_M = 4.6
 _DPI = 130
 
 
 def plot_heat(heat: Heatmap, path: Path, goals: Sequence[Goal]) -> Path:
     """Write a picture of a heatmap: a panel for each factor, and one for their product.
+
+    The colour of a place is its heat times the confidence that the thing there is what was queried, as a goal's
+    score is; what was not found stays dark.
 
     Args:
         heat: the heat.
@@ -51,14 +55,15 @@ def draw_heat(heat: Heatmap, goals: Sequence[Goal]) -> "Figure":
     figure, axes = panels(view, count)
     for factor, ax in zip(heat.factors, axes, strict=False):
         draw_ground(ax, view, heat.space)
-        _draw_heat(ax, view, factor.values)
+        _draw_heat(ax, view, factor.shown)
         _draw_anchors(ax, factor)
-        note = "" if factor.found else " · not found"
+        note = "" if factor.found else f" · not found, at most {factor.shown.max(initial=0.0):.2f}"
         ax.set_title(f"{plot_text(_asked(factor))} ({factor.part.role}){note}", fontsize=10, color=INK, loc="left")
     if count > 1:
         draw_ground(axes[-1], view, heat.space)
-        _draw_heat(axes[-1], view, heat.values)
-        title = f"all together · peak {heat.peak:.2f}" + ("" if heat.found else " · not found")
+        shown = heat.shown
+        _draw_heat(axes[-1], view, shown)
+        title = f"all together · peak {shown.max(initial=0.0):.2f}" + ("" if heat.found else " · not found")
         axes[-1].set_title(title, fontsize=10, color=INK, loc="left", fontweight="bold")
     _draw_goals(axes[-1], heat.space, goals)
     finish(figure, axes, with_heat=True)
@@ -141,7 +146,7 @@ def _draw_anchors(ax: "Axes", factor: Factor) -> None:
     if not isinstance(factor, NearAnchors) or not len(factor.anchors):
         return
     anchors = factor.space.level(factor.anchors)
-    likely = np.asarray(factor.scores) >= 0.5
+    likely = np.asarray(factor.scores) >= FOUND_AT
     if factor.part.modality is Modality.IMAGE:
         ax.plot(*anchors[0, :2], marker="^", color=_SOUND, markeredgecolor="white", markersize=11, linestyle="none")
         return
@@ -193,7 +198,7 @@ def finish(figure: "Figure", axes: "Sequence[Axes]", with_heat: bool) -> None:
     if with_heat:
         shown = ListedColormap(colormaps[_COLOURMAP](0.15 + 0.8 * np.linspace(0.0, 1.0, 256)))
         bar = figure.colorbar(ScalarMappable(cmap=shown), ax=list(axes), shrink=0.7, pad=0.015, fraction=0.04)
-        bar.set_label("heat", fontsize=8, color=INK)
+        bar.set_label(HEAT_LABEL, fontsize=8, color=INK)
         bar.ax.tick_params(labelsize=7, colors=INK)
         bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
 

@@ -8,6 +8,9 @@ from avlmaps.core.question import Part
 if TYPE_CHECKING:
     from avlmaps.query.heatmap import Heatmap
 
+# What has this confidence or more is found: an instance, a sound, a view, the place of a photo.
+FOUND_AT = 0.5
+
 
 @dataclass(frozen=True, slots=True)
 class Goal:

@@ -1,10 +1,11 @@
 """What a recording is: frames with poses, an audio track, and how to get at them without reading it whole."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
@@ -93,6 +94,7 @@ class Recording(ABC):
         up_in_world: unit vector, or None where the recording does not know which way is up.
         audio: the sound track on the frames' clock, or None.
         notices: one sentence for each thing worth knowing (gaps, clock jumps, frames left out).
+        topics: of a bag, which topic was chosen for what (rgb, depth, pose, audio); empty for others.
     """
 
     path: Path
@@ -103,6 +105,7 @@ class Recording(ABC):
     up_in_world: Float[np.ndarray, "3"] | None
     audio: AudioTrack | None
     notices: tuple[str, ...]
+    topics: Mapping[str, str] = MappingProxyType({})
 
     @abstractmethod
     def frame(self, index: int) -> Frame:

@@ -132,7 +132,9 @@ class _Trip:
     duration_s: float
 
 
-def record_scene(scene: Scene, out: Path, settings: RecordSettings | None = None, seed: int = 0) -> SceneRecording:
+def record_scene(
+    scene: Scene, out: Path | str, settings: RecordSettings | None = None, seed: int = 0
+) -> SceneRecording:
     """Drive through a scene and write a recording in our folder format, with its truth beside it.
 
     The same scene, settings and seed give the same bytes, on however many processes.
@@ -147,7 +149,7 @@ def record_scene(scene: Scene, out: Path, settings: RecordSettings | None = None
         RecordingError: the folder is not empty, or nothing in the scene can be driven through.
         AudioError: the folder of clips cannot be used.
     """
-    settings = settings or RecordSettings()
+    settings, out = settings or RecordSettings(), Path(out)
     if (out / DESCRIPTION).exists():  # told before the work is done, not after
         raise RecordingError(f"{out} holds a recording already; choose another folder or remove it.")
     for_walk, for_sounds, for_track, for_frames = np.random.default_rng(seed).spawn(4)

@@ -155,7 +155,8 @@ class RosbagRecording(Recording):
         if len(a) < len(depth):
             notices.append(f"{len(depth) - len(a)} of {len(depth)} depth images have no colour image within 50 ms.")
         stamps_s = depth_s[depth][a]
-        _add_motion(self._bag, topics, camera_frame, tree)
+        pose_topic = _add_motion(self._bag, topics, camera_frame, tree)
+        self.topics = {"rgb": self._rgb_topic, "depth": self._depth_topic, "pose": pose_topic}
         poses, known = tree.root_from(camera_frame, stamps_s)
         if not known.any():
             raise RecordingError(
@@ -211,6 +212,7 @@ class RosbagRecording(Recording):
             return None, ()
         if not self._bag.connections(found[0]):
             raise RecordingError(f"{self.path} has no topic {found[0]!r}; name one that it has (audio=TOPIC).")
+        self.topics = {**self.topics, "audio": found[0]}
         # The bag's sound goes to a file of its own for as long as this recording is open: a track is read by pieces.
         self._folder = tempfile.TemporaryDirectory(prefix="avlmaps-rosbag-")
         infos = self._bag.topics_of(_AUDIO_INFO_TYPES)
@@ -306,12 +308,12 @@ def _check_pose_topic(bag: _Bag, topic: str) -> None:
         )
 
 
-def _add_motion(bag: _Bag, topics: RosTopics, camera_frame: str, tree: TransformTree) -> None:
-    """Add to the tree of mounts what moves the camera: /tf, else odometry or a pose topic."""
+def _add_motion(bag: _Bag, topics: RosTopics, camera_frame: str, tree: TransformTree) -> str:
+    """Add to the tree of mounts what moves the camera: /tf, else odometry or a pose topic; return which."""
     if not topics.pose:
         _add_tf(bag, "/tf", tree)
         if tree.moves(camera_frame):
-            return
+            return "/tf"
     if topics.pose:
         _check_pose_topic(bag, topics.pose)
     candidates = [topics.pose] if topics.pose else bag.topics_of(_POSE_TYPES)
@@ -332,3 +334,4 @@ def _add_motion(bag: _Bag, topics: RosTopics, camera_frame: str, tree: Transform
             f"{bag.path} has poses of {body!r} on {candidates[0]} but no static transform from there to the camera "
             f"{camera_frame!r}; record /tf_static."
         )
+    return candidates[0]
