@@ -145,6 +145,13 @@ def write_bag(
     return maker.path
 
 
+def test_a_bag_knows_how_far_the_robots_base_lies_below_the_camera(tmp_path: Path) -> None:
+    recording = open_recording(write_bag(tmp_path, "mcap"))
+    base = recording.base_height
+    assert base is not None and not base.on_floor
+    assert base.below_camera_m == pytest.approx(BODY_FROM_CAMERA[2, 3])
+
+
 @pytest.mark.parametrize("kind", ["ros1", "ros2", "mcap"])
 @pytest.mark.parametrize("poses", ["tf", "odometry"])
 def test_a_bag_opens_with_interpolated_poses_of_the_camera(tmp_path: Path, kind: str, poses: str) -> None:

@@ -61,3 +61,20 @@ def size_of(count: int) -> str:
             return f"{size:.0f} {unit}" if unit == "B" else f"{size:.1f} {unit}"
         size /= 1000
     return f"{size:.1f} GB"
+
+
+def ground_lines(ground: Mapping[str, Any]) -> list[str]:
+    """Lay out where the floor is: the one that most cameras stood over, the runner-up, and every floor there is."""
+    source = {"surfaces": "", "user": ", as given", "recording": ", from the robot's frames"}[ground["known_from"]]
+    unseen = "" if ground["in_view"] else ", not in view"
+    sure = f"confidence {ground['confidence']:.2f}"
+    lines = [f"floor: {ground['camera_height_m']:.2f} m under the camera, {sure}{unseen}{source}"]
+    if (second := ground["runner_up"]) is not None:
+        lines.append(f"  runner-up: {second['camera_height_m']:.2f} m, confidence {second['confidence']:.2f}")
+    if len(ground["floors"]) > 1:
+        lines += [
+            f"  at height {floor['height_m']:.2f} m: {floor['cameras']:.0%} of the frames looked at, "
+            f"confidence {floor['confidence']:.2f}"
+            for floor in ground["floors"]
+        ]
+    return lines

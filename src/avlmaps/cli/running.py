@@ -86,7 +86,7 @@ def _size(words: str) -> tuple[int, int]:
 def build(verb: "Build") -> dict[str, Any]:
     """Build a map and describe it."""
     from avlmaps.maps.build import build_map, describe
-    from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings
+    from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings, GravitySettings
     from avlmaps.recordings.open import open_recording
 
     begin = perf_counter()
@@ -103,6 +103,7 @@ def build(verb: "Build") -> dict[str, Any]:
         voxel_size_m=verb.voxel_size_m,
         frames=FrameSettings(step=verb.frame_step, max_bad_share=verb.max_bad_share),
         fusion=FusionSettings(max_depth_m=verb.max_depth_m),
+        gravity=GravitySettings(camera_height_m=verb.camera_height_m),
         seed=verb.seed,
     )
     stored = build_map(

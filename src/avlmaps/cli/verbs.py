@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from avlmaps.cli.output import UsageError, emit, place, size_of, table_lines
+from avlmaps.cli.output import UsageError, emit, ground_lines, place, size_of, table_lines
 from avlmaps.cli.verb import ModelVerb, Verb
 
 # Further names of a sound are shown from this score on.
@@ -194,6 +194,9 @@ class Build(ModelVerb):
     """Stop when more than this share of the frames cannot be read; fewer are left out and told."""
     max_depth_m: float = 10.0
     """Ignore depth beyond this, metres."""
+    camera_height_m: Annotated[float | None, arg(aliases=("--floor-height",), metavar="METRES")] = None
+    """Height of the depth camera over the floor in the first frame, metres. Default: found from the frames; give it
+    where `build` reports the floor with a low confidence."""
     resume: bool = False
     """Go on with a stopped build. This is what happens anyway; the flag is for scripts that say so."""
     fresh: bool = False
@@ -334,6 +337,8 @@ def info_lines(answer: dict[str, Any]) -> list[str]:
             lines.append(f"wrote {value}")
         elif isinstance(value, list) and value and isinstance(value[0], str):
             lines += [f"{key}:", *[f"  {line}" for line in value]]
+        elif key == "ground" and isinstance(value, dict):
+            lines += ground_lines(value)
         elif key == "bytes" and isinstance(value, int):
             lines.append(f"size: {size_of(value)}")
         elif value not in (None, [], {}):

@@ -8,7 +8,7 @@ from avlmaps.maps.keyframe_stage import keep_keyframes
 from avlmaps.maps.partial_maps import build_part, merge_parts
 from avlmaps.maps.plan import claim, make_plan
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
-from avlmaps.maps.stages import commit, find_up, fuse, hear_sounds, merge, stand
+from avlmaps.maps.stages import attach_ground, commit, find_up, fuse, hear_sounds, merge
 from avlmaps.maps.store.lock import locked
 from avlmaps.maps.store.reader import StoredMap, describe, open_stored
 from avlmaps.perception.cache.cached_encoders import remembering
@@ -57,10 +57,10 @@ def build_map(
     with silenced(not progress), locked(plan.path):
         if claim(plan, resume, overwrite) is None:
             up = find_up(plan)
-            plan = stand(plan, up[0])
+            plan, ground, grounding_s = attach_ground(plan, up[0])
             fused = fuse(plan, parts)
             pictures = keep_keyframes(plan, fused)
             heard = hear_sounds(plan)
             voxels = merge(plan, fused)  # late, because it fills the memory
-            commit(plan, up, fused, pictures, heard, voxels)
+            commit(plan, up, (ground, grounding_s), fused, pictures, heard, voxels)
     return open_stored(plan.path)

@@ -32,7 +32,7 @@ from avlmaps.perception.profiles import profile as profile_of
 from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.recordings.types import Recording
 
-BUILD_VERSION = 2  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
+BUILD_VERSION = 3  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
 
 Span = tuple[int, int, int]
 
@@ -83,7 +83,7 @@ def fusion_key(recording: Recording, settings: BuildSettings, used: Profile) -> 
     """Return the hash of all that the sums of a frame depend on; parts are only ever added to parts of the same key."""
     encoder = pixel_encoder_of(used)
     card = None if encoder is None else encoder.card
-    ground = (settings.gravity, settings.seed) if encoder is not None else None
+    ground = (settings.gravity, settings.seed, recording.base_height) if encoder is not None else None
     return key_of("fusion", BUILD_VERSION, recording.fingerprint, settings.voxel_size_m, settings.fusion, card, ground)
 
 

@@ -38,6 +38,7 @@ class Subset(Recording):
         self.up_in_world = whole.up_in_world
         self.audio = whole.audio
         self.notices = whole.notices
+        self.base_height = whole.base_height
 
     def frame(self, index: int) -> Frame:
         """Read one frame; its ``index`` is the one in the subset."""

@@ -36,6 +36,19 @@ class Ground:
 
 
 @dataclass(frozen=True, slots=True)
+class BaseHeight:
+    """Where a robot's base is under its camera.
+
+    Attributes:
+        below_camera_m: from the base up to the depth camera, metres.
+        on_floor: whether the base lies on the floor (ROS ``base_footprint``) or somewhere above it (``base_link``).
+    """
+
+    below_camera_m: float
+    on_floor: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Frame:
     """One moment of the camera.
 
@@ -95,6 +108,7 @@ class Recording(ABC):
         audio: the sound track on the frames' clock, or None.
         notices: one sentence for each thing worth knowing (gaps, clock jumps, frames left out).
         topics: of a bag, which topic was chosen for what (rgb, depth, pose, audio); empty for others.
+        base_height: where the robot's base is under the camera in the first frame, None where that is not known.
     """
 
     path: Path
@@ -106,6 +120,7 @@ class Recording(ABC):
     audio: AudioTrack | None
     notices: tuple[str, ...]
     topics: Mapping[str, str] = MappingProxyType({})
+    base_height: "BaseHeight | None" = None
 
     @abstractmethod
     def frame(self, index: int) -> Frame:

@@ -137,6 +137,57 @@ class UpInfo(msgspec.Struct, frozen=True, kw_only=True):
         return np.array(self.direction, np.float64)
 
 
+class FloorGuess(msgspec.Struct, frozen=True, kw_only=True):
+    """One hypothesis of where a floor is.
+
+    Attributes:
+        height_m: of the floor along up, in the recording's world.
+        camera_height_m: of the cameras over it, their median.
+        confidence: how likely the floor lies within 0.12 m of that height under all the evidence, in [0, 1].
+        in_view: whether level surface was seen there; False says that no floor is in view, so that it was put at the
+            bottom of what is in view or where cameras usually have it.
+        level_m2: area of level surface seen there.
+        below: share of the surface in view that lies below it, in [0, 1]; near 0 for a floor.
+    """
+
+    height_m: float
+    camera_height_m: float
+    confidence: float
+    in_view: bool
+    level_m2: float
+    below: float
+
+
+class FloorInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """A floor that cameras stood over.
+
+    Attributes:
+        best: the hypothesis that was taken.
+        runner_up: the best one at another height, None where there is none.
+        cameras: share of the cameras that stood over this floor, in [0, 1].
+    """
+
+    best: FloorGuess
+    runner_up: FloorGuess | None
+    cameras: float
+
+
+class GroundInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """The floors under the cameras, lowest first, and how they are known.
+
+    Attributes:
+        known_from: the surfaces in view, a height that the user gave, or the recording's own (a robot's frames).
+        floors: every floor, step and landing that a camera stood over.
+    """
+
+    known_from: Literal["surfaces", "user", "recording"]
+    floors: tuple[FloorInfo, ...]
+
+    def main(self) -> FloorInfo:
+        """Return the floor that most cameras stood over."""
+        return max(self.floors, key=lambda floor: floor.cameras)
+
+
 class BadFrame(msgspec.Struct, frozen=True, kw_only=True):
     """A frame that could not be read and was left out, with the sentence that told why."""
 
@@ -185,6 +236,7 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
         build_key: hash of everything that went in (recording, settings, models); another build has another one.
         voxel_size_m: the grid.
         up: which way is up.
+        ground: where the floors are; None in maps of older releases and in imported ones.
         rig: the recording's cameras.
         profile: which models perceived.
         models: their cards, by module.
@@ -206,6 +258,7 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
     build_key: str
     voxel_size_m: float
     up: UpInfo
+    ground: GroundInfo | None = None
     rig: RigInfo
     profile: str
     models: dict[str, ModelInfo]

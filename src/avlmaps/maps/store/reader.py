@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from jaxtyping import Float
 
@@ -15,7 +16,7 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.array_files import FileInfo, checked_path, read_array
 from avlmaps.maps.store.array_validation import array_fields, assembled, check_order
 from avlmaps.maps.store.lock import is_locked
-from avlmaps.maps.store.manifest import MANIFEST, MapInfo, parse_manifest
+from avlmaps.maps.store.manifest import MANIFEST, GroundInfo, MapInfo, parse_manifest
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 from avlmaps.perception.models.names import public_choice, public_name
 from avlmaps.perception.profiles import Profile, profile
@@ -206,6 +207,7 @@ def describe(stored: StoredMap) -> dict[str, Any]:
         "up_in_world": list(info.up.direction),
         "up_known_from": info.up.known_from,
         "up_support": info.up.support,
+        "ground": None if info.ground is None else _describe_ground(info.ground),
         "bounding_box_m": [list(info.bounding_box_m.low), list(info.bounding_box_m.high)],
         "duration_s": info.recording.duration_s,
         "recording": info.recording.name,
@@ -217,4 +219,17 @@ def describe(stored: StoredMap) -> dict[str, Any]:
         "avlmaps_version": info.avlmaps_version,
         "seed": info.seed,
         "finished": info.timings.finished,
+    }
+
+
+def _describe_ground(ground: GroundInfo) -> dict[str, Any]:
+    """Return the floor that most cameras stood over, and all of them."""
+    main = ground.main()
+    return {
+        "camera_height_m": main.best.camera_height_m,
+        "confidence": main.best.confidence,
+        "in_view": main.best.in_view,
+        "known_from": ground.known_from,
+        "runner_up": None if main.runner_up is None else msgspec.to_builtins(main.runner_up),
+        "floors": [{**msgspec.to_builtins(floor.best), "cameras": round(floor.cameras, 4)} for floor in ground.floors],
     }

@@ -24,7 +24,7 @@ from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.formats.ros_audio import extract_audio
 from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of, header_stamp_s, pose_of
 from avlmaps.recordings.formats.ros_transforms import TransformTree
-from avlmaps.recordings.types import Frame, Recording
+from avlmaps.recordings.types import BaseHeight, Frame, Recording
 
 _IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _INFO_TYPES = ("sensor_msgs/msg/CameraInfo",)
@@ -174,6 +174,7 @@ class RosbagRecording(Recording):
         self._rgb_at = [(int(rgb_ns[rgb[i]]), float(rgb_s[rgb[i]])) for i in b[rows]]
         self._depth_at = [(int(depth_ns[depth[i]]), float(depth_s[depth[i]])) for i in a[rows]]
         self.up_in_world = np.array([0.0, 0.0, 1.0])
+        self.base_height = _base_height(tree, camera_frame, float(stamps_s[rows[0]]))
         self.audio, audio_notices = self._read_audio(topics)
         self.notices = (*notices, *gap_notices(self.stamps_s, "frames"), *audio_notices)
 
@@ -219,6 +220,20 @@ class RosbagRecording(Recording):
         info = next((message for topic in infos for _, message in self._bag.messages(topic)), None)
         folder = Path(self._folder.name)
         return extract_audio(self._bag.messages(found[0]), info, found[0], folder, self._start_s)
+
+
+def _base_height(tree: TransformTree, camera_frame: str, stamp_s: float) -> BaseHeight | None:
+    """Return how far the robot's base lies below the camera; by REP 120 ``base_footprint`` lies on the floor."""
+    at_s = np.array([stamp_s])
+    camera, _ = tree.root_from(camera_frame, at_s)
+    for name, on_floor in (("base_footprint", True), ("base_link", False)):
+        if tree.root(name) != tree.root(camera_frame):  # the bag has no such frame, or not in this tree
+            continue
+        base, known = tree.root_from(name, at_s)
+        below_m = float(camera[0, 2, 3] - base[0, 2, 3])
+        if known[0] and below_m > 0.0:
+            return BaseHeight(below_m, on_floor)
+    return None
 
 
 def _image_topics(bag: _Bag, topics: RosTopics) -> tuple[str, str]:
