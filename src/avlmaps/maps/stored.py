@@ -14,7 +14,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.maps.checks import array_fields, assembled, check_order
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.lock import is_locked
-from avlmaps.maps.manifest import MANIFEST, MapInfo, parse_manifest
+from avlmaps.maps.manifest import MANIFEST, MapInfo, parse_manifest, read_manifest
 from avlmaps.maps.shards import FileInfo, checked_path, read_array
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 from avlmaps.perception.models.names import public_choice, public_name
@@ -119,11 +119,9 @@ def has_unfinished_build(path: Path | str) -> bool:
 
 def _manifest_content(path: Path) -> bytes:
     try:
-        return (path / MANIFEST).read_bytes()
+        return read_manifest(path / MANIFEST)
     except (FileNotFoundError, NotADirectoryError):
         pass
-    except OSError as fault:
-        raise MapError(f"{path / MANIFEST} cannot be read ({fault.strerror}); check its permissions.") from fault
     if is_locked(path):
         raise MapError(f"{path} is being built at this moment; wait until the build has finished.")
     if has_unfinished_build(path):

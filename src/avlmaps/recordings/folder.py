@@ -15,6 +15,7 @@ from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.file_recording import FileRecording, Shots, find_audio, list_names, settle
 from avlmaps.recordings.layout import Description
+from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault
 from avlmaps.recordings.tables import read_table, text_lines
 from avlmaps.recordings.video import VideoFrames
 
@@ -42,6 +43,7 @@ def open_folder(path: Path, report: Report = stop_at_first) -> FileRecording:
     known = _read_poses(path, report)
     video = _find_video(path, description)
     found = _find_pictures(path, description, known, video, report)
+    _check_clocks(path, description, found, known)
     shots, notices, start_s = _pose_pictures(found, known)
     shots, more = settle(path, shots, report, pose_file=None)
     audio_start_s = description.audio_start_s - (start_s if description.audio_start_s > _DATE_S else 0.0)
@@ -57,6 +59,25 @@ def open_folder(path: Path, report: Report = stop_at_first) -> FileRecording:
         notices=(*notices, *more),
         video=video,
     )
+
+
+def _check_clocks(folder: Path, description: Description, found: "_Pictures", known: "_Poses") -> None:
+    """Raise ``RecordingError`` where the stamps of poses or frames are in another unit than seconds."""
+    poses_s = np.sort(known.stamps_s[np.isfinite(known.stamps_s)])
+    interval_s = 1.0 / description.pose_rate_hz if description.pose_rate_hz else None
+    fault = ""
+    if found.stamps_s is not None:
+        frames_s = np.sort(found.stamps_s[np.isfinite(found.stamps_s)])
+        fault = clock_fault(frames_s, "frames", poses_s, f"poses of {layout.POSES}")
+        interval_s = interval_s if np.array_equal(frames_s, poses_s) else None
+        rate_s = 1.0 / description.rgb_rate_hz if description.rgb_rate_hz else interval_s
+        fault = fault or pace_fault(frames_s, "frames", rate_s)
+    else:
+        rate_s = 1.0 / description.rgb_rate_hz if description.rgb_rate_hz else interval_s
+        fault = date_fault(poses_s, f"poses of {layout.POSES}")
+        fault = fault or pace_fault(poses_s, f"poses of {layout.POSES}", rate_s)
+    if fault:
+        raise RecordingError(f"{folder}: {fault}")
 
 
 def _open_audio(path: Path, start_s: float, video: VideoFrames | None) -> AudioTrack | None:
@@ -241,5 +262,9 @@ def _interpolated(
         world_from_camera[covered] = trajectory.at(stamps_s[covered])
     if not covered.all():
         lost = int((~covered).sum())
-        notices.append(f"{lost} frame(s) lie outside the poses of {layout.POSES} or in a gap of them; left out.")
+        span = f"{known.stamps_s[rows].min():.2f} to {known.stamps_s[rows].max():.2f} s" if len(rows) else "none"
+        notices.append(
+            f"{lost} of {len(stamps_s)} frame(s) lie outside the poses of {layout.POSES} ({span}) or in a gap of them; "
+            "left out."
+        )
     return covered, world_from_camera, notices

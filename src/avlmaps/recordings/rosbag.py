@@ -21,6 +21,7 @@ from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.timeline import associate, gap_notices, in_order
 from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.content import add_files, stamp_of
 from avlmaps.recordings.ros_audio import extract_audio
 from avlmaps.recordings.ros_messages import camera_of, colour_of, depth_of, header_stamp_s, pose_of
 from avlmaps.recordings.ros_transforms import TransformTree
@@ -198,12 +199,17 @@ class RosbagRecording(Recording):
     def fingerprint(self) -> str:
         """See ``Recording.fingerprint``."""
         digest = hashlib.sha256()
-        files = sorted(self.path.rglob("*")) if self.path.is_dir() else [self.path]
-        for file in files:
-            if file.is_file():
-                digest.update(f"{file.name} {file.stat().st_size}\n".encode())
+        for file in self._files():
+            add_files(digest, file.parent, [file.name])
         digest.update(self.stamps_s.tobytes() + self.world_from_camera.tobytes() + repr(self.rig).encode())
         return digest.hexdigest()
+
+    def change_stamp(self) -> str:
+        """See ``Recording.change_stamp``."""
+        return stamp_of(self.path.parent, (), self._files())
+
+    def _files(self) -> list[Path]:
+        return sorted(file for file in self.path.rglob("*") if file.is_file()) if self.path.is_dir() else [self.path]
 
     def _read_audio(self, topics: RosTopics) -> tuple[AudioTrack | None, tuple[str, ...]]:
         found = [topics.audio] if topics.audio else self._bag.topics_of(_AUDIO_TYPES)

@@ -29,6 +29,7 @@ from avlmaps.maps.manifest import (
     Timings,
     UpInfo,
     parse_manifest,
+    read_manifest,
 )
 from avlmaps.maps.reference.frames import Walk, read_walk
 from avlmaps.maps.reference.hdf5 import opened
@@ -125,7 +126,7 @@ def _finished(path: Path, key: str, overwrite: bool) -> bool:
     manifest = path / MANIFEST
     if overwrite or not manifest.is_file():
         return False
-    there = parse_manifest(manifest.read_bytes(), manifest)
+    there = parse_manifest(read_manifest(manifest), manifest)
     if there.build_key != key:
         raise MapError(
             f"{path} is a finished map already, of {there.recording.name}; give another --out, or replace it with "
