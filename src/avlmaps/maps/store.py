@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 
 from avlmaps.maps.checks import array_fields
+from avlmaps.maps.integrity import remember_checked
 from avlmaps.maps.lock import LOCK
 from avlmaps.maps.manifest import MANIFEST, MapInfo, write_manifest
 from avlmaps.maps.shards import FileInfo, sync_names, write_array, write_copy
@@ -60,6 +61,7 @@ def write_map(path: Path, content: MapContent, info: MapInfo) -> MapInfo:
     whole = msgspec.structs.replace(info, files=dict(sorted(files.items())), bytes=size)
     sync_names(path, files.values())
     write_manifest(path, whole)
+    remember_checked(path, files.values())  # their checksums are those of what was written just now
     sweep(path, whole)
     return whole
 

@@ -11,11 +11,12 @@ from jaxtyping import Float
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.registry import Kind
-from avlmaps.maps.checks import array_fields, assembled, check_order
+from avlmaps.maps.checks import array_fields, assembled, check_extent, check_order, content_fault
 from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.integrity import Guard
 from avlmaps.maps.lock import is_locked
 from avlmaps.maps.manifest import MANIFEST, MapInfo, parse_manifest, read_manifest
-from avlmaps.maps.shards import FileInfo, checked_path, read_array
+from avlmaps.maps.shards import MEND, FileInfo, checked_path, read_array
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 from avlmaps.perception.models.names import public_choice, public_name
 from avlmaps.perception.profiles import Profile, profile
@@ -23,6 +24,7 @@ from avlmaps.perception.profiles import Profile, profile
 PARTS = "parts"
 STATE = "keyframes/state/"
 CLIPS = "sounds/clips/"
+_GUARDED = frozenset({"voxels", "keyframes", "sounds", "place_state"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +42,7 @@ class StoredMap:
         sounds: what was heard; ``clip_path`` finds a clip.
         profile: which models perceived.
         rig: the recording's cameras.
+        guard: watches over the large files; reading voxels or keyframes waits until they are known to be whole.
     """
 
     path: Path
@@ -52,6 +55,13 @@ class StoredMap:
     sounds: HeardSounds
     profile: Profile
     rig: Rig
+    guard: Guard
+
+    def __getattribute__(self, name: str) -> Any:
+        value = object.__getattribute__(self, name)
+        if name in _GUARDED:
+            object.__getattribute__(self, "guard").require_whole()
+        return value
 
     def clip_path(self, sound: int) -> Path:
         """Return the FLAC file of a sound, by its number in ``sounds``."""
@@ -134,20 +144,31 @@ def _manifest_content(path: Path) -> bytes:
     raise MapError(f"{path} is not there, or is not a map's folder; make one with `avlmaps build`.")
 
 
-def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
+def profile_of_map(path: Path, info: MapInfo) -> Profile:
+    """Return the models that a map was built with, whatever the profile of that name has come to hold since.
+
+    Raises:
+        MapError: the profile is not known here.
+    """
     try:
-        # The models that it was built with, whatever the profile of that name has come to hold since.
-        used_profile = profile(info.profile).remembered(
+        return profile(info.profile).remembered(
             {kind: public_choice(model.backend) for kind, model in info.models.items()}
         )
     except BackendError as fault:
         raise MapError(f"{path / MANIFEST} is of a profile that is not known here. {fault}") from fault
+
+
+def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
+    used_profile = profile_of_map(path, info)
     try:
         grid, rig = GridSpec(info.voxel_size_m), info.rig.rig()
     except ValueError as fault:
         raise MapError(f"{path / MANIFEST} is damaged: {fault}; restore it from a copy.") from fault
     names = info.files
-    arrays = {name: read_array(path, file, verify=verify) for name, file in names.items() if file.dtype}
+    arrays = {name: read_array(path, file) for name, file in names.items() if file.dtype}
+    for name, array in arrays.items():
+        if not isinstance(array, np.memmap) and (fault := content_fault(name, array)):
+            raise MapError(f"{path / names[name].path} is damaged: {fault}; {MEND}.")
     voxels = assembled(Voxels, _of(arrays, Voxels, "voxels/"), f"{path}/voxels")
     keyframes = assembled(Keyframes, _of(arrays, Keyframes, "keyframes/"), f"{path}/keyframes")
     clips = tuple(_clip(path, names[name], verify) for name in sorted(names) if name.startswith(CLIPS))
@@ -161,10 +182,13 @@ def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
         counts.sounds,
     ):
         raise MapError(f"{path / MANIFEST} is damaged: its counts are not those of the arrays; restore it from a copy.")
+    guard = Guard(path, names, trusting=not verify)
+    check_extent(np.asarray(voxels.index), grid.voxel_size_m, f"{path}/voxels")
     if verify:
+        guard.require_whole()
         check_order(voxels, f"{path}/voxels")
     state = {name.removeprefix(STATE): array for name, array in arrays.items() if name.startswith(STATE)}
-    return StoredMap(path, info, grid, info.up.vector(), voxels, keyframes, state, sounds, used_profile, rig)
+    return StoredMap(path, info, grid, info.up.vector(), voxels, keyframes, state, sounds, used_profile, rig, guard)
 
 
 def _of(arrays: Mapping[str, np.ndarray], kind: type, prefix: str) -> dict[str, Any]:

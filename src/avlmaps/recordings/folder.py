@@ -1,5 +1,6 @@
 """Reading our own folder format; `layout.py` tells what is in it, `writer.py` writes it."""
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from avlmaps.core import poses, timeline
-from avlmaps.core.errors import AudioError, RecordingError
+from avlmaps.core.errors import NoAudioStreamError, RecordingError
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
@@ -86,7 +87,7 @@ def _open_audio(path: Path, start_s: float, video: VideoFrames | None) -> AudioT
     if file is not None:
         return AudioTrack.open(file, start_s=start_s)
     if video is not None:
-        with suppress(AudioError):
+        with suppress(NoAudioStreamError):
             return AudioTrack.open(video.path, start_s=start_s)
     return None
 
@@ -113,7 +114,7 @@ class _Pictures:
 
 def _read_poses(folder: Path, report: Report) -> _Poses:
     path = folder / layout.POSES
-    if not path.is_file():
+    if not os.path.lexists(path):
         raise RecordingError(f"{path} is missing; the recording needs it.")
     table = read_table(path, (8,), report, header=True)
     stamps_s, translation, quaternion = table.values[:, 0], table.values[:, 1:4], table.values[:, 4:8]
@@ -149,7 +150,7 @@ def _read_poses(folder: Path, report: Report) -> _Poses:
 def _find_video(folder: Path, description: Description) -> VideoFrames | None:
     """Open ``rgb.mp4`` (or another container) where there is no ``rgb/``."""
     files = [folder / f"rgb{suffix}" for suffix in layout.VIDEO_SUFFIXES]
-    file = next((f for f in files if f.is_file()), None)
+    file = next((f for f in files if os.path.lexists(f)), None)
     if file is None or (folder / "rgb").is_dir():
         return None
     video, camera = VideoFrames(file), description.intrinsics.rgb
@@ -175,7 +176,7 @@ def _find_pictures(
             "each frame needs its depth."
         )
     path = folder / layout.FRAMES
-    if path.exists():
+    if os.path.lexists(path):
         rows = list(_listed(path, report))
         names = [name for name, _ in rows]
         stamps_s: Float[np.ndarray, " n"] | None = np.array([stamp for _, stamp in rows], np.float64)
@@ -186,7 +187,7 @@ def _find_pictures(
         stamps_s = video.stamps_s if video else _stamps_without_list(folder, names, description, known, report)
     colour = [f"rgb/{found.get(name, name + '.png')}" for name in names]
     if description.frames is not None and description.frames != len(names):
-        where = path.name if path.exists() else "rgb/"
+        where = path.name if os.path.lexists(path) else "rgb/"
         sentence = f"{folder / layout.DESCRIPTION} tells of {description.frames} frames, but {where} has {len(names)}."
         report(Fault(sentence, folder / layout.DESCRIPTION, fatal=False))
     depth = [f"depth/{name}.png" for name in names]

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float64, UInt8
 
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import SOUND_BYTES, checked_size
 
 
 class VideoFrames:
@@ -61,8 +62,12 @@ class VideoFrames:
         import av
         from av.error import FFmpegError
 
-        if not self.path.is_file():
-            raise RecordingError(f"There is no video {self.path}.")
+        try:
+            checked_size(self.path, SOUND_BYTES)
+        except FileNotFoundError:
+            raise RecordingError(f"There is no video {self.path}.") from None
+        except OSError as error:
+            raise RecordingError(f"{self.path} cannot be read ({error.strerror or error}); check the file.") from None
         try:
             container = av.open(str(self.path))
         except FFmpegError as error:
