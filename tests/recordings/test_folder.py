@@ -1,10 +1,10 @@
 """Our own folder format: written by hand, written by the writer, cut short, and asked for a lot of frames."""
 
 import json
+import os
 import re
 import subprocess
 import sys
-import os
 import tracemalloc
 import warnings
 from pathlib import Path

@@ -253,7 +253,7 @@ def test_a_named_topic_of_the_wrong_kind_is_refused(tmp_path: Path) -> None:
         RecordingError, match="is of the type sensor_msgs/msg/Image, which tells no poses; name a topic"
     ):
         open_rosbag(path, {"pose": "/camera/color/image_raw"})
-    with pytest.raises(RecordingError, match=r"has no topic '/ear'; name one that it has \(audio=TOPIC\)\.$"):
+    with pytest.raises(RecordingError, match=r"has no sound topic '/ear' \(it has: none\); name one of them\.$"):
         open_rosbag(path, {"audio": "/ear"})
 
 

@@ -46,7 +46,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Args:
         arguments: the words after ``avlmaps``; those of this process if None.
     """
-    words = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        _main(sys.argv[1:] if arguments is None else list(arguments))
+    except KeyboardInterrupt:  # while it was reading its words
+        sys.exit(_complain("stopped", 130))
+
+
+def _main(words: list[str]) -> None:
     if words == ["--version"]:
         from avlmaps.core.version import __version__
 
@@ -86,6 +92,8 @@ def _run(verb: Verb) -> int:
         return 0
     except OSError as error:
         return _complain(_sentence(error), 1)
+    except MemoryError:
+        return _complain("there is not enough memory for this; check the sizes in the input, or free some", 1)
     except KeyboardInterrupt:
         return _complain("stopped; the same command goes on where this one ended, where it can", 130)
     return 0

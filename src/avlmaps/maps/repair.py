@@ -97,7 +97,9 @@ def repair_map(path: Path | str, recording: Recording | None) -> Repaired:
 
 def _put_back(path: Path, info: MapInfo, made: MapInfo, damaged: dict[str, str]) -> Repaired:
     same = all(name in made.files and made.files[name].sha256 == info.files[name].sha256 for name in damaged)
-    wanted = {name: info.files[name] if same else file for name, file in made.files.items() if not same or name in damaged}
+    wanted = {
+        name: info.files[name] if same else file for name, file in made.files.items() if not same or name in damaged
+    }
     with writing_into(path):
         for name, file in wanted.items():
             _replace(path / _WORKSHOP, made.files[name], path, file)

@@ -53,9 +53,7 @@ def examine(path: Path) -> tuple[int, int]:
     return rate_hz, count
 
 
-def read_piece(
-    path: Path, begin: int, end: int, rate_hz: int, channel: int | None = None
-) -> Float32[np.ndarray, " n"]:
+def read_piece(path: Path, begin: int, end: int, rate_hz: int, channel: int | None = None) -> Float32[np.ndarray, " n"]:
     """Return the mono samples ``begin:end``; fewer where the file ends before.
 
     Args:
@@ -76,9 +74,7 @@ def read_piece(
             raise _unreadable(path, error) from None
 
 
-def stream(
-    path: Path, count: int, rate_hz: int, channel: int | None = None
-) -> Iterator[Float32[np.ndarray, " _"]]:
+def stream(path: Path, count: int, rate_hz: int, channel: int | None = None) -> Iterator[Float32[np.ndarray, " _"]]:
     """Go through the first ``count`` mono samples in pieces of any length; fewer where the file ends before."""
     if not _is_plain(path):
         yield from _placed(path, 0, count, rate_hz, channel)

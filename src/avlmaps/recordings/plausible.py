@@ -88,9 +88,7 @@ def pace_fault(stamps_s: Float[np.ndarray, " n"], what: str, expected_s: float |
     if expected_s is not None:
         if 1 / 300 < pace_s / expected_s < 300:
             return ""
-        return (
-            f"The {what} are {pace_s:.3g} s apart, and the recording says {expected_s:.3g} s; are the stamps in seconds?"
-        )
+        return f"The {what} are {pace_s:.3g} s apart, and the recording says {expected_s:.3g} s; are the stamps in seconds?"
     if pace_s < SLOWEST_PACE_S or float(np.median(np.abs(interval_s - pace_s))) > 0.2 * pace_s:
         return ""
     return (

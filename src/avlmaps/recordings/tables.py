@@ -12,7 +12,6 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, TABLE_BYTES, open_regular, read_regular
 from avlmaps.recordings.faults import Fault, Report
 
-
 # A line holds 16 numbers or a name; without a limit a file of zeros would be one line of gigabytes.
 _LINE_BYTES = 1 << 14
 
@@ -46,7 +45,9 @@ def text_lines(path: Path, report: Report) -> Iterator[tuple[int, str]]:
     with stream:
         for number, raw in enumerate(iter(lambda: stream.readline(_LINE_BYTES), b""), start=1):
             if len(raw) >= _LINE_BYTES:
-                report(Fault(f"{path}, line {number}: the line has {_LINE_BYTES} bytes or more; mend it.", path, number))
+                report(
+                    Fault(f"{path}, line {number}: the line has {_LINE_BYTES} bytes or more; mend it.", path, number)
+                )
                 return
             try:
                 text = raw.decode("utf-8-sig" if number == 1 else "utf-8").strip()
