@@ -524,7 +524,7 @@ def test_a_repair_gives_back_what_was_built(copied: Path) -> None:
     file_of(copied, "keyframes/xy").unlink()
     assert set(damaged_files(copied)) == {"voxels/feature", "keyframes/xy"}
     with pytest.raises(
-        MapError, match=r"2 of \d+ files of .* are damaged \(keyframes/xy, voxels/feature\); give the rec"
+        MapError, match=r"2 of \d+ files of .* are damaged \(keyframes/xy, voxels/feature\); give"
     ):
         repair_map(copied, None)
     with pytest.raises(MapError, match="was built from another recording"):

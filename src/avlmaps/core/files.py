@@ -1,7 +1,7 @@
 """Writing files so that a kill at any instant leaves the old or the new one, and reading files with suspicion.
 
 Every file that a user gives is opened by ``open_regular``: a pipe, a device, a socket or a file of 20 GB where a
-picture belongs is refused before a byte is read. Refusals are ``OSError``, so that readers put them into their own sentences.
+picture belongs is refused before a byte is read. Refusals are ``OSError``; readers put them into their own sentences.
 """
 
 import errno

@@ -43,7 +43,8 @@ class AudioTrack:
     """An audio file, or the audio stream of a video, placed on a recording's clock.
 
     WAV, FLAC and OGG are read by libsndfile, everything else (mp4, mkv, m4a, mp3) by FFmpeg; several channels
-    become one, their mean; where they cancel one another in it, the loudest is read alone. Nothing is read before it is asked for, so a track may be hours long.
+    become one, their mean; where they cancel one another in it, the loudest is read alone. Nothing is read before it is
+    asked for, so a track may be hours long.
 
     Attributes:
         path: the file.

@@ -203,7 +203,7 @@ class FileRecording(Recording):
 
     @cached_property
     def fingerprint(self) -> str:
-        """A hex SHA-256 over poses, stamps, cameras and every file's name and content; see ``Recording.fingerprint``."""
+        """A hex SHA-256 over poses, stamps, cameras and every file's content; see ``Recording.fingerprint``."""
         digest = hashlib.sha256(f"{self.format} {_numbers(self.rig)} {self.depth_units}".encode())
         up = np.zeros(3) if self.up_in_world is None else self.up_in_world
         for numbers in (up, self.stamps_s, self.world_from_camera):

@@ -82,10 +82,7 @@ def picture_size(path: Path, content: bytes | None = None) -> tuple[int, int]:
     Raises:
         RecordingError: the file is missing, has no such header, or is of a size that no camera has.
     """
-    if path.suffix == ".npy":
-        size = _npy_size(path)
-    else:
-        size = encoded_size(_head(path) if content is None else content)
+    size = _npy_size(path) if path.suffix == ".npy" else encoded_size(_head(path) if content is None else content)
     if size is None:
         raise RecordingError(f"{path} is no PNG, JPEG or NPY picture (or is cut off); copy it again.")
     if size[0] < 1 or size[1] < 1 or size[0] * size[1] > MOST_PIXELS:
@@ -118,7 +115,8 @@ def first_picture_size(folder: Path, names: Sequence[str]) -> tuple[int, int]:
         RecordingError: none of the few has a size; the sentence is about the first.
     """
     sizes: Counter[tuple[int, int]] = Counter()
-    for at in dict.fromkeys(np.linspace(0, len(names) - 1, _TRIED).round().astype(int).tolist()):
+    spread: list[int] = np.linspace(0, len(names) - 1, _TRIED).round().astype(int).tolist()
+    for at in dict.fromkeys(spread):
         with suppress(RecordingError):
             sizes[picture_size(folder / names[at])] += 1
     return sizes.most_common(1)[0][0] if sizes else picture_size(folder / names[0])

@@ -5,6 +5,7 @@ Stamps in milliseconds where seconds belong, or one pose a thousand kilometres a
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -88,7 +89,7 @@ def pace_fault(stamps_s: Float[np.ndarray, " n"], what: str, expected_s: float |
     if expected_s is not None:
         if 1 / 300 < pace_s / expected_s < 300:
             return ""
-        return f"The {what} are {pace_s:.3g} s apart, and the recording says {expected_s:.3g} s; are the stamps in seconds?"
+        return f"The {what} are {pace_s:.3g} s apart, the recording says {expected_s:.3g} s; are the stamps in seconds?"
     if pace_s < SLOWEST_PACE_S or float(np.median(np.abs(interval_s - pace_s))) > 0.2 * pace_s:
         return ""
     return (
@@ -138,12 +139,12 @@ def plausible_walk(
     notices: list[str] = []
     if len(strays):
         away_m = np.linalg.norm(positions_m[strays] - np.median(positions_m[kept], axis=0), axis=1)
-        shown = ", ".join(names[i] for i in strays[:_SHOWN]) + (" ..." if len(strays) > _SHOWN else "")
+        shown = ", ".join(names[i] for i in strays[:_SHOWN].tolist()) + (" ..." if len(strays) > _SHOWN else "")
         notices.append(
             f"{len(strays)} frame(s) are up to {away_m.max():,.0f} m from the others, too far to be reached in time; "
             f"left out: {shown}."
         )
-    return Plausible(kept, (*notices, *shifts), fault or _extent_fault(positions_m[kept], [names[i] for i in kept]))
+    return Plausible(kept, (*notices, *shifts), fault or _extent_fault(positions_m[kept], [names[i] for i in kept.tolist()]))
 
 
 def _edges(stamps_s: Float[np.ndarray, " n"], positions_m: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " e"]:
@@ -171,7 +172,7 @@ def _reachable(
     names: Sequence[str],
 ) -> tuple[Int[np.ndarray, " k"], list[str], str]:
     """Return the frames that belong together, notices of shifts between them, and a fault or nothing."""
-    stretches = [np.arange(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    stretches = [np.arange(a, b) for a, b in pairwise(edges.tolist())]
     longest = int(np.argmax(np.diff(edges)))
     kept, shifts, fault = [stretches[longest]], [], ""
     few = max(MAX_STRAYS, int(MAX_STRAY_SHARE * len(stamps_s)))

@@ -1,7 +1,7 @@
 """The sound of a ROS bag, gathered into one file that can be read in pieces.
 
-Two packages are called ``audio_common_msgs``. That of ROS 1 (and its port) has AudioData or AudioDataStamped with bytes,
-and an AudioInfo on a topic of its own that says how they are coded. That of ROS 2 has AudioStamped, each with samples
+Two packages are called ``audio_common_msgs``. That of ROS 1 (and its port) has AudioData or AudioDataStamped with
+bytes, and an AudioInfo on a topic of its own that says how they are coded. That of ROS 2 has AudioStamped, each with samples
 and an AudioInfo (PortAudio's numbers of formats).
 """
 
@@ -113,8 +113,8 @@ def _coding_of(beginning: bytes, said: str, topic: str) -> str:
     if said:
         if not (said.isalnum() and len(said) < 10):
             raise RecordingError(
-                f"The AudioInfo of {topic} says that the sound is coded as {said[:20]!r}, which is no coding; give a file "
-                "(--audio FILE) or leave it out (--topics audio=none)."
+                f"The AudioInfo of {topic} says that the sound is coded as {said[:20]!r}, which is no coding; give a "
+                "file (--audio FILE) or leave it out (--topics audio=none)."
             )
         return said
     for start, coding in _BEGINNINGS.items():

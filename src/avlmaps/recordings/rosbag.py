@@ -54,7 +54,7 @@ class RosTopics:
         depth: depth images (raw or compressedDepth).
         pose: odometry, or poses of the camera or the body; empty: /tf first.
         audio: audio data; ``none`` leaves the sound out.
-        audio_pcm: no topic: ``16000,1`` says that the audio data are plain 16-bit samples, so many a second and channels.
+        audio_pcm: no topic: ``16000,1`` says that audio data are plain 16-bit samples, 16,000 a second, in one channel.
     """
 
     rgb: str = ""
@@ -100,8 +100,8 @@ class _Bag:
                 reader.open()
             except Exception as error:  # rosbags, sqlite and yaml raise their own kinds
                 raise RecordingError(
-                    f"{self.path} cannot be read as a ROS bag ({type(error).__name__}: {_first_line(error)}); if it was cut off "
-                    "while recording, mend it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
+                    f"{self.path} cannot be read as a ROS bag ({type(error).__name__}: {_first_line(error)}); if it was "
+                    "cut off while recording, mend it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
                 ) from error
             self._local.reader = reader
         return self._local.reader
@@ -131,7 +131,7 @@ class _Bag:
         except Exception as error:
             raise RecordingError(
                 f"A message of {topic} in {self.path} cannot be read ({type(error).__name__}: {_first_line(error)}); "
-                "the bag is damaged: copy it again, or mend it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
+                "the bag is damaged: copy it, or mend it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
             ) from error
 
     def stamps(self, topic: str) -> tuple[np.ndarray, np.ndarray]:

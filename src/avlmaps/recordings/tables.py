@@ -46,7 +46,7 @@ def text_lines(path: Path, report: Report) -> Iterator[tuple[int, str]]:
         for number, raw in enumerate(iter(lambda: stream.readline(_LINE_BYTES), b""), start=1):
             if len(raw) >= _LINE_BYTES:
                 report(
-                    Fault(f"{path}, line {number}: the line has {_LINE_BYTES} bytes or more; mend it.", path, number)
+                    Fault(f"{path}, line {number}: it has {_LINE_BYTES} bytes or more; mend it.", path, number)
                 )
                 return
             try:
