@@ -125,7 +125,7 @@ def build(case: Path, out: Path) -> int:
     from avlmaps.cli.main import _run
     from avlmaps.cli.verbs import Build
 
-    status = _run(Build(recording=case, out=out, profile=PROFILE, feature_cache="off"))
+    status = _run(Build(recording=case, out=out, profile=PROFILE, feature_cache="off", max_bad_share=0.5))
     return status or look_into_map(out)
 
 

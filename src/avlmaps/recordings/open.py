@@ -77,7 +77,7 @@ def _is_seven_scenes(path: Path) -> bool:
 
 
 def _is_rosbag(path: Path) -> bool:
-    if path.is_file():
+    if not path.is_dir():
         return path.suffix.lower() in _BAG_SUFFIXES
     return (path / "metadata.yaml").exists() and _some_name(path, "*.db3", "*.mcap", "*.db3.*", "*.mcap.*")
 
