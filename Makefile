@@ -9,7 +9,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help demo test test-foundation types-foundation lint format bench train lock clean
+.PHONY: help demo test test-foundation types-foundation lint format fuzz bench train lock clean
 
 help:  ## Show what can be made.
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -51,6 +51,9 @@ format: $(READY)  ## Put the code in order.
 	$(RUN)/ruff check --fix .
 	$(RUN)/ruff format .
 
+fuzz: $(READY)  ## Break 10,000 recordings and maps in seeded ways (a night; goes on where it was stopped): fuzz_out/.
+	$(RUN)/python tests/fuzz/campaign.py --cases $(or $(CASES),10000) --out fuzz_out
+
 bench: $(READY)  ## Measure speed and quality; writes docs/benchmarks.md.
 	$(RUN)/python benchmarks/report.py --out docs/benchmarks.md
 
@@ -69,4 +72,4 @@ lock: $(READY)  ## Pin every dependency again (needs uv).
 	uv pip compile --universal --generate-hashes --group dev pyproject.toml --output-file requirements/lock.txt --quiet
 
 clean:  ## Remove the virtual environment and what the targets made.
-	rm -rf $(VENV) demo_out bench_out
+	rm -rf $(VENV) demo_out bench_out fuzz_out

@@ -58,7 +58,15 @@ def run_case(number: int, seeds: dict[str, Path], scratch: Path) -> dict[str, ob
         seconds = round(time.perf_counter() - begin, 3)
         text = text.replace(folder, "CASE")
     verdict = _verdict(status, text)
-    return {"case": number, "seed": name, "done": done, "verdict": verdict, "status": status, "s": seconds, "text": text}
+    return {
+        "case": number,
+        "seed": name,
+        "done": done,
+        "verdict": verdict,
+        "status": status,
+        "s": seconds,
+        "text": text,
+    }
 
 
 def _verdict(status: int, text: str) -> str:

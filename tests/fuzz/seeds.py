@@ -58,5 +58,19 @@ def is_text(file: Path) -> bool:
 
 def numbers_of(rng: np.random.Generator) -> str:
     """Return a number as nobody writes one."""
-    odd = ("nan", "inf", "-inf", "1e308", "1e6", "-1e4", "0", "1e-300", "", "x", "1.#IND", "99999999999999999999", "0x10")
+    odd = (
+        "nan",
+        "inf",
+        "-inf",
+        "1e308",
+        "1e6",
+        "-1e4",
+        "0",
+        "1e-300",
+        "",
+        "x",
+        "1.#IND",
+        "99999999999999999999",
+        "0x10",
+    )
     return str(rng.choice(odd))

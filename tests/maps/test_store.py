@@ -523,9 +523,7 @@ def test_a_repair_gives_back_what_was_built(copied: Path) -> None:
     flip(file_of(copied, "voxels/feature"))
     file_of(copied, "keyframes/xy").unlink()
     assert set(damaged_files(copied)) == {"voxels/feature", "keyframes/xy"}
-    with pytest.raises(
-        MapError, match=r"2 of \d+ files of .* are damaged \(keyframes/xy, voxels/feature\); give"
-    ):
+    with pytest.raises(MapError, match=r"2 of \d+ files of .* are damaged \(keyframes/xy, voxels/feature\); give"):
         repair_map(copied, None)
     with pytest.raises(MapError, match="was built from another recording"):
         repair_map(copied, Walk(12, seed=9))

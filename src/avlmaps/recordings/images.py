@@ -96,7 +96,7 @@ def encoded_size(content: bytes) -> tuple[int, int] | None:
     """Return (width, height) that a JPEG's or PNG's header says, None where there is no whole header."""
     if content.startswith(_PNG) and len(content) >= 33:
         whole = zlib.crc32(content[12:29]) == struct.unpack_from(">I", content, 29)[0]
-        return struct.unpack_from(">II", content, 16) if whole and content[12:16] == b"IHDR" else None
+        return struct.unpack_from(">II", content, 16) if whole and content[8:16] == b"\0\0\0\rIHDR" else None
     return _jpeg_size(content) if content.startswith(_JPEG) else None
 
 

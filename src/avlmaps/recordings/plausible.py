@@ -144,7 +144,9 @@ def plausible_walk(
             f"{len(strays)} frame(s) are up to {away_m.max():,.0f} m from the others, too far to be reached in time; "
             f"left out: {shown}."
         )
-    return Plausible(kept, (*notices, *shifts), fault or _extent_fault(positions_m[kept], [names[i] for i in kept.tolist()]))
+    return Plausible(
+        kept, (*notices, *shifts), fault or _extent_fault(positions_m[kept], [names[i] for i in kept.tolist()])
+    )
 
 
 def _edges(stamps_s: Float[np.ndarray, " n"], positions_m: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " e"]:

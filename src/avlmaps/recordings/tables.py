@@ -45,9 +45,7 @@ def text_lines(path: Path, report: Report) -> Iterator[tuple[int, str]]:
     with stream:
         for number, raw in enumerate(iter(lambda: stream.readline(_LINE_BYTES), b""), start=1):
             if len(raw) >= _LINE_BYTES:
-                report(
-                    Fault(f"{path}, line {number}: it has {_LINE_BYTES} bytes or more; mend it.", path, number)
-                )
+                report(Fault(f"{path}, line {number}: it has {_LINE_BYTES} bytes or more; mend it.", path, number))
                 return
             try:
                 text = raw.decode("utf-8-sig" if number == 1 else "utf-8").strip()
