@@ -199,3 +199,11 @@ def test_settings_that_nest_or_lie_in_other_formats_are_sentences(tmp_path: Path
         (path / "camera.json").write_text(content)
         with pytest.raises(RecordingError, match=r"camera\.json is not as it should be"):
             open_recording(path)
+
+
+def test_a_sentence_does_not_quote_a_whole_file(tmp_path: Path) -> None:
+    path = write_seven_scenes(tmp_path / "walk")
+    (path / "frame-000002.pose.txt").write_text('{"camera":' * 10_000)
+    with pytest.raises(RecordingError) as fault:
+        open_recording(path)
+    assert len(str(fault.value)) < 500 and "does not hold numbers only" in str(fault.value)

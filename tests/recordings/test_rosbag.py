@@ -299,7 +299,8 @@ def test_plain_samples_without_audio_info_say_how_to_name_them(
         RecordingError, match=r"has no AudioInfo and is no MP3.*audio_pcm=16000,1.*--audio FILE.*audio=none"
     ):
         open_rosbag(path)
-    audio = open_rosbag(path, {"audio_pcm": f"{RATE_HZ}"}).audio
+    recording = open_rosbag(path, {"audio_pcm": f"{RATE_HZ}"})
+    audio = recording.audio
     assert audio is not None and audio.rate_hz == RATE_HZ and audio.duration_s == pytest.approx(1.0)
     assert np.abs(audio.read().samples).max() == pytest.approx(8000 / 32768, rel=0.02)
     assert open_rosbag(path, {"audio": "none"}).audio is None
@@ -355,7 +356,8 @@ def test_the_samples_of_ros_2_are_read(tmp_path: Path, monkeypatch: pytest.Monke
     (tmp_path / "one").mkdir()
     path = bag_with(tmp_path / "one", "ros2", monkeypatch, more)
     for topics in ({}, {"audio": "/mic"}):
-        audio = open_rosbag(path, topics).audio
+        recording = open_rosbag(path, topics)
+        audio = recording.audio
         assert audio is not None and audio.rate_hz == RATE_HZ and audio.duration_s == pytest.approx(1.0)
         assert np.abs(audio.read().samples).max() == pytest.approx(8000 / 32768, rel=0.02)
     monkeypatch.undo()

@@ -22,6 +22,7 @@ from avlmaps.core.npy import load_npy
 
 SMALL_BYTES = 1 << 20  # files up to this size are read whole and always compared with their checksum
 MOST_BYTES = 1 << 42
+_QUOTED = 200  # characters of what a damaged manifest says
 _CHUNK_BYTES = 1 << 24
 MEND = "repair it with `avlmaps info MAP --repair --recording REC`, or restore it from a copy"
 
@@ -147,7 +148,7 @@ def _type_name(said: str) -> str:
     try:
         return str(np.dtype(said))
     except TypeError:
-        return said
+        return said[:_QUOTED]
 
 
 def checked_path(folder: Path, info: FileInfo, *, verify: bool = False) -> Path:
@@ -158,7 +159,9 @@ def checked_path(folder: Path, info: FileInfo, *, verify: bool = False) -> Path:
     """
     parts = PurePosixPath(info.path).parts
     if not parts or ".." in parts or "\\" in info.path or ":" in info.path or info.path.startswith("/"):
-        raise MapError(f"{folder} names a file outside itself ({info.path}); do not use a map from that source.")
+        raise MapError(
+            f"{folder} names a file outside itself ({info.path[:_QUOTED]}); do not use a map from that source."
+        )
     path = folder.joinpath(*parts)
     try:
         size = checked_size(path, MOST_BYTES)

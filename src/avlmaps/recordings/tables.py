@@ -14,6 +14,7 @@ from avlmaps.recordings.faults import Fault, Report
 
 # A line holds 16 numbers or a name; without a limit a file of zeros would be one line of gigabytes.
 _LINE_BYTES = 1 << 14
+_QUOTED = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +119,8 @@ def read_matrix(path: Path, rows: int, columns: int) -> Float[np.ndarray, "rows 
     except UnicodeDecodeError:
         raise RecordingError(f"{path} is not UTF-8 text; save the file as UTF-8.") from None
     except ValueError as error:
-        raise RecordingError(f"{path} does not hold numbers only ({error}); mend the file.") from None
+        reason = str(error) if len(str(error)) < _QUOTED else f"{str(error)[:_QUOTED]}..."
+        raise RecordingError(f"{path} does not hold numbers only ({reason}); mend the file.") from None
     if len(numbers) != rows * columns:
         raise RecordingError(f"{path} holds {len(numbers)} numbers where {rows}x{columns} belong; mend the file.")
     return np.array(numbers).reshape(rows, columns)
