@@ -18,15 +18,15 @@ import tempfile
 import time
 import traceback
 from collections import Counter
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from mutators import MUTATORS, copied  # noqa: E402
-from seeds import PROFILE, write_seeds  # noqa: E402
+from mutators import MUTATORS, copied
+from seeds import PROFILE, write_seeds
 
 MEMORY_BYTES = 1 << 30  # beyond what the process has before the case
 PROCESSOR_S = 20
@@ -89,10 +89,8 @@ def _in_child(name: str, case: Path, out: Path) -> tuple[int, str]:
     os.set_blocking(read, False)
     text = b""
     while True:
-        try:
+        with suppress(BlockingIOError):
             text += os.read(read, 1 << 16)
-        except BlockingIOError:
-            pass
         ended, status = os.waitpid(child, os.WNOHANG)
         if ended:
             break
@@ -102,11 +100,9 @@ def _in_child(name: str, case: Path, out: Path) -> tuple[int, str]:
             os.close(read)
             return -99, "hangs"
         time.sleep(0.002)
-    try:
+    with suppress(BlockingIOError):
         while piece := os.read(read, 1 << 16):
             text += piece
-    except BlockingIOError:
-        pass
     os.close(read)
     return os.waitstatus_to_exitcode(status), text.decode("utf-8", "replace")
 

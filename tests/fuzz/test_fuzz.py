@@ -10,8 +10,8 @@ if sys.platform == "win32":
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from campaign import report, run_case  # noqa: E402
-from seeds import write_seeds  # noqa: E402
+from campaign import report, run_case
+from seeds import write_seeds
 
 CASES = 120
 BLOCKS = 4

@@ -20,7 +20,7 @@ FRAMES_S = np.arange(150) / 30.0
 def test_poses_in_another_unit_are_named(rate_hz: float, factor: float, unit: str) -> None:
     poses_s = np.arange(0.0, 5.0, 1.0 / rate_hz)
     fault = clock_fault(FRAMES_S, "frames", poses_s * factor, "poses")
-    assert unit in fault and "the stamps of the poses look like" in fault or "since 1970" in fault
+    assert unit in fault and ("the stamps of the poses look like" in fault or "since 1970" in fault)
     assert not clock_fault(FRAMES_S, "frames", poses_s, "poses")
 
 

@@ -1,8 +1,8 @@
 """The sound of a ROS bag, gathered into one file that can be read in pieces.
 
 Two packages are called ``audio_common_msgs``. That of ROS 1 (and its port) has AudioData or AudioDataStamped with
-bytes, and an AudioInfo on a topic of its own that says how they are coded. That of ROS 2 has AudioStamped, each with samples
-and an AudioInfo (PortAudio's numbers of formats).
+bytes, and an AudioInfo on a topic of its own that says how they are coded. That of ROS 2 has AudioStamped, each with
+samples and an AudioInfo (PortAudio's numbers of formats).
 """
 
 from collections.abc import Iterable, Iterator

@@ -100,8 +100,8 @@ class _Bag:
                 reader.open()
             except Exception as error:  # rosbags, sqlite and yaml raise their own kinds
                 raise RecordingError(
-                    f"{self.path} cannot be read as a ROS bag ({type(error).__name__}: {_first_line(error)}); if it was "
-                    "cut off while recording, mend it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
+                    f"{self.path} cannot be read as a ROS bag ({type(error).__name__}: {_first_line(error)}); if it "
+                    "was cut off while recording, mend it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
                 ) from error
             self._local.reader = reader
         return self._local.reader
