@@ -95,7 +95,7 @@ class Corners:
     card = _card("corners", 3)
 
     def encode(self, rgb: np.ndarray) -> LocalFeatures:
-        xy = np.array([[2.0, 2.0], [10.0, 6.0], [30.0, 20.0]], np.float32) % rgb.shape[1::-1]
+        xy = np.array([[2.0, 2.0], [10.0, 6.0], [30.0, 20.0]], np.float32) % np.array(rgb.shape[1::-1], np.float32)
         descriptors = rgb[tuple(xy.astype(int).T[::-1])] + np.float32(1.0)
         return LocalFeatures(xy, (descriptors / np.linalg.norm(descriptors, axis=1, keepdims=True)).astype(np.float32))
 

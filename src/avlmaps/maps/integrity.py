@@ -50,6 +50,8 @@ def is_large(info: FileInfo) -> bool:
 def remember_checked(folder: Path, files: Iterable[FileInfo]) -> None:
     """Note that these large files are whole, as they are now; where the folder cannot be written, nothing is noted."""
     stamps = {file.path: found for file in files if is_large(file) and (found := stamp(folder / file.path))}
+    if not stamps:
+        return
     with suppress(OSError):
         write_bytes_atomically(folder / CHECKED, msgspec.json.encode(_Checked(files=stamps)))
 
