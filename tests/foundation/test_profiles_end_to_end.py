@@ -34,7 +34,7 @@ from avlmaps.cli import main
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, backends, load
-from avlmaps.maps.stored import open_stored
+from avlmaps.maps.store.reader import open_stored
 from avlmaps.perception.models.availability import availability
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame

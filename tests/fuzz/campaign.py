@@ -140,9 +140,9 @@ def look_into_map(path: Path) -> int:
 
     if status := _run(Info(path=path, json=True)):
         return status
-    from avlmaps.maps.stored import open_stored
-    from avlmaps.query.level import Space
+    from avlmaps.maps.store.reader import open_stored
     from avlmaps.query.topdown import TopDown
+    from avlmaps.query.voxel_space import Space
 
     stored = open_stored(path)
     raster = TopDown.of(Space(stored.grid, stored.voxels.index, stored.up_in_world, stored))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.maps.ground import USUAL_HEIGHT_M, find_ground
+from avlmaps.maps.gravity.floor import USUAL_HEIGHT_M, find_ground
 from avlmaps.recordings.types import Frame
 from avlmaps.sim.raycast import render
 from avlmaps.sim.room import Room

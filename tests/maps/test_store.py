@@ -19,11 +19,11 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
 from avlmaps.maps import integrity
 from avlmaps.maps.build import build_map
-from avlmaps.maps.checks import array_fields, assembled, check_order
-from avlmaps.maps.lock import is_locked, locked
 from avlmaps.maps.repair import damaged_files, repair_map
-from avlmaps.maps.shards import SMALL_BYTES, read_array, write_array
-from avlmaps.maps.stored import has_unfinished_build, open_stored, verify_stored
+from avlmaps.maps.store.array_files import SMALL_BYTES, read_array, write_array
+from avlmaps.maps.store.array_validation import array_fields, assembled, check_order
+from avlmaps.maps.store.lock import is_locked, locked
+from avlmaps.maps.store.reader import has_unfinished_build, open_stored, verify_stored
 from avlmaps.maps.types import HeardSounds, Voxels
 
 PROFILE = register_fakes()
@@ -234,7 +234,7 @@ def test_a_flipped_bit_in_a_small_file_is_always_seen(copied: Path) -> None:
 
 
 def test_a_flipped_bit_in_a_large_file_is_seen_where_it_is_read(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("avlmaps.maps.shards.SMALL_BYTES", 0)
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
     file = file_of(copied, "voxels/feature")
     flip(file)
     said = f"{file} is damaged: its checksum is not the one that was written; {MEND}"
@@ -350,7 +350,7 @@ def test_the_order_of_voxels_is_told_exactly(index: np.ndarray) -> None:
 
 def test_a_map_replaced_while_it_is_opened_is_opened_anew(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Between reading map.json and the files, another build's commit removes the old files."""
-    from avlmaps.maps import stored
+    from avlmaps.maps.store import reader as stored
 
     opened, calls = stored._opened, []
 
@@ -420,7 +420,7 @@ def test_scores_of_some_keypoints_only_are_a_damage(copied: Path) -> None:
 def test_an_opened_map_is_checked_once_and_again_when_a_file_was_written(
     copied: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("avlmaps.maps.shards.SMALL_BYTES", 0)
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
     read: list[Path] = []
     real = integrity.open_regular
     monkeypatch.setattr(integrity, "open_regular", lambda path, limit: (read.append(path), real(path, limit))[1])
@@ -435,13 +435,13 @@ def test_an_opened_map_is_checked_once_and_again_when_a_file_was_written(
 
 
 def test_a_map_that_was_just_built_is_not_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("avlmaps.maps.shards.SMALL_BYTES", 0)
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
     monkeypatch.setattr(integrity, "open_regular", None)
     assert build_map(Walk(8), tmp_path / "map", PROFILE, SETTINGS, progress=False).guard.faults == ()
 
 
 def test_every_flipped_bit_in_a_large_file_is_seen(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("avlmaps.maps.shards.SMALL_BYTES", 0)
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
     rng = np.random.default_rng(0)
     for entry in json.loads((copied / "map.json").read_text())["files"].values():
         file = copied / entry["path"]
@@ -458,7 +458,7 @@ def test_every_flipped_bit_in_a_large_file_is_seen(copied: Path, monkeypatch: py
 def test_a_file_that_is_cut_off_under_an_open_map_is_a_sentence_and_no_bus_error(
     copied: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("avlmaps.maps.shards.SMALL_BYTES", 0)
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
     stored = open_stored(copied)
     assert len(stored.voxels)
     file = file_of(copied, "voxels/feature")
@@ -468,7 +468,7 @@ def test_a_file_that_is_cut_off_under_an_open_map_is_a_sentence_and_no_bus_error
 
 
 def test_an_open_map_stays_readable_when_another_takes_its_place(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("avlmaps.maps.shards.SMALL_BYTES", 0)
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
     stored = open_stored(copied)
     count = len(stored.voxels)
     build_map(Walk(6, seed=3), copied, PROFILE, SETTINGS, progress=False, overwrite=True)
@@ -487,7 +487,7 @@ def test_a_nan_with_the_right_checksum_is_refused(
         array = np.zeros((1, *array.shape[1:]), array.dtype)
     array.reshape(-1)[-1] = np.nan
     replace(copied, name, array)
-    monkeypatch.setattr("avlmaps.maps.shards.SMALL_BYTES", 0 if large else SMALL_BYTES)
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0 if large else SMALL_BYTES)
     with pytest.raises(MapError, match=r"holds numbers that are NaN or infinite|divide|sounds"):
         open_stored(copied).voxels  # noqa: B018
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from avlmaps.maps.grid import GridSpec
-from avlmaps.query.level import Space
 from avlmaps.query.topdown import TopDown
+from avlmaps.query.voxel_space import Space
 
 
 def test_a_wide_map_is_drawn_in_larger_cells() -> None:

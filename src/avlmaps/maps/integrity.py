@@ -19,9 +19,9 @@ import numpy as np
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, open_regular, read_regular, write_bytes_atomically
-from avlmaps.maps import shards
-from avlmaps.maps.checks import content_fault
-from avlmaps.maps.shards import MEND, FileInfo
+from avlmaps.maps.store import array_files as shards
+from avlmaps.maps.store.array_files import MEND, FileInfo
+from avlmaps.maps.store.array_validation import content_fault
 
 CHECKED = ".checked.json"
 _CHUNK_BYTES = 1 << 22

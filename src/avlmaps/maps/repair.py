@@ -8,12 +8,12 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.progress import say
 from avlmaps.maps.build import build_map
 from avlmaps.maps.integrity import Guard, remember_checked
-from avlmaps.maps.lock import locked
-from avlmaps.maps.manifest import MANIFEST, MapInfo, parse_manifest, read_manifest, write_manifest
 from avlmaps.maps.plan import make_plan
-from avlmaps.maps.shards import FileInfo, checked_path, sync_names, writing_into
-from avlmaps.maps.store import sweep
-from avlmaps.maps.stored import open_stored, profile_of_map
+from avlmaps.maps.store.array_files import FileInfo, checked_path, sync_names, writing_into
+from avlmaps.maps.store.lock import locked
+from avlmaps.maps.store.manifest import MANIFEST, MapInfo, parse_manifest, read_manifest, write_manifest
+from avlmaps.maps.store.reader import open_stored, profile_of_map
+from avlmaps.maps.store.writer import sweep
 from avlmaps.recordings.types import Recording
 
 _WORKSHOP = ".repair"

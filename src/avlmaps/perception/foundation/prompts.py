@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float, Float32
 
-from avlmaps.perception.models.kept_words import KeptWords
+from avlmaps.perception.cache.text_features import KeptWords
 
 # The subset of seven of its ImageNet sentences that the authors of CLIP found to do as well as all eighty.
 CLIP_PROMPTS = (

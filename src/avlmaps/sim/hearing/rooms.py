@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.sim.hearing.air import Air
+from avlmaps.sim.hearing.sound_paths import Air
 from avlmaps.sim.scene import Area, Scene, SceneObject
 
 SPEED_M_S = 343.0

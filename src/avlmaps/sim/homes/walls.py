@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.sim.furniture import Families, Piece
-from avlmaps.sim.furniture.joinery import chance, draw, pick
 from avlmaps.sim.furniture.openings import door, folding_door, window
+from avlmaps.sim.furniture.recipe_helpers import chance, draw, pick
 from avlmaps.sim.homes.plan import OUTSIDE, WELL, Hole, Plan, Room, Wall
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined
