@@ -39,8 +39,8 @@ from avlmaps.perception.models.availability import availability
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
-from avlmaps.sim.raycast import render
-from avlmaps.sim.room import Room
+from helpers.raycast import render
+from helpers.room import Room
 
 CAMERA = Pinhole(80.0, 80.0, 60.0, 45.0, 120, 90)
 RATE_HZ = 16_000

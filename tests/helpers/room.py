@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float64
 
-from avlmaps.sim.raycast import Scene
+from helpers.raycast import Scene
 
 Triple = tuple[float, float, float]
 
