@@ -17,7 +17,7 @@ NUMERIC := tests/query/test_heatmap.py tests/query/test_goals.py tests/query/tes
   tests/maps/test_gravity.py tests/maps/test_grid.py
 NUMERIC_COMPILED := tests/query/test_heatmap.py tests/query/test_objects.py tests/query/test_half_precision.py tests/maps/test_fusion.py
 
-.PHONY: help demo test test-kernels bounds test-foundation types-foundation lint format docs bench train lock clean
+.PHONY: help demo test test-kernels bounds test-foundation types-foundation lint format docs fuzz bench train lock clean
 
 help:  ## Show what can be made.
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -77,6 +77,9 @@ $(VENV)-docs/.ready: requirements/docs.txt
 	$(VENV)-docs/bin/python -m pip install --quiet -r requirements/docs.txt
 	touch $@
 
+fuzz: $(READY)  ## Break 10,000 recordings and maps in seeded ways (a night; goes on where it was stopped): fuzz_out/.
+	$(RUN)/python tests/fuzz/campaign.py --cases $(or $(CASES),10000) --out fuzz_out
+
 bench: $(READY)  ## Measure speed and quality; writes docs/benchmarks.md.
 	$(RUN)/python benchmarks/report.py --out docs/benchmarks.md
 
@@ -95,4 +98,4 @@ lock: $(READY)  ## Pin every dependency again (needs uv).
 	uv pip compile --universal --generate-hashes --group dev pyproject.toml --output-file requirements/lock.txt --quiet
 
 clean:  ## Remove the virtual environment and what the targets made.
-	rm -rf $(VENV) demo_out bench_out
+	rm -rf $(VENV) demo_out bench_out fuzz_out

@@ -55,7 +55,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Args:
         arguments: the words after ``avlmaps``; those of this process if None.
     """
-    words = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        _main(sys.argv[1:] if arguments is None else list(arguments))
+    except KeyboardInterrupt:  # while it was reading its words
+        sys.exit(_complain("stopped", 130))
+
+
+def _main(words: list[str]) -> None:
     if words == ["--version"]:
         from avlmaps.core.version import __version__
 
@@ -118,7 +124,7 @@ def _run(verb: Verb) -> int:
     except BrokenPipeError:  # the reader of our output has gone (`avlmaps info MAP | head`): nothing to tell
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except OSError as error:
+    except (OSError, MemoryError) as error:
         return _fail(verb, error, _sentence(error), 1)
     except KeyboardInterrupt as stop:
         if (status := getattr(stop, "status", None)) is not None:  # of a robot that was driving; its answer is printed
@@ -152,8 +158,10 @@ def _emit_error(error: BaseException, message: str) -> None:
         emit({"error": error_answer(kind_of(error), message)}, (), as_json=True)
 
 
-def _sentence(error: OSError) -> str:
-    """Tell what the system refused, without its numbers for it."""
+def _sentence(error: OSError | MemoryError) -> str:
+    """Return what the system refused, without its numbers for it."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory for this; check the sizes in the input, or free some"
     if error.filename is None or error.strerror is None:
         return f"{error.strerror or error}; check the files and the space on the disk."
     name = str(error.filename)

@@ -11,7 +11,7 @@ from avlmaps.core.progress import say
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from avlmaps.cli.verbs import Build, Query, Record
+    from avlmaps.cli.verbs import Build, Info, Query, Record
     from avlmaps.core.camera import Pinhole
     from avlmaps.core.question import Part
     from avlmaps.maps.store.reader import StoredMap
@@ -172,6 +172,22 @@ def describe_path(path: Path, format: str, verify: bool, plot: Path | None) -> d
             say(f"fault: {fault}")
         raise
     return {**_describe_recording(recording), "faults": faults}
+
+
+def repair(verb: "Info") -> dict[str, Any]:
+    """Build the damaged files of a map again and name them."""
+    from avlmaps.maps.repair import repair_map
+    from avlmaps.recordings.open import open_recording
+
+    recording = None
+    if verb.recording is not None:
+        recording = open_recording(verb.recording, format=verb.format, audio=verb.audio)
+    done = repair_map(verb.path, recording)
+    if not done.files:
+        say(f"every file of {verb.path} is whole; there is nothing to repair.")
+    elif done.rebuilt:
+        say(f"note: the whole map was built again: {verb.path} now differs in last bits from what it was.")
+    return {"repaired": list(done.files)}
 
 
 def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]:

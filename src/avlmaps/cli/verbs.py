@@ -230,14 +230,23 @@ class Info(Verb):
     """Format of the recording, where it cannot be told from its files."""
     verify: bool = False
     """Check every file of a map against its checksum, or every picture of a recording."""
+    repair: bool = False
+    """Check every file of a map, and build the damaged ones again from --recording."""
+    recording: Path | None = None
+    """The recording that the map was built from, for --repair."""
+    audio: Path | None = None
+    """The sound file that the map was built with, if it was given to `build --audio`; for --repair."""
     plot: Path | None = None
     """Draw the map from above, with the walk and the sounds, into this picture."""
 
     def run(self) -> None:
         """Describe it."""
-        from avlmaps.cli.running import describe_path
+        from avlmaps.cli.running import describe_path, repair
 
-        answer = describe_path(self.path, self.format, verify=self.verify, plot=self.plot)
+        if self.recording is not None and not self.repair:
+            raise UsageError("--recording belongs to --repair.")
+        repaired = repair(self) if self.repair else {}
+        answer = describe_path(self.path, self.format, verify=self.verify, plot=self.plot) | repaired
         emit(answer, info_lines(answer), self.json)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from avlmaps.core.progress import silenced
 from avlmaps.maps.keyframe_stage import keep_keyframes
 from avlmaps.maps.partial_maps import build_part, merge_parts
-from avlmaps.maps.plan import claim, make_plan
+from avlmaps.maps.plan import claim, make_plan, require_unchanged
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.stages import attach_ground, commit, find_up, fuse, hear_sounds, merge, sense
 from avlmaps.maps.store.lock import locked
@@ -53,6 +53,7 @@ def build_map(
         RecordingError: too many frames cannot be read, or none has depth.
         BackendError: the profile is not known, or a package for it is missing.
     """
+    stamp = recording.change_stamp()
     plan = make_plan(recording, Path(path), remembering(profile_of(profile), cache), settings)
     with silenced(not progress), locked(plan.path):
         if claim(plan, resume, overwrite) is None:
@@ -63,5 +64,6 @@ def build_map(
             pictures = keep_keyframes(plan, fused)
             heard = hear_sounds(plan)
             merged = merge(plan, fused, sensor)  # late, because it fills the memory
+            require_unchanged(plan, stamp)
             commit(plan, up, (ground, grounding_s), fused, pictures, heard, merged)
     return open_stored(plan.path)

@@ -61,6 +61,10 @@ class Subset(Recording):
         """The whole recording's."""
         return self.whole.depth_units_per_m
 
+    def change_stamp(self) -> str:
+        """Of the whole recording."""
+        return self.whole.change_stamp()
+
     @cached_property
     def fingerprint(self) -> str:
         """Of the whole recording's and the choice."""

@@ -135,9 +135,17 @@ class Recording(ABC):
     def fingerprint(self) -> str:
         """A hex SHA-256 that changes when the recording does.
 
-        It covers poses, intrinsics and every file's name and size, but not the pictures' bytes, so that a
-        recording of a million frames has one in seconds.
+        It covers poses, intrinsics and every file's name, size and content. Small files are read whole, of large ones
+        evenly spread blocks and the end (see ``recordings.content``). Where a copy lies and when its files were
+        written makes no difference.
         """
+
+    def change_stamp(self) -> str:
+        """Return a word that changes when a file of the recording is written; in a copy it is another.
+
+        A build takes it at its beginning and its end, so that a recording that changes meanwhile makes no map.
+        """
+        return ""
 
     def name(self, index: int) -> str:
         """Return what the recording calls a frame, without reading it."""

@@ -39,6 +39,7 @@ from avlmaps.maps.store.manifest import (
     Timings,
     UpInfo,
     parse_manifest,
+    read_manifest,
 )
 from avlmaps.maps.store.reader import PARTS, StoredMap, open_stored
 from avlmaps.maps.store.writer import MapContent, is_map_or_free, write_map
@@ -126,7 +127,7 @@ def _finished(path: Path, key: str, overwrite: bool) -> bool:
     manifest = path / MANIFEST
     if overwrite or not manifest.is_file():
         return False
-    there = parse_manifest(manifest.read_bytes(), manifest)
+    there = parse_manifest(read_manifest(manifest), manifest)
     if there.build_key != key:
         raise MapError(
             f"{path} is a finished map already, of {there.recording.name}; give another --out, or replace it with "

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
-from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.files import MANIFEST_BYTES, decode_json, read_regular, write_bytes_atomically
 from avlmaps.maps.sensor import SensorModel
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.array_files import FileInfo, writing_into
@@ -321,6 +321,21 @@ def write_manifest(folder: Path, info: MapInfo) -> None:
         write_bytes_atomically(folder / MANIFEST, content + b"\n")
 
 
+def read_manifest(path: Path) -> bytes:
+    """Return the content of ``map.json``.
+
+    Raises:
+        FileNotFoundError, NotADirectoryError: there is none.
+        MapError: it cannot be read, or is no regular file of a possible size.
+    """
+    try:
+        return read_regular(path, MANIFEST_BYTES)
+    except (FileNotFoundError, NotADirectoryError):
+        raise
+    except OSError as fault:
+        raise MapError(f"{path} cannot be read ({fault.strerror or fault}); check the file.") from fault
+
+
 def parse_manifest(content: bytes, path: Path) -> MapInfo:
     """Return what ``map.json`` says.
 
@@ -332,7 +347,7 @@ def parse_manifest(content: bytes, path: Path) -> MapInfo:
         MapError: it is not JSON, not UTF-8, of no map, of another schema version, or lacks something.
     """
     try:
-        ident = msgspec.json.decode(content, type=_Ident)
+        ident = decode_json(content, _Ident)
     except (msgspec.DecodeError, UnicodeDecodeError) as fault:
         raise MapError(f"{path} is damaged: it is not JSON in UTF-8 ({fault}); restore it from a copy.") from fault
     if ident.format != "avlmap":
@@ -343,6 +358,6 @@ def parse_manifest(content: bytes, path: Path) -> MapInfo:
             f"{path} has schema version {ident.schema_version}, this avlmaps reads version {SCHEMA_VERSION}; {how}."
         )
     try:
-        return msgspec.json.decode(content, type=MapInfo)
+        return decode_json(content, MapInfo)
     except (msgspec.DecodeError, ValueError, MapError) as fault:
         raise MapError(f"{path} is damaged: {str(fault).rstrip('.')}; restore it from a copy.") from fault

@@ -14,10 +14,11 @@ from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.poses import FRAME, rotation_to_level
 from avlmaps.core.registry import Kind
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.store.array_files import FileInfo, checked_path, read_array
-from avlmaps.maps.store.array_validation import array_fields, assembled, check_order
+from avlmaps.maps.integrity import Guard
+from avlmaps.maps.store.array_files import MEND, FileInfo, checked_path, read_array
+from avlmaps.maps.store.array_validation import array_fields, assembled, check_extent, check_order, content_fault
 from avlmaps.maps.store.lock import is_locked
-from avlmaps.maps.store.manifest import MANIFEST, GroundInfo, MapInfo, parse_manifest
+from avlmaps.maps.store.manifest import MANIFEST, GroundInfo, MapInfo, parse_manifest, read_manifest
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 from avlmaps.perception.models.names import public_choice, public_name
 from avlmaps.perception.profiles import Profile, profile
@@ -25,6 +26,7 @@ from avlmaps.perception.profiles import Profile, profile
 PARTS = "parts"
 STATE = "keyframes/state/"
 CLIPS = "sounds/clips/"
+_GUARDED = frozenset({"voxels", "keyframes", "sounds", "place_state"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +44,7 @@ class StoredMap:
         sounds: what was heard; ``clip_path`` finds a clip.
         profile: which models perceived.
         rig: the recording's cameras.
+        guard: watches over the large files; reading voxels or keyframes waits until they are known to be whole.
     """
 
     path: Path
@@ -54,6 +57,13 @@ class StoredMap:
     sounds: HeardSounds
     profile: Profile
     rig: Rig
+    guard: Guard
+
+    def __getattribute__(self, name: str) -> Any:
+        value = object.__getattribute__(self, name)
+        if name in _GUARDED:
+            object.__getattribute__(self, "guard").require_whole()
+        return value
 
     def clip_path(self, sound: int) -> Path:
         """Return the FLAC file of a sound, by its number in ``sounds``."""
@@ -121,11 +131,9 @@ def has_unfinished_build(path: Path | str) -> bool:
 
 def _manifest_content(path: Path) -> bytes:
     try:
-        return (path / MANIFEST).read_bytes()
+        return read_manifest(path / MANIFEST)
     except (FileNotFoundError, NotADirectoryError):
         pass
-    except OSError as fault:
-        raise MapError(f"{path / MANIFEST} cannot be read ({fault.strerror}); check its permissions.") from fault
     if is_locked(path):
         raise MapError(f"{path} is being built at this moment; wait until the build has finished.")
     if has_unfinished_build(path):
@@ -138,20 +146,31 @@ def _manifest_content(path: Path) -> bytes:
     raise MapError(f"{path} is not there, or is not a map's folder; make one with `avlmaps build`.")
 
 
-def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
+def profile_of_map(path: Path, info: MapInfo) -> Profile:
+    """Return the models that a map was built with, whatever the profile of that name has come to hold since.
+
+    Raises:
+        MapError: the profile is not known here.
+    """
     try:
-        # The models that it was built with, whatever the profile of that name has come to hold since.
-        used_profile = profile(info.profile).remembered(
+        return profile(info.profile).remembered(
             {kind: public_choice(model.backend) for kind, model in info.models.items()}
         )
     except BackendError as fault:
         raise MapError(f"{path / MANIFEST} is of a profile that is not known here. {fault}") from fault
+
+
+def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
+    used_profile = profile_of_map(path, info)
     try:
         grid, rig = GridSpec(info.voxel_size_m), info.rig.rig()
     except ValueError as fault:
         raise MapError(f"{path / MANIFEST} is damaged: {fault}; restore it from a copy.") from fault
     names = info.files
-    arrays = {name: read_array(path, file, verify=verify) for name, file in names.items() if file.dtype}
+    arrays = {name: read_array(path, file) for name, file in names.items() if file.dtype}
+    for name, array in arrays.items():
+        if not isinstance(array, np.memmap) and (fault := content_fault(name, array)):
+            raise MapError(f"{path / names[name].path} is damaged: {fault}; {MEND}.")
     voxels = assembled(Voxels, _of(arrays, Voxels, "voxels/"), f"{path}/voxels")
     keyframes = assembled(Keyframes, _of(arrays, Keyframes, "keyframes/"), f"{path}/keyframes")
     clips = tuple(_clip(path, names[name], verify) for name in sorted(names) if name.startswith(CLIPS))
@@ -165,10 +184,13 @@ def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
         counts.sounds,
     ):
         raise MapError(f"{path / MANIFEST} is damaged: its counts are not those of the arrays; restore it from a copy.")
+    guard = Guard(path, names, trusting=not verify)
+    check_extent(np.asarray(voxels.index), grid.voxel_size_m, f"{path}/voxels")
     if verify:
+        guard.require_whole()
         check_order(voxels, f"{path}/voxels")
     state = {name.removeprefix(STATE): array for name, array in arrays.items() if name.startswith(STATE)}
-    return StoredMap(path, info, grid, info.up.vector(), voxels, keyframes, state, sounds, used_profile, rig)
+    return StoredMap(path, info, grid, info.up.vector(), voxels, keyframes, state, sounds, used_profile, rig, guard)
 
 
 def _of(arrays: Mapping[str, np.ndarray], kind: type, prefix: str) -> dict[str, Any]:
