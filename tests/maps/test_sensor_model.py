@@ -19,7 +19,7 @@ from avlmaps.recordings.types import Frame
 
 GRID = GridSpec(0.1)
 CAMERA = Pinhole(150.0, 150.0, 80.0, 60.0, 160, 120)
-NOISY = replace(KINECT, edge_sigmas=np.inf)
+NOISY = replace(KINECT, edge_sigmas=None)
 seeds = st.integers(0, 2**32 - 1)
 
 
