@@ -13,7 +13,7 @@ def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
     """Return the network, with the running ``mean`` of its weights or the ``last`` ones."""
     state = torch.load(checkpoint, map_location="cpu", weights_only=True)
     network = RoomNetwork(len(state["categories"]), len(state["rooms"]), tuple(state["widths"]))
-    network.load_state_dict(state[weights])
+    network.load_state_dict({name: value.float() for name, value in state[weights].items()})
     return network.eval()
 
 
