@@ -1,4 +1,4 @@
-"""Batches for training: views of rendered and real frames, turned, zoomed, mirrored and spoiled as sensors spoil them."""
+"""Batches for training: views of rendered and real frames, turned, zoomed, mirrored and degraded as by sensors."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,9 +41,14 @@ class Frames:
         names = ("depth", "label", "rgb", "rgb_row", "room", "camera")
         return cls(**{name: np.load(folder / f"{name}.npy", mmap_mode="r") for name in names})
 
+    @property
+    def is_real(self) -> bool:
+        """Say whether the frames are real ones; their cameras have one number more."""
+        return self.camera.shape[1] > 8
+
     def height_is_known(self, index: int) -> bool:
         """Say whether a camera's height is true; of some real frames it is an estimate."""
-        return self.camera.shape[1] < 9 or bool(self.camera[index, 8])
+        return not self.is_real or bool(self.camera[index, 8])
 
 
 @dataclass
@@ -197,7 +202,9 @@ def _sample(frames: Frames, index: int, category: int, view: View, rng: np.rando
         depth, label, colour = depth[:, ::-1], label[:, ::-1], colour[:, :, ::-1]
         up, cx = up * (-1, 1, 1), view.width - cx
     known = frames.height_is_known(index)
-    depth = degraded(np.ascontiguousarray(depth), real=label.max() >= FIRST_COARSE and frames.camera.shape[1] > 8, rng=rng)
+    depth = degraded(
+        np.ascontiguousarray(depth), real=label.max() >= FIRST_COARSE and frames.camera.shape[1] > 8, rng=rng
+    )
     stretch = np.exp(rng.normal(0.0, 0.07))  # things come larger and smaller than the recipes make them
     depth, height = depth * np.float32(stretch), height * stretch
     believed_up, off = mistaken(up, known, rng)

@@ -13,7 +13,7 @@ import torch
 import tyro
 from torch import nn
 from training.pixels.batches import Shards
-from training.pixels.labels import CATEGORIES, FIRST_COARSE, UNLABELLED
+from training.pixels.labels import CATEGORIES, FIRST_COARSE
 from training.pixels.losses import groups
 from training.pixels.whole import whole_frame
 
@@ -31,9 +31,9 @@ def real_figures(network: nn.Module, shards: Shards, flip: bool = False) -> dict
         label = frames.label[index].astype(int) - FIRST_COARSE
         said = cv2.resize(group, label.shape[::-1], interpolation=cv2.INTER_LINEAR).argmax(axis=-1)
         scored = (label >= 0) & (label < SCORED)
-        confusion += np.bincount(
-            label[scored] * SCORED + said[scored], minlength=SCORED * SCORED
-        ).reshape(SCORED, SCORED)
+        confusion += np.bincount(label[scored] * SCORED + said[scored], minlength=SCORED * SCORED).reshape(
+            SCORED, SCORED
+        )
     right, truth = np.diag(confusion), confusion.sum(axis=1)
     there = truth > 0
     union = truth + confusion.sum(axis=0) - right
@@ -61,9 +61,7 @@ def rendered_figures(network: nn.Module, shards: Shards, count: int = 150) -> di
     return {"accuracy": float(right.sum() / truth.sum()), "mean IoU": float((right[often] / union[often]).mean())}
 
 
-def probabilities(
-    network: nn.Module, geometry: np.ndarray, colour: np.ndarray, flip: bool = False
-) -> torch.Tensor:
+def probabilities(network: nn.Module, geometry: np.ndarray, colour: np.ndarray, flip: bool = False) -> torch.Tensor:
     """Return (k, h, w) probabilities of a padded frame; ``flip``: the mean with those of its mirror image."""
     g, c = torch.from_numpy(geometry), torch.from_numpy(colour)
     p = network(g, c)[0].float().softmax(dim=1)[0]

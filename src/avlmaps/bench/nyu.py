@@ -16,7 +16,7 @@ from jaxtyping import Float, Float32, Int, UInt8
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.maps.ground import find_ground
+from avlmaps.maps.gravity.floor import find_ground
 from avlmaps.recordings.types import Frame, Ground
 
 CLASSES = (
@@ -121,7 +121,7 @@ class NyuFolder:
         index = folder / "frames.csv"
         if not index.is_file():
             raise RecordingError(f"There is no {index}; the suite frames needs a folder in the layout of NYU Depth V2.")
-        self._up: dict[str, Float[np.ndarray, "3"]] = {}
+        self._up: dict[str, np.ndarray] = {}
         with index.open(newline="", encoding="utf-8") as stream:
             for line, row in enumerate(csv.DictReader(stream), 2):
                 try:
@@ -200,6 +200,4 @@ def _grounded(
         ground = Ground(up, np.zeros(1), np.array([floor_m]))
     else:
         ground = find_ground([frame], up)
-    return LabelledFrame(
-        Frame(number, name, 0.0, rgb, depth_m, np.eye(4), frame.rig, ground), label, is_labelled
-    )
+    return LabelledFrame(Frame(number, name, 0.0, rgb, depth_m, np.eye(4), frame.rig, ground), label, is_labelled)

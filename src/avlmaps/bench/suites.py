@@ -1,6 +1,9 @@
 """The suites behind `avlmaps bench`: run one, write its tables as JSON, Markdown and a picture."""
 
+import csv
+import io
 import json
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +30,7 @@ class Asked:
     Attributes:
         sounds: folder of clips with an index.csv, for the suites of sound.
         scenes: recordings with poses, for ``locate``.
+        nyuv2: folder of labelled frames, for ``frames``.
         profile: which models are measured.
         seed: of what is drawn at random.
         indexing: what the suites ``indexing`` and ``objects`` are run on; its own defaults if None.
@@ -35,6 +39,7 @@ class Asked:
 
     sounds: Path | None = None
     scenes: tuple[Path, ...] = ()
+    nyuv2: Path | None = None
     profile: str = "embedded"
     seed: int = 0
     indexing: "IndexingSettings | None" = None
@@ -42,10 +47,11 @@ class Asked:
 
 
 def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
-    """Run a suite and write SUITE.json, SUITE.md and SUITE.png into ``out``.
+    """Run a suite and write SUITE.json, SUITE.md, SUITE.png and a SUITE-TABLE.csv for each table into ``out``.
 
     Args:
-        suite: ``words``, ``sounds``, ``segmentation``, ``locate``, ``objects``, ``indexing`` or ``navigation``.
+        suite: ``words``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``objects``, ``indexing`` or
+            ``navigation``.
         asked: what it measures on.
         out: folder to write into.
 
@@ -60,7 +66,7 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
         from avlmaps.bench.navigation.suite import run_navigation
 
         return run_navigation(asked.navigation, out)
-    scenes = [source.resolve().name for source in (asked.sounds, *asked.scenes) if source is not None]
+    scenes = [source.resolve().name for source in (asked.sounds, asked.nyuv2, *asked.scenes) if source is not None]
     if suite == "objects":
         from avlmaps.bench.indexing import DEFAULT_SCENES
         from avlmaps.bench.objects import run_objects
@@ -79,6 +85,9 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
     out.mkdir(parents=True, exist_ok=True)
     write_bytes_atomically(out / f"{suite}.json", (json.dumps(answer, indent=1) + "\n").encode())
     write_bytes_atomically(out / f"{suite}.md", markdown(tables).encode())
+    for name, table in tables.items():
+        slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
+        write_bytes_atomically(out / f"{suite}-{slug}.csv", as_csv(table).encode())
     draw(tables, out / f"{suite}.png")
     return answer
 
@@ -120,11 +129,29 @@ def _locate(asked: Asked) -> Mapping[str, Table]:
     return tables
 
 
+def _frames(asked: Asked) -> Mapping[str, Table]:
+    from avlmaps.bench.frames import run_frames
+    from avlmaps.perception.embedded.pixels import EmbeddedPixels
+    from avlmaps.perception.profiles import profile
+
+    if asked.nyuv2 is None:
+        raise BenchError("This suite measures on labelled frames in the layout of NYU Depth V2; name their folder with "
+                         "--nyuv2.")  # fmt: skip
+    encoder = profile(asked.profile).pixel_encoder()
+    if not isinstance(encoder, EmbeddedPixels):
+        raise BenchError(
+            f"The suite frames sums probabilities of kinds, which the pixel encoder of the profile {asked.profile!r} "
+            "does not give. Choose embedded or synthetic."
+        )
+    return run_frames(encoder, asked.nyuv2)
+
+
 _SUITES: dict[str, Callable[[Asked], Mapping[str, Table]]] = {
     "words": _words,
     "sounds": _sounds,
     "segmentation": _segmentation,
     "locate": _locate,
+    "frames": _frames,
 }
 
 
@@ -146,6 +173,13 @@ def markdown(tables: Mapping[str, Table]) -> str:
         lines = [_row(table["columns"]), _row(["---"] * len(table["columns"])), *[_row(row) for row in table["rows"]]]
         blocks.append(f"### {name}\n\n" + "\n".join(lines) + "\n")
     return "\n".join(blocks)
+
+
+def as_csv(table: Table) -> str:
+    """Write one table as CSV."""
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows([table["columns"], *table["rows"]])
+    return stream.getvalue()
 
 
 def _row(cells: Sequence[object]) -> str:

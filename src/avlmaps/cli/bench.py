@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from avlmaps.bench.indexing import IndexingSettings
     from avlmaps.bench.navigation import NavigationSettings
 
-Suite = Literal["words", "sounds", "segmentation", "locate", "objects", "indexing", "navigation"]
+Suite = Literal["words", "sounds", "segmentation", "locate", "frames", "objects", "indexing", "navigation"]
 Series = Literal["sounds-1", "sounds-2", "sounds-3", "images", "pairs", "commands", "spatial"]
 
 
@@ -58,6 +58,7 @@ class Bench(ModelVerb):
     words: household phrases kept out of training; needs nothing.
     sounds, segmentation: need --sounds, a folder of clips with an index.csv.
     locate: needs --scenes, recordings with poses; half of the frames become the map, the others are asked.
+    frames: needs --nyuv2, labelled frames in the layout of NYU Depth V2; kinds of pixels, without any map.
     objects: are things where the map says, in the same scenes as indexing, whose maps it shares.
     indexing: objects told apart by sounds, photos and areas, in twelve held-out homes or in --scenes by name.
     navigation: robots sent from sentence to place, in twelve held-out homes or in --scenes by name.
@@ -71,10 +72,12 @@ class Bench(ModelVerb):
     """Folder of sound clips with an index.csv (path, category, fold)."""
     scenes: tuple[str, ...] = ()
     """Recordings with poses (locate); names of scenes such as house:1000000:held-out (the others)."""
+    nyuv2: Path | None = None
+    """Folder of labelled frames (frames.csv, NNNN.color.jpg, NNNN.depth8.png, NNNN.label.png)."""
     profile: str = "embedded"
     """Which models are measured."""
     out: Path = Path("bench_out")
-    """Folder for SUITE.json, SUITE.md and SUITE.png."""
+    """Folder for SUITE.json, SUITE.md, SUITE.png and a CSV file for each table."""
     seed: int = 0
     """Seed of what is drawn at random."""
     indexing: Annotated[Indexing, OmitArgPrefixes] = field(default_factory=Indexing)
@@ -89,7 +92,7 @@ class Bench(ModelVerb):
         indexing = self.indexing_settings() if self.suite in ("indexing", "objects") else None
         navigation = self.navigation_settings() if self.suite == "navigation" else None
         scenes = () if indexing or navigation else tuple(map(Path, self.scenes))
-        asked = Asked(self.sounds, scenes, self.profile, self.seed, indexing, navigation)
+        asked = Asked(self.sounds, scenes, self.nyuv2, self.profile, self.seed, indexing, navigation)
         answer = run_suite(self.suite, asked, self.out)
         lines: list[str] = []
         for name, table in answer["tables"].items():

@@ -89,7 +89,8 @@ def _name() -> str:
 @cache
 def _seen() -> frozenset[str]:
     """Return the names of things and rooms that the pixel encoder which ships knows, from its notes alone."""
-    notes = json.loads(files("avlmaps.perception.embedded").joinpath("weights/rooms.json").read_text(encoding="utf-8"))
+    weights = files("avlmaps.perception.embedded") / "weights"
+    notes = json.loads((weights / "scene_encoder.json").read_text(encoding="utf-8"))
     called = [name for other in notes["called"].values() for name in other]
     return frozenset({*notes["categories"], *notes["rooms"], *called, *notes["kinds"]} - {"other", "picture", "light"})
 
