@@ -31,11 +31,11 @@ def read_start(path: Path) -> dict[str, torch.Tensor]:
 
 
 def write_onnx(network: RoomNetwork, path: Path) -> None:
-    """Write the network; its pictures may have any size that is a multiple of 16."""
-    inputs = (torch.zeros(1, GEOMETRY, 64, 80), torch.zeros(1, COLOUR, 64, 80))
+    """Write the network; its pictures may have any size that is a multiple of 32."""
+    inputs = (torch.zeros(1, GEOMETRY, 64, 96), torch.zeros(1, COLOUR, 64, 96))
     size = {2: "height", 3: "width"}
     torch.onnx.export(
-        network, inputs, str(path), input_names=["geometry", "colour"], output_names=["category", "room"],
+        network, inputs, str(path), input_names=["geometry", "colour"], output_names=["category", "room", "floor"],
         dynamic_axes={"geometry": size, "colour": size, "category": {2: "rows", 3: "columns"}},
         opset_version=17, do_constant_folding=True, dynamo=False,
     )  # fmt: skip

@@ -2,13 +2,15 @@
 
 Runs on a GPU where there is one, else on the CPU, in bfloat16 where the processor multiplies that (where it does not,
 bfloat16 is three times slower than float32). The learning rate follows the clock, so that a run of any length ends
-well; a checkpoint is written every few minutes, and ``--resume`` goes on from it.
+well. A checkpoint of less than 20 MB is written every few minutes; ``--resume`` goes on from it and along the same
+schedule, so that one training may take several sittings (``--sitting 9`` stops after nine minutes).
 """
 
 import json
 import sys
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
+from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
 from typing import Literal
@@ -39,7 +41,9 @@ class Options:
     out: Path = Path("build/pixels/network.pt")
     """Checkpoint; a learning curve is written beside it."""
     minutes: float = 80.0
-    """How long; 600 on two cores is a night."""
+    """How long in all; 600 on two cores is a night."""
+    sitting: float = 1e9
+    """Stop after so many minutes of this run; ``--resume`` takes up the schedule where it was left."""
     batch: int = 16
     """Pictures in a step."""
     real_share: float = 0.5
@@ -51,15 +55,15 @@ class Options:
     threads: int = 2
     """CPU threads."""
     readers: int = 1
-    """Threads that draw batches; a GPU takes a dozen."""
+    """What draws batches: one thread, or so many processes; a GPU takes a dozen."""
     view: View = field(default_factory=View)
     """Size of the pictures."""
     seed: int = 0
     """Of pictures and of the first weights."""
     resume: bool = False
-    """Go on from the checkpoint's last weights."""
+    """Go on from the checkpoint, with its last weights."""
     start: Path | None = None
-    """Begin with the weights of this file instead of random ones; ``training/pixels/start.npz`` are those that ship."""
+    """Begin with these weights: ``training/pixels/start.npz``, those that ship, or a checkpoint, its mean."""
     widths: tuple[int, int, int, int, int] = WIDTHS
     """Channels at 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's size."""
     dropout: tuple[float, float] = (0.1, 0.1)
@@ -110,11 +114,15 @@ def _begun(options: Options, device: torch.device) -> RoomNetwork:
     if options.resume:
         state = load_network(options.out, "last").state_dict()
     elif options.start is not None:
-        state = read_start(options.start)
+        state = read_start(options.start) if options.start.suffix == ".npz" else _mean_of(options.start)
     if state is not None:
         new = begin_with(network, state)
         print(f"{len(new)} arrays are new", file=sys.stderr)
     return network.train().to(device, memory_format=torch.channels_last)
+
+
+def _mean_of(checkpoint: Path) -> dict[str, Tensor]:
+    return load_network(checkpoint, "mean").state_dict()
 
 
 class Run:
@@ -137,12 +145,15 @@ class Run:
         self.average = Average(self.network)
         self.optimisers = optimisers_of(self.network, options)
         self.running: dict[str, float] = {}
-        self.pool = ThreadPoolExecutor(options.readers)
+        self.spent = _spent(options) if options.resume else 0.0
+        self.pool = ThreadPoolExecutor(1) if options.readers == 1 else processes(self.sources, options)
         self.coming = [self._drawn() for _ in range(2 * options.readers)]
 
     def _drawn(self) -> Future[Batch]:
-        rng = np.random.default_rng(self.rng.integers(1 << 62))
-        return self.pool.submit(draw_batch, self.sources, self.options.view, rng)
+        seed = int(self.rng.integers(1 << 62))
+        if self.options.readers > 1:
+            return self.pool.submit(draw_here, self.options.view, seed)
+        return self.pool.submit(draw_batch, self.sources, self.options.view, np.random.default_rng(seed))
 
     def train_step(self, done: float) -> None:
         """Learn from one batch."""
@@ -179,17 +190,42 @@ class Run:
         with self.options.out.with_suffix(".curve.jsonl").open("a") as stream:
             stream.write(line + "\n")
 
-    def save(self) -> None:
+    def save(self, minutes: float) -> None:
         """Write the checkpoint so that a reader never meets half of one; weights in half precision, under 20 MB."""
         self.options.out.parent.mkdir(parents=True, exist_ok=True)
         scratch = self.options.out.with_suffix(".part")
-        state = {"last": _halved(self.network.state_dict()), "mean": _halved(self.average.state)}
+        state: dict[str, object] = {"last": _halved(self.network.state_dict()), "mean": _halved(self.average.state)}
         about = {key: str(value) for key, value in asdict(self.options).items()}
-        torch.save(
-            {**state, "widths": list(self.options.widths), "step": self.step, "categories": list(CATEGORIES),
-             "rooms": list(ROOMS), "options": about}, scratch,
-        )  # fmt: skip
+        state |= {"widths": list(self.options.widths), "step": self.step, "minutes": minutes, "options": about}
+        torch.save({**state, "categories": list(CATEGORIES), "rooms": list(ROOMS)}, scratch)
         scratch.rename(self.options.out)
+
+
+def _spent(options: Options) -> float:
+    return float(torch.load(options.out, map_location="cpu", weights_only=True).get("minutes", 0.0))
+
+
+_HERE: list[tuple[Shards, int]] = []
+_drawn_here = 0
+
+
+def processes(sources: list[tuple[Shards, int]], options: Options) -> ProcessPoolExecutor:
+    """Return processes that draw batches; each opens the shards itself."""
+    folders = [(shards.folder, size) for shards, size in sources]
+    return ProcessPoolExecutor(options.readers, get_context("spawn"), _open_here, (folders,))
+
+
+def _open_here(folders: list[tuple[Path, int]]) -> None:
+    _HERE.extend((Shards(folder), size) for folder, size in folders)
+
+
+def draw_here(view: View, seed: int) -> Batch:
+    """Draw a batch in a process of its own; every hundredth time it looks for new shards."""
+    global _drawn_here
+    _drawn_here += 1
+    if _drawn_here % 100 == 0:
+        _HERE[0][0].refresh()
+    return draw_batch(_HERE, view, np.random.default_rng(seed))
 
 
 def _halved(state: dict[str, Tensor]) -> dict[str, Tensor]:
@@ -203,7 +239,9 @@ def fit(options: Options) -> None:
     """Train until the time is over."""
     run = Run(options)
     begin = shown = saved = measured = perf_counter()
-    while (done := (perf_counter() - begin) / 60.0 / options.minutes) < 1.0:
+    end = min(options.minutes - run.spent, options.sitting)
+    while (here := (perf_counter() - begin) / 60.0) < end:
+        done = (run.spent + here) / options.minutes
         run.train_step(done)
         now = perf_counter()
         if now - shown > 60:
@@ -214,14 +252,14 @@ def fit(options: Options) -> None:
                   flush=True)  # fmt: skip
             shown = now
         if now - saved > 180:
-            run.save()
+            run.save(run.spent + here)
             saved = now
         if now - measured > 60 * options.measure_minutes:
-            run.measure((now - begin) / 60)
+            run.measure(run.spent + here)
             measured = perf_counter()
     run.pool.shutdown(cancel_futures=True)
-    run.save()
-    run.measure(options.minutes)
+    run.save(run.spent + end)
+    run.measure(run.spent + end)
 
 
 if __name__ == "__main__":
