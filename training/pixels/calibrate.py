@@ -25,8 +25,8 @@ PIXELS_PER_FRAME = 400
 # view, and a thing whose pixels all lean to the wall is never seen. Instances are calibrated afterwards.
 PRIOR_SHARE = 0.25
 NOTES = {
-    "real": "A small network for homes and offices, trained on rendered rooms and on the 795 training frames of NYU "
-    "Depth V2, which is published for research and states no licence: decide whether that suits you, or take "
+    "real": "A small network for homes and offices, trained on rendered rooms and on training frames of NYU Depth "
+    "V2, which is published for research and states no licence: decide whether that suits you, or take "
     "--profile synthetic.",
     "synthetic": "A small network for homes and offices, trained on rendered rooms alone; it goes by shape.",
 }

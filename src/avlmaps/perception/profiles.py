@@ -164,7 +164,7 @@ _EMBEDDED = Profile(
     place="vlad",
     matcher="mutual-ratio",
     about="small models shipped with the package: no download, no GPU; its eyes learnt from rendered worlds and from "
-    "795 frames of NYU Depth V2, a data set for research that states no licence",
+    "frames of NYU Depth V2, a data set for research that states no licence",
     # A small network knows a sofa from two metres better than a cushion's width of it from half a metre: with nearly
     # even weights 44 % of the voxels of things are named rightly, with the paper's 41 % (docs/benchmarks.md).
     weight_variance_m2=50.0,
