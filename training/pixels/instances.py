@@ -26,7 +26,6 @@ from avlmaps.sim.recorder import RecordSettings, record_scene
 from avlmaps.sim.scenes import open_scene
 from avlmaps.sim.truth import read_truth
 
-
 # How far the categories' biases lie apart: of 1, 0.6, 0.4, 0.25 and 0.1 the one that pieces left out found likeliest.
 SPREAD = 0.4
 

@@ -24,7 +24,7 @@ CATEGORIES = (
     "whiteboard", "partition", "locker", "water dispenser",
     "other",
     # Kinds that real frames teach alone: rendered worlds have none of them.
-    "clothes", "paper", "person", "shower curtain",
+    "clothing", "paper", "person", "shower curtain",
 )  # fmt: skip
 
 ROOMS = (

@@ -50,7 +50,7 @@ KINDS_OF_CLASS: dict[str, tuple[str, ...]] = {
     "pillow": ("cushion",),
     "mirror": ("mirror",),
     "floor mat": ("carpet", "mat"),
-    "clothes": ("clothes",),
+    "clothes": ("clothing",),
     "ceiling": ("ceiling",),
     "books": ("book",),
     "refrigerator": ("refrigerator",),

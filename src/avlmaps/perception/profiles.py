@@ -173,15 +173,6 @@ register_profile(_EMBEDDED)
 register_profile(
     replace(
         _EMBEDDED,
-        name="synthetic",
-        pixels="embedded-synthetic",
-        views="embedded-synthetic",
-        about="as embedded, but its eyes learnt from rendered worlds alone; weaker in real rooms",
-    )
-)
-register_profile(
-    replace(
-        _EMBEDDED,
         name="colours",
         pixels="colours",
         views="",
@@ -212,5 +203,14 @@ register_profile(
         place="netvlad",
         matcher="superglue",
         about="the models of the AVLMaps paper, to compare with; some of their weights are for research alone",
+    )
+)
+register_profile(
+    replace(
+        _EMBEDDED,
+        name="synthetic",
+        pixels="embedded-synthetic",
+        views="embedded-synthetic",
+        about="as embedded, but its eyes learnt from rendered worlds alone; weaker in real rooms",
     )
 )
