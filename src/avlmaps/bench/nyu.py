@@ -199,5 +199,5 @@ def _grounded(
         floor_m = float(np.median(CAMERA.backproject(depth_m)[floor] @ up))
         ground = Ground(up, np.zeros(1), np.array([floor_m]))
     else:
-        ground = find_ground([frame], up)
+        ground = find_ground([frame], up).ground
     return LabelledFrame(Frame(number, name, 0.0, rgb, depth_m, np.eye(4), frame.rig, ground), label, is_labelled)
