@@ -100,7 +100,7 @@ def test_a_faintly_meant_name_still_competes() -> None:
 def test_a_word_that_means_nothing_is_not_found_and_says_so() -> None:
     factor = ask("elephant")
     assert not factor.found and not factor.mask.any()
-    assert factor.note == "the pixel encoder knows nothing like 'elephant'"
+    assert factor.note == "'elephant' is not a known thing, so the pixel encoder has nothing to look for"
 
 
 @pytest.mark.parametrize(("phrase", "clump"), [("red chair", 0), ("blue dining table", 1), ("white chair", 3)])

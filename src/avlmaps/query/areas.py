@@ -6,11 +6,13 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Float32, Int
 
+from avlmaps.core.lexicon import Kind
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.protocols import NamedViewEncoder, ScaledEncoder, ViewEncoder
 from avlmaps.query.heatmap import HeatSettings, NearAnchors, normalised
 from avlmaps.query.level import Space
 from avlmaps.query.question import Part
+from avlmaps.query.unknown_names import unknown_note
 
 # What a place may be, if it is not what was asked for.
 AREA_NAMES = (
@@ -198,7 +200,7 @@ def area_factor(
     best = float(posterior.max(initial=0.0))
     note = "" if best >= 0.5 else f"no view is like {part.query!r}; the best score is {best:.2f}, below 0.50"
     if isinstance(encoder, NamedViewEncoder) and not encoder.meant(part.query).any():
-        note = f"the view encoder knows no room like {part.query!r}; it knows: {', '.join(encoder.names)}"
+        note = f"{unknown_note(part.query, Kind.ROOM)}; it knows: {', '.join(encoder.names)}"
     if not len(keyframes):
         note = "the map holds no keyframes"
     group = modes(space.level(anchors)[:, :2], scores, settings.link_m)

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float16, Float32, Int, UInt8
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.heatmap import HeatSettings, NearThings
 from avlmaps.query.level import Space
@@ -18,6 +19,7 @@ from avlmaps.query.open_words import fitting, is_a, is_open
 from avlmaps.query.pieces import joined_pieces, likeliest, without_specks
 from avlmaps.query.question import Part
 from avlmaps.query.tints import Tint, is_tinted, tint_of, tinted_share
+from avlmaps.query.unknown_names import unknown_note
 
 _CHUNK = 16_384
 # A name that a phrase means at least so much is the thing itself and does not compete with it.
@@ -256,13 +258,14 @@ def object_factor(
     Raises:
         QueryError: the encoder understands nothing of the word.
     """
-    tint = tint_of(part.query) if rgb is not None and isinstance(encoder, NamedPixelEncoder) else None
+    compound = " " in part.query.strip() and lexicon().find(part.query, Kind.THING) is not None  # a white board
+    tint = tint_of(part.query) if rgb is not None and isinstance(encoder, NamedPixelEncoder) and not compound else None
     if tint and rgb is not None and not tint.thing:
         return colour_factor(space, rgb, tint, part, settings, heat)
     asked = Asked.of(encoder, tint.thing if tint else part.query)
     understood = f"{tint.text} {asked.understood}" if tint and asked.understood else asked.understood
     if not len(asked.rows) and isinstance(encoder, NamedPixelEncoder):
-        note = f"the pixel encoder knows nothing like {part.query!r}"
+        note = unknown_note(tint.thing if tint else part.query)
         nothing = np.zeros(0, np.int64), np.zeros(0, np.float32), False, "", note
         return NearThings(space, part, heat.falloff_per_m(part.role), np.zeros(len(feature), bool), *nothing)
     if not len(asked.rows):
