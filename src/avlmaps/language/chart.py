@@ -1,0 +1,186 @@
+"""A weighted chart parser: every rule at every place, each result once, the cheapest few kept.
+
+Rules are read top down and their results are stored by place, so that no span is read twice. A result is an edge: where
+it ends, what it cost, and its value. Words have no cost; a comma inside a rule costs a little.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from avlmaps.language.grammar import BUILT_IN, Grammar, Part, Template
+from avlmaps.language.lexer import Token
+
+_COMMA = 0.4
+_MOST_A_SPAN = 3
+_MOST_REPEATS = 6
+BuiltIn = Callable[[int], "list[tuple[int, float, Any]]"]
+Slots = tuple[tuple[str, Any], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Tree:
+    """What a rule read.
+
+    Attributes:
+        rule: its name.
+        slots: names and values, in the order of the words.
+        start: the first token.
+        end: behind the last token.
+    """
+
+    rule: str
+    slots: Slots
+    start: int = field(compare=False)
+    end: int = field(compare=False)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """Return the first value of a slot."""
+        return next((value for key, value in self.slots if key == name), default)
+
+    def all(self, name: str) -> list[Any]:
+        """Return all values of a slot."""
+        return [value for key, value in self.slots if key == name]
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """One result of a rule at a place."""
+
+    end: int
+    cost: float
+    value: Any
+
+
+class Chart:
+    """The results of a grammar's rules over one sentence."""
+
+    def __init__(self, grammar: Grammar, tokens: Sequence[Token], built_in: dict[str, BuiltIn]) -> None:
+        """Take a sentence; nothing is read before `edges` is called."""
+        self.grammar = grammar
+        self.tokens = tokens
+        self._built_in = built_in
+        self._stored: dict[tuple[str, int], list[Edge]] = {}
+        self._terminals: dict[tuple[str, int], list[Edge]] = {}
+        self._words = [self._matches(i) for i in range(len(tokens))]
+        self._begins: list[frozenset[str] | None] = [None] * len(tokens)
+
+    def edges(self, rule: str, at: int) -> list[Edge]:
+        """Return what a rule reads from a token on, the cheapest first."""
+        key = (rule, at)
+        found = self._stored.get(key)
+        if found is None:
+            self._stored[key] = []  # a rule that begins with itself would never end
+            found = self._stored[key] = self._read(rule, at)
+        return found
+
+    def begins(self, at: int) -> frozenset[str]:
+        """Return the words and classes that begin at a token."""
+        known = self._begins[at]
+        if known is None:
+            own = {f"={self.tokens[at].text}", *(key for key, _, _ in self._words[at])}
+            known = self._begins[at] = frozenset(own | {name for name in BUILT_IN if self.terminal(name, at)})
+        return known
+
+    def terminal(self, name: str, at: int) -> list[Edge]:
+        """Return where a class of words ends that begins at a token."""
+        if at >= len(self.tokens):
+            return []
+        key = (name, at)
+        found = self._terminals.get(key)
+        if found is None:
+            if name in BUILT_IN:
+                found = [Edge(end, cost, value) for end, cost, value in self._built_in[name](at)]
+            else:
+                found = [Edge(end, 0.0, value) for kind, end, value in self._words[at] if kind == name]
+            self._terminals[key] = found
+        return found
+
+    def _matches(self, at: int) -> list[tuple[str, int, str]]:
+        found: list[tuple[str, int, str]] = []
+        node, end = self.grammar.tree, at
+        while end < len(self.tokens):
+            node = node.after.get(self.tokens[end].text)
+            if node is None:
+                break
+            end += 1
+            found += [(kind, end, value) for kind, value in node.ends]
+        return found
+
+    def _read(self, rule: str, at: int) -> list[Edge]:
+        if at >= len(self.tokens):
+            return []
+        best: dict[int, dict[Any, float]] = {}
+        here = self.begins(at)
+        for template, first in zip(self.grammar.rules[rule], self.grammar.first[rule], strict=True):
+            if first.isdisjoint(here):
+                continue
+            for end, cost, slots in self._part(template.body, at, 0):
+                if end > at:
+                    value = _value(template, slots, at, end)
+                    ends = best.setdefault(end, {})
+                    ends[value] = min(cost + template.cost, ends.get(value, float("inf")))
+        return [
+            Edge(end, cost, value)
+            for end, values in best.items()
+            for value, cost in sorted(values.items(), key=lambda pair: pair[1])[:_MOST_A_SPAN]
+        ]
+
+    def _part(self, part: Part, at: int, depth: int) -> Iterator[tuple[int, float, Slots]]:
+        match part.kind:
+            case "seq":
+                yield from self._sequence(part.parts, 0, at, depth)
+            case "any":
+                for inner in part.parts:
+                    yield from self._part(inner, at, depth)
+            case "maybe":
+                yield from self._part(part.parts[0], at, depth)
+                yield at, 0.0, ()
+            case "many":
+                yield from self._many(part.parts[0], at, depth)
+            case "word":
+                if at < len(self.tokens) and self.tokens[at].text == part.name:
+                    yield at + 1, 0.0, ()
+            case "class":
+                for edge in self.terminal(part.name, at):
+                    yield edge.end, edge.cost, ((part.slot, edge.value),) if part.slot else ()
+            case _:
+                for edge in self.edges(part.name, at):
+                    yield edge.end, edge.cost, ((part.slot or "_", edge.value),)
+
+    def _sequence(
+        self, parts: tuple[Part, ...], k: int, at: int, depth: int
+    ) -> Iterator[tuple[int, float, Slots]]:  # fmt: skip
+        if k == len(parts):
+            yield at, 0.0, ()
+            return
+        starts = [(at, 0.0)]
+        if k and at < len(self.tokens) and self.tokens[at].text in (",", "-") and parts[k].name not in (",", "-"):
+            starts.append((at + 1, _COMMA))
+        for start, extra in starts:
+            for middle, cost, slots in self._part(parts[k], start, depth):
+                if extra and middle == start:
+                    continue  # a comma belongs before something
+                for end, more, rest in self._sequence(parts, k + 1, middle, depth):
+                    yield end, cost + more + extra, slots + rest
+
+    def _many(self, part: Part, at: int, depth: int) -> Iterator[tuple[int, float, Slots]]:
+        yield at, 0.0, ()
+        if depth >= _MOST_REPEATS:
+            return
+        starts = [(at, 0.0)]
+        if at and at < len(self.tokens) and self.tokens[at].text in (",", "-"):
+            starts.append((at + 1, _COMMA))
+        for start, extra in starts:
+            for middle, cost, slots in self._part(part, start, 0):
+                if middle > start:
+                    for end, more, rest in self._many(part, middle, depth + 1):
+                        yield end, cost + more + extra, slots + rest
+
+
+def _value(template: Template, slots: Slots, start: int, end: int) -> Any:
+    """Return a tree, or the value of the only rule in it where a template adds nothing."""
+    if not template.constants and len(slots) == 1 and slots[0][0] == "_":
+        return slots[0][1]
+    kept = tuple(slot for slot in slots if slot[0] != "_")
+    return Tree(template.rule, (*template.constants, *kept), start, end)

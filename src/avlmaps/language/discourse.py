@@ -1,0 +1,266 @@
+"""From a reading to intents: orders in the order of doing, references resolved, corrections and repetitions applied."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from avlmaps.language.chart import Tree
+from avlmaps.language.intents import (
+    Between, Clarify, Face, Go, Intent, Kind, Refuse, Repeat, Return, Reason, Target, VisitEach,
+)  # fmt: skip
+from avlmaps.language.orders import MOST_TIMES, count_of, intents_of, refuse
+from avlmaps.language.readings import Item, Reading, Sentence
+from avlmaps.language.targets import Memory, Unresolved, resolve
+
+_HARD = frozenset({".", "!", "?", ";"})
+
+
+@dataclass(frozen=True, slots=True)
+class Composed:
+    """What a reading means.
+
+    Attributes:
+        intents: in the order of doing; empty where ``stop`` says why.
+        stop: a refusal or a question instead.
+        notes: how words were taken.
+        skipped: words that the reading leaves out and that may matter.
+    """
+
+    intents: tuple[Intent, ...]
+    stop: Refuse | Clarify | None
+    notes: tuple[str, ...]
+    skipped: tuple[str, ...]
+
+
+@dataclass(slots=True)
+class _Group:
+    """Intents of one order, or of names that continue it."""
+
+    intents: list[Intent]
+    kind: str = "go"
+    sentence: int = 0
+
+
+@dataclass(slots=True)
+class _Composer:
+    sentence: Sentence
+    memory: Memory = field(default_factory=Memory)
+    groups: list[_Group] = field(default_factory=list)
+    held: list[_Group] = field(default_factory=list)  # orders said after "before ..." that come first
+    notes: list[str] = field(default_factory=list)
+    skipped: list[str] = field(default_factory=list)
+    join: str = ""  # BEFORE, AFTER, BUT_FIRST or CORRECT, until the next order
+    number: int = 0  # of the sentence
+    loop_from: int | None = None  # the group where a repetition of all that follows begins
+    loop_times: int = 1
+
+    def item(self, item: Item, rest: tuple[Item, ...], before: Item | None) -> None:
+        match item.kind:
+            case "order":
+                self.order(item.value, rest, before)
+            case "bare":
+                self.bare(item.value, rest)
+            case "mention":
+                self.mention(item.value)
+            case "repeat":
+                self.repeat(item.value, rest)
+            case "THEN" | "mark":
+                self.boundary(item)
+            case "BEFORE":
+                said = self.groups and self.groups[-1].sentence == self.number
+                self.join = "" if said else "BEFORE"
+            case "AFTER":
+                said = self.groups and self.groups[-1].sentence == self.number
+                self.join = "AFTER" if said else ""
+            case "BUT_FIRST":
+                self.join = "BUT_FIRST" if self.groups else ""
+            case "CORRECT" | "MAKE_IT":
+                self.join = "CORRECT" if self.groups else self.join
+            case "SLOW":
+                self.notes.append(f"'{item.value}' has no effect: the robot has one speed.")
+            case "THOUGH" if len(self.groups) > 1 and not rest and item.value in ("first", "beforehand", "first though"):
+                self.groups.insert(-1, self.groups.pop())
+            case "skip":
+                self.skipped.append(self.sentence.words(item.start, item.end))
+            case _:
+                pass
+
+    def boundary(self, item: Item) -> None:
+        if self.sentence.words(item.start, item.end).strip() in _HARD and self.held and self.groups:
+            self.flush()
+        if self.sentence.words(item.start, item.end).strip() in _HARD:
+            self.number += 1
+
+    def flush(self) -> None:
+        self.groups += self.held
+        self.held = []
+
+    def order(self, tree: Any, rest: tuple[Item, ...], before: Item | None) -> None:
+        if isinstance(tree, Tree) and tree.rule == "refuse":
+            raise Unresolved(refuse(tree.get("reason")))  # type: ignore[arg-type]
+        intents, notes = intents_of(tree, self.memory)
+        self.notes += notes
+        if isinstance(tree, Tree) and tree.get("arrive") and self.groups:
+            last = self.groups[-1].intents[-1]
+            if isinstance(last, Go) and intents == [last]:
+                return
+            if before is not None and before.kind == "order":
+                self.join = "AFTER"
+        self.place(_Group(intents, tree.rule if isinstance(tree, Tree) else "go", self.number))
+
+    def place(self, group: _Group) -> None:
+        join, self.join = self.join, ""
+        if join == "BEFORE":
+            self.held.append(group)
+        elif join in ("AFTER", "BUT_FIRST"):
+            self.groups.insert(len(self.groups) - 1, group)
+        elif join == "CORRECT" and self.groups:
+            self.groups[-1] = group
+        else:
+            self.groups.append(group)
+
+    def bare(self, tree: Any, rest: tuple[Item, ...]) -> None:
+        target = resolve(tree.get("to") if isinstance(tree, Tree) and tree.rule == "bare" else tree, self.memory)
+        correcting = self.join == "CORRECT"
+        if not correcting and self.is_referred_to(rest) and not self.continues():
+            self.memory.add(target)
+            return
+        self.memory.add(target)
+        kind = self.groups[-1].kind if self.groups and (correcting or self.continues()) else "go"
+        if correcting and self.groups:
+            self.join = ""
+            group = self.groups[-1]
+            group.intents[-1] = _with_target(group.intents[-1], target)
+            return
+        intent: Intent = Face(target) if kind == "face" else VisitEach(target) if kind == "each" else Go(target)
+        if self.continues() and not self.join and not self.held:
+            self.groups[-1].intents.append(intent)
+            return
+        self.place(_Group([intent], kind, self.number))
+
+    def continues(self) -> bool:
+        return bool(self.groups) and self.groups[-1].sentence == self.number and self.groups[-1].kind in ("go", "face", "each")
+
+    def is_referred_to(self, rest: tuple[Item, ...]) -> bool:
+        following = next((item for item in rest if item.kind in ("order", "bare", "refuse")), None)
+        return following is not None and following.kind == "order" and _refers(following.value)
+
+    def mention(self, tree: Any) -> None:
+        if not isinstance(tree, Tree):
+            self.memory.add(resolve(tree, self.memory))
+            return
+        for name in ("a", "b"):
+            if tree.get(name) is not None:
+                self.memory.add(resolve(tree.get(name), self.memory))
+        if tree.get("a") is not None:
+            return
+        base = tree.get("to") or tree.get("sound")
+        near: list[Target] = []
+        for at in tree.all("at"):
+            whole = resolve(Tree("target", (("at", at),), 0, 0), self.memory)
+            near += [Target(whole.kind, whole.name, (), whole.pick), *whole.near]
+        if base is None and not near:
+            return
+        target = resolve(base, self.memory).with_near(*near) if base is not None else near[0].with_near(*near[1:])
+        self.memory.add(target)
+        if tree.get("who") is not None and str(tree.get("who")) in ("i", "we", "we all", "we are all"):
+            self.memory.speaker = target
+
+    def repeat(self, tree: Any, rest: tuple[Item, ...]) -> None:
+        times = count_of(tree.get("times")) if isinstance(tree, Tree) and tree.get("times") is not None else count_of(tree)
+        if isinstance(tree, Tree) and tree.get("again") == "yes":
+            times = 2
+        if times is None or times < 1 or times != int(times) or times > MOST_TIMES:
+            raise Unresolved(Clarify(f"How many times? Say a number from 1 to {MOST_TIMES}."))
+        more = any(item.kind in ("order", "bare") for item in rest)
+        ahead = isinstance(tree, Tree) and (tree.get("next") == "yes" or (tree.get("next") == "maybe" and not self.groups))
+        if more and (ahead or not self.groups):
+            self.loop_from, self.loop_times = len(self.groups), int(times)
+            return
+        if not self.groups:
+            raise Unresolved(Clarify("What should be repeated? Say what to do, then how often."))
+        if times == 1:
+            return
+        everything = isinstance(tree, Tree) and tree.rule == "repeat" and tree.get("times") is not None and tree.slots[0][0] == "times" and tree.get("all") == "yes"
+        again = isinstance(tree, Tree) and (tree.get("again") == "yes" or tree.get("all") == "yes" or everything)
+        chosen = self.groups if again else self.groups[-1:]
+        if not again and chosen[0].kind in ("shuttle", "roundtrip"):
+            chosen[0].intents = [Repeat(int(times), tuple(chosen[0].intents))]
+            return
+        body = tuple(intent for group in chosen for intent in group.intents)
+        del self.groups[len(self.groups) - len(chosen) :]
+        self.groups.append(_Group([Repeat(int(times), body)], "repeat", self.number))
+
+
+def compose(sentence: Sentence, reading: Reading) -> Composed:
+    """Return what a reading means."""
+    composer = _Composer(sentence)
+    stop: Refuse | Clarify | None = None
+    try:
+        for k, item in enumerate(reading.items):
+            if item.kind in ("refuse", "chat", "inquire"):
+                if item.kind == "inquire" and any(one.kind in ("order",) for one in reading.items[k + 1 :]):
+                    continue
+                stop = refuse(item.value.get("reason"))
+                break
+            composer.item(item, reading.items[k + 1 :], reading.items[k - 1] if k else None)
+        composer.flush()
+    except Unresolved as fault:
+        stop = fault.question
+    intents = [intent for group in composer.groups for intent in group.intents]
+    if composer.loop_from is not None and stop is None:
+        before = [intent for group in composer.groups[: composer.loop_from] for intent in group.intents]
+        body = tuple(intents[len(before) :])
+        intents = [*before, Repeat(composer.loop_times, body)] if composer.loop_times > 1 else intents
+    if stop is None and not intents:
+        stop = _nothing(composer, reading)
+    return Composed(tuple(_tidied(intents)) if stop is None else (), stop, tuple(composer.notes), tuple(_phrases(composer, reading)))
+
+
+def _phrases(composer: _Composer, reading: Reading) -> list[str]:
+    """Return the skipped words, neighbours as one phrase."""
+    phrases: list[list[int]] = []
+    for item in reading.items:
+        if item.kind == "skip":
+            if phrases and phrases[-1][1] == item.start:
+                phrases[-1][1] = item.end
+            else:
+                phrases.append([item.start, item.end])
+    return [composer.sentence.words(start, end) for start, end in phrases]
+
+
+def _nothing(composer: _Composer, reading: Reading) -> Refuse | Clarify:
+    if composer.memory.targets:
+        return Clarify(f"What should I do with '{composer.memory.targets[-1].name}'? Say, for example, go to it.")
+    if any(item.kind == "GREETING" for item in reading.items) and not composer.skipped:
+        return refuse(Reason.CHAT)
+    return refuse(Reason.UNKNOWN)
+
+
+def _tidied(intents: list[Intent]) -> list[Intent]:
+    """Return intents without a drive to where the robot was just sent."""
+    kept: list[Intent] = []
+    for intent in intents:
+        if kept and intent == kept[-1] and isinstance(intent, Go | Face | Return):
+            continue
+        kept.append(intent)
+    return kept
+
+
+def _with_target(intent: Intent, target: Target) -> Intent:
+    from avlmaps.language.commands import on_targets
+
+    if isinstance(intent, Between):
+        return Between((intent.of[0], target))
+    if isinstance(intent, Repeat):
+        return Repeat(intent.times, (*intent.body[:-1], _with_target(intent.body[-1], target)))
+    changed = on_targets(intent, lambda _: target)
+    return changed if changed != intent or target in (getattr(intent, "to", None), getattr(intent, "of", None)) else Go(target)
+
+
+def _refers(value: Any) -> bool:
+    """Return whether a tree holds a pronoun."""
+    if not isinstance(value, Tree):
+        return False
+    if value.rule in ("pronoun", "pronoun_there") or value.get("it") or value.get("one") or value.get("two") or value.get("there"):
+        return True
+    return any(_refers(inner) for _, inner in value.slots)

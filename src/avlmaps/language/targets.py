@@ -1,0 +1,174 @@
+"""From what the grammar read to targets; pronouns become what was named before."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from avlmaps.language.chart import Tree
+from avlmaps.language.intents import Clarify, Kind, Pick, Target
+
+_ROOMS_OF_THINGS = frozenset({"toilet", "bath", "shower", "loo", "wc", "lavatory"})
+
+
+class Unresolved(Exception):
+    """A target cannot be resolved; the question says why."""
+
+    def __init__(self, question: Clarify) -> None:
+        super().__init__(question.question)
+        self.question = question
+
+
+@dataclass(slots=True)
+class Memory:
+    """What was named, in order, for "it", "there", "the two" and "the other one".
+
+    Attributes:
+        targets: things, sounds, areas and files, the last named last.
+        speaker: where the person is, if it was said.
+        used: whether a word referred to what was named before.
+    """
+
+    targets: list[Target] = field(default_factory=list)
+    speaker: Target | None = None
+    used: bool = False
+
+    def add(self, target: Target) -> None:
+        """Remember a target as the last named."""
+        if target.kind is not Kind.HERE:
+            if target in self.targets:
+                self.targets.remove(target)
+            self.targets.append(target)
+
+    def last(self, word: str) -> Target:
+        """Return the last target that was named.
+
+        Raises:
+            Unresolved: nothing was named.
+        """
+        self.used = True
+        if not self.targets:
+            raise Unresolved(Clarify(f"What does '{word}' refer to? Name the thing."))
+        return self.targets[-1]
+
+    def two(self) -> tuple[Target, Target]:
+        """Return the last two targets that were named.
+
+        Raises:
+            Unresolved: fewer were named.
+        """
+        self.used = True
+        if len(self.targets) < 2:
+            raise Unresolved(Clarify("Between which two things? Name both."))
+        return self.targets[-2], self.targets[-1]
+
+
+def resolve(value: Any, memory: Memory) -> Target:
+    """Return the target that a part of a reading names.
+
+    Raises:
+        Unresolved: it refers to nothing that is known.
+    """
+    if isinstance(value, Target):
+        return value
+    assert isinstance(value, Tree)
+    if value.get("me"):
+        if memory.speaker is None:
+            raise Unresolved(Clarify("I do not know where you are. Which thing or room are you near?"))
+        return memory.speaker
+    if value.get("here"):
+        return Target(Kind.HERE)
+    if value.get("deictic"):
+        return Target(Kind(value.get("deictic")), "")
+    match value.rule:
+        case "noun" | "strict" | "known":
+            return _noun(value, memory)
+        case "sound" | "heard" | "noise" | "noise_of" | "noise_there" | "heard_noise" | "clause_noise" | "bare_noise":
+            return _sound(value, memory)
+        case "picture" if value.get("image"):
+            return Target(Kind.IMAGE, value.get("image"))
+        case "clip" if value.get("clip"):
+            return Target(Kind.CLIP, value.get("clip"))
+        case "pronoun" | "pronoun_there":
+            return memory.last("there" if value.get("it") == "there" else "it")
+        case _:
+            return _whole(value, memory)
+
+
+def _whole(value: Tree, memory: Memory) -> Target:
+    """Return a target with all that says where it is."""
+    inner = next((value.get(name) for name in ("is", "noun", "sound", "image", "clip", "it", "to", "of", "what", "name", "near") if value.get(name) is not None), None)  # fmt: skip
+    if value.get("one") == "yes":
+        base = memory.last("one")
+        base = replace(base, near=()) if value.all("at") else base
+    elif inner is None and value.get("pick") == "other":
+        base = replace(memory.last("the other"), pick=Pick.OTHER)
+    elif inner is None and value.all("at"):
+        parts = [part for at in value.all("at") for part in _near(at, memory)]
+        if not parts:
+            raise Unresolved(Clarify("Which place? Name a thing or a room."))
+        sounds = [part for part in parts if part.kind is Kind.SOUND]
+        first = sounds[0] if sounds else parts[0]
+        return first.with_near(*(part for part in parts if part != first))
+    elif inner is None:
+        raise Unresolved(Clarify("Which thing? Name it."))
+    else:
+        base = resolve(inner, memory)
+    if value.get("which") is not None:
+        base = base.with_near(resolve(value.get("which"), memory))
+    if value.rule == "target" and value.get("sound") is not None and value.get("near") is not None:
+        base = resolve(value.get("sound"), memory).with_near(resolve(value.get("near"), memory))
+    if value.get("there") == "yes":
+        base = base.with_near(_last_area(memory))
+    for at in value.all("at"):
+        base = base.with_near(*_near(at, memory))
+    return base
+
+
+def _near(at: Any, memory: Memory) -> list[Target]:
+    if not isinstance(at, Tree):
+        return [resolve(at, memory)]
+    if at.rule == "heard_at" or at.rule in ("heard", "sound", "clip", "picture"):
+        return [resolve(at, memory)]
+    if at.get("there") == "yes":
+        return [_last_area(memory)]
+    found = [resolve(one, memory) for one in at.all("near")]
+    if at.get("in") == "yes":
+        found = [_as_room(one) for one in found]
+    return [flat for one in found for flat in (replace(one, near=()), *one.near)]
+
+
+def _last_area(memory: Memory) -> Target:
+    areas = [one for one in memory.targets if one.kind is Kind.AREA]
+    return areas[-1] if areas else memory.last("there")
+
+
+def _as_room(target: Target) -> Target:
+    """Return what something is in: a toilet as the room."""
+    is_room = target.kind is Kind.OBJECT and target.name in _ROOMS_OF_THINGS
+    return replace(target, kind=Kind.AREA) if is_room else target
+
+
+def _noun(value: Tree, memory: Memory) -> Target:
+    what = value.get("what")
+    pick = Pick(value.get("pick", ""))
+    if what is None:
+        if pick is Pick.OTHER:
+            last = memory.last("the other one")
+            return Target(last.kind, last.name, (), Pick.OTHER)
+        return memory.last("it")
+    base = resolve(what, memory)
+    if pick is Pick.OTHER:
+        memory.used = True
+        if not any(one.name.rstrip("s") == base.name.rstrip("s") for one in memory.targets):
+            raise Unresolved(Clarify(f"Which other {base.name}? Name the first one, or say what it is near."))
+    return replace(base, pick=Pick.ANY if pick is Pick.NEAREST else pick)
+
+
+def _sound(value: Tree, memory: Memory) -> Target:
+    if value.get("clip") is not None:
+        return resolve(value.get("clip"), memory)
+    parts = value.all("noise") or value.all("name") or value.all("sound")
+    found = [part if isinstance(part, Target) else resolve(part, memory) for part in parts]
+    if not found:
+        raise Unresolved(Clarify("Which sound? Name it, such as: the sound of rain."))
+    name = " ".join(one.name for one in found)
+    return Target(Kind.SOUND, name)
