@@ -226,7 +226,7 @@ def ask(verb: "Query") -> dict[str, Any]:
     if parts:
         question = Question.of(parts, Modality(verb.primary) if verb.primary else None)
     else:
-        from avlmaps.language.sentence import parse_sentence
+        from avlmaps.language.questions import parse_sentence
 
         question = parse_sentence(verb.sentence)
         if verb.primary:

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.demo.evidence import Box, Evidence
-from avlmaps.language.sentence import parse_sentence
+from avlmaps.language.questions import parse_sentence
 from avlmaps.query.question import Modality, Part, Question
 
 # What a label of training is also called in speech; none of these words was ever a label. The largest come first.

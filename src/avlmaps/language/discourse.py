@@ -1,6 +1,6 @@
 """From a reading to intents: orders in the order of doing, references resolved, corrections and repetitions applied."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from avlmaps.language.chart import Tree
@@ -105,7 +105,22 @@ class _Composer:
                 return
             if before is not None and before.kind == "order":
                 self.join = "AFTER"
+        if self.groups and self.groups[-1].kind in ("beside", "between", "standoff") and _is_there(tree):
+            return
+        if self.groups and self.groups[-1].kind == "lead" and self.groups[-1].sentence == self.number:
+            intents = self.led(intents)
         self.place(_Group(intents, tree.rule if isinstance(tree, Tree) else "go", self.number))
+
+    def led(self, intents: list[Intent]) -> list[Intent]:
+        """Return an order after "in the kitchen, ...": a thing is the one in there; anything else is done there."""
+        first, lead = intents[0], self.groups[-1].intents[0]
+        if isinstance(first, Go | Face) and isinstance(lead, Go) and first.to.kind is Kind.OBJECT and not first.to.near:
+            if first.to not in self.memory.targets[:-1]:
+                self.groups.pop()
+                changed = first.to.with_near(Target(lead.to.kind, lead.to.name), *lead.to.near)
+                self.memory.add(changed)
+                return [replace(first, to=changed), *intents[1:]]
+        return intents
 
     def place(self, group: _Group) -> None:
         join, self.join = self.join, ""
@@ -255,6 +270,14 @@ def _with_target(intent: Intent, target: Target) -> Intent:
         return Repeat(intent.times, (*intent.body[:-1], _with_target(intent.body[-1], target)))
     changed = on_targets(intent, lambda _: target)
     return changed if changed != intent or target in (getattr(intent, "to", None), getattr(intent, "of", None)) else Go(target)
+
+
+def _is_there(tree: Any) -> bool:
+    """Return whether an order goes to where the robot was just sent: "stop there"."""
+    if not isinstance(tree, Tree) or tree.rule != "go":
+        return False
+    to = tree.get("to")
+    return tree.get("there") == "yes" or (isinstance(to, Tree) and to.rule.startswith("pronoun") and to.get("it") == "there")
 
 
 def _refers(value: Any) -> bool:

@@ -53,7 +53,7 @@ class Names:
             if _known(words) is not None or any(word in _never() for word in words):
                 continue
             head = words[-1]
-            if len(head) < 2 or len(words) > 3 or _is_sounding(head):
+            if len(head) < 2 or len(words) > 3 or _is_sounding(head) or head in _verbs():
                 continue
             mended = self._mend(words)
             if mended is not None:
@@ -82,7 +82,7 @@ class Names:
             yield end, tuple(t.text for t in self.tokens[at:end])
 
     def _mend(self, words: tuple[str, ...]) -> tuple[float, Target] | None:
-        if len(words[-1]) < 4:
+        if len(words[-1]) < 4 or words[-1] in _grammar_words():
             return None
         for tail in range(min(2, len(words)), 0, -1):
             wrong = " ".join(words[-tail:])
@@ -303,6 +303,19 @@ def _forms() -> dict[str, str]:
 def _pasts() -> frozenset[str]:
     irregular = (pair.split("=")[0] for pair in load_grammar().lists["irregular"].split())
     return frozenset([*irregular, *(form for form in _forms() if form.endswith("ed"))])
+
+
+@cache
+def _grammar_words() -> frozenset[str]:
+    """Return all words of the grammar's classes; none of them is a misspelt name."""
+    return frozenset(word for phrases in load_grammar().words.values() for phrase in phrases for word in phrase.split())
+
+
+@cache
+def _verbs() -> frozenset[str]:
+    """Return the verbs that stand alone in a class of orders; none of them is the head of an unknown name."""
+    classes = ("GO", "DIRECT", "TURN", "MANIPULATE", "HARM", "FLYING", "FACE", "GREETING", "NEGATION", "IF", "FILLER")
+    return frozenset(phrase for name in classes for phrase in load_grammar().words[name] if " " not in phrase)
 
 
 @cache

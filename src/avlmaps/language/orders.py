@@ -173,6 +173,11 @@ def _roundtrip(tree: Tree, memory: Memory) -> Result:
     return [Go(_target(tree.get("to"), memory)), Return()], []
 
 
+def _fromto(tree: Tree, memory: Memory) -> Result:
+    a, b = _pair(tree, memory)
+    return [Go(a), Go(b)], []
+
+
 def count_of(tree: Any) -> float | None:
     """Return how many times a count says."""
     if isinstance(tree, Tree):
@@ -186,5 +191,5 @@ def count_of(tree: Any) -> float | None:
 
 _READ = {
     "go": _go, "face": _face, "turn": _turn, "move": _move, "between": _between, "beside": _beside, "standoff": _standoff,
-    "arrive": _go, "circle": _circle, "each": _each, "wait": _wait, "shuttle": _shuttle, "return": _return, "roundtrip": _roundtrip,
+    "arrive": _go, "fromto": _fromto, "lead": _go, "circle": _circle, "each": _each, "wait": _wait, "shuttle": _shuttle, "return": _return, "roundtrip": _roundtrip,
 }  # fmt: skip

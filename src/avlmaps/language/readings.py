@@ -153,6 +153,8 @@ def _steps(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | No
             kind = "refuse" if getattr(edge.value, "rule", "") == "refuse" else rule
             anywhere = kind == "refuse" and edge.value.get("reason") in ("condition", "negation", "endless")
             after = edge.value.get("next") == "yes" or None if rule == "repeat" else fresh
+            if getattr(edge.value, "rule", "") in ("lead", "arrive"):
+                after = True
             if kind == "refuse" and not anywhere:
                 needs = True
             yield Item(kind, edge.value, at, edge.end), cost + edge.cost, after, needs

@@ -79,7 +79,7 @@ def resolve(value: Any, memory: Memory) -> Target:
     if value.get("deictic"):
         return Target(Kind(value.get("deictic")), "")
     match value.rule:
-        case "noun" | "strict" | "known":
+        case "noun" | "strict" | "known" | "part_of":
             return _noun(value, memory)
         case "sound" | "heard" | "noise" | "noise_of" | "noise_there" | "heard_noise" | "clause_noise" | "bare_noise":
             return _sound(value, memory)

@@ -1,0 +1,146 @@
+"""From a sentence to a question for the map: where something is, how many there are, whether there is one."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from avlmaps.core.errors import QueryError
+from avlmaps.language.chart import Tree
+from avlmaps.language.commands import Given, unknown
+from avlmaps.language.grammar import load_grammar
+from avlmaps.language.intents import Ask, Clarify, Inquiry, Kind, Pick, Target
+from avlmaps.language.readings import Sentence
+from avlmaps.language.targets import Memory, Unresolved, resolve
+from avlmaps.query.question import MOST_CHARACTERS, Modality, Part, Question
+
+_EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
+_MODALITIES = {
+    Kind.OBJECT: Modality.OBJECT, Kind.SOUND: Modality.SOUND, Kind.CLIP: Modality.SOUND, Kind.AREA: Modality.AREA,
+    Kind.IMAGE: Modality.IMAGE,
+}  # fmt: skip
+_SKIP, _FILLER, _WORST = 2.6, 0.2, 3.0
+_MEANING = frozenset({"not", "no", "without", "except", "never", "unless", "or", "if", "but"})
+
+
+@dataclass(frozen=True, slots=True)
+class AskedSentence:
+    """What a sentence asks the map.
+
+    Attributes:
+        inquiry: what is to be known, of which targets.
+        notes: one sentence each: how words were taken.
+    """
+
+    inquiry: Inquiry
+    notes: tuple[str, ...] = ()
+
+    @property
+    def questions(self) -> tuple[Question, ...]:
+        """One question for each target; any of them answers."""
+        return tuple(question_of(target) for target in self.inquiry.of)
+
+
+def parse_sentence(sentence: str) -> Question:
+    """Return the question that a sentence asks; its first part is sought, the others say where it is.
+
+    Raises:
+        QueryError: the sentence is empty, too long, or not understood; it says which words.
+    """
+    return read_question(sentence, Given(knows=lambda _: True)).questions[0]
+
+
+def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
+    """Return what a sentence asks.
+
+    Raises:
+        QueryError: the sentence is empty, too long, or not understood; it says which words.
+    """
+    given = given or Given()
+    if not any(mark.isalnum() for mark in sentence):
+        raise QueryError(f"The sentence is empty; say what is sought, such as: {_EXAMPLE}.")
+    if len(sentence) > MOST_CHARACTERS:
+        raise QueryError(
+            f"The sentence has {len(sentence)} characters, more than {MOST_CHARACTERS}; say it shorter, like: {_EXAMPLE}."
+        )
+    read = Sentence(sentence, given.knows)
+    tree, words = _best(read)
+    if tree is None:
+        raise QueryError(f"{words} is not understood; say it like: {_EXAMPLE}.")
+    try:
+        targets = _targets(tree)
+    except Unresolved as fault:
+        raise QueryError(fault.question.question) from None
+    notes: list[str] = []
+    checked = tuple(_checked(target, read, given, notes) for target in targets)
+    return AskedSentence(Inquiry(Ask(tree.get("ask")), checked), tuple(notes))
+
+
+def question_of(target: Target) -> Question:
+    """Return a target as a question to the map."""
+    parts = [Part(_MODALITIES[one.kind], one.name, is_file=one.is_file) for one in (target, *target.near)]
+    return Question.of(parts)
+
+
+def _best(read: Sentence) -> tuple[Tree | None, str]:
+    """Return the cheapest reading of a whole sentence, or the words that are not understood."""
+    tokens, chart = read.tokens, read.chart
+    soft = [token.kind == "punct" or bool(chart.terminal("GREETING", i)) or bool(chart.terminal("FILLER", i)) or bool(chart.terminal("POLITE", i)) for i, token in enumerate(tokens)]  # fmt: skip
+    best: tuple[float, Tree] | None = None
+    longest = 0
+    before = 0.0
+    for at in range(len(tokens)):
+        for edge in chart.edges("question", at):
+            left = tokens[edge.end :]
+            if any(token.text in _MEANING for token in left) or any(token.text in _MEANING for token in tokens[:at]):
+                longest = max(longest, edge.end)
+                continue
+            after = sum(0.02 if token.kind == "punct" else _FILLER if soft[edge.end + k] else _SKIP for k, token in enumerate(left))
+            longest = max(longest, edge.end)
+            total = before + edge.cost + after
+            if isinstance(edge.value, Tree) and edge.value.rule == "question" and (best is None or total < best[0]):
+                best = (total, edge.value)
+        reach = max((end for end in (e.end for name in ("GREETING", "POLITE") for e in chart.terminal(name, at))), default=at + 1)
+        before += 0.02 if tokens[at].kind == "punct" else _FILLER if soft[at] or reach > at + 1 else _SKIP
+    if best is None or best[0] > _WORST:
+        said = read.words(longest, len(tokens)) or read.text
+        return None, f"{said[:80]!r}"
+    return best[1], ""
+
+
+def _targets(tree: Tree) -> tuple[Target, ...]:
+    if tree.get("use") is not None:
+        return _for_use(str(tree.get("use")))
+    memory = Memory()
+    base = tree.get("of")
+    target = resolve(base, memory)
+    for at in tree.all("at"):
+        whole = resolve(Tree("target", (("at", at),), 0, 0), memory)
+        target = target.with_near(replace(whole, near=()), *whole.near)
+    if target.pick in (Pick.FARTHEST, Pick.OTHER):
+        raise Unresolved(Clarify(f"'{target.pick} {target.name}' cannot be asked of a map; say what it is near."))
+    return (target,)
+
+
+def _for_use(use: str) -> tuple[Target, ...]:
+    """Return the things that serve a purpose."""
+    uses = load_grammar().lists["uses"]
+    key = max((key for key in uses if use.startswith(key)), key=len, default=None)
+    if key is None:
+        raise Unresolved(Clarify(f"What serves to {use} is not known; name the thing."))
+    return tuple(Target(Kind.OBJECT, name.strip()) for name in uses[key].split(","))
+
+
+def _checked(target: Target, read: Sentence, given: Given, notes: list[str]) -> Target:
+    if target.is_file and not target.name:
+        path: str | None = given.image if target.kind is Kind.IMAGE else given.clip
+        if path is None:
+            option = "--image" if target.kind is Kind.IMAGE else "--sound-clip"
+            raise QueryError(f"The sentence speaks of a file that is not given; add {option} FILE.")
+        target = replace(target, name=path)
+    elif not read.names.known(target):
+        raise QueryError(unknown(target.name).question)
+    if target.name in read.names.mended:
+        notes.append(f"'{read.names.mended[target.name]}' is read as '{target.name}'.")
+    return replace(target, near=tuple(_checked(one, read, given, notes) for one in target.near))
+
+
+Knows = Callable[[str], bool]
