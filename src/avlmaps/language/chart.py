@@ -12,6 +12,7 @@ from avlmaps.language.grammar import BUILT_IN, Grammar, Part, Template
 from avlmaps.language.lexer import Token
 
 _COMMA = 0.4
+_FILLER = 0.3
 _MOST_A_SPAN = 3
 _MOST_REPEATS = 6
 BuiltIn = Callable[[int], "list[tuple[int, float, Any]]"]
@@ -155,14 +156,20 @@ class Chart:
             yield at, 0.0, ()
             return
         starts = [(at, 0.0)]
-        if k and at < len(self.tokens) and self.tokens[at].text in (",", "-") and parts[k].name not in (",", "-"):
-            starts.append((at + 1, _COMMA))
+        if k and at < len(self.tokens):
+            starts += self._skips(at, parts[k])
         for start, extra in starts:
             for middle, cost, slots in self._part(parts[k], start, depth):
                 if extra and middle == start:
                     continue  # a comma belongs before something
                 for end, more, rest in self._sequence(parts, k + 1, middle, depth):
                     yield end, cost + more + extra, slots + rest
+
+    def _skips(self, at: int, part: Part) -> list[tuple[int, float]]:
+        """Return where a part may begin behind a comma or words that say nothing."""
+        if self.tokens[at].text in (",", "-"):
+            return [(at + 1, _COMMA)] if part.name not in (",", "-") else []
+        return [(edge.end, _FILLER) for edge in self.terminal("FILLER", at) if edge.end == at + 1]
 
     def _many(self, part: Part, at: int, depth: int) -> Iterator[tuple[int, float, Slots]]:
         yield at, 0.0, ()

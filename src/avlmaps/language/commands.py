@@ -7,13 +7,14 @@ from avlmaps.core.errors import LanguageError
 from avlmaps.language.discourse import Composed, compose
 from avlmaps.language.intents import (
     Beside, Between, Circle, Clarify, Face, Go, Intent, Kind, Refuse, Repeat, StopAt, Target, VisitEach,
+    Wait,
 )  # fmt: skip
 from avlmaps.language.names import near_names
 from avlmaps.language.readings import Sentence, readings
 
 MOST_CHARACTERS = 1000
 _EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
-_MARGIN = 0.12  # readings of different meaning that are closer are asked about
+_MARGIN = 0.06  # readings of different meaning that are closer are asked about
 _ASKING = 1.5  # a reading that ends in a question or a refusal counts as so much worse than one that does not
 
 
@@ -84,7 +85,7 @@ def read_command(text: str, given: Given | None = None) -> Command:
         composed = compose(sentence, reading)
         intents, notes = _guarded(composed, sentence, given)
         extra = _ASKING if isinstance(intents[0], Clarify | Refuse) else 0.0
-        if not any(one.intents == intents for one in weighed):
+        if not any(_same(one.intents, intents) for one in weighed):
             weighed.append(Weighed(intents, reading.cost + extra, notes, composed.skipped))
     if not weighed:
         weighed = [Weighed((Clarify(f"I do not understand this. Say it like: {_EXAMPLE}."),), 99.0)]
@@ -109,6 +110,11 @@ def _decided(weighed: tuple[Weighed, ...], sentence: Sentence) -> Command:
             question = f"This can mean two things. 1: {choices[0]} 2: {choices[1]} Which one?"
             return Command((Clarify(question, choices),), best.notes, weighed)
     return Command(best.intents, best.notes, weighed)
+
+
+def _same(a: tuple[Intent, ...], b: tuple[Intent, ...]) -> bool:
+    """Return whether two readings drive alike; a wait makes no difference."""
+    return tuple(one for one in a if not isinstance(one, Wait)) == tuple(one for one in b if not isinstance(one, Wait))
 
 
 def check_length(text: str, what: str, example: str) -> None:

@@ -79,10 +79,19 @@ class _Composer:
                 self.notes.append(f"'{item.value}' has no effect: the robot has one speed.")
             case "THOUGH" if len(self.groups) > 1 and not rest and item.value in ("first", "beforehand", "first though"):
                 self.groups.insert(-1, self.groups.pop())
+            case "remark":
+                self.files_of(item)
             case "skip":
+                self.files_of(item)
                 self.skipped.append(self.sentence.words(item.start, item.end))
             case _:
                 pass
+
+    def files_of(self, item: Item) -> None:
+        """Remember the files that a remark names."""
+        for token in self.sentence.tokens[item.start : item.end]:
+            if token.kind in ("image", "clip"):
+                self.memory.add(Target(Kind(token.kind), token.text))
 
     def boundary(self, item: Item) -> None:
         if self.sentence.words(item.start, item.end).strip() in _HARD and self.held and self.groups:
@@ -156,7 +165,7 @@ class _Composer:
         return bool(self.groups) and self.groups[-1].sentence == self.number and self.groups[-1].kind in ("go", "face", "each")
 
     def is_referred_to(self, rest: tuple[Item, ...]) -> bool:
-        following = next((item for item in rest if item.kind in ("order", "bare", "refuse")), None)
+        following = next((item for item in rest if item.kind in ("order", "refuse")), None)
         return following is not None and following.kind == "order" and _refers(following.value)
 
     def mention(self, tree: Any) -> None:
@@ -174,6 +183,11 @@ class _Composer:
             whole = resolve(Tree("target", (("at", at),), 0, 0), self.memory)
             near += [Target(whole.kind, whole.name, (), whole.pick), *whole.near]
         if base is None and not near:
+            return
+        if tree.get("same") == "yes":
+            last = self.memory.last("it")
+            self.memory.targets.remove(last)
+            self.memory.add(last.with_near(*near))
             return
         target = resolve(base, self.memory).with_near(*near) if base is not None else near[0].with_near(*near[1:])
         self.memory.add(target)
@@ -213,7 +227,7 @@ def compose(sentence: Sentence, reading: Reading) -> Composed:
     try:
         for k, item in enumerate(reading.items):
             if item.kind in ("refuse", "chat", "inquire"):
-                if item.kind == "inquire" and any(one.kind in ("order",) for one in reading.items[k + 1 :]):
+                if item.kind != "refuse" and any(one.kind == "order" for one in reading.items):
                     continue
                 stop = refuse(item.value.get("reason"))
                 break
@@ -257,6 +271,8 @@ def _tidied(intents: list[Intent]) -> list[Intent]:
     for intent in intents:
         if kept and intent == kept[-1] and isinstance(intent, Go | Face | Return):
             continue
+        if kept and isinstance(kept[-1], Face) and isinstance(intent, Go) and kept[-1].to == intent.to and intent.to.is_file:
+            kept.pop()
         kept.append(intent)
     return kept
 

@@ -15,7 +15,7 @@ from avlmaps.language.lexer import Token
 from avlmaps.language.names import Names
 
 MOST_READINGS = 4
-_RUN_ON, _BARE, _MENTION, _REMARK, _REMARK_WORD = 0.8, 1.1, 0.9, 1.5, 0.04
+_RUN_ON, _BARE, _MENTION, _REMARK, _REMARK_WORD = 0.8, 1.1, 0.9, 1.15, 0.04
 _SKIP, _SKIP_MARK, _SKIP_MEANING, _ORDER = 2.6, 0.05, 6.0, 0.3
 _HARD = frozenset({".", "!", "?", ";"})
 _BREAKS = frozenset({*_HARD, ",", ":", "-", ">"})
@@ -171,7 +171,7 @@ def _steps(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | No
 def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | None, bool]]:
     """Yield the statements that begin at a token: what people say about themselves, or why."""
     chart, tokens = sentence.chart, sentence.tokens
-    because = tokens[at].text in ("because", "since", "as", "so", "before", "while", "until", "which", "where")
+    because = tokens[at].text in ("because", "since", "as", "so", "before", "while", "until", "which", "where", "when", "in", "by", "within")
     starts = chart.terminal("SUBJECT", at)
     if not starts:
         return
@@ -180,7 +180,7 @@ def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | 
     for end in range(at, len(tokens)):
         token = tokens[end]
         words.append(token.text)
-        finite = finite or bool(chart.terminal("FINITE", end))
+        finite = finite or bool(chart.terminal("FINITE", end)) or token.text in ("minute", "moment", "o'clock", "noon", "arrive", "arrives", "starts", "sleep")
         if end > at and token.text in ("not", "never", "if", "unless") and "you" in words:
             return
         after = tokens[end + 1].text if end + 1 < len(tokens) else "."
@@ -190,5 +190,5 @@ def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | 
                 Item("remark", None, at, end + 1),
                 _REMARK + _REMARK_WORD * len(words) + 1.5 * orders, after in _BREAKS or None, not because,
             )  # fmt: skip
-        if after in _HARD:
+        if after in _BREAKS:
             return
