@@ -16,7 +16,7 @@ use_one_thread()
 import numpy as np  # noqa: E402
 
 from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
-from avlmaps.maps.fusion import VoxelAccumulator  # noqa: E402
+from avlmaps.maps.fusion.accumulator import VoxelAccumulator  # noqa: E402
 from avlmaps.maps.grid import GridSpec  # noqa: E402
 from avlmaps.recordings.types import Frame  # noqa: E402
 

@@ -22,13 +22,13 @@ import numpy as np
 import timing
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.camera import Rig as CameraRig
-from avlmaps.maps.checkpoints import save_checkpoint
-from avlmaps.maps.manifest import Box, Counts, MapInfo, RecordingInfo, RigInfo, Timings, UpInfo
-from avlmaps.maps.parts import PartInfo
+from avlmaps.maps.fusion.voxel_sums import VoxelSums
+from avlmaps.maps.partial_maps import PartInfo
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store import MapContent, write_map
+from avlmaps.maps.store.checkpoints import save_checkpoint
+from avlmaps.maps.store.manifest import Box, Counts, MapInfo, RecordingInfo, RigInfo, Timings, UpInfo
+from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
-from avlmaps.maps.voxel_sums import VoxelSums
 
 PEAK = """
 import json, pathlib, resource, sys, time
@@ -39,7 +39,7 @@ def peak_mb():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 """
 OPEN = """
-from avlmaps.maps.stored import open_stored
+from avlmaps.maps.store.reader import open_stored
 before = time.perf_counter()
 stored = open_stored(sys.argv[1], verify=sys.argv[2] == "verify")
 opened = time.perf_counter()
@@ -51,8 +51,8 @@ print(json.dumps({"open_s": opened - before, "features": mapped, "then_5000_rows
 MERGE = """
 from pathlib import Path
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.parts import add_up, load_part
-from avlmaps.maps.shards import write_array
+from avlmaps.maps.partial_maps import add_up, load_part
+from avlmaps.maps.store.array_files import write_array
 before = time.perf_counter()
 folders = sorted(Path(sys.argv[1]).glob("part*"))
 voxels = add_up([load_part(folder, verify=False) for folder in folders], GridSpec()).voxels()

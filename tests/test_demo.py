@@ -21,7 +21,7 @@ from avlmaps.demo.run import REACH_M, DemoReport, DemoSettings, Step, record_set
 from avlmaps.demo.svg import Sheet
 from avlmaps.language.rules import command_to_program
 from avlmaps.navigate.instruct import Outcome
-from avlmaps.navigate.moves import Move
+from avlmaps.navigate.motion_log import Move
 from avlmaps.perception.embedded.scene_network import load_network
 from avlmaps.query.question import Modality
 from avlmaps.sim import furniture

@@ -9,8 +9,8 @@ import pytest
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
-from avlmaps.sim.raycast import render
-from avlmaps.sim.room import Room
+from helpers.raycast import render
+from helpers.room import Room
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

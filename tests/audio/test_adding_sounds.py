@@ -8,7 +8,7 @@ import soundfile
 from audio_fakes import FakeWalk, quiet, straight_walk, tone, track_of
 
 from avlmaps.core.errors import AudioError, RecordingError
-from avlmaps.maps.segmentation import segment
+from avlmaps.maps.audio.segmentation import segment
 from avlmaps.recordings.add_sounds import add_sounds, read_events
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.clips import audible, find_clips, loudness_db

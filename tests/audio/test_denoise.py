@@ -7,7 +7,7 @@ from audio_fakes import RATE_HZ, quiet, tone
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.maps.denoise import NoiseProfile, denoised, denoised_blocks, noise_profile
+from avlmaps.maps.audio.denoise import NoiseProfile, denoised, denoised_blocks, noise_profile
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.background import background
 from avlmaps.recordings.clips import amplified, audible_part, find_clips, loudness_db

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError, BackendError
-from avlmaps.maps.segmentation import Segment, SegmentationSettings, segment
-from avlmaps.maps.sounds import HearingSettings, hear
-from avlmaps.maps.sounds import track_of as places_of
+from avlmaps.maps.audio.events import HearingSettings, hear
+from avlmaps.maps.audio.events import track_of as places_of
+from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings, segment
 from avlmaps.recordings.audio import AudioTrack
 
 PLAIN = HearingSettings()

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError
-from avlmaps.maps.band_levels import band_powers
-from avlmaps.maps.segmentation import Segment, SegmentationSettings, segment
+from avlmaps.maps.audio.filterbank import band_powers
+from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings, segment
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 
 HOP_S = 0.01
@@ -134,7 +134,7 @@ def test_segments_do_not_depend_on_the_size_of_blocks(tmp_path: Path, monkeypatc
         for method in ("adaptive", "silence")
     }  # pyright: ignore[reportArgumentType]
     for seconds in (0.07, 1.0, 3.3):
-        monkeypatch.setattr("avlmaps.maps.segmentation._BLOCK_S", seconds)
+        monkeypatch.setattr("avlmaps.maps.audio.segmentation._BLOCK_S", seconds)
         for method, found in expected.items():
             assert segment(track, replace(BARE, method=method, silence_threshold=0.02)) == found  # pyright: ignore[reportArgumentType]
     assert len(expected["adaptive"]) > 3

@@ -5,7 +5,7 @@ import pytest
 
 from avlmaps.bench.intervals import poisson, wilson
 from avlmaps.bench.segmentation import COLUMNS, Tally, clips_to_test, measure
-from avlmaps.maps.segmentation import Segment, SegmentationSettings
+from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings
 
 
 def test_a_segment_over_two_sounds_finds_one_of_them() -> None:

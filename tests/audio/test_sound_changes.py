@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError, BackendError
+from avlmaps.maps.audio.change_points import ChangeSettings, cut_at_changes, frames_of_track
+from avlmaps.maps.audio.events import HearingSettings, hear
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.sound_changes import ChangeSettings, cut_at_changes, frames_of_track
-from avlmaps.maps.sounds import HearingSettings, hear
 from avlmaps.perception.protocols import FrameSoundEncoder, ModelCard
 from avlmaps.recordings.audio import Sound
 

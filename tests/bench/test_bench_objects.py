@@ -12,8 +12,8 @@ from avlmaps.bench.objects import auroc, measure, table_of
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.goals import find_goals
 from avlmaps.query.heatmap import Heatmap, NearThings
-from avlmaps.query.level import Space
 from avlmaps.query.question import Modality, Part, Role
+from avlmaps.query.voxel_space import Space
 from avlmaps.sim.scene import SceneObject
 
 SIZE_M = 0.05

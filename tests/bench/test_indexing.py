@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.bench.indexing.asked_scene import AskedScene
 from avlmaps.bench.indexing.configurations import CONFIGURATIONS, configurations
 from avlmaps.bench.indexing.factors import near_polygon, true_regions
 from avlmaps.bench.indexing.metrics import LIMITS_M, Answered, bootstrapped_mean, judged, scored
@@ -26,6 +25,7 @@ from avlmaps.bench.indexing.rules import (
     sound_tasks,
 )
 from avlmaps.bench.indexing.runs import IndexingSettings, run
+from avlmaps.bench.indexing.scene_queries import AskedScene
 from avlmaps.bench.indexing.tables import tables
 from avlmaps.bench.indexing.tasks import Box, Recorded, Task, TaskError, TaskKind, TaskSet, load_tasks, save_tasks
 from avlmaps.bench.indexing.true_voxels import TrueVoxels

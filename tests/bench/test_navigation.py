@@ -14,6 +14,7 @@ from avlmaps.bench.indexing.tasks import Box, Recorded, TaskError, TaskKind
 from avlmaps.bench.navigation import Episode, Leg, MissionSet, Outcome, load_missions, save_missions
 from avlmaps.bench.navigation.commands import COMMANDS, SPATIAL, command_missions
 from avlmaps.bench.navigation.configurations import CEILING, CONFIGURATIONS, OURS, configurations
+from avlmaps.bench.navigation.contact_monitor import Foreknowledge, WatchedBody
 from avlmaps.bench.navigation.episodes import Journal
 from avlmaps.bench.navigation.evidence import Ground
 from avlmaps.bench.navigation.floor import Floor
@@ -27,7 +28,6 @@ from avlmaps.bench.navigation.runs import SceneFacts
 from avlmaps.bench.navigation.scores import scored
 from avlmaps.bench.navigation.settings import NavigationSettings
 from avlmaps.bench.navigation.tables import TITLE, tables
-from avlmaps.bench.navigation.watched import Foreknowledge, WatchedBody
 from avlmaps.core.motion import Action, GroundPose, Moved
 from avlmaps.language.program import parse_program
 from avlmaps.language.rules import command_to_program

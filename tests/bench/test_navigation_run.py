@@ -11,13 +11,13 @@ import pytest
 from avlmaps.bench.indexing.tasks import Box
 from avlmaps.bench.indexing.true_voxels import TrueVoxels
 from avlmaps.bench.navigation.configurations import CEILING, Configuration, configurations
+from avlmaps.bench.navigation.episode_runner import Pilot
 from avlmaps.bench.navigation.episodes import Episode
 from avlmaps.bench.navigation.floor import Floor
 from avlmaps.bench.navigation.goals import Goal, GoalKind
+from avlmaps.bench.navigation.map_variants import KnownScene, Perceived, Senses
 from avlmaps.bench.navigation.missions import Mission, Series
-from avlmaps.bench.navigation.perceived import KnownScene, Perceived, Senses
 from avlmaps.bench.navigation.phrases import a_sound, an_object, near_sound
-from avlmaps.bench.navigation.pilot import Pilot
 from avlmaps.bench.navigation.runs import run
 from avlmaps.bench.navigation.settings import NavigationSettings
 from avlmaps.bench.navigation.suite import run_navigation

@@ -13,8 +13,8 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
-from avlmaps.sim.raycast import render
-from avlmaps.sim.room import Room
+from helpers.raycast import render
+from helpers.room import Room
 
 CAMERA = Pinhole(160.0, 160.0, 120.0, 90.0, 240, 180)
 RATE_HZ = 22050

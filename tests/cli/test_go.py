@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from avlmaps.sim.materials import material
-from avlmaps.sim.room import Room
 from avlmaps.sim.scene import Scene, SceneBuilder
 from avlmaps.sim.shapes import slab
+from helpers.room import Room
 
 
 def scene_of(room: Room) -> Scene:

@@ -10,8 +10,8 @@ import pytest
 import soundfile
 
 from avlmaps.core.poses import rotation_angle_rad
-from avlmaps.sim.raycast import render
-from avlmaps.sim.room import Room
+from helpers.raycast import render
+from helpers.room import Room
 
 from .conftest import CAMERA, RATE_HZ, beeps
 

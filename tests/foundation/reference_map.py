@@ -17,10 +17,10 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.avlmaps_layout import WORLD_FROM_HABITAT, base_from_camera
+from avlmaps.recordings.formats.avlmaps_layout import WORLD_FROM_HABITAT, base_from_camera
 from avlmaps.recordings.types import Frame
-from avlmaps.sim.raycast import ROOM, View, render
-from avlmaps.sim.room import Room
+from helpers.raycast import ROOM, View, render
+from helpers.room import Room
 
 CAMERA = Pinhole(24.0, 24.0, 24.0, 16.0, 48, 32)  # 90 degrees, as the data set
 CELL_M = 0.1

@@ -35,11 +35,11 @@ from avlmaps.core import poses, registry
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Backend, Kind
 from avlmaps.maps.build import BuildSettings, build_map
-from avlmaps.maps.reference.convert import ImportSettings, import_reference_map
-from avlmaps.maps.stored import StoredMap, verify_stored
+from avlmaps.maps.import_reference.convert import ImportSettings, import_reference_map
+from avlmaps.maps.store.reader import StoredMap, verify_stored
 from avlmaps.perception.profiles import Profile, register_profile
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.recordings.avlmaps_layout import base_poses
+from avlmaps.recordings.formats.avlmaps_layout import base_poses
 
 SETTINGS = ImportSettings(cell_size_m=CELL_M)
 # From a point to the middle of the reference's cell, from there to the middle of ours, and from the point to that of

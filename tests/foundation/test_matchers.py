@@ -25,7 +25,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.registry import Kind, load
 from avlmaps.maps.build import build_map
-from avlmaps.maps.stored import open_stored
+from avlmaps.maps.store.reader import open_stored
 from avlmaps.perception.conformance import check
 from avlmaps.perception.foundation import aliked, disk
 from avlmaps.perception.foundation.lightglue import LightGlue

@@ -34,13 +34,13 @@ from avlmaps.cli import main
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, backends, load
-from avlmaps.maps.stored import open_stored
+from avlmaps.maps.store.reader import open_stored
 from avlmaps.perception.models.availability import availability
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
-from avlmaps.sim.raycast import render
-from avlmaps.sim.room import Room
+from helpers.raycast import render
+from helpers.room import Room
 
 CAMERA = Pinhole(80.0, 80.0, 60.0, 45.0, 120, 90)
 RATE_HZ = 16_000

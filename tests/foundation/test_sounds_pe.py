@@ -14,7 +14,7 @@ from transformers import PeAudioFrameLevelModel, PeAudioProcessor
 
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.registry import Kind
-from avlmaps.maps.sound_changes import cut_at_changes, frames_of_track
+from avlmaps.maps.audio.change_points import cut_at_changes, frames_of_track
 from avlmaps.perception.conformance import check
 from avlmaps.perception.foundation.pe_a_frame import FrameSounds, _chunks, _Space
 from avlmaps.perception.protocols import FrameSoundEncoder

@@ -16,7 +16,7 @@ from avlmaps.core.registry import Kind, find, load
 from avlmaps.perception.conformance import example_frame
 from avlmaps.perception.profiles import profile
 from avlmaps.perception.protocols import LocalFeatures, PlaceEncoder, ViewEncoder
-from avlmaps.query.areas import AREA_NAMES, AreaSettings, area_scores, same_place
+from avlmaps.query.modalities.area import AREA_NAMES, AreaSettings, area_scores, same_place
 
 
 def _plain(folder: Path) -> None:

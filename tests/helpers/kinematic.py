@@ -9,10 +9,10 @@ import numpy as np
 from avlmaps.core.motion import Action, GroundPose
 from avlmaps.maps.grid import GridSpec
 from avlmaps.navigate.driver import Arrival
-from avlmaps.navigate.outline import Outline
+from avlmaps.navigate.footprint import Outline
+from avlmaps.navigate.instances import Thing
 from avlmaps.navigate.skills import Robot, RobotSettings
-from avlmaps.navigate.things import Thing
-from avlmaps.query.level import Space
+from avlmaps.query.voxel_space import Space
 
 UP = np.array([0.0, 0.0, 1.0])
 

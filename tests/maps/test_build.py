@@ -14,12 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import MapError, RecordingError
-from avlmaps.maps.ahead import run_ahead
 from avlmaps.maps.build import build_map, build_part, describe, merge_parts
-from avlmaps.maps.checks import array_fields
-from avlmaps.maps.parts import load_part, plan_spans
+from avlmaps.maps.partial_maps import load_part, plan_spans
+from avlmaps.maps.prefetch import run_ahead
 from avlmaps.maps.settings import BuildSettings, FrameSettings
-from avlmaps.maps.stored import StoredMap, open_stored, verify_stored
+from avlmaps.maps.store.array_validation import array_fields
+from avlmaps.maps.store.reader import StoredMap, open_stored, verify_stored
 from avlmaps.maps.types import Keyframes
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.subset import Subset
@@ -101,7 +101,7 @@ def test_a_damaged_map_can_be_overwritten(tmp_path: Path) -> None:
 
 
 def test_an_opened_map_stays_readable_when_it_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("avlmaps.maps.shards.SMALL_BYTES", 0)
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
     before = build(Walk(6), tmp_path / "a")
     assert isinstance(before.voxels.feature, np.memmap)
     expected = build(Walk(6), tmp_path / "b").voxels.feature
@@ -336,7 +336,7 @@ def test_finished_keyframes_and_sounds_are_not_made_again(tmp_path: Path, monkey
         with pytest.raises(KeyboardInterrupt):
             build(walk, tmp_path / "a")
     monkeypatch.setattr("avlmaps.maps.keyframe_stage.see_keyframe", None)
-    monkeypatch.setattr("avlmaps.maps.sounds.hear", None)
+    monkeypatch.setattr("avlmaps.maps.audio.events.hear", None)
     assert len(build(walk, tmp_path / "a").sounds) == 2
 
 

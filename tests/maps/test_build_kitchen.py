@@ -7,7 +7,7 @@ import pytest
 
 from avlmaps.maps.build import build_map, describe
 from avlmaps.maps.settings import BuildSettings, FrameSettings
-from avlmaps.maps.stored import StoredMap, verify_stored
+from avlmaps.maps.store.reader import StoredMap, verify_stored
 from avlmaps.perception.profiles import Profile, register_profile
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.subset import Subset

@@ -18,15 +18,15 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.build import build_map, build_part
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.perception.conformance import check
-from avlmaps.perception.models.feature_store import CacheSettings, FeatureStore, key_of
-from avlmaps.perception.models.remembering import (
+from avlmaps.perception.cache.cached_encoders import (
     RememberingFrameSounds,
     RememberingKeypoints,
     RememberingPixels,
     came_from_store,
     remembering,
 )
+from avlmaps.perception.cache.feature_store import CacheSettings, FeatureStore, key_of
+from avlmaps.perception.conformance import check
 from avlmaps.perception.models.settings import ModelSettings, using_models
 from avlmaps.perception.profiles import Profile, profile
 from avlmaps.perception.protocols import (
@@ -164,7 +164,7 @@ def test_what_was_used_longest_ago_goes_first(tmp_path: Path) -> None:
     later = FeatureStore(tmp_path, 5.5 * size)
     later._opened_s -= 10.0
     assert later.get(Kind.PIXELS, CARD, "old2") is not None  # the oldest, but used now
-    import avlmaps.perception.models.feature_store as module
+    import avlmaps.perception.cache.feature_store as module
 
     share, module._LARGEST_SHARE = module._LARGEST_SHARE, 1.0
     try:

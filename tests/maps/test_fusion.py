@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import BackendError, MapError, RecordingError
-from avlmaps.maps.fusion import FusionSettings, VoxelAccumulator, VoxelSums
+from avlmaps.maps.fusion.accumulator import FusionSettings, VoxelAccumulator, VoxelSums
 from avlmaps.maps.grid import GridSpec
 from avlmaps.recordings.types import Frame
 

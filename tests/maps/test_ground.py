@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.maps.ground import USUAL_HEIGHT_M, find_ground
+from avlmaps.maps.gravity.floor import USUAL_HEIGHT_M, find_ground
 from avlmaps.recordings.types import Frame
-from avlmaps.sim.raycast import render
-from avlmaps.sim.room import Room
+from helpers.raycast import render
+from helpers.room import Room
 
 CAMERA = Pinhole(160.0, 160.0, 160.0, 120.0, 320, 240)
 UP = np.array([0.0, 0.0, 1.0])

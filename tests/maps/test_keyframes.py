@@ -18,7 +18,7 @@ from avlmaps.maps.keyframes import (
     see_keyframe,
     select_keyframes,
 )
-from avlmaps.maps.lifting import lifted, middle_of_view
+from avlmaps.maps.keypoint_depth import lifted, middle_of_view
 from avlmaps.perception.profiles import Profile, profile
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.registration import depth_in_colour

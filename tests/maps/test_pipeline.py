@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, register
-from avlmaps.maps.ahead import run_ahead
 from avlmaps.maps.build import build_map
-from avlmaps.maps.manifest import BadFrame
-from avlmaps.maps.perceiving import perceived
+from avlmaps.maps.encoding import perceived
+from avlmaps.maps.prefetch import run_ahead
+from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.perception.profiles import Profile, profile
 from avlmaps.recordings.types import Frame
 

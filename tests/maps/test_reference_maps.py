@@ -12,11 +12,11 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.reference.convert import ImportSettings, import_reference_map
-from avlmaps.maps.reference.places import Cubes, cubes_from_corner, cubes_from_first_base, voxels_filled
-from avlmaps.maps.reference.scene import find_scene
-from avlmaps.maps.reference.views import middles_of_view, thinned
-from avlmaps.recordings.avlmaps_layout import WORLD_FROM_HABITAT, base_from_camera, reference_map_from_world
+from avlmaps.maps.import_reference.convert import ImportSettings, import_reference_map
+from avlmaps.maps.import_reference.places import Cubes, cubes_from_corner, cubes_from_first_base, voxels_filled
+from avlmaps.maps.import_reference.scene import find_scene
+from avlmaps.maps.import_reference.views import middles_of_view, thinned
+from avlmaps.recordings.formats.avlmaps_layout import WORLD_FROM_HABITAT, base_from_camera, reference_map_from_world
 
 
 def _cells(points_map: np.ndarray, grid: int, cell_m: float) -> np.ndarray:

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.registry import Backend, Kind, forget_loaded, register
 from avlmaps.maps.build import build_map
-from avlmaps.maps.manifest import ModelInfo
-from avlmaps.maps.stored import open_stored
+from avlmaps.maps.store.manifest import ModelInfo
+from avlmaps.maps.store.reader import open_stored
 from avlmaps.perception.models.names import public_choice, public_name
 from avlmaps.perception.profiles import Profile, profile, register_profile
 

@@ -16,7 +16,7 @@ import pytest
 from build_fakes import register_fakes
 
 from avlmaps.core.errors import MapError
-from avlmaps.maps.stored import open_stored
+from avlmaps.maps.store.reader import open_stored
 
 register_fakes()
 OLD, NEW = 1, 2  # seeds of the walks

@@ -18,10 +18,10 @@ from hypothesis.extra import numpy as hnp
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
 from avlmaps.maps.build import build_map
-from avlmaps.maps.checks import array_fields, assembled, check_order
-from avlmaps.maps.lock import is_locked, locked
-from avlmaps.maps.shards import SMALL_BYTES, read_array, write_array
-from avlmaps.maps.stored import has_unfinished_build, open_stored, verify_stored
+from avlmaps.maps.store.array_files import SMALL_BYTES, read_array, write_array
+from avlmaps.maps.store.array_validation import array_fields, assembled, check_order
+from avlmaps.maps.store.lock import is_locked, locked
+from avlmaps.maps.store.reader import has_unfinished_build, open_stored, verify_stored
 from avlmaps.maps.types import HeardSounds, Voxels
 
 PROFILE = register_fakes()
@@ -232,7 +232,7 @@ def test_a_flipped_bit_in_a_small_file_is_always_seen(copied: Path) -> None:
 
 
 def test_a_flipped_bit_in_a_large_file_is_seen_when_asked(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("avlmaps.maps.shards.SMALL_BYTES", 0)
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
     file = file_of(copied, "voxels/feature")
     flip(file)
     open_stored(copied)
@@ -345,7 +345,7 @@ def test_the_order_of_voxels_is_told_exactly(index: np.ndarray) -> None:
 
 def test_a_map_replaced_while_it_is_opened_is_opened_anew(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Between reading map.json and the files, another build's commit removes the old files."""
-    from avlmaps.maps import stored
+    from avlmaps.maps.store import reader as stored
 
     opened, calls = stored._opened, []
 

@@ -14,11 +14,11 @@ from avlmaps.core.errors import GoalNotFoundError, ProgramError, QueryError
 from avlmaps.core.motion import GroundPose
 from avlmaps.language.vocabulary import Picture, Place
 from avlmaps.maps.grid import GridSpec
-from avlmaps.navigate.outline import Outline, middle_between
-from avlmaps.navigate.readable import Readable, named_files, offered_by
+from avlmaps.navigate.file_access import Readable, named_files, offered_by
+from avlmaps.navigate.footprint import Outline, middle_between
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.level import Space
+from avlmaps.query.voxel_space import Space
 from helpers.kinematic import KinematicDriver
 from query.query_fakes import FakeViews, furnished_map, keyframes_at, sounds_of
 

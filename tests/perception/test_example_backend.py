@@ -16,7 +16,7 @@ import numpy as np
 from pathlib import Path
 from avlmaps.core.registry import Kind, find, load
 from avlmaps.maps.build import build_map
-from avlmaps.maps.stored import open_stored
+from avlmaps.maps.store.reader import open_stored
 from avlmaps.perception.conformance import check
 from avlmaps.perception.profiles import profile
 from avlmaps.recordings.open import open_recording

@@ -8,7 +8,7 @@ import soundfile
 
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.perception.embedded.sounds import EmbeddedSounds
-from avlmaps.perception.taught import forget_sound, sounds_folder, taught_sounds, teach_sound
+from avlmaps.perception.enrolment import forget_sound, sounds_folder, taught_sounds, teach_sound
 from avlmaps.perception.user_folder import user_folder
 from avlmaps.recordings.audio import AudioTrack, Sound
 

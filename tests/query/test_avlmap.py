@@ -10,8 +10,8 @@ from query_fakes import fake_map, fake_profile, furnished_map, keyframes_at, sou
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError, BackendError, QueryError
 from avlmaps.query import locate as locate_module
-from avlmaps.query.areas import AreaSettings
 from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.query.modalities.area import AreaSettings
 from avlmaps.query.photometric import Panoramas, Start
 from avlmaps.query.question import Modality, Part, Question, Role
 from avlmaps.recordings.audio import AudioTrack, Sound

@@ -5,11 +5,11 @@ from hypothesis import strategies as st
 from query_fakes import UP, furnished_map, keyframes_at, sounds_of
 
 from avlmaps.maps.grid import GridSpec
-from avlmaps.query.areas import AreaSettings, modes
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.heatmap import Heatmap, NearAnchors
-from avlmaps.query.level import Space
+from avlmaps.query.modalities.area import AreaSettings, modes
 from avlmaps.query.question import Modality, Part, Role
+from avlmaps.query.voxel_space import Space
 
 
 def track(x: float, y: float, z: float = 1.2, length_m: float = 1.0) -> np.ndarray:

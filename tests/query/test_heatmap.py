@@ -6,8 +6,8 @@ from hypothesis.extra import numpy as hnp
 
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.heatmap import Heatmap, HeatSettings, NearAnchors, anchor_heat, fused, normalised, object_heat
-from avlmaps.query.level import Space
 from avlmaps.query.question import Modality, Part, Role
+from avlmaps.query.voxel_space import Space
 
 SIZE_M = 0.05
 FALLOFFS = st.sampled_from([0.2, 0.7, 2.0, 9.0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from query_fakes import fake_map
 
-from avlmaps.maps.fusion import VoxelAccumulator
+from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.colours import ColourWords
 from avlmaps.query.avlmap import AVLMap

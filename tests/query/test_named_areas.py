@@ -10,10 +10,10 @@ from query_fakes import keyframes_at
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedViewEncoder
-from avlmaps.query.areas import AreaSettings, area_factor, area_scores, pooled
 from avlmaps.query.heatmap import HeatSettings
-from avlmaps.query.level import Space
+from avlmaps.query.modalities.area import AreaSettings, area_factor, area_scores, pooled
 from avlmaps.query.question import Modality, Part, Role
+from avlmaps.query.voxel_space import Space
 
 ROOMS = ("kitchen", "bedroom", "office", "open-plan office")
 MEANT = {"kitchen": (1, 0, 0, 0), "workplace": (0, 0, 1, 1)}

@@ -8,11 +8,11 @@ import pytest
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
+from avlmaps.query.colour_filter import tint_of
 from avlmaps.query.heatmap import Heatmap, HeatSettings, NearAnchors
-from avlmaps.query.level import Space
-from avlmaps.query.objects import Asked, ObjectSettings, Rivals, object_factor
+from avlmaps.query.modalities.object import Asked, ObjectSettings, Rivals, object_factor
 from avlmaps.query.question import Modality, Part, Role
-from avlmaps.query.tints import tint_of
+from avlmaps.query.voxel_space import Space
 
 NAMES = ("chair", "dining table", "coffee table", "floor", "other")
 MEANT = {

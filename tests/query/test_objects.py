@@ -9,9 +9,9 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.query.heatmap import HeatSettings
 from avlmaps.query.kernels import feature_scores, linked
-from avlmaps.query.level import Space
-from avlmaps.query.objects import ObjectSettings, Rivals, instance_confidence, object_factor, object_margins
+from avlmaps.query.modalities.object import ObjectSettings, Rivals, instance_confidence, object_factor, object_margins
 from avlmaps.query.question import Modality, Part
+from avlmaps.query.voxel_space import Space
 
 
 def unit_rows(rng: np.random.Generator, n: int, d: int) -> np.ndarray:

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from query_fakes import furnished_map, keyframes_at
 
 from avlmaps.perception.protocols import ModelCard, ScaledEncoder
-from avlmaps.query.areas import AREA_NAMES, AreaSettings, area_scores, same_place
 from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.query.modalities.area import AREA_NAMES, AreaSettings, area_scores, same_place
 
 _DIM = 64
 

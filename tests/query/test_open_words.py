@@ -9,10 +9,10 @@ from query_fakes import UP, box
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.query.heatmap import HeatSettings
-from avlmaps.query.level import Space
-from avlmaps.query.objects import ObjectSettings, Rivals, instance_confidence, object_factor
-from avlmaps.query.open_words import fitting, is_a, is_open
+from avlmaps.query.modalities.object import ObjectSettings, Rivals, instance_confidence, object_factor
 from avlmaps.query.question import Modality, Part
+from avlmaps.query.synonyms import fitting, is_a, is_open
+from avlmaps.query.voxel_space import Space
 
 WORDS = ("chair", "office chair", "dining table", "sofa", "bed", "lamp", "door", "floor", "other", "couch", "table")
 DIM = len(WORDS) + 8

@@ -14,9 +14,9 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.poses import apply, inverse, rotation_angle_rad
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Keyframes, Voxels
-from avlmaps.query.level import Space
 from avlmaps.query.photometric import Panoramas, PhotometricSettings, Start
 from avlmaps.query.photometric_kernels import compare_panoramas, compare_view, draw_panoramas
+from avlmaps.query.voxel_space import Space
 from helpers.picture_room import CAMERA, RoomWalk, looking
 
 SIZE_M = 0.05

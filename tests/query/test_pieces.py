@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.query.pieces import joined_pieces
+from avlmaps.query.instance_merging import joined_pieces
 
 CELL_M, JOIN_M, VOXEL_M = 0.1, 0.3, 0.05
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]

@@ -8,9 +8,9 @@ from query_fakes import UP, box, fake_map, furnished_map, keyframes_at, sounds_o
 from avlmaps.core.errors import QueryError
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.level import Space
 from avlmaps.query.plots import plot_map
 from avlmaps.query.topdown import TopDown
+from avlmaps.query.voxel_space import Space
 
 WALK = np.stack([np.linspace(1, 5, 20), 1 + np.sin(np.linspace(0, 3, 20)), np.full(20, 1.4)], axis=1)
 

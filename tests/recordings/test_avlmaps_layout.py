@@ -15,7 +15,7 @@ from recording_scenes import metres, pose_line, save_depth, save_rgb, shot
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.avlmaps_layout import (
+from avlmaps.recordings.formats.avlmaps_layout import (
     WORLD_FROM_HABITAT,
     base_from_camera,
     base_poses,

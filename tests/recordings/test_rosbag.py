@@ -13,9 +13,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import from_quaternion, inverse
+from avlmaps.recordings.formats.ros_messages import camera_of, depth_of
+from avlmaps.recordings.formats.rosbag import open_rosbag
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.ros_messages import camera_of, depth_of
-from avlmaps.recordings.rosbag import open_rosbag
 
 WIDTH, HEIGHT, RATE_HZ = 32, 24, 8000
 BODY_FROM_CAMERA = np.array([[0.0, 0, 1, 0.1], [-1, 0, 0, 0.0], [0, -1, 0, 0.9], [0, 0, 0, 1]])
@@ -226,7 +226,7 @@ def test_compressed_depth_is_undone() -> None:
 
 
 def test_a_static_chain_is_inverted_where_the_tree_asks() -> None:
-    from avlmaps.recordings.ros_transforms import TransformTree
+    from avlmaps.recordings.formats.ros_transforms import TransformTree
 
     tree = TransformTree()
     base_from_a = from_quaternion(np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 0.6, 0.8]))

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from avlmaps.sim.furniture import Piece, families, make
 from avlmaps.sim.furniture.decor import CARPET_SHAPES, carpet
 from avlmaps.sim.furniture.drapes import CURTAIN_STYLES, curtain
-from avlmaps.sim.furniture.joinery import blade, cloth, rim, strut, turned_ring
 from avlmaps.sim.furniture.openings import DOOR_STYLES, WINDOW_STYLES, door, folding_door, window
+from avlmaps.sim.furniture.recipe_helpers import blade, cloth, rim, strut, turned_ring
 from avlmaps.sim.mesh import Material
 
 # Category: least and greatest largest extent, greatest height (metres), least number of families.

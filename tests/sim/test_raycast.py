@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.poses import apply
-from avlmaps.sim.raycast import ROOM, Scene, render
-from avlmaps.sim.room import Room
+from helpers.raycast import ROOM, Scene, render
+from helpers.room import Room
 
 CAMERA = Pinhole(40.0, 42.0, 31.0, 25.0, 64, 48)
 

@@ -13,7 +13,7 @@ import pytest
 
 from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.recordings.add_sounds import read_events
-from avlmaps.recordings.folder import open_folder
+from avlmaps.recordings.formats.folder import open_folder
 from avlmaps.recordings.layout import UNFINISHED
 from avlmaps.sim import recorder
 from avlmaps.sim.mesh import Material

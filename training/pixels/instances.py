@@ -14,11 +14,11 @@ from training.pixels.worlds import FIRST_CALIBRATION_SEED
 from avlmaps.bench.objects import FEWEST_VOXELS, GROWN_M, STRUCTURE
 from avlmaps.core.errors import MapError
 from avlmaps.maps.build import build_map
-from avlmaps.maps.stored import StoredMap
+from avlmaps.maps.store.reader import StoredMap
 from avlmaps.perception.embedded.pixels import LARGEST_LOG_AREA, SMALLEST_LOG_AREA, EmbeddedPixels
 from avlmaps.perception.embedded.scene_network import InstanceNotes, Notes
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.objects import Asked, ObjectSettings, Rivals, object_pieces
+from avlmaps.query.modalities.object import Asked, ObjectSettings, Rivals, object_pieces
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
 from avlmaps.sim.recorder import RecordSettings, record_scene

@@ -17,7 +17,7 @@ from jaxtyping import Float32
 
 from avlmaps.bench.intervals import poisson, wilson
 from avlmaps.core.progress import progress
-from avlmaps.maps.segmentation import Segment, SegmentationSettings, segment
+from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings, segment
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.background import background
 from avlmaps.recordings.clips import Clip, amplified, audible_part, find_clips, gain_for

@@ -47,8 +47,8 @@ class ImportMap(ModelVerb):
 
 
 def _imported(verb: ImportMap) -> dict[str, Any]:
-    from avlmaps.maps.reference.convert import ImportSettings, import_reference_map
-    from avlmaps.maps.stored import describe
+    from avlmaps.maps.import_reference.convert import ImportSettings, import_reference_map
+    from avlmaps.maps.store.reader import describe
 
     settings = ImportSettings(verb.cell_size_m, verb.max_bad_share, verb.sounds, verb.hear_with)
     stored = import_reference_map(

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from avlmaps.cli.verbs import Build, Query, Record
     from avlmaps.core.camera import Pinhole
-    from avlmaps.perception.models.feature_store import CacheSettings
+    from avlmaps.perception.cache.feature_store import CacheSettings
     from avlmaps.perception.profiles import Profile
     from avlmaps.query.question import Part
     from avlmaps.recordings.types import Recording
@@ -137,7 +137,7 @@ def _chosen_profile(name: str, words: "Sequence[str]") -> "Profile":
 
 
 def _cache(place: str, limit_gb: float) -> "CacheSettings":
-    from avlmaps.perception.models.feature_store import CacheSettings
+    from avlmaps.perception.cache.feature_store import CacheSettings
 
     if place in ("auto", "off"):
         return CacheSettings(place, limit_gb)
@@ -172,7 +172,7 @@ def describe_path(path: Path, format: str, verify: bool, plot: Path | None) -> d
 
 
 def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]:
-    from avlmaps.maps.stored import describe, open_stored
+    from avlmaps.maps.store.reader import describe, open_stored
 
     stored = open_stored(path, verify=verify)
     if plot is not None:
@@ -263,7 +263,7 @@ def _camera_for(picture: Path | None, intrinsics: str | None) -> "Pinhole | None
         return None
     if picture is None:
         raise UsageError("--intrinsics belongs to a photo (--image); there is none.")
-    from avlmaps.query.images import read_picture
+    from avlmaps.query.modalities.image import read_picture
 
     height, width = read_picture(picture).shape[:2]
     return _camera_of(intrinsics, width, height)
@@ -284,7 +284,7 @@ def _camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":
 def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[str, Any]:
     """Locate a photo."""
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.images import read_picture
+    from avlmaps.query.modalities.image import read_picture
 
     rgb = read_picture(picture)
     given = None if intrinsics is None else _camera_of(intrinsics, rgb.shape[1], rgb.shape[0])
@@ -304,7 +304,7 @@ def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[
 
 def teach(name: str, clips: tuple[Path, ...]) -> dict[str, Any]:
     """Teach a kind of sound from clips, or forget it where there are none."""
-    from avlmaps.perception.taught import forget_sound, taught_sounds, teach_sound
+    from avlmaps.perception.enrolment import forget_sound, taught_sounds, teach_sound
 
     if clips:
         teach_sound(name, list(clips))

@@ -57,6 +57,9 @@ class Entry:
         rooms: names of the rooms where it usually is; for a sound, where it is also heard without its makers.
         like: what an encoder that does not know it may take it for, since they look alike: a freezer, a refrigerator.
         generic: whether it says too little to look for: an object, an appliance; what it is stands beside it.
+        wet: of a room, whether its walls get wet.
+        tiled: of a room, whether its floor is hard.
+        spoken: what people mostly say for it where that is not the name, else ``""``.
         split: ``training`` where an encoder which ships was trained to tell it; ``held out`` for all others.
     """
 
@@ -75,6 +78,9 @@ class Entry:
     rooms: tuple[str, ...] = ()
     like: tuple[str, ...] = ()
     generic: bool = False
+    wet: bool = False
+    tiled: bool = False
+    spoken: str = ""
     split: Split = "held out"
 
     @property
@@ -113,6 +119,16 @@ class Lexicon:
         """Return the entries, or those of one kind, in the order of the file."""
         kinds = Kind if kind is None else (kind,)
         return tuple(self._entry(each, name) for each in kinds for name in self._said[each])
+
+    def named(self, name: str, kind: Kind) -> Entry:
+        """Return the entry of exactly this name.
+
+        Raises:
+            KeyError: there is none; whoever lists names of entries finds out at once.
+        """
+        if name not in self._said[kind]:
+            raise KeyError(f"the lexicon has no {kind} {name!r}; add it to core/lexicon.toml")
+        return self._entry(kind, name)
 
     def find(self, phrase: str, kind: Kind | None = None) -> Entry | None:
         """Return the entry that a phrase names exactly, by any of its spellings; None where there is none.
@@ -174,21 +190,20 @@ class Lexicon:
         """Return all entries that a wider kind takes in, in the order of the file: "seat" takes in chair and sofa."""
         return tuple(entry for each in self.senses(wider) for entry in self._members[each.kind].get(each.name, ()))
 
-    def is_a(self, other: str, wanted: str) -> bool:
+    def is_a(self, other: str, wanted: str, kind: Kind | None = None) -> bool:
         """Return whether what one phrase names is what another wants.
 
         Args:
             other: ``red office chair``; its head counts.
             wanted: ``chair``, ``chairs`` or ``seat``; a chair is no office chair.
+            kind: compare only entries of this kind.
         """
-        wants = self.senses(wanted)
-        if not wants:
-            return _ends_with(other, wanted)
-        for kind in {entry.kind for entry in wants}:
-            named = self.senses(other, kind) or tuple(filter(None, (self.head(other, kind),)))
-            for entry in named:
-                if any(want is entry or want in self.wider(entry.name, kind) for want in wants):
-                    return True
+        for want in self.senses(wanted, kind):
+            named = self.senses(other, want.kind) or tuple(filter(None, (self.head(other, want.kind),)))
+            # A dining chair is a chair; an armchair is a chair too, and no dining chair.
+            wide = squeezed(wanted) not in map(squeezed, want.compounds)
+            if any(want is entry or (wide and want in self.wider(entry.name, want.kind)) for entry in named):
+                return True
         return _ends_with(other, wanted)
 
     def suggest(self, word: str, kind: Kind | None = None, most: int = 3) -> tuple[str, ...]:
@@ -243,12 +258,11 @@ class Lexicon:
         index = {squeezed(name): name for name in said}
         for key, names in self.ambiguous[kind].items():
             index.setdefault(key, names[0])
-        for words in (("plural",), ("also", "such_as"), ("learnt",)):
+        for field in ("plural", "also", "such_as", "learnt"):
             for name, own in said.items():
-                for word in words:
-                    for key in squeezed(own.get(word, "")).split(","):
+                if field in own:
+                    for key in squeezed(own[field]).split(","):
                         index.setdefault(key, name)
-        index.pop("", None)
         return index
 
     def _entry(self, kind: Kind, name: str) -> Entry:
@@ -259,7 +273,8 @@ class Lexicon:
     def _made(self, kind: Kind, name: str, said: Mapping[str, Any]) -> Entry:
         learnt = _listed(said.get("learnt", ""))
         # An encoder may take other things for one of its own: a tap for a sink. They are no synonyms.
-        same = (word for word in learnt if self._index[kind][squeezed(word)] == name)
+        special = _listed(said.get("such_as", ""))
+        same = (word for word in learnt if self._index[kind][squeezed(word)] == name and word not in special)
         return Entry(
             name=name,
             kind=kind,
@@ -267,7 +282,7 @@ class Lexicon:
             synonyms=(*same, *_listed(said.get("also", ""))),
             learnt=learnt,
             wider=_listed(said.get("wider", "")),
-            compounds=_listed(said.get("such_as", "")),
+            compounds=special,
             mount=said.get("mount", "floor"),
             size_m=_size(said["size"]) if "size" in said else None,
             soft=said.get("soft", False),
@@ -276,6 +291,9 @@ class Lexicon:
             rooms=_listed(said.get("rooms", "")),
             like=_listed(said.get("like", "")),
             generic=said.get("generic", False),
+            wet=said.get("wet", False),
+            tiled=said.get("tiled", False),
+            spoken=said.get("spoken", ""),
             split="training" if said.get("trained", False) else "held out",
         )
 

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float, Float32, Int, UInt8
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.query.level import Space
 from avlmaps.query.topdown import TopDown
+from avlmaps.query.voxel_space import Space
 from avlmaps.sim.render import Renderer
 from avlmaps.sim.scene import NOTHING, Scene
 

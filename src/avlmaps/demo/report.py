@@ -125,7 +125,7 @@ def _home(sheet: Sheet, home: Plan, evidence: "Evidence") -> str:
 def _strip(recording: "Recording", asked: "AVLMap", moments: int) -> Strip:
     """Look again at some moments of the walk, as the map's own pixel encoder does."""
     from avlmaps.core.progress import progress
-    from avlmaps.maps.gravity_stage import grounded
+    from avlmaps.maps.gravity.stage import grounded
     from avlmaps.maps.settings import DEFAULTS
     from avlmaps.perception.embedded.pixels import EmbeddedPixels
 
@@ -290,7 +290,7 @@ def _label(answer: "Answer", part: int) -> str:
 
 
 def _read(step: "Step", name: str) -> np.ndarray:
-    from avlmaps.query.images import read_picture
+    from avlmaps.query.modalities.image import read_picture
 
     path = next(Path(part.query) for part in step.ask.question.parts if part.query.endswith(name))
     return read_picture(path)

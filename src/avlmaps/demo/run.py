@@ -289,7 +289,7 @@ def _answer(asked: "AVLMap", ask: Ask, number: int, out: Path) -> "tuple[Step, A
 def _located(asked: "AVLMap", photo: "PhotoView", out: Path) -> tuple[float, float] | None:
     """Return how far off the map takes the photo's camera to be, cm and degrees; None where it is not located."""
     from avlmaps.core.poses import rotation_angle_rad
-    from avlmaps.query.images import read_picture
+    from avlmaps.query.modalities.image import read_picture
 
     pose, truth = asked.locate(read_picture(out / PHOTO)).world_from_camera, photo.world_from_camera
     if pose is None:

@@ -5,14 +5,14 @@ from pathlib import Path
 
 from avlmaps.core.progress import silenced
 from avlmaps.maps.keyframe_stage import keep_keyframes
-from avlmaps.maps.lock import locked
-from avlmaps.maps.parts import build_part, merge_parts
+from avlmaps.maps.partial_maps import build_part, merge_parts
 from avlmaps.maps.plan import claim, make_plan
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.stages import commit, find_up, fuse, hear_sounds, merge, stand
-from avlmaps.maps.stored import StoredMap, describe, open_stored
-from avlmaps.perception.models.feature_store import DEFAULT_CACHE, CacheSettings
-from avlmaps.perception.models.remembering import remembering
+from avlmaps.maps.store.lock import locked
+from avlmaps.maps.store.reader import StoredMap, describe, open_stored
+from avlmaps.perception.cache.cached_encoders import remembering
+from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.profiles import Profile
 from avlmaps.perception.profiles import profile as profile_of
 from avlmaps.recordings.types import Recording

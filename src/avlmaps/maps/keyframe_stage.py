@@ -13,15 +13,15 @@ from jaxtyping import Float32, Int
 
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
-from avlmaps.maps.ahead import run_ahead
-from avlmaps.maps.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
-from avlmaps.maps.checks import RAGGED, ROWS_OR_NONE, array_fields, assembled
 from avlmaps.maps.keyframes import assembled as put_together
 from avlmaps.maps.keyframes import learn_places, see_keyframe, select_keyframes
-from avlmaps.maps.parts import BUILD_VERSION, Part
+from avlmaps.maps.partial_maps import BUILD_VERSION, Part
 from avlmaps.maps.plan import Plan
+from avlmaps.maps.prefetch import run_ahead
+from avlmaps.maps.store.array_validation import RAGGED, ROWS_OR_NONE, array_fields, assembled
+from avlmaps.maps.store.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
 from avlmaps.maps.types import Keyframes
-from avlmaps.perception.models.remembering import came_from_store
+from avlmaps.perception.cache.cached_encoders import came_from_store
 from avlmaps.perception.protocols import LocalFeatures, ViewEncoder
 from avlmaps.recordings.subset import Subset
 from avlmaps.recordings.types import Frame, Recording

@@ -8,12 +8,12 @@ import numpy as np
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.progress import say
-from avlmaps.maps.checkpoints import key_of
-from avlmaps.maps.manifest import MANIFEST, MapInfo, ModelInfo, parse_manifest
-from avlmaps.maps.parts import BUILD_VERSION, fusion_key
+from avlmaps.maps.partial_maps import BUILD_VERSION, fusion_key
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store import is_map_or_free, sweep
-from avlmaps.maps.stored import PARTS
+from avlmaps.maps.store.checkpoints import key_of
+from avlmaps.maps.store.manifest import MANIFEST, MapInfo, ModelInfo, parse_manifest
+from avlmaps.maps.store.reader import PARTS
+from avlmaps.maps.store.writer import is_map_or_free, sweep
 from avlmaps.perception.profiles import Profile
 from avlmaps.recordings.types import Recording
 

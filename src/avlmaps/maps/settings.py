@@ -4,9 +4,9 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from avlmaps.core.errors import MapError
-from avlmaps.maps.fusion_settings import FusionSettings
+from avlmaps.maps.audio.events import HearingSettings
+from avlmaps.maps.fusion.settings import FusionSettings
 from avlmaps.maps.keyframes import KeyframeSettings
-from avlmaps.maps.sounds import HearingSettings
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,14 +13,12 @@ import numpy as np
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
-from avlmaps.maps.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
-from avlmaps.maps.checks import array_fields, assembled
-from avlmaps.maps.gravity_stage import look_for_up, spread_frames
+from avlmaps.maps.encoding import without_place
+from avlmaps.maps.gravity.floor import GroundedRecording, find_ground
+from avlmaps.maps.gravity.stage import look_for_up, spread_frames
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.ground import GroundedRecording, find_ground
 from avlmaps.maps.keyframe_stage import KeptKeyframes
-from avlmaps.maps.manifest import Box, Counts, MapInfo, RecordingInfo, RigInfo, Timings, UpInfo
-from avlmaps.maps.parts import (
+from avlmaps.maps.partial_maps import (
     BUILD_VERSION,
     Part,
     add_up,
@@ -30,9 +28,11 @@ from avlmaps.maps.parts import (
     load_part,
     plan_spans,
 )
-from avlmaps.maps.perceiving import without_place
 from avlmaps.maps.plan import Plan, audio_key
-from avlmaps.maps.store import MapContent, write_map
+from avlmaps.maps.store.array_validation import array_fields, assembled
+from avlmaps.maps.store.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
+from avlmaps.maps.store.manifest import Box, Counts, MapInfo, RecordingInfo, RigInfo, Timings, UpInfo
+from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import HeardSounds, Voxels
 from avlmaps.recordings.types import Ground, Recording
 
@@ -129,7 +129,7 @@ def hear_sounds(plan: Plan) -> KeptSounds:
     folder = plan.folder("sounds", key)
     found = find_checkpoint(folder, _Facts, key)
     if found is None:
-        from avlmaps.maps.sounds import hear
+        from avlmaps.maps.audio.events import hear
 
         begin = perf_counter()
         scratch = folder.with_name("clips.unfinished")

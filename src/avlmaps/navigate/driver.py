@@ -12,6 +12,7 @@ from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, 
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate import grid_kernels
 from avlmaps.navigate.bodies import BASE, Body, BodyShape
+from avlmaps.navigate.contact_map import Met
 from avlmaps.navigate.controller import (
     ActionController,
     VelocityController,
@@ -22,7 +23,6 @@ from avlmaps.navigate.controller import (
     turns_for,
 )
 from avlmaps.navigate.costmap import CostSettings, costmap_of
-from avlmaps.navigate.met import Met
 from avlmaps.navigate.planner import Planner, PlanSettings, Stop
 
 _SAMPLE_M = 0.02  # places along a straight move that are looked at

@@ -16,8 +16,8 @@ from avlmaps.core.motion import Action
 from avlmaps.language.program import Budget, Step, Trace, parse_program, run_program
 from avlmaps.language.translator import Translation, Translator
 from avlmaps.navigate.driver import Driver
-from avlmaps.navigate.moves import Move
-from avlmaps.navigate.readable import Readable, offered_by
+from avlmaps.navigate.file_access import Readable, offered_by
+from avlmaps.navigate.motion_log import Move
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
 

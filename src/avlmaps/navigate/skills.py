@@ -20,11 +20,11 @@ from avlmaps.core.motion import Action, wrapped
 from avlmaps.language.vocabulary import Clip, Heat, Picture, Place, Target
 from avlmaps.navigate.arguments import kind_of, number_of, text_of
 from avlmaps.navigate.driver import Arrival, Driver
-from avlmaps.navigate.moves import Move, Triple, joined
-from avlmaps.navigate.outline import Outline, bearing_rad, middle_between, to_the_left
-from avlmaps.navigate.readable import Readable
-from avlmaps.navigate.seeking import Seeker
-from avlmaps.navigate.things import Thing
+from avlmaps.navigate.file_access import Readable
+from avlmaps.navigate.footprint import Outline, bearing_rad, middle_between, to_the_left
+from avlmaps.navigate.grounding import Seeker
+from avlmaps.navigate.instances import Thing
+from avlmaps.navigate.motion_log import Move, Triple, joined
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 
@@ -86,14 +86,14 @@ class Robot:
 
     def load_image(self, path: str) -> Picture:
         """Load a picture from a file, to ask where it was taken."""
-        from avlmaps.query.images import read_picture
+        from avlmaps.query.modalities.image import read_picture
 
         read_picture(self.seeker.readable.find(text_of(path, "load_image"), "picture"))
         return Picture(path)
 
     def load_sound(self, path: str) -> Clip:
         """Load a recorded sound from a file, to ask where one like it was heard."""
-        from avlmaps.query.sounds import read_clip
+        from avlmaps.query.modalities.sound import read_clip
 
         read_clip(self.seeker.readable.find(text_of(path, "load_sound"), "clip"))
         return Clip(path)

@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose
-from avlmaps.navigate.moves import Move
-from avlmaps.query.level import Space
+from avlmaps.navigate.motion_log import Move
 from avlmaps.query.plots import INK, draw_ground, finish, mark, panels, save
 from avlmaps.query.topdown import TopDown
+from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

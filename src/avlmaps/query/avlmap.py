@@ -12,17 +12,17 @@ from jaxtyping import UInt8
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.registry import Kind
-from avlmaps.query.areas import AreaSettings, area_factor
 from avlmaps.query.heatmap import Factor, Heatmap, HeatSettings, NearAnchors, fused
-from avlmaps.query.images import image_factor, read_picture, require_fitting
-from avlmaps.query.level import Space
-from avlmaps.query.objects import ObjectSettings, Rivals, object_factor
+from avlmaps.query.modalities.area import AreaSettings, area_factor
+from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
+from avlmaps.query.modalities.object import ObjectSettings, Rivals, object_factor
+from avlmaps.query.modalities.sound import SoundSettings, read_clip, require_audible, sound_factor, sound_features
 from avlmaps.query.question import Answer, Modality, Part, PartAnswer, Question, Role
-from avlmaps.query.sounds import SoundSettings, read_clip, require_audible, sound_factor, sound_features
+from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
-    from avlmaps.maps.stored import StoredMap
+    from avlmaps.maps.store.reader import StoredMap
     from avlmaps.query.locate import Located
     from avlmaps.query.photometric import Panoramas
 
@@ -71,7 +71,7 @@ class AVLMap:
         Raises:
             MapError: it is no map, damaged, or of another schema or profile.
         """
-        from avlmaps.maps.stored import open_stored
+        from avlmaps.maps.store.reader import open_stored
 
         return cls(open_stored(Path(path)), settings)
 

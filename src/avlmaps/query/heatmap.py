@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from avlmaps.query.level import Space
 from avlmaps.query.question import Goal, Modality, Part, Role
+from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,15 +9,15 @@ from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import QueryError
 from avlmaps.query.heatmap import Factor, Heatmap, NearAnchors
-from avlmaps.query.level import Space
 from avlmaps.query.question import Goal, Modality
 from avlmaps.query.topdown import TopDown, walked
+from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from avlmaps.maps.stored import StoredMap
+    from avlmaps.maps.store.reader import StoredMap
 
 _PAPER = "#f6f5f1"
 INK = "#26292e"

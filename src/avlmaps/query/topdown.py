@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, UInt8
 
-from avlmaps.query.level import Space
+from avlmaps.query.voxel_space import Space
 
 # The view is cut this much over the highest place of the camera, so that a ceiling does not hide the room.
 _HEADROOM_M = 0.3

@@ -85,7 +85,7 @@ def _some_name(folder: Path, *patterns: str) -> bool:
         return any(fnmatch(entry.name, pattern) for entry in islice(entries, _LOOKED_AT) for pattern in patterns)
 
 
-_HERE = "avlmaps.recordings"
+_HERE = "avlmaps.recordings.formats"
 FORMATS: tuple[Format, ...] = (
     Format(
         "folder",

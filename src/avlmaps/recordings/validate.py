@@ -9,9 +9,9 @@ from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.core.progress import progress
 from avlmaps.recordings import images
 from avlmaps.recordings.faults import Fault, Report
-from avlmaps.recordings.file_recording import FileRecording
+from avlmaps.recordings.formats.file_recording import FileRecording
+from avlmaps.recordings.formats.tables import text_lines
 from avlmaps.recordings.open import find_format
-from avlmaps.recordings.tables import text_lines
 from avlmaps.recordings.types import Recording
 
 # The last frame may be taken a little after the sound track's end: encoders cut to whole blocks.

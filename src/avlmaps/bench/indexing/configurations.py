@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from avlmaps.bench.indexing.asked_scene import AskedScene
+from avlmaps.bench.indexing.scene_queries import AskedScene
 from avlmaps.bench.indexing.tasks import Task, TaskKind
 from avlmaps.core.errors import QueryError
 from avlmaps.core.registry import Kind

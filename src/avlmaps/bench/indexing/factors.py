@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from avlmaps.query.heatmap import Factor, NearAnchors, NearThings
-from avlmaps.query.level import Space
 from avlmaps.query.question import Part
+from avlmaps.query.voxel_space import Space
 from avlmaps.sim.scene import Area
 
 _STOREY_M = 0.5  # an area reaches so far below its floor and above its ceiling

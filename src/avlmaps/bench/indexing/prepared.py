@@ -13,8 +13,8 @@ import msgspec
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from avlmaps.bench.indexing.asked_scene import AskedScene
 from avlmaps.bench.indexing.rules import Event, Evidence, Photo, area_tasks, photo_tasks, sound_tasks
+from avlmaps.bench.indexing.scene_queries import AskedScene
 from avlmaps.bench.indexing.tasks import Recorded, Task, TaskError, TaskKind
 from avlmaps.bench.indexing.true_voxels import TrueVoxels
 from avlmaps.core.camera import Pinhole
@@ -22,7 +22,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.version import __version__
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.images import read_picture
+from avlmaps.query.modalities.image import read_picture
 from avlmaps.recordings.types import Recording
 from avlmaps.sim.recorder import RecordSettings, record_scene
 from avlmaps.sim.scene import NOTHING, Scene, SceneObject

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from avlmaps.bench.navigation.map_variants import Senses
 from avlmaps.bench.navigation.missions import Series
-from avlmaps.bench.navigation.perceived import Senses
 from avlmaps.core.registry import Kind
 
 OURS, CEILING = "ours", "true perception"

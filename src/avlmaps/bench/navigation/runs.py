@@ -21,7 +21,7 @@ from avlmaps.bench.navigation.missions import (
     load_missions,
     save_missions,
 )
-from avlmaps.bench.navigation.place import NavigationPlace
+from avlmaps.bench.navigation.scene_setup import NavigationPlace
 from avlmaps.bench.navigation.settings import NavigationSettings
 from avlmaps.core.progress import progress, say, silence
 from avlmaps.core.version import __version__

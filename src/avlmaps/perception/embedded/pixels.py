@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Float32
 
+from avlmaps.perception.embedded.closed_set import NamedEncoder
 from avlmaps.perception.embedded.codes import features_of
-from avlmaps.perception.embedded.named import NamedEncoder
 from avlmaps.perception.embedded.scene_network import SceneNetwork
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.types import Frame

@@ -32,8 +32,8 @@ from avlmaps.perception.embedded.sound_calibration import (
     sigmoid,
     taught_lead,
 )
+from avlmaps.perception.enrolment import TaughtSound, sounds_folder, taught_sounds
 from avlmaps.perception.protocols import ModelCard, WordEncoder
-from avlmaps.perception.taught import TaughtSound, sounds_folder, taught_sounds
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.resample import resampled
 

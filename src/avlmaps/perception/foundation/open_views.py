@@ -10,10 +10,10 @@ import torch
 from jaxtyping import Float32, UInt8
 
 from avlmaps.core.errors import BackendError
+from avlmaps.perception.cache.text_features import KeptWords
 from avlmaps.perception.foundation.prompts import Prompted
 from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.device import chosen_batch, chosen_device, unit_rows
-from avlmaps.perception.models.kept_words import KeptWords
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder

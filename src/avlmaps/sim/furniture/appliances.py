@@ -15,7 +15,7 @@ from avlmaps.sim.furniture.fittings import (
     spindle,
     steel,
 )  # fmt: skip
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, slab, tube

@@ -6,7 +6,7 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.containers import cardboard, tub
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, strut
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, strut
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import (

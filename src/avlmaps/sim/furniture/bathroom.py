@@ -9,7 +9,7 @@ from avlmaps.sim.furniture.fittings import (
     outline,
     shell,
 )  # fmt: skip
-from avlmaps.sim.furniture.joinery import chance, draw, finished, pick, pictured
+from avlmaps.sim.furniture.recipe_helpers import chance, draw, finished, pick, pictured
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh
 from avlmaps.sim.shapes import box, cylinder, ellipsoid, rounded_box, slab, tube

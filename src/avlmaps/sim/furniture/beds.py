@@ -6,8 +6,8 @@ import numpy as np
 
 from avlmaps.sim.furniture.carcass import Room, drawers, front_style, split
 from avlmaps.sim.furniture.catalogue import Piece, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, rim
 from avlmaps.sim.furniture.legs import LegStyle, four_legs, leg, leg_style, named_leg
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, rim
 from avlmaps.sim.furniture.upholstery import (
     Bedding,
     blanket,

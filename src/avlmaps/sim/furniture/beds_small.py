@@ -7,8 +7,8 @@ import numpy as np
 from avlmaps.sim.furniture.beds import BedPlan, bed_look, bedclothes
 from avlmaps.sim.furniture.carcass import Room, board_look, carcass, doors, drawers, front_style
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick
 from avlmaps.sim.furniture.legs import cabinet_base, four_legs, leg_style, named_leg
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick
 from avlmaps.sim.furniture.upholstery import Bedding, heap, mattress
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh

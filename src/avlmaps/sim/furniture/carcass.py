@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from avlmaps.sim.furniture.joinery import chance, draw, pick, rim
+from avlmaps.sim.furniture.recipe_helpers import chance, draw, pick, rim
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, ellipsoid, sheet, tube

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from avlmaps.sim.furniture.joinery import chance, count, draw, pick, strut
 from avlmaps.sim.furniture.legs import LegStyle, leg
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, pick, strut
 from avlmaps.sim.furniture.upholstery import cushion
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined

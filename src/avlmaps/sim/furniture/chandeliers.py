@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut, turned_ring
 from avlmaps.sim.furniture.lighting import shade, shining
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut, turned_ring
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined
 from avlmaps.sim.shapes import circle, cylinder, ellipsoid, lathe, rounded_box, slab, tube

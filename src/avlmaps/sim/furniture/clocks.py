@@ -6,7 +6,7 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.fittings import body, chrome, face, spindle
-from avlmaps.sim.furniture.joinery import chance, draw, finished, pick, pictured, rim, strut
+from avlmaps.sim.furniture.recipe_helpers import chance, draw, finished, pick, pictured, rim, strut
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, triangles_of
 from avlmaps.sim.shapes import box, circle, cylinder, ellipsoid, loft, rounded_box, slab, tube

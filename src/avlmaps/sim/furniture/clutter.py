@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, sheet, slab, tube

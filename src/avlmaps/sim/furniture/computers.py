@@ -7,7 +7,7 @@ import numpy as np
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.electronics import casing, screen
 from avlmaps.sim.furniture.fittings import Pair, body, face, feet, spindle
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, pictured
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, pictured
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined, triangles_of
 from avlmaps.sim.shapes import box, sheet, slab

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut, turned_ring
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut, turned_ring
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import (

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture.carcass import Room
-from avlmaps.sim.furniture.joinery import chance, count, draw, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, triangles_of
 from avlmaps.sim.shapes import box, lathe, loft, rounded_rectangle, tube

@@ -4,7 +4,7 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.fittings import body, chrome, dial, enamel, face, feet, outline, shell, spindle, steel
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, slab, tube

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Families, Piece, family
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, rim
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, rim
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined, triangles_of
 from avlmaps.sim.shapes import circle, lathe, loft, prism, rounded_rectangle, sheet, slab, tube

@@ -6,7 +6,7 @@ from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.computers import face_up, key_field
 from avlmaps.sim.furniture.electronics import screen
 from avlmaps.sim.furniture.fittings import body, chrome, face, feet, outline, shell, spindle
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, pictured, strut
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, pictured, strut
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, sheet, slab, tube

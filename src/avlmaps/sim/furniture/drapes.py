@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.sim.furniture.catalogue import Families, Piece, family
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, ellipsoid, rounded_box, sheet, slab, tube

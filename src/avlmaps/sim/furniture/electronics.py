@@ -7,7 +7,7 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.fittings import Pair, body, face, spindle
-from avlmaps.sim.furniture.joinery import chance, cloth, draw, finished, pick, pictured, rim, strut
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, draw, finished, pick, pictured, rim, strut
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import cylinder, loft, prism, rounded_rectangle, slab, tube

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.sports import barbell, crank, hoop
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.sim.furniture.joinery import chance, draw, pick, rim
+from avlmaps.sim.furniture.recipe_helpers import chance, draw, pick, rim
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined
 from avlmaps.sim.shapes import box, circle, cylinder, ellipsoid, loft, polygon, rounded_box, sheet, tube

@@ -7,7 +7,7 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.fittings import FrontStyle, cabinet_box, chrome, front, front_style, steel
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, pictured
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, pictured
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, cylinder, ellipsoid, rounded_box, slab, tube

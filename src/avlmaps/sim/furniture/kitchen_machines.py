@@ -15,7 +15,7 @@ from avlmaps.sim.furniture.fittings import (
     spindle,
     steel,
 )  # fmt: skip
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, loft, rounded_box, rounded_rectangle, slab, tube

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from avlmaps.sim.furniture.joinery import chance, count, draw, pick, strut
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, pick, strut
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, ellipsoid, sheet, tube

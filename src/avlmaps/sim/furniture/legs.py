@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from avlmaps.sim.furniture.joinery import chance, draw, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, draw, pick
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined
 from avlmaps.sim.shapes import box, circle, cylinder, lathe, loft, slab, tube

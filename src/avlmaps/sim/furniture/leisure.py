@@ -3,8 +3,8 @@
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut, turned_ring
 from avlmaps.sim.furniture.plants import frond
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut, turned_ring
 from avlmaps.sim.furniture.sports import hoop
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined

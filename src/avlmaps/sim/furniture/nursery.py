@@ -4,7 +4,7 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.containers import tub
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, strut
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.sports import wheel
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, rim, strut
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, rim, strut
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, sheet, slab, tube

@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Families, Piece, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, rim
 from avlmaps.sim.furniture.leaves import door_leaf, opaque
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, rim
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, sheet

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
-from avlmaps.sim.furniture.joinery import blade, chance, count, draw, finished, pick
+from avlmaps.sim.furniture.recipe_helpers import blade, chance, count, draw, finished, pick
 from avlmaps.sim.furniture.vases import flowers
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh

@@ -20,8 +20,8 @@ from avlmaps.sim.furniture.chair_parts import (
     splat,
     upright_slats,
 )
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.legs import LegStyle, leg, leg_style, named_leg, stretchers
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.upholstery import covering
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined

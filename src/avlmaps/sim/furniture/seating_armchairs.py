@@ -6,8 +6,8 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.chair_parts import bent_rail
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.legs import four_legs, leg_style, star_base
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.seating_chairs import shell, shell_base
 from avlmaps.sim.furniture.sofa_parts import (
     SofaPlan,

@@ -4,8 +4,8 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.chair_parts import bent_rail, chair_frame
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.legs import four_legs, leg, leg_style, named_leg, sled, star_base
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.upholstery import covering, cushion
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined

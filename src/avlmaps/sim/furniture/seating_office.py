@@ -3,8 +3,8 @@
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.legs import star_base
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.upholstery import covering, cushion
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh

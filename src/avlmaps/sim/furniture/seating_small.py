@@ -7,8 +7,8 @@ import numpy as np
 from avlmaps.sim.furniture.carcass import board_look
 from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.chair_parts import bent_rail
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.legs import four_legs, leg, leg_style, named_leg, stretchers
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.table_parts import hairpins, trestles
 from avlmaps.sim.furniture.upholstery import covering, cushion, throw
 from avlmaps.sim.materials import material

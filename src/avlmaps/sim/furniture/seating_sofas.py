@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
 from avlmaps.sim.furniture.legs import LegStyle, four_legs, sled
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick
 from avlmaps.sim.furniture.sofa_parts import (
     body_back,
     box_arms,

@@ -11,7 +11,7 @@ from avlmaps.sim.furniture.fittings import (
     outline,
     shell,
 )  # fmt: skip
-from avlmaps.sim.furniture.joinery import chance, cloth, draw, finished, pick, pictured
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, draw, finished, pick, pictured
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, cylinder, ellipsoid, slab, tube

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from avlmaps.sim.furniture.joinery import chance, count, draw, pick
 from avlmaps.sim.furniture.legs import LegStyle, four_legs, named_leg
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps.sim.furniture.upholstery import back_cushions, covering, cushion_row, scattered_pillows, throw
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined

@@ -15,8 +15,8 @@ from avlmaps.sim.furniture.carcass import (
 )
 from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.contents import cloth_looks, folded, hanging
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
 from avlmaps.sim.furniture.legs import cabinet_base
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh
 from avlmaps.sim.shapes import box, sheet, slab, tube

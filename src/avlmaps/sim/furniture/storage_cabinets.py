@@ -15,8 +15,8 @@ from avlmaps.sim.furniture.carcass import (
 )
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.contents import ornament
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
 from avlmaps.sim.furniture.legs import cabinet_base, four_legs, leg_style
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick
 from avlmaps.sim.furniture.storage_shelves import filled
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh

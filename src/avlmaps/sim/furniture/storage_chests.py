@@ -4,8 +4,8 @@ import numpy as np
 
 from avlmaps.sim.furniture.carcass import Room, board_look, carcass, doors, drawers, front_style, split
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, rim
 from avlmaps.sim.furniture.legs import cabinet_base, four_legs, leg_style
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, rim
 from avlmaps.sim.furniture.table_parts import metal_frame
 from avlmaps.sim.furniture.upholstery import pillow
 from avlmaps.sim.materials import material

@@ -14,8 +14,8 @@ from avlmaps.sim.furniture.carcass import (
 )
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.contents import book_looks, shelf_things
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.legs import cabinet_base, four_legs, leg_style
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh
 from avlmaps.sim.shapes import box, slab

@@ -5,8 +5,8 @@ import numpy as np
 from avlmaps.sim.furniture.carcass import Room, board_look, carcass, doors, drawers, front_style, grip, inside, split
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.contents import book_looks, cloth_looks, ornament, shelf_things
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.legs import four_legs, leg_style, star_base
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, rounded_rectangle, slab, tube

@@ -5,8 +5,8 @@ from typing import Literal
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Support
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, pick, rim, strut
 from avlmaps.sim.furniture.legs import four_legs, leg, leg_style, named_leg, star_base
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, rim, strut
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, circle, cylinder, lathe, loft, prism, rounded_rectangle, slab, tube

@@ -5,8 +5,8 @@ import numpy as np
 from avlmaps.sim.furniture.carcass import FrontStyle, Room, board_look, carcass, doors, drawers, front_style, inside
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.contents import book_looks, shelf_things
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
 from avlmaps.sim.furniture.legs import apron, four_legs, leg_style, named_leg, stretchers
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick
 from avlmaps.sim.furniture.table_parts import (
     Outline,
     hairpins,

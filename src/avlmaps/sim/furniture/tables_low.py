@@ -4,8 +4,8 @@ import numpy as np
 
 from avlmaps.sim.furniture.carcass import Room, board_look, drawers, front_style, split
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.legs import apron, cabinet_base, four_legs, leg_style, sled
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut
 from avlmaps.sim.furniture.table_parts import (
     Outline,
     hairpins,

@@ -4,7 +4,7 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
 from avlmaps.sim.furniture.fittings import chrome, face, knob, outline, spindle
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, rim
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, rim
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, circle, cylinder, loft, polygon, rounded_box, tube

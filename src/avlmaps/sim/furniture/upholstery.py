@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from avlmaps.sim.furniture.joinery import chance, cloth, draw, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, draw, pick
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined
 from avlmaps.sim.shapes import rounded_box

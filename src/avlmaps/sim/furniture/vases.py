@@ -3,8 +3,8 @@
 import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, family
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick
 from avlmaps.sim.furniture.lighting import shining
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple
 from avlmaps.sim.shapes import circle, cylinder, ellipsoid, lathe, loft, rounded_rectangle, slab, tube

@@ -14,7 +14,7 @@ from avlmaps.sim.furniture.fittings import (
     shell,
     spindle,
 )  # fmt: skip
-from avlmaps.sim.furniture.joinery import chance, cloth, count, draw, finished, pick, strut
+from avlmaps.sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, strut
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, circle, cylinder, lathe, loft, rounded_box, slab, tube

@@ -6,7 +6,7 @@ import numpy as np
 
 from avlmaps.sim.furniture.catalogue import Piece, Support, family
 from avlmaps.sim.furniture.fittings import china, chrome, front, front_style, outline, shell, steel, tap
-from avlmaps.sim.furniture.joinery import chance, count, draw, finished, pick, pictured
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, finished, pick, pictured
 from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.shapes import box, cylinder, lathe, rounded_box, slab, tube

@@ -17,9 +17,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float
 
-from avlmaps.sim.hearing.air import Air, Way
 from avlmaps.sim.hearing.filters import shaped_impulse, split
 from avlmaps.sim.hearing.rooms import BANDS_HZ, SPEED_M_S, WALL_DB, Rooms
+from avlmaps.sim.hearing.sound_paths import Air, Way
 from avlmaps.sim.scene import Area, Scene
 
 _SLAB_DB = WALL_DB + 12.0

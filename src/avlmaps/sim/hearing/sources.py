@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.recordings.audio import Sound
-from avlmaps.sim.hearing.banks import Bank, Synthesised, chosen_categories
 from avlmaps.sim.hearing.kinds import ANYWHERE, SoundKind, kind_of
+from avlmaps.sim.hearing.sound_library import Bank, Synthesised, chosen_categories
 from avlmaps.sim.mesh import Triple
 from avlmaps.sim.scene import Scene
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from avlmaps.sim.furniture import Piece, Support
-from avlmaps.sim.furniture.joinery import chance, count, draw, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps.sim.homes.furnish import Among, Furnisher, Stood, floor_standing, footprint
 from avlmaps.sim.homes.polygons import corners_of, overlapping
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from avlmaps.sim.furniture.joinery import chance, draw, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, draw, pick
 from avlmaps.sim.homes.plan import OUTSIDE, WELL, Hole, HoleKind, Room, Wall
 from avlmaps.sim.homes.polygons import inside
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from avlmaps.sim.furniture import Families
-from avlmaps.sim.furniture.joinery import chance, draw
+from avlmaps.sim.furniture.recipe_helpers import chance, draw
 from avlmaps.sim.homes import offices, rooms, service
 from avlmaps.sim.homes.clutter import dress, litter
 from avlmaps.sim.homes.doors import joined_up, lit_by_day

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture import Piece
-from avlmaps.sim.furniture.joinery import chance, count, draw, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps.sim.homes.furnish import Furnisher, footprint
 from avlmaps.sim.homes.polygons import area_m2, half
 from avlmaps.sim.homes.walls import surface

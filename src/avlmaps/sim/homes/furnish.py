@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.sim.furniture import Families, Piece, families, make
-from avlmaps.sim.furniture.joinery import draw, pick
+from avlmaps.sim.furniture.recipe_helpers import draw, pick
 from avlmaps.sim.homes.placing import Footprint, Ground, Place, Side
 from avlmaps.sim.homes.polygons import middle
 from avlmaps.sim.mesh import Mesh

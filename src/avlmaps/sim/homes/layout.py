@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.sim.furniture.joinery import chance, count, draw, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps.sim.homes.plan import WELL, WELL_LENGTH_M
 from avlmaps.sim.homes.polygons import area_m2, half, middle, rectangle, widths_m
 

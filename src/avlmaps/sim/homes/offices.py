@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from avlmaps.sim.furniture.joinery import chance, count, draw, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps.sim.homes.furnish import Furnisher
 from avlmaps.sim.homes.polygons import middle
 from avlmaps.sim.homes.rooms import desk_place, equip, several, under

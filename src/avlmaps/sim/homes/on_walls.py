@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture.drapes import curtain
-from avlmaps.sim.furniture.joinery import chance, count, draw
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw
 from avlmaps.sim.homes.furnish import Furnisher, footprint, hangs, on_floor_or_wall, wall_hung
 from avlmaps.sim.homes.placing import Side
 from avlmaps.sim.homes.polygons import area_m2, middle

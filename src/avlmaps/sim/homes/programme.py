@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from avlmaps.sim.furniture.joinery import chance, draw, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, draw, pick
 from avlmaps.sim.homes.layout import Programme
 from avlmaps.sim.homes.plan import WELL, Room
 from avlmaps.sim.homes.polygons import area_m2

@@ -4,7 +4,7 @@ import numpy as np
 
 from avlmaps.sim.furniture import Piece
 from avlmaps.sim.furniture.decor import CARPET_SHAPES, carpet
-from avlmaps.sim.furniture.joinery import chance, count, draw, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps.sim.homes.clutter import set_at
 from avlmaps.sim.homes.furnish import Furnisher, Stood, footprint, hangs, wall_hung
 from avlmaps.sim.homes.polygons import middle

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.sim.furniture import Piece
-from avlmaps.sim.furniture.joinery import chance, draw
+from avlmaps.sim.furniture.recipe_helpers import chance, draw
 from avlmaps.sim.homes.furnish import Furnisher, Stood, footprint
 from avlmaps.sim.homes.placing import Footprint
 from avlmaps.sim.mesh import Mesh

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from avlmaps.sim.furniture.joinery import chance, draw, pick
+from avlmaps.sim.furniture.recipe_helpers import chance, draw, pick
 from avlmaps.sim.homes.plan import WELL, WELL_LENGTH_M, Plan, Wall
 from avlmaps.sim.homes.walls import heading_of, placed, surface
 from avlmaps.sim.mesh import Material, Mesh, joined

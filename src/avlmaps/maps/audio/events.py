@@ -1,0 +1,188 @@
+"""Hearing: from a recording's track to sounds with features, and the places where the robot heard them."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float32
+
+from avlmaps.core.errors import AudioError, BackendError
+from avlmaps.core.progress import progress, say
+from avlmaps.maps.audio.change_points import ChangeSettings, cut_at_changes, frames_of_track
+from avlmaps.maps.audio.denoise import denoised, noise_profile
+from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings, segment
+from avlmaps.maps.types import HeardSounds
+from avlmaps.perception.protocols import FrameSoundEncoder, SoundEncoder
+from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
+from avlmaps.recordings.types import Recording
+
+_NEAR_M = 1e-4  # places nearer than this are one
+_EDGE_S = 0.05  # quiet is only what is this far from a sound
+
+
+@dataclass(frozen=True, slots=True)
+class HearingSettings:
+    """From the sound track to the sounds of a map."""
+
+    segmentation: SegmentationSettings = field(default_factory=SegmentationSettings)
+    """Finding the sounds in the track."""
+    noise_reduction_db: float = 12.0
+    """The background is made quieter by at most this, dB, before a sound is encoded; 0 leaves it as it is."""
+    quiet_s: float = 5.0
+    """The background is learnt from so many seconds before a sound and after it, where nothing else sounds."""
+    cut: Literal["auto", "energy", "changes"] = "auto"
+    """energy: sounds are what stands out from the background; changes: the whole track is kept, divided where what
+    sounds changes; auto: changes where the sound model gives a feature every few hundredths of a second."""
+    changes: ChangeSettings = field(default_factory=ChangeSettings)
+    """Dividing the track where what sounds changes."""
+
+    def __post_init__(self) -> None:
+        for name in ("noise_reduction_db", "quiet_s"):
+            value = getattr(self, name)
+            if not np.isfinite(value) or value < 0.0:
+                raise AudioError(f"hearing.{name} is {value}; choose 0 or more.")
+
+
+def hear(recording: Recording, encoder: SoundEncoder, settings: HearingSettings, clips_folder: Path) -> HeardSounds:
+    """Find the sounds of a recording, encode each whole, and tell where the robot was while it heard them.
+
+    An encoder with a feature for each short step of time hears the whole track instead, which is then divided where the
+    features change (``maps.audio.change_points``); only digital silence, samples that are all zero, is left out.
+
+    Args:
+        recording: the walk; without a track it has no sounds.
+        encoder: gives a sound one feature or more, one for each window or step of it.
+        settings: how.
+        clips_folder: where each sound is written as FLAC, as it was heard, named by its onset; made if need be.
+
+    Returns:
+        The sounds in the order of their onset; ``clips`` are file names in ``clips_folder``.
+
+    Raises:
+        AudioError: the track cannot be read.
+        BackendError: the encoder's features are not what its card says, or it has none for each step and ``cut`` is
+            ``changes``.
+    """
+    if recording.audio is None:
+        return _collected([], encoder.card.dim)
+    clips_folder.mkdir(parents=True, exist_ok=True)
+    if isinstance(encoder, FrameSoundEncoder) and settings.cut != "energy":
+        pieces = _by_changes(recording.audio, encoder, settings.changes)
+    elif settings.cut == "changes":
+        raise BackendError(
+            f"The sound model {encoder.card.id} gives no feature for each step of time to cut a track by; choose "
+            "hearing.cut auto or energy, or another model."
+        )
+    else:
+        pieces = _by_energy(recording.audio, encoder, settings)
+    heard: list[_Heard] = []
+    for found, sound, feature in pieces:
+        clip = f"{found.onset_s:010.3f}.flac"
+        write_flac(clips_folder / clip, sound)
+        heard.append(_Heard(found, track_of(recording, found), feature, clip))
+    _tell_outside(recording, [one.segment for one in heard])
+    return _collected(heard, encoder.card.dim)
+
+
+_Piece = tuple[Segment, Sound, Float32[np.ndarray, "windows d"]]
+
+
+def _by_energy(track: AudioTrack, encoder: SoundEncoder, settings: HearingSettings) -> Iterator[_Piece]:
+    """Yield what stands out from the background, as it was heard, and its features without the background."""
+    found = segment(track, settings.segmentation)
+    each = range(len(found))
+    for i in progress(each, "hearing", unit="sound") if found else each:
+        sound = track.read(found[i].onset_s, found[i].offset_s)
+        yield found[i], sound, _encoded(encoder, _cleaned(sound, track, found, i, settings))
+
+
+def _by_changes(track: AudioTrack, encoder: FrameSoundEncoder, settings: ChangeSettings) -> Iterator[_Piece]:
+    """Yield the stretches of the track between changes, and the features of their steps."""
+    features = frames_of_track(track, encoder)
+    edges = cut_at_changes(features, encoder.hop_s, settings)
+    for begin, end in pairwise(edges.tolist()):
+        offset_s = min(track.start_s + end * encoder.hop_s, track.end_s)
+        stretch = Segment(track.start_s + begin * encoder.hop_s, offset_s)
+        sound = track.read(stretch.onset_s, stretch.offset_s)
+        if sound.samples.any():
+            yield stretch, sound, features[begin:end]
+
+
+def track_of(recording: Recording, heard: Segment) -> Float32[np.ndarray, "places 3"]:
+    """Return where the robot was from a sound's onset to its offset: at both, and at every frame between.
+
+    Positions between frames are interpolated; before the first frame and after the last the nearest one's place
+    counts. There is at least one place, however short the sound; a robot that stood still has just one.
+    """
+    stamps_s = recording.stamps_s
+    between = stamps_s[(stamps_s > heard.onset_s) & (stamps_s < heard.offset_s)]
+    at_s = np.concatenate([[heard.onset_s], between, [heard.offset_s]])
+    positions = np.stack([np.interp(at_s, stamps_s, axis) for axis in recording.world_from_camera[:, :3, 3].T], axis=1)
+    moved = np.linalg.norm(np.diff(positions, axis=0), axis=1) > _NEAR_M
+    return positions[np.append(True, moved)].astype(np.float32)
+
+
+@dataclass(frozen=True, slots=True)
+class _Heard:
+    segment: Segment
+    track: Float32[np.ndarray, "places 3"]
+    feature: Float32[np.ndarray, "windows d"]
+    clip: str
+
+
+def _cleaned(sound: Sound, track: AudioTrack, found: Sequence[Segment], index: int, settings: HearingSettings) -> Sound:
+    """Return the sound with less of the background that is heard before and after it."""
+    if settings.noise_reduction_db == 0.0 or settings.quiet_s == 0.0:
+        return sound
+    profile = noise_profile(_quiet_around(track, found, index, settings.quiet_s))
+    return sound if profile is None else denoised(sound, profile, settings.noise_reduction_db)
+
+
+def _quiet_around(track: AudioTrack, found: Sequence[Segment], index: int, quiet_s: float) -> Iterator[Sound]:
+    here = found[index]
+    earliest = found[index - 1].offset_s + _EDGE_S if index else track.start_s
+    latest = found[index + 1].onset_s - _EDGE_S if index + 1 < len(found) else track.end_s
+    before = (max(earliest, here.onset_s - _EDGE_S - quiet_s), here.onset_s - _EDGE_S)
+    after = (here.offset_s + _EDGE_S, min(latest, here.offset_s + _EDGE_S + quiet_s))
+    for begin_s, end_s in (before, after):
+        if end_s > begin_s:
+            yield track.read(begin_s, end_s)
+
+
+def _encoded(encoder: SoundEncoder, sound: Sound) -> Float32[np.ndarray, "windows d"]:
+    feature = np.asarray(encoder.encode(sound), np.float32)
+    if feature.ndim != 2 or len(feature) < 1 or feature.shape[1] != encoder.card.dim or not np.isfinite(feature).all():
+        raise BackendError(
+            f"The sound model {encoder.card.id} returned features of {feature.shape} for {sound.duration_s:.2f} s; its "
+            f"card promises finite ones of (windows, {encoder.card.dim})."
+        )
+    return feature
+
+
+def _collected(heard: Sequence[_Heard], dim: int) -> HeardSounds:
+    def offsets(parts: Sequence[np.ndarray]) -> np.ndarray:
+        return np.cumsum([0, *(len(part) for part in parts)], dtype=np.int64)
+
+    tracks, features = [one.track for one in heard], [one.feature for one in heard]
+    return HeardSounds(
+        onset_s=np.array([one.segment.onset_s for one in heard], np.float64),
+        offset_s=np.array([one.segment.offset_s for one in heard], np.float64),
+        track_offsets=offsets(tracks),
+        track=np.concatenate([np.zeros((0, 3), np.float32), *tracks]),
+        feature_offsets=offsets(features),
+        feature=np.concatenate([np.zeros((0, dim), np.float32), *features]),
+        clips=tuple(one.clip for one in heard),
+    )
+
+
+def _tell_outside(recording: Recording, found: Sequence[Segment]) -> None:
+    first_s, last_s = float(recording.stamps_s[0]), float(recording.stamps_s[-1])
+    outside = [one for one in found if one.offset_s < first_s or one.onset_s > last_s]
+    if outside:
+        say(
+            f"note: {len(outside)} of {len(found)} sounds lie outside the frames, {first_s:.2f} to {last_s:.2f} s, "
+            f"the first at {outside[0].onset_s:.2f} s; they are put where the nearest frame was taken."
+        )

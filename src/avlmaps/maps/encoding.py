@@ -1,0 +1,86 @@
+"""From numbers of frames to frames with features: decoding and encoding each in a thread of its own.
+
+Both run ahead of whoever takes the frames, so that the slowest of decoding, encoding and fusion sets the pace.
+"""
+
+from collections.abc import Generator, Iterable, Iterator, Sequence
+from contextlib import closing
+from itertools import islice
+
+import numpy as np
+from jaxtyping import Float32
+
+from avlmaps.core.errors import RecordingError
+from avlmaps.maps.prefetch import run_ahead
+from avlmaps.maps.store.manifest import BadFrame
+from avlmaps.perception.cache.cached_encoders import encoded_together
+from avlmaps.perception.protocols import BatchPixelEncoder, PixelEncoder
+from avlmaps.recordings.types import Frame, Recording
+
+Perceived = tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]
+
+
+def perceived(
+    recording: Recording, stretches: Sequence[Sequence[int]], encoder: PixelEncoder | None
+) -> Generator[Perceived]:
+    """Yield the frames with their features, in order; one that cannot be read keeps its place.
+
+    Args:
+        recording: where the frames are.
+        stretches: numbers of frames; no batch reaches from one stretch into the next, so that a build that goes on
+            from a stretch encodes the same batches as one that was never stopped.
+        encoder: None yields frames alone.
+    """
+    every = [index for stretch in stretches for index in stretch]
+    size = 1 if encoder is None else batch_of(encoder)
+    with closing(run_ahead(decoded(recording, every), max(2, size))) as frames:
+        if encoder is None:
+            yield from ((frame, None) for frame in frames)
+            return
+        lengths = [len(stretch) for stretch in stretches]
+        with closing(run_ahead(encoded(frames, lengths, encoder, size))) as seen:
+            yield from seen
+
+
+def decoded(recording: Recording, indices: Iterable[int]) -> Generator[Frame | BadFrame]:
+    """Read frames; what cannot be read comes as the sentence that tells why."""
+    for index in indices:
+        try:
+            yield recording.frame(index)
+        except RecordingError as fault:
+            yield BadFrame(index=index, why=without_place(str(fault), recording))
+
+
+def encoded(
+    frames: Iterator[Frame | BadFrame], lengths: Sequence[int], encoder: PixelEncoder, size: int
+) -> Generator[Perceived]:
+    """Add features to frames, at most ``size`` frames at once, stretch by stretch."""
+    for length in lengths:
+        stretch = islice(frames, length)
+        while group := _next_group(stretch, size):
+            good = [frame for frame in group if isinstance(frame, Frame)]
+            features = iter(encoded_together(encoder, good))
+            for frame in group:
+                yield frame, (next(features) if isinstance(frame, Frame) else None)
+
+
+def _next_group(frames: Iterator[Frame | BadFrame], size: int) -> list[Frame | BadFrame]:
+    """Take so many good frames, and the bad ones among them."""
+    group: list[Frame | BadFrame] = []
+    good = 0
+    for frame in frames:
+        group.append(frame)
+        good += isinstance(frame, Frame)
+        if good == size:
+            break
+    return group
+
+
+def batch_of(encoder: PixelEncoder) -> int:
+    """Return how many frames an encoder is to be given at once."""
+    return max(1, encoder.batch) if isinstance(encoder, BatchPixelEncoder) else 1
+
+
+def without_place(sentence: str, recording: Recording) -> str:
+    """Return a sentence about a recording without the folders that it lies in: a map may travel."""
+    return sentence.replace(str(recording.path), recording.path.name)

@@ -1,0 +1,166 @@
+"""Fusion of pixel features, colour and geometry into voxels.
+
+The feature of a voxel is the weighted mean of the features of all pixels that fell into it, with the paper's weight
+exp(−d² / (2·0.6)), d the distance in metres from the camera to the point (Huang et al., Audio Visual Language Maps
+for Robot Navigation, section III-A). It is a true mean, so that the order of frames does not matter and maps of
+parts of a recording add up to the map of the whole.
+"""
+
+import numpy as np
+from jaxtyping import Float, Float16, Float32
+
+from avlmaps.core.camera import Rig
+from avlmaps.core.errors import BackendError, MapError, RecordingError
+from avlmaps.maps.fusion import add_kernels as sums
+from avlmaps.maps.fusion import measure_kernels as kernels
+from avlmaps.maps.fusion.pixel_lookup import PixelLookup, look_up
+from avlmaps.maps.fusion.settings import FusionSettings
+from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
+from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.types import Voxels
+from avlmaps.recordings.types import Frame
+
+FARTHEST_VOXEL = (1 << 31) - 2 * kernels.REACH_VOXELS  # indices are int32
+
+__all__ = ["FusionSettings", "VoxelAccumulator", "VoxelSums"]
+
+
+class VoxelAccumulator:
+    """Adds up frames, or the sums of parts, into sparse voxels without bounds.
+
+    Weights are float64 and never fall below 1e-30 (which exp(−d² / 1.2) reaches at 9.1 m), so that what was only
+    ever seen from afar keeps its feature in float32; it counts for nothing beside a nearer look. Memory is that of
+    the voxels, 4·dim + 70 bytes each, however many frames there are. Kernels release the interpreter's lock:
+    two accumulators on two threads map two parts at once.
+    """
+
+    def __init__(self, grid: GridSpec, dim: int, settings: FusionSettings | None = None) -> None:
+        """Begin an empty map.
+
+        Args:
+            grid: the voxels' size.
+            dim: length of a feature; 0 where no pixel features will come.
+            settings: depth limits and the weight's width.
+        """
+        if dim < 0:
+            raise ValueError(f"dim is {dim}; a feature cannot have fewer than 0 numbers")
+        self.grid = grid
+        self.dim = dim
+        self.settings = settings or FusionSettings()
+        self._table = VoxelTable(dim)
+        self._lookup: tuple[Rig, int, int, PixelLookup] | None = None
+        self._scratch = kernels.make_scratch(1, 1)
+
+    def __len__(self) -> int:
+        """Return how many voxels there are."""
+        return self._table.count
+
+    def add(self, frame: Frame, features: Float[np.ndarray, "hf wf d"] | None = None) -> int:
+        """Add a frame: every pixel with a depth within the limits counts, once.
+
+        The colour and the feature of a point are those of the colour pixel that it projects to. A point outside of
+        the colour picture adds to the geometry only (an occupied voxel, hits, last seen), and so does a feature
+        that is all zero, but for the colour.
+
+        Args:
+            frame: colour, depth and pose.
+            features: (hf, wf, dim), covering the colour picture evenly, at any resolution; None adds colour and
+                geometry only.
+
+        Returns:
+            How many pixels were added.
+
+        Raises:
+            ValueError: the features have another shape.
+            RecordingError: the pose is not finite or too far away for the grid.
+            BackendError: features are NaN or infinite. The finite ones have been added by then.
+        """
+        cells, (feature_rows, feature_columns) = self._cells(features)
+        lookup = self._lookup_for(frame.rig, feature_rows, feature_columns)
+        pose = self._pose_of(frame)
+        limits = self.settings.min_depth_m, self.settings.max_depth_m, 0.5 / self.settings.variance_m2
+        traced = kernels.trace(
+            np.require(frame.depth_m, np.float32, ["C", "W"]),
+            (lookup.x, lookup.y),
+            pose,
+            (self.grid.voxel_size_m, *limits),
+            np.require(frame.rgb, np.uint8, ["C", "W"]).reshape(-1, 3),
+            lookup.tables,
+            lookup.projection,
+            self._scratch,
+        )
+        points, voxels, pairs = (int(count) for count in traced)
+        table = self._table
+        table.reserve(voxels)
+        stamp_s = float(frame.stamp_s)
+        table.count = sums.commit(voxels, self._scratch, pose[2], stamp_s, table.slots, table.geometry, table.count)
+        faults = sums.flush(voxels, pairs, self._scratch, cells, table.feature_sum, table.weight) if pairs else 0
+        if faults:
+            raise BackendError(
+                f"The pixel encoder gave NaN or infinite features for frame {frame.name} (in {faults} voxels); "
+                "leave the frame out or choose another profile."
+            )
+        return points
+
+    def merge(self, part: VoxelSums) -> None:
+        """Add the sums of another part of the same recording, in any order; a memory-mapped part is streamed.
+
+        Raises:
+            MapError: its features have another length.
+        """
+        self._table.add(part)
+
+    def sums(self, feature_out: Float32[np.ndarray, "n d"] | None = None) -> VoxelSums:
+        """Return a copy of the sums, sorted by index.
+
+        Args:
+            feature_out: where to write the sums of features, such as a memory-mapped file; by default a new array.
+        """
+        return self._table.sums(feature_out)
+
+    def voxels(self, feature_out: Float16[np.ndarray, "n d"] | None = None) -> Voxels:
+        """Return the means, sorted by index: features of unit length, colours.
+
+        Args:
+            feature_out: where to write the features, such as a memory-mapped file; by default a new array.
+        """
+        return self._table.voxels(feature_out)
+
+    def _cells(self, features: np.ndarray | None) -> tuple[Float32[np.ndarray, "cells d"], tuple[int, int]]:
+        """Return the features as rows of cells, and how many rows and columns of cells there are."""
+        if features is not None and (features.ndim != 3 or features.shape[2] != self.dim or 0 in features.shape[:2]):
+            raise ValueError(f"features have shape {features.shape}; this map takes (rows, columns, {self.dim})")
+        if features is None or self.dim == 0:
+            return np.zeros((0, self.dim), np.float32), (0, 0)
+        cells = np.ascontiguousarray(features, np.float32).reshape(-1, self.dim)
+        return cells, (features.shape[0], features.shape[1])
+
+    def _lookup_for(self, rig: Rig, feature_rows: int, feature_columns: int) -> PixelLookup:
+        """Return the lookup of this rig and feature map, kept from the frame before where they are the same."""
+        if self._lookup is not None:
+            known_rig, known_rows, known_columns, lookup = self._lookup
+            if known_rig is rig and (known_rows, known_columns) == (feature_rows, feature_columns):
+                return lookup
+        lookup = look_up(rig, feature_rows, feature_columns)
+        reach = lookup.longest_ray * self.settings.max_depth_m / self.grid.voxel_size_m
+        if reach >= kernels.REACH_VOXELS - 1:
+            raise MapError(
+                f"A depth of {self.settings.max_depth_m} m spans {reach:.0f} voxels of {self.grid.voxel_size_m} m, and "
+                f"a frame takes fewer than {kernels.REACH_VOXELS - 1}; choose larger voxels or a smaller depth."
+            )
+        self._scratch = kernels.make_scratch(rig.depth.height, rig.depth.width)
+        self._lookup = rig, feature_rows, feature_columns, lookup
+        return lookup
+
+    def _pose_of(self, frame: Frame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the rotation, the translation and the camera's voxel."""
+        pose = np.asarray(frame.world_from_camera, np.float64)
+        if not np.isfinite(pose).all():
+            raise RecordingError(f"The pose of frame {frame.name} holds NaN or infinity; leave that frame out.")
+        origin = np.floor(pose[:3, 3] / self.grid.voxel_size_m)
+        if np.abs(origin).max() > FARTHEST_VOXEL:
+            raise RecordingError(
+                f"Frame {frame.name} lies {np.abs(pose[:3, 3]).max():.3g} m from the world's origin, more than "
+                f"{FARTHEST_VOXEL} voxels; move the world's origin nearer to the recording."
+            )
+        return np.ascontiguousarray(pose[:3, :3]), pose[:3, 3].copy(), origin.astype(np.int64)

@@ -1,0 +1,180 @@
+"""Sums over voxels: what fusion adds up, in a table that grows in place, and in a sorted form that can be kept."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float32, Float64, Int32, Int64
+
+from avlmaps.core.errors import MapError
+from avlmaps.maps.fusion import voxel_kernels as kernels
+from avlmaps.maps.types import Voxels
+
+BLOCK_BYTES = 1 << 22  # merging and finishing go through features in blocks of this size, which stay in the cache
+SMALLEST_ROOM = 4096  # rows
+
+
+@dataclass(frozen=True, slots=True)
+class VoxelSums:
+    """The sums of one part of a recording, sorted by index (x, then y, then z); parts add up to the whole.
+
+    The arrays may be memory-mapped.
+
+    Attributes:
+        index: which voxel.
+        feature_sum: sum of weight times feature.
+        weight: sum of the weights of the pixels with a feature; 0 where there was none.
+        rgb_sum: sum of weight times colour (0 to 255).
+        rgb_weight: sum of the weights of the pixels with a colour.
+        hits: how many pixels fell into it, with a feature and a colour or without.
+        last_seen_s: when a pixel last fell into it.
+    """
+
+    index: Int32[np.ndarray, "n 3"]
+    feature_sum: Float32[np.ndarray, "n d"]
+    weight: Float64[np.ndarray, " n"]
+    rgb_sum: Float64[np.ndarray, "n 3"]
+    rgb_weight: Float64[np.ndarray, " n"]
+    hits: Int64[np.ndarray, " n"]
+    last_seen_s: Float64[np.ndarray, " n"]
+
+    def __post_init__(self) -> None:
+        count = len(self.index)
+        expected = {
+            "index": (np.int32, (count, 3)),
+            "feature_sum": (np.float32, (count, self.feature_sum.shape[-1])),
+            "weight": (np.float64, (count,)),
+            "rgb_sum": (np.float64, (count, 3)),
+            "rgb_weight": (np.float64, (count,)),
+            "hits": (np.int64, (count,)),
+            "last_seen_s": (np.float64, (count,)),
+        }
+        for name, (dtype, shape) in expected.items():
+            array = getattr(self, name)
+            if array.shape != shape or array.dtype != dtype:
+                raise ValueError(f"{name} is {array.dtype} of {array.shape}; it must be {np.dtype(dtype)} of {shape}")
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+
+class VoxelTable:
+    """Sums over an unbounded set of voxels, in the order in which they were first met, found by a hash of the index.
+
+    Rows are added in place: the arrays grow by an eighth through ``realloc``, which moves pages, not bytes, so that
+    memory stays at the size of the map. Private to `avlmaps.maps`; kernels write into its arrays.
+
+    Attributes:
+        dim: length of a feature.
+        count: voxels so far.
+        slots: hash table of rows, -1 free; its length is a power of two and at least twice the count.
+    """
+
+    def __init__(self, dim: int) -> None:
+        self.dim = dim
+        self.count = 0
+        self.slots = np.full(2 * SMALLEST_ROOM, -1, np.int32)
+        self.feature_sum = np.zeros((SMALLEST_ROOM, dim), np.float32)
+        self.weight = np.zeros(SMALLEST_ROOM)
+        self.index = np.zeros((SMALLEST_ROOM, 3), np.int32)
+        self.rgb_sum = np.zeros((SMALLEST_ROOM, 3))
+        self.rgb_weight = np.zeros(SMALLEST_ROOM)
+        self.hits = np.zeros(SMALLEST_ROOM, np.int64)
+        self.last_seen_s = np.zeros(SMALLEST_ROOM)
+
+    @property
+    def geometry(self) -> tuple[np.ndarray, ...]:
+        """All sums but the features', as the kernels take them."""
+        return self.index, self.rgb_sum, self.rgb_weight, self.hits, self.last_seen_s
+
+    def reserve(self, extra: int) -> None:
+        """Make room for so many new voxels."""
+        needed = self.count + extra
+        if needed > len(self.weight):
+            rows = max(needed, len(self.weight) + len(self.weight) // 8, 2 * SMALLEST_ROOM)
+            for array in (self.feature_sum, self.weight, *self.geometry):
+                array.resize((rows, *array.shape[1:]), refcheck=False)
+        if 2 * needed > len(self.slots):
+            self.slots = np.full(1 << (4 * needed - 1).bit_length(), -1, np.int32)
+            kernels.rehash(self.slots, self.index, self.count)
+
+    def add(self, part: VoxelSums) -> None:
+        """Add the sums of a part, block by block, so that a memory-mapped part is never whole in memory.
+
+        Raises:
+            MapError: its features have another length.
+        """
+        if part.feature_sum.shape[1] != self.dim:
+            raise MapError(
+                f"The part's features have {part.feature_sum.shape[1]} numbers and this map's {self.dim}; "
+                "merge only maps that were built with the same profile."
+            )
+        for rows in blocks(len(part), self.dim):
+            # Copies: of a bounded size, and never read-only (which would compile the kernel a second time).
+            arrays = (part.index, part.rgb_sum, part.rgb_weight, part.hits, part.last_seen_s, part.feature_sum)
+            block = tuple(np.array(array[rows], order="C") for array in (*arrays, part.weight))
+            self.reserve(len(block[0]))
+            self.count = kernels.add_rows(block, self.slots, self.geometry, self.feature_sum, self.weight, self.count)
+
+    def sorted_rows(self) -> Int64[np.ndarray, " n"]:
+        """Return the rows in the order of their index (x, then y, then z)."""
+        index = self.index[: self.count].astype(np.int64)
+        if not len(index):
+            return np.zeros(0, np.int64)
+        low = index.min(axis=0)
+        span = [int(size) for size in index.max(axis=0) - low + 1]
+        if span[0] * span[1] * span[2] >= 1 << 62:
+            return np.lexsort(index.T[::-1])
+        i, j, k = (index - low).T
+        return np.argsort((i * span[1] + j) * span[2] + k)
+
+    def sums(self, feature_out: np.ndarray | None = None) -> VoxelSums:
+        """Return the sums, sorted; see `VoxelAccumulator.sums`."""
+        rows = self.sorted_rows()
+        feature_sum = feature_array(feature_out, (self.count, self.dim), np.float32)
+        for block in blocks(self.count, self.dim):
+            feature_sum[block] = self.feature_sum[rows[block]]
+        return VoxelSums(
+            index=self.index[rows],
+            feature_sum=feature_sum,
+            weight=self.weight[rows],
+            rgb_sum=self.rgb_sum[rows],
+            rgb_weight=self.rgb_weight[rows],
+            hits=self.hits[rows],
+            last_seen_s=self.last_seen_s[rows],
+        )
+
+    def voxels(self, feature_out: np.ndarray | None = None) -> Voxels:
+        """Return the means, sorted; see `VoxelAccumulator.voxels`."""
+        rows = self.sorted_rows()
+        feature = feature_array(feature_out, (self.count, self.dim), np.float16)
+        parts = blocks(self.count, self.dim)
+        buffer = np.empty((parts[0].stop if parts else 0, self.dim), np.float32)
+        for block in parts:
+            unit = buffer[: block.stop - block.start]
+            kernels.unit_rows(self.feature_sum, rows[block], unit)
+            feature[block] = unit
+        rgb_weight = self.rgb_weight[rows, None]
+        rgb = np.divide(self.rgb_sum[rows], rgb_weight, out=np.zeros((self.count, 3)), where=rgb_weight > 0.0)
+        return Voxels(
+            index=self.index[rows],
+            feature=feature,
+            weight=self.weight[rows].astype(np.float32),
+            rgb=np.rint(rgb).astype(np.uint8),
+            last_seen_s=self.last_seen_s[rows],
+            hits=self.hits[rows],
+        )
+
+
+def blocks(count: int, dim: int) -> list[slice]:
+    """Return slices that cover ``count`` rows of ``dim`` float32 in blocks of `BLOCK_BYTES`."""
+    step = max(1, BLOCK_BYTES // (4 * max(dim, 1)))
+    return [slice(start, min(start + step, count)) for start in range(0, count, step)]
+
+
+def feature_array(out: np.ndarray | None, shape: tuple[int, int], dtype: type) -> np.ndarray:
+    """Return the array that features are to be written to, checked, or a new one."""
+    if out is None:
+        return np.empty(shape, dtype)
+    if out.shape != shape or out.dtype != dtype:
+        raise ValueError(f"feature_out is {out.dtype} of {out.shape}; this map needs {np.dtype(dtype)} of {shape}")
+    return out

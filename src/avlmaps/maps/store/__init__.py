@@ -1,0 +1,1 @@
+"""The map on disk: array files, manifest, checkpoints, writer and reader."""

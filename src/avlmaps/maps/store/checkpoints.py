@@ -1,0 +1,122 @@
+"""What a stage of a build has finished, kept in a folder of its own so that a stopped build goes on from there.
+
+The arrays are written first and ``done.json`` last: without it the folder does not count. Its ``key`` is the hash of
+everything that the stage's outcome depends on; a checkpoint with another key is another stage's and is passed over.
+"""
+
+import hashlib
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import msgspec
+import numpy as np
+
+from avlmaps.core.errors import MapError
+from avlmaps.core.files import write_bytes_atomically
+from avlmaps.maps.store.array_files import (
+    FileInfo,
+    checked_path,
+    read_array,
+    sync_names,
+    write_array,
+    write_copy,
+    writing_into,
+)
+
+DONE = "done.json"
+
+F = TypeVar("F", bound=msgspec.Struct)
+
+
+class _Done(msgspec.Struct, kw_only=True):
+    key: str
+    facts: msgspec.Raw
+    files: dict[str, FileInfo]
+
+
+@dataclass(frozen=True, slots=True)
+class Checkpoint(Generic[F]):
+    """A finished stage, read back.
+
+    Attributes:
+        folder: where it lies.
+        key: hash of all that it depends on.
+        facts: what is not an array.
+        arrays: memory-mapped where large.
+        files: other files (clips), in the order of their names.
+    """
+
+    folder: Path
+    key: str
+    facts: F
+    arrays: dict[str, np.ndarray]
+    files: dict[str, Path]
+
+
+def key_of(*ingredients: Any) -> str:
+    """Return the hex SHA-256 of numbers, words, dataclasses, structs, and lists and dictionaries of them."""
+    return hashlib.sha256(msgspec.json.encode(ingredients, order="deterministic")).hexdigest()
+
+
+def save_checkpoint(
+    folder: Path,
+    key: str,
+    facts: msgspec.Struct,
+    arrays: Mapping[str, np.ndarray],
+    files: Mapping[str, Path] | None = None,
+) -> None:
+    """Write a finished stage; a kill at any instant leaves a checkpoint or none.
+
+    Args:
+        folder: of this stage alone.
+        key: see ``key_of``.
+        facts: what is not an array.
+        arrays: by name.
+        files: other files, copied.
+    """
+    written = {name: write_array(folder, name, array) for name, array in arrays.items()}
+    written |= {name: write_copy(folder, name, source) for name, source in (files or {}).items()}
+    done = _Done(key=key, facts=msgspec.Raw(msgspec.json.encode(facts)), files=written)
+    with writing_into(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        sync_names(folder, written.values())
+        write_bytes_atomically(folder / DONE, msgspec.json.encode(done))
+
+
+def load_checkpoint(folder: Path, facts: type[F], key: str | None = None, *, verify: bool = False) -> Checkpoint[F]:
+    """Read a finished stage.
+
+    Args:
+        folder: that ``save_checkpoint`` wrote.
+        facts: type of its facts.
+        key: that it must have; None takes any.
+        verify: compare large files with their checksums, too.
+
+    Raises:
+        MapError: it is not finished, damaged, or has another key.
+    """
+    path = folder / DONE
+    try:
+        done = msgspec.json.decode(path.read_bytes(), type=_Done)
+        said = msgspec.json.decode(done.facts, type=facts)
+    except OSError as fault:
+        raise MapError(f"{folder} holds no finished part of a map (no readable {DONE}).") from fault
+    except (msgspec.DecodeError, UnicodeDecodeError) as fault:
+        raise MapError(f"{path} is damaged ({fault}); remove {folder} and build it again.") from fault
+    if key is not None and done.key != key:
+        raise MapError(f"{folder} was made from another recording, with other settings or with other models.")
+    arrays = {name: read_array(folder, file, verify=verify) for name, file in done.files.items() if file.dtype}
+    others = {n: checked_path(folder, file, verify=verify) for n, file in sorted(done.files.items()) if not file.dtype}
+    return Checkpoint(folder, done.key, said, arrays, others)
+
+
+def find_checkpoint(folder: Path, facts: type[F], key: str, *, verify: bool = True) -> Checkpoint[F] | None:
+    """Return a finished stage, or None where there is none that can be used; what is left of one is removed."""
+    try:
+        return load_checkpoint(folder, facts, key, verify=verify)
+    except MapError:
+        shutil.rmtree(folder, ignore_errors=True)
+        return None

@@ -1,0 +1,77 @@
+"""One build at a time in a folder. The system lets go of the lock when a process ends, however it ends."""
+
+import os
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from avlmaps.core.errors import MapError
+from avlmaps.maps.store.array_files import writing_into
+
+LOCK = ".lock"
+
+if sys.platform == "win32":  # pragma: no cover - tried on Windows only
+    import msvcrt
+
+    def _grab(descriptor: int) -> None:
+        os.lseek(descriptor, 1 << 20, os.SEEK_SET)  # beyond the text, which others may then still read
+        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+
+else:
+    import fcntl
+
+    def _grab(descriptor: int) -> None:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _grab_patiently(descriptor: int) -> None:
+    """Try a few times: `is_locked` of another process holds the lock for an instant."""
+    for _ in range(3):
+        try:
+            return _grab(descriptor)
+        except OSError:
+            time.sleep(0.02)
+    return _grab(descriptor)
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold the folder's lock; the folder is made if it is not there.
+
+    Raises:
+        MapError: another build holds it, or the folder cannot be written.
+    """
+    with writing_into(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        try:
+            _grab_patiently(descriptor)
+        except OSError as fault:
+            holder = os.pread(descriptor, 32, 0).decode("ascii", "replace").strip() if hasattr(os, "pread") else ""
+            raise MapError(
+                f"{folder} is being built by another process{f' ({holder})' if holder else ''} at this moment; wait "
+                "for it, or build into another folder."
+            ) from fault
+        os.ftruncate(descriptor, 0)
+        os.write(descriptor, f"{os.getpid()}\n".encode())
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def is_locked(folder: Path) -> bool:
+    """Tell whether a build is running in the folder at this moment."""
+    try:
+        descriptor = os.open(folder / LOCK, os.O_RDWR)
+    except OSError:
+        return False
+    try:
+        _grab(descriptor)
+    except OSError:
+        return True
+    finally:
+        os.close(descriptor)
+    return False

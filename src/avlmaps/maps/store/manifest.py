@@ -1,0 +1,260 @@
+"""``map.json``: what is written about a map beside its arrays, and how it is read with suspicion."""
+
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import MapError
+from avlmaps.core.files import write_bytes_atomically
+from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.store.array_files import FileInfo, writing_into
+from avlmaps.perception.models.names import public_choice, public_name
+from avlmaps.perception.protocols import ModelCard
+
+SCHEMA_VERSION = 1
+MANIFEST = "map.json"
+
+Vector = tuple[float, float, float]
+
+
+class ModelInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """A model that made features of this map: its card, and the backend's name in the profile.
+
+    ``backend`` is ``name@model`` where a backend can run several. Of a model that was given as a path only the name is
+    kept, here and in ``id``: where it lay is nobody's business. ``normalisation`` is that of the stored features; there
+    is one as yet.
+    """
+
+    backend: str
+    id: str
+    dim: int
+    licence: str
+    checksum: str
+    prompts: tuple[str, ...]
+    note: str = ""
+    normalisation: str = "unit length"
+
+    @classmethod
+    def of(cls, backend: str, card: ModelCard) -> "ModelInfo":
+        """Return the entry for a backend."""
+        return cls(
+            backend=public_choice(backend),
+            id=public_name(card.id),
+            dim=card.dim,
+            licence=card.licence,
+            checksum=card.checksum,
+            prompts=tuple(card.prompts),
+            note=card.note,
+        )
+
+
+class CameraInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """Intrinsics in pixels, conventions as in ``core.camera``."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+
+    @classmethod
+    def of(cls, camera: Pinhole) -> "CameraInfo":
+        """Return the entry for a camera."""
+        return cls(
+            fx=float(camera.fx),
+            fy=float(camera.fy),
+            cx=float(camera.cx),
+            cy=float(camera.cy),
+            width=int(camera.width),
+            height=int(camera.height),
+        )
+
+    def camera(self) -> Pinhole:
+        """Return the camera."""
+        return Pinhole(self.fx, self.fy, self.cx, self.cy, self.width, self.height)
+
+
+class RigInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """The recording's two cameras; ``rgb_from_depth`` row by row."""
+
+    rgb: CameraInfo
+    depth: CameraInfo
+    rgb_from_depth: tuple[tuple[float, float, float, float], ...]
+
+    @classmethod
+    def of(cls, rig: Rig) -> "RigInfo":
+        """Return the entry for a rig."""
+        rows = tuple(tuple(float(value) for value in row) for row in rig.rgb_from_depth)
+        return cls(rgb=CameraInfo.of(rig.rgb), depth=CameraInfo.of(rig.depth), rgb_from_depth=rows)  # pyright: ignore[reportArgumentType]
+
+    def rig(self) -> Rig:
+        """Return the rig."""
+        return Rig(self.rgb.camera(), self.depth.camera(), np.array(self.rgb_from_depth, np.float64).reshape(4, 4))
+
+
+class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """Which recording the map was built from. The folder's name only: where it lay is nobody's business."""
+
+    name: str
+    format: str
+    fingerprint: str
+    frames: int
+    duration_s: float
+    notices: tuple[str, ...] = ()
+
+
+class UpInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """Which way is up in the recording's world, and how that is known.
+
+    Attributes:
+        direction: unit vector.
+        known_from: the recording's word, the planes in view, or (a guess) how the camera was held.
+        support: for planes the share of the surface that agrees, in [0, 1]; 1 for a known one, 0 for a guess.
+    """
+
+    direction: Vector
+    known_from: Literal["recording", "planes", "camera"]
+    support: float
+
+    @classmethod
+    def of(
+        cls,
+        direction: Float[np.ndarray, "3"],
+        known_from: Literal["recording", "planes", "camera"],
+        support: float,
+    ) -> "UpInfo":
+        """Return the entry for a direction of any length but zero."""
+        x, y, z = (float(value) for value in direction / np.linalg.norm(direction))
+        return cls(direction=(x, y, z), known_from=known_from, support=support)
+
+    def vector(self) -> Float[np.ndarray, "3"]:
+        """Return the direction as an array."""
+        return np.array(self.direction, np.float64)
+
+
+class BadFrame(msgspec.Struct, frozen=True, kw_only=True):
+    """A frame that could not be read and was left out, with the sentence that told why."""
+
+    index: int
+    why: str
+
+
+class Counts(msgspec.Struct, frozen=True, kw_only=True):
+    """How much there is of everything.
+
+    Attributes:
+        frames: fused frames.
+        keyframes: kept pictures.
+        voxels: occupied voxels.
+        sounds: heard sounds.
+    """
+
+    frames: int
+    keyframes: int
+    voxels: int
+    sounds: int
+
+
+class Box(msgspec.Struct, frozen=True, kw_only=True):
+    """The smallest box along the world's axes that holds every occupied voxel, metres."""
+
+    low: Vector
+    high: Vector
+
+
+class Timings(msgspec.Struct, frozen=True, kw_only=True):
+    """When the map was finished (ISO 8601, UTC) and the seconds of work in each stage, over all runs that it took."""
+
+    finished: str
+    elapsed_s: float
+    stages_s: dict[str, float]
+
+
+class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """The whole of ``map.json``.
+
+    Attributes:
+        format: says that this is a map.
+        schema_version: of the folder's layout.
+        avlmaps_version: which release built it.
+        build_key: hash of everything that went in (recording, settings, models); another build has another one.
+        voxel_size_m: the grid.
+        up: which way is up.
+        rig: the recording's cameras.
+        profile: which models perceived.
+        models: their cards, by module.
+        settings: resolved, defaults included.
+        seed: of everything that was drawn at random.
+        recording: what was recorded.
+        counts: how much there is.
+        bounding_box_m: where the voxels are.
+        bad_frames: frames that were left out because they could not be read.
+        notices: a sentence for each thing worth knowing.
+        files: every file, by what it holds (``voxels/feature``); nothing else in the folder is part of the map.
+        bytes: size of all files.
+        timings: when it was built and how long it took; the only part that differs when a build is repeated.
+    """
+
+    format: Literal["avlmap"] = "avlmap"
+    schema_version: int = SCHEMA_VERSION
+    avlmaps_version: str
+    build_key: str
+    voxel_size_m: float
+    up: UpInfo
+    rig: RigInfo
+    profile: str
+    models: dict[str, ModelInfo]
+    settings: BuildSettings
+    seed: int
+    recording: RecordingInfo
+    counts: Counts
+    bounding_box_m: Box
+    bad_frames: tuple[BadFrame, ...] = ()
+    notices: tuple[str, ...] = ()
+    files: dict[str, FileInfo] = {}
+    bytes: int = 0
+    timings: Timings
+
+
+class _Ident(msgspec.Struct):
+    format: str = ""
+    schema_version: int = 0
+
+
+def write_manifest(folder: Path, info: MapInfo) -> None:
+    """Write ``map.json``; with it the folder becomes this map, and not before."""
+    content = msgspec.json.format(msgspec.json.encode(info), indent=2)
+    with writing_into(folder):
+        write_bytes_atomically(folder / MANIFEST, content + b"\n")
+
+
+def parse_manifest(content: bytes, path: Path) -> MapInfo:
+    """Return what ``map.json`` says.
+
+    Args:
+        content: of the file.
+        path: the file, for the errors.
+
+    Raises:
+        MapError: it is not JSON, not UTF-8, of no map, of another schema version, or lacks something.
+    """
+    try:
+        ident = msgspec.json.decode(content, type=_Ident)
+    except (msgspec.DecodeError, UnicodeDecodeError) as fault:
+        raise MapError(f"{path} is damaged: it is not JSON in UTF-8 ({fault}); restore it from a copy.") from fault
+    if ident.format != "avlmap":
+        raise MapError(f"{path} belongs to no map of avlmaps; give the folder that `avlmaps build` wrote.")
+    if ident.schema_version != SCHEMA_VERSION:
+        how = "upgrade avlmaps" if ident.schema_version > SCHEMA_VERSION else "build the map again with --overwrite"
+        raise MapError(
+            f"{path} has schema version {ident.schema_version}, this avlmaps reads version {SCHEMA_VERSION}; {how}."
+        )
+    try:
+        return msgspec.json.decode(content, type=MapInfo)
+    except (msgspec.DecodeError, ValueError, MapError) as fault:
+        raise MapError(f"{path} is damaged: {str(fault).rstrip('.')}; restore it from a copy.") from fault

@@ -1,0 +1,105 @@
+"""Writing a map: new files beside the old ones, then ``map.json``, then the old files go.
+
+Until ``map.json`` is replaced, in one step, the folder is the old map (or none); from then on it is the new one.
+"""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from avlmaps.maps.store.array_files import FileInfo, sync_names, write_array, write_copy
+from avlmaps.maps.store.array_validation import array_fields
+from avlmaps.maps.store.lock import LOCK
+from avlmaps.maps.store.manifest import MANIFEST, MapInfo, write_manifest
+from avlmaps.maps.store.reader import CLIPS, PARTS, STATE
+from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
+
+SECTIONS = ("voxels", "keyframes", "sounds")
+
+
+@dataclass(frozen=True, slots=True)
+class MapContent:
+    """The arrays of a map.
+
+    Attributes:
+        voxels: occupied voxels.
+        keyframes: kept pictures.
+        place_state: what the place encoder learned from them.
+        sounds: what was heard; ``clips`` are file names below ``clips_folder``.
+        clips_folder: where the clips lie now.
+    """
+
+    voxels: Voxels
+    keyframes: Keyframes
+    place_state: dict[str, np.ndarray]
+    sounds: HeardSounds
+    clips_folder: Path
+
+
+def write_map(path: Path, content: MapContent, info: MapInfo) -> MapInfo:
+    """Make the folder this map.
+
+    Args:
+        path: the map's folder; what it held as a map is replaced.
+        content: the arrays.
+        info: the manifest but for ``files`` and ``bytes``.
+
+    Returns:
+        The whole manifest, as written.
+
+    Raises:
+        MapError: the disk is full, or the folder cannot be written; the old map is then still there.
+    """
+    files = dict(_write_files(path, content))
+    size = sum(file.bytes for file in files.values())
+    whole = msgspec.structs.replace(info, files=dict(sorted(files.items())), bytes=size)
+    sync_names(path, files.values())
+    write_manifest(path, whole)
+    sweep(path, whole)
+    return whole
+
+
+def _write_files(path: Path, content: MapContent) -> Iterator[tuple[str, FileInfo]]:
+    for section, whole in zip(SECTIONS, (content.voxels, content.keyframes, content.sounds), strict=True):
+        for field in array_fields(type(whole)):
+            name = f"{section}/{field}"
+            yield name, write_array(path, name, getattr(whole, field))
+    for name, array in content.place_state.items():
+        if not name.isidentifier():
+            raise ValueError(f"the place encoder calls an array {name!r}; its name must be an identifier")
+        yield STATE + name, write_array(path, f"keyframes/state_{name}", array)
+    for number, clip in enumerate(content.sounds.clips):
+        source = content.clips_folder / Path(clip).name
+        yield f"{CLIPS}{number:06d}", write_copy(path, f"sounds/{number:06d}", source)
+
+
+def sweep(path: Path, info: MapInfo) -> None:
+    """Remove from a map's folder the parts of its build and the files of maps before it.
+
+    Only the folders that avlmaps makes are looked into, and a file that cannot be removed is left.
+    """
+    kept = {path / file.path for file in info.files.values()}
+    for section in SECTIONS:
+        for old in (path / section).iterdir():
+            if old not in kept and old.is_file():
+                with suppress(OSError):
+                    old.unlink()
+    for unfinished in path.glob(f".{MANIFEST}.*.partial"):
+        with suppress(OSError):
+            unfinished.unlink()
+    shutil.rmtree(path / PARTS, ignore_errors=True)
+
+
+def is_map_or_free(path: Path) -> bool:
+    """Tell whether a build may write here: nothing there, an empty folder, or a map, whole or half-built."""
+    if not path.exists():
+        return True
+    if not path.is_dir():
+        return False
+    names = {entry.name for entry in path.iterdir()}
+    return bool(names & {MANIFEST, PARTS}) or names <= {LOCK, *SECTIONS}

@@ -1,0 +1,185 @@
+"""Which things a program's words, heatmaps and places mean, asked of a map."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.errors import GoalNotFoundError, ProgramError
+from avlmaps.language.vocabulary import Clip, Picture, Place, Target
+from avlmaps.navigate.arguments import kind_of, text_of
+from avlmaps.navigate.file_access import Readable
+from avlmaps.navigate.footprint import Outline
+from avlmaps.navigate.instances import Thing, likely, nearest, same_thing, tells_one, things_in
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.heatmap import Heatmap
+
+
+class Seeker:
+    """Asks a map what a program means.
+
+    Attributes:
+        asked: the map.
+        guess: whether to take the best guess where the map is not sure.
+        readable: which files a program may load.
+        notes: what a person should know: words half understood, guesses.
+    """
+
+    def __init__(self, asked: AVLMap, guess: bool, readable: Readable, tell: Callable[[str], None]) -> None:
+        """Take a map, and what is to be told of things as they are found."""
+        self.asked = asked
+        self.guess = guess
+        self.readable = readable
+        self.notes: list[str] = []
+        self._tell = tell
+        self._handed_out: dict[Place, Thing] = {}
+        self._instances: set[Place] = set()
+        self._last_told = ""
+
+    def heat(self, skill: str, obj: object, sound: object, img: object, area: object, *, primary: bool) -> Heatmap:
+        """Return the heatmap of the one thing that is given.
+
+        Args:
+            skill: who asks, for the sentence of an error.
+            obj: words for an object.
+            sound: words for a sound, or a clip.
+            img: a picture.
+            area: words for an area.
+            primary: whether it is what is sought itself.
+
+        Raises:
+            ProgramError: not exactly one is given, or it is of the wrong kind.
+            QueryError: it cannot be asked.
+        """
+        given = {"obj": obj, "sound": sound, "img": img, "area": area}
+        named = [name for name, value in given.items() if value is not None]
+        if len(named) != 1:
+            what = " and ".join(named) or "none of them"
+            raise ProgramError(f"{skill} takes exactly one of obj, sound, img and area; it was given {what}.")
+        if img is not None:
+            if not isinstance(img, Picture):
+                raise ProgramError(f"{skill} takes as img what load_image returns, not {kind_of(img)}.")
+            heat = self.asked.image(self.readable.find(img.path, "picture"), primary=primary)
+        elif isinstance(sound, Clip):
+            heat = self.asked.sound_clip(self.readable.find(sound.path, "clip"), primary=primary)
+        elif sound is not None:
+            heat = self.asked.sound(text_of(sound, skill), primary)
+        elif area is not None:
+            heat = self.asked.area(text_of(area, skill), primary)
+        else:
+            heat = self.asked.object(text_of(obj, skill), primary)
+        self._note(heat)
+        return heat
+
+    def best(self, target: Target) -> Thing:
+        """Return the best thing that a target may mean.
+
+        Raises:
+            GoalNotFoundError: there is none.
+        """
+        things, _ = self._candidates(target)
+        return self._chosen(things[0], len(things))
+
+    def meant(self, target: Target, here: Float[np.ndarray, "2"]) -> Thing:
+        """Return the thing that a target means to a robot: the best where it says which one, else the nearest.
+
+        Args:
+            target: a phrase, a place or a heatmap.
+            here: where the robot stands, level x and y.
+
+        Raises:
+            GoalNotFoundError: there is none.
+        """
+        things, one = self._candidates(target)
+        return self._chosen(things[0] if one else nearest(things, here), len(things))
+
+    def pair(self, a: Target, b: Target, here: Float[np.ndarray, "2"]) -> tuple[Thing, Thing]:
+        """Return the two things that are meant: of several, those nearest to each other and to the robot.
+
+        Raises:
+            GoalNotFoundError: there is none, or only one thing for both.
+        """
+        (first, one), (second, other) = self._candidates(a), self._candidates(b)
+        first, second = likely(first, one), likely(second, other)
+        pairs = [(x, y) for x, y in product(first, second) if not same_thing(x, y)]
+        if not pairs:
+            raise GoalNotFoundError(
+                f"There is only one {first[0].name} in the map, and between a thing and itself there is nothing; name "
+                "two different things."
+            )
+
+        def far_m(pair: tuple[Thing, Thing]) -> float:
+            near, far = pair[0].outline.gap_to(pair[1].outline)
+            return float(np.linalg.norm(near - far) + np.linalg.norm((near + far) / 2 - here))
+
+        x, y = min(pairs, key=far_m)
+        return self._chosen(x, len(first)), self._chosen(y, len(second))
+
+    def _candidates(self, target: Target) -> tuple[list[Thing], bool]:
+        """Return the things that a target may mean, best first, and whether it says itself which one."""
+        if isinstance(target, Place):
+            level = self.asked.space.level(np.array([target.x, target.y, target.z]))
+            known = self._handed_out.get(target, Thing("", Outline.at(level[:2]), level))
+            return [known if target in self._instances else replace(known, outline=Outline.at(level[:2]))], True
+        heat = self.asked.object(target, primary=True) if isinstance(target, str) else target
+        if not isinstance(heat, Heatmap):
+            raise ProgramError(f"A skill takes a phrase, a place or a heatmap to go to, not {kind_of(target)}.")
+        things = things_in(heat, self.guess)
+        if isinstance(target, str):
+            self._note(heat)
+        if not heat.found:
+            self.note(f"the map is not sure of {things[0].name}; this is its best guess, {things[0].sure:.2f} sure")
+        return things, tells_one(heat)
+
+    def place_of(self, target: Target) -> Place:
+        """Return the place of the best thing that a target may mean; told where to go, a robot knows it again.
+
+        Raises:
+            GoalNotFoundError: there is none.
+        """
+        return self._handed(self.best(target))
+
+    def place_of_thing(self, thing: Thing) -> Place:
+        """Return the place of one thing; a skill that is given this place knows the thing with its outline."""
+        place = self._handed(thing)
+        self._instances.add(place)
+        return place
+
+    def every(self, target: Target, here: Float[np.ndarray, "2"]) -> list[Thing]:
+        """Return all things that a target may mean, the nearest first.
+
+        Args:
+            target: a phrase, a place or a heatmap.
+            here: where the robot stands, level x and y.
+
+        Raises:
+            GoalNotFoundError: there is none.
+        """
+        things, one = self._candidates(target)
+        chosen = likely(things, one) if not one else things
+        return sorted(chosen, key=lambda thing: float(np.linalg.norm(thing.outline.nearest_to(here) - here)))
+
+    def _handed(self, thing: Thing) -> Place:
+        x, y, z = (float(value) for value in self.asked.space.world(thing.place))
+        place = Place(x, y, z)
+        self._handed_out[place] = thing
+        return place
+
+    def note(self, note: str) -> None:
+        """Keep a note, once, and tell it."""
+        if note and note not in self.notes:
+            self.notes.append(note)
+            self._tell(f"note: {note}")
+
+    def _note(self, heat: Heatmap) -> None:
+        self.note(heat.factors[0].note)
+
+    def _chosen(self, thing: Thing, of: int) -> Thing:
+        place = ", ".join(f"{value:.2f}" for value in self.asked.space.world(thing.place))
+        line = f"{thing.name}: at ({place}) m, {thing.sure:.2f} sure"
+        if thing.name and not self._last_told.startswith(line):
+            self._last_told = line + (f", one of {of}" if of > 1 else "")
+            self._tell(self._last_told)
+        return thing

@@ -1,0 +1,126 @@
+"""From what a program names to things on the ground: which instance is meant, where it is, and what it covers."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.errors import GoalNotFoundError
+from avlmaps.navigate.footprint import Outline
+from avlmaps.query.goals import lead_of
+from avlmaps.query.heatmap import Factor, Heatmap, NearThings
+from avlmaps.query.question import Goal
+
+# From this on an instance is more likely what was asked for than not.
+SURE = 0.5
+_MOST_GOALS = 30
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Thing:
+    """Something to go to.
+
+    Attributes:
+        name: what it was called; ``""`` for a place that a program gives.
+        outline: what it covers of the ground, level frame; a single point where it is no thing.
+        place: where the goal is, level frame, metres.
+        sure: in [0, 1]: how sure the map is; 1 for a place that a program gives.
+        solid: whether it is a thing with an extent, rather than a place.
+    """
+
+    name: str
+    outline: Outline
+    place: Float[np.ndarray, "3"]
+    sure: float = 1.0
+    solid: bool = False
+
+
+def named(heat: Heatmap) -> str:
+    """Return what a heatmap asks for in words: ``'chair' near 'glass breaking'``."""
+    lead = lead_of(heat)
+    others = [f"{factor.part.query!r}" for factor in heat.factors if factor is not lead]
+    return f"{lead.part.query!r}" + (f" near {' and '.join(others)}" if others else "")
+
+
+def tells_one(heat: Heatmap) -> bool:
+    """Tell whether a heatmap says which one is meant, rather than only what it is called."""
+    return len(heat.factors) > 1 or not isinstance(lead_of(heat), NearThings)
+
+
+def things_in(heat: Heatmap, guess: bool = False) -> list[Thing]:
+    """Return the distinct things that a heatmap asks for, best first; at least one.
+
+    Args:
+        heat: what is sought, and what it is near.
+        guess: take the best guess where the map is not sure that there is such a thing, however unsure that is; where
+            nothing comes together with what it is near, the thing alone.
+
+    Raises:
+        GoalNotFoundError: there is none.
+    """
+    tries = _guesses(heat) if guess else (heat,) if heat.found else ()
+    for tried in tries:
+        goals = tried.goals(_MOST_GOALS)
+        if goals:
+            return [_thing(tried, lead_of(tried), goal) for goal in goals]
+    raise GoalNotFoundError(why_not(heat, guess))
+
+
+def _guesses(heat: Heatmap) -> Iterator[Heatmap]:
+    """Yield what may be meant by a heatmap, the surest first."""
+    lead = Heatmap.of(lead_of(heat))
+    yield heat
+    yield heat.with_unsure()
+    if len(heat.factors) > 1:
+        yield lead
+        yield lead.with_unsure()
+
+
+def nearest(things: Sequence[Thing], xy: Float[np.ndarray, "2"]) -> Thing:
+    """Return the thing nearest to a place, of those that the map is sure of; the best where it is of none."""
+    sure = [thing for thing in things if thing.sure >= SURE]
+    return min(sure, key=lambda thing: thing.outline.distance_m(xy)) if sure else things[0]
+
+
+def likely(things: Sequence[Thing], one: bool) -> Sequence[Thing]:
+    """Return the things that may be meant: the best where it is said which one, else those that the map is sure of."""
+    return things[:1] if one else [thing for thing in things if thing.sure >= SURE] or things[:1]
+
+
+def same_thing(a: Thing, b: Thing) -> bool:
+    """Tell whether two are one and the same thing."""
+    return a.solid and b.solid and np.allclose(a.outline.centre, b.outline.centre, atol=1e-6)
+
+
+def _thing(heat: Heatmap, lead: Factor, goal: Goal) -> Thing:
+    position = np.array(goal.position)
+    instance = int(lead.instance[np.argmin(np.linalg.norm(lead.anchors - position, axis=1))])
+    place, sure = heat.space.level(position), goal.score
+    if not isinstance(lead, NearThings):
+        return Thing(named(heat), Outline.at(place[:2]), place, sure)
+    own = heat.space.level(lead.anchors[lead.instance == instance])
+    outline = Outline.round(own[:, :2], heat.space.grid.voxel_size_m)
+    if len(heat.factors) == 1:
+        sure = float(lead.confidence[instance])
+    return Thing(named(heat), outline, place, sure, solid=True)
+
+
+def why_not(heat: Heatmap, guess: bool = False) -> str:
+    """Return one sentence on why there is no goal: which phrase, how sure the map is, and what to do."""
+    missing = [factor for factor in heat.factors if not factor.found]
+    if not missing:
+        return (
+            f"{named(heat)} is nowhere in the map: each is there, but they do not come together anywhere; name it by "
+            "something that is nearer to it."
+        )
+    told = "; ".join(_absence(factor) for factor in missing)
+    advice = "say it in other words" if guess else "say it in other words, or let the robot go to the best guess"
+    return f"{named(heat)} is not found in the map: {told}; {advice}."
+
+
+def _absence(factor: Factor) -> str:
+    what = f"{factor.part.modality} {factor.part.query!r}"
+    best = float(np.max(factor.confidence, initial=0.0)) if isinstance(factor, NearThings) else 0.0
+    note = factor.note or f"it is at best {best:.2f} sure of it, below {SURE:.2f}"
+    return f"{what}: {note}".rstrip(".")

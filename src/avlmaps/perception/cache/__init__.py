@@ -1,0 +1,1 @@
+"""Caches of features by content: encoders that do not encode the same input twice."""

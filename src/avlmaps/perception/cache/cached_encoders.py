@@ -1,0 +1,320 @@
+"""A profile whose models remember: what one of them has made of a frame or a sound it does not make again.
+
+Features of pixels on torch pass through float16 whether they are kept or not, so that a map is the same, bit by bit,
+with the store and without; all others are kept as they are.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any, cast
+
+import numpy as np
+from jaxtyping import Float32, UInt8
+
+from avlmaps.core.registry import Kind
+from avlmaps.core.version import __version__
+from avlmaps.perception.cache.feature_store import CacheSettings, FeatureStore, key_of
+from avlmaps.perception.models.settings import precision_in_force
+from avlmaps.perception.profiles import Profile
+from avlmaps.perception.protocols import (
+    BatchPixelEncoder,
+    FrameSoundEncoder,
+    LocalEncoder,
+    LocalFeatures,
+    PixelEncoder,
+    PlaceEncoder,
+    SoundEncoder,
+    ViewEncoder,
+)
+from avlmaps.perception.user_folder import cache_folder
+from avlmaps.recordings.audio import Sound
+from avlmaps.recordings.types import Frame
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RememberingProfile(Profile):
+    """A profile with a store of features behind some of its encoders.
+
+    Attributes:
+        store: where features are kept; None keeps none.
+        remembered_kinds: of which modules.
+    """
+
+    store: FeatureStore | None = None
+    remembered_kinds: frozenset[Kind] = frozenset()
+
+    def pixel_encoder(self) -> PixelEncoder:
+        """Return the pixel encoder, or raise ``BackendError``."""
+        store, half = self._store_of(Kind.PIXELS), self.on_torch(Kind.PIXELS)
+        encoder = Profile.pixel_encoder(self)
+        return encoder if store is None and not half else RememberingPixels(encoder, store, half)
+
+    def view_encoder(self) -> ViewEncoder:
+        """Return the view encoder, or raise ``BackendError``."""
+        store, encoder = self._store_of(Kind.VIEWS), Profile.view_encoder(self)
+        return encoder if store is None else RememberingViews(encoder, store)
+
+    def sound_encoder(self) -> SoundEncoder:
+        """Return the sound encoder, or raise ``BackendError``."""
+        store, encoder = self._store_of(Kind.SOUNDS), Profile.sound_encoder(self)
+        if store is None:
+            return encoder
+        made = RememberingFrameSounds if isinstance(encoder, FrameSoundEncoder) else RememberingSounds
+        return made(encoder, store)
+
+    def local_encoder(self) -> LocalEncoder:
+        """Return the keypoint encoder, or raise ``BackendError``."""
+        store, encoder = self._store_of(Kind.LOCAL), Profile.local_encoder(self)
+        return encoder if store is None else RememberingKeypoints(encoder, store)
+
+    def place_encoder(self) -> PlaceEncoder:
+        """Return the place encoder, or raise ``BackendError``."""
+        store, encoder = self._store_of(Kind.PLACE), Profile.place_encoder(self)
+        return encoder if store is None else RememberingPlaces(encoder, store)
+
+    def _store_of(self, kind: Kind) -> FeatureStore | None:
+        return self.store if kind in self.remembered_kinds else None
+
+
+def remembering(used: Profile, settings: CacheSettings) -> Profile:
+    """Return the profile with a store behind its encoders, as the settings say."""
+    kinds = [kind for kind in Kind if kind is not Kind.WORDS and used.backend_name(kind)]
+    on_torch = frozenset(kind for kind in kinds if used.on_torch(kind))
+    if settings.place == "off":
+        folder, kinds_kept = None, frozenset[Kind]()
+    elif settings.place == "auto":
+        folder, kinds_kept = cache_folder() / "features", on_torch
+    else:
+        folder, kinds_kept = settings.place, frozenset(kinds)
+    if not kinds_kept and Kind.PIXELS not in on_torch:
+        return used
+    store = FeatureStore(folder, 1e9 * settings.limit_gb) if folder is not None and kinds_kept else None
+    same = {field.name: getattr(used, field.name) for field in fields(Profile)}
+    return RememberingProfile(**same, store=store, remembered_kinds=kinds_kept)
+
+
+def came_from_store(used: Profile, kind: Kind) -> str:
+    """Return how many features of a module came from the store, for a progress bar; ``""`` where none can."""
+    if not isinstance(used, RememberingProfile) or used.store is None or kind not in used.remembered_kinds:
+        return ""
+    return f"{used.store.found.get(kind, 0)} from the cache"
+
+
+class _Remembering:
+    """An encoder in front of another one.
+
+    What is not remembered goes straight to that, written out for each protocol: ``isinstance`` sees no ``__getattr__``.
+    """
+
+    kind: Kind
+
+    def __init__(self, encoder: Any, store: FeatureStore | None) -> None:
+        self._encoder, self._store = encoder, store
+        self.card = encoder.card
+
+    def _key(self, *seen: np.ndarray | str | float | int | None) -> str:
+        """Return the key of what is seen, by this model, in this precision, by this release's code."""
+        return key_of(__version__, self.kind, self.card.id, self.card.checksum, precision_in_force(), *seen)
+
+    def _get(self, key: str) -> np.ndarray | None:
+        return None if self._store is None else self._store.get(self.kind, self.card, key)
+
+    def _put(self, key: str, array: np.ndarray) -> None:
+        if self._store is not None:
+            self._store.put(self.kind, self.card, key, array)
+
+
+class RememberingPixels(_Remembering):
+    """A ``BatchPixelEncoder`` that encodes each frame once; features on torch are rounded to float16."""
+
+    kind = Kind.PIXELS
+
+    def __init__(self, encoder: PixelEncoder, store: FeatureStore | None, half: bool) -> None:
+        """Stand before an encoder.
+
+        Args:
+            encoder: the real one.
+            store: where its features are kept; None keeps none.
+            half: round to float16.
+        """
+        super().__init__(encoder, store)
+        self._kept_as = np.float16 if half else np.float32
+
+    @property
+    def vocabulary(self) -> tuple[str, ...]:
+        """Names that compete with an asked word."""
+        return self._encoder.vocabulary
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each word, or zero."""
+        return self._encoder.encode_words(words)
+
+    def understood(self, word: str) -> str:
+        """Return the part of the phrase that the encoder can act on."""
+        return self._encoder.understood(word)
+
+    @property
+    def batch(self) -> int:
+        """How many frames it likes to be given at once."""
+        return int(getattr(self._encoder, "batch", 1))
+
+    def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
+        """Return the features of a frame."""
+        return self.encode_batch([frame])[0]
+
+    def encode_batch(self, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
+        """Return the features of each frame; the ones that are not kept are encoded together."""
+        keys = ["" if self._store is None else self._key(*_seen_in(frame)) for frame in frames]
+        kept = [self._known(key) for key in keys]
+        missing = [i for i, features in enumerate(kept) if features is None]
+        fresh = encoded_together(self._encoder, [frames[i] for i in missing])
+        for i in reversed(missing):  # a frame's features can take 150 MB: none is held twice for long
+            rounded = fresh.pop().astype(self._kept_as)
+            self._put(keys[i], rounded)
+            kept[i] = rounded.astype(np.float32, copy=False)
+        return [cast(np.ndarray, features) for features in kept]
+
+    def _known(self, key: str) -> Float32[np.ndarray, "hf wf d"] | None:
+        found = self._get(key)
+        if found is None or found.ndim != 3 or found.shape[2] != self.card.dim:
+            return None
+        return found.astype(np.float32, copy=False)
+
+
+class RememberingViews(_Remembering):
+    """A view encoder that encodes each frame once."""
+
+    kind = Kind.VIEWS
+
+    def encode(self, frames: Sequence[Frame]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each frame."""
+        keys = [self._key(*_seen_in(frame)) for frame in frames]
+        kept = [self._get(key) for key in keys]
+        missing = [i for i, features in enumerate(kept) if features is None]
+        if missing:
+            for i, row in zip(missing, self._encoder.encode([frames[i] for i in missing]), strict=True):
+                kept[i] = row
+                self._put(keys[i], row)
+        rows = [cast(np.ndarray, row) for row in kept]
+        return np.stack(rows) if rows else np.zeros((0, self.card.dim), np.float32)
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase."""
+        return self._encoder.encode_words(words)
+
+
+class RememberingSounds(_Remembering):
+    """A sound encoder that encodes each sound once."""
+
+    kind = Kind.SOUNDS
+
+    def encode(self, sound: Sound) -> Float32[np.ndarray, "windows d"]:
+        """Return a unit vector for each window of a sound."""
+        key = self._key(sound.samples, sound.rate_hz)
+        kept = self._get(key)
+        if kept is None:
+            kept = np.asarray(self._encoder.encode(sound), np.float32)
+            self._put(key, kept)
+        return kept
+
+    @property
+    def vocabulary(self) -> tuple[str, ...]:
+        """The kinds of sound that it knows."""
+        return self._encoder.vocabulary
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase."""
+        return self._encoder.encode_words(words)
+
+    def score_words(
+        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], words: Sequence[str]
+    ) -> Float32[np.ndarray, "sounds words"]:
+        """Return how likely each sound is what each phrase names."""
+        return self._encoder.score_words(sounds, words)
+
+    def score_sounds(
+        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
+    ) -> Float32[np.ndarray, " sounds"]:
+        """Return how likely each sound is of the same kind as the asked one."""
+        return self._encoder.score_sounds(sounds, asked)
+
+
+class RememberingFrameSounds(RememberingSounds):
+    """The same for an encoder that gives a vector for each step of time."""
+
+    @property
+    def hop_s(self) -> float:
+        """Seconds of a step."""
+        return self._encoder.hop_s
+
+
+class RememberingPlaces(_Remembering):
+    """A place encoder that encodes each picture once (with the same keypoints, after the same learning)."""
+
+    kind = Kind.PLACE
+
+    def fit(self, local: Sequence[LocalFeatures], rng: np.random.Generator) -> dict[str, np.ndarray]:
+        """Learn what the encoder needs from the map's own keyframes."""
+        return self._encoder.fit(local, rng)
+
+    def encode(
+        self, rgb: UInt8[np.ndarray, "h w 3"], local: LocalFeatures, state: dict[str, np.ndarray]
+    ) -> Float32[np.ndarray, " d"]:
+        """Return a unit vector (zero where the picture has no keypoints)."""
+        learnt = [part for name in sorted(state) for part in (name, np.asarray(state[name]))]
+        points = (local.xy, local.descriptors, local.scale, local.score)
+        key = self._key(rgb, *points, *learnt)
+        kept = self._get(key)
+        if kept is None:
+            kept = np.asarray(self._encoder.encode(rgb, local, state), np.float32)
+            self._put(key, kept)
+        return kept
+
+
+class RememberingKeypoints(_Remembering):
+    """A keypoint encoder that encodes each picture once; kept in float32, because keypoints are sub-pixel."""
+
+    kind = Kind.LOCAL
+
+    def encode(self, rgb: UInt8[np.ndarray, "h w 3"]) -> LocalFeatures:
+        """Return the picture's keypoints."""
+        key = self._key(rgb)
+        kept = self._get(key)
+        if kept is not None and kept.dtype.names:
+            return _keypoints(kept, (rgb.shape[1], rgb.shape[0]))
+        local = self._encoder.encode(rgb)
+        if local.size in ((0, 0), (rgb.shape[1], rgb.shape[0])):
+            self._put(key, _as_rows(local))
+        return local
+
+
+def encoded_together(encoder: PixelEncoder, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
+    """Return the features of each frame, made in one go where the encoder can."""
+    if len(frames) > 1 and isinstance(encoder, BatchPixelEncoder):
+        return encoder.encode_batch(frames)
+    return [encoder.encode(frame) for frame in frames]
+
+
+def _seen_in(frame: Frame) -> list[np.ndarray | str | float | None]:
+    """Return all of a frame that an encoder may look at: everything but its number, name and time."""
+    rig, ground = frame.rig, frame.ground
+    stands = (None,) if ground is None else (ground.up_in_world, ground.camera_m, ground.floor_m)
+    cameras = f"{rig.rgb} {rig.depth}"
+    return [frame.rgb, frame.depth_m, frame.world_from_camera, cameras, np.asarray(rig.rgb_from_depth), *stands]
+
+
+def _as_rows(local: LocalFeatures) -> np.ndarray:
+    """Pack keypoints into rows; what is not known has no column."""
+    columns = [("xy", local.xy), ("descriptors", local.descriptors)]
+    columns += [(name, getattr(local, name)) for name in ("scale", "score") if len(getattr(local, name))]
+    layout = [(name, "<f4", column.shape[1:]) for name, column in columns]
+    rows = np.zeros(len(local.xy), np.dtype([*layout, *([("sized", "u1")] if local.size != (0, 0) else [])]))
+    for name, column in columns:
+        rows[name] = column
+    return rows
+
+
+def _keypoints(rows: np.ndarray, size: tuple[int, int]) -> LocalFeatures:
+    names = [name for name in rows.dtype.names or () if name != "sized"]
+    columns = {name: np.ascontiguousarray(rows[name]) for name in names}
+    return LocalFeatures(**columns, size=size if "sized" in (rows.dtype.names or ()) else (0, 0))

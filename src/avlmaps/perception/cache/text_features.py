@@ -1,0 +1,43 @@
+"""Features of words kept on the disk: a list of rooms takes a text encoder of today half a minute on a CPU.
+
+A command that asks a map is a new process each time, and asks of the same names. They are kept in the user's cache
+folder by model, its weights, sentences and precision, and by this release's code; the folder may be deleted any time.
+"""
+
+import numpy as np
+from jaxtyping import Float32
+
+from avlmaps.core.registry import Kind
+from avlmaps.core.version import __version__
+from avlmaps.perception.cache.feature_store import FeatureStore, key_of
+from avlmaps.perception.models.settings import precision_in_force
+from avlmaps.perception.protocols import ModelCard
+from avlmaps.perception.user_folder import cache_folder
+
+_LIMIT_BYTES = 2e8
+
+
+class KeptWords:
+    """The features of words by one model.
+
+    Args:
+        card: of the model.
+    """
+
+    def __init__(self, card: ModelCard) -> None:
+        self._card = card
+        self._store = FeatureStore(cache_folder() / "words", _LIMIT_BYTES)
+
+    def get(self, phrase: str) -> Float32[np.ndarray, " d"] | None:
+        """Return the unit vector of a phrase, None where it is not kept."""
+        row = self._store.get(Kind.WORDS, self._card, self._key(phrase))
+        fits = row is not None and row.dtype == np.float32 and row.shape == (self._card.dim,)
+        return row if fits else None
+
+    def put(self, phrase: str, row: Float32[np.ndarray, " d"]) -> None:
+        """Keep the unit vector of a phrase."""
+        self._store.put(Kind.WORDS, self._card, self._key(phrase), row)
+
+    def _key(self, phrase: str) -> str:
+        card = self._card
+        return key_of(__version__, card.id, card.checksum, precision_in_force(), *card.prompts, "phrase", phrase)

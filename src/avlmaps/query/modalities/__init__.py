@@ -1,0 +1,1 @@
+"""The four modalities of a query: object, sound, area and image, each a heatmap."""

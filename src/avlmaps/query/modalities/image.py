@@ -1,0 +1,73 @@
+"""Where a picture was taken: heat around the camera that ``locate`` finds."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import UInt8
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.core.errors import QueryError
+from avlmaps.query.heatmap import HeatSettings, NearAnchors
+from avlmaps.query.question import Part
+from avlmaps.query.voxel_space import Space
+
+if TYPE_CHECKING:
+    from avlmaps.query.locate import Located
+
+
+def read_picture(path: Path) -> UInt8[np.ndarray, "h w 3"]:
+    """Read a picture as RGB.
+
+    Raises:
+        QueryError: it is missing or no picture.
+    """
+    import cv2
+
+    if not path.is_file():
+        kind = "is a folder" if path.is_dir() else "is not there"
+        raise QueryError(f"The picture {path} {kind}; check the name.")
+    encoded = np.frombuffer(path.read_bytes(), np.uint8)
+    # The pose is that of the picture as its pixels lie, so a camera's turn flag must not rotate it.
+    picture = cv2.imdecode(encoded, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION) if len(encoded) else None
+    if picture is None:
+        raise QueryError(f"The picture {path} cannot be read as an image; use a PNG or a JPEG.")
+    return cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
+
+
+def require_fitting(rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None) -> None:
+    """Raise ``QueryError`` where a picture is not RGB of whole bytes, or not of the size its intrinsics are for."""
+    if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8 or rgb.size == 0:
+        raise QueryError(
+            f"The picture is an array of {rgb.dtype} and shape {rgb.shape}; give RGB, uint8 of (height, width, 3)."
+        )
+    height, width = rgb.shape[:2]
+    if intrinsics is not None and (intrinsics.width, intrinsics.height) != (width, height):
+        raise QueryError(
+            f"The picture has {width}x{height} pixels, its intrinsics are for "
+            f"{intrinsics.width}x{intrinsics.height}; give those of the picture as it is."
+        )
+
+
+def image_factor(space: Space, located: "Located", part: Part, heat: HeatSettings) -> NearAnchors:
+    """Return the heat of a picture: one anchor of score 1 at the camera.
+
+    Where it was not located, the anchor is at the best guess, if there is one, and the heat is not "found".
+    """
+    sure = located.world_from_camera is not None
+    pose = located.world_from_camera if sure else located.guess
+    anchors = np.zeros((0, 3)) if pose is None else np.asarray(pose, np.float64)[None, :3, 3]
+    note = "" if sure else f"the picture could not be located ({located.inliers} points agree)"
+    if pose is not None and not sure:
+        note += "; the heat is that of the best guess"
+    return NearAnchors(
+        space,
+        part,
+        heat.falloff_per_m(part.role),
+        anchors,
+        np.ones(len(anchors)),
+        np.zeros(len(anchors), np.int64),
+        sure,
+        part.query,
+        note,
+    )

@@ -1,0 +1,401 @@
+"""Which voxels are the object that a word asks for, and which of them belong together.
+
+As the paper does, the asked word competes with a vocabulary and with "other" for every voxel, and wins where it
+is the closest. The margin by which it wins is kept: instances are ranked and absence is told by it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Float16, Float32, Int, UInt8
+
+from avlmaps.core.errors import QueryError
+from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
+from avlmaps.query.colour_filter import Tint, is_tinted, tint_of, tinted_share
+from avlmaps.query.heatmap import HeatSettings, NearThings
+from avlmaps.query.instance_merging import joined_pieces, likeliest, without_specks
+from avlmaps.query.question import Part
+from avlmaps.query.synonyms import fitting, is_a, is_open
+from avlmaps.query.unknown_names import unknown_note
+from avlmaps.query.voxel_space import Space
+
+_CHUNK = 16_384
+# A name that a phrase means at least so much is the thing itself and does not compete with it.
+CLEARLY_MEANT = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectSettings:
+    """From a word to instances."""
+
+    same_word_cosine: float = 0.95
+    """A vocabulary word at least this close to the asked one names the same thing and does not compete with it."""
+    least_score: float = 0.5
+    """For an encoder that has no feature for "other": a voxel must score at least this."""
+    margin_yes: float = 0.1
+    """An instance that wins its voxels by this much on average is as likely right as wrong."""
+    margin_yes_logits: float = 1.0
+    """The same for an encoder that tells by how much its cosines count: the margin times its ``logit_scale``."""
+    area_yes_m2: float = 0.01
+    """Surface below which an instance is probably noise; a mug shows about 0.02 m²."""
+    least_confidence: float = 0.3
+    """Instances below this are noise (one or two voxels of 5 cm) and give no heat; 0 keeps all, as the paper does."""
+    least_in_company: float = 0.02
+    """The same where the word is asked together with what it is near: then a weak instance there is likelier than a
+    sure one elsewhere (docs/benchmarks.md)."""
+    score_in_company: float = 0.5
+    """And there a voxel counts that scores at least this part of its best rival's score, for an encoder of names."""
+    link_m: float = 0.1
+    """Voxels of an object no farther apart than this along every axis belong to one instance."""
+    join_m: float = 0.3
+    """Pieces over one another with no larger gap in height are one thing (the legs and the back of a chair)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A word as an encoder takes it.
+
+    Attributes:
+        rows: what a voxel's feature is compared with: its score is the length of their products with it. One unit
+            vector for most encoders; for one that tells names apart, the code of each name that is meant.
+        span: unit vectors of what is clearly meant; words that lie among them do not compete.
+        understood: what of the word the encoder can act on.
+        meant: for an encoder of names, how much each is meant; empty for others.
+    """
+
+    rows: Float32[np.ndarray, "m d"]
+    span: Float32[np.ndarray, "s d"]
+    understood: str
+    meant: Float32[np.ndarray, " k"]
+
+    @classmethod
+    def of(cls, encoder: PixelEncoder, word: str) -> "Asked":
+        """Ask an encoder for a word; there are no rows where it understands nothing of it."""
+        if isinstance(encoder, NamedPixelEncoder):
+            meant = encoder.meant(word)
+            some, clear = meant > 0.0, meant >= CLEARLY_MEANT
+            rows = np.sqrt(meant[some])[:, None] * encoder.codes[some]
+            return cls(np.ascontiguousarray(rows), encoder.codes[clear], encoder.understood(word), meant)
+        row = np.asarray(encoder.encode_words([word]), np.float32)
+        row = row[np.any(row != 0.0, axis=1)]
+        return cls(row, row, encoder.understood(word), np.zeros(0, np.float32))
+
+
+@dataclass(frozen=True, slots=True)
+class Rivals:
+    """The two words of a vocabulary closest to each voxel, worked out once a map and vocabulary.
+
+    With two kept, a query is one pass over the features even when the asked word is in the vocabulary itself.
+
+    Attributes:
+        words: the vocabulary and, if the encoder has a feature for it, ``other`` as the last.
+        word_feature: unit vectors.
+        has_other: whether ``other`` is among them.
+        best: highest score; −inf where there is no word at all.
+        best_word: whose that is, −1 for nobody.
+        second: next highest score.
+        second_word: whose that is.
+    """
+
+    words: tuple[str, ...]
+    word_feature: Float32[np.ndarray, "v d"]
+    has_other: bool
+    best: Float32[np.ndarray, " n"]
+    best_word: Int[np.ndarray, " n"]
+    second: Float32[np.ndarray, " n"]
+    second_word: Int[np.ndarray, " n"]
+
+    @classmethod
+    def of(cls, feature: Float16[np.ndarray, "n d"], encoder: PixelEncoder, vocabulary: Sequence[str]) -> "Rivals":
+        """Score every voxel against a vocabulary; words of which the encoder understands nothing are left out."""
+        names = [*dict.fromkeys(word for word in vocabulary if word != "other"), "other"]
+        encoded = np.asarray(encoder.encode_words(names), np.float32)
+        known = np.any(encoded != 0.0, axis=1)
+        words = tuple(word for word, is_known in zip(names, known, strict=True) if is_known)
+        return cls(words, encoded[known], bool(known[-1]), *_two_closest(feature, encoded[known]))
+
+    def silent_for(self, encoder: PixelEncoder, asked: "Asked", cosine: float) -> Bool[np.ndarray, " v"]:
+        """Return which words do not compete because they name what is asked for; ``other`` always competes."""
+        close = np.linalg.norm(self.word_feature @ asked.span.T, axis=1) >= cosine
+        same = [bool(asked.understood) and encoder.understood(word) == asked.understood for word in self.words]
+        silent = close | np.array(same, bool)
+        if is_open(encoder):
+            silent |= np.array([is_a(word, asked.understood) for word in self.words], bool)
+        if self.has_other:
+            silent[-1] = False
+        return silent
+
+
+def _two_closest(feature: Float16[np.ndarray, "n d"], words: Float32[np.ndarray, "v d"]):
+    from avlmaps.query.kernels import best_two, share, widen
+
+    n = len(feature)
+    best, second = np.full(n, -np.inf, np.float32), np.full(n, -np.inf, np.float32)
+    best_word, second_word = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
+    columns = np.ascontiguousarray(words.T)
+
+    def work(start: int, stop: int) -> None:
+        wide = np.empty((min(_CHUNK, max(stop - start, 1)), feature.shape[1]), np.float32)
+        for a in range(start, stop, _CHUNK):
+            rows = np.ascontiguousarray(feature[a : min(a + _CHUNK, stop)], np.float16)
+            widen(rows.view(np.uint16), wide)
+            best_two(wide[: len(rows)] @ columns, best, best_word, second, second_word, a)
+
+    if len(words):
+        share(work, n, least=_CHUNK)
+    return best, best_word, second, second_word
+
+
+def object_margins(
+    feature: Float16[np.ndarray, "n d"],
+    rivals: Rivals,
+    asked: Float32[np.ndarray, "m d"],
+    silent: Bool[np.ndarray, " v"],
+    least_score: float,
+) -> tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
+    """Return by how much the asked word beats its best rival at each voxel, and its score there.
+
+    The margin is positive where the voxel is the object.
+
+    Args:
+        feature: of the voxels, zero where there is none.
+        rivals: what competes.
+        asked: rows of ``Asked``.
+        silent: which of the rivals' words do not compete.
+        least_score: what the word must beat besides where ``other`` has no feature.
+    """
+    from avlmaps.query.kernels import feature_scores, margins, share
+
+    score = feature_scores(feature, asked[0])
+    if len(asked) > 1:
+        total = np.square(score)
+        for row in asked[1:]:
+            total += np.square(feature_scores(feature, row))
+        score = np.sqrt(total)
+    floor = np.float32(-np.inf if rivals.has_other else least_score)
+    out, unsure = np.empty(len(score), np.float32), np.empty(len(score), np.bool_)
+    mute = np.append(silent, True)
+    share(
+        lambda a, b: margins(
+            score, rivals.best, rivals.best_word, rivals.second, rivals.second_word, mute, floor, out, unsure, a, b
+        ),
+        len(score),
+        least=50_000,
+    )
+    rows = np.flatnonzero(unsure)
+    if len(rows) and not silent.all():
+        others = rivals.word_feature[~silent].T
+        for a in range(0, len(rows), _CHUNK):
+            some = rows[a : a + _CHUNK]
+            best = (np.asarray(feature[some], np.float32) @ others).max(axis=1)
+            out[some] = score[some] - np.maximum(best, floor)
+    return out, score
+
+
+def instances_of(space: Space, mask: Bool[np.ndarray, " n"], link_m: float) -> Int[np.ndarray, " a"]:
+    """Return for each voxel of the mask the number of the instance that it belongs to."""
+    from avlmaps.query.kernels import linked
+
+    reach = max(1, round(link_m / space.grid.voxel_size_m))
+    return linked(np.ascontiguousarray(space.index[mask], np.int64), reach)
+
+
+def instance_confidence(
+    margin: Float[np.ndarray, " a"], instance: Int[np.ndarray, " a"], voxel_size_m: float, settings: ObjectSettings
+) -> Float32[np.ndarray, " i"]:
+    """Return in [0, 1] how sure it is that each instance is the object: m / (m + m_yes) · (1 − exp(−area / area_yes)).
+
+    m is the mean margin of its voxels, the area is a voxel's face for each of them.
+    """
+    count = np.bincount(instance)
+    mean_margin = np.bincount(instance, weights=margin) / np.maximum(count, 1)
+    clear = mean_margin / (mean_margin + settings.margin_yes)
+    large = 1.0 - np.exp(-count * voxel_size_m**2 / settings.area_yes_m2)
+    return (clear * large).astype(np.float32)
+
+
+def named_confidence(
+    encoder: NamedPixelEncoder,
+    asked: Asked,
+    score: Float[np.ndarray, " a"],
+    instance: Int[np.ndarray, " a"],
+    voxel_size_m: float,
+) -> Float32[np.ndarray, " i"]:
+    """Return how sure it is that each instance is what was asked for, as the encoder was calibrated.
+
+    A phrase that means several names is as sure as the most meant of them would be with all their probability.
+
+    Args:
+        encoder: of names.
+        asked: the word.
+        score: of each voxel, √p.
+        instance: which each belongs to.
+        voxel_size_m: edge of a voxel.
+    """
+    count = np.bincount(instance)
+    mean = np.bincount(instance, weights=np.square(score)) / np.maximum(count, 1)
+    names = [encoder.names[index] for index in np.flatnonzero(asked.meant >= CLEARLY_MEANT)]
+    sure = [encoder.instance_probability(name, mean, count * voxel_size_m**2) for name in names]
+    return np.max(sure, axis=0).astype(np.float32)
+
+
+def object_factor(
+    space: Space,
+    feature: Float16[np.ndarray, "n d"],
+    encoder: PixelEncoder,
+    rivals: Rivals,
+    part: Part,
+    settings: ObjectSettings,
+    heat: HeatSettings,
+    rgb: UInt8[np.ndarray, "n 3"] | None = None,
+) -> NearThings:
+    """Return the heat of the object that a word asks for; if none is sure enough, of the best guesses, not ``found``.
+
+    With the voxels' colours, an encoder that knows things but no colours is helped out with those.
+
+    Raises:
+        QueryError: the encoder understands nothing of the word.
+    """
+    compound = " " in part.query.strip() and lexicon().find(part.query, Kind.THING) is not None  # a white board
+    tint = tint_of(part.query) if rgb is not None and isinstance(encoder, NamedPixelEncoder) and not compound else None
+    if tint and rgb is not None and not tint.thing:
+        return colour_factor(space, rgb, tint, part, settings, heat)
+    asked = Asked.of(encoder, tint.thing if tint else part.query)
+    understood = f"{tint.text} {asked.understood}" if tint and asked.understood else asked.understood
+    if not len(asked.rows) and isinstance(encoder, NamedPixelEncoder):
+        note = unknown_note(tint.thing if tint else part.query)
+        nothing = np.zeros(0, np.int64), np.zeros(0, np.float32), False, "", note
+        return NearThings(space, part, heat.falloff_per_m(part.role), np.zeros(len(feature), bool), *nothing)
+    if not len(asked.rows):
+        known = ", ".join(encoder.vocabulary[:20]) or "nothing that it could list"
+        raise QueryError(
+            f"The pixel encoder {encoder.card.id} understands nothing of {part.query!r}; it knows: {known}."
+            + (f" ({encoder.card.note})" if encoder.card.note else "")
+        )
+    scored = object_scores(feature, encoder, rivals, asked, settings)
+
+    def things(in_company: bool) -> NearThings:
+        pieces = pieces_of(space, encoder, asked, scored, settings, in_company)
+        if tint is not None and rgb is not None:
+            share = tinted_share(rgb, pieces.mask, pieces.instance, tint)
+            pieces = replace(pieces, confidence=pieces.confidence * share)
+        best = float(pieces.confidence.max(initial=0.0)) if tint else pieces.best
+        note = "" if best >= 0.5 else _absence(part.query, len(pieces.mask), pieces.won, best)
+        if understood and understood != part.query.strip().lower():
+            note = f"understood only {understood!r} of {part.query!r}" + ("; " + note if note else "")
+        falloff, alone = heat.falloff_per_m(part.role), None if in_company else lambda: things(True)
+        return NearThings(
+            space, part, falloff, pieces.mask, pieces.instance, pieces.confidence, best >= 0.5, understood, note, alone
+        )
+
+    alone = things(False)
+    return alone if len(alone.confidence) else likeliest(things(True))
+
+
+def colour_factor(
+    space: Space,
+    rgb: UInt8[np.ndarray, "n 3"],
+    tint: Tint,
+    part: Part,
+    settings: ObjectSettings,
+    heat: HeatSettings,
+) -> NearThings:
+    """Return the heat of whatever has a colour."""
+    mask = is_tinted(np.asarray(rgb), tint)
+    instance = instances_of(space, mask, settings.link_m)
+    confidence = instance_confidence(np.ones(len(instance)), instance, space.grid.voxel_size_m, settings)
+    mask, instance, confidence = without_specks(mask, instance, confidence, settings.least_confidence)
+    best = float(confidence.max(initial=0.0))
+    note = "" if best >= 0.5 else f"nothing of some size is {tint.text}"
+    falloff = heat.falloff_per_m(part.role)
+    return NearThings(space, part, falloff, mask, instance, confidence, best >= 0.5, tint.text, note)
+
+
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """The voxels that an asked word won, and the things that they make up.
+
+    Attributes:
+        mask: which voxels they are.
+        instance: which thing each of them belongs to.
+        mean_probability: of each thing: the mean of its voxels' squared scores (for an encoder of names: p).
+        confidence: how sure it is that each is what was asked for.
+        won: how many voxels the word won before specks were left out.
+        best: highest confidence before that.
+    """
+
+    mask: Bool[np.ndarray, " n"]
+    instance: Int[np.ndarray, " a"]
+    mean_probability: Float32[np.ndarray, " i"]
+    confidence: Float32[np.ndarray, " i"]
+    won: int
+    best: float
+
+
+def object_pieces(
+    space: Space,
+    feature: Float16[np.ndarray, "n d"],
+    encoder: PixelEncoder,
+    rivals: Rivals,
+    asked: Asked,
+    settings: ObjectSettings,
+) -> Pieces:
+    """Return the things that a word names: connected voxels that it wins, specks left out, thin parts joined."""
+    return pieces_of(space, encoder, asked, object_scores(feature, encoder, rivals, asked, settings), settings)
+
+
+def object_scores(
+    feature: Float16[np.ndarray, "n d"],
+    encoder: PixelEncoder,
+    rivals: Rivals,
+    asked: Asked,
+    settings: ObjectSettings,
+) -> tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
+    """Return ``object_margins`` of a word."""
+    silent = rivals.silent_for(encoder, asked, settings.same_word_cosine)
+    return object_margins(feature, rivals, asked.rows, silent, settings.least_score)
+
+
+def pieces_of(
+    space: Space,
+    encoder: PixelEncoder,
+    asked: Asked,
+    scored: tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]],
+    settings: ObjectSettings,
+    in_company: bool = False,
+) -> Pieces:
+    """Return the things that voxels with these margins and scores make up; with ``in_company``, unsure ones as well."""
+    margin, score = scored
+    least = settings.least_in_company if in_company else settings.least_confidence
+
+    def confidence_of(mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"]) -> Float32[np.ndarray, " i"]:
+        if isinstance(encoder, NamedPixelEncoder):
+            return named_confidence(encoder, asked, score[mask], instance, space.grid.voxel_size_m)
+        return instance_confidence(margin[mask], instance, space.grid.voxel_size_m, fitting(settings, encoder))
+
+    mask = margin > 0.0
+    won = int(mask.sum())
+    if in_company and isinstance(encoder, NamedPixelEncoder):
+        mask |= score > np.maximum(settings.score_in_company * (score - margin), 0.0)
+    instance = instances_of(space, mask, settings.link_m)
+    confidence = confidence_of(mask, instance)
+    best = float(confidence.max(initial=0.0))
+    mask, instance, confidence = without_specks(mask, instance, confidence, least)
+    joined = joined_pieces(space.level(space.centres[mask]), instance, settings.link_m, settings.join_m)
+    if len(confidence) > joined.max(initial=-1) + 1:
+        instance = joined[instance]
+        confidence = confidence_of(mask, instance)
+    mean = np.bincount(instance, weights=np.square(score[mask]), minlength=len(confidence)).astype(np.float64)
+    mean /= np.maximum(np.bincount(instance, minlength=len(confidence)), 1)
+    best = max(best, float(confidence.max(initial=0.0)))
+    return Pieces(mask, instance, mean.astype(np.float32), confidence, won, best)
+
+
+def _absence(word: str, voxels: int, won: int, best: float) -> str:
+    if not voxels:
+        return "the map holds no voxels"
+    if not won:
+        return f"no voxel is closer to {word!r} than to other things"
+    return f"the best of the {won} voxels closest to {word!r} make an instance of confidence {best:.2f}, below 0.50"

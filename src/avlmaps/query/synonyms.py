@@ -1,0 +1,43 @@
+"""What an encoder of an open vocabulary needs of a query: by how much its cosines count, and which words are rivals.
+
+Such an encoder gives every word a vector, and words of one sense lie close but not at one place: queried for a couch,
+a sofa would win half of its voxels. Words which name the wanted thing, or a kind of it, do not compete; the lexicon
+lists them.
+"""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, ScaledEncoder
+
+if TYPE_CHECKING:
+    from avlmaps.query.modalities.object import ObjectSettings
+
+
+def is_a(other: str, wanted: str) -> bool:
+    """Return whether what one phrase names is what another wants, by the lexicon.
+
+    A name that an encoder carries a special thing under is one with it: a bag competes with no backpack.
+
+    Args:
+        other: ``office chair``.
+        wanted: ``chair``, ``chairs`` or ``seat``; a chair is no office chair.
+    """
+    known = lexicon()
+    if known.is_a(other, wanted, Kind.THING):
+        return True
+    entry, special = known.find(other, Kind.THING), known.find(wanted, Kind.THING)
+    return entry is not None and special is not None and not set(entry.learnt).isdisjoint(special.spellings)
+
+
+def is_open(encoder: PixelEncoder) -> bool:
+    """Return whether an encoder takes any word and tells by how much its cosines count."""
+    return isinstance(encoder, ScaledEncoder) and not isinstance(encoder, NamedPixelEncoder)
+
+
+def fitting(settings: "ObjectSettings", encoder: PixelEncoder) -> "ObjectSettings":
+    """Return the settings with the margin that an encoder is sure at, in its own cosines."""
+    if isinstance(encoder, ScaledEncoder) and is_open(encoder):
+        return replace(settings, margin_yes=settings.margin_yes_logits / encoder.logit_scale)
+    return settings

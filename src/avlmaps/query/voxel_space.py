@@ -1,0 +1,126 @@
+"""The space that heatmaps live in: the map's voxels, their places, and what is horizontal.
+
+The recording's world need not be level, so the map knows which way is up. "Level frame" means the world turned
+by the smallest rotation that makes up its z axis; it shares the world's origin.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from avlmaps.core.poses import rotation_to_level
+from avlmaps.maps.grid import GridSpec
+
+if TYPE_CHECKING:
+    from avlmaps.maps.store.reader import StoredMap
+
+# Voxels are worked on in cubes of this many a side: small enough that few objects or anchors are nearest to
+# some voxel of a cube, large enough that asking for them costs little.
+_BLOCK = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Blocks:
+    """Voxels in an order where those of one cube of space follow each other.
+
+    Attributes:
+        order: (n,) rows of the map's voxels.
+        starts: (b + 1,) first place of each block in ``order``.
+        index: (3, n) int32, the voxels in that order, one row an axis.
+        low: (b, 3) least index of each block's voxels.
+        high: (b, 3) largest index of each block's voxels.
+    """
+
+    order: Int[np.ndarray, " n"]
+    starts: Int[np.ndarray, " b1"]
+    index: Int[np.ndarray, "3 n"]
+    low: Int[np.ndarray, "b 3"]
+    high: Int[np.ndarray, "b 3"]
+
+    def __len__(self) -> int:
+        return len(self.starts) - 1
+
+    @classmethod
+    def of(cls, index: Int[np.ndarray, "n 3"]) -> "Blocks":
+        """Sort voxels into blocks."""
+        cube = np.floor_divide(index, _BLOCK)
+        order = np.lexsort((cube[:, 2], cube[:, 1], cube[:, 0]))
+        return cls._split(order, cube[order], index[order])
+
+    @classmethod
+    def _split(cls, order: Int[np.ndarray, " n"], cube: Int[np.ndarray, "n 3"], index: Int[np.ndarray, "n 3"]):
+        n = len(order)
+        first = np.flatnonzero(np.r_[True, (cube[1:] != cube[:-1]).any(axis=1)]) if n else np.zeros(0, np.int64)
+        empty = np.zeros((0, 3), np.int64)
+        low = np.minimum.reduceat(index, first).astype(np.int64) if n else empty
+        high = np.maximum.reduceat(index, first).astype(np.int64) if n else empty
+        return cls(order, np.append(first, n).astype(np.int64), np.ascontiguousarray(index.T, np.int32), low, high)
+
+    def chosen(self, mask: Bool[np.ndarray, " n"]) -> "Blocks":
+        """Return the blocks of some of the voxels only, without sorting again; blocks that have none are left out.
+
+        Args:
+            mask: in the map's order.
+        """
+        rows = np.flatnonzero(mask[self.order])
+        block = np.searchsorted(self.starts, rows, side="right") - 1
+        first = np.flatnonzero(np.r_[True, block[1:] != block[:-1]]) if len(rows) else np.zeros(0, np.int64)
+        index = np.ascontiguousarray(self.index[:, rows])
+        if not len(rows):
+            return Blocks(self.order[rows], np.zeros(1, np.int64), index, self.low[:0], self.high[:0])
+        low = np.minimum.reduceat(index, first, axis=1).T.astype(np.int64)
+        high = np.maximum.reduceat(index, first, axis=1).T.astype(np.int64)
+        starts = np.append(first, len(rows)).astype(np.int64)
+        return Blocks(self.order[rows], starts, index, np.ascontiguousarray(low), np.ascontiguousarray(high))
+
+
+class Space:
+    """Where a map's voxels are. All heatmaps of one map share one; what costs time is worked out once.
+
+    Attributes:
+        grid: turns metres into voxels.
+        index: (n, 3) occupied voxels, sorted.
+        level_from_world: 3x3 rotation.
+        stored: the map, for its colours in pictures; None for a space without one.
+    """
+
+    def __init__(
+        self,
+        grid: GridSpec,
+        index: Int[np.ndarray, "n 3"],
+        up_in_world: Float[np.ndarray, "3"],
+        stored: "StoredMap | None" = None,
+    ) -> None:
+        self.grid = grid
+        self.index = index
+        self.level_from_world = rotation_to_level(np.asarray(up_in_world, np.float64))
+        self.stored = stored
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    @cached_property
+    def centres(self) -> Float[np.ndarray, "n 3"]:
+        """The middles of the voxels, metres, world."""
+        return self.grid.centre_of(np.asarray(self.index))
+
+    @cached_property
+    def blocks(self) -> Blocks:
+        """The voxels in blocks."""
+        return Blocks.of(np.asarray(self.index))
+
+    @cached_property
+    def horizontal(self) -> Float[np.ndarray, "n 2"]:
+        """The middles of the voxels in the order of ``blocks``, horizontal coordinates of the level frame, metres."""
+        return np.ascontiguousarray(self.level(self.centres[self.blocks.order])[:, :2])
+
+    def level(self, points_world: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+        """Turn points from the world into the level frame."""
+        return np.asarray(points_world, np.float64) @ self.level_from_world.T
+
+    def world(self, points_level: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+        """Turn points from the level frame into the world."""
+        return points_level @ self.level_from_world

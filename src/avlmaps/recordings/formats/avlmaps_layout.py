@@ -1,0 +1,208 @@
+"""The AVLMaps/VLMaps dataset layout: ``poses.txt``, ``rgb/%06d.png``, ``depth/%06d.npy`` (or 16-bit PNG, mm).
+
+Frames of reference. Poses in the files are in the simulator's world W (x right, y up, z backward). ``T`` turns its
+axes to x forward, y left, z up: (x, y, z) becomes (-z, -x, y). **The world of the recordings opened here is T W: the
+simulator's world with its axes turned and its origin kept**, so z is up and a place (x, y, z) of ours is the
+simulator's (-y, z, -x). Of a pose P_i in the files we make
+
+    mobile_base   world_from_camera_i = T P_i C     P_i is the robot's base, C = base_from_camera: the camera at
+                                                    [0, 1.5, 0] in the base, turned by diag(1, -1, -1)
+    camera_base   world_from_camera_i = T P_i       P_i is the camera itself (x right, y down, z forward)
+
+The reference's maps have another origin, the first base pose: with B_i = T P_i T⁻¹ (``base_poses``) a point of ours
+is at B_0⁻¹ p in them (``reference_map_from_world``).
+
+Which of the two the poses are shows in them: the base's y axis points up, the camera's points down. ``camera.json``
+beside ``poses.txt``, every field of which may be left out, overrides what is assumed:
+
+    {"pose_type": "mobile_base", "camera_height_m": 1.5, "fx": 540, "fy": 540, "cx": 540, "cy": 360, "rate_hz": 25}
+
+The sequences below ``audio_video/`` open as well: 25 frames/s, colour without depth, the first of their
+``output_level_N.wav`` as sound track.
+"""
+
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core import poses
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names, settle
+from avlmaps.recordings.formats.tables import read_table
+from avlmaps.recordings.images import first_picture_size
+
+RATE_HZ = 25.0
+CAMERA_HEIGHT_M = 1.5
+# T: rows are the base's forward, left and up axes in the simulator's world.
+WORLD_FROM_HABITAT = np.array(
+    [[0.0, 0.0, -1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+)
+
+
+class CameraFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """The content of ``camera.json``; what is left out is taken from the published data set."""
+
+    pose_type: Literal["mobile_base", "camera_base"] | None = None
+    camera_height_m: float = CAMERA_HEIGHT_M
+    fx: float | None = None
+    fy: float | None = None
+    cx: float | None = None
+    cy: float | None = None
+    rate_hz: float = RATE_HZ
+
+
+def base_from_camera(camera_height_m: float = CAMERA_HEIGHT_M) -> Float[np.ndarray, "4 4"]:
+    """Return the camera's pose in the robot's base (x right, y up, z backward)."""
+    camera = np.diag([1.0, -1.0, -1.0, 1.0])
+    camera[1, 3] = camera_height_m
+    return camera
+
+
+def base_poses(habitat_from_base: Float[np.ndarray, "*n 4 4"]) -> Float[np.ndarray, "*n 4 4"]:
+    """Return the robot's poses with x forward, y left, z up: B_i = T P_i T⁻¹, both base and world being turned."""
+    return WORLD_FROM_HABITAT @ habitat_from_base @ poses.inverse(WORLD_FROM_HABITAT)
+
+
+def reference_map_from_world(first_habitat_from_base: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "4 4"]:
+    """Return what takes a point of a recording's world to the reference's map frame, whose origin is the first base."""
+    return poses.inverse(base_poses(first_habitat_from_base))
+
+
+def read_habitat_poses(path: Path, report: Report = stop_at_first) -> Float[np.ndarray, "n 4 4"]:
+    """Read ``poses.txt``: a line holds px py pz qx qy qz qw, or a 4x4 matrix row by row.
+
+    Raises:
+        RecordingError: the file is missing or damaged.
+    """
+    table = read_table(path, (7, 16), report)
+    values = table.values
+    if values.shape[1] == 16:
+        return values.reshape(-1, 4, 4)
+    norm = np.linalg.norm(values[:, 3:], axis=1)
+    wild = np.isfinite(norm) & (np.abs(norm - 1.0) > poses.MAX_ROTATION_FAULT)
+    for row in np.flatnonzero(wild):
+        line = int(table.lines[row])
+        sentence = f"{path}, line {line}: the quaternion has length {norm[row]:.3g}, so this is no rotation."
+        report(Fault(sentence, path, line))
+    usable = np.isfinite(values).all(axis=1) & ~wild
+    habitat_from_body = poses.from_quaternion(
+        values[:, :3], np.where(usable[:, None], values[:, 3:], (0.0, 0.0, 0.0, 1.0))
+    )
+    habitat_from_body[~usable] = np.nan
+    return habitat_from_body
+
+
+def open_avlmaps(path: Path, report: Report = stop_at_first) -> FileRecording:
+    """Open a scene of the data set, or one of its ``audio_video`` sequences, in place.
+
+    Args:
+        path: the folder with ``poses.txt`` and ``rgb/``.
+        report: is told of every fault.
+
+    Raises:
+        RecordingError: poses and pictures do not match, or a file is damaged.
+    """
+    given, notices = read_camera_file(path / "camera.json")
+    habitat_from_body = read_habitat_poses(path / "poses.txt", report)
+    colour = _numbered(path / "rgb", (".png", ".jpg"))
+    depth = _numbered(path / "depth", (".npy", ".png")) if (path / "depth").is_dir() else {}
+    numbers, more = _complete(path, colour, depth, len(habitat_from_body), report)
+    notices += more
+    world_from_camera, notice = camera_poses(habitat_from_body[numbers], given)
+    shots = Shots(
+        names=[f"{number:06d}" for number in numbers],
+        colour=[f"rgb/{colour[number]}" for number in numbers],
+        depth=[f"depth/{depth[number]}" for number in numbers] if depth else [],
+        stamps_s=np.array(numbers, np.float64) / given.rate_hz,
+        world_from_camera=world_from_camera,
+    )
+    rig = _rig(path, shots, given)
+    shots, further = settle(path, shots, report, lambda _: path / "poses.txt")
+    audio = find_audio(path) or next(iter(sorted(path.glob("output_level_*.wav"))), None)
+    return FileRecording(
+        path=path,
+        format="avlmaps",
+        rig=rig,
+        shots=shots,
+        up_in_world=np.array([0.0, 0.0, 1.0]),
+        audio=AudioTrack.open(audio) if audio else None,
+        notices=(*notices, notice, *further),
+    )
+
+
+def _complete(
+    path: Path, colour: dict[int, str], depth: dict[int, str], poses_count: int, report: Report
+) -> tuple[list[int], list[str]]:
+    """Return the numbers that have all they need, and what is to be told of the others."""
+    numbers = [n for n in sorted(colour) if n < poses_count and (not depth or n in depth)]
+    if not numbers:
+        raise RecordingError(
+            f"{path} has {len(colour)} pictures in rgb/, {len(depth)} in depth/ and {poses_count} lines in poses.txt, "
+            "but no number is in all of them; line 1 belongs to 000000."
+        )
+    notices: list[str] = []
+    partial = len(colour.keys() | depth.keys() | set(range(poses_count))) - len(numbers)
+    if partial:
+        notices.append(f"{partial} frame(s) lack their picture, their depth or their line in poses.txt; left out.")
+        report(Fault(f"{path}: {notices[-1]}", path, fatal=False))
+    if not depth:
+        notices.append("There is no depth, so only sounds and views can be mapped.")
+    return numbers, notices
+
+
+def _numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, str]:
+    stems = [(name.split(".", 1)[0], name) for name in list_names(folder, suffixes)]
+    return {int(stem): name for stem, name in stems if stem.isascii() and stem.isdigit()}
+
+
+def read_camera_file(path: Path) -> tuple[CameraFile, list[str]]:
+    """Return what ``camera.json`` says, or what is assumed where there is none, and what is to be told of that.
+
+    Raises:
+        RecordingError: the file is damaged.
+    """
+    if not path.exists():
+        return CameraFile(), [f"The stamps are counted at {RATE_HZ:g} frames/s, since poses.txt has none."]
+    try:
+        given = msgspec.json.decode(path.read_bytes(), type=CameraFile)
+    except (msgspec.DecodeError, UnicodeDecodeError, OSError) as error:
+        raise RecordingError(f"{path} is not as it should be ({error}); mend the file.") from None
+    if not given.rate_hz > 0.0:
+        raise RecordingError(f"{path}: rate_hz is {given.rate_hz}; it must be positive.")
+    return given, []
+
+
+def camera_poses(
+    habitat_from_body: Float[np.ndarray, "n 4 4"], given: CameraFile
+) -> tuple[Float[np.ndarray, "n 4 4"], str]:
+    """Turn poses as they stand in the file into the camera's poses in our world; tell what they were taken for."""
+    pose_type, how = given.pose_type, "as camera.json says"
+    if pose_type is None:
+        upward = habitat_from_body[np.isfinite(habitat_from_body[:, 1, 1]), 1, 1]
+        pose_type = "camera_base" if len(upward) and np.median(upward) < 0.0 else "mobile_base"
+        how = f"their y axis points {'down' if pose_type == 'camera_base' else 'up'}"
+    if pose_type == "camera_base":
+        return WORLD_FROM_HABITAT @ habitat_from_body, f"The poses are taken for the camera's own ({how})."
+    camera = base_from_camera(given.camera_height_m)
+    told = f"The poses are taken for the robot's base ({how}), with the camera {given.camera_height_m:g} m above it."
+    return WORLD_FROM_HABITAT @ habitat_from_body @ camera, told
+
+
+def _rig(path: Path, shots: Shots, given: CameraFile) -> Rig:
+    """Make the camera: 90 degrees of horizontal view, the middle of the picture, unless the file says otherwise."""
+    width, height = first_picture_size(path, shots.colour)
+    fx = given.fx if given.fx is not None else width / 2
+    fy = given.fy if given.fy is not None else fx
+    cx = given.cx if given.cx is not None else width / 2
+    cy = given.cy if given.cy is not None else height / 2
+    try:
+        rgb = Pinhole(fx, fy, cx, cy, width, height)
+    except ValueError as error:
+        raise RecordingError(f"{path / 'camera.json'} holds no camera: {error}; mend the file.") from None
+    return Rig(rgb, rgb.resized(*first_picture_size(path, shots.depth)) if shots.depth else rgb)

@@ -1,0 +1,245 @@
+"""Reading our own folder format; `layout.py` tells what is in it, `writer.py` writes it."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from avlmaps.core import poses, timeline
+from avlmaps.core.errors import AudioError, RecordingError
+from avlmaps.recordings import layout
+from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names, settle
+from avlmaps.recordings.formats.tables import read_table, text_lines
+from avlmaps.recordings.layout import Description
+from avlmaps.recordings.video import VideoFrames
+
+# Stamps beyond this are a date (seconds since 1970), not seconds from the start of a recording.
+_DATE_S = 1e8
+# A quaternion whose length is further from one than this was not written as a rotation.
+_MAX_QUATERNION_FAULT = 0.05
+
+
+def open_folder(path: Path, report: Report = stop_at_first) -> FileRecording:
+    """Open a recording in our own format.
+
+    Args:
+        path: the folder.
+        report: is told of every fault; by default the first fatal one ends the opening.
+
+    Raises:
+        RecordingError: the recording is unfinished or damaged so that it cannot be used.
+    """
+    if not (path / layout.DESCRIPTION).exists() and (path / layout.UNFINISHED).exists():
+        sentence = f"{path} was never finished: whatever wrote it stopped before its end; record it again."
+        report(Fault(sentence, path / layout.UNFINISHED))
+        raise RecordingError(sentence)
+    description = layout.read_description(path, report)
+    known = _read_poses(path, report)
+    video = _find_video(path, description)
+    found = _find_pictures(path, description, known, video, report)
+    shots, notices, start_s = _pose_pictures(found, known)
+    shots, more = settle(path, shots, report, pose_file=None)
+    audio_start_s = description.audio_start_s - (start_s if description.audio_start_s > _DATE_S else 0.0)
+    up = description.up_in_world
+    return FileRecording(
+        path=path,
+        format="folder",
+        rig=description.rig(),
+        shots=shots,
+        depth_units=description.depth_units_per_m,
+        up_in_world=None if up is None else np.array(up) / np.linalg.norm(up),
+        audio=_open_audio(path, audio_start_s, video),
+        notices=(*notices, *more),
+        video=video,
+    )
+
+
+def _open_audio(path: Path, start_s: float, video: VideoFrames | None) -> AudioTrack | None:
+    """Open the sound track: a file of its own, else the video's (most have none, which is no fault)."""
+    file = find_audio(path)
+    if file is not None:
+        return AudioTrack.open(file, start_s=start_s)
+    if video is not None:
+        with suppress(AudioError):
+            return AudioTrack.open(video.path, start_s=start_s)
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class _Poses:
+    """Rows of poses.csv, as they stand there: ``usable`` ones have a finite pose and a rotation."""
+
+    stamps_s: Float[np.ndarray, " n"]
+    world_from_camera: Float[np.ndarray, "n 4 4"]
+    usable: Bool[np.ndarray, " n"]
+
+
+@dataclass(frozen=True, slots=True)
+class _Pictures:
+    """The pictures' files and, where it is known, when each was taken."""
+
+    names: list[str]
+    colour: list[str]
+    depth: list[str]
+    stamps_s: Float[np.ndarray, " n"] | None
+    video_frames: Sequence[int] = ()
+
+
+def _read_poses(folder: Path, report: Report) -> _Poses:
+    path = folder / layout.POSES
+    if not path.is_file():
+        raise RecordingError(f"{path} is missing; the recording needs it.")
+    table = read_table(path, (8,), report, header=True)
+    stamps_s, translation, quaternion = table.values[:, 0], table.values[:, 1:4], table.values[:, 4:8]
+    length = np.linalg.norm(quaternion, axis=1)
+    finite = np.isfinite(table.values).all(axis=1)
+    rigid = np.abs(length - 1.0) <= _MAX_QUATERNION_FAULT
+    for row in np.flatnonzero(~finite):
+        line = int(table.lines[row])
+        report(Fault(f"{path}, line {line}: the pose is NaN or infinite; it is not used.", path, line, fatal=False))
+    for row in np.flatnonzero(finite & ~rigid):
+        line = int(table.lines[row])
+        sentence = (
+            f"{path}, line {line}: the quaternion has length {length[row]:.3g}, so this is no rotation; "
+            "write qx qy qz qw of length 1, or leave the line out."
+        )
+        report(Fault(sentence, path, line))
+    for row in np.flatnonzero(np.diff(stamps_s) <= 0.0) + 1:
+        line = int(table.lines[row])
+        sentence = (
+            f"{path}, line {line}: stamp {stamps_s[row]:.6f} s is not after that of the line before "
+            f"({stamps_s[row - 1]:.6f} s); frames are sorted, or cut where the clock was set anew."
+        )
+        report(Fault(sentence, path, line, fatal=False))
+    usable = finite & rigid
+    quaternion = np.where(usable[:, None], quaternion, (0.0, 0.0, 0.0, 1.0))
+    pose = poses.from_quaternion(translation, quaternion)
+    pose[~usable] = np.nan
+    if len(stamps_s) == 0:
+        raise RecordingError(f"{path} holds no pose, so there is nothing to map.")
+    return _Poses(stamps_s, pose, usable)
+
+
+def _find_video(folder: Path, description: Description) -> VideoFrames | None:
+    """Open ``rgb.mp4`` (or another container) where there is no ``rgb/``."""
+    files = [folder / f"rgb{suffix}" for suffix in layout.VIDEO_SUFFIXES]
+    file = next((f for f in files if f.is_file()), None)
+    if file is None or (folder / "rgb").is_dir():
+        return None
+    video, camera = VideoFrames(file), description.intrinsics.rgb
+    if (video.width, video.height) != (camera.width, camera.height):
+        raise RecordingError(
+            f"{file} is {video.width}x{video.height}, but {layout.DESCRIPTION} says {camera.width}x{camera.height}; "
+            "give the intrinsics of the video's own size."
+        )
+    return video
+
+
+def _find_pictures(
+    folder: Path, description: Description, known: _Poses, video: VideoFrames | None, report: Report
+) -> _Pictures:
+    """Find the pictures and their stamps: by frames.csv, else row by row with poses.csv, else by the rate."""
+    if not (folder / "depth").is_dir():
+        raise RecordingError(f"{folder / 'depth'} is missing; the recording needs it.")
+    where, suffixes = ("rgb", layout.COLOUR_SUFFIXES) if video is None else ("depth", (".png",))
+    found = {name.rsplit(".", 1)[0]: name for name in list_names(folder / where, suffixes)}
+    if video is not None and len(found) != len(video):
+        raise RecordingError(
+            f"{video.path} has {len(video)} frames, but {folder / 'depth'} has {len(found)} pictures; "
+            "each frame needs its depth."
+        )
+    path = folder / layout.FRAMES
+    if path.exists():
+        rows = list(_listed(path, report))
+        names = [name for name, _ in rows]
+        stamps_s: Float[np.ndarray, " n"] | None = np.array([stamp for _, stamp in rows], np.float64)
+        if not names:
+            raise RecordingError(f"{path} lists no frame, so there is nothing to map.")
+    else:
+        names = list(found)
+        stamps_s = video.stamps_s if video else _stamps_without_list(folder, names, description, known, report)
+    colour = [f"rgb/{found.get(name, name + '.png')}" for name in names]
+    if description.frames is not None and description.frames != len(names):
+        where = path.name if path.exists() else "rgb/"
+        sentence = f"{folder / layout.DESCRIPTION} tells of {description.frames} frames, but {where} has {len(names)}."
+        report(Fault(sentence, folder / layout.DESCRIPTION, fatal=False))
+    depth = [f"depth/{name}.png" for name in names]
+    if video is not None:
+        return _Pictures(names, [], depth, stamps_s, range(len(names)))
+    return _Pictures(names, colour, depth, stamps_s)
+
+
+def _listed(path: Path, report: Report) -> Iterator[tuple[str, float]]:
+    for number, text in text_lines(path, report):
+        if text.replace(" ", "") == layout.FRAMES_HEADER:
+            continue
+        name, _, stamp = text.rpartition(",")
+        try:
+            if not name or "/" in name or "\\" in name:
+                raise ValueError(name)
+            yield name, float(stamp)
+        except ValueError:
+            report(Fault(f"{path}, line {number}: {text[:40]!r} is not name,stamp_s; mend the line.", path, number))
+
+
+def _stamps_without_list(
+    folder: Path, names: list[str], description: Description, known: _Poses, report: Report
+) -> Float[np.ndarray, " n"] | None:
+    if len(names) == len(known.stamps_s):
+        return None
+    if description.rgb_rate_hz and all(name.isascii() and name.isdigit() for name in names):
+        return np.array([int(name) for name in names], np.float64) / description.rgb_rate_hz
+    sentence = (
+        f"{folder} has {len(names)} pictures in rgb/ and {len(known.stamps_s)} lines in {layout.POSES}; add "
+        f"{layout.FRAMES} ({layout.FRAMES_HEADER}), or rgb_rate_hz in {layout.DESCRIPTION} and numbers as names."
+    )
+    report(Fault(sentence, folder / layout.POSES))
+    return np.arange(len(names), dtype=np.float64)
+
+
+def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, tuple[str, ...], float]:
+    """Give every picture a pose: its own row's, or one interpolated at its stamp where that can be told.
+
+    Returns:
+        The shots, what is to be told of them, and the date that was subtracted from the stamps, seconds.
+    """
+    stamps_s = known.stamps_s if found.stamps_s is None else found.stamps_s
+    start_s, notices = 0.0, []
+    finite_s = stamps_s[np.isfinite(stamps_s)]
+    if len(finite_s) and finite_s.min() > _DATE_S:
+        start_s = float(finite_s.min())
+        notices.append(f"The stamps are dates; time 0 is the first frame's, {start_s:.6f} s since 1970.")
+    own_row = len(stamps_s) == len(known.stamps_s) and np.array_equal(stamps_s, known.stamps_s, equal_nan=True)
+    covered, world_from_camera = np.ones(len(stamps_s), bool), known.world_from_camera
+    if not own_row:
+        covered, world_from_camera, more = _interpolated(stamps_s, known)
+        notices += more
+    shots = Shots(found.names, found.colour, found.depth, stamps_s - start_s, world_from_camera, found.video_frames)
+    return shots.take(np.flatnonzero(covered)), tuple(notices), start_s
+
+
+def _interpolated(
+    stamps_s: Float[np.ndarray, " n"], known: _Poses
+) -> tuple[Bool[np.ndarray, " n"], Float[np.ndarray, "n 4 4"], list[str]]:
+    """Return where a pose can be told, the poses (NaN elsewhere), and sentences about what cannot be used."""
+    notices: list[str] = []
+    usable = np.flatnonzero(known.usable)
+    if len(usable) < len(known.usable):
+        notices.append(f"{len(known.usable) - len(usable)} pose(s) of {layout.POSES} are NaN and not used.")
+    order = timeline.in_order(known.stamps_s[usable], f"poses of {layout.POSES}")
+    notices += order.notices
+    rows = usable[order.index]
+    covered, world_from_camera = np.zeros(len(stamps_s), bool), np.full((len(stamps_s), 4, 4), np.nan)
+    if len(rows):
+        trajectory = timeline.Trajectory(known.stamps_s[rows], known.world_from_camera[rows])
+        covered = trajectory.covers(stamps_s)
+        world_from_camera[covered] = trajectory.at(stamps_s[covered])
+    if not covered.all():
+        lost = int((~covered).sum())
+        notices.append(f"{lost} frame(s) lie outside the poses of {layout.POSES} or in a gap of them; left out.")
+    return covered, world_from_camera, notices
