@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.commands import Command, Given, read_command
-from avlmaps.language.translator import Translation
+from avlmaps.language.translator import Translation, Translator
 from avlmaps.language.verbalise import verbalise
 from avlmaps.language.writing import write_program
 
@@ -69,6 +69,11 @@ def command_to_program(command: str) -> str:
     return RulesTranslator().program_for(command).program
 
 
-def explain(command: Command) -> list[str]:
-    """Return the readings that were weighed, a line each, the best first; a smaller cost is likelier."""
-    return [f"{one.cost:6.2f}  {verbalise(one.intents)}" for one in command.readings]
+def explanation(translator: Translator, command: str) -> list[str]:
+    """Return the readings of a command, a line each, the best first; the smaller the cost, the likelier.
+
+    A translator that weighs no readings has none.
+    """
+    if not isinstance(translator, RulesTranslator):
+        return ["readings: this translator weighs none"]
+    return [f"reading {one.cost:5.2f}: {verbalise(one.intents)}" for one in translator.read(command).readings]

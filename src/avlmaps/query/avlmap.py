@@ -105,6 +105,13 @@ class AVLMap:
             object_factor(self.space, feature, encoder, self._rivals[1], part, settings.objects, settings.heat, rgb)
         )
 
+    def knows(self, phrase: str) -> bool:
+        """Return whether the pixel encoder can look for a phrase: any phrase for an open vocabulary, else its names."""
+        from avlmaps.perception.protocols import NamedPixelEncoder
+
+        encoder = self.stored.profile.pixel_encoder()
+        return not isinstance(encoder, NamedPixelEncoder) or bool(encoder.meant(phrase).any())
+
     def sound(self, text: str, primary: bool = False) -> Heatmap:
         """Return the heat of where a sound of that name was heard.
 
