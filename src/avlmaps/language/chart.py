@@ -4,7 +4,7 @@ Rules are read top down and their results are stored by place, so that no span i
 it ends, what it cost, and its value. Words have no cost; a comma inside a rule costs a little.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +15,8 @@ _COMMA = 0.4
 _FILLER = 0.3
 _MOST_A_SPAN = 3
 _MOST_REPEATS = 6
+_MOST_OPEN = 12
+_INFINITE = float("inf")
 BuiltIn = Callable[[int], "list[tuple[int, float, Any]]"]
 Slots = tuple[tuple[str, Any], ...]
 
@@ -116,7 +118,7 @@ class Chart:
         for template, first in zip(self.grammar.rules[rule], self.grammar.first[rule], strict=True):
             if first.isdisjoint(here):
                 continue
-            for end, cost, slots in self._part(template.body, at, 0):
+            for end, cost, slots in self._part(template.body, at):
                 if end > at:
                     value = _value(template, slots, at, end)
                     ends = best.setdefault(end, {})
@@ -127,62 +129,73 @@ class Chart:
             for value, cost in sorted(values.items(), key=lambda pair: pair[1])[:_MOST_A_SPAN]
         ]
 
-    def _part(self, part: Part, at: int, depth: int) -> Iterator[tuple[int, float, Slots]]:
+    def _part(self, part: Part, at: int) -> "list[tuple[int, float, Slots]]":
+        """Return where a part of a template ends that begins at a token, its cost, and what it stores."""
         match part.kind:
             case "seq":
-                yield from self._sequence(part.parts, 0, at, depth)
+                return self._sequence(part.parts, at)
             case "any":
-                for inner in part.parts:
-                    yield from self._part(inner, at, depth)
+                return [found for inner in part.parts for found in self._part(inner, at)]
             case "maybe":
-                yield from self._part(part.parts[0], at, depth)
-                yield at, 0.0, ()
+                return [*self._part(part.parts[0], at), (at, 0.0, ())]
             case "many":
-                yield from self._many(part.parts[0], at, depth)
+                return self._many(part.parts[0], at)
             case "word":
-                if at < len(self.tokens) and self.tokens[at].text == part.name:
-                    yield at + 1, 0.0, ()
+                return [(at + 1, 0.0, ())] if at < len(self.tokens) and self.tokens[at].text == part.name else []
             case "class":
-                for edge in self.terminal(part.name, at):
-                    yield edge.end, edge.cost, ((part.slot, edge.value),) if part.slot else ()
+                found = self.terminal(part.name, at)
+                return [(e.end, e.cost, ((part.slot, e.value),) if part.slot else ()) for e in found]
             case _:
-                for edge in self.edges(part.name, at):
-                    yield edge.end, edge.cost, ((part.slot or "_", edge.value),)
+                return [(e.end, e.cost, ((part.slot or "_", e.value),)) for e in self.edges(part.name, at)]
 
-    def _sequence(
-        self, parts: tuple[Part, ...], k: int, at: int, depth: int
-    ) -> Iterator[tuple[int, float, Slots]]:  # fmt: skip
-        if k == len(parts):
-            yield at, 0.0, ()
-            return
-        starts = [(at, 0.0)]
-        if k and at < len(self.tokens):
-            starts += self._skips(at, parts[k])
-        for start, extra in starts:
-            for middle, cost, slots in self._part(parts[k], start, depth):
-                if extra and middle == start:
-                    continue  # a comma belongs before something
-                for end, more, rest in self._sequence(parts, k + 1, middle, depth):
-                    yield end, cost + more + extra, slots + rest
+    def _sequence(self, parts: tuple[Part, ...], at: int) -> "list[tuple[int, float, Slots]]":
+        states: dict[tuple[int, Slots], float] = {(at, ()): 0.0}
+        for k, part in enumerate(parts):
+            after: dict[tuple[int, Slots], float] = {}
+            for (middle, slots), cost in states.items():
+                starts = [(middle, 0.0)]
+                if k and middle < len(self.tokens):
+                    starts += self._skips(middle, part)
+                for start, extra in starts:
+                    for end, more, rest in self._part(part, start):
+                        if extra and end == start:
+                            continue  # a comma belongs before something
+                        key, total = (end, slots + rest), cost + more + extra
+                        if total < after.get(key, _INFINITE):
+                            after[key] = total
+            if not after:
+                return []
+            states = after
+        return [(end, cost, slots) for (end, slots), cost in states.items()]
+
+    def _many(self, part: Part, at: int) -> "list[tuple[int, float, Slots]]":
+        found: list[tuple[int, float, Slots]] = [(at, 0.0, ())]
+        open_states = found
+        for _ in range(_MOST_REPEATS):
+            more: list[tuple[int, float, Slots]] = []
+            for middle, cost, slots in open_states:
+                starts = [(middle, 0.0)]
+                if middle > at and middle < len(self.tokens) and self.tokens[middle].text in (",", "-"):
+                    starts.append((middle + 1, _COMMA))
+                elif middle == at and at and at < len(self.tokens) and self.tokens[at].text in (",", "-"):
+                    starts.append((at + 1, _COMMA))
+                for start, extra in starts:
+                    more += [
+                        (end, cost + own + extra, slots + rest)
+                        for end, own, rest in self._part(part, start)
+                        if end > start
+                    ]
+            if not more:
+                break
+            open_states = sorted(more, key=lambda state: state[1])[:_MOST_OPEN]
+            found = [*found, *open_states]
+        return found
 
     def _skips(self, at: int, part: Part) -> list[tuple[int, float]]:
         """Return where a part may begin behind a comma or words that say nothing."""
         if self.tokens[at].text in (",", "-"):
             return [(at + 1, _COMMA)] if part.name not in (",", "-") else []
         return [(edge.end, _FILLER) for edge in self.terminal("FILLER", at) if edge.end == at + 1]
-
-    def _many(self, part: Part, at: int, depth: int) -> Iterator[tuple[int, float, Slots]]:
-        yield at, 0.0, ()
-        if depth >= _MOST_REPEATS:
-            return
-        starts = [(at, 0.0)]
-        if at and at < len(self.tokens) and self.tokens[at].text in (",", "-"):
-            starts.append((at + 1, _COMMA))
-        for start, extra in starts:
-            for middle, cost, slots in self._part(part, start, 0):
-                if middle > start:
-                    for end, more, rest in self._many(part, middle, depth + 1):
-                        yield end, cost + more + extra, slots + rest
 
 
 def _value(template: Template, slots: Slots, start: int, end: int) -> Any:

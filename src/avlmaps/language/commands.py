@@ -10,6 +10,7 @@ from avlmaps.language.intents import (
     Wait,
 )  # fmt: skip
 from avlmaps.language.names import near_names
+from avlmaps.language.orders import on_targets
 from avlmaps.language.readings import Sentence, readings
 
 MOST_CHARACTERS = 1000
@@ -164,18 +165,3 @@ def unknown(name: str) -> Clarify:
     near = tuple(word for word, _ in near_names(name.split()[-1]))[:3]
     hint = f" Did you mean {' or '.join(near)}?" if near else " Say it in another word."
     return Clarify(f"I do not know '{name}'.{hint}", near)
-
-
-def on_targets(intent: Intent, change: Callable[[Target], Target]) -> Intent:
-    """Return an intent with each of its targets changed."""
-    match intent:
-        case Go(to=target) | Face(to=target):
-            return replace(intent, to=change(target))
-        case Beside(of=target) | StopAt(of=target) | Circle(of=target) | VisitEach(of=target):
-            return replace(intent, of=change(target))
-        case Between(of=(a, b)):
-            return Between((change(a), change(b)))
-        case Repeat(body=body):
-            return replace(intent, body=tuple(on_targets(one, change) for one in body))
-        case _:
-            return intent

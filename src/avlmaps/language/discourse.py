@@ -7,7 +7,7 @@ from avlmaps.language.chart import Tree
 from avlmaps.language.intents import (
     Between, Clarify, Face, Go, Intent, Kind, Refuse, Repeat, Return, Reason, Target, VisitEach,
 )  # fmt: skip
-from avlmaps.language.orders import MOST_TIMES, count_of, intents_of, refuse
+from avlmaps.language.orders import MOST_TIMES, count_of, intents_of, on_targets, refuse
 from avlmaps.language.readings import Item, Reading, Sentence
 from avlmaps.language.targets import Memory, Unresolved, resolve
 
@@ -52,6 +52,7 @@ class _Composer:
     number: int = 0  # of the sentence
     loop_from: int | None = None  # the group where a repetition of all that follows begins
     loop_times: int = 1
+    listing: bool = False  # whether "and" or "then" stands before the next name
 
     def item(self, item: Item, rest: tuple[Item, ...], before: Item | None) -> None:
         match item.kind:
@@ -92,8 +93,23 @@ class _Composer:
         for token in self.sentence.tokens[item.start : item.end]:
             if token.kind in ("image", "clip"):
                 self.memory.add(Target(Kind(token.kind), token.text))
+                return
+        if item.kind == "remark" and not self.groups:
+            self.named_in(item)
+
+    def named_in(self, item: Item) -> None:
+        """Remember the first sound or thing that a remark names, for an "it" that follows."""
+        for rule in ("clause_said", "strict_said"):
+            for at in range(item.start, item.end):
+                found = [edge for edge in self.sentence.chart.edges(rule, at) if edge.end <= item.end]
+                if found:
+                    best = max(found, key=lambda edge: (edge.end, -edge.cost))
+                    self.memory.add(resolve(best.value, self.memory))
+                    return
 
     def boundary(self, item: Item) -> None:
+        words = self.sentence.words(item.start, item.end).strip()
+        self.listing = words not in (",", "-", "(", ")", ".", ":")
         if self.sentence.words(item.start, item.end).strip() in _HARD and self.held and self.groups:
             self.flush()
         if self.sentence.words(item.start, item.end).strip() in _HARD:
@@ -144,7 +160,8 @@ class _Composer:
 
     def bare(self, tree: Any, rest: tuple[Item, ...]) -> None:
         target = resolve(tree.get("to") if isinstance(tree, Tree) and tree.rule == "bare" else tree, self.memory)
-        correcting = self.join == "CORRECT"
+        refining = isinstance(tree, Tree) and isinstance(tree.get("to"), Tree) and tree.get("to").get("one") == "yes"
+        correcting = self.join == "CORRECT" or (refining and bool(self.groups) and not self.listing)
         if not correcting and self.is_referred_to(rest) and not self.continues():
             self.memory.add(target)
             return
@@ -186,8 +203,11 @@ class _Composer:
             return
         if tree.get("same") == "yes":
             last = self.memory.last("it")
+            better = last.with_near(*near)
             self.memory.targets.remove(last)
-            self.memory.add(last.with_near(*near))
+            self.memory.add(better)
+            for group in self.groups:
+                group.intents = [on_targets(one, lambda target: better if target == last else target) for one in group.intents]
             return
         target = resolve(base, self.memory).with_near(*near) if base is not None else near[0].with_near(*near[1:])
         self.memory.add(target)
@@ -278,8 +298,6 @@ def _tidied(intents: list[Intent]) -> list[Intent]:
 
 
 def _with_target(intent: Intent, target: Target) -> Intent:
-    from avlmaps.language.commands import on_targets
-
     if isinstance(intent, Between):
         return Between((intent.of[0], target))
     if isinstance(intent, Repeat):

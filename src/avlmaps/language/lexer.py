@@ -52,6 +52,7 @@ _TENS = {
 _PARTS = {"half": 0.5, "quarter": 0.25, "quarters": 0.25, "third": 1 / 3}
 _VAGUE = {("a", "couple"): 2, ("a", "few"): 3, ("couple",): 2, ("few",): 3, ("several",): 3, ("a", "pair"): 2,
           ("a", "dozen"): 12, ("some",): 3}  # fmt: skip
+_BEGIN_NUMBERS = frozenset({*_SMALL, *_TENS, *_PARTS, *(words[0] for words in _VAGUE), "an"})
 LENGTHS = {
     "m": 1.0, "metre": 1.0, "meter": 1.0, "mtr": 1.0, "cm": 0.01, "centimetre": 0.01, "centimeter": 0.01, "dm": 0.1,
     "mm": 0.001, "millimetre": 0.001, "millimeter": 0.001, "ft": 0.3048, "foot": 0.3048, "feet": 0.3048,
@@ -130,6 +131,8 @@ def number_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
     if i >= len(tokens):
         return found
     token = tokens[i]
+    if token.kind != "number" and token.text not in _BEGIN_NUMBERS:
+        return found
     if token.kind == "number":
         whole, _, part = token.text.replace(",", ".").partition("/")
         value = float(whole) / float(part) if part and float(part) else float(whole)

@@ -1,5 +1,7 @@
 """From the tree of one order to its intents."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from avlmaps.language.chart import Tree
@@ -187,6 +189,21 @@ def count_of(tree: Any) -> float | None:
             return count_of(tree.get("times"))
         return tree.get("word") and {"once": 1.0, "twice": 2.0, "thrice": 3.0}.get(tree.get("word"))
     return None
+
+
+def on_targets(intent: Intent, change: Callable[[Target], Target]) -> Intent:
+    """Return an intent with each of its targets changed."""
+    match intent:
+        case Go(to=target) | Face(to=target):
+            return replace(intent, to=change(target))
+        case Beside(of=target) | StopAt(of=target) | Circle(of=target) | VisitEach(of=target):
+            return replace(intent, of=change(target))
+        case Between(of=(a, b)):
+            return Between((change(a), change(b)))
+        case Repeat(body=body):
+            return replace(intent, body=tuple(on_targets(one, change) for one in body))
+        case _:
+            return intent
 
 
 _READ = {

@@ -17,6 +17,8 @@ from avlmaps.language.names import Names
 MOST_READINGS = 4
 _RUN_ON, _BARE, _MENTION, _REMARK, _REMARK_WORD = 0.8, 1.1, 0.9, 1.15, 0.04
 _SKIP, _SKIP_MARK, _SKIP_MEANING, _ORDER = 2.6, 0.05, 6.0, 0.3
+_LISTED = 0.6  # a name alone costs so much less where an order goes before
+_SILENT = frozenset({"THEN", "mark", "POLITE", "GREETING", "FILLER", "INSTEAD_END"})
 _HARD = frozenset({".", "!", "?", ";"})
 _BREAKS = frozenset({*_HARD, ",", ":", "-", ">"})
 
@@ -55,6 +57,7 @@ class _State:
     fresh: bool
     item: Item | None
     before: "_State | None"
+    trail: tuple[Any, ...] = ()  # the items that mean something
 
 
 class Sentence:
@@ -112,15 +115,24 @@ def readings(sentence: Sentence) -> list[Reading]:
                 extra = _RUN_ON if item.kind in ("order", "bare") and not state.fresh else 0.0
                 if needs_fresh and not state.fresh:
                     continue
+                if item.kind == "bare" and any(kind in ("order", "bare") for kind, _ in state.trail):
+                    extra -= _LISTED
                 keeps = state.fresh if fresh is None else fresh
-                best[item.end].append(_State(state.cost + cost + extra, keeps, item, state))
+                trail = state.trail if item.kind in _SILENT else (*state.trail, (item.kind, item.value))
+                best[item.end].append(_State(state.cost + cost + extra, keeps, item, state, trail))
     return [_reading(state) for state in sorted(_pruned(best[count]), key=lambda state: state.cost)[:MOST_READINGS]]
 
 
 def _pruned(states: list[_State]) -> list[_State]:
     kept: list[_State] = []
     for fresh in (True, False):
-        kept += sorted((s for s in states if s.fresh is fresh), key=lambda s: s.cost)[: MOST_READINGS]
+        trails: set[tuple[Any, ...]] = set()
+        for state in sorted((s for s in states if s.fresh is fresh), key=lambda s: s.cost):
+            if state.trail not in trails:
+                trails.add(state.trail)
+                kept.append(state)
+            if len(trails) == MOST_READINGS:
+                break
     return kept
 
 
@@ -163,6 +175,8 @@ def _steps(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | No
             yield Item(name, edge.value, at, edge.end), cost, fresh, name == "POLITE"
     yield from _remarks(sentence, at)
     mark = tokens[at].kind == "punct"
+    if mark and chart.terminal("THEN", at):
+        return
     begins = chart.begins(at)
     cost = _SKIP_MARK if mark else _SKIP_MEANING if not begins.isdisjoint(("NEGATION", "IF")) else _SKIP
     yield Item("mark" if mark else "skip", None, at, at + 1), cost, True if mark else None, False

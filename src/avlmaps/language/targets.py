@@ -112,6 +112,8 @@ def _whole(value: Tree, memory: Memory) -> Target:
         raise Unresolved(Clarify("Which thing? Name it."))
     else:
         base = resolve(inner, memory)
+    if value.get("verb") is not None:
+        base = Target(Kind.SOUND, f"{base.name} {value.get('verb').name}", base.near)
     if value.get("which") is not None:
         base = base.with_near(resolve(value.get("which"), memory))
     if value.rule == "target" and value.get("sound") is not None and value.get("near") is not None:
