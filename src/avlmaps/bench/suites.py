@@ -45,7 +45,7 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
     """Run a suite and write SUITE.json, SUITE.md and SUITE.png into ``out``.
 
     Args:
-        suite: ``words``, ``sounds``, ``segmentation``, ``locate``, ``objects``, ``indexing`` or ``navigation``.
+        suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``objects``, ``indexing`` or ``navigation``.
         asked: what it measures on.
         out: folder to write into.
 
@@ -120,8 +120,15 @@ def _locate(asked: Asked) -> Mapping[str, Table]:
     return tables
 
 
+def _language(_: Asked) -> Mapping[str, Table]:
+    from avlmaps.bench import language
+
+    return language.run()
+
+
 _SUITES: dict[str, Callable[[Asked], Mapping[str, Table]]] = {
     "words": _words,
+    "language": _language,
     "sounds": _sounds,
     "segmentation": _segmentation,
     "locate": _locate,
