@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.discourse import Composed, compose
 from avlmaps.language.intents import (
-    Beside, Between, Circle, Clarify, Face, Go, Intent, Kind, Refuse, Repeat, StopAt, Target, VisitEach,
+    Beside, Between, Circle, Clarify, Face, Go, Intent, Kind, Reason, Refuse, Repeat, StopAt, Target, VisitEach,
     Wait,
 )  # fmt: skip
 from avlmaps.language.names import near_names
@@ -15,6 +15,8 @@ from avlmaps.language.readings import Sentence, readings
 
 MOST_CHARACTERS = 1000
 _EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
+_SAFETY = 0.35
+_DANGERS = (Reason.HARM, Reason.FLYING, Reason.ENDLESS)
 _MARGIN = 0.06  # readings of different meaning that are closer are asked about
 _ASKING = 1.5  # a reading that ends in a question or a refusal counts as so much worse than one that does not
 
@@ -85,7 +87,7 @@ def read_command(text: str, given: Given | None = None) -> Command:
     for reading in readings(sentence):
         composed = compose(sentence, reading)
         intents, notes = _guarded(composed, sentence, given)
-        extra = _ASKING if isinstance(intents[0], Clarify | Refuse) else 0.0
+        extra = 0.0 if not isinstance(intents[0], Clarify | Refuse) or _is_firm(intents[0]) else _ASKING
         if not any(_same(one.intents, intents) for one in weighed):
             weighed.append(Weighed(intents, reading.cost + extra, notes, composed.skipped))
     if not weighed:
@@ -94,8 +96,16 @@ def read_command(text: str, given: Given | None = None) -> Command:
     return _decided(tuple(weighed), sentence)
 
 
+def _is_firm(intent: Intent) -> bool:
+    """Return whether an intent refuses what the words say, and not what they lack."""
+    return isinstance(intent, Refuse) and intent.reason not in (Reason.UNKNOWN, Reason.CHAT, Reason.QUESTION)
+
+
 def _decided(weighed: tuple[Weighed, ...], sentence: Sentence) -> Command:
     best = weighed[0]
+    for one in weighed:  # safety first: a dangerous reading that is nearly as likely counts
+        if isinstance(one.intents[0], Refuse) and one.intents[0].reason in _DANGERS and one.cost - best.cost < _SAFETY:
+            return Command(one.intents, one.notes, weighed)
     if isinstance(best.intents[0], Clarify | Refuse):
         return Command(best.intents, best.notes, weighed)
     if best.skipped:

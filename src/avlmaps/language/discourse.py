@@ -64,7 +64,9 @@ class _Composer:
                 self.mention(item.value)
             case "repeat":
                 self.repeat(item.value, rest)
-            case "THEN" | "mark":
+            case "THEN" if item.value == "first" and len(self.groups) > 1 and not any(one.kind in ("order", "bare") for one in rest):
+                self.groups.insert(-1, self.groups.pop())
+            case "THEN" | "mark" | "BUT":
                 self.boundary(item)
             case "BEFORE":
                 said = self.groups and self.groups[-1].sentence == self.number
@@ -124,6 +126,8 @@ class _Composer:
             raise Unresolved(refuse(tree.get("reason")))  # type: ignore[arg-type]
         intents, notes = intents_of(tree, self.memory)
         self.notes += notes
+        if isinstance(intents[0], Return) and not self.groups:
+            raise Unresolved(Clarify("I do not know where you are. Which thing or room are you near?"))
         if isinstance(tree, Tree) and tree.get("arrive") and self.groups:
             last = self.groups[-1].intents[-1]
             if isinstance(last, Go) and intents == [last]:

@@ -18,7 +18,7 @@ MOST_READINGS = 4
 _RUN_ON, _BARE, _MENTION, _REMARK, _REMARK_WORD = 0.8, 1.1, 0.9, 1.15, 0.04
 _SKIP, _SKIP_MARK, _SKIP_MEANING, _ORDER = 2.6, 0.05, 6.0, 0.3
 _LISTED = 0.6  # a name alone costs so much less where an order goes before
-_SILENT = frozenset({"THEN", "mark", "POLITE", "GREETING", "FILLER", "INSTEAD_END"})
+_SILENT = frozenset({"THEN", "BUT", "mark", "POLITE", "GREETING", "FILLER", "INSTEAD_END"})
 _HARD = frozenset({".", "!", "?", ";"})
 _BREAKS = frozenset({*_HARD, ",", ":", "-", ">"})
 
@@ -151,7 +151,7 @@ _RULES = (
     ("chat", 0.6, False, True), ("inquire", 0.6, False, True),
 )  # fmt: skip
 _JOINS = {
-    "THEN": (0.0, True), "BUT_FIRST": (0.1, True), "BEFORE": (0.1, True), "AFTER": (0.1, True), "CORRECT": (0.45, True),
+    "THEN": (0.0, True), "BUT_FIRST": (0.0, True), "BUT": (0.25, True), "BEFORE": (0.1, True), "AFTER": (0.1, True), "CORRECT": (0.15, True),
     "POLITE": (0.05, True), "GREETING": (0.12, None), "FILLER": (0.2, None), "SLOW": (0.1, None), "INSTEAD_END": (0.4, None),
     "MAKE_IT": (0.5, True), "THOUGH": (0.25, None),
 }  # fmt: skip

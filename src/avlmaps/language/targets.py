@@ -1,9 +1,11 @@
 """From what the grammar read to targets; pronouns become what was named before."""
 
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 from avlmaps.language.chart import Tree
+from avlmaps.language.grammar import load_grammar
 from avlmaps.language.intents import Clarify, Kind, Pick, Target
 
 _ROOMS_OF_THINGS = frozenset({"toilet", "bath", "shower", "loo", "wc", "lavatory"})
@@ -158,11 +160,20 @@ def _noun(value: Tree, memory: Memory) -> Target:
             return Target(last.kind, last.name, (), Pick.OTHER)
         return memory.last("it")
     base = resolve(what, memory)
+    first, _, rest = base.name.partition(" ")
+    if rest and first in _choices():
+        raise Unresolved(Clarify(f"I cannot choose the {first} {rest} from the map. Say what it is near."))
     if pick is Pick.OTHER:
         memory.used = True
         if not any(one.name.rstrip("s") == base.name.rstrip("s") for one in memory.targets):
             raise Unresolved(Clarify(f"Which other {base.name}? Name the first one, or say what it is near."))
     return replace(base, pick=Pick.ANY if pick is Pick.NEAREST else pick)
+
+
+@cache
+def _choices() -> frozenset[str]:
+    """Return the words that choose one of several in a way that a map cannot tell."""
+    return frozenset(load_grammar().lists["choices"].split())
 
 
 def _sound(value: Tree, memory: Memory) -> Target:

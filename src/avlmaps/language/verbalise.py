@@ -65,7 +65,7 @@ def _other(intent: Intent) -> str:
         case Circle(of=target, views=views):
             return f"look at {phrase(target)} from {views} points around it"
         case VisitEach(of=target):
-            return f"go to each {phrase(target).removeprefix('the ')}"
+            return f"go to each of these, the nearest first: {phrase(target)}"
         case Wait(seconds=seconds):
             return "wait a moment" if seconds is None else f"wait {seconds:g} seconds"
         case Return():
