@@ -20,7 +20,7 @@ from avlmaps.core.lexicon import Kind, lexicon
 OUTCOMES = ("right", "harmless", "asked back", "misread")
 _STOPS = frozenset({"refuse", "clarify"})
 _LOOKS = frozenset({"wait", "face", "turn"})
-_WHO = frozenset({"someone", "somebody", "person", "a", "an", "the", "sound", "noise", "of", "on", "people", "sounds"})
+_WHO = frozenset({"anyone", "anybody", "someone", "somebody", "person", "a", "an", "the", "sound", "noise", "of", "on", "people", "sounds"})
 _ENDINGS = ("ing", "ed", "es", "s", "er", "y", "e")
 Row = Mapping[str, Any]
 

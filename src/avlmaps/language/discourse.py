@@ -52,6 +52,7 @@ class _Composer:
     number: int = 0  # of the sentence
     loop_from: int | None = None  # the group where a repetition of all that follows begins
     loop_times: int = 1
+    moved: bool = False  # whether an order was put before another
     listing: bool = False  # whether "and" or "then" stands before the next name
 
     def item(self, item: Item, rest: tuple[Item, ...], before: Item | None) -> None:
@@ -64,7 +65,7 @@ class _Composer:
                 self.mention(item.value)
             case "repeat":
                 self.repeat(item.value, rest)
-            case "THEN" if item.value == "first" and len(self.groups) > 1 and not any(one.kind in ("order", "bare") for one in rest):
+            case "THEN" if item.value == "first" and not self.moved and len(self.groups) > 1 and not any(one.kind in ("order", "bare") for one in rest):
                 self.groups.insert(-1, self.groups.pop())
             case "THEN" | "mark" | "BUT":
                 self.boundary(item)
@@ -156,6 +157,7 @@ class _Composer:
         if join == "BEFORE":
             self.held.append(group)
         elif join in ("AFTER", "BUT_FIRST"):
+            self.moved = True
             self.groups.insert(len(self.groups) - 1, group)
         elif join == "CORRECT" and self.groups:
             self.groups[-1] = group

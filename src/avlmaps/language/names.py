@@ -15,6 +15,7 @@ from avlmaps.language.lexer import Token
 
 _MOST_WORDS = 5
 _ADJECTIVE, _OPEN_WORD, _SIDE, _MENDED, _UNKNOWN = 0.02, 0.45, 0.25, 0.9, 1.6
+_VERB_ALONE = 0.5
 _ALIKE, _APART = 0.74, 0.08  # a misspelt word is at least so much like its neighbour, and so much less like the next
 _ONLY_ROOMS = frozenset({"room", "area", "zone", "hall", "corner"})
 Found = list[tuple[int, float, Target]]
@@ -127,14 +128,13 @@ class Names:
             ing = words[at].endswith("ing")
             if being and not ing and words[at] not in _pasts():
                 continue
-            if not subject and not ing:
-                continue
             sounding = _forms()[words[at]]
             if words[at] == "went" or (words[at] in ("going", "goes", "go")):
                 if words[at + 1 : at + 2] != ["off"]:
                     continue
                 at, sounding = at + 1, "going off"
             plain = 0.0 if ing or being or words[at] in _pasts() else 0.15
+            plain += 0.0 if ing or subject else _VERB_ALONE
             add(at + 1, cost + plain, f"{subject} {sounding}")
             for more, extra, thing in self._objects(words[at + 1 :]):
                 add(at + 1 + more, cost + plain + extra, _with_object(subject, sounding, thing))
