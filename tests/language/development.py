@@ -13,10 +13,17 @@ from program_equality import canonical
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.commands import read_command
-from avlmaps.language.writing import write_program
+from avlmaps.language.program.writing import write_program
 
 LISTS = Path(__file__).parent / "commands"
-NAMES = ("commands.tsv", "free.tsv", "paraphrases.jsonl", "paraphrases_2.jsonl", "paraphrases_3.jsonl", "paraphrases_4.jsonl")
+NAMES = (
+    "commands.tsv",
+    "free.tsv",
+    "paraphrases.jsonl",
+    "paraphrases_2.jsonl",
+    "paraphrases_3.jsonl",
+    "paraphrases_4.jsonl",
+)
 
 
 def rows(name: str) -> Iterator[tuple[str, list[str]]]:

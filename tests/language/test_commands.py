@@ -19,7 +19,7 @@ from avlmaps.language.questions import read_question
 from avlmaps.language.rules import RulesTranslator, UnclearError, command_to_program
 from avlmaps.language.translator import Translator
 from avlmaps.language.verbalise import verbalise
-from avlmaps.language.writing import write_program
+from avlmaps.language.program.writing import write_program
 
 LISTS = Path(__file__).parent / "commands"
 # How many commands of each development list are right at least, and how many may be read as something else at most.
@@ -94,7 +94,9 @@ def test_the_translator_is_one() -> None:
 
 
 def test_the_plan_is_in_plain_words() -> None:
-    plan = RulesTranslator().program_for("go to the armchair nearest to where breathing was heard, then face the window")
+    plan = RulesTranslator().program_for(
+        "go to the armchair nearest to where breathing was heard, then face the window"
+    )
     assert plan.plan == "I will go to the armchair nearest to where breathing was heard, then face the window."
 
 
@@ -102,7 +104,8 @@ ORDERS = ["turn left", "go to the sofa", "stop 2 m left of the bed", "find the s
 
 
 @pytest.mark.parametrize(
-    "around", ["please {}", "{}. Thanks!", "Hey robot, could you {}, please?", "I'd like you to {}", "um {} uh", "{}, okay?"]
+    "around",
+    ["please {}", "{}. Thanks!", "Hey robot, could you {}, please?", "I'd like you to {}", "um {} uh", "{}, okay?"],
 )
 @pytest.mark.parametrize("order", ORDERS)
 def test_politeness_changes_nothing(around: str, order: str) -> None:

@@ -20,7 +20,24 @@ from avlmaps.core.lexicon import Kind, lexicon
 OUTCOMES = ("right", "harmless", "asked back", "misread")
 _STOPS = frozenset({"refuse", "clarify"})
 _LOOKS = frozenset({"wait", "face", "turn"})
-_WHO = frozenset({"anyone", "anybody", "someone", "somebody", "person", "a", "an", "the", "sound", "noise", "of", "on", "people", "sounds"})
+_WHO = frozenset(
+    {
+        "anyone",
+        "anybody",
+        "someone",
+        "somebody",
+        "person",
+        "a",
+        "an",
+        "the",
+        "sound",
+        "noise",
+        "of",
+        "on",
+        "people",
+        "sounds",
+    }
+)
 _ENDINGS = ("ing", "ed", "es", "s", "er", "y", "e")
 Row = Mapping[str, Any]
 
@@ -55,7 +72,9 @@ def judge(row: Row) -> Judged:
         return _judge_question(row)
     got = _intents_of(row)
     wanted = [row["intents"], *row.get("also", [])]
-    return Judged(str(row["say"]), False, min((_outcome(got, each) for each in wanted), key=OUTCOMES.index), got, wanted[0])
+    return Judged(
+        str(row["say"]), False, min((_outcome(got, each) for each in wanted), key=OUTCOMES.index), got, wanted[0]
+    )
 
 
 def _intents_of(row: Row) -> list[Any]:
@@ -78,7 +97,9 @@ def _judge_question(row: Row) -> Judged:
     except QueryError as fault:
         got = {"ask": "refuse", "said": str(fault)}
     wanted = [row["question"], *row.get("also", [])]
-    return Judged(str(row["say"]), True, min((_answered(got, each) for each in wanted), key=OUTCOMES.index), got, wanted[0])
+    return Judged(
+        str(row["say"]), True, min((_answered(got, each) for each in wanted), key=OUTCOMES.index), got, wanted[0]
+    )
 
 
 def _answered(got: Mapping[str, Any], wanted: Any) -> str:
@@ -113,7 +134,7 @@ def _intent(intent: Mapping[str, Any]) -> tuple[Any, ...]:
     if do == "repeat":
         return do, int(intent["times"]), tuple(_plain(intent["body"]))
     if do == "between":
-        return do, frozenset(_target(one) for one in of)
+        return do, frozenset(_target(one) for one in intent["of"])
     target = _target(of if of is not None else to) if of is not None or to is not None else None
     numbers = tuple(_rounded(intent.get(name)) for name in ("metres", "seconds", "heading", "views", "times"))
     degrees = _rounded(intent.get("degrees"))

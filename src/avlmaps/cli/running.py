@@ -218,7 +218,7 @@ def ask(verb: "Query") -> dict[str, Any]:
 
     parts = _parts(verb)
     only_files = all(part.is_file for part in parts)
-    if not verb.sentence.strip() and not parts or verb.sentence.strip() and not only_files:
+    if (not verb.sentence.strip() and not parts) or (verb.sentence.strip() and not only_files):
         raise UsageError(
             "query takes a sentence, or parts (--object, --sound, --sound-clip, --area, --image), and not both: "
             'avlmaps query MAP "the red cabinet near the sound of a dog"'

@@ -6,7 +6,12 @@ from dataclasses import dataclass, replace
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.discourse import Composed, compose
 from avlmaps.language.intents import (
-    Beside, Between, Circle, Clarify, Face, Go, Intent, Kind, Reason, Refuse, Repeat, StopAt, Target, VisitEach,
+    Clarify,
+    Intent,
+    Kind,
+    Reason,
+    Refuse,
+    Target,
     Wait,
 )  # fmt: skip
 from avlmaps.language.names import near_names

@@ -5,11 +5,22 @@ from typing import Any
 
 from avlmaps.language.chart import Tree
 from avlmaps.language.intents import (
-    Between, Clarify, Face, Go, Intent, Kind, Refuse, Repeat, Return, Reason, Target, VisitEach,
+    Between,
+    Clarify,
+    Face,
+    Go,
+    Intent,
+    Kind,
+    Reason,
+    Refuse,
+    Repeat,
+    Return,
+    Target,
+    VisitEach,
 )  # fmt: skip
 from avlmaps.language.orders import MOST_TIMES, count_of, intents_of, on_targets, refuse
 from avlmaps.language.readings import Item, Reading, Sentence
-from avlmaps.language.targets import Memory, Unresolved, resolve
+from avlmaps.language.targets import Memory, UnresolvedError, resolve
 
 _HARD = frozenset({".", "!", "?", ";"})
 
@@ -65,7 +76,12 @@ class _Composer:
                 self.mention(item.value)
             case "repeat":
                 self.repeat(item.value, rest)
-            case "THEN" if item.value == "first" and not self.moved and len(self.groups) > 1 and not any(one.kind in ("order", "bare") for one in rest):
+            case "THEN" if (
+                item.value == "first"
+                and not self.moved
+                and len(self.groups) > 1
+                and not any(one.kind in ("order", "bare") for one in rest)
+            ):
                 self.groups.insert(-1, self.groups.pop())
             case "THEN" | "mark" | "BUT":
                 self.boundary(item)
@@ -81,7 +97,9 @@ class _Composer:
                 self.join = "CORRECT" if self.groups else self.join
             case "SLOW":
                 self.notes.append(f"'{item.value}' has no effect: the robot has one speed.")
-            case "THOUGH" if len(self.groups) > 1 and not rest and item.value in ("first", "beforehand", "first though"):
+            case "THOUGH" if (
+                len(self.groups) > 1 and not rest and item.value in ("first", "beforehand", "first though")
+            ):
                 self.groups.insert(-1, self.groups.pop())
             case "remark":
                 self.files_of(item)
@@ -124,11 +142,12 @@ class _Composer:
 
     def order(self, tree: Any, rest: tuple[Item, ...], before: Item | None) -> None:
         if isinstance(tree, Tree) and tree.rule == "refuse":
-            raise Unresolved(refuse(tree.get("reason")))  # type: ignore[arg-type]
-        intents, notes = intents_of(tree, self.memory)
+            raise UnresolvedError(refuse(tree.get("reason")))  # type: ignore[arg-type]
+        found, notes = intents_of(tree, self.memory)
+        intents = list(found)
         self.notes += notes
         if isinstance(intents[0], Return) and not self.groups:
-            raise Unresolved(Clarify("I do not know where you are. Which thing or room are you near?"))
+            raise UnresolvedError(Clarify("I do not know where you are. Which thing or room are you near?"))
         if isinstance(tree, Tree) and tree.get("arrive") and self.groups:
             last = self.groups[-1].intents[-1]
             if isinstance(last, Go) and intents == [last]:
@@ -185,7 +204,11 @@ class _Composer:
         self.place(_Group([intent], kind, self.number))
 
     def continues(self) -> bool:
-        return bool(self.groups) and self.groups[-1].sentence == self.number and self.groups[-1].kind in ("go", "face", "each")
+        return (
+            bool(self.groups)
+            and self.groups[-1].sentence == self.number
+            and self.groups[-1].kind in ("go", "face", "each")
+        )
 
     def is_referred_to(self, rest: tuple[Item, ...]) -> bool:
         following = next((item for item in rest if item.kind in ("order", "refuse")), None)
@@ -213,7 +236,9 @@ class _Composer:
             self.memory.targets.remove(last)
             self.memory.add(better)
             for group in self.groups:
-                group.intents = [on_targets(one, lambda target: better if target == last else target) for one in group.intents]
+                group.intents = [
+                    on_targets(one, lambda target: better if target == last else target) for one in group.intents
+                ]
             return
         target = resolve(base, self.memory).with_near(*near) if base is not None else near[0].with_near(*near[1:])
         self.memory.add(target)
@@ -221,21 +246,31 @@ class _Composer:
             self.memory.speaker = target
 
     def repeat(self, tree: Any, rest: tuple[Item, ...]) -> None:
-        times = count_of(tree.get("times")) if isinstance(tree, Tree) and tree.get("times") is not None else count_of(tree)
+        times = (
+            count_of(tree.get("times")) if isinstance(tree, Tree) and tree.get("times") is not None else count_of(tree)
+        )
         if isinstance(tree, Tree) and tree.get("again") == "yes":
             times = 2
         if times is None or times < 1 or times != int(times) or times > MOST_TIMES:
-            raise Unresolved(Clarify(f"How many times? Say a number from 1 to {MOST_TIMES}."))
+            raise UnresolvedError(Clarify(f"How many times? Say a number from 1 to {MOST_TIMES}."))
         more = any(item.kind in ("order", "bare") for item in rest)
-        ahead = isinstance(tree, Tree) and (tree.get("next") == "yes" or (tree.get("next") == "maybe" and not self.groups))
+        ahead = isinstance(tree, Tree) and (
+            tree.get("next") == "yes" or (tree.get("next") == "maybe" and not self.groups)
+        )
         if more and (ahead or not self.groups):
             self.loop_from, self.loop_times = len(self.groups), int(times)
             return
         if not self.groups:
-            raise Unresolved(Clarify("What should be repeated? Say what to do, then how often."))
+            raise UnresolvedError(Clarify("What should be repeated? Say what to do, then how often."))
         if times == 1:
             return
-        everything = isinstance(tree, Tree) and tree.rule == "repeat" and tree.get("times") is not None and tree.slots[0][0] == "times" and tree.get("all") == "yes"
+        everything = (
+            isinstance(tree, Tree)
+            and tree.rule == "repeat"
+            and tree.get("times") is not None
+            and tree.slots[0][0] == "times"
+            and tree.get("all") == "yes"
+        )
         again = isinstance(tree, Tree) and (tree.get("again") == "yes" or tree.get("all") == "yes" or everything)
         chosen = self.groups if again else self.groups[-1:]
         if not again and chosen[0].kind in ("shuttle", "roundtrip"):
@@ -259,7 +294,7 @@ def compose(sentence: Sentence, reading: Reading) -> Composed:
                 break
             composer.item(item, reading.items[k + 1 :], reading.items[k - 1] if k else None)
         composer.flush()
-    except Unresolved as fault:
+    except UnresolvedError as fault:
         stop = fault.question
     intents = [intent for group in composer.groups for intent in group.intents]
     if composer.loop_from is not None and stop is None:
@@ -268,7 +303,9 @@ def compose(sentence: Sentence, reading: Reading) -> Composed:
         intents = [*before, Repeat(composer.loop_times, body)] if composer.loop_times > 1 else intents
     if stop is None and not intents:
         stop = _nothing(composer, reading)
-    return Composed(tuple(_tidied(intents)) if stop is None else (), stop, tuple(composer.notes), tuple(_phrases(composer, reading)))
+    return Composed(
+        tuple(_tidied(intents)) if stop is None else (), stop, tuple(composer.notes), tuple(_phrases(composer, reading))
+    )
 
 
 def _phrases(composer: _Composer, reading: Reading) -> list[str]:
@@ -297,7 +334,13 @@ def _tidied(intents: list[Intent]) -> list[Intent]:
     for intent in intents:
         if kept and intent == kept[-1] and isinstance(intent, Go | Face | Return):
             continue
-        if kept and isinstance(kept[-1], Face) and isinstance(intent, Go) and kept[-1].to == intent.to and intent.to.is_file:
+        if (
+            kept
+            and isinstance(kept[-1], Face)
+            and isinstance(intent, Go)
+            and kept[-1].to == intent.to
+            and intent.to.is_file
+        ):
             kept.pop()
         kept.append(intent)
     return kept
@@ -309,7 +352,11 @@ def _with_target(intent: Intent, target: Target) -> Intent:
     if isinstance(intent, Repeat):
         return Repeat(intent.times, (*intent.body[:-1], _with_target(intent.body[-1], target)))
     changed = on_targets(intent, lambda _: target)
-    return changed if changed != intent or target in (getattr(intent, "to", None), getattr(intent, "of", None)) else Go(target)
+    return (
+        changed
+        if changed != intent or target in (getattr(intent, "to", None), getattr(intent, "of", None))
+        else Go(target)
+    )
 
 
 def _is_there(tree: Any) -> bool:
@@ -317,13 +364,21 @@ def _is_there(tree: Any) -> bool:
     if not isinstance(tree, Tree) or tree.rule != "go":
         return False
     to = tree.get("to")
-    return tree.get("there") == "yes" or (isinstance(to, Tree) and to.rule.startswith("pronoun") and to.get("it") == "there")
+    return tree.get("there") == "yes" or (
+        isinstance(to, Tree) and to.rule.startswith("pronoun") and to.get("it") == "there"
+    )
 
 
 def _refers(value: Any) -> bool:
     """Return whether a tree holds a pronoun."""
     if not isinstance(value, Tree):
         return False
-    if value.rule in ("pronoun", "pronoun_there") or value.get("it") or value.get("one") or value.get("two") or value.get("there"):
+    if (
+        value.rule in ("pronoun", "pronoun_there")
+        or value.get("it")
+        or value.get("one")
+        or value.get("two")
+        or value.get("there")
+    ):
         return True
     return any(_refers(inner) for _, inner in value.slots)

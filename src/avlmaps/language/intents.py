@@ -215,20 +215,7 @@ class Clarify:
 
 
 Intent = (
-    Go
-    | Face
-    | Turn
-    | Move
-    | Between
-    | Beside
-    | StopAt
-    | Circle
-    | VisitEach
-    | Wait
-    | Return
-    | Repeat
-    | Refuse
-    | Clarify
+    Go | Face | Turn | Move | Between | Beside | StopAt | Circle | VisitEach | Wait | Return | Repeat | Refuse | Clarify
 )
 
 

@@ -150,7 +150,7 @@ def number_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
     if spelled is not None:
         end, value = spelled
         if tokens[end : end + 1] and tokens[end].text == "quarters":
-            found.append((end + 1 + (tokens[end + 1 : end + 2] and tokens[end + 1].text == "of" or 0), value * 0.25))
+            found.append((end + 1 + ((tokens[end + 1 : end + 2] and tokens[end + 1].text == "of") or 0), value * 0.25))
         found += _with_part(tokens, end, value)
     return found
 

@@ -5,7 +5,7 @@ much where its head is unknown; a misspelt head is mended where one word is clea
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache, cached_property
+from functools import cache
 
 from avlmaps.core.lexicon import Kind as Entries
 from avlmaps.core.lexicon import lexicon
@@ -271,9 +271,9 @@ def _sound_phrase(phrase: str) -> bool:
         return False
     if len(words) == 1:
         return phrase in _noise_words()
-    return (
-        lexicon().find(phrase, Entries.SOUND) is not None and lexicon().find(phrase, Entries.THING) is None
-    ) or (words[-1] in _noise_words() and _known(tuple(words[:-1])) is not None and _entry(phrase) is None)
+    return (lexicon().find(phrase, Entries.SOUND) is not None and lexicon().find(phrase, Entries.THING) is None) or (
+        words[-1] in _noise_words() and _known(tuple(words[:-1])) is not None and _entry(phrase) is None
+    )
 
 
 def _is_sounding(word: str) -> bool:

@@ -1,15 +1,32 @@
 """From the tree of one order to its intents."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 from avlmaps.language.chart import Tree
 from avlmaps.language.intents import (
-    Beside, Between, Circle, Clarify, Face, Go, Intent, Kind, Move, Reason, Refuse, Repeat, Return, Side, StopAt, Target,
-    Turn, VisitEach, Wait,
+    Beside,
+    Between,
+    Circle,
+    Clarify,
+    Face,
+    Go,
+    Intent,
+    Kind,
+    Move,
+    Reason,
+    Refuse,
+    Repeat,
+    Return,
+    Side,
+    StopAt,
+    Target,
+    Turn,
+    VisitEach,
+    Wait,
 )  # fmt: skip
-from avlmaps.language.targets import Memory, Unresolved, resolve
+from avlmaps.language.targets import Memory, UnresolvedError, resolve
 
 MOST_TIMES, _MOST_METRES = 100, 100.0
 _EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
@@ -24,7 +41,7 @@ REFUSALS = {
     Reason.QUESTION: 'This is a question; ask the map: avlmaps query MAP "QUESTION".',
     Reason.UNKNOWN: f"This is not understood; say it like: {_EXAMPLE}.",
 }
-Result = tuple[list[Intent], list[str]]
+Result = tuple[Sequence[Intent], list[str]]
 
 
 def refuse(reason: str) -> Refuse:
@@ -36,7 +53,7 @@ def intents_of(tree: Any, memory: Memory) -> Result:
     """Return the intents of one order, and notes on how it was taken; what it names is remembered.
 
     Raises:
-        Unresolved: a reference or an amount is missing.
+        UnresolvedError: a reference or an amount is missing.
     """
     assert isinstance(tree, Tree)
     intents, notes = _READ[tree.rule](tree, memory)
@@ -65,7 +82,7 @@ def _face(tree: Tree, memory: Memory) -> Result:
 def _turn(tree: Tree, memory: Memory) -> Result:
     notes: list[str] = []
     if tree.get("which") == "none":
-        raise Unresolved(Clarify("Turn which way? Say left, right, around, or an angle.", ("left", "right", "around")))
+        raise UnresolvedError(Clarify("Turn which way? Say left, right, around, or an angle.", ("left", "right", "around")))
     if tree.get("heading") is not None or tree.get("heading_at") is not None:
         heading = tree.get("heading") if tree.get("heading") is not None else tree.get("heading_at")
         return [Turn(heading=float(heading) % 360.0)], notes
@@ -75,7 +92,7 @@ def _turn(tree: Tree, memory: Memory) -> Result:
     if tree.get("open") and side is None and degrees not in (180.0, 360.0):
         notes.append(f"No side was said for {degrees:g} degrees: the turn is to the right.")
     if abs(degrees) > 3600.0:
-        raise Unresolved(Clarify(f"{degrees:g} degrees are too many to turn; say at most 3600."))
+        raise UnresolvedError(Clarify(f"{degrees:g} degrees are too many to turn; say at most 3600."))
     if side == "left" and degrees not in (180.0, 360.0):
         degrees = -degrees
     return [Turn(round(degrees, 3))], notes
@@ -83,10 +100,12 @@ def _turn(tree: Tree, memory: Memory) -> Result:
 
 def _move(tree: Tree, memory: Memory) -> Result:
     if tree.get("which") == "none":
-        raise Unresolved(Clarify("How far? Say it like: go forward 2 metres."))
+        raise UnresolvedError(Clarify("How far? Say it like: go forward 2 metres."))
     metres = float(tree.get("metres"))
     if not 0.0 < metres <= _MOST_METRES:
-        raise Unresolved(Clarify(f"{metres:g} m is not a distance that the robot drives; say at most {_MOST_METRES:g} m."))
+        raise UnresolvedError(
+            Clarify(f"{metres:g} m is not a distance that the robot drives; say at most {_MOST_METRES:g} m.")
+        )
     if tree.get("to") is not None:
         away = tree.get("dir") == "away"
         return [Face(_target(tree.get("to"), memory)), Move(-metres if away else metres)], []
@@ -102,7 +121,7 @@ def _move(tree: Tree, memory: Memory) -> Result:
 def _pair(tree: Tree, memory: Memory) -> tuple[Target, Target]:
     if tree.get("two") is not None and tree.get("a") is None:
         if tree.get("several") is not None:
-            raise Unresolved(Clarify("Between which two things? Name both."))
+            raise UnresolvedError(Clarify("Between which two things? Name both."))
         return memory.two()
     if tree.get("ahere"):
         return Target(Kind.HERE), _target(tree.get("b"), memory)
@@ -117,7 +136,7 @@ def _between(tree: Tree, memory: Memory) -> Result:
     of = tree.get("of") if tree.get("of") is not None else tree
     a, b = _pair(of, memory)
     if a == b:
-        raise Unresolved(Clarify("Between which two things? Name two different ones."))
+        raise UnresolvedError(Clarify("Between which two things? Name two different ones."))
     return [Between((a, b))], []
 
 
@@ -142,7 +161,7 @@ def _standoff(tree: Tree, memory: Memory) -> Result:
 def _circle(tree: Tree, memory: Memory) -> Result:
     views = tree.get("views")
     if views is not None and not 1 <= float(views) <= 36:
-        raise Unresolved(Clarify("From how many points? Say a number from 1 to 36."))
+        raise UnresolvedError(Clarify("From how many points? Say a number from 1 to 36."))
     return [Circle(_target(tree.get("of"), memory), None if views is None else int(float(views)))], []
 
 
@@ -153,7 +172,7 @@ def _each(tree: Tree, memory: Memory) -> Result:
 def _wait(tree: Tree, memory: Memory) -> Result:
     seconds = tree.get("seconds")
     if seconds is not None and float(seconds) > 600.0:
-        raise Unresolved(Clarify("The robot waits for at most 10 minutes; say a shorter time."))
+        raise UnresolvedError(Clarify("The robot waits for at most 10 minutes; say a shorter time."))
     return [Wait(None if seconds is None else float(seconds))], []
 
 

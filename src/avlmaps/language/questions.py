@@ -9,7 +9,7 @@ from avlmaps.language.commands import Given, unknown
 from avlmaps.language.grammar import load_grammar
 from avlmaps.language.intents import Ask, Clarify, Inquiry, Kind, Pick, Target
 from avlmaps.language.readings import Sentence
-from avlmaps.language.targets import Memory, Unresolved, resolve
+from avlmaps.language.targets import Memory, UnresolvedError, resolve
 from avlmaps.query.question import MOST_CHARACTERS, Modality, Part, Question
 
 _EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
@@ -67,7 +67,7 @@ def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
         raise QueryError(f"{words} is not understood; say it like: {_EXAMPLE}.")
     try:
         targets = _targets(tree)
-    except Unresolved as fault:
+    except UnresolvedError as fault:
         raise QueryError(fault.question.question) from None
     notes: list[str] = []
     checked = tuple(_checked(target, read, given, notes) for target in targets)
@@ -93,12 +93,18 @@ def _best(read: Sentence) -> tuple[Tree | None, str]:
             if any(token.text in _MEANING for token in left) or any(token.text in _MEANING for token in tokens[:at]):
                 longest = max(longest, edge.end)
                 continue
-            after = sum(0.02 if token.kind == "punct" else _FILLER if soft[edge.end + k] else _SKIP for k, token in enumerate(left))
+            after = sum(
+                0.02 if token.kind == "punct" else _FILLER if soft[edge.end + k] else _SKIP
+                for k, token in enumerate(left)
+            )
             longest = max(longest, edge.end)
             total = before + edge.cost + after
             if isinstance(edge.value, Tree) and edge.value.rule == "question" and (best is None or total < best[0]):
                 best = (total, edge.value)
-        reach = max((end for end in (e.end for name in ("GREETING", "POLITE") for e in chart.terminal(name, at))), default=at + 1)
+        reach = max(
+            (end for end in (e.end for name in ("GREETING", "POLITE") for e in chart.terminal(name, at))),
+            default=at + 1,
+        )
         before += 0.02 if tokens[at].kind == "punct" else _FILLER if soft[at] or reach > at + 1 else _SKIP
     if best is None or best[0] > _WORST:
         said = read.words(longest, len(tokens)) or read.text
@@ -116,7 +122,7 @@ def _targets(tree: Tree) -> tuple[Target, ...]:
         whole = resolve(Tree("target", (("at", at),), 0, 0), memory)
         target = target.with_near(replace(whole, near=()), *whole.near)
     if target.pick in (Pick.FARTHEST, Pick.OTHER):
-        raise Unresolved(Clarify(f"'{target.pick} {target.name}' cannot be asked of a map; say what it is near."))
+        raise UnresolvedError(Clarify(f"'{target.pick} {target.name}' cannot be asked of a map; say what it is near."))
     return (target,)
 
 
@@ -125,7 +131,7 @@ def _for_use(use: str) -> tuple[Target, ...]:
     uses = load_grammar().lists["uses"]
     key = max((key for key in uses if use.startswith(key)), key=len, default=None)
     if key is None:
-        raise Unresolved(Clarify(f"What serves to {use} is not known; name the thing."))
+        raise UnresolvedError(Clarify(f"What serves to {use} is not known; name the thing."))
     return tuple(Target(Kind.OBJECT, name.strip()) for name in uses[key].split(","))
 
 

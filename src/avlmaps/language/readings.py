@@ -185,7 +185,21 @@ def _steps(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | No
 def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | None, bool]]:
     """Yield the statements that begin at a token: what people say about themselves, or why."""
     chart, tokens = sentence.chart, sentence.tokens
-    because = tokens[at].text in ("because", "since", "as", "so", "before", "while", "until", "which", "where", "when", "in", "by", "within")
+    because = tokens[at].text in (
+        "because",
+        "since",
+        "as",
+        "so",
+        "before",
+        "while",
+        "until",
+        "which",
+        "where",
+        "when",
+        "in",
+        "by",
+        "within",
+    )
     starts = chart.terminal("SUBJECT", at)
     if not starts:
         return
@@ -194,7 +208,11 @@ def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | 
     for end in range(at, len(tokens)):
         token = tokens[end]
         words.append(token.text)
-        finite = finite or bool(chart.terminal("FINITE", end)) or token.text in ("minute", "moment", "o'clock", "noon", "arrive", "arrives", "starts", "sleep")
+        finite = (
+            finite
+            or bool(chart.terminal("FINITE", end))
+            or token.text in ("minute", "moment", "o'clock", "noon", "arrive", "arrives", "starts", "sleep")
+        )
         if end > at and token.text in ("not", "never", "if", "unless") and "you" in words:
             return
         after = tokens[end + 1].text if end + 1 < len(tokens) else "."

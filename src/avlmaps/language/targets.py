@@ -11,7 +11,7 @@ from avlmaps.language.intents import Clarify, Kind, Pick, Target
 _ROOMS_OF_THINGS = frozenset({"toilet", "bath", "shower", "loo", "wc", "lavatory"})
 
 
-class Unresolved(Exception):
+class UnresolvedError(Exception):
     """A target cannot be resolved; the question says why."""
 
     def __init__(self, question: Clarify) -> None:
@@ -44,22 +44,22 @@ class Memory:
         """Return the last target that was named.
 
         Raises:
-            Unresolved: nothing was named.
+            UnresolvedError: nothing was named.
         """
         self.used = True
         if not self.targets:
-            raise Unresolved(Clarify(f"What does '{word}' refer to? Name the thing."))
+            raise UnresolvedError(Clarify(f"What does '{word}' refer to? Name the thing."))
         return self.targets[-1]
 
     def two(self) -> tuple[Target, Target]:
         """Return the last two targets that were named.
 
         Raises:
-            Unresolved: fewer were named.
+            UnresolvedError: fewer were named.
         """
         self.used = True
         if len(self.targets) < 2:
-            raise Unresolved(Clarify("Between which two things? Name both."))
+            raise UnresolvedError(Clarify("Between which two things? Name both."))
         return self.targets[-2], self.targets[-1]
 
 
@@ -67,14 +67,14 @@ def resolve(value: Any, memory: Memory) -> Target:
     """Return the target that a part of a reading names.
 
     Raises:
-        Unresolved: it refers to nothing that is known.
+        UnresolvedError: it refers to nothing that is known.
     """
     if isinstance(value, Target):
         return value
     assert isinstance(value, Tree)
     if value.get("me"):
         if memory.speaker is None:
-            raise Unresolved(Clarify("I do not know where you are. Which thing or room are you near?"))
+            raise UnresolvedError(Clarify("I do not know where you are. Which thing or room are you near?"))
         return memory.speaker
     if value.get("here"):
         return Target(Kind.HERE)
@@ -106,12 +106,12 @@ def _whole(value: Tree, memory: Memory) -> Target:
     elif inner is None and value.all("at"):
         parts = [part for at in value.all("at") for part in _near(at, memory)]
         if not parts:
-            raise Unresolved(Clarify("Which place? Name a thing or a room."))
+            raise UnresolvedError(Clarify("Which place? Name a thing or a room."))
         sounds = [part for part in parts if part.kind is Kind.SOUND]
         first = sounds[0] if sounds else parts[0]
         return first.with_near(*(part for part in parts if part != first))
     elif inner is None:
-        raise Unresolved(Clarify("Which thing? Name it."))
+        raise UnresolvedError(Clarify("Which thing? Name it."))
     else:
         base = resolve(inner, memory)
     if value.get("verb") is not None:
@@ -162,11 +162,11 @@ def _noun(value: Tree, memory: Memory) -> Target:
     base = resolve(what, memory)
     first, _, rest = base.name.partition(" ")
     if rest and first in _choices():
-        raise Unresolved(Clarify(f"I cannot choose the {first} {rest} from the map. Say what it is near."))
+        raise UnresolvedError(Clarify(f"I cannot choose the {first} {rest} from the map. Say what it is near."))
     if pick is Pick.OTHER:
         memory.used = True
         if not any(one.name.rstrip("s") == base.name.rstrip("s") for one in memory.targets):
-            raise Unresolved(Clarify(f"Which other {base.name}? Name the first one, or say what it is near."))
+            raise UnresolvedError(Clarify(f"Which other {base.name}? Name the first one, or say what it is near."))
     return replace(base, pick=Pick.ANY if pick is Pick.NEAREST else pick)
 
 
@@ -182,6 +182,6 @@ def _sound(value: Tree, memory: Memory) -> Target:
     parts = value.all("noise") or value.all("name") or value.all("sound")
     found = [part if isinstance(part, Target) else resolve(part, memory) for part in parts]
     if not found:
-        raise Unresolved(Clarify("Which sound? Name it, such as: the sound of rain."))
+        raise UnresolvedError(Clarify("Which sound? Name it, such as: the sound of rain."))
     name = " ".join(one.name for one in found)
     return Target(Kind.SOUND, name)

@@ -3,8 +3,25 @@
 from collections.abc import Sequence
 
 from avlmaps.language.intents import (
-    Beside, Between, Circle, Clarify, Face, Go, Intent, Kind, Move, Pick, Refuse, Repeat, Return, Side, StopAt, Target,
-    Turn, VisitEach, Wait,
+    Beside,
+    Between,
+    Circle,
+    Clarify,
+    Face,
+    Go,
+    Intent,
+    Kind,
+    Move,
+    Pick,
+    Refuse,
+    Repeat,
+    Return,
+    Side,
+    StopAt,
+    Target,
+    Turn,
+    VisitEach,
+    Wait,
 )  # fmt: skip
 
 _COMPASS = {0: "north", 45: "north-east", 90: "east", 135: "south-east", 180: "south", 225: "south-west", 270: "west",

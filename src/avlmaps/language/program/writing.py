@@ -8,7 +8,22 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from avlmaps.language.intents import (
-    Beside, Between, Circle, Face, Go, Intent, Kind, Move, Pick, Repeat, Return, Side, StopAt, Target, Turn, VisitEach,
+    Beside,
+    Between,
+    Circle,
+    Face,
+    Go,
+    Intent,
+    Kind,
+    Move,
+    Pick,
+    Repeat,
+    Return,
+    Side,
+    StopAt,
+    Target,
+    Turn,
+    VisitEach,
     Wait,
 )  # fmt: skip
 
@@ -199,7 +214,10 @@ class _Writer:
         """Return the phrase of a thing, or the variable or expression of a heatmap."""
         if target.kind is Kind.OBJECT and not target.near:
             return _quoted(target.name)
-        factors = [f"robot.get_major_map({_argument(target)})", *(f"robot.get_map({_argument(n)})" for n in target.near)]
+        factors = [
+            f"robot.get_major_map({_argument(target)})",
+            *(f"robot.get_map({_argument(n)})" for n in target.near),
+        ]
         if len(factors) == 1:
             return factors[0]
         heat = self.variable("heat")
