@@ -149,7 +149,7 @@ def check_length(text: str, what: str, example: str) -> None:
 
 def _guarded(composed: Composed, sentence: Sentence, given: Given) -> tuple[tuple[Intent, ...], tuple[str, ...]]:
     """Return the intents with files in the place of "this photo", or what is not known; and the notes."""
-    notes = list(composed.notes)
+    notes = [*composed.notes, *(f"'{said}' is read as '{meant}'." for said, meant in sentence.respelt.items())]
     if composed.stop is not None:
         return (composed.stop,), tuple(notes)
     problem: list[Clarify] = []

@@ -1,23 +1,29 @@
 """From a reading to intents: orders in the order of doing, references resolved, corrections and repetitions applied."""
 
 from dataclasses import dataclass, field, replace
+from math import copysign
 from typing import Any
 
 from avlmaps.language.chart import Tree
 from avlmaps.language.intents import (
+    Beside,
     Between,
     Clarify,
     Face,
     Go,
     Intent,
     Kind,
+    Move,
     Reason,
     Refuse,
     Repeat,
     Return,
+    StopAt,
     Target,
+    Turn,
     VisitEach,
-)  # fmt: skip
+    Wait,
+)
 from avlmaps.language.orders import MOST_TIMES, count_of, intents_of, on_targets, refuse
 from avlmaps.language.readings import Item, Reading, Sentence
 from avlmaps.language.targets import Memory, UnresolvedError, resolve
@@ -72,6 +78,8 @@ class _Composer:
                 self.order(item.value, rest, before)
             case "bare":
                 self.bare(item.value, rest)
+            case "amount":
+                self.amount(item.value)
             case "mention":
                 self.mention(item.value)
             case "repeat":
@@ -135,6 +143,23 @@ class _Composer:
             self.flush()
         if self.sentence.words(item.start, item.end).strip() in _HARD:
             self.number += 1
+
+    def amount(self, tree: Tree) -> None:
+        """Correct the amount of the last order: "2 metres, no, 3 metres"."""
+        last = self.groups[-1].intents[-1] if self.groups and self.join == "CORRECT" else None
+        self.join = ""
+        if isinstance(last, Move | Beside | StopAt) and tree.get("metres") is not None:
+            metres = float(tree.get("metres"))
+            back = isinstance(last, Move) and last.metres < 0
+            self.groups[-1].intents[-1] = replace(last, metres=-metres if back else metres)
+        elif isinstance(last, Turn) and last.degrees is not None and tree.get("degrees") is not None:
+            self.groups[-1].intents[-1] = replace(last, degrees=copysign(float(tree.get("degrees")), last.degrees))
+        elif isinstance(last, Wait) and tree.get("seconds") is not None:
+            self.groups[-1].intents[-1] = Wait(float(tree.get("seconds")))
+        elif isinstance(last, Repeat) and count_of(tree.get("times")):
+            self.groups[-1].intents[-1] = replace(last, times=int(count_of(tree.get("times")) or 1))
+        else:
+            raise UnresolvedError(Clarify("What is this amount for? Say it with the order."))
 
     def flush(self) -> None:
         self.groups += self.held

@@ -18,7 +18,7 @@ _TOKEN = re.compile(
   | (?P<image>"[^"]+{_IMAGES}"|'[^']+{_IMAGES}'|[^\s"',;:!?()<>{{}}]+{_IMAGES}(?![\w/]))
   | (?P<clip>"[^"]+{_CLIPS}"|'[^']+{_CLIPS}'|[^\s"',;:!?()<>{{}}]+{_CLIPS}(?![\w/]))
   | (?P<number>\d+(?:[.,]\d+)?(?:/\d+)?)
-  | (?P<clock>o'?clock\b)
+  | (?P<clock>o['\s]?clock\b)
   | (?P<word>[^\W\d_]+(?:['’][^\W\d_]+)*)
   | (?P<punct>->|=>|<-|\.+|[,;:!?()<>=\n-]|[^\w\s])
     """,

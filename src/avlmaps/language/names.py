@@ -16,6 +16,7 @@ from avlmaps.language.lexer import Token
 _MOST_WORDS = 5
 _ADJECTIVE, _OPEN_WORD, _SIDE, _MENDED, _UNKNOWN = 0.02, 0.45, 0.25, 0.9, 1.6
 _VERB_ALONE = 0.5
+_NOUN = 0.1  # a noun before a noun; a second one costs four times as much
 _ALIKE, _APART = 0.74, 0.08  # a misspelt word is at least so much like its neighbour, and so much less like the next
 _ONLY_ROOMS = frozenset({"room", "area", "zone", "hall", "corner"})
 Found = list[tuple[int, float, Target]]
@@ -154,6 +155,8 @@ class Names:
 
     def _objects(self, words: list[str]) -> list[tuple[int, float, str]]:
         """Return what may follow a sounding verb: "on the door", "a guitar", "keyboard"."""
+        if words[:2] == ["for", "help"]:
+            return [(2, 0.0, "for help")]
         at = 1 if words[:1] and words[0] in ("on", "at", "against", "with", "into") else 0
         preposition = words[0] + " " if at else ""
         start = at + 1 if words[at : at + 1] and words[at] in _DETERMINERS else at
@@ -210,14 +213,17 @@ def _known(words: tuple[str, ...]) -> tuple[float, Target] | None:
         entry = _entry(tail)
         if entry is None or (start == len(words) - 1 and (words[-1] in _never() or words[-1] in _sides())):
             continue
-        cost = 0.0
+        cost, nouns = 0.0, 0
         for word in words[:start]:
             if word in _sides():
                 cost += _SIDE
             elif word in _never():
                 return None
-            elif word in _adjectives() or _entry(word) is not None:
+            elif word in _adjectives():
                 cost += _ADJECTIVE
+            elif _entry(word) is not None:
+                cost += _NOUN * (1 + 3 * nouns)
+                nouns += 1
             else:
                 cost += _OPEN_WORD
         return cost, _target(entry, words)
@@ -244,7 +250,7 @@ def _entry(phrase: str) -> Entries | None:
     """Return the kind of what a phrase names exactly; a room comes before a thing of the same name but a toilet."""
     book = lexicon()
     thing, room = book.find(phrase, Entries.THING), book.find(phrase, Entries.ROOM)
-    if room is not None and (thing is None or phrase.split()[-1] not in ("toilet", "toilets", "bath", "shower", "wc")):
+    if room is not None and (thing is None or phrase.split()[-1] not in ("toilet", "toilets", "bath", "shower", "wc", "lift", "elevator", "lifts", "elevators")):
         return Entries.ROOM
     if thing is not None:
         return Entries.THING

@@ -17,7 +17,9 @@ _MODALITIES = {
     Kind.OBJECT: Modality.OBJECT, Kind.SOUND: Modality.SOUND, Kind.CLIP: Modality.SOUND, Kind.AREA: Modality.AREA,
     Kind.IMAGE: Modality.IMAGE,
 }  # fmt: skip
-_SKIP, _FILLER, _WORST = 2.6, 0.2, 3.0
+_SKIP, _FILLER, _REMARK, _WORST = 3.6, 0.2, 0.15, 3.5
+_REMARKS = frozenset({"i", "it", "they", "we", "my", "he", "she", "its", "like", "because", "cos", "im", "so"})
+_NO_QUESTIONS = frozenset({"who", "why", "when", "whose"})
 _MEANING = frozenset({"not", "no", "without", "except", "never", "unless", "or", "if", "but"})
 
 
@@ -63,6 +65,8 @@ def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
         )
     read = Sentence(sentence, given.knows)
     tree, words = _best(read)
+    if read.tokens[0].text in _NO_QUESTIONS:
+        raise QueryError(f"A map knows where things and sounds are, and how many; ask it like: {_EXAMPLE}.")
     if tree is None:
         raise QueryError(f"{words} is not understood; say it like: {_EXAMPLE}.")
     try:
@@ -83,33 +87,37 @@ def question_of(target: Target) -> Question:
 def _best(read: Sentence) -> tuple[Tree | None, str]:
     """Return the cheapest reading of a whole sentence, or the words that are not understood."""
     tokens, chart = read.tokens, read.chart
-    soft = [token.kind == "punct" or bool(chart.terminal("GREETING", i)) or bool(chart.terminal("FILLER", i)) or bool(chart.terminal("POLITE", i)) for i, token in enumerate(tokens)]  # fmt: skip
+    count = len(tokens)
     best: tuple[float, Tree] | None = None
     longest = 0
-    before = 0.0
-    for at in range(len(tokens)):
+    skips = [_skip(read, i) for i in range(count)]
+    for at in range(count):
         for edge in chart.edges("question", at):
-            left = tokens[edge.end :]
-            if any(token.text in _MEANING for token in left) or any(token.text in _MEANING for token in tokens[:at]):
-                longest = max(longest, edge.end)
-                continue
-            after = sum(
-                0.02 if token.kind == "punct" else _FILLER if soft[edge.end + k] else _SKIP
-                for k, token in enumerate(left)
-            )
+            around = [*tokens[:at], *tokens[edge.end :]]
             longest = max(longest, edge.end)
-            total = before + edge.cost + after
-            if isinstance(edge.value, Tree) and edge.value.rule == "question" and (best is None or total < best[0]):
-                best = (total, edge.value)
-        reach = max(
-            (end for end in (e.end for name in ("GREETING", "POLITE") for e in chart.terminal(name, at))),
-            default=at + 1,
-        )
-        before += 0.02 if tokens[at].kind == "punct" else _FILLER if soft[at] or reach > at + 1 else _SKIP
+            if any(token.text in _MEANING for token in around) or edge.value.rule != "question":
+                continue
+            remark = edge.end < count and tokens[edge.end].text in _REMARKS
+            after = sum(min(cost, _REMARK) if remark else cost for cost in skips[edge.end :])
+            opening = at > 0 and tokens[0].text in _REMARKS
+            before = sum(min(cost, _REMARK) if opening else cost for cost in skips[:at])
+            if best is None or before + edge.cost + after < best[0]:
+                best = (before + edge.cost + after, edge.value)
     if best is None or best[0] > _WORST:
-        said = read.words(longest, len(tokens)) or read.text
-        return None, f"{said[:80]!r}"
+        rest = read.words(longest, count)
+        return None, repr((rest if any(mark.isalnum() for mark in rest) else read.text)[:80])
     return best[1], ""
+
+
+def _skip(read: Sentence, at: int) -> float:
+    """Return what it costs to leave out a token."""
+    if read.tokens[at].kind == "punct":
+        return 0.02
+    for before in range(max(0, at - 4), at + 1):
+        for name in ("GREETING", "FILLER", "POLITE"):
+            if any(edge.end > at for edge in read.chart.terminal(name, before)):
+                return _FILLER
+    return _SKIP
 
 
 def _targets(tree: Tree) -> tuple[Target, ...]:

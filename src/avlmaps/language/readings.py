@@ -13,8 +13,10 @@ from avlmaps.language.chart import BuiltIn, Chart
 from avlmaps.language.grammar import load_grammar
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import Names
+from avlmaps.language.spelling import respelt
 
 MOST_READINGS = 4
+_RUN_ON_REMARK = 0.9
 _RUN_ON, _BARE, _MENTION, _REMARK, _REMARK_WORD = 0.8, 1.1, 0.9, 1.15, 0.04
 _SKIP, _SKIP_MARK, _SKIP_MEANING, _ORDER = 2.6, 0.05, 6.0, 0.3
 _LISTED = 0.6  # a name alone costs so much less where an order goes before
@@ -66,7 +68,7 @@ class Sentence:
     def __init__(self, text: str, knows: Callable[[str], bool] | None = None) -> None:
         """Take a sentence, and what besides the lexicon says that it knows a word."""
         self.text = text
-        self.tokens = lexer.tokenise(text)
+        self.tokens, self.respelt = respelt(lexer.tokenise(text))
         self.names = Names(self.tokens, knows)
         self.chart = Chart(load_grammar(), self.tokens, _built_in(self.tokens, self.names))
 
@@ -114,7 +116,9 @@ def readings(sentence: Sentence) -> list[Reading]:
             for item, cost, fresh, needs_fresh in steps:
                 extra = _RUN_ON if item.kind in ("order", "bare") and not state.fresh else 0.0
                 if needs_fresh and not state.fresh:
-                    continue
+                    if item.kind not in ("remark", "mention"):
+                        continue
+                    extra = _RUN_ON_REMARK
                 if item.kind == "bare" and any(kind in ("order", "bare") for kind, _ in state.trail):
                     extra -= _LISTED
                 keeps = state.fresh if fresh is None else fresh
@@ -148,7 +152,7 @@ def _reading(state: _State) -> Reading:
 
 _RULES = (
     ("order", _ORDER, False, False), ("bare", _BARE, False, True), ("mention", _MENTION, False, True), ("repeat", 0.2, None, False),
-    ("chat", 0.6, False, True), ("inquire", 0.6, False, True),
+    ("amount", 0.8, False, True), ("chat", 0.6, False, True), ("inquire", 0.6, False, True),
 )  # fmt: skip
 _JOINS = {
     "THEN": (0.0, True), "BUT_FIRST": (0.0, True), "BUT": (0.25, True), "BEFORE": (0.1, True), "AFTER": (0.1, True), "CORRECT": (0.15, True),
@@ -182,6 +186,14 @@ def _steps(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | No
     yield Item("mark" if mark else "skip", None, at, at + 1), cost, True if mark else None, False
 
 
+_ORDERS = frozenset({"GO", "DIRECT", "TURN", "FACE", "POLITE", "CIRCLE", "BACK_UP", "WAIT"})
+
+
+def _begins_order(sentence: Sentence, at: int) -> bool:
+    """Return whether an order may begin at a token."""
+    return at < len(sentence.tokens) and not sentence.chart.begins(at).isdisjoint(_ORDERS)
+
+
 def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | None, bool]]:
     """Yield the statements that begin at a token: what people say about themselves, or why."""
     chart, tokens = sentence.chart, sentence.tokens
@@ -204,7 +216,7 @@ def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | 
     if not starts:
         return
     words: list[str] = []
-    finite = False
+    finite = tokens[at].text in ("its", "like", "cos", "cause")
     for end in range(at, len(tokens)):
         token = tokens[end]
         words.append(token.text)
@@ -217,10 +229,10 @@ def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | 
             return
         after = tokens[end + 1].text if end + 1 < len(tokens) else "."
         if end > at and finite and (after in _BREAKS or after in ("so", "and", "but", "please", "go", "can", "could")):
-            orders = "you" in words and not because
+            orders = "you" in words and not because and words[:2] != ["you", "are"]
             yield (
                 Item("remark", None, at, end + 1),
                 _REMARK + _REMARK_WORD * len(words) + 1.5 * orders, after in _BREAKS or None, not because,
             )  # fmt: skip
-        if after in _BREAKS:
+        if after in _BREAKS or (after in ("so", "and", "but", "please") and finite and _begins_order(sentence, end + 2)):
             return
