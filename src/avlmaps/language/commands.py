@@ -20,6 +20,7 @@ from avlmaps.language.readings import Sentence, readings
 
 MOST_CHARACTERS = 1000
 _EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
+_FULLER = 0.5  # a reading with one more wait may cost so much more
 _SAFETY = 0.35
 _DANGERS = (Reason.HARM, Reason.FLYING, Reason.ENDLESS)
 _MARGIN = 0.06  # readings of different meaning that are closer are asked about
@@ -93,7 +94,12 @@ def read_command(text: str, given: Given | None = None) -> Command:
         composed = compose(sentence, reading)
         intents, notes = _guarded(composed, sentence, given)
         extra = 0.0 if not isinstance(intents[0], Clarify | Refuse) or _is_firm(intents[0]) else _ASKING
-        if not any(_same(one.intents, intents) for one in weighed):
+        same = next((k for k, one in enumerate(weighed) if _same(one.intents, intents)), None)
+        if same is not None:
+            fuller = len(intents) > len(weighed[same].intents) and reading.cost + extra - weighed[same].cost < _FULLER
+            if fuller:
+                weighed[same] = Weighed(intents, weighed[same].cost, notes, composed.skipped)
+        else:
             weighed.append(Weighed(intents, reading.cost + extra, notes, composed.skipped))
     if not weighed:
         weighed = [Weighed((Clarify(f"I do not understand this. Say it like: {_EXAMPLE}."),), 99.0)]

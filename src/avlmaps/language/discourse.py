@@ -342,6 +342,9 @@ def _phrases(composer: _Composer, reading: Reading) -> list[str]:
                 phrases[-1][1] = item.end
             else:
                 phrases.append([item.start, item.end])
+    for k, item in enumerate(reading.items[1:]):  # what follows "after" or "before" cannot be left out
+        if item.kind == "remark" and reading.items[k].kind in ("AFTER", "BEFORE", "BUT_FIRST", "CORRECT"):
+            phrases.append([item.start, item.end])
     return [composer.sentence.words(start, end) for start, end in phrases]
 
 

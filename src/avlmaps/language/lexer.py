@@ -125,6 +125,12 @@ def _words(raw: str, start: int) -> list[Token]:
     return [Token(lower.replace("'", ""), raw, "word", start, end)]
 
 
+WORDS = frozenset({
+    *_SMALL, *_TENS, *_PARTS, "hundred", "couple", "few", "several", "dozen", *LENGTHS, *_ANGLES, *_TIMES, *_SIZES, *_WHOLE,
+    "o'clock",
+})  # fmt: skip
+
+
 def number_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
     """Return the numbers that begin at a token, each with where it ends: figures, words, "half", "a couple of"."""
     found: list[tuple[int, float]] = []

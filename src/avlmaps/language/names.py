@@ -64,7 +64,7 @@ class Names:
                 continue
             cost = _UNKNOWN + _OPEN_WORD * sum(word not in _adjectives() for word in words[:-1])
             if self._knows is not None and self._knows(" ".join(words)):
-                cost = _OPEN_WORD
+                cost = _OPEN_WORD + (1.5 if len(words) > 1 and _known(words[:-1]) is not None else 0.0)
             found.append((end, cost, Target(Kind.OBJECT, " ".join(words))))
         return found
 
@@ -213,6 +213,8 @@ def _known(words: tuple[str, ...]) -> tuple[float, Target] | None:
         entry = _entry(tail)
         if entry is None or (start == len(words) - 1 and (words[-1] in _never() or words[-1] in _sides())):
             continue
+        if entry is Entries.ROOM and any(_entry(word) is Entries.ROOM for word in words[:start]):
+            return None
         cost, nouns = 0.0, 0
         for word in words[:start]:
             if word in _sides():
@@ -254,8 +256,10 @@ def _entry(phrase: str) -> Entries | None:
         return Entries.ROOM
     if thing is not None:
         return Entries.THING
-    if phrase.split()[-1] in _ONLY_ROOMS and len(phrase.split()) > 1 and phrase.split()[0] not in _never():
-        return Entries.ROOM
+    words = phrase.split()
+    if words[-1] in _ONLY_ROOMS and len(words) == 2 and words[0] not in _never():
+        if words[0] in lexicon().words() or words[0] in _adjectives():
+            return Entries.ROOM
     if phrase in _ALSO_THINGS:
         return Entries.THING
     return None
@@ -303,6 +307,11 @@ def _forms() -> dict[str, str]:
         third = verb[:-1] + "ies" if past.endswith("ied") else verb + ("es" if verb[-1] in "sxz" or verb[-2:] in ("sh", "ch") else "s")  # fmt: skip
         forms |= {verb: ing, ing: ing, past: ing, third: ing}
     return forms
+
+
+def sounding_words() -> frozenset[str]:
+    """Return all forms of the verbs that sound."""
+    return frozenset(_forms())
 
 
 @cache

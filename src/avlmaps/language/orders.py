@@ -80,6 +80,14 @@ def _face(tree: Tree, memory: Memory) -> Result:
 
 
 def _turn(tree: Tree, memory: Memory) -> Result:
+    if tree.get("where") is not None:
+        first = Go(_target(tree.get("where"), memory))
+        turned, notes = _turned(tree)
+        return [first, *turned], notes
+    return _turned(tree)
+
+
+def _turned(tree: Tree) -> Result:
     notes: list[str] = []
     if tree.get("which") == "none":
         raise UnresolvedError(Clarify("Turn which way? Say left, right, around, or an angle.", ("left", "right", "around")))

@@ -12,7 +12,8 @@ from string import ascii_lowercase
 
 from avlmaps.core.lexicon import lexicon
 from avlmaps.language.grammar import load_grammar
-from avlmaps.language.lexer import Token
+from avlmaps.language.lexer import WORDS, Token
+from avlmaps.language.names import sounding_words
 
 _SHORTEST = 5  # shorter words have too many neighbours
 
@@ -34,7 +35,7 @@ def _better(word: str) -> str | None:
     heard = dict(pair.split("=") for pair in load_grammar().lists["heard_as"].split())
     if word in heard:
         return heard[word]
-    if not word.isascii() or word in _known():
+    if not word.isascii() or word in _known() or word.removesuffix("s") in _known():
         return None
     for drawn in (re.sub(r"(.)\1{2,}", r"\1", word), re.sub(r"(.)\1{2,}", r"\1\1", word)):
         if drawn != word and drawn in _known():
@@ -66,4 +67,4 @@ def _known() -> frozenset[str]:
     grammar = load_grammar()
     listed = (word for text in grammar.lists.values() if isinstance(text, str) for word in text.split())
     classes = (word for phrases in grammar.words.values() for phrase in phrases for word in phrase.split())
-    return frozenset({*listed, *classes, *lexicon().words(), *grammar.literals})
+    return frozenset({*listed, *classes, *lexicon().words(), *grammar.literals, *WORDS, *sounding_words()})
