@@ -75,8 +75,10 @@ class _Writer:
         for intent in self.intents:
             if isinstance(intent, Repeat):
                 self.repeats.update(targets_of(intent.body))
-            if isinstance(intent, StopAt) or (isinstance(intent, Beside) and intent.side in (Side.FRONT, Side.BEHIND)):
-                pass
+        for intent in _flat(self.intents):
+            twice = isinstance(intent, StopAt) or (isinstance(intent, Beside) and intent.side is Side.FRONT)
+            if isinstance(intent, StopAt | Beside | Circle) and (twice or getattr(intent, "views", None)):
+                self.repeats[intent.of] += 1
         if any(isinstance(one, Return) for one in _flat(self.intents)):
             self.head.append("start = robot.current_pos()")
 
@@ -226,9 +228,9 @@ class _Writer:
 
 
 _RESERVED = frozenset({
-    "robot", "start", "place", "for", "in", "if", "and", "or", "not", "is", "range", "len", "i", "def", "pass", "while", "from",
+    "robot", "start", "place", "for", "in", "if", "and", "or", "not", "is", "range", "len", "def", "pass", "while", "from",
     "import", "with", "as", "none", "true", "false", "class", "return", "else", "elif", "del", "try", "lambda", "abs", "min",
-    "max", "heat", "outline", "print",
+    "max", "print",
 })  # fmt: skip
 
 
