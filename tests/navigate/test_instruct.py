@@ -55,7 +55,8 @@ def test_a_sentence_is_obeyed_and_told_as_it_goes() -> None:
     (subgoal,) = outcome.subgoals
     assert subgoal.goal[:2] == pytest.approx((5.1, 3.1), abs=0.15)
     assert subgoal.name == "'chair' near 'dog'"
-    assert lines[0].startswith("> ")
+    assert lines[0] == "I will go to the chair nearest to where dog was heard, then turn left 90 degrees."
+    assert lines[1].startswith("> ")
     assert any("'chair' near 'dog': at (5.1" in line for line in lines)
     assert "turn(angle_deg=-90)" in lines[-1]
 
