@@ -166,7 +166,8 @@ def _name(kind: str, name: Any) -> Any:
     if kind in ("image", "clip", "here"):
         return name
     if kind == "sound":
-        return frozenset(_stem(word) for word in str(name).lower().split() if word not in _WHO)
+        joined = str(name).lower().replace("door bell", "doorbell")
+        return frozenset(_stem(word) for word in joined.split() if word not in _WHO)
     words = [word for word in str(name).lower().replace("-", " ").split() if word not in ("the", "a", "an", "my")]
     wanted = Kind.ROOM if kind == "area" else Kind.THING
     for start in range(len(words)):

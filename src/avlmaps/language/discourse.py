@@ -98,7 +98,7 @@ class _Composer:
                 self.join = "" if said else "BEFORE"
             case "AFTER":
                 said = self.groups and self.groups[-1].sentence == self.number
-                self.join = "AFTER" if said else ""
+                self.join = "AFTER" if said and not (before is not None and before.kind in ("THEN", "mark")) else ""
             case "BUT_FIRST":
                 self.join = "BUT_FIRST" if self.groups else ""
             case "CORRECT" | "MAKE_IT":

@@ -17,7 +17,7 @@ _MOST_WORDS = 5
 _ADJECTIVE, _OPEN_WORD, _SIDE, _MENDED, _UNKNOWN = 0.02, 0.45, 0.25, 0.9, 1.6
 _VERB_ALONE = 0.5
 _NOUN = 0.1  # a noun before a noun; a second one costs four times as much
-_ALIKE, _APART = 0.74, 0.08  # a misspelt word is at least so much like its neighbour, and so much less like the next
+_ALIKE, _APART = 0.78, 0.08  # a misspelt word is at least so much like its neighbour, and so much less like the next
 _ONLY_ROOMS = frozenset({"room", "area", "zone", "hall", "corner"})
 Found = list[tuple[int, float, Target]]
 

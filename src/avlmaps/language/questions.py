@@ -19,6 +19,7 @@ _MODALITIES = {
 }  # fmt: skip
 _SKIP, _FILLER, _REMARK, _WORST = 3.6, 0.2, 0.15, 3.5
 _REMARKS = frozenset({"i", "it", "they", "we", "my", "he", "she", "its", "like", "because", "cos", "im", "so"})
+_NO_STARTS = frozenset({("what", "is"), ("what", "colour"), ("what", "color"), ("what", "are"), ("what", "time"), ("how", "long"), ("how", "big"), ("how", "far"), ("how", "high")})
 _NO_QUESTIONS = frozenset({"who", "why", "when", "whose"})
 _MEANING = frozenset({"not", "no", "without", "except", "never", "unless", "or", "if", "but"})
 
@@ -65,7 +66,8 @@ def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
         )
     read = Sentence(sentence, given.knows)
     tree, words = _best(read)
-    if read.tokens[0].text in _NO_QUESTIONS:
+    starts = tuple(token.text for token in read.tokens[:2])
+    if starts[0] in _NO_QUESTIONS or starts in _NO_STARTS:
         raise QueryError(f"A map knows where things and sounds are, and how many; ask it like: {_EXAMPLE}.")
     if tree is None:
         raise QueryError(f"{words} is not understood; say it like: {_EXAMPLE}.")
@@ -125,7 +127,10 @@ def _targets(tree: Tree) -> tuple[Target, ...]:
         return _for_use(str(tree.get("use")))
     memory = Memory()
     base = tree.get("of")
-    target = resolve(base, memory)
+    target = Target(Kind.IMAGE) if tree.get("picture") else resolve(base, memory)
+    if tree.get("at_in") is not None:
+        inside = resolve(tree.get("at_in"), memory)
+        target = target.with_near(replace(inside, near=()), *inside.near)
     for at in tree.all("at"):
         whole = resolve(Tree("target", (("at", at),), 0, 0), memory)
         target = target.with_near(replace(whole, near=()), *whole.near)
