@@ -20,7 +20,7 @@ from avlmaps.language.readings import Sentence, readings
 
 MOST_CHARACTERS = 1000
 _EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
-_FULLER = 0.5  # a reading with one more wait may cost so much more
+_FULLER = 0.2  # a reading with one more wait may cost so much more
 _SAFETY = 0.35
 _DANGERS = (Reason.HARM, Reason.FLYING, Reason.ENDLESS)
 _MARGIN = 0.06  # readings of different meaning that are closer are asked about

@@ -217,7 +217,7 @@ def _known(words: tuple[str, ...]) -> tuple[float, Target] | None:
             return None
         cost, nouns = 0.0, 0
         for word in words[:start]:
-            if word in _sides():
+            if word in _sides() or word in _listed("choices"):
                 cost += _SIDE
             elif word in _never():
                 return None
@@ -290,6 +290,7 @@ def _is_sounding(word: str) -> bool:
     return word in _noise_words() or (word in _forms() and word.endswith("ing"))
 
 
+@cache
 def _listed(name: str) -> frozenset[str]:
     return frozenset(load_grammar().lists[name].split())
 
