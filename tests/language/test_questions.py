@@ -20,7 +20,7 @@ UNDERSTOOD = {
     "the chair where you heard the dog bark": [("object", "chair"), ("sound", "dog bark")],
     "the chair where I heard the sound of rain": [("object", "chair"), ("sound", "rain")],
     "the chair near the sound of typing on a keyboard": [("object", "chair"), ("sound", "typing on keyboard")],
-    "where someone was heard knocking on the door": [("sound", "someone knocking on door")],
+    "where someone was heard knocking on the door": [("sound", "knocking on door")],
     "the cup on the table": [("object", "cup"), ("object", "table")],
     "where a baby was heard crying": [("sound", "baby crying")],
     "go to the barking of a dog": [("sound", "dog barking")],
