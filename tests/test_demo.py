@@ -11,6 +11,7 @@ import pytest
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.motion import GroundPose
+from avlmaps.core.question import Modality
 from avlmaps.demo import run_demo
 from avlmaps.demo.drive import Drive, command_for
 from avlmaps.demo.evidence import Box, Evidence
@@ -23,7 +24,6 @@ from avlmaps.language.rules import command_to_program
 from avlmaps.navigate.instruct import Outcome
 from avlmaps.navigate.motion_log import Move
 from avlmaps.perception.embedded.scene_network import load_network
-from avlmaps.query.question import Modality
 from avlmaps.sim import furniture
 from avlmaps.sim.materials import material
 from avlmaps.sim.scene import Area, Scene, SceneBuilder, SceneObject

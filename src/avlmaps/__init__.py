@@ -1,4 +1,4 @@
-"""Audio-Visual-Language Maps: what a robot saw and heard, as one 3D map that can be asked.
+"""Audio-Visual-Language Maps: what a robot saw and heard, as one 3D map that can be queried.
 
 Importing the package loads nothing heavy; each public name is imported when it is first used.
 """
@@ -9,24 +9,133 @@ from typing import TYPE_CHECKING, Any
 from avlmaps.core.version import __version__
 
 if TYPE_CHECKING:
-    from avlmaps.core.errors import AvlmapsError
-    from avlmaps.maps.build import build_map
-    from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.heatmap import Heatmap
+    from avlmaps.api import build_map, open_map
+    from avlmaps.core.camera import Pinhole, Rig
+    from avlmaps.core.errors import (
+        AudioError,
+        AvlmapsError,
+        BackendError,
+        LanguageError,
+        MapError,
+        NavigationError,
+        QueryError,
+        RecordingError,
+    )
+    from avlmaps.core.question import Modality, Part, Question, Role
+    from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings
+    from avlmaps.navigate.bodies import BodyShape
+    from avlmaps.navigate.skills import Robot
+    from avlmaps.perception.profiles import Profile, profile
+    from avlmaps.query.avlmap import AVLMap, QuerySettings
+    from avlmaps.query.contents import Room, SoundEvent, Thing
+    from avlmaps.query.heatmap import Heatmap, HeatSettings
+    from avlmaps.query.locate import Located
+    from avlmaps.query.modalities.area import AreaSettings
+    from avlmaps.query.modalities.object import ObjectSettings
+    from avlmaps.query.modalities.sound import SoundSettings
+    from avlmaps.query.question import Answer, Goal
+    from avlmaps.recordings.audio import Sound
     from avlmaps.recordings.open import open_recording
     from avlmaps.recordings.types import Frame, Recording
+    from avlmaps.recordings.writer import RecordingWriter
+    from avlmaps.sim.recorder import RecordSettings, record_scene
+    from avlmaps.sim.scenes import open_scene
 
+# Where each public name lives.
 _HOMES = {
     "AVLMap": "avlmaps.query.avlmap",
+    "Answer": "avlmaps.query.question",
+    "AreaSettings": "avlmaps.query.modalities.area",
+    "AudioError": "avlmaps.core.errors",
     "AvlmapsError": "avlmaps.core.errors",
+    "BackendError": "avlmaps.core.errors",
+    "BodyShape": "avlmaps.navigate.bodies",
+    "BuildSettings": "avlmaps.maps.settings",
     "Frame": "avlmaps.recordings.types",
+    "FrameSettings": "avlmaps.maps.settings",
+    "FusionSettings": "avlmaps.maps.settings",
+    "Goal": "avlmaps.query.question",
+    "HeatSettings": "avlmaps.query.heatmap",
     "Heatmap": "avlmaps.query.heatmap",
+    "LanguageError": "avlmaps.core.errors",
+    "Located": "avlmaps.query.locate",
+    "MapError": "avlmaps.core.errors",
+    "Modality": "avlmaps.core.question",
+    "NavigationError": "avlmaps.core.errors",
+    "ObjectSettings": "avlmaps.query.modalities.object",
+    "Part": "avlmaps.core.question",
+    "Pinhole": "avlmaps.core.camera",
+    "Profile": "avlmaps.perception.profiles",
+    "QueryError": "avlmaps.core.errors",
+    "QuerySettings": "avlmaps.query.avlmap",
+    "Question": "avlmaps.core.question",
+    "RecordSettings": "avlmaps.sim.recorder",
     "Recording": "avlmaps.recordings.types",
-    "build_map": "avlmaps.maps.build",
+    "RecordingError": "avlmaps.core.errors",
+    "RecordingWriter": "avlmaps.recordings.writer",
+    "Rig": "avlmaps.core.camera",
+    "Robot": "avlmaps.navigate.skills",
+    "Role": "avlmaps.core.question",
+    "Room": "avlmaps.query.contents",
+    "Sound": "avlmaps.recordings.audio",
+    "SoundEvent": "avlmaps.query.contents",
+    "SoundSettings": "avlmaps.query.modalities.sound",
+    "Thing": "avlmaps.query.contents",
+    "build_map": "avlmaps.api",
+    "open_map": "avlmaps.api",
     "open_recording": "avlmaps.recordings.open",
+    "open_scene": "avlmaps.sim.scenes",
+    "profile": "avlmaps.perception.profiles",
+    "record_scene": "avlmaps.sim.recorder",
 }
 
-__all__ = ["AVLMap", "AvlmapsError", "Frame", "Heatmap", "Recording", "__version__", "build_map", "open_recording"]
+__all__ = [
+    "AVLMap",
+    "Answer",
+    "AreaSettings",
+    "AudioError",
+    "AvlmapsError",
+    "BackendError",
+    "BodyShape",
+    "BuildSettings",
+    "Frame",
+    "FrameSettings",
+    "FusionSettings",
+    "Goal",
+    "HeatSettings",
+    "Heatmap",
+    "LanguageError",
+    "Located",
+    "MapError",
+    "Modality",
+    "NavigationError",
+    "ObjectSettings",
+    "Part",
+    "Pinhole",
+    "Profile",
+    "QueryError",
+    "QuerySettings",
+    "Question",
+    "RecordSettings",
+    "Recording",
+    "RecordingError",
+    "RecordingWriter",
+    "Rig",
+    "Robot",
+    "Role",
+    "Room",
+    "Sound",
+    "SoundEvent",
+    "SoundSettings",
+    "Thing",
+    "__version__",
+    "build_map",
+    "open_map",
+    "open_recording",
+    "open_scene",
+    "profile",
+    "record_scene",
+]
 
 
 def __getattr__(name: str) -> Any:

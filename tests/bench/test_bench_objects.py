@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.bench.objects import auroc, measure, table_of
+from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.goals import find_goals
 from avlmaps.query.heatmap import Heatmap, NearThings
-from avlmaps.query.question import Modality, Part, Role
 from avlmaps.query.voxel_space import Space
 from avlmaps.sim.scene import SceneObject
 

@@ -30,9 +30,9 @@ from avlmaps.bench.indexing.tables import tables
 from avlmaps.bench.indexing.tasks import Box, Recorded, Task, TaskError, TaskKind, TaskSet, load_tasks, save_tasks
 from avlmaps.bench.indexing.true_voxels import TrueVoxels
 from avlmaps.bench.indexing.weak_sounds import WeakSounds
+from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.question import Modality, Part
 from avlmaps.sim.hearing import Synthesised
 from avlmaps.sim.mesh import Material
 from avlmaps.sim.scene import Area, Scene, SceneBuilder

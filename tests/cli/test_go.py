@@ -68,7 +68,8 @@ def test_what_cannot_be_obeyed_is_told_with_status_1_and_json_all_the_same(run, 
     assert err.splitlines()[-1].startswith("avlmaps: ")
     said = json.loads(out)
     assert said["ok"] is False
-    assert said["error"] in err
+    assert said["error"]["kind"] == "goal-not-found"
+    assert said["error"]["message"] in err
     assert said["steps"][-1]["error"]
 
 
@@ -136,11 +137,14 @@ def test_a_real_robot_is_driven_over_rosbridge_and_let_go_at_the_end(
     asked: list[tuple[object, ...]] = []
 
     class Far(KinematicDriver):
+        def halt(self) -> None:
+            asked.append(("halted",))
+
         def close(self) -> None:
             asked.append(("closed",))
 
-    def connect(kind: str, url: str, frames: object, obstacles: object) -> Far:
-        asked.append((kind, url, frames is not None, obstacles is not None))
+    def connect(kind: str, url: str, frames: object, obstacles: object, *, settings: object, guarded: bool) -> Far:
+        asked.append((kind, url, frames is not None, obstacles is not None and settings is not None and guarded))
         return Far(GroundPose(4.4, 3.2))
 
     monkeypatch.setattr("avlmaps.navigate.ros.open_ros_driver", connect)

@@ -45,7 +45,9 @@ def test_no_spelling_names_two_entries_of_a_kind_unless_it_is_declared_ambiguous
     for kind in Kind:
         seen: dict[str, str] = {}
         for entry in KNOWN.entries(kind):
-            for key in {squeezed(spelling) for spelling in entry.spellings}:
+            keys = [squeezed(spelling) for spelling in entry.spellings]
+            assert len(set(keys)) == len(keys), f"{entry} repeats a spelling"
+            for key in keys:
                 assert key in KNOWN.ambiguous[kind] or seen.setdefault(key, entry.name) == entry.name, (key, entry)
 
 

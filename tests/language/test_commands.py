@@ -15,11 +15,11 @@ from avlmaps.core.errors import AvlmapsError, LanguageError
 from avlmaps.language.commands import Given, read_command
 from avlmaps.language.intents import Clarify, Go, Kind, Refuse, Target
 from avlmaps.language.program import parse_program
+from avlmaps.language.program.writing import write_program
 from avlmaps.language.questions import read_question
 from avlmaps.language.rules import RulesTranslator, UnclearError, command_to_program
 from avlmaps.language.translator import Translator
 from avlmaps.language.verbalise import verbalise
-from avlmaps.language.program.writing import write_program
 
 LISTS = Path(__file__).parent / "commands"
 # How many commands of each development list are right at least, and how many may be read as something else at most.

@@ -1,10 +1,10 @@
 import re
 
 import pytest
-from avlmaps.language.questions import parse_sentence
 
 from avlmaps.core.errors import QueryError
-from avlmaps.query.question import Role
+from avlmaps.core.question import Role
+from avlmaps.language.questions import parse_sentence
 
 UNDERSTOOD = {
     "the chair": [("object", "chair")],

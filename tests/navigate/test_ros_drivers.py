@@ -3,7 +3,7 @@
 import _thread
 import signal
 from math import pi
-from time import monotonic
+from time import monotonic, sleep
 
 import numpy as np
 import pytest
@@ -17,7 +17,14 @@ from avlmaps.core.motion import GroundPose, wrapped
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.navigate.driver import Driver
-from avlmaps.navigate.ros import Frames, GroundTransform, RosSettings, open_ros_driver
+from avlmaps.navigate.ros import (
+    Frames,
+    GroundTransform,
+    MoveBaseDriver,
+    Nav2Driver,
+    RosSettings,
+    open_ros_driver,
+)
 
 pytestmark = pytest.mark.timeout(60)
 
@@ -30,6 +37,7 @@ QUICK = RosSettings(
     connect_timeout_s=20.0,
     pose_timeout_s=20.0,
     pose_max_age_s=10.0,
+    stall_s=30.0,
 )
 PLACE = np.array([2.0, 1.0, 0.4])
 
@@ -258,6 +266,101 @@ def test_a_robot_that_loses_its_way_is_stopped(robot):
         assert not arrival.reached
         assert "is not known any more" in arrival.note
         assert robot.soon(lambda: cancels(robot) > 0)
+
+
+class Clock:
+    """Seconds that pass when the test says so."""
+
+    def __init__(self) -> None:
+        self.now_s = 1000.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def driven_by(robot: FakeRobot, clock: Clock, **settings: float):
+    """Open a driver of a robot by a test's clock."""
+    kind = {1: MoveBaseDriver, 2: Nav2Driver}[robot.ros]
+    return kind(robot.url, settings=quick(**settings), clock=clock)
+
+
+def test_a_lost_pose_cancels_after_the_age_that_is_set_and_not_before(robot):
+    robot.does[""] = "drive on"
+    clock = Clock()
+    with driven_by(robot, clock, pose_max_age_s=RosSettings().pose_max_age_s, stall_s=60.0) as driver:
+        thread, results = in_thread(lambda: driver.go_to(PLACE))
+        assert robot.soon(lambda: bool(goals(robot)))
+        robot.tf_on = False
+        looks = len(robot.received)
+        sleep(0.5)  # transforms on their way arrive
+        clock.now_s += 2.9
+        assert robot.soon(lambda: len(robot.received) > looks)  # the heartbeat: the loop has seen that time
+        sleep(0.3)
+        assert cancels(robot) == 0
+        clock.now_s += 0.2
+        thread.join(20.0)
+        (arrival,) = results
+    assert "is not known any more: its transforms are 3.1 s old" in arrival.note
+    assert cancels(robot) > 0
+
+
+def test_a_loop_that_stood_still_cancels_its_goal(robot):
+    robot.does[""] = "drive on"
+    clock = Clock()
+    with driven_by(robot, clock, stall_s=3.0, pose_max_age_s=60.0) as driver:
+        thread, results = in_thread(lambda: driver.go_to(PLACE))
+        assert robot.soon(lambda: bool(goals(robot)))
+        clock.now_s += 3.5
+        thread.join(20.0)
+        (arrival,) = results
+    assert "The watch over the goal stood still for 3.5 s" in arrival.note
+    assert "may still be driving" not in arrival.note
+    assert cancels(robot) > 0
+
+
+def beats(robot: FakeRobot, namespace: str = "") -> list[str]:
+    return [message["data"] for message in robot.published(f"{namespace}/avlmaps/heartbeat")]
+
+
+def test_heartbeats_name_the_active_goal_and_end_with_it(robot):
+    robot.does[""] = "drive on"
+    clock = Clock()
+    with driven_by(robot, clock, heartbeat_s=0.5, pose_max_age_s=60.0, stall_s=60.0) as driver:
+        assert not beats(robot)
+        thread, _ = in_thread(lambda: driver.go_to(PLACE))
+        assert robot.soon(lambda: len(beats(robot)) == 1)
+        for count in (2, 3):
+            clock.now_s += 0.6
+            assert robot.soon(lambda count=count: len(beats(robot)) == count)
+        assert set(beats(robot)) == set(robot.goals)
+        assert driver.stop() is not None
+        thread.join(20.0)
+        count = len(beats(robot))
+        clock.now_s += 10.0
+        sleep(0.3)
+        assert len(beats(robot)) == count
+    kinds = {said["topic"]: said["type"] for said in robot.ops("advertise")}
+    assert kinds["/avlmaps/heartbeat"] == ("std_msgs/String" if robot.ros == 1 else "std_msgs/msg/String")
+
+
+def test_a_cancel_that_the_bridge_loses_is_sent_again():
+    with FakeRobot(2, "drive on") as robot, opened(robot) as driver:
+        take, lost = robot.take, []
+
+        def loses_the_first(client, message):
+            if message["op"] == "cancel_action_goal" and not lost:
+                lost.append(message)
+                return
+            take(client, message)
+
+        robot.take = loses_the_first
+        thread, results = in_thread(lambda: driver.go_to(PLACE))
+        assert robot.soon(lambda: bool(goals(robot)))
+        driver._halted.set()
+        thread.join(20.0)
+        assert lost
+        assert cancels(robot) == 1
+        assert "may still be driving" not in results[0].note
 
 
 def test_a_robot_that_arrives_without_telling_where_has_not_arrived(robot):

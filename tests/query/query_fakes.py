@@ -140,6 +140,7 @@ def fake_map(
         profile=profile or fake_profile(),
         rig=Rig(camera, camera),
         require_model=lambda kind: None,
+        clip_path=lambda sound: Path(f"fake.avlmap/{sound}.flac"),
     )
 
 

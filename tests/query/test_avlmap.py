@@ -9,11 +9,11 @@ from query_fakes import fake_map, fake_profile, furnished_map, keyframes_at, sou
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError, BackendError, QueryError
+from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.query import locate as locate_module
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.modalities.area import AreaSettings
 from avlmaps.query.photometric import Panoramas, Start
-from avlmaps.query.question import Modality, Part, Question, Role
 from avlmaps.recordings.audio import AudioTrack, Sound
 
 CHAIR = Part(Modality.OBJECT, "chair")
@@ -36,7 +36,7 @@ def locating(
 
 def test_the_answer_has_the_keys_of_the_contract(heard: AVLMap) -> None:
     answer = heard.ask(Question.of([CHAIR, DOG]), top=1).to_json()
-    assert list(answer) == ["goals", "found", "parts", "elapsed_ms"]
+    assert list(answer) == ["goals", "found", "parts", "elapsed_ms", "frame", "level_from_recording"]
     (goal,) = answer["goals"]
     assert list(goal) == ["position", "score", "size", "parts"]
     assert set(goal["parts"]) == {"object", "sound"}

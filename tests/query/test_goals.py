@@ -4,11 +4,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from query_fakes import UP, furnished_map, keyframes_at, sounds_of
 
+from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.heatmap import Heatmap, NearAnchors
 from avlmaps.query.modalities.area import AreaSettings, modes
-from avlmaps.query.question import Modality, Part, Role
 from avlmaps.query.voxel_space import Space
 
 

@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from query_fakes import keyframes_at
 
+from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedViewEncoder
 from avlmaps.query.heatmap import HeatSettings
 from avlmaps.query.modalities.area import AreaSettings, area_factor, area_scores, pooled
-from avlmaps.query.question import Modality, Part, Role
 from avlmaps.query.voxel_space import Space
 
 ROOMS = ("kitchen", "bedroom", "office", "open-plan office")

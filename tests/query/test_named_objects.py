@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
 from avlmaps.query.colour_filter import tint_of
 from avlmaps.query.heatmap import Heatmap, HeatSettings, NearAnchors
 from avlmaps.query.modalities.object import Asked, ObjectSettings, Rivals, object_factor
-from avlmaps.query.question import Modality, Part, Role
 from avlmaps.query.voxel_space import Space
 
 NAMES = ("chair", "dining table", "coffee table", "floor", "other")
@@ -165,3 +165,19 @@ def test_who_must_guess_is_told_of_things_that_are_too_unsure_to_be_told() -> No
     table = Heatmap.of(ask("coffee table", least_confidence=0.45))
     assert [goal.score for goal in table.goals(5)] == [pytest.approx(0.5, abs=0.01)]
     assert [goal.score for goal in table.with_unsure().goals(5)][1:] == [pytest.approx(0.3, abs=0.01)]
+
+
+def test_a_colour_never_answers_for_a_noun_that_nobody_knows() -> None:
+    factor = ask("red elephant", RGB)
+    assert not factor.found
+    assert not factor.mask.any()
+    assert factor.note == "'elephant' is not a known thing, so the pixel encoder has nothing to look for"
+    assert not ask("blue zebra", RGB).found
+    assert ask("something red", RGB).mask.any()
+
+
+def test_a_known_compound_that_holds_a_colour_word_is_no_colour() -> None:
+    factor = ask("white board", RGB)
+    assert not factor.mask.any()
+    assert factor.note == "'whiteboard' is a known word, but this map's pixel encoder was not trained to detect it"
+    assert ask("labtop", RGB).note.endswith("did you mean laptop?")

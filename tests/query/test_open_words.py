@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from query_fakes import UP, box
 
+from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.query.heatmap import HeatSettings
 from avlmaps.query.modalities.object import ObjectSettings, Rivals, instance_confidence, object_factor
-from avlmaps.query.question import Modality, Part
 from avlmaps.query.synonyms import fitting, is_a, is_open
 from avlmaps.query.voxel_space import Space
 

@@ -93,7 +93,9 @@ def _judge_question(row: Row) -> Judged:
     from avlmaps.language.questions import read_question
 
     try:
-        got: Any = read_question(str(row["say"]), Given(row.get("image"), row.get("clip"), lambda _: True)).inquiry.to_json()
+        got: Any = read_question(
+            str(row["say"]), Given(row.get("image"), row.get("clip"), lambda _: True)
+        ).inquiry.to_json()
     except QueryError as fault:
         got = {"ask": "refuse", "said": str(fault)}
     wanted = [row["question"], *row.get("also", [])]

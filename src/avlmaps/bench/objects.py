@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from avlmaps.bench.intervals import wilson
+from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.progress import progress
 from avlmaps.sim.scene import SceneObject
 
@@ -29,8 +30,6 @@ REACH_M = 0.5
 FEWEST_VOXELS = 15
 SMALLEST_M = 0.3
 _MOSTLY, _A_QUARTER = 0.5, 0.25
-# What scenes from files call things, where two names stand for one kind of thing.
-COUNTS_AS = {"picture frame": "picture", "rug": "carpet", "couch": "sofa", "fridge": "refrigerator", "television": "tv"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,9 +149,15 @@ def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, dic
         place = Workplace(
             SceneJob(spec, settings.recorded, settings.sounds, settings.profile, out / "work"), open_scene
         )
-        figures.append(measure(place.asked, place.truth.objects, COUNTS_AS, spec))
+        figures.append(measure(place.asked, place.truth.objects, _same(place.truth.objects), spec))
     missed = {"columns": ["scene", "category", "first goal, m from a true one"], "rows": _missed(figures)}
     return {"objects found by their names": table_of(figures), "categories whose first goal is elsewhere": missed}
+
+
+def _same(things: Sequence[SceneObject]) -> dict[str, str]:
+    """Return the lexicon's name for what scenes from files call otherwise: ``picture frame`` counts as ``picture``."""
+    entries = {thing.category: lexicon().find(thing.category, Kind.THING) for thing in things}
+    return {word: entry.name for word, entry in entries.items() if entry is not None}
 
 
 def _missed(scenes: Sequence[ObjectFigures]) -> list[list[str]]:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional
 
@@ -63,6 +63,8 @@ class Bench(ModelVerb):
     indexing: objects told apart by sounds, photos and areas, in twelve held-out homes or in --scenes by name.
     navigation: robots sent from sentence to place, in twelve held-out homes or in --scenes by name.
     """
+
+    compiles: ClassVar[bool] = True
 
     suite: Positional[Suite]
     """What to measure."""

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from avlmaps.language.translator import Translator
     from avlmaps.maps.obstacles import Obstacles
     from avlmaps.navigate.driver import Driver
+    from avlmaps.navigate.interrupts import Halt
     from avlmaps.query.avlmap import AVLMap
 
 
@@ -30,6 +31,7 @@ class _Ready:
         start: where it stands.
         obstacles: what the map knows to stand in its way.
         met: tells where it met something that the map does not know.
+        halt: returns how the robot stands after an interrupt.
         close: ends the connection; a real robot stops where it is.
     """
 
@@ -37,6 +39,7 @@ class _Ready:
     start: "GroundPose"
     obstacles: "Obstacles"
     met: "Callable[[], Float[np.ndarray, 'm 2'] | None]"
+    halt: "Callable[[], Halt]"
     close: "Callable[[], None]"
 
 
@@ -62,11 +65,15 @@ def go(verb: "Go") -> dict[str, Any]:
             "program": translation.program, "steps": [], "actions": [], "subgoals": [], "ok": True, "error": None,
             "notes": list(translation.notes), "path_m": 0.0, "elapsed_s": 0.0,
         }  # fmt: skip
-    return _driven(verb, start)
+    from avlmaps.navigate.interrupts import raised_signals
+
+    with raised_signals():
+        return _driven(verb, start)
 
 
 def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
     from avlmaps.navigate.instruct import instruct
+    from avlmaps.navigate.interrupts import Interrupted
     from avlmaps.navigate.skills import RobotSettings
     from avlmaps.query.avlmap import AVLMap
 
@@ -84,6 +91,9 @@ def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
         outcome = instruct(
             verb.sentence, asked, robot.driver, translator, settings=settings, translation=translation, tell=say
         )
+    except Interrupted as stop:
+        stop.halt = robot.halt()
+        raise
     finally:
         robot.close()
     if verb.plot is not None:
@@ -91,6 +101,7 @@ def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
 
         title = f"“{verb.sentence}”"
         plot_way(verb.plot, asked.space, robot.start, outcome.moves, robot.obstacles, robot.met(), title)
+        return {**outcome.to_json(), "plot": str(verb.plot)}
     return outcome.to_json()
 
 
@@ -130,19 +141,23 @@ def _start(words: str | None) -> "GroundPose | None":
 def _in_scene(verb: "Go", asked: "AVLMap", start: "GroundPose | None") -> _Ready:
     from avlmaps.demo.driving import robot_in
     from avlmaps.navigate.bodies import SHAPES
+    from avlmaps.navigate.interrupts import Halt
     from avlmaps.sim.scenes import open_scene
 
     robot = robot_in(asked, open_scene(verb.scene or ""), SHAPES[verb.body], start)
-    return _Ready(robot.driver, robot.start, robot.obstacles, lambda: robot.met, lambda: None)
+    halt = Halt(True, "the simulated robot moves only while the command runs")
+    return _Ready(robot.driver, robot.start, robot.obstacles, lambda: robot.met, lambda: halt, lambda: None)
 
 
 def _real(verb: "Go", asked: "AVLMap") -> _Ready:
     from avlmaps.navigate.bodies import SHAPES
     from avlmaps.navigate.costmap import obstacles_for
-    from avlmaps.navigate.ros import Frames, open_ros_driver
+    from avlmaps.navigate.ros import Frames, RosSettings, open_ros_driver
 
-    frames = None if verb.ros_frames is None else Frames.read(verb.ros_frames)
+    given = verb.ros_frames
+    frames = None if given is None else Frames.read(given)
+    settings = None if given is None else RosSettings.read(given)
     obstacles = obstacles_for(asked, SHAPES[verb.body])
     kind = "nav2" if verb.robot == "nav2" else "move_base"
-    driver = open_ros_driver(kind, verb.ros, frames, obstacles)
-    return _Ready(driver, driver.pose, obstacles, lambda: None, driver.close)
+    driver = open_ros_driver(kind, verb.ros, frames, obstacles, settings=settings, guarded=True)
+    return _Ready(driver, driver.pose, obstacles, lambda: None, driver.halt, driver.close)

@@ -11,12 +11,14 @@ from avlmaps.core.progress import say
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from avlmaps.cli.verbs import Build, Query, Record
+    from avlmaps.cli.verbs import Build, Info, Query, Record
     from avlmaps.core.camera import Pinhole
+    from avlmaps.core.question import Part
+    from avlmaps.maps.store.reader import StoredMap
     from avlmaps.perception.cache.feature_store import CacheSettings
     from avlmaps.perception.profiles import Profile
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.question import Answer, Part
+    from avlmaps.query.question import Answer
     from avlmaps.recordings.types import Recording
 
 MAP_MANIFEST = "map.json"
@@ -72,6 +74,7 @@ def record(verb: "Record") -> dict[str, Any]:
         "hearing": verb.hearing,
         "sounds": len(events),
         "events": events,
+        "floor": made.floor.to_json(),
         "elapsed_s": round(perf_counter() - begin, 3),
     }
 
@@ -86,7 +89,7 @@ def _size(words: str) -> tuple[int, int]:
 def build(verb: "Build") -> dict[str, Any]:
     """Build a map and describe it."""
     from avlmaps.maps.build import build_map, describe
-    from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings
+    from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings, GravitySettings
     from avlmaps.recordings.open import open_recording
 
     begin = perf_counter()
@@ -102,7 +105,8 @@ def build(verb: "Build") -> dict[str, Any]:
     settings = BuildSettings(
         voxel_size_m=verb.voxel_size_m,
         frames=FrameSettings(step=verb.frame_step, max_bad_share=verb.max_bad_share),
-        fusion=FusionSettings(max_depth_m=verb.max_depth_m),
+        fusion=FusionSettings(max_depth_m=verb.max_depth_m, sensor=verb.sensor),
+        gravity=GravitySettings(camera_height_m=verb.camera_height_m),
         seed=verb.seed,
     )
     stored = build_map(
@@ -114,7 +118,7 @@ def build(verb: "Build") -> dict[str, Any]:
         resume=not verb.fresh,
         overwrite=verb.overwrite,
     )
-    return {**describe(stored), "elapsed_s": round(perf_counter() - begin, 3)}
+    return {**with_sound_names(describe(stored), stored), "elapsed_s": round(perf_counter() - begin, 3)}
 
 
 def _chosen_profile(name: str, words: "Sequence[str]") -> "Profile":
@@ -172,15 +176,50 @@ def describe_path(path: Path, format: str, verify: bool, plot: Path | None) -> d
     return {**_describe_recording(recording), "faults": faults}
 
 
+def repair(verb: "Info") -> dict[str, Any]:
+    """Build the damaged files of a map again and name them."""
+    from avlmaps.maps.repair import repair_map
+    from avlmaps.recordings.open import open_recording
+
+    recording = None
+    if verb.recording is not None:
+        recording = open_recording(verb.recording, format=verb.format, audio=verb.audio)
+    done = repair_map(verb.path, recording)
+    if not done.files:
+        say(f"every file of {verb.path} is whole; there is nothing to repair.")
+    elif done.rebuilt:
+        say(f"note: the whole map was built again: {verb.path} now differs in last bits from what it was.")
+    return {"repaired": list(done.files)}
+
+
 def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]:
     from avlmaps.maps.store.reader import describe, open_stored
 
     stored = open_stored(path, verify=verify)
+    told = with_sound_names(describe(stored), stored)
     if plot is not None:
         from avlmaps.query.plots import plot_map
 
-        plot_map(stored, plot)
-    return describe(stored)
+        told["plot"] = str(plot_map(stored, plot))
+    return told
+
+
+def with_sound_names(told: dict[str, Any], stored: "StoredMap") -> dict[str, Any]:
+    """Return what is told of a map, each sound with the names that fit it best, where its sound model is here."""
+    from avlmaps.query.avlmap import AVLMap
+
+    if not told["sounds"]:
+        return told
+    try:
+        heard = AVLMap(stored).sounds()
+    except AvlmapsError as error:
+        say(f"note: the sounds have no names here. {error}")
+        return told
+    sounds = [
+        {**sound, "names": list(event.names), "confidences": list(event.confidences)}
+        for sound, event in zip(told["sounds"], heard, strict=True)
+    ]
+    return {**told, "sounds": sounds}
 
 
 def _describe_recording(recording: "Recording") -> dict[str, Any]:
@@ -198,6 +237,7 @@ def _describe_recording(recording: "Recording") -> dict[str, Any]:
             for name, camera in (("rgb", rig.rgb), ("depth", rig.depth))
         },
         "up_in_world": None if up is None else [float(value) for value in up],
+        "topics": dict(recording.topics),
         "audio": None
         if audio is None
         else {
@@ -213,8 +253,8 @@ def _describe_recording(recording: "Recording") -> dict[str, Any]:
 
 def ask(verb: "Query") -> dict[str, Any]:
     """Query a map with a sentence or with parts."""
+    from avlmaps.core.question import Modality, Question
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.question import Modality, Question
 
     parts = _parts(verb)
     only_files = all(part.is_file for part in parts)
@@ -238,10 +278,10 @@ _MOST_COUNTED, _AS_LIKELY = 200, 0.5  # instances count that score at least half
 
 def _asked_in_words(verb: "Query", asked: "AVLMap") -> dict[str, Any]:
     """Answer a sentence; several questions in it are alternatives, and the best answer counts."""
+    from avlmaps.core.question import Modality, Question
     from avlmaps.language.commands import Given
     from avlmaps.language.intents import Ask
     from avlmaps.language.questions import read_question
-    from avlmaps.query.question import Modality, Question
 
     files = (None if path is None else str(path) for path in (verb.image, verb.sound_clip))
     sentence = read_question(verb.sentence, Given(*files, knows=lambda _: True))
@@ -265,13 +305,14 @@ def _asked_in_words(verb: "Query", asked: "AVLMap") -> dict[str, Any]:
 
 
 def _plotted(verb: "Query", answer: "Answer") -> dict[str, Any]:
+    told = answer.to_json()
     if verb.plot is not None and answer.heat is not None:
-        answer.heat.plot(verb.plot, top=verb.top)
-    return answer.to_json()
+        told["plot"] = str(answer.heat.plot(verb.plot, top=verb.top))
+    return told
 
 
 def _parts(verb: "Query") -> list["Part"]:
-    from avlmaps.query.question import Modality, Part
+    from avlmaps.core.question import Modality, Part
 
     named = (
         (Modality.OBJECT, verb.object, False),
@@ -284,7 +325,7 @@ def _parts(verb: "Query") -> list["Part"]:
 
 
 def _first_image(parts: "tuple[Part, ...]") -> Path | None:
-    from avlmaps.query.question import Modality
+    from avlmaps.core.question import Modality
 
     return next((Path(part.query) for part in parts if part.modality is Modality.IMAGE), None)
 
@@ -315,6 +356,7 @@ def _camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":
 
 def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[str, Any]:
     """Locate a photo."""
+    from avlmaps.core.poses import FRAME
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.modalities.image import read_picture
 
@@ -328,6 +370,7 @@ def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[
         "world_from_camera": None if pose is None else [[float(value) for value in row] for row in pose],
         "inliers": int(found.inliers),
         "reference": found.reference_stamp_s,
+        "frame": FRAME,
         "score": found.score,
         "intrinsics": [camera.fx, camera.fy, camera.cx, camera.cy],
         "elapsed_ms": found.elapsed_ms,

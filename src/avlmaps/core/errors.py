@@ -5,9 +5,14 @@ prints it without a traceback and exits 1. Mistakes of a programmer (wrong shape
 ``ValueError`` and ``TypeError``.
 """
 
+from avlmaps.core.printable import printable
+
 
 class AvlmapsError(Exception):
-    """Base of every error that a user can cause and mend."""
+    """Base of every error that a user can cause and mend; its sentence is safe to print, whatever text it quotes."""
+
+    def __str__(self) -> str:
+        return printable(super().__str__())
 
 
 class RecordingError(AvlmapsError):
@@ -16,6 +21,10 @@ class RecordingError(AvlmapsError):
 
 class AudioError(AvlmapsError):
     """A sound or an audio track cannot be read or used."""
+
+
+class NoAudioStreamError(AudioError):
+    """A video has no sound, which for most videos is no fault."""
 
 
 class MapError(AvlmapsError):

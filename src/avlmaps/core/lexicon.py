@@ -221,7 +221,7 @@ class Lexicon:
         return self._spellers[kind].suggest(word, most)
 
     def words(self) -> frozenset[str]:
-        """Return every single word that is known, in small letters: of all spellings, colours and materials."""
+        """Return every known word in small letters: of all spellings, joined ones too, colours and materials."""
         return self._words
 
     @cached_property
@@ -229,7 +229,8 @@ class Lexicon:
         phrases = [*self.colours, *self.materials]
         for entry in self.entries():
             phrases += [*entry.spellings, entry.plural]
-        return frozenset(word for phrase in phrases for word in phrase.lower().replace("-", " ").split())
+        single = {word for phrase in phrases for word in phrase.lower().replace("-", " ").split()}
+        return frozenset(single | {squeezed(phrase) for phrase in phrases})
 
     @cached_property
     def _spellers(self) -> "dict[Kind | None, Speller]":
@@ -274,7 +275,8 @@ class Lexicon:
         learnt = _listed(said.get("learnt", ""))
         # An encoder may take other things for one of its own: a tap for a sink. They are no synonyms.
         special = _listed(said.get("such_as", ""))
-        same = (word for word in learnt if self._index[kind][squeezed(word)] == name and word not in special)
+        keys = {squeezed(word): word for word in reversed(learnt) if word not in special}
+        same = (word for key, word in reversed(keys.items()) if self._index[kind][key] == name)
         return Entry(
             name=name,
             kind=kind,
@@ -316,8 +318,13 @@ def lexicon() -> Lexicon:
 
 def noun_of(phrase: str) -> str:
     """Return the word that says what a phrase is about, known or not: "blue zebra in a cage" is a zebra."""
+    return undescribed(phrase).split()[-1] if phrase.split() else ""
+
+
+def undescribed(phrase: str) -> str:
+    """Return a phrase without the description after its noun: "bottle of wine" is "bottle"."""
     words = phrase.split()
-    return words[_link(words) - 1] if words else ""
+    return " ".join(words[: _link(words)])
 
 
 def _link(words: Sequence[str]) -> int:

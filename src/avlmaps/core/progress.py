@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
+from avlmaps.core.printable import printable
+
 T = TypeVar("T")
 _quiet = False
 _open_bars: list[Any] = []
@@ -66,7 +68,7 @@ def progress(
     on_terminal = sys.stderr.isatty()
     bar = tqdm(
         items,
-        desc=label,
+        desc=printable(label),
         total=total,
         initial=done,
         unit=f" {unit}s",
@@ -80,7 +82,7 @@ def progress(
     try:
         for item in bar:
             if note is not None:
-                bar.set_postfix_str(note(), refresh=False)
+                bar.set_postfix_str(printable(note()), refresh=False)
             yield item
     finally:
         bar.close()
@@ -96,4 +98,4 @@ def end_bars() -> None:
 def say(message: str) -> None:
     """Print one line on standard error, unless progress is silenced."""
     if not _quiet:
-        sys.stderr.write(message + "\n")
+        sys.stderr.write(printable(message) + "\n")

@@ -70,7 +70,9 @@ class Grammar:
     @property
     def literals(self) -> frozenset[str]:
         """The words that stand in templates themselves."""
-        pieces = (piece[1] for each in self.rules.values() for t in each for piece in _PIECE.findall(t.text.split("::")[0]))
+        pieces = (
+            piece[1] for each in self.rules.values() for t in each for piece in _PIECE.findall(t.text.split("::")[0])
+        )
         return frozenset(piece for piece in pieces if piece.isalpha() and piece.islower())
 
 

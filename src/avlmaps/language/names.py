@@ -252,7 +252,11 @@ def _entry(phrase: str) -> Entries | None:
     """Return the kind of what a phrase names exactly; a room comes before a thing of the same name but a toilet."""
     book = lexicon()
     thing, room = book.find(phrase, Entries.THING), book.find(phrase, Entries.ROOM)
-    if room is not None and (thing is None or phrase.split()[-1] not in ("toilet", "toilets", "bath", "shower", "wc", "lift", "elevator", "lifts", "elevators")):
+    if room is not None and (
+        thing is None
+        or phrase.split()[-1]
+        not in ("toilet", "toilets", "bath", "shower", "wc", "lift", "elevator", "lifts", "elevators")
+    ):
         return Entries.ROOM
     if thing is not None:
         return Entries.THING

@@ -90,7 +90,9 @@ def _turn(tree: Tree, memory: Memory) -> Result:
 def _turned(tree: Tree) -> Result:
     notes: list[str] = []
     if tree.get("which") == "none":
-        raise UnresolvedError(Clarify("Turn which way? Say left, right, around, or an angle.", ("left", "right", "around")))
+        raise UnresolvedError(
+            Clarify("Turn which way? Say left, right, around, or an angle.", ("left", "right", "around"))
+        )
     if tree.get("heading") is not None or tree.get("heading_at") is not None:
         heading = tree.get("heading") if tree.get("heading") is not None else tree.get("heading_at")
         return [Turn(heading=float(heading) % 360.0)], notes

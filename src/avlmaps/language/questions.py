@@ -4,13 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
 from avlmaps.language.chart import Tree
 from avlmaps.language.commands import Given, unknown
 from avlmaps.language.grammar import load_grammar
 from avlmaps.language.intents import Ask, Clarify, Inquiry, Kind, Pick, Target
 from avlmaps.language.readings import Sentence
 from avlmaps.language.targets import Memory, UnresolvedError, resolve
-from avlmaps.query.question import MOST_CHARACTERS, Modality, Part, Question
 
 _EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
 _MODALITIES = {
@@ -19,7 +19,19 @@ _MODALITIES = {
 }  # fmt: skip
 _SKIP, _FILLER, _REMARK, _WORST = 3.6, 0.2, 0.15, 3.5
 _REMARKS = frozenset({"i", "it", "they", "we", "my", "he", "she", "its", "like", "because", "cos", "im", "so"})
-_NO_STARTS = frozenset({("what", "is"), ("what", "colour"), ("what", "color"), ("what", "are"), ("what", "time"), ("how", "long"), ("how", "big"), ("how", "far"), ("how", "high")})
+_NO_STARTS = frozenset(
+    {
+        ("what", "is"),
+        ("what", "colour"),
+        ("what", "color"),
+        ("what", "are"),
+        ("what", "time"),
+        ("how", "long"),
+        ("how", "big"),
+        ("how", "far"),
+        ("how", "high"),
+    }
+)
 _NO_QUESTIONS = frozenset({"who", "why", "when", "whose"})
 _MEANING = frozenset({"not", "no", "without", "except", "never", "unless", "or", "if", "but"})
 

@@ -234,5 +234,7 @@ def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | 
                 Item("remark", None, at, end + 1),
                 _REMARK + _REMARK_WORD * len(words) + 1.5 * orders, after in _BREAKS or None, not because,
             )  # fmt: skip
-        if after in _BREAKS or (after in ("so", "and", "but", "please") and finite and _begins_order(sentence, end + 2)):
+        if after in _BREAKS or (
+            after in ("so", "and", "but", "please") and finite and _begins_order(sentence, end + 2)
+        ):
             return

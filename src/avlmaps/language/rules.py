@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.commands import Command, Given, read_command
+from avlmaps.language.program.writing import write_program
 from avlmaps.language.translator import Translation, Translator
 from avlmaps.language.verbalise import verbalise
-from avlmaps.language.program.writing import write_program
 
 
 class UnclearError(LanguageError):

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose
+from avlmaps.core.printable import plot_text
 from avlmaps.navigate.motion_log import Move
 from avlmaps.query.plots import INK, draw_ground, finish, mark, panels, save
 from avlmaps.query.topdown import TopDown
@@ -74,7 +75,7 @@ def draw_way(
         ax.plot(*met.T, linestyle="none", marker="x", markersize=5, color=_MET, zorder=6, label="met on the way")
     for number, move in enumerate((one for one in moves if one.goal is not None), 1):
         _draw_subgoal(ax, space, number, move)
-    ax.set_title(title, fontsize=10, color=INK, loc="left", fontweight="bold", wrap=True)
+    ax.set_title(plot_text(title), fontsize=10, color=INK, loc="left", fontweight="bold", wrap=True)
     finish(figure, [ax], with_heat=False)
     return figure
 
@@ -104,6 +105,6 @@ def _draw_subgoal(ax: "Axes", space: Space, number: int, move: Move) -> None:
     ax.plot(*goal[:2], linestyle="none", marker="o", markersize=11, markerfacecolor="none", markeredgecolor=_GOAL,
             markeredgewidth=2.0, zorder=7)  # fmt: skip
     mark(ax, stop, str(number), _GOAL if move.reached else _MET)
-    name = (move.name or move.skill.replace("_", " "))[:_LONGEST_NAME]
+    name = plot_text(move.name or move.skill.replace("_", " "), _LONGEST_NAME)
     reached = f"{move.distance_m:.2f} m from it" if move.reached else "not reached"
     ax.plot([], [], " ", label=f"{number}: {name}, {reached}")

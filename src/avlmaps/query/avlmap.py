@@ -5,24 +5,33 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 
 from avlmaps.core.camera import Pinhole
+from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
+from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.query.heatmap import Factor, Heatmap, HeatSettings, NearAnchors, fused
 from avlmaps.query.modalities.area import AreaSettings, area_factor
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
-from avlmaps.query.modalities.object import ObjectSettings, Rivals, object_factor
-from avlmaps.query.modalities.sound import SoundSettings, read_clip, require_audible, sound_factor, sound_features
-from avlmaps.query.question import Answer, Modality, Part, PartAnswer, Question, Role
+from avlmaps.query.modalities.object import Asked, ObjectSettings, Pieces, Rivals, object_factor, object_pieces
+from avlmaps.query.modalities.sound import (
+    SoundSettings,
+    read_clip,
+    require_audible,
+    sound_factor,
+    sound_features,
+)
+from avlmaps.query.question import Answer, PartAnswer
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.contents import Room, SoundEvent, Thing
     from avlmaps.query.locate import Located
     from avlmaps.query.photometric import Panoramas
 
@@ -94,15 +103,79 @@ class AVLMap:
         """
         part = Part(Modality.OBJECT, word, _role(primary))
         encoder = self.stored.profile.pixel_encoder()
+        rivals = self._rivals_of(encoder, vocabulary)
+        settings, voxels = self.settings, self.stored.voxels
+        return Heatmap.of(
+            object_factor(
+                self.space, voxels.feature, encoder, rivals, part, settings.objects, settings.heat, voxels.rgb
+            )
+        )
+
+    def pieces(self, word: str) -> Pieces:
+        """Return the voxels that a word wins against the vocabulary, and the instances that they make up."""
+        encoder = self.stored.profile.pixel_encoder()
+        rivals = self._rivals_of(encoder, None)
+        asked = Asked.of(encoder, word)
+        return object_pieces(self.space, self.stored.voxels.feature, encoder, rivals, asked, self.settings.objects)
+
+    def _rivals_of(self, encoder: PixelEncoder, vocabulary: Sequence[str] | None) -> Rivals:
         self.stored.require_model(Kind.PIXELS)
-        feature = self.stored.voxels.feature
         names = tuple(encoder.vocabulary if vocabulary is None else vocabulary)
         if self._rivals is None or self._rivals[0] != names:
-            self._rivals = names, Rivals.of(feature, encoder, names)
-        settings = self.settings
-        rgb = self.stored.voxels.rgb
-        return Heatmap.of(
-            object_factor(self.space, feature, encoder, self._rivals[1], part, settings.objects, settings.heat, rgb)
+            self._rivals = names, Rivals.of(self.stored.voxels.feature, encoder, names)
+        return self._rivals[1]
+
+    def things(
+        self, names: Sequence[str] | None = None, least_confidence: float = 0.5, structure: bool = False
+    ) -> list["Thing"]:
+        """Return the things of the map, most confident first; see ``contents.find_things``."""
+        from avlmaps.query.contents import find_things
+
+        return find_things(self, names, least_confidence, structure)
+
+    def sounds(self, most_names: int = 3) -> list["SoundEvent"]:
+        """Return the sounds of the map in the order of their onset; see ``contents.find_sounds``."""
+        from avlmaps.query.contents import find_sounds
+
+        return find_sounds(self, most_names)
+
+    def rooms(self, least_confidence: float = 0.0) -> list["Room"]:
+        """Return the rooms of the map, those with most views first; see ``contents.find_rooms``."""
+        from avlmaps.query.contents import find_rooms
+
+        return find_rooms(self, least_confidence)
+
+    @property
+    def points(self) -> Float[np.ndarray, "n 3"]:
+        """The middles of the voxels, metres, recording frame."""
+        return self.space.centres
+
+    @property
+    def colors(self) -> UInt8[np.ndarray, "n 3"]:
+        """RGB of the voxels."""
+        return np.asarray(self.stored.voxels.rgb)
+
+    def to_open3d(self) -> "Any":
+        """Return the voxels as an ``open3d.geometry.PointCloud``.
+
+        Raises:
+            BackendError: open3d is not installed.
+        """
+        from avlmaps.query.export import to_open3d
+
+        return to_open3d(self.points, self.colors)
+
+    def to_trimesh(self) -> "Any":
+        """Return the voxels as a ``trimesh.PointCloud`` with colours."""
+        from avlmaps.query.export import to_trimesh
+
+        return to_trimesh(self.points, self.colors)
+
+    def __repr__(self) -> str:
+        counts = self.stored.info.counts
+        return (
+            f"AVLMap({self.stored.path.name!r}: {counts.voxels:,} voxels of {self.stored.info.voxel_size_m:g} m, "
+            f"{counts.keyframes} keyframes, {counts.sounds} sounds, profile {self.stored.info.profile})"
         )
 
     def knows(self, phrase: str) -> bool:
@@ -224,15 +297,22 @@ class AVLMap:
             return self.image(part.query, intrinsics, primary)
         return self.sound_clip(part.query, primary) if part.is_file else self.sound(part.query, primary)
 
-    def ask(self, question: Question, top: int = 3, intrinsics: Pinhole | None = None) -> Answer:
-        """Answer a question with places.
+    def ask(self, question: Question | str, top: int = 3, intrinsics: Pinhole | None = None) -> Answer:
+        """Answer a query with places.
 
         Args:
-            question: what is sought, and near what.
+            question: a sentence, such as "the chair near the sound of glass breaking", or its parts.
             top: at most so many goals.
             intrinsics: of the camera that took the question's pictures; by default the map's own.
+
+        Raises:
+            QueryError: the sentence is not understood, or a part of the query cannot be used.
         """
         begin = time.perf_counter()
+        if isinstance(question, str):
+            from avlmaps.language.questions import parse_sentence
+
+            question = parse_sentence(question)
         heat = fused([self.heat(part, intrinsics) for part in question.parts])
         goals, found = heat.goals(top), heat.found
         elapsed_ms = 1e3 * (time.perf_counter() - begin)

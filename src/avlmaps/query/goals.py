@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from avlmaps.core.question import Role
 from avlmaps.query.heatmap import Factor, Heatmap, NearThings
-from avlmaps.query.question import Goal, Role
+from avlmaps.query.question import FOUND_AT, Goal
 
 # Where everything asked for is in the map, but nowhere together by at least this much heat, the whole is not found.
 LEAST_TOGETHER = 0.1
@@ -72,7 +73,7 @@ def is_found(heat: Heatmap) -> bool:
     if len(heat.factors) == 1:
         return True
     lead = lead_of(heat)
-    likely = np.asarray(lead.confidence) >= 0.5
+    likely = np.asarray(lead.confidence) >= FOUND_AT
     return bool((_shares(heat, lead).peak[likely] >= LEAST_TOGETHER).any())
 
 

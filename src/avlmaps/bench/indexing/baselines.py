@@ -7,10 +7,10 @@ from jaxtyping import UInt8
 
 from avlmaps.bench.indexing.factors import true_places
 from avlmaps.bench.indexing.weak_sounds import weak_ear
+from avlmaps.core.question import Modality, Part, Role
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.sound import SoundSettings, sound_factor
-from avlmaps.query.question import Modality, Part, Role
 from avlmaps.recordings.audio import AudioTrack, Sound
 
 

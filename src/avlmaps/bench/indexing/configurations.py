@@ -7,9 +7,9 @@ from functools import partial
 from avlmaps.bench.indexing.scene_queries import AskedScene
 from avlmaps.bench.indexing.tasks import Task, TaskKind
 from avlmaps.core.errors import QueryError
+from avlmaps.core.question import Role
 from avlmaps.core.registry import Kind
 from avlmaps.query.heatmap import Heatmap, fused
-from avlmaps.query.question import Role
 from avlmaps.sim.mesh import Triple
 
 Source = Callable[[AskedScene, Task, Role], Heatmap | None]

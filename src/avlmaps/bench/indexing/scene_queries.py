@@ -13,11 +13,11 @@ from avlmaps.bench.indexing.factors import VoxelHeat, true_places, true_regions,
 from avlmaps.bench.indexing.tasks import Task
 from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import apply
+from avlmaps.core.question import Modality, Part, Role
 from avlmaps.core.registry import Kind
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.area import area_factor, area_scores
-from avlmaps.query.question import Modality, Part, Role
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.types import Recording
 from avlmaps.sim.truth import Truth

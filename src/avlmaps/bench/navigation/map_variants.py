@@ -13,10 +13,10 @@ from avlmaps.bench.indexing.factors import VoxelHeat, true_places, true_regions,
 from avlmaps.bench.navigation.phrases import spoken
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import QueryError
+from avlmaps.core.question import Modality, Part, Role
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.image import read_picture
-from avlmaps.query.question import Modality, Part, Role
 from avlmaps.sim.truth import Truth
 
 Sense = Literal["ours", "weak", "true", "none"]

@@ -6,6 +6,7 @@ A robot that has begun to move should not stop half way for a slip that could be
 from collections.abc import Callable
 from contextlib import suppress
 from enum import Enum, auto
+from functools import reduce
 from typing import Any
 
 from avlmaps.core.errors import ProgramError
@@ -180,17 +181,20 @@ class _Kinds:
 
     def _give(self, statement: syntax.Assign) -> None:
         target, value = statement.target, statement.value
-        kind = self.of(value)
         if not target.unpacks:
-            self._join(target.names[0], kind)
+            self._join(target.names[0], self.of(value))
             return
-        if isinstance(kind, Kind):
-            check_unpacked(statement.line, kind)
-        written = value.elements if isinstance(value, syntax.Collection) else None
-        if written is not None and len(written) != len(target.names):
-            raise misfit(statement.line, target, len(written))
-        for at, name in enumerate(target.names):
-            self._join(name, self.of(written[at]) if written is not None else Unsure.ANYTHING)
+        if isinstance(value, syntax.Collection):
+            kinds = [self.of(element) for element in value.elements]
+            if len(kinds) != len(target.names):
+                raise misfit(statement.line, target, len(kinds))
+        else:
+            kind = self.of(value)
+            if isinstance(kind, Kind):
+                check_unpacked(statement.line, kind)
+            kinds = [Unsure.ANYTHING] * len(target.names)
+        for name, kind in zip(target.names, kinds, strict=True):
+            self._join(name, kind)
 
     def _join(self, name: str, kind: Guess) -> None:
         self.names[name] = _joined(self.names.get(name, Unsure.NOT_YET), kind)
@@ -235,12 +239,12 @@ class _Kinds:
         return Kind.TRUTH
 
     def logical(self, part: syntax.Logical) -> Guess:
-        joined: Guess = Unsure.NOT_YET
-        for operand in part.operands:
-            joined = _joined(joined, self.of(operand))
-        for operand in part.operands[:-1]:
-            self._truth(operand)
-        return joined
+        # Each operand is worked out once: twice at each level would double the work with every level of nesting.
+        kinds = [self.of(operand) for operand in part.operands]
+        for operand, kind in zip(part.operands[:-1], kinds, strict=False):
+            if isinstance(kind, Kind):
+                check_truth(operand.line, kind)
+        return reduce(_joined, kinds)
 
     def conditional(self, part: syntax.Conditional) -> Guess:
         self._truth(part.test)

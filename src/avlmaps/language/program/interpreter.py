@@ -137,6 +137,10 @@ class _Run:
                 "raise the budget",
             )
 
+    def keep_value(self, line: int, value: Value) -> None:
+        """Count the elements of a value that was made."""
+        self.keep(line, size_of(line, value, self.budget.elements - self.made))
+
     def look_at_clock(self, line: int) -> None:
         """Stop the program whose time is over."""
         if self.clock() - self.started > self.budget.seconds:
@@ -225,7 +229,7 @@ class _Run:
     def collection(self, part: syntax.Collection) -> Value:
         elements = [self.value(element) for element in part.elements]
         made = elements if part.is_list else tuple(elements)
-        self.keep(part.line, size_of(part.line, made))
+        self.keep_value(part.line, made)
         return made
 
     def unary(self, part: syntax.Unary) -> Value:
@@ -245,7 +249,7 @@ class _Run:
         except AvlmapsError as fault:
             raise _SkillFailedError(line, f"`{operator}`", fault) from fault
         if isinstance(made, (str, list, tuple)):
-            self.keep(line, size_of(line, made))
+            self.keep_value(line, made)
         elif isinstance(made, Made):
             self.keep(line, len(made.how))
             self.look_at_clock(line)
@@ -256,7 +260,8 @@ class _Run:
         for operator, operand in zip(part.operators, part.rest, strict=True):
             right = self.value(operand)
             check_comparison(part.line, operator, kind_of(left), kind_of(right))
-            self.step(part.line, size_of(part.line, left) + size_of(part.line, right))
+            for value in (left, right):
+                self.step(part.line, size_of(part.line, value, self.budget.steps - self.worked_out))
             if not _COMPARE[operator](left, right):
                 return False
             left = right
@@ -318,7 +323,8 @@ class _Run:
         result = adopted(skill, returned, how)
         content = shown(result)
         self.record(Step(skill.name, seen, content, part.line, self.clock() - began))
-        self.keep(part.line, size_of(part.line, result) + size_of_shown(content))
+        self.keep_value(part.line, result)
+        self.keep(part.line, size_of_shown(content))
         return result
 
     def record(self, step: Step) -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from avlmaps.core.errors import ProgramError
+from avlmaps.core.printable import UNSAFE, printable
 from avlmaps.language.program.budget import refused
 from avlmaps.language.program.literals import number, string
 
@@ -61,12 +62,6 @@ _REFUSED_SIGNS = {
     "...": "write `pass` where nothing is to be done",
     "!": "use `not`",
 }
-# Control characters, halves of surrogate pairs, and marks that turn the direction of writing, which can hide what a
-# line does.
-_NOWHERE = re.compile(
-    "[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069]"
-)
-
 _TOKEN = re.compile(
     r"""
     (?P<space>[ \t]+) | (?P<comment>\#.*)
@@ -137,7 +132,8 @@ def tokens_of(text: str) -> list[Token]:
 
 
 def _check_characters(text: str) -> None:
-    found = _NOWHERE.search(text)
+    # What is invisible or turns the direction of writing can hide what a line does.
+    found = next((found for found in UNSAFE.finditer(text) if found.group() not in "\n\t"), None)
     if found:
         line = text.count("\n", 0, found.start()) + 1
         raise refused(line, f"the character U+{ord(found.group()):04X} has no place in a program; remove it")
@@ -221,7 +217,10 @@ class _Lexer:
             case "string":
                 self._string(text)
             case "prefixed":
-                raise refused(self.line, f"a string has no `{text}` before its quote; write it plainly, or join with +")
+                prefix = printable(text, 40)
+                raise refused(
+                    self.line, f"a string has no `{prefix}` before its quote; write it plainly, or join with +"
+                )
             case "open":
                 raise refused(self.line, f"the string that starts with {text} does not end on its line; close it")
             case "number":

@@ -2,6 +2,7 @@
 
 import re
 
+from avlmaps.core.printable import UNSAFE
 from avlmaps.language.program.budget import refused
 
 LARGEST = 10**15
@@ -55,10 +56,13 @@ def string(line: int, text: str) -> str:
 def _unescaped(line: int, escape: str) -> str:
     if escape[1] in _ESCAPES:
         return _ESCAPES[escape[1]]
-    if len(escape) > 2:
-        code = int(escape[2:], 16)
-        if 0x20 <= code <= 0x10FFFF and not 0xD800 <= code <= 0xDFFF:
-            return chr(code)
+    code = int(escape[2:], 16) if len(escape) > 2 else 0
+    if 0x20 <= code <= 0x10FFFF and not 0xD800 <= code <= 0xDFFF:
+        if UNSAFE.match(chr(code)):
+            raise refused(
+                line, f"the string has `{escape}`, which is not seen or turns the direction of writing; leave it out"
+            )
+        return chr(code)
     raise refused(
         line,
         f"the string has a backslash before {escape[1:]!r}, which makes no character; write `\\\\` for a backslash",

@@ -52,19 +52,33 @@ def kind_of(value: Value) -> Kind:
     return _KINDS[type(value)]
 
 
-def size_of(line: int, value: Value, depth: int = 0) -> int:
+def size_of(line: int, value: Value, most: int) -> int:
     """Return how many elements and characters a value has, counted as often as they appear in it.
+
+    A list that holds another many times over is small in memory and large by this count, so the count ends once it is
+    past ``most``: the work is bounded by what the program may still use, not by what it wrote.
+
+    Args:
+        line: of the program, for the error.
+        value: what to count.
+        most: where to stop; what is returned is then larger.
 
     Raises:
         ProgramError: it nests too deep.
     """
-    if isinstance(value, str):
-        return 1 + len(value)
-    if not isinstance(value, (list, tuple)):
-        return 1
-    if depth == DEEPEST_VALUE:
-        raise refused(line, f"lists and tuples nest more than {DEEPEST_VALUE} deep; keep them flat")
-    return 1 + sum(size_of(line, element, depth + 1) for element in value)
+    size, waiting = 1, [(value, 0)]
+    while waiting:
+        part, depth = waiting.pop()
+        if isinstance(part, (list, tuple)):
+            if depth == DEEPEST_VALUE:
+                raise refused(line, f"lists and tuples nest more than {DEEPEST_VALUE} deep; keep them flat")
+            size += len(part)
+            if size > most:
+                return size
+            waiting += [(each, depth + 1) for each in part if isinstance(each, (str, list, tuple))]
+        elif isinstance(part, str):
+            size += len(part)
+    return size
 
 
 def combined(line: int, operator: str, left: Any, right: Any, factors: int) -> Value:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from math import pi
+from time import monotonic
 from typing import ClassVar, Self
 
 import numpy as np
@@ -14,14 +15,18 @@ from jaxtyping import Float
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.driver import Arrival
+from avlmaps.navigate.interrupts import Halt
 from avlmaps.navigate.ros.contact import Contact
 from avlmaps.navigate.ros.frames import Frames
 from avlmaps.navigate.ros.goals import End, Goal, Plan, Task, Track, Watch
+from avlmaps.navigate.ros.guard import Guard
 from avlmaps.navigate.ros.link import Link
 from avlmaps.navigate.ros.plans import LEAST_M, LONGEST_M, Standing, ahead_of, place_to_stand, turned_from
 from avlmaps.navigate.ros.settings import RosSettings
 
 _LOOK_EVERY_S = 0.1
+_CANCEL_AGAIN_S = 1.0
+_IDLE = Halt(True, "no goal was active")
 
 
 class RosDriver(ABC):
@@ -30,12 +35,15 @@ class RosDriver(ABC):
     Attributes:
         frames: the robot's frames, and how they lie to the map.
         settings: names, patience, tolerances.
+        guard: a second process that cancels when this one dies; None where nobody started one.
     """
 
     called: ClassVar[str]
     """What drives the robot, as notes name it."""
     tf_kind: ClassVar[str]
     """The type of /tf."""
+    heartbeat_kind: ClassVar[str]
+    """The type of the heartbeat: text, the id of the active goal."""
 
     def __init__(
         self,
@@ -46,6 +54,7 @@ class RosDriver(ABC):
         standing: Standing | None = None,
         level_from_world: Float[np.ndarray, "3 3"] | None = None,
         token: str | None = None,
+        clock: Callable[[], float] = monotonic,
     ) -> None:
         """Connect, and wait until the robot tells its pose.
 
@@ -56,6 +65,7 @@ class RosDriver(ABC):
             standing: moves a goal to where a body can stand; goals are sent as they are without it.
             level_from_world: the map's rotation into its level frame; the identity by default.
             token: for a proxy before the bridge.
+            clock: seconds, by which poses age and the loop's own stalls are measured; replaced in tests.
 
         Raises:
             NavigationError: there is no bridge, or the robot does not tell where it is.
@@ -67,8 +77,11 @@ class RosDriver(ABC):
         self._level_from_world = np.eye(3) if level_from_world is None else np.asarray(level_from_world, np.float64)
         self._busy, self._halted = threading.Lock(), threading.Event()
         self._goal: Goal | None = None
+        self._halt = _IDLE
+        self._clock = clock
+        self.guard: Guard | None = None
         self._absent: set[str] = set()
-        self._contact = Contact(url, token, self.frames, self.settings, self.tf_kind, self._greet)
+        self._contact = Contact(url, token, self.frames, self.settings, self.tf_kind, self._greeted, clock)
 
     # What differs between the two.
 
@@ -97,6 +110,14 @@ class RosDriver(ABC):
 
     def _forward_tasks(self, start: GroundPose, distance_m: float) -> tuple[Task, ...]:
         return (self._pose_task(start.ahead(distance_m)),)
+
+    def _greeted(self, link: Link) -> None:
+        link.advertise(self._heartbeat_topic, self.heartbeat_kind)
+        self._greet(link)
+
+    @property
+    def _heartbeat_topic(self) -> str:
+        return f"{self.settings.namespace}/avlmaps/heartbeat"
 
     def _remind(self, goal: Goal) -> None:  # noqa: B027 - most need none
         """Say a goal again where it may have been lost."""
@@ -138,13 +159,27 @@ class RosDriver(ABC):
         still = contact.stands_still(self.settings.cancel_timeout_s)
         return self._arrival(still, track, "" if still else "The robot was told to stop and is not seen to stand")
 
+    def halt(self) -> Halt:
+        """Return whether the robot stands after an interrupt, which has cancelled the goal that was active.
+
+        Unlike ``stop`` it leaves goals of others alone. It waits at most ``cancel_timeout_s``.
+        """
+        halt = self._halt
+        if not halt.stopped:
+            return halt
+        if self._contact.stands_still(self.settings.cancel_timeout_s):
+            pose = self.pose
+            return Halt(True, f"{halt.note}; the robot stands at ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
+        return Halt(False, f"{halt.note}, but the robot is not seen to stand")
+
     def close(self) -> None:
         """End the connection; a goal that is under way is called off first."""
         goal, link = self._goal, self._contact.link
         if goal is not None and link.lost is None:
-            self._cancel(goal)
-            self._ended_within(goal, self.settings.cancel_timeout_s)
+            self._called_off(goal)
         link.close()
+        if self.guard is not None:
+            self.guard.close()
 
     def __enter__(self) -> Self:
         return self
@@ -168,6 +203,7 @@ class RosDriver(ABC):
             return self._arrival(False, Track(self.pose), "The robot is still at another movement")
         try:
             self._halted.clear()
+            self._halt = _IDLE
             self._contact.renew()
             start = self._contact.pose_within(self.settings.pose_max_age_s)
             if start is None:
@@ -206,22 +242,34 @@ class RosDriver(ABC):
         """Send one goal and see it to its end, whatever it is."""
         goal = self._goal = Goal(task)
         try:
+            self._beat(goal)
             self._send(goal)
             why, absent = self._watch(goal, track)
             if goal.end is None:
                 self._give_up(goal, why, absent)
         except BaseException:  # above all KeyboardInterrupt: nobody watches the robot any more
-            self._cancel(goal)
-            self._ended_within(goal, self.settings.cancel_timeout_s)
+            agreed = (self._contact.link.lost is None and self._called_off(goal)) or self._call_off_anew()
+            note = "the active goal was cancelled" if agreed else "the robot did not confirm that it gave up its goal"
+            self._halt = Halt(agreed, note)
             raise
         finally:
             self._goal = None
+            if self.guard is not None and goal.end is not None:
+                self.guard.rest()
         return goal
 
     def _watch(self, goal: Goal, track: Track) -> tuple[str, bool]:
         """Wait for a goal's end; else return why it is to be given up, and whether nobody is there to take it."""
         watch, settings = Watch(), self.settings
+        looked_s = beaten_s = self._clock()
         while not self._ended_within(goal, _LOOK_EVERY_S):
+            now_s = self._clock()
+            stood_s, looked_s = now_s - looked_s, now_s
+            if stood_s > settings.stall_s:
+                return f"The watch over the goal stood still for {stood_s:.1f} s", False
+            if now_s - beaten_s >= settings.heartbeat_s:
+                beaten_s = now_s
+                self._beat(goal)
             track.passed(self.pose)
             if self._contact.link.lost is not None:
                 return self._contact.loss(), False
@@ -232,7 +280,7 @@ class RosDriver(ABC):
                 return f"Nothing answers at {goal.task.action} {within}", True
             if watch.took_s > goal.task.limit_s:
                 return f"{self.called} was not done within {goal.task.limit_s:g} s", False
-            if self._contact.is_unseen_for(3 * settings.pose_max_age_s):
+            if self._contact.is_unseen_for(settings.pose_max_age_s):
                 return f"Where the robot is is not known any more: {self._contact.unseen()}", False
             self._remind(goal)
         return "", False
@@ -246,14 +294,28 @@ class RosDriver(ABC):
             told = "it was reached again and told to stop" if agreed else "it may still be driving: use its own stop"
             goal.note = f"{why}; {told}"
             return
-        self._cancel(goal)
         wait_s = self.settings.cancel_timeout_s
-        agreed = self._ended_within(goal, min(wait_s, 1.0) if absent else wait_s)
+        agreed = self._called_off(goal, min(wait_s, 1.0) if absent else wait_s)
         agreed = agreed or self._call_off_anew() or absent
         goal.end = End.ABSENT if absent else End.CANCELLED
         goal.note = why if agreed else f"{why}; it does not say that it gave up, and may still be driving"
         if absent and link.told:
             goal.note += f" ({link.told[-1]})"
+
+    def _beat(self, goal: Goal) -> None:
+        """Publish that this loop runs and wants the goal to go on."""
+        if self.guard is not None:
+            self.guard.beat()
+        if self._contact.link.lost is None:
+            self._contact.link.publish(self._heartbeat_topic, {"data": goal.id})
+
+    def _called_off(self, goal: Goal, wait_s: float | None = None) -> bool:
+        """Cancel a goal until the robot confirms it: a bridge that has only just received it may miss the first."""
+        until_s = monotonic() + (self.settings.cancel_timeout_s if wait_s is None else wait_s)
+        while goal.end is None and self._contact.link.lost is None and (left_s := until_s - monotonic()) > 0.0:
+            self._cancel(goal)
+            self._ended_within(goal, min(left_s, _CANCEL_AGAIN_S))
+        return goal.end is not None
 
     def _call_off_anew(self) -> bool:
         """Cancel everything over a new connection: the old one is lost, or waits behind the goal itself."""

@@ -32,6 +32,7 @@ class Contact:
         settings: RosSettings,
         tf_kind: str,
         greet: Callable[[Link], None],
+        clock: Callable[[], float] = monotonic,
     ) -> None:
         """Connect, and wait until the robot tells its pose.
 
@@ -42,6 +43,7 @@ class Contact:
             settings: patience and names.
             tf_kind: the type of /tf.
             greet: called with every new connection, to subscribe to what else is needed.
+            clock: seconds, by which the age of a pose is measured; replaced in tests.
 
         Raises:
             NavigationError: there is no bridge, or the robot does not tell where it is.
@@ -49,6 +51,7 @@ class Contact:
         """
         self.frames, self.settings = frames, settings
         self._url, self._token, self._tf_kind, self._greet = url, token, tf_kind, greet
+        self._clock = clock
         self._last: GroundPose | None = None
         self._connect()
         if self.pose_within(settings.pose_timeout_s) is None:
@@ -60,7 +63,7 @@ class Contact:
 
     def _connect(self) -> None:
         link = Link(self._url, self._token, self.settings.connect_timeout_s)
-        tree, prefix = LiveTree(), self.settings.tf_namespace
+        tree, prefix = LiveTree(self._clock), self.settings.tf_namespace
         link.subscribe(f"{prefix}/tf", self._tf_kind, lambda message: tree.hear(message, static=False))
         link.subscribe(f"{prefix}/tf_static", self._tf_kind, lambda message: tree.hear(message, static=True))
         self._greet(link)
@@ -106,8 +109,8 @@ class Contact:
 
     def pose_from_now(self, wait_s: float) -> GroundPose | None:
         """Return a pose that was told after this call; None where none is within that time."""
-        now_s = monotonic()
-        while monotonic() < now_s + wait_s and self.link.lost is None:
+        now_s, until_s = self._clock(), monotonic() + wait_s
+        while monotonic() < until_s and self.link.lost is None:
             seen = self.sighting()
             if seen is not None and seen.heard_s > now_s:
                 self._last = self.frames.to_level(seen.pose)
@@ -121,9 +124,9 @@ class Contact:
         Only what it tells from now on counts: two poses some time apart, and no other place between them. A robot that
         tells nothing is not seen to stand.
         """
-        begun_s = monotonic()
+        begun_s, until_s = self._clock(), monotonic() + wait_s
         since_s, at = begun_s, None
-        while monotonic() < begun_s + wait_s and self.link.lost is None:
+        while monotonic() < until_s and self.link.lost is None:
             sleep(_LOOK_EVERY_S)
             seen = self.sighting()
             if seen is None or seen.heard_s <= begun_s:
@@ -135,7 +138,7 @@ class Contact:
         return False
 
     def is_unseen_for(self, longest_s: float) -> bool:
-        """Tell whether the pose has not been told for so long."""
+        """Return whether no pose has arrived for that time."""
         seen = self.sighting()
         return seen is None or seen.age_s > longest_s
 

@@ -7,6 +7,7 @@ so that one rigid movement over the ground lies between them: a shift and a turn
 from dataclasses import dataclass, field
 from math import atan2, cos, degrees, isfinite, radians, sin
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -162,7 +163,7 @@ class RobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     map_frame: str = "map"
     base_frame: str = "base_link"
     map_from_avlmap: _Shift = msgspec.field(default_factory=_Shift)
-    settings: dict[str, float | str] = msgspec.field(default_factory=dict)
+    settings: dict[str, Any] = msgspec.field(default_factory=dict)
 
     @classmethod
     def read(cls, path: Path | str) -> "RobotFile":

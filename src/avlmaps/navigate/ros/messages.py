@@ -4,7 +4,6 @@ Sources: the rosbridge v2 protocol; the definitions of nav2_msgs, action_msgs, a
 tf2_msgs. rosbridge writes NaN as null, which no number here takes.
 """
 
-import re
 from math import cos, sin
 from typing import Annotated, Any
 
@@ -14,6 +13,7 @@ from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.poses import from_quaternion
+from avlmaps.core.printable import UNSAFE, printable
 
 # Nothing that is waited for is larger; a transform tree of a humanoid is about 20 kB.
 MOST_BYTES = 1_000_000
@@ -177,6 +177,5 @@ def text_in(raw: msgspec.Raw, most: int = 200) -> str:
 
 
 def shown(text: str, most: int = 200) -> str:
-    """Return a text from outside on one line, without control characters, and not too long."""
-    line = " ".join(re.sub(r"[^ -~\u00a0-\U0010ffff]", " ", text).split())
-    return line if len(line) <= most else line[: most - 1] + "…"
+    """Return a text from outside on one line, nothing in it but what is seen, and not too long."""
+    return printable(" ".join(UNSAFE.sub(" ", text).split()), most)

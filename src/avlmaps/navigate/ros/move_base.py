@@ -29,6 +29,7 @@ class MoveBaseDriver(RosDriver):
 
     called: ClassVar[str] = "move_base"
     tf_kind: ClassVar[str] = "tf2_msgs/TFMessage"
+    heartbeat_kind: ClassVar[str] = "std_msgs/String"
 
     def _topic(self, name: str) -> str:
         return f"{self.settings.namespace}/move_base/{name}"

@@ -39,6 +39,7 @@ class Nav2Driver(RosDriver):
 
     called: ClassVar[str] = "Nav2"
     tf_kind: ClassVar[str] = "tf2_msgs/msg/TFMessage"
+    heartbeat_kind: ClassVar[str] = "std_msgs/msg/String"
 
     def _greet(self, link: Link) -> None:
         self._answers: dict[str, bool] = {}

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from avlmaps.navigate.ros.base import RosDriver
 from avlmaps.navigate.ros.frames import Frames
+from avlmaps.navigate.ros.guard import Guard, Orders
 from avlmaps.navigate.ros.move_base import MoveBaseDriver
 from avlmaps.navigate.ros.nav2 import Nav2Driver
 from avlmaps.navigate.ros.plans import Standing
@@ -29,6 +30,7 @@ def open_ros_driver(
     settings: RosSettings | None = None,
     level_from_world: Float[np.ndarray, "3 3"] | None = None,
     token: str | None = None,
+    guarded: bool = False,
 ) -> RosDriver:
     """Connect to a robot over rosbridge.
 
@@ -42,6 +44,7 @@ def open_ros_driver(
             or else the identity, by default.
         token: sent as ``Authorization: Bearer`` to a proxy before the bridge; by default the environment variable
             AVLMAPS_ROS_TOKEN, where it is set.
+        guarded: start a second process that cancels the robot's goals when this one dies or stands still.
 
     Raises:
         NavigationError: nobody answers there, or the robot does not know where it is.
@@ -53,7 +56,11 @@ def open_ros_driver(
         level_from_world = obstacles.level_from_world
     standing = None if obstacles is None else standing_on(obstacles, settings.radius_m)
     driver = {"nav2": Nav2Driver, "move_base": MoveBaseDriver}[kind]
-    return driver(url, frames, settings, standing=standing, level_from_world=level_from_world, token=token)
+    opened = driver(url, frames, settings, standing=standing, level_from_world=level_from_world, token=token)
+    if guarded:
+        silence_s = settings.stall_s + settings.heartbeat_s
+        opened.guard = Guard(Orders(kind, url, token, settings.namespace, silence_s, settings.goal_timeout_s))
+    return opened
 
 
 def standing_on(obstacles: "Obstacles", radius_m: float) -> Standing:

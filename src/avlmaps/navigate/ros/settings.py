@@ -1,11 +1,29 @@
 """How a ROS robot is driven: names, patience and tolerances. Its speed is the robot's own affair."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from math import pi
 from pathlib import Path
 from typing import Any, Self
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.navigate.ros.frames import RobotFile
+
+# The least and the most that each number may be; beyond lies a slip of the unit (milliseconds, centimetres, degrees).
+_RANGES: Mapping[str, tuple[float, float]] = {
+    "radius_m": (0.01, 3.0),
+    "goal_timeout_s": (0.1, 86_400.0),
+    "answer_timeout_s": (0.1, 600.0),
+    "cancel_timeout_s": (0.1, 60.0),
+    "connect_timeout_s": (0.1, 600.0),
+    "pose_timeout_s": (0.1, 600.0),
+    "pose_max_age_s": (0.1, 60.0),
+    "heartbeat_s": (0.05, 5.0),
+    "stall_s": (0.5, 60.0),
+    "reached_m": (0.01, 5.0),
+    "reached_rad": (0.01, pi),
+    "speed_m_s": (0.01, 2.0),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +48,10 @@ class RosSettings:
     """How long to wait for the first pose."""
     pose_max_age_s: float = 3.0
     """Transforms that are older tell no pose; the robot is not driven without one."""
+    heartbeat_s: float = 0.5
+    """While a goal is active, a heartbeat is published on ``avlmaps/heartbeat`` once in this time."""
+    stall_s: float = 3.0
+    """A goal is cancelled when the loop that watches it did not run for this time."""
     reached_m: float = 0.5
     """A robot that says it has arrived must stand this near; Nav2's own tolerance is 0.25 m by default."""
     reached_rad: float = 0.35
@@ -39,14 +61,15 @@ class RosSettings:
 
     def __post_init__(self) -> None:
         for name in ("namespace", "tf_namespace"):
-            bare = str(getattr(self, name)).strip("/")
-            if bare and not all(part.isidentifier() for part in bare.split("/")):
-                raise NavigationError(f"{getattr(self, name)!r} is no ROS namespace; write it as /robot1.")
+            given = getattr(self, name)
+            bare = given.strip("/") if isinstance(given, str) else "?"
+            if bare and not all(part.isascii() and part.isidentifier() for part in bare.split("/")):
+                raise NavigationError(f"{name} is {given!r}, which is no ROS namespace; write it as /robot1.")
             object.__setattr__(self, name, f"/{bare}" if bare else "")
-        for name in self.__slots__:
+        for name, (least, most) in _RANGES.items():
             value = getattr(self, name)
-            if not name.endswith("namespace") and not (isinstance(value, (int, float)) and 0.0 < value < 1e5):
-                raise NavigationError(f"{name} is {value!r}; the settings of a ROS robot are numbers over 0.")
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
+                raise NavigationError(f"{name} is {value!r}; it is a number from {least:g} to {most:g}.")
 
     @classmethod
     def read(cls, path: Path | str) -> Self:
@@ -59,5 +82,10 @@ class RosSettings:
         unknown = sorted(set(told) - set(cls.__slots__))
         if unknown:
             known = ", ".join(cls.__slots__)
-            raise NavigationError(f"{path} sets {unknown[0]!r}, which a ROS robot has not; it has {known}.")
-        return cls(**told)
+            raise NavigationError(
+                f"{path} sets {unknown[0]!r}, which is no setting of a robot; the settings are {known}."
+            )
+        try:
+            return cls(**told)
+        except NavigationError as fault:
+            raise NavigationError(f"In the settings of {path}, {fault}") from None

@@ -63,16 +63,16 @@ class Meanings:
             return self._all_of(self.kinds[clean])
         known = lexicon()
         if senses := known.senses(clean, self.kind):
-            return next((weights for entry in senses if (weights := self._all_of(self.names_of(entry))).any()),
-                        self._all_of(()))  # fmt: skip
+            weights = (self._all_of(self.names_of(entry)) for entry in senses)
+            some = next((each for each in weights if each.any()), self._all_of(()))
+            return some if some.any() or not senses[0].generic else self._general(clean, senses[0])
         if clean.partition(" ")[0] in _DESCRIBES:
             return self._nearest(clean, self.names, self.least_cosine)
         head = known.head(clean, self.kind)
         if head is None:  # the words round it would make a sofa of a "sofa elephant"
             return self._nearest(noun_of(clean), self.names, self.sure_cosine)
         if head.generic:
-            fitting = [entry.name for entry in known.members(head.name) if entry.name in self.names]
-            return self._nearest(clean, fitting or self.names, self.least_within if fitting else self.least_cosine)
+            return self._general(clean, head)
         return self._described(clean, head)
 
     def names_of(self, entry: Entry) -> tuple[str, ...]:
@@ -90,6 +90,12 @@ class Meanings:
             if wide in self.names:
                 return (wide,)
         return ()
+
+    def _general(self, phrase: str, head: Entry) -> Float32[np.ndarray, " k"]:
+        """Return what a phrase about an appliance, a piece of furniture ... means: the nearest name that there is."""
+        near = self._nearest(phrase, self.names, self.least_cosine)
+        fitting = [entry.name for entry in lexicon().members(head.name) if entry.name in self.names]
+        return near if near.any() else self._nearest(phrase, fitting, self.least_within)
 
     def _described(self, phrase: str, head: Entry) -> Float32[np.ndarray, " k"]:
         """Return what a known noun with words round it means: of several names that fit the nearest to the phrase."""

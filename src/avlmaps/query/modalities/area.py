@@ -8,10 +8,11 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.question import Part
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.protocols import NamedViewEncoder, ScaledEncoder, ViewEncoder
 from avlmaps.query.heatmap import HeatSettings, NearAnchors, normalised
-from avlmaps.query.question import Part
+from avlmaps.query.question import FOUND_AT
 from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.voxel_space import Space
 
@@ -211,11 +212,12 @@ def area_factor(
     anchors = np.asarray(places, np.float64).reshape(-1, 3)
     posterior, scores = area_scores(np.asarray(keyframes.view), encoder, part.query, settings, anchors)
     best = float(posterior.max(initial=0.0))
-    note = "" if best >= 0.5 else f"no view is like {part.query!r}; the best score is {best:.2f}, below 0.50"
+    missed = f"no view is like {part.query!r}; the best score is {best:.2f}, below {FOUND_AT:.2f}"
+    note = "" if best >= FOUND_AT else missed
     if isinstance(encoder, NamedViewEncoder) and not encoder.meant(part.query).any():
         note = f"{unknown_note(part.query, Kind.ROOM)}; it knows: {', '.join(encoder.names)}"
     if not len(keyframes):
         note = "the map holds no keyframes"
     group = modes(space.level(anchors)[:, :2], scores, settings.link_m)
     falloff = heat.falloff_per_m(part.role)
-    return NearAnchors(space, part, falloff, anchors, scores, group, best >= 0.5, part.query, note)
+    return NearAnchors(space, part, falloff, anchors, scores, group, best >= FOUND_AT, part.query, note)

@@ -1,0 +1,62 @@
+"""The functions of the package's face that join several rooms: from a recording to a map that answers queries."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from avlmaps.maps.settings import BuildSettings
+    from avlmaps.perception.profiles import Profile
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.recordings.types import Recording
+
+
+def build_map(
+    recording: "Recording | str | Path",
+    path: str | Path,
+    profile: "str | Profile" = "embedded",
+    settings: "BuildSettings | None" = None,
+    *,
+    resume: bool = True,
+    overwrite: bool = False,
+    progress: bool = True,
+) -> "AVLMap":
+    """Build a map of a recording and open it.
+
+    A build that is stopped at any time goes on where it ended when it is called again. A map that is finished already,
+    from the same recording with the same settings, is opened without work.
+
+    Args:
+        recording: folder or file of a recording in any known format, or one from ``open_recording``.
+        path: folder of the map, by custom ``NAME.avlmap``.
+        profile: which models perceive: ``embedded``, ``foundation``, ``paper`` or one of your own.
+        settings: everything else about the build; the defaults if None.
+        resume: go on with what a stopped build had finished; otherwise begin anew.
+        overwrite: replace a finished map there that came from another recording, or with other settings.
+        progress: show progress bars on standard error.
+
+    Raises:
+        RecordingError: the recording cannot be opened, or too many of its frames cannot be read.
+        MapError: the folder is no place for a map, holds another map, or cannot be written.
+        BackendError: the profile is not known, or a package for it is missing.
+    """
+    from avlmaps.maps.build import build_map as build
+    from avlmaps.maps.settings import DEFAULTS
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.recordings.open import open_recording
+
+    opened = open_recording(recording) if isinstance(recording, str | Path) else recording
+    stored = build(
+        opened, path, profile, settings or DEFAULTS, resume=resume, overwrite=overwrite, progress=progress
+    )  # fmt: skip
+    return AVLMap(stored)
+
+
+def open_map(path: str | Path) -> "AVLMap":
+    """Open a map's folder; its large arrays stay on disk until they are used.
+
+    Raises:
+        MapError: it is no map, or damaged, or of another schema or profile.
+    """
+    from avlmaps.query.avlmap import AVLMap
+
+    return AVLMap.open(path)

@@ -1,0 +1,101 @@
+"""`avlmaps export`: write a map for other programs."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+from tyro.conf import Positional, arg
+
+from avlmaps.cli.output import UsageError, emit, size_of
+from avlmaps.cli.verb import ModelVerb
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
+
+_SUFFIXES = (".ply", ".glb", ".pgm", ".csv")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Export(ModelVerb):
+    """Write a map for other programs: PLY, GLB, an occupancy grid for Nav2 (PGM and YAML), or CSV.
+
+    Example: avlmaps export home.avlmap --out home.glb
+    Example: avlmaps export home.avlmap --out sofa.ply --heat "the sofa"
+    Example: avlmaps export home.avlmap --out floor.pgm --radius-m 0.3
+    """
+
+    compiles: ClassVar[bool] = True
+
+    map: Positional[Path]
+    """Map folder (NAME.avlmap)."""
+    out: Annotated[Path, arg(metavar="FILE")]
+    """File to write; its suffix chooses the format: .ply points, .glb blocks, .pgm occupancy grid, .csv table."""
+    things: bool = False
+    """Colour voxels by the thing that they belong to (.ply, .glb)."""
+    heat: Annotated[str | None, arg(metavar="SENTENCE")] = None
+    """Colour voxels by the heat of a query (.ply, .glb)."""
+    least: Annotated[float, arg(metavar="CONFIDENCE")] = 0.5
+    """Use things with at least this confidence, 0 to 1 (.csv, --things)."""
+    radius_m: Annotated[float, arg(metavar="METRES")] = 0.2
+    """Radius of the robot (.pgm)."""
+    height_m: Annotated[float, arg(metavar="METRES")] = 1.5
+    """Height of the robot; what is higher is no obstacle (.pgm)."""
+    overwrite: bool = False
+    """Replace a file that exists."""
+
+    def run(self) -> None:
+        """Write the file."""
+        answer = _export(self)
+        files = ", ".join(f"{name} ({size_of(Path(name).stat().st_size)})" for name in answer["files"])
+        emit(answer, [f"wrote {files}"], self.json)
+
+
+def _export(verb: Export) -> dict[str, Any]:
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.export import write_table
+
+    kind = verb.out.suffix.lower()
+    if kind not in _SUFFIXES:
+        raise UsageError(f"--out takes a file that ends in {', '.join(_SUFFIXES)}; {verb.out.name!r} does not.")
+    if verb.things and verb.heat is not None:
+        raise UsageError("--things and --heat both choose colours; give one of them.")
+    if (verb.things or verb.heat is not None) and kind not in (".ply", ".glb"):
+        raise UsageError(f"--things and --heat colour a .ply or a .glb; {verb.out.name!r} has no colours.")
+    written = [verb.out, *([verb.out.with_suffix(".yaml")] if kind == ".pgm" else [])]
+    there = [str(path) for path in written if path.exists()]
+    if there and not verb.overwrite:
+        raise UsageError(f"{' and '.join(there)} exists; give another --out, or replace it with --overwrite.")
+    opened = AVLMap.open(verb.map)
+    if kind == ".pgm":
+        _write_grid(verb, opened)
+    elif kind == ".csv":
+        write_table(verb.out, opened.things(least_confidence=verb.least), opened.sounds())
+    else:
+        _write_voxels(verb, opened, kind)
+    frame = "level" if kind == ".pgm" else "recording"
+    return {"map": str(verb.map), "files": [str(path) for path in written], "frame": frame}
+
+
+def _write_grid(verb: Export, opened: "AVLMap") -> None:
+    from avlmaps.navigate.bodies import BodyShape
+    from avlmaps.navigate.costmap import obstacles_for
+    from avlmaps.query.export import write_occupancy
+
+    shape = BodyShape(radius_m=verb.radius_m, height_m=verb.height_m)
+    write_occupancy(verb.out, obstacles_for(opened, shape))
+
+
+def _write_voxels(verb: Export, opened: "AVLMap", kind: str) -> None:
+    from avlmaps.query.export import heat_colors, thing_colors, write_glb, write_ply
+
+    colors, columns = opened.colors, {}
+    if verb.things:
+        colors = thing_colors(len(colors), opened.things(least_confidence=verb.least))
+    elif verb.heat is not None:
+        heat = opened.ask(verb.heat).heat
+        if heat is not None:
+            colors, columns = heat_colors(heat.shown), {"heat": heat.values}
+    if kind == ".ply":
+        write_ply(verb.out, opened.points, colors, columns)
+    else:
+        write_glb(verb.out, opened.stored.voxels.index, opened.space.grid.voxel_size_m, colors)

@@ -1,0 +1,94 @@
+"""A query as plain values: the things, sounds, areas and pictures that it names, one of them primary.
+
+Sentences are parsed into these (``language``), and the map answers them (``query``).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from avlmaps.core.errors import QueryError
+
+# Nobody calls a thing by more; a text that was pasted by mistake would be read for minutes.
+MOST_CHARACTERS = 500
+
+
+class Modality(StrEnum):
+    """The four ways to point at a place; the value is the word on the command line."""
+
+    OBJECT = "object"
+    SOUND = "sound"
+    AREA = "area"
+    IMAGE = "image"
+
+
+class Role(StrEnum):
+    """What a part is for: the primary part is the thing that is sought, the context says where it is."""
+
+    PRIMARY = "primary"
+    CONTEXT = "context"
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One thing that a question names.
+
+    Attributes:
+        modality: how it points at a place.
+        query: a phrase, or the path of a file for an image and for a sound asked by a clip.
+        role: primary or context.
+        is_file: whether ``query`` is a path (always so for an image).
+    """
+
+    modality: Modality
+    query: str
+    role: Role = Role.CONTEXT
+    is_file: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.query.strip():
+            raise QueryError(f"The {self.modality} asked for is empty; name one, such as {_EXAMPLES[self.modality]}.")
+        if len(self.query) > MOST_CHARACTERS and not self.is_file:
+            raise QueryError(
+                f"The {self.modality} asked for has {len(self.query)} characters, more than {MOST_CHARACTERS}; name it "
+                f"in a few words, such as {_EXAMPLES[self.modality]}."
+            )
+
+
+_EXAMPLES = {
+    Modality.OBJECT: "'red cabinet'",
+    Modality.SOUND: "'glass breaking'",
+    Modality.AREA: "'kitchen'",
+    Modality.IMAGE: "./photo.jpg",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """One primary part and any number of parts of context.
+
+    Attributes:
+        parts: in the order in which they were asked; exactly one is primary.
+    """
+
+    parts: tuple[Part, ...]
+
+    def __post_init__(self) -> None:
+        primaries = sum(part.role is Role.PRIMARY for part in self.parts)
+        if not self.parts:
+            raise QueryError("The question is empty; name an object, a sound, an area or a picture.")
+        if primaries != 1:
+            raise QueryError(f"The question has {primaries} primary parts; exactly one is what is sought.")
+
+    @classmethod
+    def of(cls, parts: Sequence[Part], primary: Modality | None = None) -> "Question":
+        """Make the first part primary, or the first one of the named modality, and the others its context.
+
+        Raises:
+            QueryError: there is no part, or none of that modality.
+        """
+        chosen = next((i for i, part in enumerate(parts) if primary in (None, part.modality)), None)
+        if parts and chosen is None:
+            raise QueryError(f"The primary part is to be a {primary}, but none is asked for; add one or leave it out.")
+        roles = [Role.PRIMARY if i == chosen else Role.CONTEXT for i in range(len(parts))]
+        return cls(tuple(Part(p.modality, p.query, role, p.is_file) for p, role in zip(parts, roles, strict=True)))

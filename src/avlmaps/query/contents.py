@@ -1,0 +1,253 @@
+"""What a map holds without a question: its things, its sounds and its rooms, each named with a confidence.
+
+A thing is a connected group of voxels that a word of the vocabulary wins (``modalities.object``). Several words may
+claim the same voxels ("chair", "office chair"); the most confident claim stands, and what overlaps it is left out.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+from avlmaps.core.errors import QueryError
+from avlmaps.core.registry import Kind
+from avlmaps.perception.protocols import NamedViewEncoder
+from avlmaps.query.modalities.area import AREA_NAMES, area_distribution, modes
+from avlmaps.query.modalities.object import Pieces
+from avlmaps.query.modalities.sound import sound_features
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
+
+# Surfaces that make up a building; they are everywhere, and listed only on request.
+STRUCTURE = ("wall", "floor", "ceiling", "column", "stairs", "railing")
+# A claim that shares this part of its voxels with a more confident thing names the same thing again.
+_SAME_SHARE = 0.5
+# A room is listed where at least this many keyframes show it.
+_FEWEST_VIEWS = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Thing:
+    """One thing of the map.
+
+    Attributes:
+        name: the word of the vocabulary.
+        confidence: that it is one, in [0, 1].
+        position: its voxel nearest to its middle, metres, recording frame.
+        size: extent along the axes of the level frame (x and y horizontal, z up), metres.
+        color: mean RGB of its voxels.
+        rows: numbers of its voxels in the map.
+        points: middles of its voxels, metres, recording frame.
+    """
+
+    name: str
+    confidence: float
+    position: tuple[float, float, float]
+    size: tuple[float, float, float]
+    color: tuple[int, int, int]
+    rows: Int[np.ndarray, " m"] = field(repr=False)
+    points: Float[np.ndarray, "m 3"] = field(repr=False)
+
+    def to_json(self) -> dict[str, object]:
+        """Return the thing as ``avlmaps things --json`` prints it."""
+        return {
+            "name": self.name,
+            "confidence": self.confidence,
+            "position": list(self.position),
+            "size": list(self.size),
+            "color": list(self.color),
+            "voxels": len(self.rows),
+        }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SoundEvent:
+    """One sound of the map.
+
+    Attributes:
+        names: the likeliest names, best first; empty for an encoder with an open vocabulary.
+        confidences: of each name, in [0, 1].
+        onset_s: start, seconds from the start of the recording.
+        offset_s: end, the same.
+        position: middle of the robot's positions during the sound, metres, recording frame.
+        track: the robot's positions during the sound, metres, recording frame.
+        clip: FLAC file of the sound.
+    """
+
+    names: tuple[str, ...]
+    confidences: tuple[float, ...]
+    onset_s: float
+    offset_s: float
+    position: tuple[float, float, float]
+    track: Float[np.ndarray, "t 3"] = field(repr=False)
+    clip: Path
+
+    def to_json(self) -> dict[str, object]:
+        """Return the sound as ``avlmaps things --json`` prints it."""
+        return {
+            "names": list(self.names),
+            "confidences": list(self.confidences),
+            "onset_s": self.onset_s,
+            "offset_s": self.offset_s,
+            "position": list(self.position),
+            "clip": self.clip.name,
+        }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Room:
+    """One room: keyframes side by side whose views have the same likeliest name.
+
+    Attributes:
+        name: kind of room.
+        confidence: mean posterior of the name over its views, in [0, 1].
+        position: its view's place nearest to their middle, metres, recording frame.
+        views: number of keyframes.
+        places: middle of what each of its keyframes saw, metres, recording frame.
+    """
+
+    name: str
+    confidence: float
+    position: tuple[float, float, float]
+    views: int
+    places: Float[np.ndarray, "k 3"] = field(repr=False)
+
+    def to_json(self) -> dict[str, object]:
+        """Return the room as ``avlmaps things --json`` prints it."""
+        return {
+            "name": self.name,
+            "confidence": self.confidence,
+            "position": list(self.position),
+            "views": self.views,
+        }
+
+
+def find_things(
+    asked: "AVLMap", names: Sequence[str] | None = None, least_confidence: float = 0.5, structure: bool = False
+) -> list[Thing]:
+    """Return the things of a map, most confident first.
+
+    Args:
+        asked: the map.
+        names: what to list; by default the pixel encoder's vocabulary.
+        least_confidence: things below it are left out, in [0, 1].
+        structure: list walls, floors and the like as well.
+
+    Raises:
+        QueryError: ``least_confidence`` lies outside [0, 1].
+        BackendError: the map's profile has no pixel encoder.
+    """
+    if not 0.0 <= least_confidence <= 1.0:
+        raise QueryError(f"The least confidence is {least_confidence:g}; it must lie between 0 and 1.")
+    vocabulary = asked.stored.profile.pixel_encoder().vocabulary if names is None else names
+    wanted = [name for name in vocabulary if structure or name not in STRUCTURE]
+    claims = [claim for name in wanted for claim in _claims(name, asked.pieces(name), least_confidence)]
+    claims.sort(key=lambda claim: (-claim[1], -len(claim[2]), claim[0]))
+    owned = np.zeros(len(asked.space), bool)
+    things: list[Thing] = []
+    for name, confidence, rows in claims:
+        if owned[rows].mean() >= _SAME_SHARE:
+            continue
+        owned[rows] = True
+        things.append(_thing(asked, name, confidence, rows))
+    return things
+
+
+def _claims(name: str, pieces: Pieces, least: float) -> Iterator[tuple[str, float, Int[np.ndarray, " m"]]]:
+    rows = np.flatnonzero(pieces.mask)
+    order = np.argsort(pieces.instance, kind="stable")
+    bounds = np.searchsorted(pieces.instance[order], np.arange(len(pieces.confidence) + 1))
+    for number in np.flatnonzero(pieces.confidence >= least):
+        yield name, float(pieces.confidence[number]), rows[order[bounds[number] : bounds[number + 1]]]
+
+
+def _thing(asked: "AVLMap", name: str, confidence: float, rows: Int[np.ndarray, " m"]) -> Thing:
+    points = asked.space.centres[rows]
+    extent = np.ptp(asked.space.level(points), axis=0) + asked.space.grid.voxel_size_m
+    colors: UInt8[np.ndarray, "m 3"] = np.asarray(asked.stored.voxels.rgb)[rows]
+    r, g, b = (int(value) for value in colors.mean(axis=0).round())
+    return Thing(name, round(confidence, 3), _middle(points), _triple(extent), (r, g, b), rows, points)
+
+
+def find_sounds(asked: "AVLMap", most_names: int = 3) -> list[SoundEvent]:
+    """Return the sounds of a map in the order of their onset, each with its likeliest names.
+
+    Args:
+        asked: the map.
+        most_names: names for each sound.
+
+    Raises:
+        MapError: the map was built with another sound encoder than is installed.
+    """
+    stored, heard = asked.stored, asked.stored.sounds
+    if not len(heard):
+        return []
+    stored.require_model(Kind.SOUNDS)
+    encoder = stored.profile.sound_encoder()
+    words = list(encoder.vocabulary)
+    scores = encoder.score_words(sound_features(heard), words) if words else np.zeros((len(heard), 0))
+    events: list[SoundEvent] = []
+    for k in range(len(heard)):
+        best = np.argsort(-scores[k], kind="stable")[:most_names]
+        track = np.asarray(heard.track[heard.track_offsets[k] : heard.track_offsets[k + 1]], np.float64)
+        events.append(
+            SoundEvent(
+                names=tuple(words[i] for i in best),
+                confidences=tuple(round(float(scores[k, i]), 3) for i in best),
+                onset_s=float(heard.onset_s[k]),
+                offset_s=float(heard.offset_s[k]),
+                position=_triple(track.mean(axis=0)),
+                track=track,
+                clip=stored.clip_path(k),
+            )
+        )
+    return events
+
+
+def find_rooms(asked: "AVLMap", least_confidence: float = 0.0) -> list[Room]:
+    """Return the rooms of a map, those with most views first.
+
+    A room is a group of keyframes with the same likeliest name, whose views' places lie close to one another.
+
+    Args:
+        asked: the map.
+        least_confidence: rooms below it are left out, in [0, 1].
+
+    Raises:
+        BackendError: the map's profile has no view encoder.
+    """
+    stored, settings = asked.stored, asked.settings.areas
+    if not len(stored.keyframes):
+        return []
+    encoder = stored.profile.view_encoder()
+    stored.require_model(Kind.VIEWS)
+    names = encoder.names if isinstance(encoder, NamedViewEncoder) else AREA_NAMES
+    places = np.asarray(stored.keyframes.centre, np.float64).reshape(-1, 3)
+    share = area_distribution(np.asarray(stored.keyframes.view), encoder, names, settings, places)
+    likeliest = share.argmax(axis=1)
+    rooms: list[Room] = []
+    for number in np.unique(likeliest):
+        of_name = np.flatnonzero(likeliest == number)
+        confidence = share[of_name, number]
+        group = modes(asked.space.level(places[of_name])[:, :2], confidence, settings.link_m)
+        for k in range(int(group.max(initial=-1)) + 1):
+            members = of_name[group == k]
+            mean = float(share[members, number].mean())
+            if len(members) < _FEWEST_VIEWS or mean < least_confidence:
+                continue
+            rooms.append(Room(names[number], round(mean, 3), _middle(places[members]), len(members), places[members]))
+    return sorted(rooms, key=lambda room: (-room.views, room.name))
+
+
+def _middle(points: Float[np.ndarray, "m 3"]) -> tuple[float, float, float]:
+    """Return the point nearest to the mean: a place that exists, also for a ring of points."""
+    return _triple(points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))])
+
+
+def _triple(vector: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in vector)
+    return x, y, z

@@ -1,0 +1,254 @@
+"""Writing a map for other programs: point clouds and meshes (PLY, GLB), occupancy grids (PGM, YAML) and tables (CSV).
+
+Positions are metres in the recording frame. An occupancy grid is a floor plan and needs z up: it is in the level frame,
+which shares the recording frame's origin; the YAML file holds the rotation between the two.
+"""
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float, Float32, Int, UInt8
+
+from avlmaps.core.errors import BackendError, QueryError
+from avlmaps.core.files import write_bytes_atomically
+
+if TYPE_CHECKING:
+    from avlmaps.maps.obstacles import Obstacles
+    from avlmaps.query.contents import SoundEvent, Thing
+
+# Gray values of Nav2's map_server for mode "trinary".
+_OCCUPIED, _FREE, _UNKNOWN = 0, 254, 205
+# The six faces of a voxel: the neighbour behind each, and its corners counter-clockwise from outside.
+_FACES = (
+    ((1, 0, 0), ((1, 0, 0), (1, 1, 0), (1, 1, 1), (1, 0, 1))),
+    ((-1, 0, 0), ((0, 0, 0), (0, 0, 1), (0, 1, 1), (0, 1, 0))),
+    ((0, 1, 0), ((0, 1, 0), (0, 1, 1), (1, 1, 1), (1, 1, 0))),
+    ((0, -1, 0), ((0, 0, 0), (1, 0, 0), (1, 0, 1), (0, 0, 1))),
+    ((0, 0, 1), ((0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))),
+    ((0, 0, -1), ((0, 0, 0), (0, 1, 0), (1, 1, 0), (1, 0, 0))),
+)
+_PALETTE_SEED = 5
+
+
+class ColorBy(StrEnum):
+    """What colours an export; the value is the word on the command line."""
+
+    PICTURE = "picture"
+    THING = "thing"
+    HEAT = "heat"
+
+
+def thing_colors(count: int, things: "Sequence[Thing]") -> UInt8[np.ndarray, "n 3"]:
+    """Return a colour for each voxel: one for each name, gray where no thing is."""
+    colors = np.full((count, 3), 170, np.uint8)
+    names = sorted({thing.name for thing in things})
+    palette = _palette(len(names))
+    for thing in reversed(things):  # the most confident is drawn last
+        colors[thing.rows] = palette[names.index(thing.name)]
+    return colors
+
+
+def heat_colors(values: Float32[np.ndarray, " n"]) -> UInt8[np.ndarray, "n 3"]:
+    """Return the colour of each voxel's heat, on the scale of the plots; gray where there is none."""
+    from matplotlib import colormaps
+
+    heat = np.clip(np.asarray(values, np.float64), 0.0, 1.0)
+    colors = (255 * colormaps["inferno"](0.15 + 0.8 * heat)[:, :3]).round().astype(np.uint8)
+    colors[heat <= 0.0] = 170
+    return colors
+
+
+def _palette(count: int) -> UInt8[np.ndarray, "k 3"]:
+    """Return colours far apart in hue; the same for the same count."""
+    from matplotlib.colors import hsv_to_rgb
+
+    hue = (np.arange(count) * 0.61803398875) % 1.0
+    rng = np.random.default_rng(_PALETTE_SEED)
+    hsv = np.stack([hue, rng.uniform(0.55, 0.9, count), rng.uniform(0.7, 0.95, count)], axis=1)
+    return (255 * hsv_to_rgb(hsv.reshape(-1, 3))).round().astype(np.uint8)
+
+
+def write_ply(
+    path: Path,
+    points: Float[np.ndarray, "n 3"],
+    colors: UInt8[np.ndarray, "n 3"],
+    columns: dict[str, np.ndarray] | None = None,
+) -> Path:
+    """Write a binary PLY point cloud.
+
+    Args:
+        path: file.
+        points: metres, recording frame.
+        colors: RGB.
+        columns: more numbers for each point (``heat``, ``weight``), written as float32.
+
+    Raises:
+        QueryError: the file cannot be written.
+    """
+    columns = columns or {}
+    fields = [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1")]
+    rows = np.zeros(len(points), np.dtype(fields + [(name, "<f4") for name in columns]))
+    for k, axis in enumerate("xyz"):
+        rows[axis] = points[:, k]
+    for k, color in enumerate(("red", "green", "blue")):
+        rows[color] = colors[:, k]
+    for name, values in columns.items():
+        rows[name] = values
+    kinds = {"<f4": "float", "u1": "uchar"}
+    described = [f"property {kinds[kind]} {name}" for name, kind in fields] + [f"property float {n}" for n in columns]
+    header = ["ply", "format binary_little_endian 1.0", "comment metres, recording frame",
+              f"element vertex {len(rows)}", *described, "end_header", ""]  # fmt: skip
+    return _write(path, "\n".join(header).encode("ascii") + rows.tobytes())
+
+
+def voxel_mesh(
+    index: Int[np.ndarray, "n 3"], voxel_size_m: float, colors: UInt8[np.ndarray, "n 3"]
+) -> tuple[Float32[np.ndarray, "v 3"], Int[np.ndarray, "t 3"], UInt8[np.ndarray, "v 3"]]:
+    """Return the outer faces of voxels as vertices, triangles and vertex colours, without those between two voxels.
+
+    Args:
+        index: of the voxels, each once.
+        voxel_size_m: their edge.
+        colors: RGB of each.
+    """
+    index = np.asarray(index, np.int64)
+    known = _keys(index, index)
+    vertices, shades = [], []
+    for step, corners in _FACES:
+        outer = ~np.isin(_keys(index + np.array(step), index), known)
+        quads = (index[outer][:, None, :] + np.array(corners)) * voxel_size_m
+        vertices.append(quads.reshape(-1, 3).astype(np.float32))
+        shades.append(np.repeat(colors[outer], 4, axis=0))
+    every = np.concatenate(vertices) if vertices else np.zeros((0, 3), np.float32)
+    first = 4 * np.arange(len(every) // 4)[:, None]
+    triangles = np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])])
+    return every, triangles, np.concatenate(shades)
+
+
+def _keys(index: Int[np.ndarray, "m 3"], of: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " m"]:
+    """Return one number for each index, distinct within one step of the box of ``of``."""
+    if not len(of):
+        return np.zeros(len(index), np.int64)
+    low = of.min(axis=0) - 1
+    span = of.max(axis=0) - low + 2
+    shifted = index - low
+    return (shifted[:, 0] * span[1] + shifted[:, 1]) * span[2] + shifted[:, 2]
+
+
+def write_glb(
+    path: Path,
+    index: Int[np.ndarray, "n 3"],
+    voxel_size_m: float,
+    colors: UInt8[np.ndarray, "n 3"],
+) -> Path:
+    """Write the voxels as blocks into a GLB file, recording frame.
+
+    Raises:
+        QueryError: the map is empty, or the file cannot be written.
+    """
+    import trimesh
+    from trimesh.exchange.gltf import export_glb
+
+    if not len(index):
+        raise QueryError("The map holds no voxels, so that there is no mesh to export.")
+    vertices, triangles, shades = voxel_mesh(index, voxel_size_m, colors)
+    mesh = trimesh.Trimesh(vertices, triangles, vertex_colors=shades, process=False)
+    return _write(path, bytes(export_glb(trimesh.Scene({"map": mesh}))))
+
+
+def write_occupancy(path: Path, obstacles: "Obstacles") -> tuple[Path, Path]:
+    """Write a PGM picture and the YAML file that Nav2's ``map_server`` reads.
+
+    The grid is in the level frame: x to the right, y up, the first row of the picture at the largest y.
+
+    Args:
+        path: of the PGM; the YAML file has the same name with the suffix ``.yaml``.
+        obstacles: of the body that is to drive there.
+
+    Returns:
+        Both files.
+
+    Raises:
+        QueryError: a file cannot be written.
+    """
+    from avlmaps.maps.obstacles import CellState
+
+    gray = np.full(obstacles.states.shape, _UNKNOWN, np.uint8)
+    gray[obstacles.states == CellState.FREE] = _FREE
+    gray[obstacles.states == CellState.OCCUPIED] = _OCCUPIED
+    picture = np.ascontiguousarray(gray.T[::-1])
+    x, y = (float(value) for value in obstacles.origin_m)
+    rotation = [[round(float(value), 9) for value in row] for row in obstacles.level_from_world]
+    lines = [
+        f"image: {path.name}",
+        "mode: trinary",
+        f"resolution: {obstacles.cell_size_m:g}",
+        f"origin: [{x:.6f}, {y:.6f}, 0.0]",
+        "negate: 0",
+        "occupied_thresh: 0.65",
+        "free_thresh: 0.196",
+        f"# Level frame, z up; the floor lies at z = {obstacles.floor_m:.3f} m. level_from_recording: {rotation}",
+        "",
+    ]
+    described = path.with_suffix(".yaml")
+    _write(path, f"P5\n{picture.shape[1]} {picture.shape[0]}\n255\n".encode("ascii") + picture.tobytes())
+    return path, _write(described, "\n".join(lines).encode("utf-8"))
+
+
+def write_table(path: Path, things: "Iterable[Thing]", sounds: "Iterable[SoundEvent]") -> Path:
+    """Write things and sounds as CSV, one row each; positions are metres, recording frame.
+
+    Raises:
+        QueryError: the file cannot be written.
+    """
+    columns = ["kind", "name", "confidence", "x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m",
+               "onset_s", "offset_s"]  # fmt: skip
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    for thing in things:
+        numbers = [f"{value:.3f}" for value in (thing.confidence, *thing.position, *thing.size)]
+        writer.writerow(["thing", thing.name, *numbers, "", ""])
+    for sound in sounds:
+        name, confidence = (sound.names[0], f"{sound.confidences[0]:.3f}") if sound.names else ("", "")
+        place = [f"{value:.3f}" for value in sound.position]
+        writer.writerow(
+            ["sound", name, confidence, *place, "", "", "", f"{sound.onset_s:.3f}", f"{sound.offset_s:.3f}"]
+        )
+    return _write(path, text.getvalue().encode("utf-8"))
+
+
+def to_open3d(points: Float[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3"]) -> Any:
+    """Return an ``open3d.geometry.PointCloud``.
+
+    Raises:
+        BackendError: open3d is not installed.
+    """
+    try:
+        import open3d  # pyright: ignore[reportMissingImports]
+    except ImportError as fault:
+        raise BackendError("open3d is not installed; install it with: pip install open3d") from fault
+    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(np.asarray(points, np.float64)))
+    cloud.colors = open3d.utility.Vector3dVector(np.asarray(colors, np.float64) / 255.0)
+    return cloud
+
+
+def to_trimesh(points: Float[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3"]) -> Any:
+    """Return a ``trimesh.PointCloud`` with colours."""
+    import trimesh
+
+    return trimesh.PointCloud(np.asarray(points, np.float64), colors=np.asarray(colors))
+
+
+def _write(path: Path, content: bytes) -> Path:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes_atomically(path, content)
+    except OSError as fault:
+        raise QueryError(f"{path} cannot be written ({fault.strerror}); choose another place.") from fault
+    return path

@@ -1,0 +1,69 @@
+"""`avlmaps things` and `avlmaps export`, end to end on a small map."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import trimesh
+
+
+def test_things_lists_what_the_map_holds(built: Path, answer: Callable[..., dict[str, Any]], tmp_path: Path) -> None:
+    listed = answer("things", built, "--least", "0.2", "--csv", tmp_path / "t.csv")
+    assert listed["frame"] == "recording"
+    assert listed["things"], "the room has colours of some size"
+    assert set(listed["things"][0]) == {"name", "confidence", "position", "size", "color", "voxels"}
+    assert len(listed["sounds"]) == 1
+    assert (tmp_path / "t.csv").read_text().count("\n") == 1 + len(listed["things"]) + 1
+
+
+def test_things_prints_a_table(built: Path, run: Callable[..., tuple[int, str, str]]) -> None:
+    status, out, _ = run("things", built, "--least", "0.2")
+    assert status == 0
+    assert out.startswith("thing ")
+    assert "position of the robot" in out
+
+
+@pytest.mark.parametrize("name", ["a.ply", "a.glb", "a.csv", "a.pgm"])
+def test_export_writes_each_format(
+    built: Path, answer: Callable[..., dict[str, Any]], tmp_path: Path, name: str
+) -> None:
+    written = answer("export", built, "--out", tmp_path / name)
+    assert all(Path(file).stat().st_size > 0 for file in written["files"])
+    assert written["frame"] == ("level" if name == "a.pgm" else "recording")
+
+
+def test_export_colours_by_heat(built: Path, answer: Callable[..., dict[str, Any]], tmp_path: Path) -> None:
+    answer("export", built, "--out", tmp_path / "h.ply", "--heat", "the red thing")
+    assert len(trimesh.load(tmp_path / "h.ply").vertices) > 100
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--out", "a.obj"), ".ply, .glb, .pgm, .csv"),
+        (("--out", "a.csv", "--things"), "has no colours"),
+        (("--out", "a.ply", "--things", "--heat", "red"), "both choose colours"),
+    ],
+)
+def test_export_refuses_what_does_not_fit(
+    built: Path, run: Callable[..., tuple[int, str, str]], words: tuple[str, ...], says: str
+) -> None:
+    status, _, err = run("export", built, *words)
+    assert status == 2
+    assert says in err
+
+
+def test_export_replaces_nothing_unasked(built: Path, run: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+    assert run("export", built, "--out", tmp_path / "a.csv")[0] == 0
+    status, _, err = run("export", built, "--out", tmp_path / "a.csv")
+    assert status == 2
+    assert "--overwrite" in err
+    assert run("export", built, "--out", tmp_path / "a.csv", "--overwrite")[0] == 0
+
+
+def test_an_empty_colour_map_is_valid_json(built: Path, run: Callable[..., tuple[int, str, str]]) -> None:
+    status, out, _ = run("things", built, "--least", "1", "--json")
+    assert status == 0
+    assert json.loads(out)["things"] == []

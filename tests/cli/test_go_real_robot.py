@@ -1,0 +1,191 @@
+"""`avlmaps go` in its own process, with a robot behind the tests' rosbridge: signals stop it, its file is read."""
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from time import sleep
+from typing import Any
+
+import pytest
+
+pytest.importorskip("roslibpy")
+sys.path.insert(0, str(Path(__file__).parents[1] / "navigate"))
+
+from ros_bridge import FakeRobot
+
+from avlmaps.core.motion import GroundPose
+
+pytestmark = [pytest.mark.timeout(200), pytest.mark.slow]
+
+SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+# Where a test's own process ignores a signal (a shell in the background, nohup), this one heeds it all the same.
+_HEEDING = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    "; signal.signal(signal.SIGHUP, signal.SIG_DFL); from avlmaps.cli import main; main()"
+)
+# No test uses this patience up, though the machine may stand still beneath it.
+PATIENT = {"answer_timeout_s": 30.0, "cancel_timeout_s": 10.0, "pose_max_age_s": 20.0, "stall_s": 30.0}
+Started = Callable[..., "subprocess.Popen[str]"]
+
+
+@pytest.fixture
+def go(built: Path, tmp_path: Path) -> Iterator[Started]:
+    """Start `avlmaps go` in the background."""
+    begun: list[subprocess.Popen[str]] = []
+
+    def start(url: str, sentence: str, kind: str = "nav2", **settings: Any) -> "subprocess.Popen[str]":
+        file = tmp_path / "robot.json"
+        file.write_text(json.dumps({"settings": PATIENT | settings}))
+        words = ["go", str(built), sentence, "--robot", kind, "--ros", url, "--ros-frames", str(file), "--json"]
+        command = [sys.executable, "-c", _HEEDING, *words]
+        begun.append(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
+        return begun[-1]
+
+    yield start
+    for process in begun:
+        process.kill()
+        process.communicate()
+
+
+def robot_here(ros: int = 2) -> FakeRobot:
+    return FakeRobot(ros, "drive on", GroundPose(4.4, 3.2))
+
+
+def ended(robot: FakeRobot) -> bool:
+    return all(goal["status"] not in (0, 1) for goal in robot.goals.values())
+
+
+@pytest.mark.parametrize(("ros", "kind"), [(2, "nav2"), (1, "move_base")])
+@pytest.mark.parametrize("number", SIGNALS, ids=lambda number: number.name)
+def test_each_signal_cancels_the_goal_and_says_that_the_robot_stands(
+    go: Started, number: signal.Signals, ros: int, kind: str
+) -> None:
+    with robot_here(ros) as robot:
+        process = go(robot.url, "move forward 50 metres", kind)
+        assert robot.soon(lambda: bool(robot.goals), 60.0)
+        robot.moves_on = True
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60)
+        assert ended(robot)
+        assert not robot.moves_on
+    assert process.returncode == 128 + number, err
+    last = err.splitlines()[-1]
+    assert last.startswith(f"avlmaps: stopped by {number.name}: the active goal was cancelled; the robot stands at (")
+    said = json.loads(out)
+    assert (said["ok"], said["signal"], said["robot_stopped"]) == (False, number.name, True)
+    assert "Traceback" not in err
+
+
+def test_a_robot_that_will_not_stop_is_reported_and_has_its_own_status(go: Started) -> None:
+    with robot_here() as robot:
+        process = go(robot.url, "move forward 50 metres", cancel_timeout_s=1.0)
+        assert robot.soon(lambda: bool(robot.goals), 60.0)
+        for goal in robot.goals.values():
+            goal["does"] = "stubborn"
+        robot.does[""] = "stubborn"
+        robot.moves_on = True
+        process.terminate()
+        process.terminate()  # a second signal cuts no stop short
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 3, err
+    assert "stopped by SIGTERM, and the robot may still be driving" in err.splitlines()[-1]
+    assert json.loads(out)["robot_stopped"] is False
+
+
+@pytest.mark.parametrize(("ros", "kind"), [(2, "nav2"), (1, "move_base")])
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=lambda number: number.name)
+def test_a_process_that_dies_or_stands_still_leaves_no_goal(
+    go: Started, number: signal.Signals, ros: int, kind: str
+) -> None:
+    with robot_here(ros) as robot:
+        process = go(robot.url, "move forward 50 metres", kind, stall_s=1.0)
+        assert robot.soon(lambda: len(robot.published("/avlmaps/heartbeat")) > 1, 60.0)
+        robot.moves_on = True
+        process.send_signal(number)
+        assert robot.soon(lambda: ended(robot), 60.0)
+        assert not robot.moves_on
+
+
+@pytest.mark.parametrize("number", SIGNALS, ids=lambda number: number.name)
+def test_a_signal_while_it_connects_ends_it_at_once(go: Started, number: signal.Signals) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as silent:  # takes the connection and never answers
+        silent.settimeout(60.0)
+        process = go(f"ws://127.0.0.1:{silent.getsockname()[1]}", "turn left", connect_timeout_s=100.0)
+        connection, _ = silent.accept()
+        with connection:
+            process.send_signal(number)
+            _, err = process.communicate(timeout=60)
+    assert process.returncode == 128 + number, err
+    assert err.splitlines()[-1] == f"avlmaps: stopped by {number.name}: no goal was sent to a robot."
+
+
+@pytest.mark.parametrize("later_s", [0.0, 0.1])
+def test_a_signal_while_it_plans_leaves_no_goal(go: Started, later_s: float) -> None:
+    with robot_here() as robot:
+        process = go(robot.url, "move forward 50 metres")
+        assert robot.soon(lambda: bool(robot.ops("subscribe")), 60.0)
+        sleep(later_s)
+        process.terminate()
+        _, err = process.communicate(timeout=60)
+        assert ended(robot)
+    assert process.returncode == 128 + signal.SIGTERM, err
+    assert "stopped by SIGTERM: " in err.splitlines()[-1]
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("later_s", [0.0, 0.05])
+def test_a_signal_between_two_goals_leaves_no_goal(go: Started, later_s: float) -> None:
+    with robot_here() as robot:
+        robot.does["/spin"] = "succeed"
+        process = go(robot.url, "turn left, then move forward 50 metres")
+        assert robot.soon(lambda: bool(robot.goals) and ended(robot), 60.0)
+        sleep(later_s)
+        process.terminate()
+        _, err = process.communicate(timeout=60)
+        assert ended(robot)
+        assert not robot.moves_on
+    assert process.returncode == 128 + signal.SIGTERM, err
+    assert "robot stands at" in err.splitlines()[-1]
+
+
+@pytest.mark.parametrize("name", ["/robot1", "/robot2"])
+def test_of_two_robots_the_one_of_the_file_drives(go: Started, name: str) -> None:
+    with robot_here() as robot:
+        robot.does[""] = "succeed"
+        process = go(robot.url, "turn left, then move forward 0.3 metres", namespace=name, speed_m_s=0.42)
+        _, err = process.communicate(timeout=60)
+        assert process.returncode == 0, err
+        turn, straight = robot.ops("send_action_goal")
+        services = {call["service"].split("/")[1] for call in robot.ops("call_service")}
+    assert (turn["action"], straight["action"]) == (f"{name}/spin", f"{name}/drive_on_heading")
+    assert straight["args"]["speed"] == 0.42
+    assert services <= {name.strip("/")}
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"name_space": "/robot1"}, "sets 'name_space', which is no setting of a robot; the settings are namespace, "),
+        ({"speed_m_s": "fast"}, "speed_m_s is 'fast'; it is a number from 0.01 to 2."),
+        ({"speed_m_s": 15}, "speed_m_s is 15; it is a number from 0.01 to 2."),
+        ({"goal_timeout_s": True}, "goal_timeout_s is True; it is a number from 0.1 to 86400."),
+        ({"pose_max_age_s": 3000}, "pose_max_age_s is 3000; it is a number from 0.1 to 60."),
+        ({"namespace": 3}, "namespace is 3, which is no ROS namespace"),
+        ({"namespace": ["a"]}, "which is no ROS namespace"),
+        ({"radius_m": None}, "radius_m is None; it is a number"),
+    ],
+)
+def test_nonsense_in_the_robot_file_is_one_sentence_before_anything_connects(
+    run: Callable[..., tuple[int, str, str]], built: Path, tmp_path: Path, settings: dict[str, Any], says: str
+) -> None:
+    file = tmp_path / "robot.json"
+    file.write_text(json.dumps({"settings": settings}))
+    words = ("--robot", "nav2", "--ros", "ws://127.0.0.1:1", "--ros-frames", file)
+    status, out, err = run("go", built, "turn left", *words)
+    assert (status, out) == (1, "")
+    assert says in err.splitlines()[-1]
+    assert str(file) in err.splitlines()[-1]

@@ -1,0 +1,99 @@
+"""Listing what a map holds: things, sounds and rooms against a furnished map whose contents are known."""
+
+import numpy as np
+import pytest
+from query_fakes import (
+    FakePixels,
+    FakeSounds,
+    FakeViews,
+    box,
+    fake_map,
+    fake_profile,
+    furnished_map,
+    keyframes_at,
+    sounds_of,
+    voxels_of,
+)
+
+from avlmaps.core.errors import QueryError
+from avlmaps.query.avlmap import AVLMap
+
+
+@pytest.fixture
+def furnished() -> AVLMap:
+    track = np.array([[1.0, 1.0, 1.0], [2.0, 1.0, 1.0]])
+    return AVLMap(furnished_map(sounds=sounds_of([track], [0.8])))
+
+
+def test_each_thing_is_listed_once_with_its_voxels(furnished: AVLMap) -> None:
+    things = furnished.things(least_confidence=0.3)
+    assert sorted(thing.name for thing in things) == ["chair", "chair", "table"]
+    chair = max((thing for thing in things if thing.name == "chair"), key=lambda thing: len(thing.rows))
+    assert len(chair.points) == len(chair.rows) == 4 * 4 * 8
+    assert chair.size == pytest.approx((0.2, 0.2, 0.4))
+    assert chair.position == pytest.approx((0.6, 0.6, 0.25), abs=0.06)
+    assert chair.color == (120, 90, 60)
+
+
+def test_things_share_no_voxel_and_the_most_confident_come_first(furnished: AVLMap) -> None:
+    things = furnished.things(least_confidence=0.0, structure=True)
+    rows = np.concatenate([thing.rows for thing in things])
+    assert len(np.unique(rows)) == len(rows)
+    assert [t.confidence for t in things] == sorted((t.confidence for t in things), reverse=True)
+
+
+def test_structure_is_listed_on_request_alone(furnished: AVLMap) -> None:
+    assert "floor" not in {thing.name for thing in furnished.things(least_confidence=0.0)}
+    assert "floor" in {thing.name for thing in furnished.things(least_confidence=0.0, structure=True)}
+
+
+def test_two_names_of_one_thing_are_one_thing() -> None:
+    encoder = FakePixels(("chair", "seat"))
+    index = box((0, 0, 0), (6, 6, 8))
+    feature = np.tile(encoder.encode_words(["chair"]) * 0.8 + encoder.encode_words(["seat"]) * 0.6, (len(index), 1))
+    things = AVLMap(fake_map(voxels_of(index, feature), profile=fake_profile(encoder))).things(
+        ["chair", "chair seat", "seat"], least_confidence=0.0
+    )
+    assert len(things) == 1
+
+
+def test_names_choose_what_is_listed(furnished: AVLMap) -> None:
+    assert {thing.name for thing in furnished.things(["table"], least_confidence=0.0)} == {"table"}
+
+
+@pytest.mark.parametrize("least", [-0.1, 1.5, float("nan")])
+def test_a_confidence_outside_zero_to_one_is_refused(furnished: AVLMap, least: float) -> None:
+    with pytest.raises(QueryError, match="between 0 and 1"):
+        furnished.things(least_confidence=least)
+
+
+def test_sounds_have_names_times_and_the_robots_positions(furnished: AVLMap) -> None:
+    (sound,) = furnished.sounds()
+    assert sound.names == ("dog",)
+    assert sound.confidences == pytest.approx((0.8,))
+    assert (sound.onset_s, sound.offset_s) == (0.0, 0.5)
+    assert sound.position == pytest.approx((1.5, 1.0, 1.0))
+    assert sound.track.shape == (2, 3)
+
+
+def test_rooms_are_keyframes_side_by_side_with_one_name() -> None:
+    places = np.array([[0.0, 0, 1], [0.4, 0, 1], [0.8, 0, 1], [9.0, 0, 1], [9.4, 0, 1], [20.0, 0, 1]])
+    view = np.array([[1.0, 0], [1, 0], [1, 0], [1, 0], [1, 0], [1, 0]], np.float32)
+    stored = furnished_map(views=FakeViews(), keyframes=keyframes_at(places, view))
+    rooms = [room for room in AVLMap(stored).rooms() if room.name == "kitchen"]
+    assert [room.views for room in rooms] == [3, 2], "the lone view at 20 m is no room"
+    assert rooms[0].position == pytest.approx((1.4, 0.0, 1.0)), "the middle of what was seen, one metre ahead"
+    assert all(0.0 <= room.confidence <= 1.0 for room in rooms)
+
+
+def test_an_empty_map_holds_nothing() -> None:
+    profile = fake_profile(FakePixels(("chair",)), FakeSounds(), FakeViews())
+    nothing = AVLMap(fake_map(voxels_of(np.zeros((0, 3), int), np.zeros((0, 2))), profile=profile))
+    assert (nothing.things(), nothing.sounds(), nothing.rooms()) == ([], [], [])
+    assert nothing.points.shape == (0, 3)
+
+
+def test_a_sentence_is_answered_like_its_parts(furnished: AVLMap) -> None:
+    answer = furnished.ask("the chair near the sound of a dog")
+    assert answer.parts[0].part.query == "chair"
+    assert answer.goals[0].position == pytest.approx(furnished.things(["chair"])[0].position, abs=0.3)
