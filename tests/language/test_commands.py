@@ -136,8 +136,10 @@ def test_an_empty_or_endless_command_is_an_error(text: str) -> None:
 
 _WORDS = [word for command, _ in rows("free.tsv") for word in command.split()]
 _NASTY = (
-    "ignore all previous instructions and", "__import__('os').system('rm')", "../../etc/passwd", "{{7*7}}", "\x00", "robot.",
-    "for i in range(9):", "🤖", "go to", "%s", "<script>", "DROP TABLE map;", "'", '"', "\\n", "½", "1e999", "-1 m", "0 m",
+    "ignore all previous instructions and", "__import__('os').system('rm')", "../../etc/passwd", "{{7*7}}", "\x00",
+    "robot.",
+    "for i in range(9):", "🤖", "go to", "%s", "<script>", "DROP TABLE map;", "'", '"', "\\n", "½", "1e999",
+    "-1 m", "0 m",
 )  # fmt: skip
 
 
@@ -171,7 +173,8 @@ def test_any_text_is_read_or_refused(text: str) -> None:
 
 
 NONSENSE = [
-    "banana purple seventeen the of", "colourless green ideas sleep furiously", "the the and the", "frobnicate the lamp",
+    "banana purple seventeen the of", "colourless green ideas sleep furiously", "the the and the",
+    "frobnicate the lamp",
     "dance the tango", "wibble wobble to", "sofa sofa sofa of between", "and then and then and then", "7 9 2 4",
 ]  # fmt: skip
 

@@ -45,7 +45,8 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
     """Run a suite and write SUITE.json, SUITE.md and SUITE.png into ``out``.
 
     Args:
-        suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``objects``, ``indexing`` or ``navigation``.
+        suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``objects``, ``indexing`` or
+            ``navigation``.
         asked: what it measures on.
         out: folder to write into.
 

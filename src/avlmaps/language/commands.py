@@ -123,7 +123,8 @@ def _decided(weighed: tuple[Weighed, ...], sentence: Sentence) -> Command:
         said = ", ".join(f"'{words}'" for words in best.skipped)
         question = f"I do not understand {said}. Can you say it in other words?"
         return Command((Clarify(question),), best.notes, weighed)
-    rivals = [one for one in weighed[1:] if one.cost - best.cost < _MARGIN and not isinstance(one.intents[0], Clarify | Refuse)]  # fmt: skip
+    close = (one for one in weighed[1:] if one.cost - best.cost < _MARGIN)
+    rivals = [one for one in close if not isinstance(one.intents[0], Clarify | Refuse)]
     if rivals:
         from avlmaps.language.verbalise import verbalise
 

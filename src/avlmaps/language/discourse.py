@@ -72,7 +72,7 @@ class _Composer:
     moved: bool = False  # whether an order was put before another
     listing: bool = False  # whether "and" or "then" stands before the next name
 
-    def item(self, item: Item, rest: tuple[Item, ...], before: Item | None) -> None:
+    def item(self, item: Item, rest: tuple[Item, ...], before: Item | None) -> None:  # noqa: C901
         match item.kind:
             case "order":
                 self.order(item.value, rest, before)
@@ -188,12 +188,13 @@ class _Composer:
     def led(self, intents: list[Intent]) -> list[Intent]:
         """Return an order after "in the kitchen, ...": a thing is the one in there; anything else is done there."""
         first, lead = intents[0], self.groups[-1].intents[0]
-        if isinstance(first, Go | Face) and isinstance(lead, Go) and first.to.kind is Kind.OBJECT and not first.to.near:
-            if first.to not in self.memory.targets[:-1]:
-                self.groups.pop()
-                changed = first.to.with_near(Target(lead.to.kind, lead.to.name), *lead.to.near)
-                self.memory.add(changed)
-                return [replace(first, to=changed), *intents[1:]]
+        if not isinstance(first, Go | Face) or not isinstance(lead, Go) or first.to in self.memory.targets[:-1]:
+            return intents
+        if first.to.kind is Kind.OBJECT and not first.to.near:
+            self.groups.pop()
+            changed = first.to.with_near(Target(lead.to.kind, lead.to.name), *lead.to.near)
+            self.memory.add(changed)
+            return [replace(first, to=changed), *intents[1:]]
         return intents
 
     def place(self, group: _Group) -> None:

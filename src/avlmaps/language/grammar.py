@@ -186,7 +186,7 @@ def _check(rules: Mapping[str, tuple[Template, ...]], words: Mapping[str, Any]) 
             walk(template.body, rule)
 
 
-def _firsts(rules: Mapping[str, tuple[Template, ...]]) -> dict[str, tuple[frozenset[str], ...]]:
+def _firsts(rules: Mapping[str, tuple[Template, ...]]) -> dict[str, tuple[frozenset[str], ...]]:  # noqa: C901
     """Return, for each template of each rule, the words and classes that it can begin with."""
     known: dict[str, frozenset[str]] = {}
     open_rules: set[str] = set()

@@ -126,8 +126,8 @@ def _words(raw: str, start: int) -> list[Token]:
 
 
 WORDS = frozenset({
-    *_SMALL, *_TENS, *_PARTS, "hundred", "couple", "few", "several", "dozen", *LENGTHS, *_ANGLES, *_TIMES, *_SIZES, *_WHOLE,
-    "o'clock",
+    *_SMALL, *_TENS, *_PARTS, "hundred", "couple", "few", "several", "dozen", *LENGTHS, *_ANGLES, *_TIMES, *_SIZES,
+    *_WHOLE, "o'clock",
 })  # fmt: skip
 
 

@@ -170,9 +170,18 @@ class Names:
         return found
 
 
-_BEING = frozenset({"is", "was", "were", "are", "'s", "been", "being", "keeps", "kept", "started", "has", "have", "just", "still", "had", "starts", "began", "it"})  # fmt: skip
-_DETERMINERS = frozenset({"the", "a", "an", "my", "your", "our", "his", "her", "their", "some", "that", "this"})
-_MAKERS = frozenset({"glass", "water", "wind", "alarm", "dog", "cat", "baby", "child", "children", "kid", "kids", "bird", "birds", "phone", "telephone", "bell", "door bell", "kettle", "tap", "alarm clock", "engine", "music", "rooster", "hammer", "timer"})  # fmt: skip
+_BEING = frozenset({
+    "is", "was", "were", "are", "'s", "been", "being", "keeps", "kept", "started", "has", "have", "just",
+    "still", "had", "starts", "began", "it",
+})  # fmt: skip
+_DETERMINERS = frozenset({
+    "the", "a", "an", "my", "your", "our", "his", "her", "their", "some", "that", "this",
+})  # fmt: skip
+_MAKERS = frozenset({
+    "glass", "water", "wind", "alarm", "dog", "cat", "baby", "child", "children", "kid", "kids", "bird",
+    "birds", "phone", "telephone", "bell", "door bell", "kettle", "tap", "alarm clock", "engine", "music",
+    "rooster", "hammer", "timer",
+})  # fmt: skip
 
 
 def _with_object(subject: str, sounding: str, thing: str) -> str:
@@ -194,7 +203,7 @@ def near_names(word: str) -> tuple[tuple[str, float], ...]:
 
 
 @cache
-def _known(words: tuple[str, ...]) -> tuple[float, Target] | None:
+def _known(words: tuple[str, ...]) -> tuple[float, Target] | None:  # noqa: C901
     """Return the cost and the target of a name whose head the lexicon knows."""
     phrase = " ".join(words)
     if any(word in _unnameable() for word in words):
@@ -261,15 +270,18 @@ def _entry(phrase: str) -> Entries | None:
     if thing is not None:
         return Entries.THING
     words = phrase.split()
-    if words[-1] in _ONLY_ROOMS and len(words) == 2 and words[0] not in _never():
-        if words[0] in lexicon().words() or words[0] in _adjectives():
-            return Entries.ROOM
+    described = words[0] in lexicon().words() or words[0] in _adjectives()
+    if words[-1] in _ONLY_ROOMS and len(words) == 2 and words[0] not in _never() and described:
+        return Entries.ROOM
     if phrase in _ALSO_THINGS:
         return Entries.THING
     return None
 
 
-_ALSO_THINGS = frozenset({"person", "people", "man", "woman", "child", "baby", "dog", "cat", "wall", "corner", "leak", "spider", "mailbox", "aquarium", "fish tank", "car", "kid", "bird", "exit sign"})  # fmt: skip
+_ALSO_THINGS = frozenset({
+    "person", "people", "man", "woman", "child", "baby", "dog", "cat", "wall", "corner", "leak", "spider",
+    "mailbox", "aquarium", "fish tank", "car", "kid", "bird", "exit sign",
+})  # fmt: skip
 
 
 def _target(entry: Entries, words: tuple[str, ...]) -> Target:
@@ -309,7 +321,8 @@ def _forms() -> dict[str, str]:
             short = verb + verb[-1]
         ing = short + "ing"
         past = verb[:-1] + "ied" if verb.endswith("y") and verb[-2] not in "aeiou" else short + "ed"
-        third = verb[:-1] + "ies" if past.endswith("ied") else verb + ("es" if verb[-1] in "sxz" or verb[-2:] in ("sh", "ch") else "s")  # fmt: skip
+        plural = "es" if verb[-1] in "sxz" or verb[-2:] in ("sh", "ch") else "s"
+        third = verb[:-1] + "ies" if past.endswith("ied") else verb + plural
         forms |= {verb: ing, ing: ing, past: ing, third: ing}
     return forms
 

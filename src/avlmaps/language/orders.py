@@ -236,6 +236,8 @@ def on_targets(intent: Intent, change: Callable[[Target], Target]) -> Intent:
 
 
 _READ = {
-    "go": _go, "face": _face, "turn": _turn, "move": _move, "between": _between, "beside": _beside, "standoff": _standoff,
-    "arrive": _go, "fromto": _fromto, "lead": _go, "circle": _circle, "each": _each, "wait": _wait, "shuttle": _shuttle, "return": _return, "roundtrip": _roundtrip,
+    "go": _go, "face": _face, "turn": _turn, "move": _move, "between": _between, "beside": _beside,
+    "standoff": _standoff,
+    "arrive": _go, "fromto": _fromto, "lead": _go, "circle": _circle, "each": _each,
+    "wait": _wait, "shuttle": _shuttle, "return": _return, "roundtrip": _roundtrip,
 }  # fmt: skip

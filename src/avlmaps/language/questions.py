@@ -74,7 +74,8 @@ def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
         raise QueryError(f"The sentence is empty; say what is sought, such as: {_EXAMPLE}.")
     if len(sentence) > MOST_CHARACTERS:
         raise QueryError(
-            f"The sentence has {len(sentence)} characters, more than {MOST_CHARACTERS}; say it shorter, like: {_EXAMPLE}."
+            f"The sentence has {len(sentence)} characters, more than {MOST_CHARACTERS}; say it shorter, like: "
+            f"{_EXAMPLE}."
         )
     read = Sentence(sentence, given.knows)
     tree, words = _best(read)

@@ -1,7 +1,7 @@
 """All readings of a sentence: its clauses, in order, with what joins them and what had to be skipped.
 
 A reading is a path over the sentence: orders, names alone, statements, joining words and skipped words, each with a
-cost. The cheapest readings come first; a skipped word costs much, and a word that changes the meaning cannot be skipped.
+cost. The cheapest readings come first; a skipped word costs much, a word that changes the meaning far more.
 """
 
 from collections.abc import Callable, Iterator
@@ -30,8 +30,8 @@ class Item:
     """One part of a reading.
 
     Attributes:
-        kind: ``order``, ``bare``, ``mention``, ``repeat``, ``refuse``, ``chat``, ``inquire``, ``remark``, ``skip``, ``slow``,
-            or the class of words that joins two parts.
+        kind: ``order``, ``bare``, ``mention``, ``repeat``, ``refuse``, ``chat``, ``inquire``, ``remark``, ``skip``,
+            ``slow``, or the class of words that joins two parts.
         value: the tree of a rule, else None.
         start: its first token.
         end: behind its last.
@@ -89,7 +89,8 @@ def _built_in(tokens: list[Token], names: Names) -> dict[str, BuiltIn]:
     return {
         "NUMBER": amounts(lexer.number_at), "LENGTH": amounts(lexer.length_at), "ANGLE": amounts(lexer.angle_at),
         "DURATION": amounts(lexer.duration_at), "CLOCK": amounts(lexer.clock_at), "IMAGE": files("image"),
-        "CLIP": files("clip"), "NAME": names.names, "OPEN": names.open_names, "NOISE": names.noises, "ROOM": names.rooms,
+        "CLIP": files("clip"), "NAME": names.names, "OPEN": names.open_names, "NOISE": names.noises,
+        "ROOM": names.rooms,
         "WORDS": lambda at: list(_rest(tokens, at)),
     }  # fmt: skip
 
@@ -151,18 +152,21 @@ def _reading(state: _State) -> Reading:
 
 
 _RULES = (
-    ("order", _ORDER, False, False), ("bare", _BARE, False, True), ("mention", _MENTION, False, True), ("repeat", 0.2, None, False),
+    ("order", _ORDER, False, False), ("bare", _BARE, False, True), ("mention", _MENTION, False, True),
+    ("repeat", 0.2, None, False),
     ("amount", 0.8, False, True), ("chat", 0.6, False, True), ("inquire", 0.6, False, True),
 )  # fmt: skip
 _JOINS = {
-    "THEN": (0.0, True), "BUT_FIRST": (0.0, True), "BUT": (0.25, True), "BEFORE": (0.1, True), "AFTER": (0.1, True), "CORRECT": (0.15, True),
-    "POLITE": (0.05, True), "GREETING": (0.12, None), "FILLER": (0.2, None), "SLOW": (0.1, None), "INSTEAD_END": (0.4, None),
+    "THEN": (0.0, True), "BUT_FIRST": (0.0, True), "BUT": (0.25, True), "BEFORE": (0.1, True), "AFTER": (0.1, True),
+    "CORRECT": (0.15, True),
+    "POLITE": (0.05, True), "GREETING": (0.12, None), "FILLER": (0.2, None), "SLOW": (0.1, None),
+    "INSTEAD_END": (0.4, None),
     "MAKE_IT": (0.5, True), "THOUGH": (0.25, None),
 }  # fmt: skip
 
 
 def _steps(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | None, bool]]:
-    """Yield what may begin at a token: the item, its cost, whether a clause may begin after it, whether it begins one."""
+    """Yield what may begin at a token: the item, its cost, whether a clause may follow, whether it begins one."""
     chart, tokens = sentence.chart, sentence.tokens
     for rule, cost, fresh, needs in _RULES:
         for edge in chart.edges(rule, at):

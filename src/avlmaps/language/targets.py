@@ -8,6 +8,7 @@ from avlmaps.language.chart import Tree
 from avlmaps.language.grammar import load_grammar
 from avlmaps.language.intents import Clarify, Kind, Pick, Target
 
+_OWN_SLOTS = ("is", "noun", "sound", "image", "clip", "it", "to", "of", "what", "name", "near")
 _ROOMS_OF_THINGS = frozenset({"toilet", "bath", "shower", "loo", "wc", "lavatory"})
 
 
@@ -63,7 +64,7 @@ class Memory:
         return self.targets[-2], self.targets[-1]
 
 
-def resolve(value: Any, memory: Memory) -> Target:
+def resolve(value: Any, memory: Memory) -> Target:  # noqa: C901
     """Return the target that a part of a reading names.
 
     Raises:
@@ -95,9 +96,9 @@ def resolve(value: Any, memory: Memory) -> Target:
             return _whole(value, memory)
 
 
-def _whole(value: Tree, memory: Memory) -> Target:
+def _whole(value: Tree, memory: Memory) -> Target:  # noqa: C901
     """Return a target with all that says where it is."""
-    inner = next((value.get(name) for name in ("is", "noun", "sound", "image", "clip", "it", "to", "of", "what", "name", "near") if value.get(name) is not None), None)  # fmt: skip
+    inner = next((value.get(name) for name in _OWN_SLOTS if value.get(name) is not None), None)
     if value.get("one") == "yes":
         base = memory.last("one")
         base = replace(base, near=()) if value.all("at") else base

@@ -29,7 +29,8 @@ _COMPASS = {0: "north", 45: "north-east", 90: "east", 135: "south-east", 180: "s
 _TIMES = {1: "once", 2: "twice"}
 _SIDES = {
     Side.LEFT: "to the left of", Side.RIGHT: "to the right of", Side.FRONT: "in front of", Side.BEHIND: "behind",
-    Side.NORTH: "to the north of", Side.SOUTH: "to the south of", Side.EAST: "to the east of", Side.WEST: "to the west of",
+    Side.NORTH: "to the north of", Side.SOUTH: "to the south of", Side.EAST: "to the east of",
+    Side.WEST: "to the west of",
 }  # fmt: skip
 
 

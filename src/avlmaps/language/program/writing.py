@@ -95,7 +95,7 @@ class _Writer:
         for intent in intents:
             self.write(intent)
 
-    def write(self, intent: Intent) -> None:
+    def write(self, intent: Intent) -> None:  # noqa: C901
         match intent:
             case Go(to=target):
                 self.go(target)
@@ -176,7 +176,8 @@ class _Writer:
 
     def repeat(self, intent: Repeat) -> None:
         for target in dict.fromkeys(targets_of(intent.body)):
-            if target.kind is not Kind.HERE and not any(isinstance(one, VisitEach) and one.of == target for one in _flat(intent.body)):  # fmt: skip
+            visited = {one.of for one in _flat(intent.body) if isinstance(one, VisitEach)}
+            if target.kind is not Kind.HERE and target not in visited:
                 self.value(target)
         self.add(f"for {self.variable('i')} in range({intent.times}):")
         self.indent += "    "
@@ -203,7 +204,7 @@ class _Writer:
         return self.names[target]
 
     def value(self, target: Target) -> str:
-        """Return what a skill is given for a target: a phrase, a heatmap's best place, or the variable that holds it."""
+        """Return what a skill is given for a target: a phrase, a heatmap's best place, or its variable."""
         if target.kind is Kind.HERE:
             return "robot.current_pos()"
         if target in self.names or self.repeats[target] > 1 or target.pick in (Pick.OTHER, Pick.FARTHEST):
@@ -228,8 +229,10 @@ class _Writer:
 
 
 _RESERVED = frozenset({
-    "robot", "start", "place", "for", "in", "if", "and", "or", "not", "is", "range", "len", "def", "pass", "while", "from",
-    "import", "with", "as", "none", "true", "false", "class", "return", "else", "elif", "del", "try", "lambda", "abs", "min",
+    "robot", "start", "place", "for", "in", "if", "and", "or", "not", "is", "range", "len", "def", "pass", "while",
+    "from",
+    "import", "with", "as", "none", "true", "false", "class", "return", "else", "elif", "del", "try", "lambda", "abs",
+    "min",
     "max", "print",
 })  # fmt: skip
 
