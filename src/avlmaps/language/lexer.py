@@ -156,7 +156,8 @@ def number_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
     if spelled is not None:
         end, value = spelled
         if tokens[end : end + 1] and tokens[end].text == "quarters":
-            found.append((end + 1 + ((tokens[end + 1 : end + 2] and tokens[end + 1].text == "of") or 0), value * 0.25))
+            is_of = end + 1 < len(tokens) and tokens[end + 1].text == "of"
+            found.append((end + 1 + is_of, value * 0.25))
         found += _with_part(tokens, end, value)
     return found
 
