@@ -165,6 +165,7 @@ def test_word_salad_raises_nothing_but_errors_of_the_family(text: str) -> None:
 @given(text=st.text(max_size=200))
 @example(text="{" * 50)
 @example(text="a " * 250)
+@example(text="half of of right, north you right")
 def test_any_text_is_read_or_refused(text: str) -> None:
     with suppress(AvlmapsError):
         read_command(text)

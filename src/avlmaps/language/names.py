@@ -244,12 +244,12 @@ def _known(words: tuple[str, ...]) -> tuple[float, Target] | None:  # noqa: C901
 def _joined(words: tuple[str, ...]) -> tuple[float, Target] | None:
     """Return a name such as "bottle of milk" or "black and white rug"."""
     if "and" in words:
-        at = words.index("and")
+        at = words.index("and", 1)
         if at == 1 and words[0] in _colours() and words[2] in _colours() and len(words) > 3:
             read = _known(words[3:])
             return None if read is None else (read[0] + 0.05, Target(read[1].kind, " ".join(words)))
         return None
-    at = words.index("of")
+    at = words.index("of", 1)
     before, after = _known(words[:at]), words[at + 1 :]
     if before is None or before[1].kind is not Kind.OBJECT or any(word in _never() for word in after):
         return None
