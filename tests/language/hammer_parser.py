@@ -29,7 +29,7 @@ def main(count: int, seed: int) -> None:
             read_question(text[:400])
         except AvlmapsError:
             pass
-        except Exception as fault:
+        except Exception as fault:  # noqa: BLE001
             sys.stdout.write(f"{type(fault).__name__}: {fault}: {text!r}\n")
         spent.append((time.process_time() - begin) * 1e3)
     spent.sort()

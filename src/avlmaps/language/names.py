@@ -243,7 +243,7 @@ def _known(words: tuple[str, ...]) -> tuple[float, Target] | None:  # noqa: C901
 
 def _joined(words: tuple[str, ...]) -> tuple[float, Target] | None:
     """Return a name such as "bottle of milk" or "black and white rug"."""
-    if "and" in words:
+    if "and" in words[1:-1]:
         at = words.index("and", 1)
         if at == 1 and words[0] in _colours() and words[2] in _colours() and len(words) > 3:
             read = _known(words[3:])
