@@ -132,6 +132,8 @@ class _Writer:
     def go(self, target: Target) -> None:
         value = self.value(target)
         plain = target.kind is Kind.OBJECT and not target.near
+        if not plain and target not in self.names:
+            value = f"robot.get_max_pos_3d({value})"
         self.add(f"robot.move_to_object({value})" if plain else f"robot.move_to({value})")
 
     def face(self, target: Target, side: Side) -> None:
@@ -199,7 +201,8 @@ class _Writer:
             else:
                 heat = self.query(target)
                 name = self.variable(target.name.split()[-1] if not target.is_file else "place")
-                self.add(f"{name} = robot.get_max_pos_3d({heat})")
+                skill = "get_nearest_pos" if target.kind is Kind.OBJECT else "get_max_pos_3d"
+                self.add(f"{name} = robot.{skill}({heat})")
             self.names[target] = name
         return self.names[target]
 
@@ -211,7 +214,7 @@ class _Writer:
             return self.bound(target)
         if target.kind is Kind.OBJECT and not target.near:
             return _quoted(target.name)
-        return f"robot.get_max_pos_3d({self.query(target)})"
+        return self.query(target)
 
     def query(self, target: Target) -> str:
         """Return the phrase of a thing, or the variable or expression of a heatmap."""
@@ -223,7 +226,8 @@ class _Writer:
         ]
         if len(factors) == 1:
             return factors[0]
-        heat = self.variable("heat")
+        self.taken["heat"] += 1
+        heat = f"heat{self.taken['heat']}"
         self.add(f"{heat} = {' * '.join(factors)}")
         return heat
 
