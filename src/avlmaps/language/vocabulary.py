@@ -117,7 +117,7 @@ class Vocabulary(Protocol):
         ...
 
     def get_nearest_pos(self, target: Target) -> Place:
-        """Return the place of the nearest object of that name, or the best of a heatmap; use it to mean the same again."""
+        """Return the place of the nearest object of that name, or the best of a heatmap; it means the same later."""
         ...
 
     def get_all_pos(self, target: Target) -> list[Place]:

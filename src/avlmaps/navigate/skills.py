@@ -129,7 +129,7 @@ class Robot:
         return self.seeker.place_of(target)
 
     def get_nearest_pos(self, target: Target) -> Place:
-        """Return the place of the nearest object of that name, or the best of a heatmap; use it to mean the same again."""
+        """Return the place of the nearest object of that name, or the best of a heatmap; it means the same later."""
         return self.seeker.place_of_thing(self.seeker.meant(target, self._here))
 
     def get_all_pos(self, target: Target) -> list[Place]:
