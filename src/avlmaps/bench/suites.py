@@ -50,7 +50,7 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
     """Run a suite and write SUITE.json, SUITE.md, SUITE.png and a SUITE-TABLE.csv for each table into ``out``.
 
     Args:
-        suite: ``words``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``objects``, ``indexing`` or
+        suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``objects``, ``indexing`` or
             ``navigation``.
         asked: what it measures on.
         out: folder to write into.
@@ -146,8 +146,15 @@ def _frames(asked: Asked) -> Mapping[str, Table]:
     return run_frames(encoder, asked.nyuv2)
 
 
+def _language(_: Asked) -> Mapping[str, Table]:
+    from avlmaps.bench import language
+
+    return language.run()
+
+
 _SUITES: dict[str, Callable[[Asked], Mapping[str, Table]]] = {
     "words": _words,
+    "language": _language,
     "sounds": _sounds,
     "segmentation": _segmentation,
     "locate": _locate,

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from avlmaps.bench.indexing import IndexingSettings
     from avlmaps.bench.navigation import NavigationSettings
 
-Suite = Literal["words", "sounds", "segmentation", "locate", "frames", "objects", "indexing", "navigation"]
+Suite = Literal["words", "language", "sounds", "segmentation", "locate", "frames", "objects", "indexing", "navigation"]
 Series = Literal["sounds-1", "sounds-2", "sounds-3", "images", "pairs", "commands", "spatial"]
 
 
@@ -56,6 +56,7 @@ class Bench(ModelVerb):
     """Measure how good the parts are, with counts and 95 % intervals.
 
     words: household phrases kept out of training; needs nothing.
+    language: commands and questions that strangers wrote; needs nothing.
     sounds, segmentation: need --sounds, a folder of clips with an index.csv.
     locate: needs --scenes, recordings with poses; half of the frames become the map, the others are asked.
     frames: needs --nyuv2, labelled frames in the layout of NYU Depth V2; kinds of pixels, without any map.
