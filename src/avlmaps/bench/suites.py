@@ -50,8 +50,8 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
     """Run a suite and write SUITE.json, SUITE.md, SUITE.png and a SUITE-TABLE.csv for each table into ``out``.
 
     Args:
-        suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``objects``, ``indexing`` or
-            ``navigation``.
+        suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``,
+            ``objects``, ``indexing`` or ``navigation``.
         asked: what it measures on.
         out: folder to write into.
 
