@@ -95,3 +95,47 @@ def write_onnx(nets: Sequence[SoundNet], path: Path) -> None:
     )  # fmt: skip
     onnx.checker.check_model(model)
     path.write_bytes(model.SerializeToString())
+
+
+def read_onnx(path: Path) -> SoundNet:
+    """Return the network of a file that ``write_onnx`` wrote from one network, to go on from it.
+
+    Its batch norms are folded; ``opened_norms`` sets them so that it can be fitted again.
+    """
+    tensors = [torch.from_numpy(numpy_helper.to_array(t).astype(np.float32)) for t in onnx.load(path).graph.initializer]
+    tensors = [t for t in tensors if t.is_floating_point() and t.ndim]
+    net = SoundNet(tensors[-2].shape[0], tensors[0].shape[0])
+    layers = [(net.stem, net.stem_norm)]
+    for block in net.blocks:
+        assert isinstance(block, Block)
+        layers += [(block.first, block.first_norm), (block.second, block.second_norm), (block.short, block.short_norm)]
+    with torch.no_grad():
+        for (convolution, norm), weight, bias in zip(layers, tensors[0:-2:2], tensors[1:-2:2], strict=True):
+            convolution.weight.copy_(weight)
+            norm.bias.copy_(bias)
+            norm.running_var.fill_(1.0 - norm.eps)  # pyright: ignore[reportOptionalMemberAccess]
+        net.head.weight.copy_(tensors[-2])
+        net.head.bias.copy_(tensors[-1])
+    return net.eval()
+
+
+@torch.no_grad()
+def opened_norms(net: SoundNet, x: torch.Tensor) -> SoundNet:
+    """Give folded batch norms the statistics of a batch (n, 2, bands, frames), without changing what the net answers.
+
+    Without that, fitting would begin with every channel scaled anew.
+    """
+    def open_up(norm: nn.Module, inputs: tuple[torch.Tensor, ...]) -> None:
+        assert isinstance(norm, nn.BatchNorm2d) and norm.running_mean is not None and norm.running_var is not None
+        mean, var = inputs[0].mean(dim=(0, 2, 3)), inputs[0].var(dim=(0, 2, 3), unbiased=False)
+        norm.weight.copy_(torch.sqrt(var + norm.eps))
+        norm.bias.add_(mean)
+        norm.running_mean.copy_(mean)
+        norm.running_var.copy_(var)
+
+    net = net.eval()
+    hooks = [m.register_forward_pre_hook(open_up) for m in net.modules() if isinstance(m, nn.BatchNorm2d)]
+    net(x)
+    for hook in hooks:
+        hook.remove()
+    return net

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 import torch.nn.functional as functional
 from torch import Tensor
-from training.sounds.augmentation import Augmentation, augmented, heard
+from training.sounds.augmentation import Augmentation, augmented, fluctuations, heard
 from training.sounds.clips import Examples
 from training.sounds.kinds import CALLED, TEMPLATES
 from training.sounds.network import SoundNet
@@ -56,23 +56,24 @@ def targets(encode_words: EncodeWords) -> Tensor:
 
 def steady_noise(count: int, generator: torch.Generator) -> Tensor:
     """Return mel power of noise of random colour: from falling by 25 dB over the bands to rising by 16 (white: 12)."""
-    power = 0.5 + 0.5 * torch.empty(count, logmel.WINDOW_FRAMES, logmel.BANDS).exponential_(generator=generator)
+    power = fluctuations(count, generator)
     tilt_db = 41.0 * torch.rand(count, 1, 1, generator=generator) - 25.0
     return power * 10.0 ** (tilt_db * torch.linspace(0.0, 1.0, logmel.BANDS) / 10.0)
 
 
 class _Batches:
-    """Draws batches: recorded clips evenly over kinds, synthetic ones at random."""
+    """Draws batches: recorded clips by the root of how many a kind has, synthetic ones at random."""
 
     def __init__(self, examples: Examples, settings: Settings) -> None:
         self._rng = np.random.default_rng(settings.seed)
         self._examples, self._settings = examples, settings
-        kinds = np.unique(examples.recorded_kinds)
+        kinds, counts = np.unique(examples.recorded_kinds, return_counts=True)
+        self._share = np.sqrt(counts) / np.sqrt(counts).sum()
         self._of_kind = [np.flatnonzero(examples.recorded_kinds == kind) for kind in kinds]
 
     def draw(self) -> tuple[Tensor, Tensor]:
         e, rng = self._examples, self._rng
-        kinds = rng.integers(len(self._of_kind), size=self._settings.recorded)
+        kinds = rng.choice(len(self._of_kind), size=self._settings.recorded, p=self._share)
         rows = np.array([rng.choice(self._of_kind[kind]) for kind in kinds])
         made = rng.integers(len(e.synthetic), size=self._settings.synthetic)
         power = np.concatenate([e.recorded[rows], e.synthetic[made]])
@@ -81,7 +82,9 @@ class _Batches:
         )
 
 
-def fit(examples: Examples, words: Tensor, settings: Settings, label: str = "") -> SoundNet:
+def fit(
+    examples: Examples, words: Tensor, settings: Settings, label: str = "", start: SoundNet | None = None
+) -> SoundNet:
     """Return the averaged network.
 
     Args:
@@ -89,11 +92,13 @@ def fit(examples: Examples, words: Tensor, settings: Settings, label: str = "") 
         words: targets (templates, kinds, dim).
         settings: how.
         label: for the lines of progress.
+        start: the network to go on from; a new one if None.
     """
     torch.manual_seed(settings.seed)
     generator = torch.Generator().manual_seed(settings.seed)
     batches = _Batches(examples, settings)
-    net = SoundNet(words.shape[2], settings.width).to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+    fresh = SoundNet(words.shape[2], settings.width) if start is None else copy.deepcopy(start).train()
+    net = fresh.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
     average = copy.deepcopy(net).eval()
     optimiser = torch.optim.AdamW(net.parameters(), lr=settings.rate, weight_decay=settings.decay)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, settings.rate, settings.steps, pct_start=0.1)
@@ -101,20 +106,23 @@ def fit(examples: Examples, words: Tensor, settings: Settings, label: str = "") 
     for step in range(settings.steps):
         power, kinds = batches.draw()
         noise = steady_noise(len(power), generator)
-        x = augmented(power, noise, settings.augmentation, generator).to(memory_format=torch.channels_last)
+        x, other, share = augmented(power, noise, settings.augmentation, generator)
         with torch.autocast("cpu", torch.bfloat16):
-            y = net(x)
+            y = net(x.to(memory_format=torch.channels_last))
         template = words[int(torch.randint(len(words), (1,), generator=generator))]
         logits = y.float() @ template.T / settings.temperature
-        loss = functional.cross_entropy(logits, kinds, label_smoothing=settings.smoothing)
+        classes = logits.shape[1]
+        aim = functional.one_hot(kinds, classes) * (1.0 - share[:, None])
+        aim = aim + functional.one_hot(kinds[other], classes) * share[:, None]
+        loss = functional.cross_entropy(logits, aim, label_smoothing=settings.smoothing)
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
         schedule.step()
         _blend(average, net, min(settings.averaging, (1 + step) / (10 + step)))
         total += loss.item()
-        if (step + 1) % 100 == 0:
-            say(f"{label} step {step + 1}/{settings.steps} loss {total / 100:.3f}")
+        if (step + 1) % 50 == 0:
+            say(f"{label} step {step + 1}/{settings.steps} loss {total / 50:.3f}")
             total = 0.0
     return average
 

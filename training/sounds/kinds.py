@@ -1,17 +1,16 @@
 """Every kind of sound the encoder learns, and what else it is called, from the project's lexicon.
 
-The order is that of the network's outputs, so new names go to the end. The first name of a kind is the one that
+The first name of a kind is the one that
 answers give. The others stand beside it when a question is compared with the known kinds; the paraphrases by which the
 encoder is tested (``avlmaps/bench/data/sounds_paraphrases.csv``) are none of them.
 """
 
+from avlmaps.bench import sound_categories
+from avlmaps.bench.sound_categories import CATEGORIES, ESC50
 from avlmaps.core.lexicon import Kind, lexicon
 
-_RECORDED = (
-    "chainsaw", "clock tick", "crackling fire", "crying baby", "dog bark", "helicopter", "rain", "rooster",
-    "sea waves", "sneezing",
-)  # fmt: skip
-_SYNTHESISED = (
+# Every kind that ``avlmaps.sim.synthesis`` makes; most of them have one to eight real clips as well.
+_MADE = (
     "door knock", "door opening or closing", "creaking door", "glass breaking", "dishes clattering", "can opening",
     "vacuum cleaner", "hair dryer", "fan or air conditioner", "washing machine", "blender", "electric drill",
     "alarm clock", "smoke alarm", "microwave beep", "doorbell", "phone ringing", "keyboard typing", "mouse click",
@@ -32,10 +31,19 @@ def _called(name: str) -> tuple[str, ...]:
     return entry.learnt if name in _UNSPOKEN else (name, *entry.learnt)
 
 
-RECORDED: dict[str, tuple[str, ...]] = {name: _called(name) for name in _RECORDED}
-SYNTHESISED: dict[str, tuple[str, ...]] = {name: _called(name) for name in _SYNTHESISED}
+ESC10: dict[str, tuple[str, ...]] = {name: _called(name) for name in sound_categories.ESC10}  # about 32 clips each
+MADE: dict[str, tuple[str, ...]] = {name: _called(name) for name in _MADE}
 
 TEMPLATES = ("{}", "the sound of {}", "a recording of {}", "{} sound", "the noise of {}")
+HOUSEHOLD = {name: called for name, called in MADE.items() if name in ESC50.values()}  # kinds with a few real clips
+SYNTHESISED = {name: called for name, called in MADE.items() if name not in HOUSEHOLD}  # kinds without any
+RECORDED: dict[str, tuple[str, ...]] = ESC10 | HOUSEHOLD
 KINDS: dict[str, tuple[str, ...]] = RECORDED | SYNTHESISED
 NAMES = tuple(KINDS)
 CALLED = tuple(called[0] for called in KINDS.values())
+
+
+def kind_of(category: str) -> int:
+    """Return the index in ``NAMES`` of a category of the index of clips, or -1 for one that is not learnt."""
+    name = CATEGORIES.get(category, category)
+    return NAMES.index(name) if name in KINDS else -1
