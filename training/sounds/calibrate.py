@@ -21,6 +21,8 @@ from avlmaps.perception.embedded.sound_calibration import (
 START = Calibration(0.07, (0.0, 0.0, 0.0), 0.05, (0.0, 0.0), (0.0, 1.0), (0.0, 0.0, 0.0), (-4.0, 8.0))
 
 UNKNOWN_SHARE = 0.2
+RECORDED_COUNT = len(RECORDED)
+PRESENT = 4.0  # a question names a sound that is there this much more often than a draw among all kinds would
 
 # Phrases that name no sound; with the kinds' other names they fit what counts as naming one. Not used for testing.
 NO_SOUNDS = (
@@ -164,7 +166,7 @@ def fit_word(
     """Fit the last step of a question in words, as if UNKNOWN_SHARE of a building's sounds were of no known kind.
 
     Args:
-        heard: held-out clips of the ten recorded kinds; each is asked for by all ten names.
+        heard: held-out clips of recorded kinds; each is asked for by the names of all recorded kinds.
         kinds: which kind each is.
         unknown: clips of kinds that a network was fitted without, and the recorded kinds that it was fitted with, by
             whose names each is asked for.
@@ -173,7 +175,8 @@ def fit_word(
     """
     odds = matching_odds(heard, [KINDS[name][0] for name in RECORDED], encode_words, c)
     right = kinds[:, None] == np.arange(len(RECORDED))[None, :]
-    parts, labels, weights = [odds.ravel()], [right.ravel()], [np.ones(odds.size)]
+    parts, labels = [odds.ravel()], [right.ravel()]
+    weights = [np.where(right, PRESENT, 1.0).ravel()]
     count = sum(len(strange) for strange, _ in unknown)
     odds_unknown = UNKNOWN_SHARE / (1.0 - UNKNOWN_SHARE)
     for strange, asked in unknown:

@@ -1,13 +1,15 @@
 """The training clips: recorded ones with their licences and folds, and synthetic ones, as mel power."""
 
 import csv
+import re
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float32
-from training.sounds.kinds import RECORDED, SYNTHESISED
+from training.sounds.kinds import MADE, NAMES, kind_of
 
 from avlmaps.core.progress import progress
 from avlmaps.perception.embedded import logmel
@@ -18,20 +20,27 @@ from avlmaps.sim.synthesis import MAKERS
 SHIPPABLE = ("CC0", "CC-BY ")  # the start of a licence with which a clip may teach weights that ship
 
 
+FOLDS = (2, 3, 4, 5)
+
+
 @dataclass(frozen=True, slots=True)
 class Clip:
     """One row of the index.
 
     Attributes:
         path: relative to the folder of sounds.
-        kind: its category.
+        category: what the index calls it.
+        kind: its index in ``NAMES``, -1 for a kind that is not learnt.
         fold: 2 to 5, or 0 for the clips that are only tested on.
+        source: freesound's number of the recording that it was cut from, 0 where the file name has none.
         licence: name, author and source, separated by bars.
     """
 
     path: str
-    kind: str
+    category: str
+    kind: int
     fold: int
+    source: int
     licence: str
 
     @property
@@ -41,10 +50,29 @@ class Clip:
 
 
 def read_index(sounds_folder: Path) -> list[Clip]:
-    """Read ``index.csv``."""
+    """Read ``index.csv``; clips of ESC-50 get a fold by their source, so that no recording is in two folds."""
     with (sounds_folder / "index.csv").open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
-    return [Clip(r["path"], r["category"], int(r["fold"] or 0), r["licence"]) for r in rows]
+    clips = []
+    for row in rows:
+        named = re.search(r"\d-(\d+)-[A-Z]", row["path"])
+        source, kind = int(named[1]) if named else 0, kind_of(row["category"])
+        clips.append(Clip(row["path"], row["category"], kind, int(row["fold"] or 0), source, row["licence"]))
+    return _with_folds(clips)
+
+
+def _with_folds(clips: Sequence[Clip]) -> list[Clip]:
+    """Put the sources of each kind without folds evenly into folds, the one with most clips first."""
+    fold_of = {clip.source: clip.fold for clip in clips if clip.fold}
+    total: Counter[int] = Counter()
+    for kind in sorted({clip.kind for clip in clips if not clip.fold and clip.source}):
+        sizes = Counter(clip.source for clip in clips if clip.kind == kind and not clip.fold and clip.source)
+        own: Counter[int] = Counter()
+        for source in sorted(sizes, key=lambda s: (-sizes[s], str(s))):
+            fold = fold_of.setdefault(source, min(FOLDS, key=lambda f: (own[f], total[f], f)))
+            own[fold] += sizes[source]
+            total[fold] += sizes[source]
+    return [replace(clip, fold=fold_of.get(clip.source, 0)) for clip in clips]
 
 
 def read_samples(path: Path) -> Float32[np.ndarray, " n"]:
@@ -68,30 +96,25 @@ def recorded_mels(sounds_folder: Path, clips: Sequence[Clip]) -> Float32[np.ndar
 
 
 def synthetic_mels(each: int, seed: int, cache: Path) -> tuple[Float32[np.ndarray, "n frames bands"], np.ndarray]:
-    """Make ``each`` sounds of every synthesised kind.
+    """Make ``each`` sounds of every kind that can be made.
 
     Returns:
-        mel power, and for each sound the index of its kind in ``SYNTHESISED``.
+        mel power, and for each sound the index of its kind in ``NAMES``.
     """
-    missing = set(SYNTHESISED) ^ set(MAKERS)
+    missing = set(MADE) ^ set(MAKERS)
     if missing:
         raise ValueError(f"kinds and makers differ: {sorted(missing)}")
     file = cache / f"synthetic-{each}-{seed}.npy"
-    kinds = np.repeat(np.arange(len(SYNTHESISED)), each)
+    kinds = np.repeat([NAMES.index(name) for name in MADE], each)
     if not file.exists():
         mels = []
-        for k, name in enumerate(progress(list(SYNTHESISED), "synthesising", unit="kind")):
+        for k, name in enumerate(progress(list(MADE), "synthesising", unit="kind")):
             rngs = [np.random.default_rng([seed, k, i]) for i in range(each)]
             mels += [mels_of(MAKERS[name](rng).astype(np.float32)).astype(np.float16) for rng in rngs]
         cache.mkdir(parents=True, exist_ok=True)
         np.save(file, np.stack(mels))
     # half precision ends at 6e-8, far under the floor
     return np.load(file).astype(np.float32), kinds
-
-
-def recorded_kind(clip: Clip) -> int:
-    """Return the index of a clip's kind among the recorded ones."""
-    return list(RECORDED).index(clip.kind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +137,6 @@ class Corpus:
         mels: their mel power.
         synthetic: mel power of the synthetic clips.
         synthetic_kinds: index in ``NAMES`` of each.
-        others: the clips without a fold, only for testing.
     """
 
     folder: Path
@@ -122,20 +144,29 @@ class Corpus:
     mels: np.ndarray
     synthetic: np.ndarray
     synthetic_kinds: np.ndarray
-    others: tuple[Clip, ...]
 
-    def examples(self, chosen: np.ndarray, without: Sequence[str] = ()) -> Examples:
-        """Return the chosen recorded clips (a mask) that may ship and all synthetic ones, without some kinds."""
-        may = np.array([clip.may_ship and clip.kind not in without for clip in self.clips])
-        rows = np.flatnonzero(chosen & may)
-        kinds = np.array([recorded_kind(self.clips[i]) for i in rows])
-        return Examples(self.mels[rows], kinds, self.synthetic, self.synthetic_kinds)
+    @property
+    def kinds(self) -> np.ndarray:
+        """The index in ``NAMES`` of every recorded clip."""
+        return np.array([clip.kind for clip in self.clips])
+
+    @property
+    def folds(self) -> np.ndarray:
+        """The fold of every recorded clip."""
+        return np.array([clip.fold for clip in self.clips])
+
+    def examples(self, fold: int = 0, without: Sequence[int] = ()) -> Examples:
+        """Return the recorded clips of other folds that may ship and all synthetic ones, without some kinds."""
+        may = np.array([clip.may_ship and clip.kind not in without and clip.fold != fold for clip in self.clips])
+        made = ~np.isin(self.synthetic_kinds, without)
+        return Examples(self.mels[may], self.kinds[may], self.synthetic[made], self.synthetic_kinds[made])
 
 
-def read_corpus(folder: Path, cache: Path, each: int = 24, seed: int = 0) -> Corpus:
-    """Read the recorded clips and make the synthetic ones (or take them from the cache)."""
-    index = read_index(folder)
-    clips = tuple(clip for clip in index if clip.fold)
-    others = tuple(clip for clip in index if not clip.fold)
-    synthetic, kinds = synthetic_mels(each, seed, cache)
-    return Corpus(folder, clips, recorded_mels(folder, clips), synthetic, kinds + len(RECORDED), others)
+def read_corpus(folder: Path, cache: Path, each: int = 16, seed: int = 0) -> Corpus:
+    """Read the recorded clips with folds and make the synthetic ones; both are kept in the cache."""
+    clips = tuple(clip for clip in read_index(folder) if clip.fold)
+    file = cache / f"recorded-{len(clips)}.npy"
+    if not file.exists():
+        cache.mkdir(parents=True, exist_ok=True)
+        np.save(file, recorded_mels(folder, clips))
+    return Corpus(folder, clips, np.load(file), *synthetic_mels(each, seed, cache))

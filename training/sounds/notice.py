@@ -13,7 +13,7 @@ def attributions(sounds_folder: Path) -> list[str]:
     for clip in read_index(sounds_folder):
         if clip.fold and clip.may_ship:
             licence, author, source = (part.strip() for part in clip.licence.split("|"))
-            counts[clip.kind, author, licence, source] += 1
+            counts[clip.category, author, licence, source] += 1
     return [
         f"- {kind}: {author}, {licence}, {source}" + (f" ({count} clips)" if count > 1 else "")
         for (kind, author, licence, source), count in sorted(counts.items())

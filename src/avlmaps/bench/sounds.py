@@ -5,7 +5,6 @@ begin with "cross-validation" were written when the weights were made (``trainin
 heard the clips they were asked about; the others are measured when the suite runs, on clips that no network heard.
 """
 
-import csv
 import json
 from collections.abc import Sequence
 from importlib.resources import files
@@ -16,51 +15,31 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32
 
+from avlmaps.bench.sound_clips import kind_names, read_clips
 from avlmaps.core.errors import AudioError
 from avlmaps.perception.embedded.sounds import EmbeddedSounds
 from avlmaps.recordings.audio import AudioTrack, Sound
 
 Table = dict[str, list[Any]]
 
-# What the index of the other clips calls things, and the kind that we know them as; the rest are unknown to us.
-KINDS_OF_OTHERS = {
-    "applause": "clapping",
-    "car engine": "car engine",
-    "chirping birds": "birds chirping",
-    "crackling fire": "crackling fire",
-    "crowd cheering": "crowd cheering",
-    "door open close": "door opening or closing",
-    "footsteps gravel": "footsteps",
-    "footsteps hard": "footsteps",
-    "footsteps metal": "footsteps",
-    "footsteps wood": "footsteps",
-    "glass breaking": "glass breaking",
-    "keyboard typing": "keyboard typing",
-    "piano": "piano",
-    "rain": "rain",
-    "running water": "running water",
-    "snoring": "snoring",
-    "thunder": "thunder",
-    "train": "train",
-    "wood chop": "chopping wood",
-}
-
-
 def run(sounds_folder: Path) -> dict[str, Table]:
     """Return every table, ``{name: {"columns", "rows"}}``.
 
     Args:
-        sounds_folder: a folder of clips with an ``index.csv`` (path, category, fold ...); clips without a fold count.
+        sounds_folder: a folder of clips with an ``index.csv`` (path, category ...); clips that the weights were
+            fitted to do not count.
 
     Raises:
-        AudioError: there is no index, or no clip without a fold.
+        AudioError: there is no index, or no clip that the weights were not fitted to.
     """
     encoder = EmbeddedSounds()
-    clips = _unheard(sounds_folder)
-    features = [encoder.encode(AudioTrack.open(sounds_folder / path).read()) for path, _ in clips]
+    clips = [clip for clip in read_clips(sounds_folder, encoder) if not clip.heard]
+    if not clips:
+        raise AudioError(f"The weights were fitted to every clip of {sounds_folder}; give clips of other recordings.")
+    features = [encoder.encode(AudioTrack.open(clip.path).read()) for clip in clips]
     return {
         **cross_validation(),
-        "other recordings, shipped weights": others_table(encoder, features, [category for _, category in clips]),
+        "other recordings, shipped weights": others_table(encoder, features, [clip.category for clip in clips]),
         "speed on one core": speed_table(encoder),
     }
 
@@ -79,13 +58,14 @@ def others_table(
     Refused is a clip of which no question by any kind's name is answered by yes.
     """
     origins = {kind.name: kind.origin for kind in encoder.kinds}
+    kinds = kind_names(encoder)
     names = [kind.called[0] for kind in encoder.kinds]
     rows = []
     for category in sorted(set(categories)):
         mine = [f for f, c in zip(features, categories, strict=True) if c == category]
         heard = [encoder.describe(f) for f in mine]
         refused = int((encoder.score_words(mine, names).max(axis=1) < 0.5).sum())
-        kind = KINDS_OF_OTHERS.get(category, "")
+        kind = kinds.get(category, "")
         order = [[encoder.kinds[k].name for k in np.argsort(-h.kinds[: len(encoder.kinds)])] for h in heard]
         first = sum(names[0] == kind for names in order)
         five = sum(kind in names[:5] for names in order)
@@ -122,14 +102,3 @@ def speed_table(encoder: EmbeddedSounds, seconds: float = 60.0) -> Table:
         took_s = process_time() - start
         rows.append([f"{rate_hz} Hz", seconds, round(took_s * 1e3, 1), round(seconds / took_s)])
     return {"columns": ["sound", "seconds", "ms", "times real time"], "rows": rows}
-
-
-def _unheard(sounds_folder: Path) -> list[tuple[str, str]]:
-    index = sounds_folder / "index.csv"
-    if not index.is_file():
-        raise AudioError(f"There is no {index}; the suite needs a folder of clips with an index.csv.")
-    with index.open(newline="", encoding="utf-8") as stream:
-        clips = [(row["path"], row["category"]) for row in csv.DictReader(stream) if not row.get("fold")]
-    if not clips:
-        raise AudioError(f"{index} names no clip without a fold; those of the folds taught the weights.")
-    return clips

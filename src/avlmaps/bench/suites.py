@@ -29,6 +29,7 @@ class Asked:
 
     Attributes:
         sounds: folder of clips with an index.csv, for the suites of sound.
+        clips: the same, for ``sounds``: clips that are asked for by name, dry and in rooms.
         scenes: recordings with poses, for ``locate``.
         nyuv2: folder of labelled frames, for ``frames``.
         profile: which models are measured.
@@ -38,6 +39,7 @@ class Asked:
     """
 
     sounds: Path | None = None
+    clips: Path | None = None
     scenes: tuple[Path, ...] = ()
     nyuv2: Path | None = None
     profile: str = "embedded"
@@ -66,7 +68,8 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
         from avlmaps.bench.navigation.suite import run_navigation
 
         return run_navigation(asked.navigation, out)
-    scenes = [source.resolve().name for source in (asked.sounds, asked.nyuv2, *asked.scenes) if source is not None]
+    given = (asked.sounds, asked.clips, asked.nyuv2, *asked.scenes)
+    scenes = [source.resolve().name for source in given if source is not None]
     if suite == "objects":
         from avlmaps.bench.indexing import DEFAULT_SCENES
         from avlmaps.bench.objects import run_objects
@@ -100,9 +103,11 @@ def _words(asked: Asked) -> Mapping[str, Table]:
 
 
 def _sounds(asked: Asked) -> Mapping[str, Table]:
-    from avlmaps.bench import sounds
+    from avlmaps.bench import sound_clips, sounds
 
     _embedded_only(asked, "sounds")
+    if asked.clips is not None:
+        return sound_clips.run(asked.clips)
     return sounds.run(_clips(asked))
 
 

@@ -71,6 +71,8 @@ class Bench(ModelVerb):
     """What to measure."""
     sounds: Path | None = None
     """Folder of sound clips with an index.csv (path, category, fold)."""
+    clips: Path | None = None
+    """Folder of clips with an index.csv: asks for each by name, dry and in simulated rooms (sounds)."""
     scenes: tuple[str, ...] = ()
     """Recordings with poses (locate); names of scenes such as house:1000000:held-out (the others)."""
     nyuv2: Path | None = None
@@ -93,7 +95,7 @@ class Bench(ModelVerb):
         indexing = self.indexing_settings() if self.suite in ("indexing", "objects") else None
         navigation = self.navigation_settings() if self.suite == "navigation" else None
         scenes = () if indexing or navigation else tuple(map(Path, self.scenes))
-        asked = Asked(self.sounds, scenes, self.nyuv2, self.profile, self.seed, indexing, navigation)
+        asked = Asked(self.sounds, self.clips, scenes, self.nyuv2, self.profile, self.seed, indexing, navigation)
         answer = run_suite(self.suite, asked, self.out)
         lines: list[str] = []
         for name, table in answer["tables"].items():
