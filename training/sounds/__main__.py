@@ -18,12 +18,13 @@ from training.sounds.fit import EncodeWords, Settings
 from training.sounds.kinds import KINDS, NAMES, TEMPLATES
 
 from avlmaps.core.progress import say
+from avlmaps.perception.embedded.sound_calibration import evidence_for
 from avlmaps.perception.embedded.words import EmbeddedWords
 
 ROOT = Path(__file__).resolve().parents[2]
 WEIGHTS = Path("src/avlmaps/perception/embedded/weights")
 FIGURES = Path("src/avlmaps/bench/data/sounds_crossvalidation.json")
-ONWARDS = Settings(steps=300, rate=1.5e-3, averaging=0.98)
+ONWARDS = Settings(steps=600, rate=2e-3, averaging=0.985)
 SCRATCH = Settings(steps=600, averaging=0.99)
 NOTE = (
     "A small closed-set encoder: ten kinds learnt from about 32 recordings each, forty from one to eight, the others "
@@ -70,7 +71,7 @@ def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.Calibra
     known, strangers = answers.known, answers.strangers
     heard = calibrate.joined([known.dry, known.wet])
     kinds, nets = np.tile(known.kinds, 2), np.concatenate([known.nets, known.nets + 10])
-    evidence = calibrate.evidence_for(heard)
+    evidence = evidence_for(heard.cosines, heard.typical)
     c = replace(calibrate.START, temperature=calibrate.fit_temperature(evidence, kinds))
     c = calibrate.fit_phrases(encode, c)
     unknown = calibrate.joined([strangers.dry, strangers.wet])

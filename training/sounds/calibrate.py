@@ -10,12 +10,14 @@ from training.sounds.kinds import CALLED, KINDS, RECORDED
 
 from avlmaps.perception.embedded.sound_calibration import (
     Calibration,
+    evidence_for,
     kinds_of_phrases,
     kinds_of_windows,
     log_odds,
     nearness,
     softmax,
     taught_lead,
+    typical_examples,
 )
 
 START = Calibration(0.07, (0.0, 0.0, 0.0), 0.05, (0.0, 0.0), (0.0, 1.0), (0.0, 0.0, 0.0), (-4.0, 8.0))
@@ -71,11 +73,13 @@ class Evidence:
     Attributes:
         features: (n, dim).
         cosines: (n, kinds), to the words of every kind; -1 for kinds that the network was fitted without.
+        typical: (n, kinds), to the typical example that the network was fitted to; likewise.
         near: (n, kinds), to the nearest example that the network was fitted to; likewise.
     """
 
     features: np.ndarray
     cosines: np.ndarray
+    typical: np.ndarray
     near: np.ndarray
 
     def __len__(self) -> int:
@@ -83,24 +87,29 @@ class Evidence:
 
     def at(self, chosen: np.ndarray) -> "Evidence":
         """Return some of the sounds."""
-        return Evidence(self.features[chosen], self.cosines[chosen], self.near[chosen])
+        return Evidence(self.features[chosen], self.cosines[chosen], self.typical[chosen], self.near[chosen])
+
+
+FIELDS = ("features", "cosines", "typical", "near")
 
 
 def joined(parts: Sequence[Evidence]) -> Evidence:
     """Return the sounds of several one after another."""
-    return Evidence(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("features", "cosines", "near")))
+    return Evidence(*(np.concatenate([getattr(p, name) for p in parts]) for name in FIELDS))
 
 
 def evidence_of(
     features: np.ndarray, aims: np.ndarray, examples: np.ndarray, kinds: np.ndarray, without: Sequence[int] = ()
 ) -> Evidence:
     """Compare features with the words and with the examples (of the given kinds, sorted)."""
-    near = np.full((len(features), len(aims)), -1.0)
     present, starts = np.unique(kinds, return_index=True)
-    near[:, present] = nearness(features, examples, starts)
     cosines = (features @ aims.T).astype(np.float64)
     cosines[:, list(without)] = -1.0
-    return Evidence(features, cosines, near)
+    # a kind whose only recording is held out has no example: its words stand in
+    near, typical = cosines.copy(), cosines.copy()
+    near[:, present] = nearness(features, examples, starts)
+    typical[:, present] = features @ typical_examples(examples, starts).T
+    return Evidence(features, cosines, typical, near)
 
 
 def fit_temperature(cosines: np.ndarray, kinds: np.ndarray) -> float:
@@ -129,7 +138,7 @@ def fit_phrases(encode_words: EncodeWords, c: Calibration) -> Calibration:
 
 def heard_kinds(heard: Evidence, c: Calibration) -> np.ndarray:
     """Return how likely each sound is of each kind, as ``EmbeddedSounds`` finds it."""
-    posterior, known = kinds_of_windows(heard.cosines, heard.near, c)
+    posterior, known = kinds_of_windows(heard.cosines, heard.typical, heard.near, c)
     return posterior * known[:, None]
 
 
@@ -137,7 +146,7 @@ def fit_known(known: Evidence, unknown: Evidence, c: Calibration) -> Calibration
     """Fit the refusal of unknown sounds, both sides weighing the same."""
 
     def clues(heard: Evidence) -> np.ndarray:
-        best = np.sort((heard.cosines + heard.near) / 2.0, axis=1)
+        best = np.sort(evidence_for(heard.cosines, heard.typical), axis=1)
         return np.stack([heard.near.max(axis=1), best[:, -1] - best[:, -2]], axis=1)
 
     x = np.concatenate([clues(known), clues(unknown)])

@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import torch
@@ -164,42 +164,3 @@ def turned(net: SoundNet, old: Tensor, new: Tensor) -> SoundNet:
     copied.head.weight.copy_(rotation @ net.head.weight)
     copied.head.bias.copy_(rotation @ net.head.bias)
     return copied
-
-
-@torch.no_grad()
-def refit_head(net: SoundNet, examples: Examples, words: Tensor, copies: int = 3, ridge: float = 0.1) -> SoundNet:
-    """Return the network with its last layer solved anew, by ridge regression from what it pools to the words.
-
-    Every kind weighs the same, however few clips it has (those without recordings half as much), which a few hundred
-    steps do not reach. Each clip counts as it is and in other circumstances.
-
-    Args:
-        net: the fitted network.
-        examples: what it was fitted to.
-        words: targets (templates, kinds, dim).
-        copies: how many other circumstances.
-        ridge: strength of the penalty, per unit of weight and variance.
-    """
-    bare = ~np.isin(examples.synthetic_kinds, examples.recorded_kinds)
-    power = torch.from_numpy(np.concatenate([examples.recorded, examples.synthetic[bare]]))
-    kinds = np.concatenate([examples.recorded_kinds, examples.synthetic_kinds[bare]])
-    weight = np.where(np.isin(kinds, examples.recorded_kinds), 1.0, 0.5) / np.bincount(kinds)[kinds]
-    how, generator = replace(Augmentation(), mixed=0.0, masks=(4, 20)), torch.Generator().manual_seed(2)
-    pooled = []
-    for copy_number in range(copies + 1):
-        for part in power.split(32):
-            noise = fluctuations(len(part), generator)
-            x = augmented(part, noise, how, generator)[0] if copy_number else heard(part)
-            pooled.append(net.pooled(x))
-    x = torch.cat(pooled).double().numpy()
-    w = np.tile(weight / weight.sum() / (copies + 1), copies + 1)[:, None]
-    aims = words.double().mean(dim=0).numpy()
-    aims = (aims / np.linalg.norm(aims, axis=1, keepdims=True))[np.tile(kinds, copies + 1)]
-    mean, middle = (w * x).sum(axis=0), (w * aims).sum(axis=0)
-    spread = np.sqrt((w * (x - mean) ** 2).sum(axis=0)) + 1e-6
-    z = (x - mean) / spread
-    solved = np.linalg.solve((w * z).T @ z + ridge * np.eye(z.shape[1]), (w * z).T @ (aims - middle)) / spread[:, None]
-    copied = copy.deepcopy(net)
-    copied.head.weight.copy_(torch.from_numpy(solved.T))
-    copied.head.bias.copy_(torch.from_numpy(middle - mean @ solved))
-    return copied.eval()

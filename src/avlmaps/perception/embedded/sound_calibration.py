@@ -60,20 +60,39 @@ def nearness(
     return np.maximum.reduceat(features @ examples.T, starts, axis=1)
 
 
+def typical_examples(examples: Float[np.ndarray, "n d"], starts: np.ndarray) -> Float[np.ndarray, "kinds d"]:
+    """Return the direction of the mean example of every kind; examples lie by kind, from ``starts``."""
+    total = np.add.reduceat(examples, starts, axis=0)
+    return total / np.linalg.norm(total, axis=1, keepdims=True)
+
+
+def evidence_for(
+    cosines: Float[np.ndarray, "windows kinds"], typical: Float[np.ndarray, "windows kinds"]
+) -> Float[np.ndarray, "windows kinds"]:
+    """Return what speaks for every kind: the cosine to its words and that to its typical example, both alike.
+
+    Where a kind has few examples, their mean names new clips better than the nearest of them does.
+    """
+    return (np.asarray(cosines, np.float64) + typical) / 2.0
+
+
 def kinds_of_windows(
-    cosines: Float[np.ndarray, "windows kinds"], near: Float[np.ndarray, "windows kinds"], c: Calibration
+    cosines: Float[np.ndarray, "windows kinds"],
+    typical: Float[np.ndarray, "windows kinds"],
+    near: Float[np.ndarray, "windows kinds"],
+    c: Calibration,
 ) -> tuple[Float[np.ndarray, "windows kinds"], Float[np.ndarray, " windows"]]:
     """Return each window's posterior over the known kinds, and how likely it is of any of them.
 
-    Two things speak for a kind: the cosine to the words that it is called, which the network was fitted to, and the
-    cosine to the nearest example, which tells strangers apart far better (a stranger lies between the kinds).
+    The cosine to the nearest example tells strangers apart (a stranger lies between the kinds).
 
     Args:
         cosines: to the words of every kind.
+        typical: to the typical example of every kind.
         near: to the nearest example of every kind.
         c: the constants.
     """
-    evidence = (np.asarray(cosines, np.float64) + near) / 2.0
+    evidence = evidence_for(cosines, typical)
     best = np.sort(evidence, axis=1)
     bias, by_nearness, by_lead = c.known
     known = sigmoid(bias + by_nearness * near.max(axis=1) + by_lead * (best[:, -1] - best[:, -2]))

@@ -31,6 +31,7 @@ from avlmaps.perception.embedded.sound_calibration import (
     same_kind,
     sigmoid,
     taught_lead,
+    typical_examples,
 )
 from avlmaps.perception.enrolment import TaughtSound, sounds_folder, taught_sounds
 from avlmaps.perception.protocols import ModelCard, WordEncoder
@@ -91,6 +92,7 @@ class EmbeddedSounds:
         # features of some of the clips that the network learnt from, sorted by kind
         self._examples = np.load(BytesIO(examples), allow_pickle=False).astype(np.float32)
         self._starts = np.cumsum([0, *(k["examples"] for k in about["kinds"][:-1])])
+        self._typical = typical_examples(self._examples, self._starts)
         self.calibration = msgspec.convert(about["calibration"], Calibration)
         self.card = ModelCard(
             id=about["id"],
@@ -211,7 +213,8 @@ class EmbeddedSounds:
     def _hear(self, features: Float32[np.ndarray, "windows d"], taught: Sequence[TaughtSound]) -> Heard:
         """Return the kinds in a sound: for each the most likely window."""
         near = nearness(features, self._examples, self._starts)
-        posterior, known = kinds_of_windows(features @ self._prototypes.T, near, self.calibration)
+        typical = features @ self._typical.T
+        posterior, known = kinds_of_windows(features @ self._prototypes.T, typical, near, self.calibration)
         likely = posterior * known[:, None]
         if taught:
             bias, slope = self.calibration.taught
