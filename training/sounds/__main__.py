@@ -75,7 +75,8 @@ def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.Calibra
     c = replace(calibrate.START, temperature=calibrate.fit_temperature(evidence, kinds))
     c = calibrate.fit_phrases(encode, c)
     unknown = calibrate.joined([strangers.dry, strangers.wet])
-    c = calibrate.fit_known(heard, unknown, c)
+    peers = calibrate.joined([answers.peers.dry, answers.peers.wet])  # of the same network
+    c = calibrate.fit_known(peers, unknown, c)
     c = calibrate.fit_taught(answers.lessons(3), c)
     left = [k for k in range(calibrate.RECORDED_COUNT) if k not in answers.without]
     c = calibrate.fit_word(heard, kinds, [(unknown, left)], encode, c)

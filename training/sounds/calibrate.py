@@ -24,7 +24,7 @@ START = Calibration(0.07, (0.0, 0.0, 0.0), 0.05, (0.0, 0.0), (0.0, 1.0), (0.0, 0
 
 UNKNOWN_SHARE = 0.2
 RECORDED_COUNT = len(RECORDED)
-PRESENT = 4.0  # a question names a sound that is there this much more often than a draw among all kinds would
+PRESENT = 3.0  # a question names a sound that is there this much more often than a draw among all kinds would
 
 # Phrases that name no sound; with the kinds' other names they fit what counts as naming one. Not used for testing.
 NO_SOUNDS = (

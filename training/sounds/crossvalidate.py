@@ -114,15 +114,20 @@ class Answers:
 
     Attributes:
         household: every clip of ESC-50, by the network of its fold.
-        ten: the ESC-10 clips of one fold, by the network that started anew without it.
+        peers: every clip of one fold of kinds that the network which started anew without it was fitted to.
         strangers: every clip of the kinds that this network was fitted without.
         without: those kinds.
     """
 
     household: Held
-    ten: Held
+    peers: Held
     strangers: Held
     without: tuple[int, ...]
+
+    @property
+    def ten(self) -> Held:
+        """The ESC-10 clips among the peers."""
+        return self.peers.at(self.peers.kinds < len(ESC10))
 
     @property
     def known(self) -> Held:
@@ -130,8 +135,8 @@ class Answers:
         return held_together([self.household, self.ten])
 
     def lessons(self, clips: int) -> list[Lesson]:
-        """Teach each kind left out from some clips; the ESC-10 clips and the other strangers are what it is not."""
-        every = held_together([self.ten, self.strangers])
+        """Teach each kind left out from some clips; the peers and the other strangers are what it is not."""
+        every = held_together([self.peers, self.strangers])
         return lessons(every.dry, every.kinds, every.sources, self.without, clips)
 
 
@@ -172,9 +177,10 @@ def hear_held_out(corpus: Corpus, networks: Networks, aims: np.ndarray) -> Answe
         parts.append(held(household & (corpus.folds == fold), net, bank, fold))
     net, without = networks.stranger(), tuple(map(NAMES.index, LEFT_OUT))
     bank = example_bank(net, corpus.examples(LEFT_OUT_FOLD, without))
-    ten = held(~household & (corpus.folds == LEFT_OUT_FOLD), net, bank, 0, without)
-    strangers = held(np.isin(corpus.kinds, without), net, bank, 0, without)
-    return Answers(held_together(parts), ten, strangers, without)
+    strange = np.isin(corpus.kinds, without)
+    peers = held(~strange & (corpus.folds == LEFT_OUT_FOLD), net, bank, 0, without)
+    strangers = held(strange, net, bank, 0, without)
+    return Answers(held_together(parts), peers, strangers, without)
 
 
 def wet_mels(corpus: Corpus, rows: np.ndarray, cache: Path) -> np.ndarray:

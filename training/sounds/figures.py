@@ -96,12 +96,12 @@ def refusal_table(answers: Answers, c: Calibration) -> Table:
     Strangers are clips of ten household kinds that one network was fitted without.
     """
     bias, slope = c.word
-    known, ten, strange = (
+    peers, ten, strange = (
         heard_kinds(held.dry, c)[:, : len(RECORDED)].max(axis=1)
-        for held in (answers.household, answers.ten, answers.strangers)
+        for held in (answers.peers, answers.ten, answers.strangers)
     )
     rows = []
-    for what, clips in (("household clips", known), ("ESC-10 clips", ten)):
+    for what, clips in (("all clips of the fold", peers), ("its ESC-10 clips", ten)):
         area, low, high = area_under_curve(clips, strange)
         yes, no = bias + slope * log_odds(clips) >= 0.0, bias + slope * log_odds(strange) < 0.0
         rows.append([what, len(clips), len(strange), round(area, 3), f"{low:.3f}-{high:.3f}", *(
