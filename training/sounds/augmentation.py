@@ -196,4 +196,8 @@ def augmented(
     power = trimmed(moved(power, how, generator), how, generator)
     power, other, share = mixed(coloured(power, how, generator), how, generator)
     power = in_rooms(power, how, generator)
-    return masked(heard(peak_normalised(in_noise(power, noise, how, generator)), coarse=True), how, generator), other, share
+    return (
+        masked(heard(peak_normalised(in_noise(power, noise, how, generator)), coarse=True), how, generator),
+        other,
+        share,
+    )

@@ -60,9 +60,7 @@ class Networks:
         generator = torch.Generator().manual_seed(1)
         power = torch.from_numpy(self.corpus.mels[::8])
         noise = fluctuations(len(power), generator)
-        return opened_norms(
-            read_onnx(self.start), augmented(power, noise, self.settings.augmentation, generator)[0]
-        )
+        return opened_norms(read_onnx(self.start), augmented(power, noise, self.settings.augmentation, generator)[0])
 
     def _network(
         self, name: str, fold: int, settings: Settings, start: SoundNet | None, without: Sequence[int] = ()
@@ -184,7 +182,7 @@ def hear_held_out(corpus: Corpus, networks: Networks, aims: np.ndarray) -> Answe
 
 
 def wet_mels(corpus: Corpus, rows: np.ndarray, cache: Path) -> np.ndarray:
-    """Return mel power of clips 4 m away in a simulated room of RT60 ``ROOM_S``, kept in the cache; zeros for others."""
+    """Return mel power of clips 4 m away in a simulated room of RT60 ``ROOM_S`` (cached); zeros for other clips."""
     file = cache / f"wet-{int(rows.sum())}.npy"
     wet = np.zeros_like(corpus.mels)
     if not file.exists():

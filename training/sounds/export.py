@@ -125,6 +125,7 @@ def opened_norms(net: SoundNet, x: torch.Tensor) -> SoundNet:
 
     Without that, fitting would begin with every channel scaled anew.
     """
+
     def open_up(norm: nn.Module, inputs: tuple[torch.Tensor, ...]) -> None:
         assert isinstance(norm, nn.BatchNorm2d) and norm.running_mean is not None and norm.running_var is not None
         mean, var = inputs[0].mean(dim=(0, 2, 3)), inputs[0].var(dim=(0, 2, 3), unbiased=False)

@@ -107,7 +107,9 @@ def run(folder: Path) -> dict[str, Table]:
         kinds = [clips[i].kind for i in known]
         tables["by name"] = by_name(encoder, [features[i] for i in known], kinds)
         tables["by name, each kind"] = each_kind(encoder, [features[i] for i in known], kinds)
-        tables["in rooms, 4 m away"] = in_rooms(encoder, [sounds[i] for i in known], [features[i] for i in known], kinds)
+        tables["in rooms, 4 m away"] = in_rooms(
+            encoder, [sounds[i] for i in known], [features[i] for i in known], kinds
+        )
     unknown = [i for i, clip in enumerate(clips) if not clip.kind]
     if unknown:
         tables["sounds of no known kind"] = _refusals(
@@ -129,7 +131,7 @@ def by_name(encoder: EmbeddedSounds, features: Sequence[Features], kinds: Sequen
         every = encoder.score_words(mine, list(called.values()))
         first = every.argmax(axis=1) == [list(called).index(kind) for kind in right]
         rows += [
-            [group, f"right name first among {len(asked)} names", *_share((scores.argmax(axis=1) == truth))],
+            [group, f"right name first among {len(asked)} names", *_share(scores.argmax(axis=1) == truth)],
             [group, f"right name first among all {len(called)} kinds", *_share(first)],
             [group, "right kind says yes", *_share(yes[is_right])],
             [group, "another kind says yes", *_share(yes[~is_right])],
@@ -159,9 +161,7 @@ def each_kind(encoder: EmbeddedSounds, features: Sequence[Features], kinds: Sequ
     return _table(["kind", "learnt from", "clips", "first", "among five", "yes", "taken for"], rows)
 
 
-def in_rooms(
-    encoder: EmbeddedSounds, sounds: Sequence[Sound], dry: Sequence[Features], kinds: Sequence[str]
-) -> Table:
+def in_rooms(encoder: EmbeddedSounds, sounds: Sequence[Sound], dry: Sequence[Features], kinds: Sequence[str]) -> Table:
     """Return how names and scores hold when the same clips sound 4 m away in rooms of growing reverberation."""
     from scipy.signal import oaconvolve
 
@@ -191,9 +191,7 @@ def room_response(rt60_s: float, rate_hz: int) -> Float[np.ndarray, " t"]:
     import pyroomacoustics as pra
 
     absorption, order = pra.inverse_sabine(rt60_s, ROOM_M)
-    room = pra.ShoeBox(
-        ROOM_M, fs=rate_hz, materials=pra.Material(absorption), max_order=min(order, _HIGHEST_ORDER)
-    )
+    room = pra.ShoeBox(ROOM_M, fs=rate_hz, materials=pra.Material(absorption), max_order=min(order, _HIGHEST_ORDER))
     room.add_source(list(SPEAKER_M))
     room.add_microphone(list(MICROPHONE_M))
     room.compute_rir()

@@ -22,6 +22,7 @@ from avlmaps.recordings.audio import AudioTrack, Sound
 
 Table = dict[str, list[Any]]
 
+
 def run(sounds_folder: Path) -> dict[str, Table]:
     """Return every table, ``{name: {"columns", "rows"}}``.
 
