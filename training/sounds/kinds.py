@@ -1,8 +1,8 @@
 """Every kind of sound the encoder learns, and what else it is called, from the project's lexicon.
 
-The first name of a kind is the one that
-answers give. The others stand beside it when a question is compared with the known kinds; the paraphrases by which the
-encoder is tested (``avlmaps/bench/data/sounds_paraphrases.csv``) are none of them.
+The first name of a kind is the one that answers give. The others stand beside it when a question is compared with the
+known kinds; the paraphrases by which the encoder is tested (``avlmaps/bench/data/sounds_paraphrases.csv``) are none of
+them.
 """
 
 from avlmaps.bench import sound_categories
