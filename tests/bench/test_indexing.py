@@ -10,26 +10,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from avlmaps.bench.harness.evidence import MARGIN_M, NEAR_M, Box, Event, Evidence, Photo, alone_near
+from avlmaps.bench.harness.factors import near_polygon, true_regions
+from avlmaps.bench.harness.settings import Recorded, TaskError
+from avlmaps.bench.harness.true_voxels import TrueVoxels
+from avlmaps.bench.harness.weak_sounds import WeakSounds
 from avlmaps.bench.indexing.configurations import CONFIGURATIONS, configurations
-from avlmaps.bench.indexing.factors import near_polygon, true_regions
 from avlmaps.bench.indexing.metrics import LIMITS_M, Answered, bootstrapped_mean, judged, scored
-from avlmaps.bench.indexing.rules import (
-    MARGIN_M,
-    NEAR_M,
-    Event,
-    Evidence,
-    Photo,
-    alone_near,
-    area_tasks,
-    photo_tasks,
-    sound_tasks,
-)
+from avlmaps.bench.indexing.rules import area_tasks, photo_tasks, sound_tasks
 from avlmaps.bench.indexing.runs import IndexingSettings, run
 from avlmaps.bench.indexing.scene_queries import AskedScene
 from avlmaps.bench.indexing.tables import tables
-from avlmaps.bench.indexing.tasks import Box, Recorded, Task, TaskError, TaskKind, TaskSet, load_tasks, save_tasks
-from avlmaps.bench.indexing.true_voxels import TrueVoxels
-from avlmaps.bench.indexing.weak_sounds import WeakSounds
+from avlmaps.bench.indexing.tasks import Task, TaskKind, TaskSet, load_tasks, save_tasks
 from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
@@ -354,7 +346,7 @@ def test_a_file_that_is_not_there_is_told(tmp_path: Path):
 
 
 def test_a_whole_run_makes_tables_and_a_second_one_makes_nothing_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("avlmaps.bench.indexing.weak_sounds._EXAMPLES", 2)  # its ear has a test of its own
+    monkeypatch.setattr("avlmaps.bench.harness.weak_sounds._EXAMPLES", 2)  # its ear has a test of its own
     opened: list[str] = []
 
     def open_spec(spec: str) -> Scene:

@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.bench.indexing.rules import Event, Evidence, Photo, photo_tasks, sound_tasks
-from avlmaps.bench.indexing.tasks import Box, Recorded, TaskError, TaskKind
+from avlmaps.bench.harness.evidence import Box, Event, Evidence, Photo
+from avlmaps.bench.harness.settings import Recorded, TaskError
+from avlmaps.bench.indexing.rules import photo_tasks, sound_tasks
+from avlmaps.bench.indexing.tasks import TaskKind
 from avlmaps.bench.navigation import Episode, Leg, MissionSet, Outcome, load_missions, save_missions
 from avlmaps.bench.navigation.commands import COMMANDS, SPATIAL, command_missions
 from avlmaps.bench.navigation.configurations import CEILING, CONFIGURATIONS, OURS, configurations

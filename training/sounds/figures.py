@@ -11,7 +11,7 @@ from training.sounds.crossvalidate import Stranger
 from training.sounds.fit import EncodeWords
 from training.sounds.kinds import KINDS, RECORDED
 
-from avlmaps.bench.intervals import wilson
+from avlmaps.bench.harness.intervals import wilson
 from avlmaps.perception.embedded.sound_calibration import Calibration, log_odds, same_kind
 
 DRAWS = 50

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from avlmaps.cli.verbs import Build, Query, Record
     from avlmaps.core.camera import Pinhole
     from avlmaps.core.question import Part
+    from avlmaps.maps.store.reader import StoredMap
     from avlmaps.perception.cache.feature_store import CacheSettings
     from avlmaps.perception.profiles import Profile
     from avlmaps.recordings.types import Recording
@@ -84,8 +85,9 @@ def _size(words: str) -> tuple[int, int]:
 
 def build(verb: "Build") -> dict[str, Any]:
     """Build a map and describe it."""
-    from avlmaps.maps.build import build_map, describe
+    from avlmaps.maps.build import build_map
     from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings
+    from avlmaps.query.rules import build_settings
     from avlmaps.recordings.open import open_recording
 
     begin = perf_counter()
@@ -108,12 +110,12 @@ def build(verb: "Build") -> dict[str, Any]:
         recording,
         verb.out,
         used,
-        settings,
+        build_settings(verb.rules, settings),
         cache=cache,
         resume=not verb.fresh,
         overwrite=verb.overwrite,
     )
-    return {**describe(stored), "elapsed_s": round(perf_counter() - begin, 3)}
+    return {**_described(stored), "elapsed_s": round(perf_counter() - begin, 3)}
 
 
 def _chosen_profile(name: str, words: "Sequence[str]") -> "Profile":
@@ -172,14 +174,22 @@ def describe_path(path: Path, format: str, verify: bool, plot: Path | None) -> d
 
 
 def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]:
-    from avlmaps.maps.store.reader import describe, open_stored
+    from avlmaps.maps.store.reader import open_stored
 
     stored = open_stored(path, verify=verify)
     if plot is not None:
         from avlmaps.query.plots import plot_map
 
         plot_map(stored, plot)
-    return describe(stored)
+    return _described(stored)
+
+
+def _described(stored: "StoredMap") -> dict[str, Any]:
+    """Describe a map, and the rules that it was built by."""
+    from avlmaps.maps.store.reader import describe
+    from avlmaps.query.rules import rules_of
+
+    return {**describe(stored), "rules": rules_of(stored.info.settings)}
 
 
 def _describe_recording(recording: "Recording") -> dict[str, Any]:
@@ -214,6 +224,7 @@ def ask(verb: "Query") -> dict[str, Any]:
     """Ask a map a question in a sentence or in parts."""
     from avlmaps.core.question import Modality, Question
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.rules import query_settings
 
     parts = _parts(verb)
     if bool(verb.sentence.strip()) == bool(parts):
@@ -232,7 +243,7 @@ def ask(verb: "Query") -> dict[str, Any]:
         if verb.primary:
             question = Question.of(question.parts, Modality(verb.primary))
     camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
-    answer = AVLMap.open(verb.map).ask(question, top=verb.top, intrinsics=camera)
+    answer = AVLMap.open(verb.map, query_settings(verb.rules)).ask(question, top=verb.top, intrinsics=camera)
     if verb.plot is not None and answer.heat is not None:
         answer.heat.plot(verb.plot, top=verb.top)
     return answer.to_json()
