@@ -20,7 +20,7 @@ _A_SOUND = 10  # the same for a sound that is sought: few sounds are heard at tw
 
 
 def sound_tasks(evidence: Evidence, rng: np.random.Generator, most: int) -> list[Task]:
-    """Make tasks "the sound of SOUND near the OBJECT" (Table IV): heard at several places, one of them near such a thing.
+    """Make tasks "the sound of SOUND near the OBJECT" (Table IV): of several places, one is near such a thing.
 
     Any thing of the category may be the near one; a thing that the recording does not show counts as well.
     """

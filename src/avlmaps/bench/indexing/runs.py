@@ -187,6 +187,9 @@ def _made(todo: _Todo) -> list[Task]:
             *photo_tasks(evidence, photos, rng(3), most),
             *sound_tasks(evidence, rng(5), most),
         ]
+        for task in tasks:  # drawn now, while the scene is open
+            if task.photo is not None:
+                place.photo_file(task.world_from_photo)
         save_tasks(TaskSet(todo.job.recorded, (todo.job.spec,), tuple(tasks)), path)
     return list(load_tasks(path).tasks)
 

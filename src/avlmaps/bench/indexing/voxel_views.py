@@ -44,7 +44,7 @@ def view_features(asked: AVLMap, recording: Recording) -> Float32[np.ndarray, "n
 
 
 def region_features(asked: AVLMap, recording: Recording) -> Float32[np.ndarray, "n d"]:
-    """Return for each voxel the mean feature of the regions that it was seen in, unit length; zero where none saw it."""
+    """Return for each voxel the mean feature of the regions that showed it, unit length; zero for one never shown."""
     views, encoder = asked.stored.keyframes.view, asked.stored.profile.view_encoder()
 
     def rows(frame: Frame, keyframe: int) -> tuple[Float32[np.ndarray, "r d"], Int[np.ndarray, "h w"]]:
