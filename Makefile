@@ -54,8 +54,8 @@ format: $(READY)  ## Put the code in order.
 	$(RUN)/ruff check --fix .
 	$(RUN)/ruff format .
 
-bench: $(READY)  ## Measure speed and quality; writes docs/benchmarks.md.
-	$(RUN)/python benchmarks/report.py --out docs/benchmarks.md
+bench: $(READY)  ## Measure speed and accuracy; writes docs/benchmarks.md and the table of the README (two nights).
+	$(RUN)/python benchmarks/report.py
 
 train: $(VENV)-training/.ready  ## Train the embedded encoders again (CPU, a night; SOUNDS=folder of clips with an index.csv).
 	$(VENV)-training/bin/python -m training.words
