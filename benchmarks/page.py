@@ -53,7 +53,7 @@ ENTRIES = (
     Entry("words", "Words", "avlmaps bench words --out OUT"),
     Entry(
         "sounds", "Sounds", "avlmaps bench sounds --sounds SOUNDS --out OUT", 0.0,
-        "Tables called cross-validation were written when the weights were made, by networks that had not heard the fold.",
+        "Tables called cross-validation were written with the weights, by networks that had not heard the fold.",
     ),
     Entry("segmentation", "Sounds in a track", "avlmaps bench segmentation --sounds SOUNDS --out OUT", 0.3),
     Entry("locate", "Position of a photo", "avlmaps bench locate --scenes RECORDING --out OUT", 0.2),

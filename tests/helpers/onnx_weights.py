@@ -1,4 +1,4 @@
-"""ONNX files with the numbers of every weight in another order: the same network, of the same size, that learnt nothing."""
+"""ONNX files with the numbers of each weight in another order: the same network, which has learnt nothing."""
 
 from collections.abc import Iterator
 

@@ -1,7 +1,7 @@
 """The accuracy of the weights that ship, on a small set that is rendered and synthesised here; random weights fail it.
 
-The floors lie some points below what the weights reach (in brackets, 22 November 2026): they hold a file that was damaged,
-exchanged or badly quantised, not the last point. ``avlmaps bench`` measures the accuracy itself.
+The floors lie some points below what the weights reach (in brackets, 22 November 2026): they notice a file that was
+damaged, exchanged or badly quantised, not the last point. ``avlmaps bench`` measures the accuracy itself.
 """
 
 from dataclasses import replace

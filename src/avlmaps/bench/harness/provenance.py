@@ -31,7 +31,8 @@ def in_words(answer: Mapping[str, Any]) -> str:
     recorded = answer.get("recorded")
     parts = [f"Profile {answer['profile']}{models}", f"rules {answer.get('rules', 'ours')}", f"seed {answer['seed']}"]
     if answer.get("scenes"):
-        parts.append(f"{len(answer['scenes'])} scenes ({', '.join(answer['scenes'])})")
+        count = len(answer["scenes"])
+        parts.append(f"{count} scene{'s' if count > 1 else ''} ({', '.join(answer['scenes'])})")
     if recorded:
         parts += [
             f"at most {recorded['frames']} frames each",
