@@ -16,7 +16,6 @@ from jaxtyping import Bool, Float, Int
 
 from avlmaps.bench.harness.chosen import chosen_on
 from avlmaps.bench.harness.intervals import wilson
-from avlmaps.bench.harness.models import checksums
 from avlmaps.bench.harness.provenance import in_words, provenance
 from avlmaps.bench.output import draw, markdown, write_answer
 from avlmaps.core.progress import progress
@@ -152,7 +151,7 @@ def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, Any
     from avlmaps.sim.scenes import open_scene
 
     settings = settings or IndexingSettings()
-    weights = checksums(settings.used)
+    weights = settings.checked()
     figures = []
     jobs = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
     for job in progress(jobs, "measuring", unit="scene"):

@@ -4,10 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from avlmaps.bench.harness.models import chosen_profile
+from avlmaps.bench.harness.clips import unheard_rows
+from avlmaps.bench.harness.models import checksums, chosen_profile
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.perception.profiles import Profile
 from avlmaps.query.rules import Rules
+from avlmaps.recordings.clips import find_clips
 
 Clips = Literal["unheard", "all"]
 
@@ -96,3 +98,17 @@ class SceneSettings:
             BackendError: there is no such profile or backend.
         """
         return chosen_profile(self.profile, self.models)
+
+    def checked(self) -> dict[str, str]:
+        """Check everything that is given before anything is recorded; return the models' checksums by module.
+
+        Raises:
+            BackendError: a model is not known, or missing.
+            AudioError: the folder of clips cannot be used.
+        """
+        weights = checksums(self.used)
+        if self.sounds is not None:
+            find_clips(self.sounds)
+            if self.clips == "unheard":
+                unheard_rows(self.sounds)
+        return weights

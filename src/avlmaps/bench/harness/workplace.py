@@ -136,8 +136,8 @@ class Workplace:
         """
         if self.own is not None:
             raise TaskError(
-                f"{self.job.spec} is a recording; robots are sent only through scenes whose geometry is known. Give "
-                "house:SEED or a scene file, or run the suite indexing or objects."
+                f"{self.job.spec} is a recording: its geometry is not known beyond its boxes. Give house:SEED or "
+                "a scene file."
             )
         scene = self.open_spec(self.job.spec)
         folder = self.job.folder / "recording"

@@ -8,7 +8,6 @@ from time import perf_counter
 
 import msgspec
 
-from avlmaps.bench.harness.models import checksums
 from avlmaps.bench.harness.settings import SceneSettings, TaskError
 from avlmaps.bench.harness.workers import side_by_side
 from avlmaps.bench.harness.workplace import SceneJob, Workplace, scene_jobs
@@ -128,7 +127,7 @@ def run(settings: IndexingSettings, work: Path, open_spec: Callable[[str], Scene
         TaskError: the tasks cannot be read, or no scene yields any.
         BackendError: a model is missing; nothing is recorded then.
     """
-    weights = checksums(settings.used)
+    weights = settings.checked()
     work.mkdir(parents=True, exist_ok=True)
     tasks = _tasks(settings, work, open_spec)
     if settings.save is not None:

@@ -6,7 +6,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from avlmaps.bench.harness.models import checksums
+from avlmaps.bench.harness.own_recording import is_recording
 from avlmaps.bench.harness.settings import TaskError
 from avlmaps.bench.harness.workers import side_by_side
 from avlmaps.bench.harness.workplace import SceneJob, scene_jobs
@@ -90,7 +90,12 @@ def run(settings: NavigationSettings, out: Path, open_spec: OpenSpec = open_scen
         TaskError: the missions cannot be read, do not fit, or no scene yields any.
         BackendError: a model is missing.
     """
-    weights = checksums(settings.used)  # a model that is missing is named before anything is recorded
+    weights = settings.checked()
+    if recordings := [scene for scene in settings.scenes if is_recording(scene)]:
+        raise TaskError(
+            f"{recordings[0]} is a recording; robots are sent only through scenes whose geometry is known. Give "
+            "house:SEED or a scene file, or run the suite indexing or objects."
+        )
     missions = _missions(settings, out, open_spec)
     kept = tuple(mission for mission in missions.missions if mission.series in settings.series)
     if not kept:
