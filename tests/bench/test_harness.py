@@ -16,12 +16,14 @@ from avlmaps.bench.harness.evidence import Box
 from avlmaps.bench.harness.models import chosen_profile, shipped_checksums
 from avlmaps.bench.harness.own_recording import OwnRecording, is_recording
 from avlmaps.bench.harness.paper import paper_figures
-from avlmaps.bench.harness.provenance import in_words, outdated
+from avlmaps.bench.harness.provenance import clip_table, in_words, outdated, shown_scene
 from avlmaps.bench.harness.settings import TaskError
 from avlmaps.bench.indexing import IndexingSettings, run
 from avlmaps.bench.indexing.runs import PAPER_SIZES, _in_turn
 from avlmaps.bench.indexing.tasks import Task, TaskKind
 from avlmaps.bench.indexing.voxel_views import cut_out, mixed, surface_regions
+from avlmaps.bench.navigation import NavigationSettings
+from avlmaps.bench.navigation.runs import run as run_navigation
 from avlmaps.bench.output import as_csv, table_markdown, write_answer
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import AudioError, BackendError
@@ -163,6 +165,13 @@ def test_a_heading_says_where_sounds_are_from_and_what_the_encoder_heard():
     assert "esc that the embedded sound encoder was not trained on" in in_words(answer)
     assert "that also made training sounds" in in_words({**answer, "recorded": {**recorded, "sounds": ""}})
     assert "weights not recorded" in in_words({**answer, "weights": {}})
+
+
+def test_no_place_of_this_machine_is_shown():
+    assert shown_scene("/data/mine/house.glb") == "house.glb"
+    assert shown_scene("house:7:held-out") == "house:7:held-out"
+    table = clip_table([("rain", "/data/esc/b.ogg"), ("rain", "esc/a.ogg"), ("dog bark", "/data/esc/c.ogg")])
+    assert table["rows"] == [["dog bark", 1, "c.ogg"], ["rain", 2, "a.ogg, b.ogg"]]
 
 
 # A recording of one's own.

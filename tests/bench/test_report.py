@@ -1,6 +1,7 @@
 """docs/benchmarks.md and the README's table follow from docs/benchmarks.json, and say what is outdated."""
 
 import json
+import re
 import shlex
 import sys
 from pathlib import Path
@@ -130,6 +131,11 @@ def test_every_command_of_the_page_is_one_that_the_command_line_reads(entry):
         assert bench.indexing_settings().sizes is not None
     if bench.suite == "navigation":
         assert bench.navigation_settings().sequences == 200
+
+
+def test_no_figure_names_a_place_of_a_machine():
+    content = (ROOT / "docs" / "benchmarks.json").read_text(encoding="utf-8")
+    assert not re.search(r'"(?:/|[A-Z]:\\\\|~/)', content)
 
 
 def test_the_figures_are_plain_json_of_one_spelling():

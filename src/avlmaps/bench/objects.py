@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Int
 
 from avlmaps.bench.harness.chosen import chosen_on
 from avlmaps.bench.harness.intervals import wilson
-from avlmaps.bench.harness.provenance import in_words, provenance
+from avlmaps.bench.harness.provenance import in_words, provenance, shown_scene
 from avlmaps.bench.output import draw, markdown, write_answer
 from avlmaps.core.progress import progress
 from avlmaps.sim.scene import SceneObject
@@ -156,7 +156,7 @@ def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, Any
     jobs = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
     for job in progress(jobs, "measuring", unit="scene"):
         place = Workplace(job, open_scene)
-        figures.append(measure(place.asked, place.truth.objects, COUNTS_AS, job.spec))
+        figures.append(measure(place.asked, place.truth.objects, COUNTS_AS, shown_scene(job.spec)))
     missed = {"columns": ["scene", "category", "first goal, m from a true one"], "rows": _missed(figures)}
     named = {"objects found by their names": table_of(figures), "categories whose first goal is elsewhere": missed}
     chosen = chosen_on(settings.scenes)

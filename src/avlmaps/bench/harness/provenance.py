@@ -1,6 +1,7 @@
 """What one must know to judge a table: scenes, seed, profile, weights, rules; as JSON and in words."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import PurePath
 from typing import Any
 
 import msgspec
@@ -15,7 +16,7 @@ def provenance(
 ) -> dict[str, Any]:
     """Return what a suite on scenes writes beside its tables."""
     return {
-        "scenes": list(scenes),
+        "scenes": [shown_scene(scene) for scene in scenes],
         "profile": settings.profile,
         "models": list(settings.models),
         "rules": settings.rules,
@@ -23,6 +24,24 @@ def provenance(
         "recorded": msgspec.to_builtins(recorded),
         "weights": dict(weights),
     }
+
+
+def shown_scene(spec: str) -> str:
+    """Return a scene's name for tables: of a file or folder its own name, never the place on this machine."""
+    return PurePath(spec).name if "/" in spec or "\\" in spec else spec
+
+
+def clip_table(clips: Iterable[tuple[str, str]]) -> dict[str, Any]:
+    """Return the table of the clips that were heard: sound, number of times, names of the files.
+
+    Args:
+        clips: sound and clip of every event.
+    """
+    named: dict[str, list[str]] = {}
+    for sound, clip in clips:
+        named.setdefault(sound, []).append(PurePath(clip).name)
+    rows = [[sound, len(own), ", ".join(sorted(set(own)))] for sound, own in sorted(named.items())]
+    return {"columns": ["sound", "times", "clips"], "rows": rows}
 
 
 def in_words(answer: Mapping[str, Any]) -> str:

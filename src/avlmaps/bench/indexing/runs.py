@@ -67,6 +67,7 @@ class SceneOutcome:
         voxels: voxels of the map.
         sounds: the numbers of sounds that were detected, and that there were.
         seconds: of work.
+        clips: sound and clip of every event.
     """
 
     scene: str
@@ -76,6 +77,7 @@ class SceneOutcome:
     voxels: int
     sounds: tuple[int, int]
     seconds: float
+    clips: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +207,9 @@ def _asked(todo: _Todo) -> SceneOutcome:
     answers = msgspec.json.decode(path.read_bytes(), type=tuple[Answered, ...])
     sounds = (info.counts.sounds, len(place.truth.events))
     seconds = perf_counter() - begin
-    return SceneOutcome(todo.job.spec, todo.tasks, answers, info.counts.frames, info.counts.voxels, sounds, seconds)
+    clips = tuple((event.category, event.clip) for event in place.truth.events)
+    counts = info.counts
+    return SceneOutcome(todo.job.spec, todo.tasks, answers, counts.frames, counts.voxels, sounds, seconds, clips)
 
 
 def _answers(place: Workplace, tasks: Sequence[Task]) -> list[Answered]:

@@ -42,6 +42,7 @@ class SceneFacts:
         voxels: how many it has.
         sounds: how many sounds were heard, and how many there were.
         episodes: what became of its missions, by mission and then configuration.
+        clips: sound and clip of every event.
     """
 
     scene: str
@@ -49,6 +50,7 @@ class SceneFacts:
     voxels: int
     sounds: tuple[int, int]
     episodes: tuple[Episode, ...]
+    clips: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +191,8 @@ def _sent(todo: _Todo) -> SceneFacts:
     info = place.work.asked.stored.info.counts
     sounds = (info.sounds, len(place.work.truth.events))
     episodes = tuple(done[key] for key, _, _ in keyed)
-    return SceneFacts(todo.job.spec, info.frames, info.voxels, sounds, episodes)
+    clips = tuple((event.category, event.clip) for event in place.work.truth.events)
+    return SceneFacts(todo.job.spec, info.frames, info.voxels, sounds, episodes, clips)
 
 
 def _key(settings: NavigationSettings, built: str, mission: Mission, one: Configuration) -> str:

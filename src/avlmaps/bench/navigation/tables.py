@@ -4,6 +4,7 @@ from typing import Any
 
 from avlmaps.bench.harness.chosen import chosen_on
 from avlmaps.bench.harness.paper import paper_figures
+from avlmaps.bench.harness.provenance import clip_table, shown_scene
 from avlmaps.bench.navigation.commands import COMMANDS, SPATIAL
 from avlmaps.bench.navigation.configurations import CEILING, OURS, configurations
 from avlmaps.bench.navigation.episodes import Episode
@@ -42,7 +43,10 @@ def tables(outcome: Outcome) -> dict[str, dict[str, Any]]:
     made = {TITLE[series]: _table(outcome, series) for series in shown}
     if {Series.COMMANDS, Series.SPATIAL} & set(shown):
         made["Commands and spatial goals, form by form"] = _forms(outcome)
-    return {**made, "All experiments": _figures(outcome), "Scenes": _scenes(outcome)}
+    made = {**made, "All experiments": _figures(outcome), "Scenes": _scenes(outcome)}
+    if outcome.missions.recorded.sounds:
+        made["Clips that were heard"] = clip_table(clip for one in outcome.scenes for clip in one.clips)
+    return made
 
 
 def columns(series: Series) -> list[str]:
@@ -130,7 +134,7 @@ def _scenes(outcome: Outcome) -> dict[str, Any]:
     for one in outcome.scenes:
         own = [mission for mission in outcome.missions.missions if mission.scene == one.scene]
         counts = [sum(mission.series is series for mission in own) for series in shown]
-        rows.append([one.scene, one.frames, one.voxels, f"{one.sounds[0]} of {one.sounds[1]}", *counts])
+        rows.append([shown_scene(one.scene), one.frames, one.voxels, f"{one.sounds[0]} of {one.sounds[1]}", *counts])
     total = [sum(row[column] for row in rows) for column in (1, 2)]
     counts = [sum(row[4 + column] for row in rows) for column in range(len(shown))]
     return {
