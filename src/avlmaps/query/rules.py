@@ -18,9 +18,9 @@ from avlmaps.query.modalities.sound import SoundSettings
 
 Rules = Literal["ours", "paper"]
 
-# A sample beyond a fixed threshold is sound, a pause of a second divides two sounds, nothing is widened, cleaned or cut.
-# The published code's threshold is 0: its tracks are silent between the clips. No microphone's track is, nor ours; with 0
-# such a track is one sound. The noise of our rooms peaks at 0.018 of full scale.
+# A sample beyond a fixed threshold is sound, a pause of a second divides two sounds, nothing is widened or cleaned.
+# The published code's threshold is 0: its tracks are silent between the clips. No microphone's track is, nor ours, and
+# with 0 such a track is one sound. The noise of our rooms peaks at 0.018 of full scale.
 PAPER_HEARING = HearingSettings(
     segmentation=SegmentationSettings(
         method="silence", silence_threshold=0.02, silence_s=1.0, min_length_s=0.0, max_length_s=86_400.0, padding_s=0.0
