@@ -9,10 +9,18 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help demo test bounds test-foundation types-foundation lint format bench train lock clean
+# What `make test-kernels` runs: products of matrices and what is decided by them; and the compiled loops beside them.
+NUMERIC := tests/query/test_heatmap.py tests/query/test_goals.py tests/query/test_objects.py tests/query/test_open_areas.py \
+  tests/query/test_named_objects.py tests/query/test_named_areas.py tests/perception/test_matching.py \
+  tests/perception/test_words.py tests/perception/test_vlad.py tests/perception/test_pose.py tests/perception/test_sounds.py \
+  tests/core tests/audio/test_segmentation.py tests/audio/test_sound_changes.py tests/audio/test_resample.py \
+  tests/maps/test_gravity.py tests/maps/test_grid.py
+NUMERIC_COMPILED := tests/query/test_heatmap.py tests/query/test_objects.py tests/query/test_half_precision.py tests/maps/test_fusion.py
+
+.PHONY: help demo test test-kernels bounds test-foundation types-foundation lint format docs fuzz bench train lock clean
 
 help:  ## Show what can be made.
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
 
 $(READY): requirements/lock.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "avlmaps needs Python 3.11 or newer; say which with: make PYTHON=python3.12 ...")'
@@ -23,12 +31,19 @@ $(READY): requirements/lock.txt pyproject.toml
 
 demo: $(READY)  ## Make a home, walk it, hear it, map it, ask it; pictures land in demo_out/.
 	$(RUN)/avlmaps demo --out demo_out
+	@echo "For the command avlmaps in this shell: source $(VENV)/bin/activate"
 
 test: $(READY)  ## Run every test (offline, two cores, no GPU).
 	$(RUN)/python -m pytest -n 3 --dist loadfile
 
 bounds: $(READY)  ## Run 100,000 random programs; print the worst processor time and the memory (20 minutes).
 	$(RUN)/python tests/helpers/program_bounds.py 100000 1
+
+# Floats may differ in their last digits from processor to processor; no test may depend on them.
+test-kernels: $(READY)  ## Run the fast numeric tests as older processors compute.
+	OPENBLAS_CORETYPE=Prescott $(RUN)/python -m pytest -n 2 --dist loadfile -m "not slow and not shared" $(NUMERIC)
+	OPENBLAS_CORETYPE=Haswell NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=$(VENV)/numba-generic \
+	  $(RUN)/python -m pytest -n 2 --dist loadfile -m "not slow and not shared" $(NUMERIC_COMPILED)
 
 test-foundation: $(TORCH)/.ready  ## Run the tests of the models on torch (in a virtual environment of their own, 1.5 GB).
 	$(TORCH)/bin/python -m pytest -n 2 --dist loadfile tests/foundation
@@ -54,6 +69,17 @@ format: $(READY)  ## Put the code in order.
 	$(RUN)/ruff check --fix .
 	$(RUN)/ruff format .
 
+docs: $(VENV)-docs/.ready  ## Build the documentation site into build/site (links are checked).
+	NO_MKDOCS_2_WARNING=1 $(VENV)-docs/bin/mkdocs build --quiet
+
+$(VENV)-docs/.ready: requirements/docs.txt
+	$(PYTHON) -m venv $(VENV)-docs
+	$(VENV)-docs/bin/python -m pip install --quiet -r requirements/docs.txt
+	touch $@
+
+fuzz: $(READY)  ## Break 10,000 recordings and maps in seeded ways (a night; goes on where it was stopped): fuzz_out/.
+	$(RUN)/python tests/fuzz/campaign.py --cases $(or $(CASES),10000) --out fuzz_out
+
 bench: $(READY)  ## Measure speed and accuracy; writes docs/benchmarks.md and the table of the README (two nights).
 	$(RUN)/python benchmarks/report.py
 
@@ -72,4 +98,4 @@ lock: $(READY)  ## Pin every dependency again (needs uv).
 	uv pip compile --universal --generate-hashes --group dev pyproject.toml --output-file requirements/lock.txt --quiet
 
 clean:  ## Remove the virtual environment and what the targets made.
-	rm -rf $(VENV) demo_out bench_out
+	rm -rf $(VENV) demo_out bench_out fuzz_out

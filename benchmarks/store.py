@@ -157,6 +157,8 @@ def write_parts(folder: Path, voxels: int, dim: int, parts: int = 4) -> None:
             np.ones((len(rows), 3)),
             ones,
             ones.astype(np.int64),
+            ones.astype(np.int32),
+            ones.astype(np.int64),
             ones,
         )
         info = PartInfo(recording="", spans=((number, number + 1, 1),), fused=1, bad_frames=(), elapsed_s=0.0)

@@ -1,9 +1,13 @@
 """Fixtures that every room's tests share."""
 
 import os
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from helpers.plain_numbers import assert_plain
 
 # Small matrices run up to twenty times slower on several BLAS threads when the machine is shared.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -13,6 +17,33 @@ from hypothesis import settings  # noqa: E402
 
 settings.register_profile("ci", deadline=None, max_examples=40, derandomize=True)
 settings.load_profile("ci")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _every_message_has_plain_numbers() -> Iterator[None]:
+    """Hold every error that any test provokes, and every line of progress or of an answer, to ``assert_plain``."""
+    from avlmaps.core import errors, progress
+
+    def checked(self: Exception, *words: object) -> None:
+        Exception.__init__(self, *words)
+        assert_plain(str(self))
+
+    def say(message: str) -> None:
+        assert_plain(message)
+        original(message)
+
+    original, places = progress.say, [progress, *_importers("say", progress.say)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(errors.AvlmapsError, "__init__", checked)
+        for place in places:
+            patch.setattr(place, "say", say)
+        yield
+
+
+def _importers(name: str, value: object) -> list[object]:
+    """Return the modules of the package that are loaded already and hold this value under this name."""
+    ours = [module for key, module in sys.modules.items() if key.startswith("avlmaps.")]
+    return [module for module in ours if vars(module).get(name) is value and module.__name__ != "avlmaps.core.progress"]
 
 
 @pytest.fixture(scope="session")

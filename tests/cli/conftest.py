@@ -13,6 +13,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
+from helpers.plain_numbers import assert_plain
 from helpers.raycast import render
 from helpers.room import Room
 
@@ -60,6 +61,7 @@ def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str
         with pytest.raises(SystemExit) as stop:
             main([str(word) for word in words])
         said = capsys.readouterr()
+        assert_plain(said.out + said.err)
         return int(stop.value.code or 0), said.out, said.err
 
     return call

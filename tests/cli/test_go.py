@@ -68,7 +68,8 @@ def test_what_cannot_be_obeyed_is_told_with_status_1_and_json_all_the_same(run, 
     assert err.splitlines()[-1].startswith("avlmaps: ")
     said = json.loads(out)
     assert said["ok"] is False
-    assert said["error"] in err
+    assert said["error"]["kind"] == "goal-not-found"
+    assert said["error"]["message"] in err
     assert said["steps"][-1]["error"]
 
 

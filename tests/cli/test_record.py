@@ -21,6 +21,8 @@ def test_a_recording_is_made_and_told_and_can_be_opened(answer, tmp_path: Path) 
     out = tmp_path / "rec"
     made = answer("record", "--scene", "house:7", "--out", out, *FEW, "--semantic", "--colour", "jpg")
     assert (made["recording"], made["scene"], made["frames"], made["sounds"]) == (str(out), "flat", 4, 2)
+    assert 0.0 < made["floor"]["seen_share"] <= 1.0
+    assert 0.0 < made["floor"]["driven_share"] <= made["floor"]["reached_share"] == 1.0
     first = made["events"][0]
     assert set(first) == {"onset_s", "offset_s", "category", "clip", "position", "source", "object"}
     names = {thing.name for thing in flat().objects}
@@ -37,7 +39,8 @@ def test_people_read_a_table_of_what_sounds_where(run, tmp_path: Path) -> None:
     assert status == 0
     lines = out.splitlines()
     assert lines[0].split() == ["onset_s", "offset_s", "category", "sounds", "at", "made", "by"]
-    assert len(lines) == 4
+    assert len(lines) == 5
+    assert "m² of walkable floor" in lines[-2]
     assert lines[-1].startswith(f"wrote {tmp_path / 'rec'}: 4 frames, ")
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import soundfile
 
+from avlmaps.core.errors import BackendError
 from avlmaps.core.poses import rotation_angle_rad
 from helpers.raycast import render
 from helpers.room import Room
@@ -45,7 +46,8 @@ def test_another_map_is_not_built_over_a_finished_one(built: Path, walk: Path, r
 
 def test_a_query_by_words_finds_the_cabinet(built: Path, answer) -> None:
     told = answer("query", built, "the red cabinet", "--top", 2)
-    assert {"goals", "found", "parts", "elapsed_ms"} == told.keys()
+    assert {"goals", "found", "parts", "elapsed_ms", "frame", "level_from_recording"} == told.keys()
+    assert told["frame"] == "recording"
     assert told["found"] is True
     goal = told["goals"][0]
     assert {"position", "score", "size", "parts"} == goal.keys()
@@ -80,13 +82,50 @@ def test_parts_are_fused_and_drawn(built: Path, answer, tmp_path: Path) -> None:
     assert picture is not None and picture.std() > 10
 
 
+def test_each_plot_says_what_it_wrote(built: Path, run, answer, tmp_path: Path) -> None:
+    for number, words in enumerate((("query", built, "--object", "red"), ("info", built))):
+        plot = tmp_path / f"{number}.png"
+        assert run(*words, "--plot", plot)[1].splitlines()[-1] == f"wrote {plot}"
+        assert plot.is_file()
+        assert answer(*words, "--plot", plot)["plot"] == str(plot)
+        assert "plot" not in answer(*words)
+
+
+def test_info_names_each_sound_by_what_fits_it_best(built: Path, answer, run) -> None:
+    (sound,) = answer("info", built)["sounds"]
+    scores = sound["confidences"]
+    assert len(sound["names"]) == len(scores) == 3
+    assert scores == sorted(scores, reverse=True) and all(0.0 <= score <= 1.0 for score in scores)
+    assert f"m: {sound['names'][0]} {scores[0]:.2f}" in run("info", built)[1]
+
+
+def test_a_map_whose_sound_model_is_not_here_is_described_without_names(
+    built: Path, run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(*_: object) -> None:
+        raise BackendError("The sound model is not installed.")
+
+    monkeypatch.setattr("avlmaps.query.avlmap.AVLMap.sounds", missing)
+    status, out, err = run("info", built, "--json")
+    assert status == 0 and "names" not in json.loads(out)["sounds"][0]
+    assert err == "note: the sounds have no names here. The sound model is not installed.\n"
+
+
+def test_info_of_a_bag_names_the_topics(walk: Path, run, answer, monkeypatch: pytest.MonkeyPatch) -> None:
+    from avlmaps.recordings.types import Recording
+
+    assert answer("info", walk)["topics"] == {}
+    monkeypatch.setattr(Recording, "topics", {"rgb": "/colour", "pose": "/tf"})
+    assert "topics:\n  rgb: /colour\n  pose: /tf\n" in run("info", walk)[1]
+
+
 def test_a_photo_is_located_to_the_contract(built: Path, answer, tmp_path: Path) -> None:
     truth = Room().walk()[146]  # between two frames of the map
     view = render(Room().scene, CAMERA, truth)
     photo = tmp_path / "photo.png"
     cv2.imwrite(str(photo), view.rgb[..., ::-1])
     told = answer("locate", built, photo)
-    assert {"world_from_camera", "inliers", "reference", "elapsed_ms"} <= told.keys()
+    assert {"world_from_camera", "inliers", "reference", "frame", "elapsed_ms"} <= told.keys()
     pose = np.array(told["world_from_camera"])
     assert np.linalg.norm(pose[:3, 3] - truth[:3, 3]) < 0.05
     assert np.rad2deg(rotation_angle_rad(pose, truth)) < 1.0
@@ -164,6 +203,7 @@ WRONG_WORDS = (
     (("query", "MAP", "--object", "red", "--intrinsics", "1,2,3,4"), "--intrinsics belongs to a photo"),
     (("teach-sound", "x"), "teach-sound takes clips to learn from, or --forget"),
     (("info", "REC", "--plot", "x.png"), "--plot draws a map"),
+    (("build", "REC", "--out", "x.avlmap", "--rules", "paper", "--sensor", "kinect"), "use every depth as it is"),
 )
 
 

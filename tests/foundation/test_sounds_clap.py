@@ -72,7 +72,7 @@ def test_a_long_sound_has_one_feature_whatever_was_drawn_before(models: Path, fu
     np.random.seed(1)  # noqa: NPY002 - the generator that published code draws from
     first = clap.encode(sound)
     np.random.seed(2)  # noqa: NPY002
-    np.testing.assert_array_equal(first, clap.encode(sound))
+    np.testing.assert_allclose(first, clap.encode(sound), atol=1e-5)
 
 
 def test_no_second_of_a_long_sound_is_lost(clap: ClapSounds) -> None:
@@ -155,7 +155,7 @@ def test_weights_are_read_from_the_published_bin_too_but_no_code_is_run(models: 
     weights = load_file(path)
     path.unlink()
     torch.save(weights, models / MODEL / "pytorch_model.bin")
-    np.testing.assert_array_equal(ClapSounds().encode(noise(1.0)), expected)
+    np.testing.assert_allclose(ClapSounds().encode(noise(1.0)), expected, atol=1e-5)
     torch.save({**weights, "trap": _Trap(tmp_path / "sprung")}, models / MODEL / "pytorch_model.bin")
     with pytest.raises(BackendError, match="cannot be loaded as ClapModel"):
         ClapSounds()

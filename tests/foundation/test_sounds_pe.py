@@ -61,13 +61,14 @@ def test_frames_and_their_probabilities_are_the_published_ones(framed: FrameSoun
     lengths = np.linalg.norm(embeddings, axis=1, keepdims=True)
     directions = ours[:, :-1] / np.linalg.norm(ours[:, :-1], axis=1, keepdims=True)
     np.testing.assert_allclose(directions, embeddings / lengths, atol=1e-4)
-    odds = logits - np.log(0.3 / 0.7)
+    odds = odds_of_frames = logits - np.log(0.3 / 0.7)
     if len(odds) > 5:
         odds = np.stack([odds[i : i + 5].mean(axis=0) for i in range(len(odds) - 4)])
     expected = 1.0 / (1.0 + np.exp(-(odds.max(axis=0) if samples > 5 * HOP else odds.mean(axis=0))))
     np.testing.assert_allclose(framed.score_words([ours], words)[0], expected, atol=1e-4)
     yes = framed.encode_words(words) @ ours.T > 0.0
-    np.testing.assert_array_equal(yes.T, 1.0 / (1.0 + np.exp(-logits)) > 0.3)
+    clear = np.abs(odds_of_frames) > 1e-4
+    np.testing.assert_array_equal(yes.T[clear], (odds_of_frames > 0.0)[clear])
 
 
 def test_a_text_is_taken_before_the_last_normalisation_as_in_the_published_code(
@@ -92,7 +93,8 @@ def test_a_long_sound_is_encoded_in_chunks_that_know_their_neighbours(framed: Fr
     features = framed.encode(sound)
     assert features.shape == (802, framed.card.dim)
     np.testing.assert_allclose(np.linalg.norm(features, axis=1), 1.0, atol=1e-5)
-    np.testing.assert_array_equal(features[:650], framed.encode(Sound(sound.samples[: 700 * HOP], RATE_HZ))[:650])
+    alone = framed.encode(Sound(sound.samples[: 700 * HOP], RATE_HZ))
+    np.testing.assert_allclose(features[:650], alone[:650], atol=1e-5)
 
 
 def test_a_track_is_mapped_whole_and_asked_by_its_stretches(framed: FrameSounds, tmp_path: Path) -> None:

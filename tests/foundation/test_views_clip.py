@@ -64,11 +64,12 @@ def test_words_are_the_mean_of_their_sentences_by_the_models_own_forward(models:
     np.testing.assert_allclose(np.linalg.norm(views.encode_words(["kitchen", "a" * 400]), axis=1), 1.0, atol=1e-6)
 
 
-def test_the_same_frame_gives_the_same_bytes_in_any_batch_of_one(models: Path) -> None:
+def test_a_frames_feature_does_not_depend_on_the_frames_beside_it(models: Path) -> None:
     write_clip(models)
     frames = [example_frame(seed) for seed in range(3)]
     views = ClipViews(MODEL)
-    assert views.encode(frames).tobytes() == np.concatenate([views.encode([frame]) for frame in frames]).tobytes()
+    alone = np.concatenate([views.encode([frame]) for frame in frames])
+    np.testing.assert_allclose(views.encode(frames), alone, atol=1e-5)
     with using_models(ModelSettings(folder=models, device="cpu", batch=3, offline=True)):
         np.testing.assert_allclose(views.encode(frames), ClipViews(MODEL).encode(frames), atol=1e-5)
 

@@ -85,7 +85,8 @@ class Pixels:
     vocabulary = ("red", "green")
 
     def encode(self, frame: Frame) -> np.ndarray:
-        cells = np.concatenate([frame.rgb[::4, ::4] / 255.0, np.full((6, 8, 1), 0.1)], axis=2)
+        colours = frame.rgb[::4, ::4] / 255.0
+        cells = np.concatenate([colours, np.full((*colours.shape[:2], 1), 0.1)], axis=2)
         return (cells / np.linalg.norm(cells, axis=2, keepdims=True)).astype(np.float32)
 
 
@@ -94,8 +95,8 @@ class Corners:
     card = _card("corners", 3)
 
     def encode(self, rgb: np.ndarray) -> LocalFeatures:
-        xy = np.array([[2.0, 2.0], [10.0, 6.0], [30.0, 20.0]], np.float32)
-        descriptors = rgb[[2, 6, 20], [2, 10, 30]] + np.float32(1.0)
+        xy = np.array([[2.0, 2.0], [10.0, 6.0], [30.0, 20.0]], np.float32) % np.array(rgb.shape[1::-1], np.float32)
+        descriptors = rgb[tuple(xy.astype(int).T[::-1])] + np.float32(1.0)
         return LocalFeatures(xy, (descriptors / np.linalg.norm(descriptors, axis=1, keepdims=True)).astype(np.float32))
 
 

@@ -9,6 +9,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.maps.fusion.settings import FusionSettings
 from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.sensor import NONE, SensorModel
 from avlmaps.recordings.types import Frame
 
 DEPTH = Pinhole(30.0, 31.0, 15.7, 12.2, 32, 24)
@@ -57,11 +58,16 @@ class Pixels:
     stamp_s: np.ndarray
     colour: np.ndarray  # NaN outside of the colour picture
     feature: np.ndarray  # zero where there is none
+    sharp: np.ndarray
 
 
-def pixels_of(frame: Frame, features: np.ndarray, grid: GridSpec, settings: FusionSettings) -> Pixels:
+def pixels_of(
+    frame: Frame, features: np.ndarray, grid: GridSpec, settings: FusionSettings, sensor: SensorModel = NONE
+) -> Pixels:
     rig, depth = frame.rig, frame.depth_m.astype(np.float64)
     valid = np.isfinite(depth) & (depth >= settings.min_depth_m) & (depth <= settings.max_depth_m)
+    valid &= depth <= sensor.farthest_m(grid.voxel_size_m)
+    exact = 1.0 / (1.0 + (sensor.sigma_m(depth[valid]) / (0.5 * grid.voxel_size_m)) ** 2)
     points = rig.depth.backproject(np.where(valid, depth, 1.0))
     seen = points[valid]
     place = rig.rgb.project(poses.apply(rig.rgb_from_depth, seen))
@@ -75,10 +81,11 @@ def pixels_of(frame: Frame, features: np.ndarray, grid: GridSpec, settings: Fusi
     cell_column, cell_row = np.where(inside[:, None], place * cells / size, 0).astype(int).T
     return Pixels(
         grid.index_of(poses.apply(frame.world_from_camera, seen)),
-        np.maximum(np.exp(-np.sum(seen**2, axis=1) / (2 * settings.variance_m2)), 1e-30),
+        np.maximum(np.exp(-np.sum(seen**2, axis=1) / (2 * settings.variance_m2)), 1e-30) * exact,
         np.full(len(seen), frame.stamp_s),
         np.where(inside[:, None], frame.rgb[row, column], np.nan),
         np.where(inside[:, None], features[cell_row, cell_column], 0.0),
+        np.floor(256 * exact + 0.5),
     )
 
 
@@ -86,9 +93,12 @@ def fused(pixels: list[Pixels]) -> VoxelSums:
     """Add the pixels up in float64; the sums of features are rounded to float32 at the end."""
     voxel, which = np.unique(np.concatenate([p.voxel for p in pixels]), axis=0, return_inverse=True)
     which = which.ravel()
-    weight, stamp_s, colour, feature = (
-        np.concatenate([getattr(p, name) for p in pixels]) for name in ("weight", "stamp_s", "colour", "feature")
+    weight, stamp_s, colour, feature, sharp = (
+        np.concatenate([getattr(p, name) for p in pixels])
+        for name in ("weight", "stamp_s", "colour", "feature", "sharp")
     )
+    frame = np.repeat(np.arange(len(pixels)), [len(p.voxel) for p in pixels])
+    views = np.bincount(np.unique(np.stack([which, frame], 1), axis=0)[:, 0], minlength=len(voxel))
     says, coloured = np.any(feature != 0.0, axis=1), np.isfinite(colour[:, 0])
 
     def total(values: np.ndarray) -> np.ndarray:
@@ -105,6 +115,8 @@ def fused(pixels: list[Pixels]) -> VoxelSums:
         rgb_sum=total(np.where(coloured[:, None], weight[:, None] * colour, 0.0)),
         rgb_weight=total(np.where(coloured, weight, 0.0)),
         hits=total(np.ones(len(which))).astype(np.int64),
+        views=views.astype(np.int32),
+        sharp=total(sharp).astype(np.int64),
         last_seen_s=last_seen_s,
     )
 
@@ -113,6 +125,8 @@ def assert_same_sums(found: VoxelSums, expected: VoxelSums) -> None:
     """Weights agree to 1e-12, sums of features to 1e-5 of the largest number of the voxel's feature."""
     np.testing.assert_array_equal(found.index, expected.index)
     np.testing.assert_array_equal(found.hits, expected.hits)
+    np.testing.assert_array_equal(found.views, expected.views)
+    np.testing.assert_array_equal(found.sharp, expected.sharp)
     np.testing.assert_array_equal(found.last_seen_s, expected.last_seen_s)
     for name in ("weight", "rgb_weight", "rgb_sum"):
         np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-12, atol=0.0)

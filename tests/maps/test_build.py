@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,16 +14,22 @@ from build_fakes import SETTINGS, Walk, register_fakes, write_beeps
 from hypothesis import given
 from hypothesis import strategies as st
 
+sys.path.insert(0, str(Path(__file__).parent.parent / "recordings"))
+from recording_scenes import save_depth, shots, write_folder
+
 from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.maps.build import build_map, build_part, describe, merge_parts
 from avlmaps.maps.partial_maps import load_part, plan_spans
+from avlmaps.maps.plan import audio_key
 from avlmaps.maps.prefetch import run_ahead
 from avlmaps.maps.settings import BuildSettings, FrameSettings
 from avlmaps.maps.store.array_validation import array_fields
 from avlmaps.maps.store.reader import StoredMap, open_stored, verify_stored
 from avlmaps.maps.types import Keyframes
 from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.subset import Subset
+from avlmaps.recordings.types import Frame
 
 PROFILE = register_fakes()
 
@@ -36,7 +43,7 @@ def content_of(path: Path) -> dict[str, bytes]:
     files = {
         str(file.relative_to(path)): file.read_bytes()
         for file in path.rglob("*")
-        if file.is_file() and file.name != ".lock"
+        if file.is_file() and file.name not in (".lock", ".checked.json")
     }
     manifest = json.loads(files.pop("map.json"))
     manifest.pop("timings")
@@ -179,13 +186,13 @@ def test_the_first_bad_frame_stops_a_strict_build_with_its_own_sentence(tmp_path
 def test_a_stopped_build_reads_no_finished_frame_again(tmp_path: Path) -> None:
     walk, read = Walk(20), []
 
-    def frame_until_the_second_14(index: int):  # the first reading looks for the ground
+    def frame_until_the_third_14(index: int):  # the first two look for the ground and at the depth's error
         read.append(index)
-        if index == 14 and read.count(14) == 2:
+        if index == 14 and read.count(14) == 3:
             raise KeyboardInterrupt
         return Walk.frame(walk, index)
 
-    walk.frame = frame_until_the_second_14
+    walk.frame = frame_until_the_third_14
     with pytest.raises(KeyboardInterrupt):
         build(walk, tmp_path / "a")
     walk.frame = lambda index: read.append(index) or Walk.frame(walk, index)
@@ -197,7 +204,7 @@ def test_a_stopped_build_reads_no_finished_frame_again(tmp_path: Path) -> None:
 def stop_after_four_parts(path: Path) -> None:
     """Leave a half-built map of 20 frames."""
     with pytest.raises(RecordingError):
-        build(Walk(20, bad=(16,)), path, replace(SETTINGS, frames=replace(SETTINGS.frames, on_bad="stop")))
+        build(Walk(20, bad=(18,)), path, replace(SETTINGS, frames=replace(SETTINGS.frames, on_bad="stop")))
 
 
 def test_without_resume_all_is_done_anew(tmp_path: Path) -> None:
@@ -407,3 +414,48 @@ def test_maps_can_be_moved_and_copied(tmp_path: Path) -> None:
 def test_merging_no_parts_is_refused(tmp_path: Path) -> None:
     with pytest.raises(MapError, match=r"^There are no parts to merge into .*; name the folders that build_part wrote"):
         merge_parts([], tmp_path / "sum")
+
+
+class Written(Walk):
+    """A walk whose files are written while it is read."""
+
+    writes = 0
+
+    def frame(self, index: int) -> Frame:
+        self.writes += index == 3
+        return super().frame(index)
+
+    def change_stamp(self) -> str:
+        return str(self.writes)
+
+
+def test_a_recording_that_is_written_while_it_is_mapped_makes_no_map(tmp_path: Path) -> None:
+    with pytest.raises(MapError, match="were written while it was mapped, so that the map would be of two recordings"):
+        build_map(Written(8), tmp_path / "map", PROFILE, SETTINGS, progress=False)
+    assert not (tmp_path / "map/map.json").exists() and not list((tmp_path / "map").glob("parts/*"))
+
+
+def test_changed_content_of_the_same_size_is_another_recording_to_a_build(tmp_path: Path) -> None:
+    walk = write_folder(tmp_path / "walk")
+    first = build_map(open_recording(walk), tmp_path / "map", PROFILE, SETTINGS, progress=False)
+    build_map(open_recording(walk), tmp_path / "map", PROFILE, SETTINGS, progress=False)  # finished already
+    file = walk / "depth/000002.png"
+    size = file.stat().st_size
+    save_depth(file, np.where(shots()[2].depth_mm > 0, shots()[2].depth_mm // 2, 0))
+    with file.open("ab") as stream:
+        stream.write(bytes(max(0, size - file.stat().st_size)))
+    with pytest.raises(MapError, match=r"is a finished map already, of walk \(another recording, or it has changed\)"):
+        build_map(open_recording(walk), tmp_path / "map", PROFILE, SETTINGS, progress=False)
+    again = build_map(open_recording(walk), tmp_path / "map", PROFILE, SETTINGS, progress=False, overwrite=True)
+    assert not np.array_equal(first.info.counts.voxels, again.info.counts.voxels)
+
+
+def test_another_sound_file_of_the_same_size_is_another_build(tmp_path: Path) -> None:
+    one, two = (write_beeps(tmp_path / name, onsets) for name, onsets in (("a.flac", (0.3,)), ("b.flac", (0.3,))))
+    content = bytearray(two.read_bytes())
+    content[-2000] ^= 1
+    (tmp_path / "other").mkdir()
+    changed = tmp_path / "other" / "a.flac"
+    changed.write_bytes(content)
+    keys = [audio_key(Walk(4, audio=file)) for file in (one, changed)]
+    assert keys[0] != keys[1] and keys[0] == audio_key(Walk(4, audio=one))

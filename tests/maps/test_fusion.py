@@ -300,7 +300,15 @@ def test_a_map_grows_through_many_enlargements():
     n = len(index)
     feature = rng.normal(size=(n, 3)).astype(np.float32)
     part = VoxelSums(
-        index, feature, rng.random(n), rng.random((n, 3)), rng.random(n), np.arange(1, n + 1), rng.random(n)
+        index,
+        feature,
+        rng.random(n),
+        rng.random((n, 3)),
+        rng.random(n),
+        np.arange(1, n + 1),
+        np.arange(n, dtype=np.int32),
+        np.arange(n),
+        rng.random(n),
     )
     accumulator = VoxelAccumulator(GRID, 3)
     for some in np.array_split(rng.permutation(n), 37):

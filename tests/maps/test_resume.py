@@ -74,7 +74,11 @@ def undisturbed(builder: Builder) -> Undisturbed:
 
 def content_of(path: Path) -> dict[str, bytes]:
     """Return every file, and map.json without its timings."""
-    files = {str(f.relative_to(path)): f.read_bytes() for f in path.rglob("*") if f.is_file() and f.name != ".lock"}
+    files = {
+        str(f.relative_to(path)): f.read_bytes()
+        for f in path.rglob("*")
+        if f.is_file() and f.name not in (".lock", ".checked.json")
+    }
     manifest = json.loads(files.pop("map.json"))
     manifest.pop("timings")
     return {**files, "map.json": json.dumps(manifest, sort_keys=True).encode()}

@@ -17,7 +17,9 @@ from hypothesis.extra import numpy as hnp
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
+from avlmaps.maps import integrity
 from avlmaps.maps.build import build_map
+from avlmaps.maps.repair import damaged_files, repair_map
 from avlmaps.maps.store.array_files import SMALL_BYTES, read_array, write_array
 from avlmaps.maps.store.array_validation import array_fields, assembled, check_order
 from avlmaps.maps.store.lock import is_locked, locked
@@ -209,7 +211,7 @@ def test_a_map_json_that_is_none(copied: Path, content: bytes, said: str) -> Non
     assert refused(copied).startswith(f"{copied}/map.json {said}")
 
 
-MEND = "restore it from a copy, or build the map again with --overwrite."
+MEND = "repair it with `avlmaps info MAP --repair --recording REC`, or restore it from a copy."
 
 
 def test_a_missing_file(copied: Path) -> None:
@@ -231,11 +233,14 @@ def test_a_flipped_bit_in_a_small_file_is_always_seen(copied: Path) -> None:
     assert refused(copied) == f"{file} is damaged: its checksum is not the one that was written; {MEND}"
 
 
-def test_a_flipped_bit_in_a_large_file_is_seen_when_asked(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_flipped_bit_in_a_large_file_is_seen_where_it_is_read(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
     file = file_of(copied, "voxels/feature")
     flip(file)
-    open_stored(copied)
+    said = f"{file} is damaged: its checksum is not the one that was written; {MEND}"
+    with pytest.raises(MapError) as fault:
+        open_stored(copied).voxels  # noqa: B018 - reading is what waits for the check
+    assert str(fault.value) == said
     assert refused(copied, verify=True) == f"{file} is damaged: its checksum is not the one that was written; {MEND}"
 
 
@@ -379,7 +384,7 @@ def test_an_array_that_may_not_be_read_is_not_called_damaged(tmp_path: Path, mon
     def refuse(*arguments: object, **named: object) -> None:
         raise PermissionError(errno.EACCES, "Permission denied")
 
-    monkeypatch.setattr(np, "load", refuse)
+    monkeypatch.setattr("avlmaps.core.npy.open_regular", refuse)
     with pytest.raises(MapError, match=r"cannot be read \(Permission denied\); check its permissions\.$"):
         read_array(tmp_path, info)
 
@@ -410,3 +415,121 @@ def test_scores_of_some_keypoints_only_are_a_damage(copied: Path) -> None:
     assert refused(copied) == (
         f"{copied}/keyframes, score has {count - 1} rows; xy has {count}; build the map again with --overwrite."
     )
+
+
+def test_an_opened_map_is_checked_once_and_again_when_a_file_was_written(
+    copied: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
+    read: list[Path] = []
+    real = integrity.open_regular
+    monkeypatch.setattr(integrity, "open_regular", lambda path, limit: (read.append(path), real(path, limit))[1])
+    assert open_stored(copied).guard.faults == () and len(read) > 10  # a copy is read once
+    read.clear()
+    assert open_stored(copied).guard.faults == () and not read
+    file = file_of(copied, "voxels/weight")
+    before = file.stat()
+    flip(file)
+    os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert [file.name in fault for fault in open_stored(copied).guard.faults] == [True]
+
+
+def test_a_map_that_was_just_built_is_not_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
+    monkeypatch.setattr(integrity, "open_regular", None)
+    assert build_map(Walk(8), tmp_path / "map", PROFILE, SETTINGS, progress=False).guard.faults == ()
+
+
+def test_every_flipped_bit_in_a_large_file_is_seen(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
+    rng = np.random.default_rng(0)
+    for entry in json.loads((copied / "map.json").read_text())["files"].values():
+        file = copied / entry["path"]
+        whole = file.read_bytes()
+        broken = bytearray(whole)
+        broken[rng.integers(128, len(whole))] ^= 1 << int(rng.integers(8))
+        file.write_bytes(broken)
+        with pytest.raises(MapError, match=r"is damaged: its checksum is not the one that was written|do not divide"):
+            open_stored(copied).voxels  # noqa: B018
+        file.write_bytes(whole)
+    assert len(open_stored(copied).voxels) > 0
+
+
+def test_a_file_that_is_cut_off_under_an_open_map_is_a_sentence_and_no_bus_error(
+    copied: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
+    stored = open_stored(copied)
+    assert len(stored.voxels)
+    file = file_of(copied, "voxels/feature")
+    os.truncate(file, 4096)
+    with pytest.raises(MapError, match=r"was written while the map was open \(it had \d+ bytes, now 4096\)"):
+        stored.voxels  # noqa: B018
+
+
+def test_an_open_map_stays_readable_when_another_takes_its_place(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
+    stored = open_stored(copied)
+    count = len(stored.voxels)
+    build_map(Walk(6, seed=3), copied, PROFILE, SETTINGS, progress=False, overwrite=True)
+    assert len(stored.voxels) == count and np.isfinite(np.asarray(stored.voxels.weight)).all()
+
+
+@pytest.mark.parametrize("large", [False, True])
+@pytest.mark.parametrize(
+    "name", ["voxels/feature", "voxels/weight", "keyframes/world_from_camera", "keyframes/place", "sounds/track"]
+)
+def test_a_nan_with_the_right_checksum_is_refused(
+    copied: Path, name: str, large: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    array = np.load(file_of(copied, name))
+    if not array.size:
+        array = np.zeros((1, *array.shape[1:]), array.dtype)
+    array.reshape(-1)[-1] = np.nan
+    replace(copied, name, array)
+    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0 if large else SMALL_BYTES)
+    with pytest.raises(MapError, match=r"holds numbers that are NaN or infinite|divide|sounds"):
+        open_stored(copied).voxels  # noqa: B018
+
+
+def test_voxels_beyond_any_building_are_refused(copied: Path) -> None:
+    index = np.load(file_of(copied, "voxels/index"))
+    index[-1, 0] = 2_000_000
+    replace(copied, "voxels/index", index)
+    assert "voxels extend over 100,0" in refused(copied)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+@pytest.mark.parametrize("name", ["voxels/rgb", "keyframes/thumbnails"])
+def test_a_pipe_in_place_of_a_file_is_refused(copied: Path, name: str) -> None:
+    file = file_of(copied, name)
+    file.unlink()
+    os.mkfifo(file)
+    assert refused(copied) == f"{file} cannot be read (it is a pipe, not a regular file); {MEND}"
+
+
+def test_json_nested_a_thousand_deep_is_a_sentence(copied: Path) -> None:
+    (copied / "map.json").write_bytes(b'{"a":' * 5000 + b"1" + b"}" * 5000)
+    assert "nested too deeply" in refused(copied)
+
+
+def test_a_sparse_map_json_of_20_gb_is_refused_by_its_size(copied: Path) -> None:
+    os.truncate(copied / "map.json", 20_000_000_000)
+    assert "it has 20,000,000,000 bytes, more than the 256,000,000 of the largest such file" in refused(copied)
+
+
+def test_a_repair_gives_back_what_was_built(copied: Path) -> None:
+    before = {file: file.read_bytes() for file in copied.rglob("*-*.*") if file.is_file()}
+    flip(file_of(copied, "voxels/feature"))
+    file_of(copied, "keyframes/xy").unlink()
+    assert set(damaged_files(copied)) == {"voxels/feature", "keyframes/xy"}
+    with pytest.raises(MapError, match=r"2 of \d+ files of .* are damaged \(keyframes/xy, voxels/feature\); give"):
+        repair_map(copied, None)
+    with pytest.raises(MapError, match="was built from another recording"):
+        repair_map(copied, Walk(12, seed=9))
+    done = repair_map(copied, Walk(12))
+    assert set(done.files) == {"voxels/feature", "keyframes/xy"}
+    assert not damaged_files(copied) and not (copied / ".repair").exists()
+    if not done.rebuilt:
+        assert all(file.read_bytes() == content for file, content in before.items())
+    assert repair_map(copied, None).files == ()

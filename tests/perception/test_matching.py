@@ -53,6 +53,14 @@ def test_a_point_with_two_look_alikes_is_left_out() -> None:
     assert matched(a, b).shape == (0, 2)
 
 
+@given(st.integers(0, 10_000), st.integers(1, 20))
+def test_look_alikes_that_differ_by_rounding_are_left_out_too(seed: int, n: int) -> None:
+    """Which of them is nearer is chance: it depends on the order in which a processor adds."""
+    a = unit_rows(seed, n, dim=64)
+    again = np.nextafter(a, np.random.default_rng(seed).choice([-2.0, 2.0], a.shape).astype(np.float32))
+    assert matched(a, np.concatenate([a, again, unit_rows(seed + 1, 3, dim=64)])).shape == (0, 2)
+
+
 def test_without_points_there_are_no_pairs() -> None:
     none, some = np.zeros((0, 8), np.float32), unit_rows(0, 3)
     assert matched(none, some).shape == matched(some, none).shape == matched(none, none).shape == (0, 2)

@@ -36,7 +36,7 @@ def locating(
 
 def test_the_answer_has_the_keys_of_the_contract(heard: AVLMap) -> None:
     answer = heard.ask(Question.of([CHAIR, DOG]), top=1).to_json()
-    assert list(answer) == ["goals", "found", "parts", "elapsed_ms"]
+    assert list(answer) == ["goals", "found", "parts", "elapsed_ms", "frame", "level_from_recording"]
     (goal,) = answer["goals"]
     assert list(goal) == ["position", "score", "size", "parts"]
     assert set(goal["parts"]) == {"object", "sound"}

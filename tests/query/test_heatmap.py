@@ -158,6 +158,18 @@ def test_one_score_and_equal_scores_become_one() -> None:
     assert len(normalised(np.zeros(0))) == 0
 
 
+@given(
+    hnp.arrays(np.float64, st.integers(1, 8), elements=st.floats(-1, 1)),
+    st.floats(-2, 2) | st.floats(-200, 200),
+)
+def test_scores_that_differ_by_rounding_alone_are_equal(noise, score) -> None:
+    rounding = 2.0 * np.finfo(np.float32).eps * max(1.0, abs(score))
+    np.testing.assert_array_equal(normalised(score + rounding * noise), np.ones(len(noise)))
+    apart = normalised(np.append(score + rounding * noise, score + 1e-3 * max(1.0, abs(score))))
+    assert apart[-1] == 1.0
+    assert np.all(apart[:-1] < 1e-3)
+
+
 def test_scores_that_are_no_numbers_are_refused() -> None:
     with pytest.raises(ValueError, match="a score is NaN or infinite"):
         normalised(np.array([0.1, np.nan]))

@@ -100,7 +100,7 @@ def test_a_faintly_meant_name_still_competes() -> None:
 def test_a_word_that_means_nothing_is_not_found_and_says_so() -> None:
     factor = ask("elephant")
     assert not factor.found and not factor.mask.any()
-    assert factor.note == "the pixel encoder knows nothing like 'elephant'"
+    assert factor.note == "'elephant' is not a known thing, so the pixel encoder has nothing to look for"
 
 
 @pytest.mark.parametrize(("phrase", "clump"), [("red chair", 0), ("blue dining table", 1), ("white chair", 3)])
@@ -165,3 +165,19 @@ def test_who_must_guess_is_told_of_things_that_are_too_unsure_to_be_told() -> No
     table = Heatmap.of(ask("coffee table", least_confidence=0.45))
     assert [goal.score for goal in table.goals(5)] == [pytest.approx(0.5, abs=0.01)]
     assert [goal.score for goal in table.with_unsure().goals(5)][1:] == [pytest.approx(0.3, abs=0.01)]
+
+
+def test_a_colour_never_answers_for_a_noun_that_nobody_knows() -> None:
+    factor = ask("red elephant", RGB)
+    assert not factor.found
+    assert not factor.mask.any()
+    assert factor.note == "'elephant' is not a known thing, so the pixel encoder has nothing to look for"
+    assert not ask("blue zebra", RGB).found
+    assert ask("something red", RGB).mask.any()
+
+
+def test_a_known_compound_that_holds_a_colour_word_is_no_colour() -> None:
+    factor = ask("white board", RGB)
+    assert not factor.mask.any()
+    assert factor.note == "'whiteboard' is a known word, but this map's pixel encoder was not trained to detect it"
+    assert ask("labtop", RGB).note.endswith("did you mean laptop?")

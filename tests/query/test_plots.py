@@ -1,17 +1,25 @@
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 from query_fakes import UP, box, fake_map, furnished_map, keyframes_at, sounds_of, voxels_of
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.plots import plot_map
+from avlmaps.query.heatmap import Heatmap, HeatSettings, NearThings
+from avlmaps.query.modalities.image import image_factor
+from avlmaps.query.plots import HEAT_LABEL, plot_map
 from avlmaps.query.topdown import TopDown
 from avlmaps.query.voxel_space import Space
 
+CHAIR = Part(Modality.OBJECT, "chair")
 WALK = np.stack([np.linspace(1, 5, 20), 1 + np.sin(np.linspace(0, 3, 20)), np.full(20, 1.4)], axis=1)
 
 
@@ -61,9 +69,57 @@ def test_the_colour_from_above_is_that_of_the_highest_voxels_under_the_ceiling()
 
 
 def test_without_a_path_a_plot_is_a_figure_for_a_notebook() -> None:
-    from matplotlib.figure import Figure
-
     m = AVLMap(furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK)))
     figure = (m.object("chair", primary=True) * m.sound("dog")).plot()
     assert isinstance(figure, Figure)
     assert len(figure.axes) >= 3
+
+
+def brightest(figure: Figure) -> float:
+    """How bright the brightest heat is that a figure shows, whatever its opacity."""
+    layers = [image for ax in figure.axes for image in ax.images if np.asarray(image.get_array()).shape[-1] == 4]
+    return max(float(np.asarray(layer.get_array())[..., :3].sum(axis=-1).max()) for layer in layers) / 3.0
+
+
+def test_what_was_not_found_is_drawn_as_dark_as_it_is_unsure() -> None:
+    m = AVLMap(furnished_map())
+    sure, unsure = m.object("chair", primary=True), m.object("chair", primary=True)
+    assert sure.found
+    factor = unsure.factors[0]
+    assert isinstance(factor, NearThings)
+    factor = replace(factor, confidence=0.2 * factor.confidence, found=False)
+    unsure = Heatmap.of(factor)
+    assert unsure.peak == pytest.approx(1.0), "the heat itself is the paper's"
+    assert unsure.shown.max() == pytest.approx(0.2 * sure.shown.max())
+    assert unsure.shown.max() == pytest.approx(unsure.goals(1)[0].score, abs=1e-3), "a picture and a score agree"
+    assert brightest(unsure.plot()) < 0.5 * brightest(sure.plot())
+    texts = [text.get_text() for text in unsure.plot().findobj(Text)]
+    assert HEAT_LABEL in texts and "confidence" in HEAT_LABEL
+    assert any("not found, at most 0." in text for text in texts)
+
+
+def test_each_thing_is_drawn_by_its_own_confidence_and_a_product_by_that_of_what_is_sought() -> None:
+    m = AVLMap(furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK)))
+    factor = m.object("chair", primary=True).factors[0]
+    assert isinstance(factor, NearThings)
+    along_x = m.stored.voxels.index[factor.mask][:, 0]
+    split = (along_x > np.median(along_x)).astype(int)
+    factor = replace(factor, instance=split, confidence=np.array([1.0, 0.25]), with_unsure=None)
+    shown = factor.shown[factor.mask]
+    np.testing.assert_allclose(shown, np.where(split == 1, 0.25, 1.0), atol=1e-6)
+    both = Heatmap.of(factor) * m.sound("dog")
+    rows = np.flatnonzero(factor.mask)
+    np.testing.assert_allclose(both.shown[rows], both.values[rows] * shown, atol=1e-6)
+    assert (both.shown <= both.values).all()
+
+
+def test_a_photo_that_is_only_guessed_is_no_certainty() -> None:
+    part = Part(Modality.IMAGE, "photo.jpg", Role.PRIMARY, is_file=True)
+    space = AVLMap(furnished_map()).object("chair").space
+    located = SimpleNamespace(world_from_camera=None, guess=np.eye(4), inliers=9, score=0.3)
+    factor = image_factor(space, located, part, HeatSettings())  # pyright: ignore[reportArgumentType]
+    assert not factor.found
+    assert Heatmap.of(factor).goals(1)[0].score == pytest.approx(0.3, abs=1e-3)
+    assert factor.shown.max() <= 0.3
+    located.world_from_camera = np.eye(4)
+    assert Heatmap.of(image_factor(space, located, part, HeatSettings())).goals(1)[0].score == 1.0  # pyright: ignore

@@ -1,6 +1,7 @@
 """Our own folder format: written by hand, written by the writer, cut short, and asked for a lot of frames."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -156,7 +157,9 @@ def test_frames_outside_the_poses_are_left_out_and_told(tmp_path: Path):
     _describe(path, rgb_rate_hz=10.0)
     recording = open_recording(path)
     assert recording.stamps_s.tolist() == [0.0, 0.1, 0.2]
-    assert recording.notices[0] == "2 frame(s) lie outside the poses of poses.csv or in a gap of them; left out."
+    assert recording.notices[0] == (
+        "2 of 5 frame(s) lie outside the poses of poses.csv (0.00 to 0.20 s) or in a gap of them; left out."
+    )
 
 
 def test_pictures_and_poses_that_do_not_match_are_told_with_what_to_add(tmp_path: Path):
@@ -362,14 +365,14 @@ def test_opening_five_thousand_frames_opens_no_picture_and_takes_little_memory(
     (path / "poses.csv").write_text("".join(f"{i / 30},{i / 100},0,0,0,0,0,1\n" for i in range(count)))
     monkeypatch.setattr(cv2, "imdecode", None)
     opened: list[Path] = []
-    read_bytes = Path.read_bytes
-    monkeypatch.setattr(Path, "read_bytes", lambda self: (opened.append(self), read_bytes(self))[1])
+    real_open = os.open
+    monkeypatch.setattr(os, "open", lambda path, *rest: (opened.append(Path(path)), real_open(path, *rest))[1])
     tracemalloc.start()
     recording = open_recording(path)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert len(recording) == count
-    assert [file.name for file in opened] == ["recording.json"]
+    assert [file.name for file in opened] == ["recording.json", "poses.csv"]
     assert peak < 2000 * count
     monkeypatch.undo()
     assert picture.exists()

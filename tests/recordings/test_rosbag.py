@@ -13,6 +13,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import from_quaternion, inverse
+from avlmaps.recordings.audio import Sound, write_flac
 from avlmaps.recordings.formats.ros_messages import camera_of, depth_of
 from avlmaps.recordings.formats.rosbag import open_rosbag
 from avlmaps.recordings.open import open_recording
@@ -145,6 +146,13 @@ def write_bag(
     return maker.path
 
 
+def test_a_bag_knows_how_far_the_robots_base_lies_below_the_camera(tmp_path: Path) -> None:
+    recording = open_recording(write_bag(tmp_path, "mcap"))
+    base = recording.base_height
+    assert base is not None and not base.on_floor
+    assert base.below_camera_m == pytest.approx(BODY_FROM_CAMERA[2, 3])
+
+
 @pytest.mark.parametrize("kind", ["ros1", "ros2", "mcap"])
 @pytest.mark.parametrize("poses", ["tf", "odometry"])
 def test_a_bag_opens_with_interpolated_poses_of_the_camera(tmp_path: Path, kind: str, poses: str) -> None:
@@ -158,6 +166,14 @@ def test_a_bag_opens_with_interpolated_poses_of_the_camera(tmp_path: Path, kind:
     assert frame.depth_m[5, 5] == pytest.approx(1.003)
     assert (recording.rig.rgb.fx, recording.rig.rgb.cx) == (30.0, 16.0)
     assert recording.up_in_world == pytest.approx((0.0, 0.0, 1.0))
+
+
+def test_a_bag_names_the_topics_that_were_chosen(tmp_path: Path) -> None:
+    images = {"rgb": "/camera/color/image_raw", "depth": "/camera/depth/image_raw"}
+    by_tf = open_rosbag(write_bag(tmp_path / "a", "ros2", sound=True))
+    assert by_tf.topics == {**images, "pose": "/tf", "audio": "/audio/audio"}
+    by_odometry = open_rosbag(write_bag(tmp_path / "b", "ros2", "odometry"))
+    assert by_odometry.topics == {**images, "pose": "/odom"}
 
 
 def test_a_single_mcap_file_opens_like_its_folder(tmp_path: Path) -> None:
@@ -253,7 +269,7 @@ def test_a_named_topic_of_the_wrong_kind_is_refused(tmp_path: Path) -> None:
         RecordingError, match="is of the type sensor_msgs/msg/Image, which tells no poses; name a topic"
     ):
         open_rosbag(path, {"pose": "/camera/color/image_raw"})
-    with pytest.raises(RecordingError, match=r"has no topic '/ear'; name one that it has \(audio=TOPIC\)\.$"):
+    with pytest.raises(RecordingError, match=r"has no sound topic '/ear' \(it has: none\); name one of them\.$"):
         open_rosbag(path, {"audio": "/ear"})
 
 
@@ -267,3 +283,134 @@ def test_registered_depth_without_a_calibration_takes_that_of_colour(tmp_path: P
     recording = open_rosbag(write_bag(tmp_path, "ros2", depth_info=False))
     assert recording.rig.depth == recording.rig.rgb
     assert any("that of /camera/color/image_raw is used" in notice for notice in recording.notices)
+
+
+def _sound(maker: BagMaker, topic: str = "/audio/audio") -> None:
+    tone = (8000 * np.sin(np.arange(RATE_HZ) * 0.3)).astype("<i2").view(np.uint8)
+    for piece in range(10):
+        part = tone[piece * len(tone) // 10 : (piece + 1) * len(tone) // 10]
+        maker.write(topic, maker.t("audio_common_msgs/msg/AudioData", part), START_S + piece * 0.1)
+
+
+def bag_with(folder: Path, kind: str, monkeypatch: pytest.MonkeyPatch, more, **settings) -> Path:
+    """Write the usual bag and let ``more(maker)`` add messages to it."""
+    camera_info, done = BagMaker.camera_info, []
+
+    def first_then_more(self: BagMaker, topic: str, stamp_s: float) -> None:
+        if not done:
+            done.append(more(self))
+        camera_info(self, topic, stamp_s)
+
+    monkeypatch.setattr(BagMaker, "camera_info", first_then_more)
+    return write_bag(folder, kind, **settings)
+
+
+@pytest.mark.parametrize("kind", ["ros1", "ros2"])
+def test_plain_samples_without_audio_info_say_how_to_name_them(
+    tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = bag_with(tmp_path, kind, monkeypatch, _sound)
+    with pytest.raises(
+        RecordingError, match=r"has no AudioInfo and is no MP3.*audio_pcm=16000,1.*--audio FILE.*audio=none"
+    ):
+        open_rosbag(path)
+    recording = open_rosbag(path, {"audio_pcm": f"{RATE_HZ}"})
+    audio = recording.audio
+    assert audio is not None and audio.rate_hz == RATE_HZ and audio.duration_s == pytest.approx(1.0)
+    assert np.abs(audio.read().samples).max() == pytest.approx(8000 / 32768, rel=0.02)
+    assert open_rosbag(path, {"audio": "none"}).audio is None
+    own = tmp_path / "own.flac"
+    write_flac(own, Sound(np.full(16_000, 0.1, np.float32), 16_000))
+    assert open_recording(path, audio=own).audio.path == own  # pyright: ignore[reportOptionalMemberAccess]
+    for words in ("fast", "16000,x", "0", "16000,0"):
+        with pytest.raises(RecordingError, match="audio_pcm"):
+            open_rosbag(path, {"audio_pcm": words})
+
+
+@pytest.mark.parametrize(("rate_hz", "channels"), [(0, 1), (16_000, 0), (4_000_000_000, 1)])
+def test_audio_info_with_impossible_numbers_is_a_sentence(
+    tmp_path: Path, rate_hz: int, channels: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def more(maker: BagMaker) -> None:
+        info = maker.t("audio_common_msgs/msg/AudioInfo", channels, rate_hz, "S16LE", 0, "wave")
+        maker.write("/audio/audio_info", info, START_S)
+        _sound(maker)
+
+    path = bag_with(tmp_path, "ros2", monkeypatch, more)
+    with pytest.raises(
+        RecordingError, match=rf"AudioInfo of /audio/audio says {rate_hz} samples a second and {channels} ch"
+    ):
+        open_rosbag(path)
+
+
+def test_the_samples_of_ros_2_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    samples = "float32[] float32_data\nint32[] int32_data\nint16[] int16_data\nint8[] int8_data\nuint8[] uint8_data"
+    name = "audio_common_msgs/msg/"
+    types = {
+        **get_types_from_msg(samples, name + "AudioData"),
+        **get_types_from_msg("int16 format\nint16 channels\nint32 rate\nint32 chunk", name + "AudioInfo"),
+        **get_types_from_msg(f"{name}AudioData audio_data\n{name}AudioInfo info", name + "Audio"),
+        **get_types_from_msg(f"std_msgs/msg/Header header\n{name}Audio audio", name + "AudioStamped"),
+    }
+    rates = [RATE_HZ]
+
+    def more(maker: BagMaker) -> None:
+        store = get_typestore(Stores.ROS2_HUMBLE)
+        store.register(types)
+        maker.store = store
+        none = {np.float32: 0, np.int32: 0, np.int8: 0, np.uint8: 0}
+        tone = (8000 * np.sin(np.arange(RATE_HZ // 10) * 0.3)).astype(np.int16)
+        f4, i4, i1, u1 = (np.zeros(0, kind) for kind in none)
+        for piece in range(10):
+            content = maker.t(name + "AudioData", f4, i4, tone, i1, u1)
+            info = maker.t(name + "AudioInfo", 8, 1, rates[piece % len(rates)], 512)
+            audio = maker.t(name + "Audio", content, info)
+            stamp_s = START_S + piece * 0.1
+            maker.write("/mic", maker.t(name + "AudioStamped", maker.header(stamp_s, "mic"), audio), stamp_s)
+
+    (tmp_path / "one").mkdir()
+    path = bag_with(tmp_path / "one", "ros2", monkeypatch, more)
+    for topics in ({}, {"audio": "/mic"}):
+        recording = open_rosbag(path, topics)
+        audio = recording.audio
+        assert audio is not None and audio.rate_hz == RATE_HZ and audio.duration_s == pytest.approx(1.0)
+        assert np.abs(audio.read().samples).max() == pytest.approx(8000 / 32768, rel=0.02)
+    monkeypatch.undo()
+    for wrong, said in (([0], "says 0 samples a second"), ([RATE_HZ, 16_000], "changes from 8000 to 16000 samples")):
+        rates[:] = wrong
+        (tmp_path / str(len(wrong))).mkdir()
+        with monkeypatch.context() as patch, pytest.raises(RecordingError, match=said):
+            open_rosbag(bag_with(tmp_path / str(len(wrong)), "ros2", patch, more))
+
+
+def test_a_cycle_of_transforms_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = bag_with(
+        tmp_path,
+        "ros2",
+        monkeypatch,
+        lambda maker: maker.tf("/tf", START_S, "base_link", "map", world_from_body(START_S)),
+    )
+    with pytest.raises(RecordingError, match=r"go round in a circle \(base_link -> map -> base_link\)"):
+        open_rosbag(path)
+
+
+def test_a_nan_in_tf_is_told_and_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = world_from_body(START_S)
+    broken[0, 3] = np.nan
+    path = bag_with(
+        tmp_path, "ros2", monkeypatch, lambda maker: maker.tf("/tf", START_S + 0.05, "map", "base_link", broken)
+    )
+    recording = open_rosbag(path)
+    assert "1 transform(s) from 'base_link' to 'map' are none (NaN, or no rotation) and left out." in recording.notices
+    assert np.isfinite(recording.world_from_camera).all()
+
+
+def test_poses_on_another_clock_name_both(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tf = BagMaker.tf
+    monkeypatch.setattr(
+        BagMaker, "tf", lambda self, topic, stamp_s, *rest: tf(self, topic, stamp_s + 500 * (topic == "/tf"), *rest)
+    )
+    with pytest.raises(
+        RecordingError, match=r"from 1000\.050 to .* s\); its poses go from 1500\.000 to 1501\.000 s, so check"
+    ):
+        open_rosbag(write_bag(tmp_path, "ros2"))

@@ -1,5 +1,7 @@
 """What the network tells apart. The order is that of its outputs, so new names go to the end."""
 
+from avlmaps.core.lexicon import Kind, lexicon
+
 CATEGORIES = (
     "wall", "floor", "ceiling", "column", "stairs", "railing",
     "chair", "armchair", "office chair", "stool", "bench", "sofa", "ottoman",
@@ -29,10 +31,14 @@ ROOMS = (
     "copy room",
 )  # fmt: skip
 
-# What homes and offices call their areas, where it is not the name above.
-ROOM_OF_AREA = {
-    "study": "office", "storage": "storage room", "corridor": "hallway", "toilet": "bathroom", "toilets": "bathroom",
-    "kitchenette": "kitchen", "copy corner": "copy room", "lounge": "living room",
-}  # fmt: skip
-
 UNLABELLED = 255
+
+
+def room_of(area: str) -> str:
+    """Return the room of ``ROOMS`` that an area is, or ``""``: what homes call a study is an office."""
+    known = lexicon()
+    for entry in known.senses(area, Kind.ROOM):
+        for name in (entry.name, *(wide.name for wide in known.wider(entry.name, Kind.ROOM))):
+            if name in ROOMS:
+                return name
+    return ""

@@ -1,61 +1,31 @@
-"""Other phrases for the categories, and wider words that take several of them in; everything else is the words' own."""
+"""Other phrases for the categories, and wider words that take several of them in, from the project's lexicon."""
 
-CALLED: dict[str, tuple[str, ...]] = {
-    "sofa": ("couch", "settee"),
-    "tv": ("television", "telly", "tv screen"),
-    "carpet": ("rug",),
-    "picture": ("painting", "picture frame", "photo on the wall", "poster"),
-    "refrigerator": ("fridge",),
-    "stove": ("oven", "cooker", "hob"),
-    "kitchen counter": ("countertop", "worktop", "counter"),
-    "chandelier": ("ceiling lamp", "pendant lamp", "ceiling light"),
-    "lamp": ("floor lamp", "table lamp", "desk lamp"),
-    "plant": ("potted plant", "houseplant"),
-    "trash can": ("waste bin", "rubbish bin", "bin"),
-    "nightstand": ("bedside table", "night table"),
-    "chest of drawers": ("dresser", "drawers"),
-    "tv cabinet": ("tv stand", "media console"),
-    "wardrobe": ("closet",),
-    "bookshelf": ("bookcase", "shelf with books"),
-    "fitness equipment": ("treadmill", "exercise bike", "exercise machine", "gym equipment"),
-    "mat": ("doormat", "exercise mat"),
-    "window": ("window pane",),
-    "loudspeaker": ("speaker",),
-    "computer": ("computer tower", "pc"),
-    "air conditioner": ("air conditioning",),
-    "bag": ("backpack", "handbag", "suitcase"),
-    "sink": ("washbasin", "wash basin", "faucet", "tap"),
-    "toilet": ("lavatory", "loo", "wc"),
-    "curtain": ("drapes",),
-    "shoes": ("shoe",),
-    "kitchen cabinet": ("wall cabinet", "kitchen cupboard"),
-    "cabinet": ("sideboard", "display cabinet"),
-    "living room": ("lounge", "sitting room"),
-    "hallway": ("corridor", "hall"),
-    "office": ("study", "home office"),
-    "bathroom": ("toilet room", "washroom"),
-    "storage room": ("storeroom",),
-    "children's room": ("nursery", "kids room"),
-    "laundry room": ("utility room",),
-    "entrance hall": ("entrance", "foyer"),
-    "gym": ("fitness room",),
-}
+from training.pixels.labels import CATEGORIES, ROOMS
 
-KINDS: dict[str, tuple[str, ...]] = {
-    "table": ("dining table", "coffee table", "side table", "console table", "desk"),
-    "seat": ("chair", "armchair", "office chair", "stool", "bench", "sofa", "ottoman"),
-    "place to sit": ("chair", "armchair", "office chair", "stool", "bench", "sofa", "ottoman"),
-    "place to sleep": ("bed", "bunk bed", "crib", "sofa"),
-    "cupboard": ("cabinet", "kitchen cabinet", "wardrobe"),
-    "light": ("lamp", "chandelier"),
-    "screen": ("tv", "monitor", "laptop"),
-    "shelf": ("bookshelf", "wall shelf", "shoe rack"),
-    "counter": ("kitchen counter", "kitchen island"),
-    "furniture": (
-        "chair", "armchair", "office chair", "stool", "bench", "sofa", "ottoman", "dining table", "coffee table",
-        "desk", "side table", "console table", "bed", "crib", "bunk bed", "nightstand", "wardrobe",
-        "chest of drawers", "bookshelf", "cabinet", "tv cabinet",
-    ),
-    "workplace": ("office", "open-plan office"),
-    "place to cook": ("kitchen",),
+from avlmaps.core.lexicon import Kind, lexicon
+
+# The wider words that notes carry; everything else is left to the nearness of words.
+_WIDE = {
+    Kind.THING: ("table", "seat", "place to sit", "place to sleep", "cupboard", "light", "screen", "shelf", "counter",
+                 "furniture"),
+    Kind.ROOM: ("workplace", "place to cook"),
 }  # fmt: skip
+_NAMES = {Kind.THING: CATEGORIES, Kind.ROOM: ROOMS}
+
+
+def _called() -> dict[str, tuple[str, ...]]:
+    entries = [lexicon().named(name, kind) for kind, names in _NAMES.items() for name in names if name != "other"]
+    return {entry.name: entry.learnt for entry in entries if entry.learnt}
+
+
+def _kinds() -> dict[str, tuple[str, ...]]:
+    members = {word: {entry.name for entry in lexicon().members(word)} for words in _WIDE.values() for word in words}
+    return {
+        word: tuple(name for name in _NAMES[kind] if name in members[word])
+        for kind, words in _WIDE.items()
+        for word in words
+    }
+
+
+CALLED: dict[str, tuple[str, ...]] = _called()
+KINDS: dict[str, tuple[str, ...]] = _kinds()

@@ -15,7 +15,7 @@ from time import perf_counter, time
 
 import numpy as np
 import tyro
-from training.pixels.labels import CATEGORIES, ROOM_OF_AREA, ROOMS, UNLABELLED
+from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED, room_of
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.sim.furniture.catalogue import Families
@@ -173,7 +173,7 @@ def _rooms_seen(scene: Scene, depth_m: np.ndarray, camera: Pinhole, pose: np.nda
     world = points @ pose[:3, :3].T + pose[:3, 3]
     share = np.zeros(len(ROOMS), np.float32)
     for area in scene.areas:
-        kind = _ROOM.get(ROOM_OF_AREA.get(area.kind, area.kind))
+        kind = _ROOM.get(room_of(area.kind))
         if kind is not None:
             inside = area.contains(world[:, :2]) & (np.abs(world[:, 2] - area.floor_m - 1.3) < 1.8)
             share[kind] += inside.mean() if len(inside) else 0.0

@@ -3,7 +3,6 @@
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import gcd
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,8 @@ from training.sounds.kinds import RECORDED, SYNTHESISED
 
 from avlmaps.core.progress import progress
 from avlmaps.perception.embedded import logmel
+from avlmaps.recordings.audio import Sound
+from avlmaps.recordings.resample import resampled
 from avlmaps.sim.synthesis import MAKERS
 
 SHIPPABLE = ("CC0", "CC-BY ")  # the start of a licence with which a clip may teach weights that ship
@@ -49,11 +50,9 @@ def read_index(sounds_folder: Path) -> list[Clip]:
 def read_samples(path: Path) -> Float32[np.ndarray, " n"]:
     """Read a file as mono at the encoder's rate."""
     import soundfile
-    from scipy.signal import resample_poly
 
     samples, rate_hz = soundfile.read(path, dtype="float32", always_2d=True)
-    common = gcd(rate_hz, logmel.RATE_HZ)
-    return resample_poly(samples.mean(axis=1), logmel.RATE_HZ // common, rate_hz // common).astype(np.float32)
+    return resampled(Sound(samples.mean(axis=1), rate_hz), logmel.RATE_HZ).samples
 
 
 def mels_of(samples: Float32[np.ndarray, " n"]) -> Float32[np.ndarray, "frames bands"]:

@@ -18,6 +18,7 @@ from avlmaps.bench.harness.chosen import chosen_on
 from avlmaps.bench.harness.intervals import wilson
 from avlmaps.bench.harness.provenance import in_words, provenance, shown_scene
 from avlmaps.bench.output import draw, markdown, write_answer
+from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.progress import progress
 from avlmaps.sim.scene import SceneObject
 
@@ -32,8 +33,6 @@ REACH_M = 0.5
 FEWEST_VOXELS = 15
 SMALLEST_M = 0.3
 _MOSTLY, _A_QUARTER = 0.5, 0.25
-# What scenes from files call things, where two names stand for one kind of thing.
-COUNTS_AS = {"picture frame": "picture", "rug": "carpet", "couch": "sofa", "fridge": "refrigerator", "television": "tv"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +155,7 @@ def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, Any
     jobs = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
     for job in progress(jobs, "measuring", unit="scene"):
         place = Workplace(job, open_scene)
-        figures.append(measure(place.asked, place.truth.objects, COUNTS_AS, shown_scene(job.spec)))
+        figures.append(measure(place.asked, place.truth.objects, _same(place.truth.objects), shown_scene(job.spec)))
     missed = {"columns": ["scene", "category", "first goal, m from a true one"], "rows": _missed(figures)}
     named = {"objects found by their names": table_of(figures), "categories whose first goal is elsewhere": missed}
     chosen = chosen_on(settings.scenes)
@@ -165,6 +164,12 @@ def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, Any
     written = write_answer(answer, out, f"{in_words(answer)}\n\n{markdown(tables)}")
     draw(tables, out / "objects.png")
     return written
+
+
+def _same(things: Sequence[SceneObject]) -> dict[str, str]:
+    """Return the lexicon's name for what scenes from files call otherwise: ``picture frame`` counts as ``picture``."""
+    entries = {thing.category: lexicon().find(thing.category, Kind.THING) for thing in things}
+    return {word: entry.name for word, entry in entries.items() if entry is not None}
 
 
 def _missed(scenes: Sequence[ObjectFigures]) -> list[list[str]]:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
@@ -70,6 +70,8 @@ class Bench(ModelVerb):
     indexing: the paper's Tables III to V, in twelve held-out homes, in --scenes, or in a recording with objects.json.
     navigation: the paper's Tables I, II and VI and its commands, in twelve held-out homes or in --scenes.
     """
+
+    compiles: ClassVar[bool] = True
 
     suite: Positional[Suite]
     """Suite to run."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from tyro.conf import Positional, arg
 
@@ -23,6 +23,8 @@ class Export(ModelVerb):
     Example: avlmaps export home.avlmap --out sofa.ply --heat "the sofa"
     Example: avlmaps export home.avlmap --out floor.pgm --radius-m 0.3
     """
+
+    compiles: ClassVar[bool] = True
 
     map: Positional[Path]
     """Map folder (NAME.avlmap)."""
@@ -92,7 +94,7 @@ def _write_voxels(verb: Export, opened: "AVLMap", kind: str) -> None:
     elif verb.heat is not None:
         heat = opened.ask(verb.heat).heat
         if heat is not None:
-            colors, columns = heat_colors(heat.values), {"heat": heat.values}
+            colors, columns = heat_colors(heat.shown), {"heat": heat.values}
     if kind == ".ply":
         write_ply(verb.out, opened.points, colors, columns)
     else:

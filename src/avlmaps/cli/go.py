@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
-from avlmaps.cli.output import emit, place, table_lines
+from avlmaps.cli.output import AnsweredError, emit, error_answer, kind_named, place, table_lines
 from avlmaps.cli.verb import ModelVerb
-from avlmaps.core.errors import NavigationError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +31,8 @@ class Go(ModelVerb):
 
     Example: avlmaps go MAP "first go to the sofa, then face the tv" --scene house:7 --plot way.png
     """
+
+    compiles: ClassVar[bool] = True
 
     map: Positional[Path]
     """The map."""
@@ -69,11 +70,27 @@ class Go(ModelVerb):
             answer = go(self)
         except Interrupted as stop:
             if self.json:
-                emit(stop.to_json(), (), as_json=True)
+                emit({**stop.to_json(), "error": error_answer("interrupted", str(stop))}, (), as_json=True)
             raise
-        emit(answer, go_lines(answer), self.json)
-        if not answer["ok"]:
-            raise NavigationError(answer["error"])
+        failed = _failure(answer)
+        emit({**answer, "error": failed}, go_lines(answer), self.json)
+        if failed is not None:
+            raise AnsweredError(failed["message"])
+
+
+def _failure(answer: dict[str, Any]) -> dict[str, Any] | None:
+    """Return why a command was not obeyed to its end, as ``error`` in JSON has it; None where it was."""
+    if answer["ok"]:
+        return None
+    if answer["error"] is not None:
+        return error_answer(kind_named(answer["error_type"]), answer["error"])
+    missed = [goal["name"] or place(goal["goal"]) for goal in answer["subgoals"] if not goal["reached"]]
+    message = (
+        f"The robot did not reach {len(missed)} of {len(answer['subgoals'])} goals: {', '.join(missed)}."
+        if missed
+        else "The robot could not end a movement; the notes say why."
+    )
+    return error_answer("navigation", message)
 
 
 def go_lines(answer: dict[str, Any]) -> list[str]:
@@ -91,4 +108,4 @@ def go_lines(answer: dict[str, Any]) -> list[str]:
     if answer["steps"]:
         done = "done" if answer["ok"] else "not done"
         lines.append(f"{done}: {answer['path_m']:.1f} m driven, {len(answer['actions'])} actions")
-    return lines
+    return [*lines, f"wrote {answer['plot']}"] if "plot" in answer else lines

@@ -89,6 +89,7 @@ def _driven(verb: "Go", translator: "Translator", start: "GroundPose | None") ->
 
         title = f"“{verb.sentence}”"
         plot_way(verb.plot, asked.space, robot.start, outcome.moves, robot.obstacles, robot.met(), title)
+        return {**outcome.to_json(), "plot": str(verb.plot)}
     return outcome.to_json()
 
 

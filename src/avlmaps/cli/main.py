@@ -1,8 +1,11 @@
 """Reading the command line, running a verb, and turning errors into one sentence and an exit status."""
 
+import io
 import os
+import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stderr, suppress
 from typing import Annotated, Any, Union
 
 import tyro
@@ -11,7 +14,7 @@ from avlmaps.cli.bench import Bench
 from avlmaps.cli.export import Export
 from avlmaps.cli.go import Go
 from avlmaps.cli.import_map import ImportMap
-from avlmaps.cli.output import UsageError
+from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_of
 from avlmaps.cli.profiles import Profiles
 from avlmaps.cli.things import Things
 from avlmaps.cli.verb import Verb, models_in_force
@@ -23,7 +26,8 @@ from avlmaps.core.progress import end_bars
 _DESCRIPTION = """Audio-Visual-Language Maps: what a robot saw and heard, as one 3D map that can be asked.
 
 Every verb takes --json (one JSON object on standard output) and --help. Progress goes to standard error.
-Exit status: 0 done, 1 a known error (one sentence says which), 2 a wrong command line."""
+Exit status: 0 done, 1 a known error (one sentence says which), 2 a wrong command line.
+With --json an error is {"error": {"kind": ..., "message": ...}} on standard output."""
 
 VERBS: dict[str, type[Verb]] = {
     "demo": Demo,
@@ -51,7 +55,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Args:
         arguments: the words after ``avlmaps``; those of this process if None.
     """
-    words = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        _main(sys.argv[1:] if arguments is None else list(arguments))
+    except KeyboardInterrupt:  # while it was reading its words
+        sys.exit(_complain("stopped", 130))
+
+
+def _main(words: list[str]) -> None:
     if words == ["--version"]:
         from avlmaps.core.version import __version__
 
@@ -64,8 +74,31 @@ def main(arguments: Sequence[str] | None = None) -> None:
         os.environ.setdefault(variable, "1")
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # a truncated picture is told in our words
     shortly = not words or words[0].startswith("-")
-    verb = tyro.cli(_any_verb(shortly), prog="avlmaps", description=_DESCRIPTION, args=words, config=_CONFIG)
+    with _usage_in_json() if _wants_json(words) else nullcontext():
+        verb = tyro.cli(_any_verb(shortly), prog="avlmaps", description=_DESCRIPTION, args=words, config=_CONFIG)
     sys.exit(_run(verb))
+
+
+def _wants_json(words: Sequence[str]) -> bool:
+    """Return whether a command line holds --json; told before it is read, since it may not be readable."""
+    return "--json" in (words[: words.index("--")] if "--" in words else words)
+
+
+@contextmanager
+def _usage_in_json() -> Iterator[None]:
+    """Print a command line that cannot be read as a JSON error, too."""
+    told = io.StringIO()
+    try:
+        with redirect_stderr(told):
+            yield
+    except SystemExit as stop:
+        sys.stderr.write(told.getvalue())
+        if stop.code not in (0, None):
+            # a title, a rule, what is wrong, a rule, and help
+            parts = re.split(r"\n *[-─]{3,} *\n", re.sub("[╭╮╰╯│]", " ", told.getvalue()))
+            message = " ".join(parts[min(1, len(parts) - 1)].split())
+            emit({"error": error_answer("usage", message)}, (), as_json=True)
+        raise
 
 
 def _any_verb(shortly: bool) -> Any:
@@ -80,26 +113,55 @@ def _any_verb(shortly: bool) -> Any:
 
 def _run(verb: Verb) -> int:
     try:
-        with models_in_force(verb):
+        with models_in_force(verb), _compiling(verb):
             verb.run()
-    except UsageError as error:
-        return _complain(error, 2)
-    except AvlmapsError as error:
+    except AnsweredError as error:
         return _complain(error, 1)
+    except UsageError as error:
+        return _fail(verb, error, str(error), 2)
+    except AvlmapsError as error:
+        return _fail(verb, error, str(error), 1)
     except BrokenPipeError:  # the reader of our output has gone (`avlmaps info MAP | head`): nothing to tell
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except OSError as error:
-        return _complain(_sentence(error), 1)
+    except (OSError, MemoryError) as error:
+        return _fail(verb, error, _sentence(error), 1)
     except KeyboardInterrupt as stop:
-        if (status := getattr(stop, "status", None)) is not None:  # of a robot that was driving
+        if (status := getattr(stop, "status", None)) is not None:  # of a robot that was driving; its answer is printed
             return _complain(stop, status)
-        return _complain("stopped; the same command goes on where this one ended, where it can", 130)
+        return _fail(verb, stop, "stopped; the same command goes on where this one ended, where it can", 130)
+    except Exception as fault:
+        if verb.json:
+            _emit_error(fault, f"{type(fault).__name__}: {fault}; this is a fault of avlmaps, please report it.")
+        raise
     return 0
 
 
-def _sentence(error: OSError) -> str:
-    """Tell what the system refused, without its numbers for it."""
+def _compiling(verb: Verb) -> AbstractContextManager[None]:
+    if not verb.compiles:
+        return nullcontext()
+    from avlmaps.core.compiling import announced
+
+    return announced()
+
+
+def _fail(verb: Verb, error: BaseException, message: str, status: int) -> int:
+    """Tell an error in one sentence on standard error, and as JSON on standard output where that is wanted."""
+    if verb.json:
+        _emit_error(error, message)
+    return _complain(message, status)
+
+
+def _emit_error(error: BaseException, message: str) -> None:
+    """Print an error as JSON, unless standard output is what failed."""
+    with suppress(OSError):
+        emit({"error": error_answer(kind_of(error), message)}, (), as_json=True)
+
+
+def _sentence(error: OSError | MemoryError) -> str:
+    """Return what the system refused, without its numbers for it."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory for this; check the sizes in the input, or free some"
     if error.filename is None or error.strerror is None:
         return f"{error.strerror or error}; check the files and the space on the disk."
     name = str(error.filename)

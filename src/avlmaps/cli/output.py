@@ -1,6 +1,7 @@
 """What a verb prints: one JSON object, or lines for a person."""
 
 import json
+import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -10,6 +11,25 @@ from avlmaps.core.printable import printable, printable_json
 
 class UsageError(Exception):
     """The words of a command do not fit together; exit status 2."""
+
+
+class AnsweredError(Exception):
+    """A verb failed and its answer, which is printed already, says why; exit status 1."""
+
+
+def error_answer(kind: str, message: str) -> dict[str, Any]:
+    """Return an error as it stands in an answer, under the key ``error``."""
+    return {"kind": kind, "message": message}
+
+
+def kind_of(error: BaseException) -> str:
+    """Return what scripts call a kind of error: ``recording``, ``goal-not-found``, ``usage`` and so on."""
+    return "system" if isinstance(error, OSError) else kind_named(type(error).__name__)
+
+
+def kind_named(error_type: str) -> str:
+    """Return the kind of an error of the class of that name."""
+    return "-".join(re.findall("[A-Z][a-z]*", error_type.removesuffix("Error"))).lower()
 
 
 def emit(answer: Mapping[str, Any], lines: Iterable[str], as_json: bool) -> None:
@@ -41,3 +61,20 @@ def size_of(count: int) -> str:
             return f"{size:.0f} {unit}" if unit == "B" else f"{size:.1f} {unit}"
         size /= 1000
     return f"{size:.1f} GB"
+
+
+def ground_lines(ground: Mapping[str, Any]) -> list[str]:
+    """Lay out where the floor is: the one that most cameras stood over, the runner-up, and every floor there is."""
+    source = {"surfaces": "", "user": ", as given", "recording": ", from the robot's frames"}[ground["known_from"]]
+    unseen = "" if ground["in_view"] else ", not in view"
+    sure = f"confidence {ground['confidence']:.2f}"
+    lines = [f"floor: {ground['camera_height_m']:.2f} m under the camera, {sure}{unseen}{source}"]
+    if (second := ground["runner_up"]) is not None:
+        lines.append(f"  runner-up: {second['camera_height_m']:.2f} m, confidence {second['confidence']:.2f}")
+    if len(ground["floors"]) > 1:
+        lines += [
+            f"  at height {floor['height_m']:.2f} m: {floor['cameras']:.0%} of the frames looked at, "
+            f"confidence {floor['confidence']:.2f}"
+            for floor in ground["floors"]
+        ]
+    return lines

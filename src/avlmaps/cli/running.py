@@ -11,7 +11,7 @@ from avlmaps.core.progress import say
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from avlmaps.cli.verbs import Build, Query, Record
+    from avlmaps.cli.verbs import Build, Info, Query, Record
     from avlmaps.core.camera import Pinhole
     from avlmaps.core.question import Part
     from avlmaps.maps.store.reader import StoredMap
@@ -72,6 +72,7 @@ def record(verb: "Record") -> dict[str, Any]:
         "hearing": verb.hearing,
         "sounds": len(events),
         "events": events,
+        "floor": made.floor.to_json(),
         "elapsed_s": round(perf_counter() - begin, 3),
     }
 
@@ -86,13 +87,17 @@ def _size(words: str) -> tuple[int, int]:
 def build(verb: "Build") -> dict[str, Any]:
     """Build a map and describe it."""
     from avlmaps.maps.build import build_map
-    from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings
+    from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings, GravitySettings
     from avlmaps.query.rules import build_settings
     from avlmaps.recordings.open import open_recording
 
     begin = perf_counter()
     if verb.resume and verb.fresh:
         raise UsageError("--resume goes on with a stopped build and --fresh begins anew; choose one of them.")
+    if verb.rules == "paper" and verb.sensor not in ("auto", "none"):
+        raise UsageError(
+            f"The paper's rules use every depth as it is; leave out --sensor {verb.sensor} or --rules paper."
+        )
     used, cache = (
         _chosen_profile(verb.profile, [word for words in verb.model for word in words]),
         _cache(verb.feature_cache, verb.feature_cache_gb),
@@ -103,7 +108,8 @@ def build(verb: "Build") -> dict[str, Any]:
     settings = BuildSettings(
         voxel_size_m=verb.voxel_size_m,
         frames=FrameSettings(step=verb.frame_step, max_bad_share=verb.max_bad_share),
-        fusion=FusionSettings(max_depth_m=verb.max_depth_m),
+        fusion=FusionSettings(max_depth_m=verb.max_depth_m, sensor=verb.sensor),
+        gravity=GravitySettings(camera_height_m=verb.camera_height_m),
         seed=verb.seed,
     )
     stored = build_map(
@@ -173,23 +179,58 @@ def describe_path(path: Path, format: str, verify: bool, plot: Path | None) -> d
     return {**_describe_recording(recording), "faults": faults}
 
 
+def repair(verb: "Info") -> dict[str, Any]:
+    """Build the damaged files of a map again and name them."""
+    from avlmaps.maps.repair import repair_map
+    from avlmaps.recordings.open import open_recording
+
+    recording = None
+    if verb.recording is not None:
+        recording = open_recording(verb.recording, format=verb.format, audio=verb.audio)
+    done = repair_map(verb.path, recording)
+    if not done.files:
+        say(f"every file of {verb.path} is whole; there is nothing to repair.")
+    elif done.rebuilt:
+        say(f"note: the whole map was built again: {verb.path} now differs in last bits from what it was.")
+    return {"repaired": list(done.files)}
+
+
 def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]:
     from avlmaps.maps.store.reader import open_stored
 
     stored = open_stored(path, verify=verify)
+    told = _described(stored)
     if plot is not None:
         from avlmaps.query.plots import plot_map
 
-        plot_map(stored, plot)
-    return _described(stored)
+        told["plot"] = str(plot_map(stored, plot))
+    return told
 
 
 def _described(stored: "StoredMap") -> dict[str, Any]:
-    """Describe a map, and the rules that it was built by."""
+    """Describe a map, the names of its sounds, and the rules that it was built by."""
     from avlmaps.maps.store.reader import describe
     from avlmaps.query.rules import rules_of
 
-    return {**describe(stored), "rules": rules_of(stored.info.settings)}
+    return {**with_sound_names(describe(stored), stored), "rules": rules_of(stored.info.settings)}
+
+
+def with_sound_names(told: dict[str, Any], stored: "StoredMap") -> dict[str, Any]:
+    """Return what is told of a map, each sound with the names that fit it best, where its sound model is here."""
+    from avlmaps.query.avlmap import AVLMap
+
+    if not told["sounds"]:
+        return told
+    try:
+        heard = AVLMap(stored).sounds()
+    except AvlmapsError as error:
+        say(f"note: the sounds have no names here. {error}")
+        return told
+    sounds = [
+        {**sound, "names": list(event.names), "confidences": list(event.confidences)}
+        for sound, event in zip(told["sounds"], heard, strict=True)
+    ]
+    return {**told, "sounds": sounds}
 
 
 def _describe_recording(recording: "Recording") -> dict[str, Any]:
@@ -207,6 +248,7 @@ def _describe_recording(recording: "Recording") -> dict[str, Any]:
             for name, camera in (("rgb", rig.rgb), ("depth", rig.depth))
         },
         "up_in_world": None if up is None else [float(value) for value in up],
+        "topics": dict(recording.topics),
         "audio": None
         if audio is None
         else {
@@ -244,9 +286,10 @@ def ask(verb: "Query") -> dict[str, Any]:
             question = Question.of(question.parts, Modality(verb.primary))
     camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
     answer = AVLMap.open(verb.map, query_settings(verb.rules)).ask(question, top=verb.top, intrinsics=camera)
+    told = answer.to_json()
     if verb.plot is not None and answer.heat is not None:
-        answer.heat.plot(verb.plot, top=verb.top)
-    return answer.to_json()
+        told["plot"] = str(answer.heat.plot(verb.plot, top=verb.top))
+    return told
 
 
 def _parts(verb: "Query") -> list["Part"]:
@@ -294,6 +337,7 @@ def _camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":
 
 def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[str, Any]:
     """Locate a photo."""
+    from avlmaps.core.poses import FRAME
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.modalities.image import read_picture
 
@@ -307,6 +351,7 @@ def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[
         "world_from_camera": None if pose is None else [[float(value) for value in row] for row in pose],
         "inliers": int(found.inliers),
         "reference": found.reference_stamp_s,
+        "frame": FRAME,
         "score": found.score,
         "intrinsics": [camera.fx, camera.fy, camera.cx, camera.cy],
         "elapsed_ms": found.elapsed_ms,

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from tyro.conf import Positional, arg
 
@@ -17,6 +17,8 @@ class Things(ModelVerb):
 
     Example: avlmaps things home.avlmap --least 0.7 --csv things.csv
     """
+
+    compiles: ClassVar[bool] = True
 
     map: Positional[Path]
     """Map folder (NAME.avlmap)."""

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -14,6 +14,9 @@ class Verb:
 
     json: bool = False
     """Print one JSON object on standard output, and nothing else there."""
+
+    compiles: ClassVar[bool] = False
+    """Whether it runs compiled loops, which the first run on a machine compiles."""
 
     def run(self) -> None:
         """Do it."""

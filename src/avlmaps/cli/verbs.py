@@ -1,18 +1,24 @@
 """The verbs. Each field's docstring is its help; heavy imports happen when a verb runs."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from avlmaps.cli.output import UsageError, emit, place, size_of, table_lines
+from avlmaps.cli.output import UsageError, emit, ground_lines, place, size_of, table_lines
 from avlmaps.cli.verb import ModelVerb, Verb
+
+# Further names of a sound are shown from this score on.
+_LIKELY = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
 class Demo(Verb):
     """Drive through a home, hear it, map it, ask it: the whole system in one command, with a report.html."""
+
+    compiles: ClassVar[bool] = True
 
     out: Path = Path("demo_out")
     """Folder for the recording, the map, the pictures and report.html."""
@@ -35,6 +41,8 @@ class Record(Verb):
 
     avlmaps record --scene house:7 --out REC --hearing acoustic
     """
+
+    compiles: ClassVar[bool] = True
 
     scene: str
     """house:SEED or office:SEED, made by rule, or a file: .glb, or Matterport3D's .glb with its _semantic.ply."""
@@ -82,6 +90,9 @@ class Record(Verb):
         ]
         lines = table_lines(("onset_s", "offset_s", "category", "sounds at", "made by"), rows) if rows else []
         said = f"wrote {self.out}: {answer['frames']} frames, {answer['duration_s']:.1f} s"
+        floor = answer["floor"]
+        shares = ", ".join(f"{floor[f'{name}_share']:.0%} {name}" for name in ("reached", "driven", "seen"))
+        lines.append(f"of {floor['walkable_m2']:.1f} m² of walkable floor: {shares}")
         emit(answer, [*lines, f"{said}, in {answer['elapsed_s']:.1f} s"], self.json)
 
 
@@ -156,6 +167,8 @@ class Build(ModelVerb):
     avlmaps build REC --out kitchen.avlmap --profile foundation --model pixels=clip-patches views=clip
     """
 
+    compiles: ClassVar[bool] = True
+
     recording: Positional[Path]
     """Our folder, 7-Scenes/3DMatch, AVLMaps/VLMaps, TUM RGB-D, Replica, ScanNet, a ROS 1 or 2 bag, MCAP."""
     out: Path
@@ -187,6 +200,11 @@ class Build(ModelVerb):
     """Stop when more than this share of the frames cannot be read; fewer are left out and told."""
     max_depth_m: float = 10.0
     """Ignore depth beyond this, metres."""
+    camera_height_m: Annotated[float | None, arg(aliases=("--floor-height",), metavar="METRES")] = None
+    """Height of the depth camera over the floor in the first frame, metres. Default: found from the frames; give it
+    where `build` reports the floor with a low confidence."""
+    sensor: Literal["auto", "kinect", "realsense", "perfect", "none"] = "auto"
+    """Depth camera: its error decides which depths are used. auto measures it; none uses all, as the paper does."""
     resume: bool = False
     """Go on with a stopped build. This is what happens anyway; the flag is for scripts that say so."""
     fresh: bool = False
@@ -214,14 +232,23 @@ class Info(Verb):
     """Format of the recording, where it cannot be told from its files."""
     verify: bool = False
     """Check every file of a map against its checksum, or every picture of a recording."""
+    repair: bool = False
+    """Check every file of a map, and build the damaged ones again from --recording."""
+    recording: Path | None = None
+    """The recording that the map was built from, for --repair."""
+    audio: Path | None = None
+    """The sound file that the map was built with, if it was given to `build --audio`; for --repair."""
     plot: Path | None = None
     """Draw the map from above, with the walk and the sounds, into this picture."""
 
     def run(self) -> None:
         """Describe it."""
-        from avlmaps.cli.running import describe_path
+        from avlmaps.cli.running import describe_path, repair
 
-        answer = describe_path(self.path, self.format, verify=self.verify, plot=self.plot)
+        if self.recording is not None and not self.repair:
+            raise UsageError("--recording belongs to --repair.")
+        repaired = repair(self) if self.repair else {}
+        answer = describe_path(self.path, self.format, verify=self.verify, plot=self.plot) | repaired
         emit(answer, info_lines(answer), self.json)
 
 
@@ -233,6 +260,8 @@ class Query(ModelVerb):
     avlmaps query MAP "the red cabinet near the sound of a dog barking"
     avlmaps query MAP --object "red cabinet" --sound-clip bark.ogg --plot heat.png
     """
+
+    compiles: ClassVar[bool] = True
 
     map: Positional[Path]
     """The map."""
@@ -270,6 +299,8 @@ class Query(ModelVerb):
 @dataclass(frozen=True, kw_only=True)
 class Locate(ModelVerb):
     """Tell where a photo was taken: the 6-DoF pose of its camera in the map, or that it was not taken there."""
+
+    compiles: ClassVar[bool] = True
 
     map: Positional[Path]
     """The map."""
@@ -311,19 +342,46 @@ class TeachSound(Verb):
 
 
 def info_lines(answer: dict[str, Any]) -> list[str]:
-    """Lay out what `build` and `info` tell."""
+    """Lay out what `build` and `info` report; entries without a layout of their own are printed as they are."""
     lines: list[str] = []
     for key, value in answer.items():
-        if key == "sounds":
-            lines.append(f"sounds: {len(value)}")
-            lines += [f"  {s['onset_s']:8.2f} - {s['offset_s']:.2f} s at {place(s['position'])}" for s in value]
-        elif isinstance(value, list) and value and isinstance(value[0], str):
+        if value in (None, [], {}) and key != "sounds":
+            continue
+        if key in _LAYOUTS:
+            lines += _LAYOUTS[key](value)
+        elif isinstance(value, list) and isinstance(value[0], str):
             lines += [f"{key}:", *[f"  {line}" for line in value]]
-        elif key == "bytes" and isinstance(value, int):
-            lines.append(f"size: {size_of(value)}")
-        elif value not in (None, [], {}):
-            lines.append(f"{key.replace('_', ' ')}: {value}")
+        else:
+            lines.append(f"{key.replace('_', ' ')}: {f'{value:.6g}' if isinstance(value, float) else value}")
     return lines
+
+
+def _sound_lines(sounds: list[dict[str, Any]]) -> list[str]:
+    rows = [f"  {s['onset_s']:8.2f} - {s['offset_s']:.2f} s at {place(s['position'])}{_names_of(s)}" for s in sounds]
+    return [f"sounds: {len(sounds)}", *rows]
+
+
+# How the entries of `info` are laid out, where a plain line would not do.
+_LAYOUTS: dict[str, Callable[[Any], list[str]]] = {
+    "sounds": _sound_lines,
+    "topics": lambda topics: ["topics:", *[f"  {use}: {topic}" for use, topic in topics.items()]],
+    "plot": lambda path: [f"wrote {path}"],
+    "ground": ground_lines,
+    "bytes": lambda count: [f"size: {size_of(count)}"],
+    "voxels_removed": lambda removed: [
+        "voxels removed: " + ", ".join(f"{count} {why.replace('_', ' ')}" for why, count in removed.items())
+    ],
+    "level_from_recording": lambda rows: [
+        "level from recording:", *["  " + " ".join(f"{value:7.4f}" for value in row) for row in rows]
+    ],
+}  # fmt: skip
+
+
+def _names_of(sound: dict[str, Any]) -> str:
+    """Lay out the best names of a sound; those that are hardly likely only where there is no better one."""
+    names = list(zip(sound.get("names", []), sound.get("confidences", []), strict=True))
+    shown = [pair for pair in names if pair[1] >= _LIKELY] or names[:1]
+    return ": " + ", ".join(f"{name} {confidence:.2f}" for name, confidence in shown) if shown else ""
 
 
 def query_lines(answer: dict[str, Any]) -> list[str]:
@@ -336,7 +394,8 @@ def query_lines(answer: dict[str, Any]) -> list[str]:
         for i, goal in enumerate(answer["goals"], start=1)
     ]
     lines.append("found" if answer["found"] else "not found here" + (": the best guesses are" if rows else ""))
-    return lines + (table_lines(("", "place", "score", "size in m"), rows) if rows else [])
+    lines += table_lines(("", f"place ({answer['frame']} frame)", "score", "size in m"), rows) if rows else []
+    return [*lines, f"wrote {answer['plot']}"] if "plot" in answer else lines
 
 
 def locate_lines(answer: dict[str, Any]) -> list[str]:
@@ -345,4 +404,4 @@ def locate_lines(answer: dict[str, Any]) -> list[str]:
     if pose is None:
         return [f"not located: {answer['inliers']} points agree, too few to tell a place"]
     rows = ["  " + " ".join(f"{value:9.4f}" for value in row) for row in pose]
-    return [f"located, {answer['inliers']} points agree; world_from_camera:", *rows]
+    return [f"located, {answer['inliers']} points agree; world_from_camera (frame: {answer['frame']}):", *rows]

@@ -31,7 +31,7 @@ class Pinhole:
     height: int
 
     def __post_init__(self) -> None:
-        numbers = (self.fx, self.fy, self.cx, self.cy)
+        numbers = tuple(float(number) for number in (self.fx, self.fy, self.cx, self.cy))
         if not np.isfinite(numbers).all() or self.fx <= 0 or self.fy <= 0:
             raise ValueError(f"a camera needs finite numbers and positive focal lengths, not {numbers}")
         if self.width < 1 or self.height < 1:

@@ -23,6 +23,10 @@ class AudioError(AvlmapsError):
     """A sound or an audio track cannot be read or used."""
 
 
+class NoAudioStreamError(AudioError):
+    """A video has no sound, which for most videos is no fault."""
+
+
 class MapError(AvlmapsError):
     """A map cannot be built, opened or merged: another schema, another profile, a damaged file."""
 

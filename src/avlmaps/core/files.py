@@ -1,11 +1,140 @@
-"""Writing files so that a kill at any instant leaves the old or the new one, and hashing them."""
+"""Writing files so that a kill at any instant leaves the old or the new one, and reading files with suspicion.
 
+Every file that a user gives is opened by ``open_regular``: a pipe, a device, a socket or a file of 20 GB where a
+picture belongs is refused before a byte is read. Refusals are ``OSError``; readers put them into their own sentences.
+"""
+
+import errno
 import hashlib
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO, TypeVar
+
+import msgspec
+
+T = TypeVar("T")
+
+MB = 1_000_000
+GB = 1000 * MB
+_BLOCK_BYTES = 4096
+_MOST_BLOCKS = 1024
+# Most bytes of a file by what it holds; larger ones are mistakes or attacks.
+DESCRIPTION_BYTES = 16 * MB  # JSON and matrices
+MANIFEST_BYTES = 256 * MB  # map.json of a million frames
+PICTURE_BYTES = 256 * MB
+TABLE_BYTES = 2 * GB  # poses and lists, read line by line
+SOUND_BYTES = 32 * GB  # sound and video, read in pieces
+SAMPLED_BYTES = 1 << 62  # a bag may be of any size
+_KINDS = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+class RefusedFileError(OSError):
+    """A file that is not read: it is no regular file, or larger than its kind may be; ``strerror`` says why."""
+
+    def __init__(self, path: Path | str, why: str, code: int = errno.EINVAL) -> None:
+        super().__init__(code, why, str(path))
+
+
+def open_regular(path: Path | str, limit_bytes: int) -> BinaryIO:
+    """Open a regular file for reading, after a look at what it is and how large.
+
+    Args:
+        path: the file; a link to a regular file will do.
+        limit_bytes: largest size that is accepted.
+
+    Raises:
+        FileNotFoundError: there is nothing there, not even a link.
+        OSError: it is a dangling link, a folder, a pipe, a device or a socket, is too large or cannot be opened;
+            ``strerror`` is the reason in words.
+    """
+    checked_size(path, limit_bytes)
+    # Never waits for a writer, should the file become a pipe between the look and the opening.
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    try:
+        _refuse(path, os.fstat(descriptor), limit_bytes)
+        return os.fdopen(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def checked_size(path: Path | str, limit_bytes: int) -> int:
+    """Return the size of a regular file; errors as of ``open_regular``. For readers that open files themselves."""
+    try:
+        found = os.stat(path)  # noqa: PTH116
+    except FileNotFoundError:
+        if os.path.islink(path):  # noqa: PTH114
+            raise RefusedFileError(path, "it is a link to a file that does not exist", errno.ENOLINK) from None
+        raise
+    except ValueError:  # a NUL in the name
+        raise RefusedFileError(path, "its name holds a zero byte") from None
+    _refuse(path, found, limit_bytes)
+    return found.st_size
+
+
+def _refuse(path: Path | str, found: os.stat_result, limit_bytes: int) -> None:
+    if not stat.S_ISREG(found.st_mode):
+        what = next((words for test, words in _KINDS if test(found.st_mode)), "no file")
+        raise RefusedFileError(path, f"it is {what}, not a regular file")
+    if found.st_size > limit_bytes:
+        raise RefusedFileError(
+            path, f"it has {found.st_size:,} bytes, more than the {limit_bytes:,} of the largest such file", errno.EFBIG
+        )
+
+
+def read_regular(path: Path | str, limit_bytes: int) -> bytes:
+    """Return the content of a regular file of limited size; errors as of ``open_regular``."""
+    with open_regular(path, limit_bytes) as stream:
+        return stream.read(os.fstat(stream.fileno()).st_size)
+
+
+def decode_json(content: bytes, type: type[T] | Any = Any) -> Any:
+    """Decode JSON to a type; nesting that no file of ours has is an error like any other.
+
+    Raises:
+        msgspec.DecodeError: it is not JSON, not of the type, or nested too deeply.
+        UnicodeDecodeError: it is not UTF-8.
+    """
+    try:
+        return msgspec.json.decode(content, type=type)
+    except RecursionError:
+        raise msgspec.DecodeError("it is nested too deeply") from None
+
+
+def sampled_digest(path: Path | str, budget_bytes: int) -> bytes:
+    """Return a SHA-256 over a file's size and content: the whole of it, or evenly spread blocks of a larger file.
+
+    The last block reaches to the end of the file, where a PNG has the checksum of all its pixels.
+
+    Args:
+        path: a regular file; one that is missing or refused has a digest of its own.
+        budget_bytes: how much is read at most; at least 4096.
+    """
+    try:
+        with open_regular(path, SAMPLED_BYTES) as stream:
+            size = os.fstat(stream.fileno()).st_size
+            digest = hashlib.sha256(size.to_bytes(8, "little"))
+            if size <= budget_bytes:
+                while chunk := stream.read(1 << 20):
+                    digest.update(chunk)
+                return digest.digest()
+            blocks = min(_MOST_BLOCKS, max(2, budget_bytes // _BLOCK_BYTES))
+            length = max(1, budget_bytes // blocks)
+            for number in range(blocks):
+                stream.seek((size - length) * number // (blocks - 1))
+                digest.update(stream.read(length))
+            return digest.digest()
+    except OSError as fault:
+        return f"unreadable {fault.errno}".encode()
 
 
 @contextmanager

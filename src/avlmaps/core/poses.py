@@ -15,6 +15,10 @@ from avlmaps.core.errors import RecordingError
 MAX_ROTATION_FAULT = 0.05
 
 
+FRAME = "recording"
+"""The frame of every position that is printed, written or drawn: the world of the recording's poses."""
+
+
 def orthonormalized(
     world_from_camera: Float[np.ndarray, "*shape"], name: str, max_fault: float = MAX_ROTATION_FAULT
 ) -> Float[np.ndarray, "4 4"]:

@@ -12,15 +12,16 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Modality, Part, Question
 from avlmaps.demo.evidence import Box, Evidence
 from avlmaps.language.sentence import parse_sentence
 
 # What a label of training is also called in speech; none of these words was ever a label. The largest come first.
 SPOKEN = {
-    "sofa": "couch", "refrigerator": "fridge", "wardrobe": "closet", "bookshelf": "bookcase", "stove": "cooker",
-    "tv": "telly", "chest of drawers": "dresser", "sink": "washbasin", "nightstand": "bedside table",
-    "trash can": "waste bin", "computer": "PC", "carpet": "rug",
+    name: lexicon().named(name, Kind.THING).spoken
+    for name in ("sofa", "refrigerator", "wardrobe", "bookshelf", "stove", "tv", "chest of drawers", "sink",
+                 "nightstand", "trash can", "computer", "carpet")
 }  # fmt: skip
 # Things that one sends a robot to; doors, curtains and pots are no goals.
 FURNITURE = (

@@ -251,12 +251,12 @@ def _panels(step: "Step", answer: "Answer", sheet: Sheet, photo: "PhotoView | No
     truth = sheet.band(ask.truth[1:]) if ask.kind == "clip" else sheet.rings(ask.truth, "truth")
     told = answer.found or ask.truth  # where there is nothing, a guess is no goal
     goals = sheet.goals([goal.position for goal in answer.goals]) if told else ""
-    layers = [ground, _layer(sheet, heat_from_above(heat.space, heat.values)), sheet.rings(ask.others, "other")]
+    layers = [ground, _layer(sheet, heat_from_above(heat.space, heat.shown)), sheet.rings(ask.others, "other")]
     large = _figure(
         sheet, [*layers, truth, seen, goals], "all together" if len(heat.factors) > 1 else _label(answer, 0)
     )
     small = [
-        _figure(sheet, [ground, _layer(sheet, heat_from_above(heat.space, factor.values)), seen], _label(answer, i))
+        _figure(sheet, [ground, _layer(sheet, heat_from_above(heat.space, factor.shown)), seen], _label(answer, i))
         for i, factor in enumerate(heat.factors)
         if len(heat.factors) > 1
     ]

@@ -8,19 +8,32 @@ from importlib.resources import files
 from typing import Any
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.lexicon import Kind, lexicon, undescribed
 from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
 
-# A phrase that ends in one of these is an area; "kitchen table" ends in a thing. A toilet is a thing, as in VLMaps, and
-# a room only where something is in it ("the mirror in the toilet") or as "toilet room".
-AREA_WORDS = frozenset({
-    "kitchen", "kitchenette", "bathroom", "bedroom", "washroom", "restroom", "office", "corridor",
-    "hallway", "hall", "foyer", "lobby", "entrance", "lounge", "garage", "garden", "patio", "terrace", "balcony",
-    "gym", "library", "pantry", "basement", "cellar", "attic", "staircase", "stairwell", "workshop", "lab",
-    "study", "den", "playroom", "conservatory", "porch", "storeroom", "passageway",
-    "laboratory", "classroom", "nursery", "studio", "canteen", "cafeteria", "restaurant", "shop", "room", "area",
-    "zone",
-})  # fmt: skip
 _EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
+
+
+def is_area(phrase: str) -> bool:
+    """Return whether a phrase names an area: "old kitchen" does, "kitchen table" names a thing.
+
+    A toilet is a thing, as in VLMaps, and a room only where something is in it ("the mirror in the toilet") or as
+    "toilet room".
+    """
+    known, plain = lexicon(), phrase.lower()
+    bare = undescribed(plain).split()
+    tails = [" ".join(words[start:]) for words in (plain.split(), bare) for start in range(len(bare))]
+    for tail in tails:
+        room, thing = known.find(tail, Kind.ROOM), known.find(tail, Kind.THING)
+        if room is not None or thing is not None:
+            return room is not None and (thing is None or (room.name == tail != thing.name))
+    return False
+
+
+# The single words that name areas.
+AREA_WORDS = frozenset(
+    word for entry in lexicon().entries(Kind.ROOM) for word in entry.spellings if " " not in word and is_area(word)
+)
 
 
 def parse_sentence(sentence: str) -> Question:
@@ -94,8 +107,8 @@ def _part(node: Any) -> Part:
         return Part(Modality.SOUND, f"{' '.join(words)} {verb.lower()}")
     if node.data == "sound":
         return Part(Modality.SOUND, " ".join(words))
-    is_area = words[-1].lower() in AREA_WORDS
-    return Part(Modality.AREA if is_area else Modality.OBJECT, " ".join(words))
+    phrase = " ".join(words)
+    return Part(Modality.AREA if is_area(phrase) else Modality.OBJECT, phrase)
 
 
 def _words(phrase: Any) -> list[str]:

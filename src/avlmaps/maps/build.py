@@ -6,9 +6,9 @@ from pathlib import Path
 from avlmaps.core.progress import silenced
 from avlmaps.maps.keyframe_stage import keep_keyframes
 from avlmaps.maps.partial_maps import build_part, merge_parts
-from avlmaps.maps.plan import claim, make_plan
+from avlmaps.maps.plan import claim, make_plan, require_unchanged
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
-from avlmaps.maps.stages import commit, find_up, fuse, hear_sounds, merge, stand
+from avlmaps.maps.stages import attach_ground, commit, find_up, fuse, hear_sounds, merge, sense
 from avlmaps.maps.store.lock import locked
 from avlmaps.maps.store.reader import StoredMap, describe, open_stored
 from avlmaps.perception.cache.cached_encoders import remembering
@@ -53,14 +53,17 @@ def build_map(
         RecordingError: too many frames cannot be read, or none has depth.
         BackendError: the profile is not known, or a package for it is missing.
     """
+    stamp = recording.change_stamp()
     plan = make_plan(recording, Path(path), remembering(profile_of(profile), cache), settings)
     with silenced(not progress), locked(plan.path):
         if claim(plan, resume, overwrite) is None:
             up = find_up(plan)
-            plan = stand(plan, up[0])
-            fused = fuse(plan, parts)
+            plan, ground, grounding_s = attach_ground(plan, up[0])
+            sensor = sense(plan)
+            fused = fuse(plan, parts, sensor)
             pictures = keep_keyframes(plan, fused)
             heard = hear_sounds(plan)
-            voxels = merge(plan, fused)  # late, because it fills the memory
-            commit(plan, up, fused, pictures, heard, voxels)
+            merged = merge(plan, fused, sensor)  # late, because it fills the memory
+            require_unchanged(plan, stamp)
+            commit(plan, up, (ground, grounding_s), fused, pictures, heard, merged)
     return open_stored(plan.path)

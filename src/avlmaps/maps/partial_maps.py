@@ -19,9 +19,12 @@ from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
 from avlmaps.maps.encoding import Perceived, perceived
+from avlmaps.maps.free_space import FreeViewCollector, FreeViews, joined
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator, VoxelSums
 from avlmaps.maps.gravity.stage import grounded
 from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.sensor import SensorModel
+from avlmaps.maps.sensor_stage import find_sensor
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.store.checkpoints import Checkpoint, find_checkpoint, key_of, load_checkpoint, save_checkpoint
 from avlmaps.maps.store.manifest import BadFrame
@@ -32,7 +35,7 @@ from avlmaps.perception.profiles import profile as profile_of
 from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.recordings.types import Recording
 
-BUILD_VERSION = 2  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
+BUILD_VERSION = 4  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
 
 Span = tuple[int, int, int]
 
@@ -71,7 +74,15 @@ class Part:
 
     def sums(self) -> VoxelSums:
         """Return the sums over its frames, memory-mapped anew, so that memory is let go with them."""
-        return VoxelSums(**load_checkpoint(self.folder, PartInfo, self.key).arrays)
+        return VoxelSums(**self._arrays(VoxelSums))
+
+    def views(self) -> FreeViews:
+        """Return where its frames saw freely, memory-mapped likewise."""
+        return FreeViews(**self._arrays(FreeViews))
+
+    def _arrays(self, of: type[VoxelSums] | type[FreeViews]) -> dict[str, np.ndarray]:
+        arrays = load_checkpoint(self.folder, PartInfo, self.key).arrays
+        return {field.name: arrays[field.name] for field in dataclasses.fields(of)}
 
 
 def pixel_encoder_of(used: Profile) -> PixelEncoder | None:
@@ -83,7 +94,7 @@ def fusion_key(recording: Recording, settings: BuildSettings, used: Profile) -> 
     """Return the hash of all that the sums of a frame depend on; parts are only ever added to parts of the same key."""
     encoder = pixel_encoder_of(used)
     card = None if encoder is None else encoder.card
-    ground = (settings.gravity, settings.seed) if encoder is not None else None
+    ground = (settings.gravity, settings.seed, recording.base_height) if encoder is not None else None
     return key_of("fusion", BUILD_VERSION, recording.fingerprint, settings.voxel_size_m, settings.fusion, card, ground)
 
 
@@ -144,7 +155,7 @@ def build_part(
             raise MapError(f"{out} holds a part of other frames; give another folder, or remove it first.")
         return part
     known = grounded(recording, settings) if used.pixels else recording
-    fuse_spans(known, [(span, out)], used, settings)
+    fuse_spans(known, [(span, out)], used, settings, find_sensor(recording, settings).model)
     return load_part(out, key)
 
 
@@ -171,7 +182,8 @@ def merge_parts(folders: Sequence[Path | str], out: Path | str) -> Part:
         elapsed_s=sum(part.info.elapsed_s for part in parts),
     )
     # The grid only turns metres into voxels, and merging meets none.
-    save_checkpoint(Path(out), key, info, _arrays(add_up(parts, GridSpec()).sums()))
+    views = joined([part.views() for part in parts])
+    save_checkpoint(Path(out), key, info, _arrays(add_up(parts, GridSpec()).sums(), views))
     return load_part(Path(out), key)
 
 
@@ -240,6 +252,7 @@ def fuse_spans(
     jobs: Sequence[tuple[Span, Path]],
     used: Profile,
     settings: BuildSettings,
+    sensor: SensorModel,
     known_bad: Sequence[BadFrame] = (),
     done: int = 0,
 ) -> None:
@@ -250,6 +263,7 @@ def fuse_spans(
         jobs: each stretch, and the folder of its part.
         used: whose pixel encoder perceives.
         settings: of the build.
+        sensor: error of the depths.
         known_bad: frames of other parts that could not be read.
         done: frames of other parts, for the progress bar.
 
@@ -267,10 +281,10 @@ def fuse_spans(
         seen = progress(ahead, "fusing", total=total_frames, done=done, note=lambda: came_from_store(used, Kind.PIXELS))
         for span, folder in jobs:
             begin = perf_counter()
-            total = VoxelAccumulator(
-                GridSpec(settings.voxel_size_m), encoder.card.dim if encoder else 0, settings.fusion
-            )
-            bad = _fuse(islice(seen, len(range(*span))), total, tolerance)
+            dim = encoder.card.dim if encoder else 0
+            total = VoxelAccumulator(GridSpec(settings.voxel_size_m), dim, settings.fusion, sensor)
+            free = FreeViewCollector(recording.rig.depth, sensor)
+            bad = _fuse(islice(seen, len(range(*span))), total, free, tolerance)
             info = PartInfo(
                 recording=recording.path.name,
                 spans=(span,),
@@ -278,12 +292,14 @@ def fuse_spans(
                 bad_frames=tuple(bad),
                 elapsed_s=perf_counter() - begin,
             )
-            save_checkpoint(folder, key, info, _arrays(total.sums()))
+            save_checkpoint(folder, key, info, _arrays(total.sums(), free.views()))
         for _ in seen:  # nothing is left; this completes the bar
             pass
 
 
-def _fuse(seen: Iterable[Perceived], total: VoxelAccumulator, tolerance: Tolerance) -> list[BadFrame]:
+def _fuse(
+    seen: Iterable[Perceived], total: VoxelAccumulator, free: FreeViewCollector, tolerance: Tolerance
+) -> list[BadFrame]:
     """Add frames up; return those that could not be read."""
     bad: list[BadFrame] = []
     for frame, features in seen:
@@ -292,11 +308,12 @@ def _fuse(seen: Iterable[Perceived], total: VoxelAccumulator, tolerance: Toleran
             tolerance.meet(frame)
         else:
             total.add(frame, features)
+            free.add(frame)
     return bad
 
 
-def _arrays(sums: VoxelSums) -> dict[str, np.ndarray]:
-    return {field.name: getattr(sums, field.name) for field in dataclasses.fields(sums)}
+def _arrays(sums: VoxelSums, views: FreeViews) -> dict[str, np.ndarray]:
+    return {field.name: getattr(of, field.name) for of in (sums, views) for field in dataclasses.fields(of)}
 
 
 def _key_in(folder: Path) -> str:

@@ -7,14 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from avlmaps.core.errors import MapError
+from avlmaps.core.files import sampled_digest
 from avlmaps.core.progress import say
 from avlmaps.maps.partial_maps import BUILD_VERSION, fusion_key
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import key_of
-from avlmaps.maps.store.manifest import MANIFEST, MapInfo, ModelInfo, parse_manifest
+from avlmaps.maps.store.manifest import MANIFEST, MapInfo, ModelInfo, parse_manifest, read_manifest
 from avlmaps.maps.store.reader import PARTS
 from avlmaps.maps.store.writer import is_map_or_free, sweep
 from avlmaps.perception.profiles import Profile
+from avlmaps.recordings.content import LARGEST_BUDGET_BYTES
 from avlmaps.recordings.types import Recording
 
 
@@ -71,8 +73,8 @@ def audio_key(recording: Recording) -> list[str | float] | None:
     track = recording.audio
     if track is None:
         return None
-    size = track.path.stat().st_size if track.path.is_file() else 0
-    return [track.path.name, size, track.rate_hz, track.duration_s, track.start_s]
+    content = sampled_digest(track.path, LARGEST_BUDGET_BYTES).hex()
+    return [track.path.name, content, track.rate_hz, track.duration_s, track.start_s]
 
 
 def claim(plan: Plan, resume: bool, overwrite: bool) -> MapInfo | None:
@@ -88,7 +90,7 @@ def claim(plan: Plan, resume: bool, overwrite: bool) -> MapInfo | None:
     """
     manifest = plan.path / MANIFEST
     if manifest.is_file() and not overwrite:
-        there = parse_manifest(manifest.read_bytes(), manifest)
+        there = parse_manifest(read_manifest(manifest), manifest)
         if there.build_key != plan.key:
             raise MapError(
                 f"{plan.path} is a finished map already, of {there.recording.name} {_difference(plan, there)}; give "
@@ -100,6 +102,27 @@ def claim(plan: Plan, resume: bool, overwrite: bool) -> MapInfo | None:
     if not resume:
         shutil.rmtree(plan.path / PARTS, ignore_errors=True)
     return None
+
+
+def require_unchanged(plan: Plan, stamp: str) -> None:
+    """Refuse to go on with a recording whose files were written since the build began.
+
+    What was made of it is removed, since nobody knows which frames are old and which are new.
+
+    Args:
+        plan: of the build.
+        stamp: the recording's ``change_stamp`` before the first frame was read.
+
+    Raises:
+        MapError: the recording has changed.
+    """
+    if plan.recording.change_stamp() == stamp:
+        return
+    shutil.rmtree(plan.path / PARTS, ignore_errors=True)
+    raise MapError(
+        f"Files of {plan.recording.path} were written while it was mapped, so that the map would be of two recordings; "
+        "run the same build again when it is complete."
+    )
 
 
 def _difference(plan: Plan, there: MapInfo) -> str:

@@ -30,13 +30,21 @@ class FrameSettings:
 
 @dataclass(frozen=True, slots=True)
 class GravitySettings:
-    """Finding which way is up, where the recording does not say."""
+    """Finding which way is up, where the recording does not say, and where the floor is."""
 
     frames: int = 60
-    """Look at so many frames, spread evenly."""
+    """Number of frames to look at, spread evenly."""
+    camera_height_m: float | None = None
+    """Height of the depth camera over the floor in the first frame, metres. Default: found from the frames."""
 
     def __post_init__(self) -> None:
         _require(self.frames >= 1, f"gravity.frames is {self.frames}", "1 or more")
+        height_m = self.camera_height_m
+        _require(
+            height_m is None or 0.02 <= height_m <= 10.0,
+            f"The height of the camera over the floor is {height_m} m",
+            "between 0.02 and 10, in metres",
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,10 @@ import numpy as np
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
+from avlmaps.maps.cleaning import clean
 from avlmaps.maps.encoding import without_place
-from avlmaps.maps.gravity.floor import GroundedRecording, find_ground
-from avlmaps.maps.gravity.stage import look_for_up, spread_frames
+from avlmaps.maps.gravity.floor import GroundedRecording
+from avlmaps.maps.gravity.stage import ground_notices, look_for_ground, look_for_up, spread
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.keyframe_stage import KeptKeyframes
 from avlmaps.maps.partial_maps import (
@@ -29,9 +30,21 @@ from avlmaps.maps.partial_maps import (
     plan_spans,
 )
 from avlmaps.maps.plan import Plan, audio_key
+from avlmaps.maps.sensor_stage import find_sensor
 from avlmaps.maps.store.array_validation import array_fields, assembled
 from avlmaps.maps.store.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
-from avlmaps.maps.store.manifest import Box, Counts, MapInfo, RecordingInfo, RigInfo, Timings, UpInfo
+from avlmaps.maps.store.manifest import (
+    Box,
+    Counts,
+    GroundInfo,
+    MapInfo,
+    RecordingInfo,
+    Removed,
+    RigInfo,
+    SensorInfo,
+    Timings,
+    UpInfo,
+)
 from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import HeardSounds, Voxels
 from avlmaps.recordings.types import Ground, Recording
@@ -43,6 +56,16 @@ _GUESS = 0.1
 class _UpFacts(msgspec.Struct):
     up: UpInfo
     elapsed_s: float
+
+
+class _GroundFacts(msgspec.Struct):
+    ground: GroundInfo
+    whole: bool
+    elapsed_s: float
+
+
+class _SensorFacts(msgspec.Struct):
+    sensor: SensorInfo
 
 
 class _Facts(msgspec.Struct):
@@ -72,23 +95,37 @@ def find_up(plan: Plan) -> tuple[UpInfo, float]:
     return found.facts.up, found.facts.elapsed_s
 
 
-def stand(plan: Plan, up: UpInfo) -> Plan:
-    """Return the plan with the recording's frames told where up and the floor are, if a model may ask for it."""
-    if not (plan.used.pixels or plan.used.views):
-        return plan
-    key = key_of("ground", BUILD_VERSION, plan.recording.fingerprint, plan.settings.gravity, up)
+def attach_ground(plan: Plan, up: UpInfo) -> tuple[Plan, GroundInfo, float]:
+    """Return the plan with up and the floor in the recording's frames, the floors, and the seconds that it took."""
+    recording = plan.recording
+    key = key_of("ground", BUILD_VERSION, recording.fingerprint, recording.base_height, plan.settings.gravity, up)
     folder = plan.folder("ground", key)
-    found = find_checkpoint(folder, _Facts, key)
-    if found is None:
+    found = find_checkpoint(folder, _GroundFacts, key)
+    if found is None or not found.facts.whole:  # a frame that could not be read then may be readable now
         begin = perf_counter()
-        ground = find_ground(spread_frames(plan.recording, plan.settings.gravity.frames), np.array(up.direction))
+        ground, info = look_for_ground(plan.recording, plan.settings, up)
         arrays = {name: getattr(ground, name) for name in ("up_in_world", "camera_m", "floor_m")}
-        save_checkpoint(folder, key, _Facts(perf_counter() - begin), arrays)
-        found = load_checkpoint(folder, _Facts, key)
-    return replace(plan, recording=GroundedRecording(plan.recording, Ground(**found.arrays)))
+        whole = len(ground.camera_m) == len(spread(recording, plan.settings.gravity.frames))
+        save_checkpoint(folder, key, _GroundFacts(info, whole, perf_counter() - begin), arrays)
+        found = load_checkpoint(folder, _GroundFacts, key)
+    on_ground = replace(plan, recording=GroundedRecording(plan.recording, Ground(**found.arrays)))
+    return on_ground, found.facts.ground, found.facts.elapsed_s
 
 
-def fuse(plan: Plan, given: Sequence[Path | str]) -> list[Part]:
+def sense(plan: Plan) -> SensorInfo:
+    """Return the depth camera, as the settings name it or as the frames show it."""
+    if plan.settings.fusion.sensor != "auto":
+        return find_sensor(plan.recording, plan.settings)
+    key = key_of("sensor", BUILD_VERSION, plan.recording.fingerprint)
+    folder = plan.folder("sensor", key)
+    found = find_checkpoint(folder, _SensorFacts, key)
+    if found is None:
+        save_checkpoint(folder, key, _SensorFacts(find_sensor(plan.recording, plan.settings)), {})
+        found = load_checkpoint(folder, _SensorFacts, key)
+    return found.facts.sensor
+
+
+def fuse(plan: Plan, given: Sequence[Path | str], sensor: SensorInfo) -> list[Part]:
     """Fuse all frames that no part covers yet; return the parts that make up the map, in a fixed order."""
     brought = [load_part(Path(folder), plan.fusion_key) for folder in given]
     covered = [span for part in brought for span in part.info.spans]
@@ -101,23 +138,41 @@ def fuse(plan: Plan, given: Sequence[Path | str]) -> list[Part]:
     had = [*brought, *(part for part in finished.values() if part is not None)]
     bad = [frame for part in had for frame in part.info.bad_frames]
     done = sum(part.info.fused + len(part.info.bad_frames) for part in had)
-    fuse_spans(plan.recording, jobs, plan.used, plan.settings, bad, done)
+    fuse_spans(plan.recording, jobs, plan.used, plan.settings, sensor.model, bad, done)
     own = [part or load_part(folder, plan.fusion_key, verify=False) for folder, part in finished.items()]
     parts = sorted([*brought, *own], key=lambda part: part.info.spans)
     check_disjoint(parts)
     return parts
 
 
-def merge(plan: Plan, parts: Sequence[Part]) -> tuple[Voxels, float]:
-    """Add the parts up to the voxels of the map; return them and the seconds that it took."""
-    begin = perf_counter()
-    voxels = add_up(parts, GridSpec(plan.settings.voxel_size_m)).voxels()
-    if len(voxels) == 0:
+@dataclass(frozen=True, slots=True)
+class Merged:
+    """The voxels of the map, what was removed from them, and the seconds that it took."""
+
+    voxels: Voxels
+    sensor: SensorInfo
+    removed: Removed
+    elapsed_s: float
+
+
+def merge(plan: Plan, parts: Sequence[Part], sensor: SensorInfo) -> Merged:
+    """Add the parts up to the voxels of the map, and remove those that are no surface."""
+    begin, grid = perf_counter(), GridSpec(plan.settings.voxel_size_m)
+    total = add_up(parts, grid)
+    if len(total) == 0:
+        farthest = min(plan.settings.fusion.max_depth_m, sensor.model.farthest_m(grid.voxel_size_m))
         raise MapError(
             f"No pixel of {plan.recording.path} has a depth between {plan.settings.fusion.min_depth_m} and "
-            f"{plan.settings.fusion.max_depth_m} m, so that the map would be empty; check the recording's depth scale."
+            f"{farthest:.4g} m, so that the map would be empty; check the recording's depth scale."
         )
-    return voxels, perf_counter() - begin
+    views = [part.views() for part in parts]
+    kept, removed = clean(total.evidence(), views, plan.recording.rig.depth, grid, sensor.model)
+    if not kept.any():
+        raise MapError(
+            f"Every voxel of {plan.recording.path} is seen through or a speck, so that the map would be empty; check "
+            "its poses and its depth scale, or use every depth as it is (--sensor none)."
+        )
+    return Merged(total.voxels(kept=kept), sensor, removed, perf_counter() - begin)
 
 
 def hear_sounds(plan: Plan) -> KeptSounds:
@@ -162,37 +217,49 @@ def _silence(plan: Plan) -> HeardSounds:
 def commit(
     plan: Plan,
     up: tuple[UpInfo, float],
+    ground: tuple[GroundInfo, float],
     parts: Sequence[Part],
     pictures: KeptKeyframes,
     heard: KeptSounds,
-    merged: tuple[Voxels, float],
+    merged: Merged,
 ) -> MapInfo:
     """Write the map and, last of all, its manifest; then the parts go."""
-    voxels, merging_s = merged
-    content = MapContent(voxels, pictures.keyframes, pictures.place_state, heard.sounds, heard.clips_folder)
+    content = MapContent(merged.voxels, pictures.keyframes, pictures.place_state, heard.sounds, heard.clips_folder)
     stages_s = {
         "up": up[1],
+        "ground": ground[1],
         "fusion": sum(part.info.elapsed_s for part in parts),
         "keyframes": pictures.elapsed_s,
         "sounds": heard.elapsed_s,
-        "merging": merging_s,
+        "merging": merged.elapsed_s,
     }
     finished = datetime.now(UTC).isoformat(timespec="seconds")
     timings = Timings(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)
-    return write_map(plan.path, content, _manifest(plan, up[0], parts, content, timings))
+    return write_map(plan.path, content, _manifest(plan, up[0], ground[0], parts, content, merged, timings))
 
 
-def _manifest(plan: Plan, up: UpInfo, parts: Sequence[Part], content: MapContent, timings: Timings) -> MapInfo:
+def _manifest(
+    plan: Plan,
+    up: UpInfo,
+    ground: GroundInfo,
+    parts: Sequence[Part],
+    content: MapContent,
+    merged: Merged,
+    timings: Timings,
+) -> MapInfo:
     bad = sorted((frame for part in parts for frame in part.info.bad_frames), key=lambda frame: frame.index)
     return MapInfo(
         avlmaps_version=__version__,
         build_key=plan.key,
         voxel_size_m=plan.settings.voxel_size_m,
         up=up,
+        ground=ground,
         rig=RigInfo.of(plan.recording.rig),
         profile=plan.used.name,
         models=plan.models,
         settings=plan.settings,
+        sensor=merged.sensor,
+        removed=merged.removed,
         seed=plan.settings.seed,
         recording=_recording_info(plan.recording),
         counts=Counts(
@@ -203,7 +270,7 @@ def _manifest(plan: Plan, up: UpInfo, parts: Sequence[Part], content: MapContent
         ),
         bounding_box_m=_box(content.voxels, plan.settings.voxel_size_m),
         bad_frames=tuple(bad),
-        notices=tuple(_notices(plan, up, len(bad))),
+        notices=tuple(_notices(plan, up, ground, len(bad))),
         timings=timings,
     )
 
@@ -225,11 +292,12 @@ def _box(voxels: Voxels, voxel_size_m: float) -> Box:
     return Box(low=low, high=high)  # pyright: ignore[reportArgumentType]
 
 
-def _notices(plan: Plan, up: UpInfo, bad: int) -> Iterator[str]:
+def _notices(plan: Plan, up: UpInfo, ground: GroundInfo, bad: int) -> Iterator[str]:
     if up.known_from == "camera":
         yield "Which way is up is a guess from how the camera was held: too little smooth surface is in view."
     elif up.support < _GUESS:
         yield f"Which way is up is a guess: only {up.support:.0%} of the surface in view agrees with it."
+    yield from ground_notices(ground)
     if bad:
         yield f"{bad} of {len(plan.recording)} frames could not be read and were left out (bad_frames in map.json)."
     if plan.recording.audio is None:

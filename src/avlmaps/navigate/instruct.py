@@ -110,6 +110,7 @@ class Outcome:
             "subgoals": [move.to_json() for move in self.subgoals],
             "ok": self.ok,
             "error": self.error,
+            "error_type": self.error_type,
             "notes": list(self.notes),
             "path_m": round(self.path_m, 3),
             "elapsed_s": round(self.elapsed_s, 3),

@@ -106,6 +106,14 @@ def example_sound(seed: int = 0, seconds: float = 1.0, rate_hz: int = 16000) -> 
     return Sound(samples.astype(np.float32), rate_hz)
 
 
+def _equal(one: np.ndarray, other: np.ndarray) -> bool:
+    """Return whether two arrays are equal within rounding.
+
+    The last digits of a network's output can differ from call to call: they depend on where memory was allocated.
+    """
+    return one.shape == other.shape and np.allclose(one, other, rtol=1e-4, atol=1e-5)
+
+
 def _check_word_encoder(encoder: WordEncoder) -> None:
     _check_words(encoder.encode, encoder.card.dim, zero_allowed=False)
 
@@ -115,7 +123,7 @@ def _check_pixel_encoder(encoder: PixelEncoder) -> None:
     _hold(features.ndim == 3, f"pixel features must have three axes, not {features.ndim}")
     flat = features.reshape(-1, features.shape[-1])
     _check_rows(flat, len(flat), encoder.card.dim, "pixel features", zero_allowed=True)
-    _hold(np.array_equal(features, encoder.encode(example_frame())), "the same frame must give the same features")
+    _hold(_equal(features, encoder.encode(example_frame())), "the same frame must give the same features")
     _hold(all(isinstance(word, str) for word in encoder.vocabulary), "the vocabulary must be words")
     _check_words(encoder.encode_words, encoder.card.dim, zero_allowed=True)
     for phrase, row in zip(PHRASES, encoder.encode_words(PHRASES), strict=True):
@@ -144,7 +152,7 @@ def _check_sound_encoder(encoder: SoundEncoder) -> None:
             abs(len(long) - 30.0 / encoder.hop_s - 0.5) <= 0.5 + 1e-6,
             f"30 s must have a vector for each of its steps of {encoder.hop_s} s, not {len(long)}",
         )
-    _hold(np.array_equal(short, encoder.encode(example_sound())), "the same sound must give the same features")
+    _hold(_equal(short, encoder.encode(example_sound())), "the same sound must give the same features")
     for bad in (np.zeros(0, np.float32), np.full(800, np.nan, np.float32)):
         try:
             encoder.encode(Sound(bad, 16000))
@@ -180,7 +188,7 @@ def _check_local_encoder(encoder: LocalEncoder) -> None:
     if len(found.score):
         _check_scores(found.score, (len(found.xy),), "keypoints' scores, where there are any,")
     _hold(found.size in ((0, 0), (320, 240)), f"the picture's size must be (width, height) or (0, 0), not {found.size}")
-    _hold(np.array_equal(found.xy, encoder.encode(frame.rgb).xy), "the same picture must give the same keypoints")
+    _hold(_equal(found.xy, encoder.encode(frame.rgb).xy), "the same picture must give the same keypoints")
     blank = encoder.encode(np.full((240, 320, 3), 128, np.uint8))
     _hold(blank.descriptors.shape == (0, encoder.card.dim), "a blank picture has no keypoints, and descriptors (0, d)")
 
@@ -191,16 +199,14 @@ def _check_place_encoder(encoder: PlaceEncoder) -> None:
     rgb = example_frame().rgb
     state = encoder.fit(local, np.random.default_rng(0))
     again = encoder.fit(local, np.random.default_rng(0))
-    _hold(all(np.array_equal(state[key], again[key]) for key in state), "the same seed must learn the same")
+    _hold(all(_equal(state[key], again[key]) for key in state), "the same seed must learn the same")
     rows = np.stack([encoder.encode(rgb, features, state) for features in local])
     _check_rows(rows, 4, rows.shape[1], "place descriptors")
     none = LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, dim), np.float32), np.zeros(0, np.float32))
     blank = encoder.encode(rgb, none, state)
     _check_rows(blank[None], 1, rows.shape[1], "the descriptor of a picture without keypoints", zero_allowed=True)
     _hold(not (state and blank.any()), "what learns from keypoints must have descriptor zero where there are none")
-    _hold(
-        np.array_equal(rows[0], encoder.encode(rgb, local[0], state)), "the same picture must give the same descriptor"
-    )
+    _hold(_equal(rows[0], encoder.encode(rgb, local[0], state)), "the same picture must give the same descriptor")
 
 
 def _check_matcher(matcher: Matcher) -> None:

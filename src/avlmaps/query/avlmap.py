@@ -18,7 +18,13 @@ from avlmaps.query.heatmap import Factor, Heatmap, HeatSettings, NearAnchors, fu
 from avlmaps.query.modalities.area import AreaSettings, area_factor
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
 from avlmaps.query.modalities.object import Asked, ObjectSettings, Pieces, Rivals, object_factor, object_pieces
-from avlmaps.query.modalities.sound import SoundSettings, read_clip, require_audible, sound_factor, sound_features
+from avlmaps.query.modalities.sound import (
+    SoundSettings,
+    read_clip,
+    require_audible,
+    sound_factor,
+    sound_features,
+)
 from avlmaps.query.question import Answer, PartAnswer
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import Sound

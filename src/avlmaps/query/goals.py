@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from avlmaps.core.question import Role
 from avlmaps.query.heatmap import Factor, Heatmap, NearThings
-from avlmaps.query.question import Goal
+from avlmaps.query.question import FOUND_AT, Goal
 
 # Where everything asked for is in the map, but nowhere together by at least this much heat, the whole is not found.
 LEAST_TOGETHER = 0.1
@@ -73,7 +73,7 @@ def is_found(heat: Heatmap) -> bool:
     if len(heat.factors) == 1:
         return True
     lead = lead_of(heat)
-    likely = np.asarray(lead.confidence) >= 0.5
+    likely = np.asarray(lead.confidence) >= FOUND_AT
     return bool((_shares(heat, lead).peak[likely] >= LEAST_TOGETHER).any())
 
 

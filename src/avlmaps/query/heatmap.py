@@ -23,6 +23,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+# Scores are products of float32 vectors of unit length. Their last digits depend on the order of summation, which
+# depends on the processor and on how many vectors are multiplied at once; a difference below this means nothing.
+ROUNDING = 1e-6
+
+
 @dataclass(frozen=True, slots=True)
 class HeatSettings:
     """How fast heat falls with distance (the paper's 0.1 and 0.01 a voxel of 5 cm)."""
@@ -80,6 +85,19 @@ class Factor(ABC):
     def at_any_rate(self) -> "Factor":
         """Return this factor with all that may be meant, however unsure."""
         return self
+
+    @cached_property
+    def shown(self) -> Float32[np.ndarray, " n"]:
+        """Heat times the confidence of the instance that it comes from, in [0, 1]: what pictures show."""
+        return self.weighted(self.values)
+
+    def weighted(self, heat: Float32[np.ndarray, " n"]) -> Float32[np.ndarray, " n"]:
+        """Return heat times the confidence of the instance of this factor that each voxel belongs to."""
+        shown = np.zeros_like(heat)
+        hot = np.flatnonzero((heat > 0.0) & (self.values > 0.0))
+        if len(hot):
+            shown[hot] = heat[hot] * self.confidence[self.instance[self.anchor_of(hot)]]
+        return shown
 
     @abstractmethod
     def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
@@ -159,6 +177,7 @@ class NearAnchors(Factor):
 
     Attributes:
         scores: (a,) in [0, 1], one for each anchor.
+        certainty: the confidence of every instance: 1 where the scores are calibrated already.
     """
 
     space: Space
@@ -170,6 +189,7 @@ class NearAnchors(Factor):
     found: bool
     understood: str = ""
     note: str = ""
+    certainty: float = 1.0
     flat: bool = field(default=True, init=False)
 
     def __post_init__(self) -> None:
@@ -177,11 +197,13 @@ class NearAnchors(Factor):
             raise ValueError(f"{len(self.anchors)} anchors, {len(self.scores)} scores, {len(self.instance)} instances")
         if len(self.scores) and not (np.min(self.scores) >= 0.0 and np.max(self.scores) <= 1.0):
             raise ValueError("an anchor's score is outside [0, 1] or NaN")
+        if not 0.0 <= self.certainty <= 1.0:
+            raise ValueError(f"certainty is {self.certainty}; it must lie in [0, 1]")
 
     @cached_property
     def confidence(self) -> Float[np.ndarray, " i"]:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """1 for each instance: the scores, and so the heat, are calibrated already."""
-        return np.ones(int(self.instance.max(initial=-1)) + 1)
+        """The certainty, for each instance."""
+        return np.full(int(self.instance.max(initial=-1)) + 1, self.certainty)
 
     @cached_property
     def _heat_and_winner(self) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
@@ -253,6 +275,13 @@ class Heatmap:
         return float(self.values.max(initial=0.0))
 
     @property
+    def shown(self) -> Float32[np.ndarray, " n"]:
+        """The heat that pictures show: times the confidence that the lead's instance there is what was queried."""
+        from avlmaps.query.goals import lead_of
+
+        return lead_of(self).weighted(self.values)
+
+    @property
     def modalities(self) -> tuple[Modality, ...]:
         """What kinds of things were asked for."""
         return tuple(factor.part.modality for factor in self.factors)
@@ -301,8 +330,8 @@ def fused(heatmaps: Sequence[Heatmap]) -> Heatmap:
 def normalised(scores: Float[np.ndarray, " a"]) -> Float[np.ndarray, " a"]:
     """Stretch scores to [0, 1] as the paper does, lowest to 0 and highest to 1.
 
-    Where all are equal (or there is one only) no anchor is better than another, and all become 1; that of
-    nothing is nothing. Only order survives: use it for scores that are not calibrated.
+    Where all are equal within rounding (or there is one only) no anchor is better than another, and all become 1;
+    that of nothing is nothing. Only order survives: use it for scores that are not calibrated.
 
     Raises:
         ValueError: a score is NaN or infinite.
@@ -310,7 +339,7 @@ def normalised(scores: Float[np.ndarray, " a"]) -> Float[np.ndarray, " a"]:
     if not np.isfinite(scores).all():
         raise ValueError("a score is NaN or infinite")
     low, high = np.min(scores, initial=np.inf), np.max(scores, initial=-np.inf)
-    if high <= low:
+    if high - low <= ROUNDING * max(1.0, abs(low), abs(high)):
         return np.ones(len(scores))
     return np.clip((scores - low) / (high - low), 0.0, 1.0)
 

@@ -49,13 +49,33 @@ def share(work: Callable[[int, int], Any], count: int, least: int = 1) -> None:
 
 @intrinsic
 def _half_to_float(typing_context, bits):
-    """Widen the bits of a float16; numba on a CPU has no float16 of its own, the processor's instruction has."""
+    """Widen the bits of a float16; numba on a CPU has no float16 of its own, the processor's instruction has.
+
+    Where the code is compiled for an x86 without that instruction (NUMBA_CPU_NAME=generic, old or emulated
+    processors) LLVM would call a function that is not there, so the bits are moved instead.
+    """
 
     def generate(context, builder, signature, arguments):
+        triple, _, features = context.codegen().magic_tuple()
+        if triple.startswith(("x86", "i386", "i686")) and "+f16c" not in features.split(","):
+            return _moved_bits(builder, arguments[0])
         half = builder.bitcast(arguments[0], ir.HalfType())
         return builder.fpext(half, ir.FloatType())
 
     return types.float32(types.uint16), generate
+
+
+def _moved_bits(builder: ir.IRBuilder, half: ir.Value) -> Any:
+    """Return the code of a float16's widening without float16: exact, for subnormals, infinities and NaN as well."""
+    whole, single = ir.IntType(32), ir.FloatType()
+    bits = builder.zext(half, whole)
+    magnitude = builder.shl(builder.and_(bits, whole(0x7FFF)), whole(13))
+    scaled = builder.fmul(builder.bitcast(magnitude, single), single(2.0**112))  # the exponents' offsets differ by 112
+    special = builder.icmp_unsigned(">=", magnitude, whole(0x7C00 << 13))
+    endless = builder.or_(magnitude, whole(0x7F800000))
+    finite = builder.bitcast(scaled, whole)
+    sign = builder.shl(builder.and_(bits, whole(0x8000)), whole(16))
+    return builder.bitcast(builder.or_(builder.select(special, endless, finite), sign), single)
 
 
 @njit(cache=True, nogil=True, fastmath=True)

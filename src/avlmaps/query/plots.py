@@ -8,10 +8,11 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import plot_text
 from avlmaps.core.question import Modality
 from avlmaps.query.heatmap import Factor, Heatmap, NearAnchors
-from avlmaps.query.question import Goal
+from avlmaps.query.question import FOUND_AT, Goal
 from avlmaps.query.topdown import TopDown, walked
 from avlmaps.query.voxel_space import Space
 
@@ -26,12 +27,17 @@ INK = "#26292e"
 _PATH = "#2f6fb0"
 _SOUND = "#0b7a75"
 _COLOURMAP = "inferno"
+HEAT_LABEL = "heat × confidence"
 _PANEL_M = 4.6
 _DPI = 130
+_ALONG = 0.999999  # cosine: over 20 m such an axis is off by less than 3 cm
 
 
 def plot_heat(heat: Heatmap, path: Path, goals: Sequence[Goal]) -> Path:
     """Write a picture of a heatmap: a panel for each factor, and one for their product.
+
+    The colour of a place is its heat times the confidence that the thing there is what was queried, as a goal's
+    score is; what was not found stays dark.
 
     Args:
         heat: the heat.
@@ -51,14 +57,15 @@ def draw_heat(heat: Heatmap, goals: Sequence[Goal]) -> "Figure":
     figure, axes = panels(view, count)
     for factor, ax in zip(heat.factors, axes, strict=False):
         draw_ground(ax, view, heat.space)
-        _draw_heat(ax, view, factor.values)
+        _draw_heat(ax, view, factor.shown)
         _draw_anchors(ax, factor)
-        note = "" if factor.found else " · not found"
+        note = "" if factor.found else f" · not found, at most {factor.shown.max(initial=0.0):.2f}"
         ax.set_title(f"{plot_text(_asked(factor))} ({factor.part.role}){note}", fontsize=10, color=INK, loc="left")
     if count > 1:
         draw_ground(axes[-1], view, heat.space)
-        _draw_heat(axes[-1], view, heat.values)
-        title = f"all together · peak {heat.peak:.2f}" + ("" if heat.found else " · not found")
+        shown = heat.shown
+        _draw_heat(axes[-1], view, shown)
+        title = f"all together · peak {shown.max(initial=0.0):.2f}" + ("" if heat.found else " · not found")
         axes[-1].set_title(title, fontsize=10, color=INK, loc="left", fontweight="bold")
     _draw_goals(axes[-1], heat.space, goals)
     finish(figure, axes, with_heat=True)
@@ -114,8 +121,7 @@ def draw_ground(ax: "Axes", view: TopDown, space: Space, with_walk: bool = True)
     ax.set_aspect("equal")
     ax.set_facecolor(_PAPER)
     ax.autoscale(False)
-    ax.set_xlabel("x (m)", fontsize=8, color=INK)
-    ax.set_ylabel("y (m)", fontsize=8, color=INK)
+    _name_axes(ax, space)
     ax.tick_params(labelsize=7, colors=INK, length=2)
     for spine in ax.spines.values():
         spine.set_color("#c9c7c0")
@@ -123,6 +129,44 @@ def draw_ground(ax: "Axes", view: TopDown, space: Space, with_walk: bool = True)
     if with_walk and len(walk) > 1:
         ax.plot(*walk[:, :2].T, color="white", linewidth=2.6, alpha=0.8)
         ax.plot(*walk[:, :2].T, color=_PATH, linewidth=1.2, label="path of the camera")
+
+
+def _name_axes(ax: "Axes", space: Space) -> None:
+    """Name the axes so that their numbers are true.
+
+    Where an axis of the picture is one of the recording's, it carries that name and its numbers; elsewhere it is an
+    axis of the level frame, and arrows show where the recording's axes point.
+    """
+    names = [recording_axis(row) for row in space.level_from_world[:2]]
+    for axis, name, level in zip((ax.xaxis, ax.yaxis), names, "xy", strict=True):
+        if name is None:
+            axis.set_label_text(f"{level} of the level frame (m)", fontsize=8, color=INK)
+            continue
+        letter, sign = name
+        axis.set_label_text(f"{letter} (m), frame: {FRAME}", fontsize=8, color=INK)
+        if sign < 0:
+            axis.set_major_formatter(lambda value, _: f"{-value:g}")
+    if None in names:
+        _draw_recording_axes(ax, space)
+
+
+def recording_axis(direction: Float[np.ndarray, "3"]) -> tuple[str, int] | None:
+    """Return the name and the sign of the recording's axis that a direction runs along; None for no such axis."""
+    largest = int(np.argmax(np.abs(direction)))
+    return None if abs(direction[largest]) < _ALONG else ("xyz"[largest], 1 if direction[largest] > 0 else -1)
+
+
+def _draw_recording_axes(ax: "Axes", space: Space) -> None:
+    """Draw where the recording's axes point, seen from above; the one along the line of sight is left out."""
+    for column, letter in enumerate("xyz"):
+        right, up = (float(value) for value in space.level_from_world[:2, column])
+        if np.hypot(right, up) < 0.3:
+            continue
+        start, end = (0.1, 0.1), (0.1 + 0.07 * right, 0.1 + 0.07 * up)
+        style = {"arrowstyle": "->", "color": INK, "linewidth": 1.0}
+        ax.annotate("", xy=end, xytext=start, xycoords="axes fraction", textcoords="axes fraction", arrowprops=style)
+        place = 0.1 + 0.1 * right, 0.1 + 0.1 * up
+        ax.text(*place, letter, transform=ax.transAxes, fontsize=7, color=INK, ha="center", va="center")
 
 
 def _draw_heat(ax: "Axes", view: TopDown, values: Float32[np.ndarray, " n"]) -> None:
@@ -141,7 +185,7 @@ def _draw_anchors(ax: "Axes", factor: Factor) -> None:
     if not isinstance(factor, NearAnchors) or not len(factor.anchors):
         return
     anchors = factor.space.level(factor.anchors)
-    likely = np.asarray(factor.scores) >= 0.5
+    likely = np.asarray(factor.scores) >= FOUND_AT
     if factor.part.modality is Modality.IMAGE:
         ax.plot(*anchors[0, :2], marker="^", color=_SOUND, markeredgecolor="white", markersize=11, linestyle="none")
         return
@@ -152,11 +196,11 @@ def _draw_anchors(ax: "Axes", factor: Factor) -> None:
 
 
 def _draw_goals(ax: "Axes", space: Space, goals: Sequence[Goal]) -> None:
-    """Number the goals, and write their scores into the legend."""
+    """Number the goals, and write their positions, in the recording's frame, and scores into the legend."""
     for number, goal in enumerate(goals, 1):
-        x, y, z = space.level(np.array(goal.position))
-        mark(ax, np.array([x, y, z]), str(number), INK)
-        ax.plot([], [], " ", label=f"{number}: score {goal.score:.2f}, z = {z:.2f} m")
+        mark(ax, space.level(np.array(goal.position)), str(number), INK)
+        position = ", ".join(f"{value:.2f}" for value in goal.position)
+        ax.plot([], [], " ", label=f"{number}: ({position}) m, score {goal.score:.2f}")
 
 
 def mark(ax: "Axes", point_level: Float[np.ndarray, "3"], text: str, colour: str) -> None:
@@ -193,7 +237,7 @@ def finish(figure: "Figure", axes: "Sequence[Axes]", with_heat: bool) -> None:
     if with_heat:
         shown = ListedColormap(colormaps[_COLOURMAP](0.15 + 0.8 * np.linspace(0.0, 1.0, 256)))
         bar = figure.colorbar(ScalarMappable(cmap=shown), ax=list(axes), shrink=0.7, pad=0.015, fraction=0.04)
-        bar.set_label("heat", fontsize=8, color=INK)
+        bar.set_label(HEAT_LABEL, fontsize=8, color=INK)
         bar.ax.tick_params(labelsize=7, colors=INK)
         bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
 

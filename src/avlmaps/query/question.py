@@ -3,10 +3,14 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from avlmaps.core.poses import FRAME
 from avlmaps.core.question import Part
 
 if TYPE_CHECKING:
     from avlmaps.query.heatmap import Heatmap
+
+# What has this confidence or more is found: an instance, a sound, a view, the place of a photo.
+FOUND_AT = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +90,12 @@ class Answer:
     heat: "Heatmap | None" = field(default=None, repr=False, compare=False)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the answer with exactly the keys of the contract."""
+        """Return the answer with exactly the keys of the contract; positions are in the frame that ``frame`` names."""
         return {
             "goals": [goal.to_json() for goal in self.goals],
             "found": self.found,
             "parts": [part.to_json() for part in self.parts],
             "elapsed_ms": self.elapsed_ms,
+            "frame": FRAME,
+            "level_from_recording": None if self.heat is None else self.heat.space.level_from_recording.tolist(),
         }

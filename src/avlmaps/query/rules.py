@@ -40,7 +40,7 @@ def build_settings(rules: Rules, settings: BuildSettings = DEFAULTS) -> BuildSet
     """Return the settings of a build with the parts replaced that the rules decide."""
     if rules == "ours":
         return settings
-    fusion = replace(settings.fusion, weight_variance_m2=PAPERS_VARIANCE_M2)
+    fusion = replace(settings.fusion, weight_variance_m2=PAPERS_VARIANCE_M2, sensor="none")
     return replace(settings, fusion=fusion, hearing=PAPER_HEARING)
 
 

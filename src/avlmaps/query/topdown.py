@@ -12,6 +12,8 @@ _HEADROOM_M = 0.3
 # Colour is the mean of this many voxels from the top of a column.
 _SKIN = 3
 _MARGIN_CELLS = 6
+# Along a side; a map that is wider is drawn in cells of several voxels, so that no map asks for gigabytes.
+_MOST_CELLS = 2500
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,15 +42,18 @@ class TopDown:
             half = _MARGIN_CELLS * voxel_size_m
             extent = (-half, half, -half, half)
             return cls(np.zeros((*empty.shape, 3), np.uint8), empty, np.zeros((0, 2), np.int64), extent)
-        ground = np.floor(level[:, :2] / voxel_size_m).astype(np.int64)
-        shown = np.concatenate([ground, np.floor(walked(space)[:, :2] / voxel_size_m).astype(np.int64)])
+        places = np.concatenate([level[:, :2], walked(space)[:, :2]])
+        sides = float(np.ptp(places, axis=0).max()) / voxel_size_m
+        cell_m = voxel_size_m * max(1, int(np.ceil(sides / _MOST_CELLS)))
+        shown = np.floor(places / cell_m).astype(np.int64)
+        ground = shown[: len(level)]
         low, high = shown.min(axis=0) - _MARGIN_CELLS, shown.max(axis=0) + _MARGIN_CELLS + 1
         cell = (ground - low)[:, ::-1]
         shape = int(high[1] - low[1]), int(high[0] - low[0])
         visible = level[:, 2] <= _ceiling_m(space, level)
         rgb, seen = _highest_colours(space, cell, level[:, 2], visible, shape)
-        left, bottom = low * voxel_size_m
-        right, top = high * voxel_size_m
+        left, bottom = low * cell_m
+        right, top = high * cell_m
         return cls(rgb, seen, cell, (float(left), float(right), float(bottom), float(top)))
 
     def heat(self, values: Float32[np.ndarray, " n"]) -> Float32[np.ndarray, "h w"]:

@@ -117,6 +117,13 @@ class Space:
         """The middles of the voxels in the order of ``blocks``, horizontal coordinates of the level frame, metres."""
         return np.ascontiguousarray(self.level(self.centres[self.blocks.order])[:, :2])
 
+    @property
+    def level_from_recording(self) -> Float[np.ndarray, "4 4"]:
+        """The pose of the recording's world in the level frame: the rotation, about the same origin."""
+        pose = np.eye(4)
+        pose[:3, :3] = self.level_from_world
+        return pose
+
     def level(self, points_world: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
         """Turn points from the world into the level frame."""
         return np.asarray(points_world, np.float64) @ self.level_from_world.T

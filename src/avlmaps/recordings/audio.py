@@ -43,19 +43,22 @@ class AudioTrack:
     """An audio file, or the audio stream of a video, placed on a recording's clock.
 
     WAV, FLAC and OGG are read by libsndfile, everything else (mp4, mkv, m4a, mp3) by FFmpeg; several channels
-    become one, their mean. Nothing is read before it is asked for, so a track may be hours long.
+    become one, their mean; where they cancel one another in it, the loudest is read alone. Nothing is read before it is
+    asked for, so a track may be hours long.
 
     Attributes:
         path: the file.
         rate_hz: samples a second.
         duration_s: length in seconds.
         start_s: the recording's time at which its first sample sounds.
+        channel: the one that is read; None for the mean of all.
     """
 
     path: Path
     rate_hz: int
     duration_s: float
     start_s: float = 0.0
+    channel: int | None = None
 
     @classmethod
     def open(cls, path: Path | str, start_s: float = 0.0) -> "AudioTrack":
@@ -76,7 +79,17 @@ class AudioTrack:
             raise AudioError(
                 f"{path} has {rate_hz} samples a second, too few for sounds; at least {LOWEST_RATE_HZ} are needed."
             )
-        return cls(path, rate_hz, count / rate_hz, start_s)
+        return cls(path, rate_hz, count / rate_hz, start_s, containers.cancelling_channel(path, count, rate_hz))
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """A sentence for each thing worth knowing of the track."""
+        if self.channel is None:
+            return ()
+        return (
+            f"The channels of {self.path} cancel one another when they are mixed (one is wired the other way round); "
+            f"channel {self.channel + 1} is used alone.",
+        )
 
     @property
     def end_s(self) -> float:
@@ -105,7 +118,7 @@ class AudioTrack:
         inside_begin, inside_end = max(begin, 0), min(end, count)
         if inside_begin < inside_end:
             at = inside_begin - begin
-            piece = containers.read_piece(self.path, inside_begin, inside_end, self.rate_hz)
+            piece = containers.read_piece(self.path, inside_begin, inside_end, self.rate_hz, self.channel)
             samples[at : at + len(piece)] = _checked(piece, self.path, self.rate_hz, inside_begin)
         return Sound(samples, self.rate_hz)
 
@@ -119,7 +132,7 @@ class AudioTrack:
 
         size = max(1, round(seconds * self.rate_hz))
         count, at = round(self.duration_s * self.rate_hz), 0
-        for block in _regrouped(containers.stream(self.path, count, self.rate_hz), size):
+        for block in _regrouped(containers.stream(self.path, count, self.rate_hz, self.channel), size):
             yield Sound(_checked(block, self.path, self.rate_hz, at), self.rate_hz)
             at += len(block)
         if at < count:

@@ -7,17 +7,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float32
 
-from avlmaps.core.errors import AudioError
+from avlmaps.core.errors import AudioError, NoAudioStreamError
+from avlmaps.core.files import SOUND_BYTES, checked_size
 
 if TYPE_CHECKING:
     import soundfile
-    from av.audio.frame import AudioFrame
 
 _PLAIN = {".wav", ".w64", ".flac", ".ogg", ".oga", ".opus", ".aif", ".aiff", ".caf"}
 _PIECE_SAMPLES = 1 << 16
 _UNKNOWN = 1 << 48  # a FLAC that was written to a pipe may say that it has this many samples or more
 _PREROLL_S = 1.0  # a decoder that starts in the middle needs a while until its output is right
 _RESYNC_S = 0.05  # stamps are rounded (to 1 ms in mkv); only a larger jump is a gap
+_LOOKS, _LOOK_S = 20, 0.25  # of a file, to find out whether its channels cancel
+_CANCELLED = 0.01
+_AUDIBLE_POWER = 1e-8
 _SLACK_S = 0.5  # containers round their durations, encoders drop or pad a few hundred samples
 
 
@@ -35,32 +38,46 @@ def examine(path: Path) -> tuple[int, int]:
     Raises:
         AudioError: there is no such file, it cannot be read, has no audio stream or no samples, or is truncated.
     """
-    if not path.is_file():
-        what = "is a folder, not a sound file" if path.is_dir() else "does not exist"
-        raise AudioError(f"{path} {what}; give a wav, flac, ogg, mp3, m4a, mp4 or mkv file.")
+    try:
+        checked_size(path, SOUND_BYTES)
+    except OSError as error:
+        what = "does not exist"
+        if path.is_dir():
+            what = "is a folder, not a sound file"
+        elif not isinstance(error, FileNotFoundError):
+            what = f"cannot be read as sound ({error.strerror or error})"
+        raise AudioError(f"{path} {what}; give a wav, flac, ogg, mp3, m4a, mp4 or mkv file.") from None
     rate_hz, count = _examine_plain(path) if _is_plain(path) else _examine_video(path)
     if count < 1:
         raise AudioError(f"{path} has an audio stream without a single sample; record or convert it again.")
     return rate_hz, count
 
 
-def read_piece(path: Path, begin: int, end: int, rate_hz: int) -> Float32[np.ndarray, " n"]:
-    """Return the mono samples ``begin:end``; fewer where the file ends before."""
+def read_piece(path: Path, begin: int, end: int, rate_hz: int, channel: int | None = None) -> Float32[np.ndarray, " n"]:
+    """Return the mono samples ``begin:end``; fewer where the file ends before.
+
+    Args:
+        path: the file.
+        begin: first sample.
+        end: one past the last sample.
+        rate_hz: samples a second.
+        channel: the one that is read; the mean of all if None.
+    """
     if not _is_plain(path):
-        pieces = list(_placed(path, begin, end, rate_hz))
+        pieces = list(_placed(path, begin, end, rate_hz, channel))
         return np.concatenate(pieces) if pieces else np.zeros(0, np.float32)
     with _opened_plain(path) as file:
         try:
             file.seek(begin)
-            return _mono(file.read(end - begin, dtype="float32", always_2d=True))
+            return _mono(file.read(end - begin, dtype="float32", always_2d=True), channel)
         except RuntimeError as error:
             raise _unreadable(path, error) from None
 
 
-def stream(path: Path, count: int, rate_hz: int) -> Iterator[Float32[np.ndarray, " _"]]:
+def stream(path: Path, count: int, rate_hz: int, channel: int | None = None) -> Iterator[Float32[np.ndarray, " _"]]:
     """Go through the first ``count`` mono samples in pieces of any length; fewer where the file ends before."""
     if not _is_plain(path):
-        yield from _placed(path, 0, count, rate_hz)
+        yield from _placed(path, 0, count, rate_hz, channel)
         return
     with _opened_plain(path) as file:
         while count > 0:
@@ -71,14 +88,55 @@ def stream(path: Path, count: int, rate_hz: int) -> Iterator[Float32[np.ndarray,
             if not len(piece):
                 return
             count -= len(piece)
-            yield _mono(piece)
+            yield _mono(piece, channel)
+
+
+def cancelling_channel(path: Path, count: int, rate_hz: int) -> int | None:
+    """Return the loudest channel of a file whose channels cancel one another when they are mixed, else None.
+
+    Looks at ``_LOOKS`` pieces spread over the file. Channels cancel where their mean has less than a hundredth of
+    their own power, as with two wires of one microphone, or a plug that is wired wrongly.
+    """
+    power = np.zeros(0)
+    mixed = 0.0
+    length = min(count, round(_LOOK_S * rate_hz))
+    for begin in np.linspace(0, count - length, min(_LOOKS, max(1, count // max(length, 1)))).astype(int).tolist():
+        piece = _channels(path, begin, begin + length, rate_hz)
+        if piece.shape[1] < 2:
+            return None
+        power = (power if len(power) == piece.shape[1] else np.zeros(piece.shape[1])) + (piece**2).sum(axis=0)
+        mixed += float((piece.mean(axis=1) ** 2).sum())
+    if len(power) < 2 or not np.isfinite(power).all() or power.max() <= _AUDIBLE_POWER * _LOOKS * length:
+        return None
+    return int(np.argmax(power)) if mixed < _CANCELLED * power.max() else None
+
+
+def _channels(path: Path, begin: int, end: int, rate_hz: int) -> Float32[np.ndarray, "n channels"]:
+    """Return samples of all channels from ``begin`` on; about as many as are wanted of files that FFmpeg reads."""
+    if _is_plain(path):
+        with _opened_plain(path) as file:
+            try:
+                file.seek(begin)
+                return file.read(end - begin, dtype="float32", always_2d=True)
+            except RuntimeError as error:
+                raise _unreadable(path, error) from None
+    frames, have = [], 0
+    for _, samples in _frames(path, begin / rate_hz):
+        frames.append(samples)
+        have += len(samples)
+        if have >= end - begin:
+            break
+    alike = [f for f in frames if f.shape[1] == frames[0].shape[1]]
+    return np.concatenate(alike) if alike else np.zeros((0, 1), np.float32)
 
 
 def _is_plain(path: Path) -> bool:
     return path.suffix.lower() in _PLAIN
 
 
-def _mono(samples: Float32[np.ndarray, "n channels"]) -> Float32[np.ndarray, " n"]:
+def _mono(samples: Float32[np.ndarray, "n channels"], channel: int | None = None) -> Float32[np.ndarray, " n"]:
+    if channel is not None:
+        return samples[:, min(channel, samples.shape[1] - 1)].copy()
     return samples[:, 0].copy() if samples.shape[1] == 1 else samples.mean(axis=1, dtype=np.float32)
 
 
@@ -164,7 +222,7 @@ def _examine_video(path: Path) -> tuple[int, int]:
     try:
         with av.open(str(path)) as container:
             if not container.streams.audio:
-                raise AudioError(f"{path} has no audio stream; give the sound as a file of its own (--audio).")
+                raise NoAudioStreamError(f"{path} has no audio stream; give the sound as a file of its own (--audio).")
             audio = container.streams.audio[0]
             rate_hz = int(audio.codec_context.sample_rate)
             zero_s = (container.start_time or 0) / av.time_base
@@ -189,8 +247,15 @@ def _end_of_packets(container: Any, audio: Any) -> float:
     return float(end * audio.time_base)
 
 
-def _decoded(path: Path, from_s: float) -> Iterator[tuple[float, Float32[np.ndarray, " _"]]]:
+def _decoded(
+    path: Path, from_s: float, channel: int | None = None
+) -> Iterator[tuple[float, Float32[np.ndarray, " _"]]]:
     """Yield (time of the first sample since the container's start, mono samples) from a while before ``from_s`` on."""
+    for time_s, samples in _frames(path, from_s):
+        yield time_s, _mono(samples, channel)
+
+
+def _frames(path: Path, from_s: float) -> Iterator[tuple[float, Float32[np.ndarray, "n channels"]]]:
     import av
     from av.error import FFmpegError
 
@@ -205,19 +270,17 @@ def _decoded(path: Path, from_s: float) -> Iterator[tuple[float, Float32[np.ndar
             for frame in container.decode(audio):
                 for plain in resampler.resample(frame):
                     if plain.pts is not None and plain.time_base is not None:
-                        yield float(plain.pts * plain.time_base) - zero_s, _frame_samples(plain)
+                        yield float(plain.pts * plain.time_base) - zero_s, plain.to_ndarray().T
     except FFmpegError as error:
         raise _unreadable(path, error) from None
 
 
-def _frame_samples(frame: "AudioFrame") -> Float32[np.ndarray, " _"]:
-    return frame.to_ndarray().mean(axis=0, dtype=np.float32)
-
-
-def _placed(path: Path, begin: int, end: int, rate_hz: int) -> Iterator[Float32[np.ndarray, " _"]]:
+def _placed(
+    path: Path, begin: int, end: int, rate_hz: int, channel: int | None = None
+) -> Iterator[Float32[np.ndarray, " _"]]:
     """Yield the samples ``begin:end`` without holes: gaps between the container's stamps are filled with silence."""
     at, started = begin, False
-    for time_s, samples in _decoded(path, begin / rate_hz):
+    for time_s, samples in _decoded(path, begin / rate_hz, channel):
         index = round(time_s * rate_hz)
         if started and abs(index - at) < _RESYNC_S * rate_hz:
             index = at

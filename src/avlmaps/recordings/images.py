@@ -1,7 +1,11 @@
-"""Reading pictures of a recording: colour (JPEG, PNG) and depth (16-bit PNG, NPY), never half a file."""
+"""Reading pictures of a recording: colour (JPEG, PNG) and depth (16-bit PNG, NPY), never half a file.
+
+A picture's header is compared with the camera before anything is decoded: a PNG of 2 MB may unfold to 4 GB.
+"""
 
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -11,13 +15,17 @@ from jaxtyping import Float32, UInt8
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import PICTURE_BYTES, open_regular, read_regular
+from avlmaps.core.npy import load_npy, npy_header
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _JPEG = b"\xff\xd8"
 # A JPEG's frame headers carry its size; of the codes C0 to CF these three mean something else.
 _JPEG_SIZE_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _HEADER_BYTES = 1 << 18
-_TRIED = 10
+_TRIED = 9
+# No RGB-D camera has more; 8192x8192.
+MOST_PIXELS = 1 << 26
 DEPTH_SATURATED = 65535
 
 
@@ -28,7 +36,7 @@ def read_bytes(path: Path) -> bytes:
         RecordingError: it is missing or cannot be read.
     """
     try:
-        return path.read_bytes()
+        return read_regular(path, PICTURE_BYTES)
     except FileNotFoundError:
         raise RecordingError(f"{path} is missing; restore it, or leave that frame out of the recording.") from None
     except OSError as error:
@@ -72,36 +80,51 @@ def picture_size(path: Path, content: bytes | None = None) -> tuple[int, int]:
     """Return (width, height) of a JPEG, PNG or NPY file from its header alone.
 
     Raises:
-        RecordingError: the file is missing or has no such header.
+        RecordingError: the file is missing, has no such header, or is of a size that no camera has.
     """
-    if content is None:
-        content = _head(path)
-    if content.startswith(_PNG) and len(content) >= 24:
-        return struct.unpack_from(">II", content, 16)
-    if content.startswith(_JPEG) and (size := _jpeg_size(content)):
-        return size
-    if path.suffix == ".npy":
-        shape = _load_npy(path, mmap=True).shape
-        if len(shape) >= 2:
-            return shape[1], shape[0]
-    raise RecordingError(f"{path} is no PNG, JPEG or NPY picture (or is cut off); copy it again.")
+    size = _npy_size(path) if path.suffix == ".npy" else encoded_size(_head(path) if content is None else content)
+    if size is None:
+        raise RecordingError(f"{path} is no PNG, JPEG or NPY picture (or is cut off); copy it again.")
+    if size[0] < 1 or size[1] < 1 or size[0] * size[1] > MOST_PIXELS:
+        raise RecordingError(
+            f"{path} says that it is {size[0]}x{size[1]}; pictures have 1 to {MOST_PIXELS:,} pixels, so copy it again."
+        )
+    return size
+
+
+def encoded_size(content: bytes) -> tuple[int, int] | None:
+    """Return (width, height) that a JPEG's or PNG's header says, None where there is no whole header."""
+    if content.startswith(_PNG) and len(content) >= 33:
+        whole = zlib.crc32(content[12:29]) == struct.unpack_from(">I", content, 29)[0]
+        return struct.unpack_from(">II", content, 16) if whole and content[8:16] == b"\0\0\0\rIHDR" else None
+    return _jpeg_size(content) if content.startswith(_JPEG) else None
+
+
+def _npy_size(path: Path) -> tuple[int, int] | None:
+    try:
+        shape = npy_header(path, PICTURE_BYTES).shape
+    except (ValueError, OSError) as error:
+        raise _no_npy(path, error) from None
+    return (shape[1], shape[0]) if len(shape) >= 2 else None
 
 
 def first_picture_size(folder: Path, names: Sequence[str]) -> tuple[int, int]:
-    """Return the size of the first picture that has one, so that a recording opens though its first file is broken.
+    """Return the size that most of a few pictures have, so that one broken file does not decide for all.
 
     Raises:
-        RecordingError: none of the first few has; the sentence is about the first.
+        RecordingError: none of the few has a size; the sentence is about the first.
     """
-    for name in names[:_TRIED]:
+    sizes: Counter[tuple[int, int]] = Counter()
+    spread: list[int] = np.linspace(0, len(names) - 1, _TRIED).round().astype(int).tolist()
+    for at in dict.fromkeys(spread):
         with suppress(RecordingError):
-            return picture_size(folder / name)
-    return picture_size(folder / names[0])
+            sizes[picture_size(folder / names[at])] += 1
+    return sizes.most_common(1)[0][0] if sizes else picture_size(folder / names[0])
 
 
 def _head(path: Path) -> bytes:
     try:
-        with path.open("rb") as stream:
+        with open_regular(path, PICTURE_BYTES) as stream:
             return stream.read(_HEADER_BYTES)
     except OSError as error:
         raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None
@@ -129,12 +152,27 @@ def read_colour(path: Path, camera: Pinhole) -> UInt8[np.ndarray, "h w 3"]:
     import cv2
 
     content = read_bytes(path)
-    check_whole(path, content)
-    bgr = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    _check_outside(path, content, camera)
+    bgr = decoded(content, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if bgr is None:
         raise RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
     _check_size(path, bgr.shape, camera)
     return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+
+
+def decoded(content: bytes, flags: int) -> np.ndarray | None:
+    """Decode a PNG or JPEG whose header was compared before; None where that fails."""
+    import cv2
+
+    with suppress(cv2.error, MemoryError):
+        return cv2.imdecode(np.frombuffer(content, np.uint8), flags)
+    return None
+
+
+def _check_outside(path: Path, content: bytes, camera: Pinhole) -> None:
+    check_whole(path, content)
+    width, height = picture_size(path, content)
+    _check_size(path, (height, width), camera)
 
 
 def read_depth(path: Path, camera: Pinhole, units_per_m: float) -> Float32[np.ndarray, "h w"]:
@@ -153,7 +191,9 @@ def read_depth(path: Path, camera: Pinhole, units_per_m: float) -> Float32[np.nd
     """
     if path.suffix == ".npy":
         return _npy_depth(path, camera)
-    raw = decode_depth_png(path, read_bytes(path))
+    content = read_bytes(path)
+    _check_outside(path, content, camera)
+    raw = decode_depth_png(path, content)
     _check_size(path, raw.shape, camera)
     depth_m = raw.astype(np.float32)
     depth_m[raw == DEPTH_SATURATED] = 0.0
@@ -166,7 +206,8 @@ def decode_depth_png(path: Path, content: bytes) -> np.ndarray:
     import cv2
 
     check_whole(path, content)
-    raw = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+    picture_size(path, content)
+    raw = decoded(content, cv2.IMREAD_UNCHANGED)
     if raw is None:
         raise RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
     if raw.dtype != np.uint16 or raw.ndim != 2:
@@ -176,25 +217,27 @@ def decode_depth_png(path: Path, content: bytes) -> np.ndarray:
 
 
 def _npy_depth(path: Path, camera: Pinhole) -> Float32[np.ndarray, "h w"]:
-    raw = _load_npy(path)
-    if raw.ndim == 3 and raw.shape[2] == 1:
-        raw = raw[..., 0]
-    if raw.ndim != 2 or raw.dtype.kind not in "fiu":
-        raise RecordingError(f"{path} holds {raw.dtype} of {raw.shape}; depth must be numbers of (height, width).")
-    _check_size(path, raw.shape, camera)
-    depth_m = raw.astype(np.float32)
+    try:
+        header = npy_header(path, PICTURE_BYTES)
+        shape = header.shape[:2] if len(header.shape) == 3 and header.shape[2] == 1 else header.shape
+        if len(shape) != 2 or header.dtype.kind not in "fiu":
+            raise RecordingError(f"{path} holds {header.dtype} of {shape}; depth must be numbers of (height, width).")
+        _check_size(path, shape, camera)
+        raw = load_npy(path, PICTURE_BYTES).reshape(shape)
+    except (ValueError, OSError) as error:
+        raise _no_npy(path, error) from None
+    with np.errstate(over="ignore"):  # float64 beyond float32 becomes infinity, which is no depth
+        depth_m = raw.astype(np.float32)
     depth_m[~(np.isfinite(depth_m) & (depth_m > 0.0))] = 0.0
     return depth_m
 
 
-def _load_npy(path: Path, mmap: bool = False) -> np.ndarray:
-    if not path.is_file():
-        read_bytes(path)
-    try:
-        return np.load(path, mmap_mode="r" if mmap else None, allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
-        reason = str(error).splitlines()[0] if str(error) else "it is empty"
-        raise RecordingError(f"{path} is no whole NPY file ({reason}); copy it again.") from None
+def _no_npy(path: Path, error: ValueError | OSError) -> RecordingError:
+    if isinstance(error, FileNotFoundError):
+        return RecordingError(f"{path} is missing; restore it, or leave that frame out of the recording.")
+    if isinstance(error, OSError):
+        return RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.")
+    return RecordingError(f"{path} is no whole NPY file ({error}); copy it again.")
 
 
 def _check_size(path: Path, shape: tuple[int, ...], camera: Pinhole) -> None:
@@ -213,8 +256,6 @@ def check_picture(path: Path, camera: Pinhole) -> None:
     """
     if path.suffix == ".npy":
         width, height = picture_size(path)
+        _check_size(path, (height, width), camera)
     else:
-        content = read_bytes(path)
-        check_whole(path, content)
-        width, height = picture_size(path, content)
-    _check_size(path, (height, width), camera)
+        _check_outside(path, read_bytes(path), camera)

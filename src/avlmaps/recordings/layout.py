@@ -19,6 +19,7 @@ import numpy as np
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.recordings.faults import Fault, Report
 
 SCHEMA_VERSION = 1
@@ -131,15 +132,15 @@ def read_description(folder: Path, report: Report) -> Description:
 
 def _decode(path: Path) -> Description:
     try:
-        content = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
+        content = read_regular(path, DESCRIPTION_BYTES).removeprefix(b"\xef\xbb\xbf")
         content.decode("utf-8")
-        version = msgspec.json.decode(content, type=_Version).schema_version
+        version = decode_json(content, _Version).schema_version
         if version != SCHEMA_VERSION:
             raise RecordingError(
                 f"{path} has schema version {version}; this avlmaps reads version {SCHEMA_VERSION}: "
                 f"{'update avlmaps' if version > SCHEMA_VERSION else 'write the recording again'}."
             )
-        return msgspec.json.decode(content, type=Description)
+        return decode_json(content, Description)
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         raise RecordingError(f"{path}, line {line}: this is not UTF-8 text; save the file as UTF-8.") from None

@@ -54,10 +54,14 @@ class Format:
         module, _, function = self.opener.partition(":")
         opener = getattr(importlib.import_module(module), function)
         if self.has_topics:
-            return opener(path, topics or {})
-        if topics:
+            recording = opener(path, topics or {})
+        elif topics:
             raise RecordingError(f"{path} is of the format {self.name}, which has no topics; leave them out.")
-        return opener(path, report=report) if self.tells_faults else opener(path)
+        else:
+            recording = opener(path, report=report) if self.tells_faults else opener(path)
+        if recording.audio is not None:
+            recording.notices = (*recording.notices, *recording.audio.notices)
+        return recording
 
 
 def _holds(*names: str) -> Callable[[Path], bool]:
@@ -73,7 +77,7 @@ def _is_seven_scenes(path: Path) -> bool:
 
 
 def _is_rosbag(path: Path) -> bool:
-    if path.is_file():
+    if not path.is_dir():
         return path.suffix.lower() in _BAG_SUFFIXES
     return (path / "metadata.yaml").exists() and _some_name(path, "*.db3", "*.mcap", "*.db3.*", "*.mcap.*")
 
@@ -143,9 +147,13 @@ def open_recording(
         AudioError: the sound track cannot be used.
     """
     path = Path(path)
-    recording = find_format(path, format).open(path, topics=topics)
+    found = find_format(path, format)
+    if audio is not None and found.has_topics and not (topics or {}).get("audio"):
+        topics = {**(topics or {}), "audio": "none"}  # its own sound need not be readable
+    recording = found.open(path, topics=topics)
     if audio is not None:
         recording.audio = AudioTrack.open(Path(audio))
+        recording.notices = (*recording.notices, *recording.audio.notices)
     return recording
 
 

@@ -38,6 +38,7 @@ class Subset(Recording):
         self.up_in_world = whole.up_in_world
         self.audio = whole.audio
         self.notices = whole.notices
+        self.base_height = whole.base_height
 
     def frame(self, index: int) -> Frame:
         """Read one frame; its ``index`` is the one in the subset."""
@@ -59,6 +60,10 @@ class Subset(Recording):
     def depth_units_per_m(self) -> float:
         """The whole recording's."""
         return self.whole.depth_units_per_m
+
+    def change_stamp(self) -> str:
+        """Of the whole recording."""
+        return self.whole.change_stamp()
 
     @cached_property
     def fingerprint(self) -> str:

@@ -1,10 +1,11 @@
 """What a recording is: frames with poses, an audio track, and how to get at them without reading it whole."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
@@ -32,6 +33,19 @@ class Ground:
         height = float(world_from_camera[:3, 3] @ self.up_in_world)
         nearest = int(np.argmin(np.abs(self.camera_m - height)))
         return height - float(self.floor_m[nearest])
+
+
+@dataclass(frozen=True, slots=True)
+class BaseHeight:
+    """Where a robot's base is under its camera.
+
+    Attributes:
+        below_camera_m: from the base up to the depth camera, metres.
+        on_floor: whether the base lies on the floor (ROS ``base_footprint``) or somewhere above it (``base_link``).
+    """
+
+    below_camera_m: float
+    on_floor: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +107,8 @@ class Recording(ABC):
         up_in_world: unit vector, or None where the recording does not know which way is up.
         audio: the sound track on the frames' clock, or None.
         notices: one sentence for each thing worth knowing (gaps, clock jumps, frames left out).
+        topics: of a bag, which topic was chosen for what (rgb, depth, pose, audio); empty for others.
+        base_height: where the robot's base is under the camera in the first frame, None where that is not known.
     """
 
     path: Path
@@ -103,6 +119,8 @@ class Recording(ABC):
     up_in_world: Float[np.ndarray, "3"] | None
     audio: AudioTrack | None
     notices: tuple[str, ...]
+    topics: Mapping[str, str] = MappingProxyType({})
+    base_height: "BaseHeight | None" = None
 
     @abstractmethod
     def frame(self, index: int) -> Frame:
@@ -117,9 +135,17 @@ class Recording(ABC):
     def fingerprint(self) -> str:
         """A hex SHA-256 that changes when the recording does.
 
-        It covers poses, intrinsics and every file's name and size, but not the pictures' bytes, so that a
-        recording of a million frames has one in seconds.
+        It covers poses, intrinsics and every file's name, size and content. Small files are read whole, of large ones
+        evenly spread blocks and the end (see ``recordings.content``). Where a copy lies and when its files were
+        written makes no difference.
         """
+
+    def change_stamp(self) -> str:
+        """Return a word that changes when a file of the recording is written; in a copy it is another.
+
+        A build takes it at its beginning and its end, so that a recording that changes meanwhile makes no map.
+        """
+        return ""
 
     def name(self, index: int) -> str:
         """Return what the recording calls a frame, without reading it."""

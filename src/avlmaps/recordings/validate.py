@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.errors import AvlmapsError, RecordingError
+from avlmaps.core.files import PICTURE_BYTES, decode_json, read_regular
 from avlmaps.core.progress import progress
 from avlmaps.recordings import images
 from avlmaps.recordings.faults import Fault, Report
@@ -134,6 +135,8 @@ def _check_truth(folder: Path, report: Report) -> None:
     objects = folder / "objects.json"
     if objects.is_file():
         try:
-            msgspec.json.decode(objects.read_bytes())
+            decode_json(read_regular(objects, PICTURE_BYTES))
+        except OSError as error:
+            unhurried(Fault(f"{objects} cannot be read ({error.strerror or error}); check the file.", objects))
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
             unhurried(Fault(f"{objects} is not JSON in UTF-8 ({error}); mend the file.", objects))

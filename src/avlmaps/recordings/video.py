@@ -8,6 +8,8 @@ import numpy as np
 from jaxtyping import Float64, UInt8
 
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import SOUND_BYTES, checked_size
+from avlmaps.recordings.images import MOST_PIXELS
 
 
 class VideoFrames:
@@ -26,8 +28,12 @@ class VideoFrames:
         self._container = self._open()
         stream = self._stream()
         self.width, self.height = stream.codec_context.width, stream.codec_context.height
+        if self.width < 1 or self.height < 1 or self.width * self.height > MOST_PIXELS:
+            raise RecordingError(f"{self.path} says that it is {self.width}x{self.height}, which no camera's video is.")
         self._pts = self._read_stamps()
-        base = float(stream.time_base)
+        base = float(stream.time_base or 0)
+        if base <= 0.0:
+            raise RecordingError(f"{self.path} does not say how fast its clock runs; convert it again.")
         self.stamps_s: Float64[np.ndarray, " n"] = (self._pts - self._pts[0]) * base
         self._next = -1  # the frame that the decoder gives next; -1 after a seek
         self._decoder: Any = None
@@ -50,19 +56,31 @@ class VideoFrames:
                 for frame in self._decoder:
                     if frame.pts is not None and frame.pts >= self._pts[index]:
                         self._next = index + 1
-                        return frame.to_ndarray(format="rgb24")
-            except FFmpegError as error:
+                        return self._checked(frame.to_ndarray(format="rgb24"), index)
+            except (FFmpegError, ValueError, MemoryError) as error:
                 raise RecordingError(
                     f"Frame {index} of {self.path} cannot be decoded ({error}); is it damaged?"
                 ) from error
         raise RecordingError(f"{self.path} ends before frame {index} of {len(self)}; the file is cut short.")
 
+    def _checked(self, picture: UInt8[np.ndarray, "h w 3"], index: int) -> UInt8[np.ndarray, "h w 3"]:
+        if picture.shape[:2] != (self.height, self.width):
+            raise RecordingError(
+                f"Frame {index} of {self.path} is {picture.shape[1]}x{picture.shape[0]}, the video {self.width}x"
+                f"{self.height}; every frame must have one size."
+            )
+        return picture
+
     def _open(self) -> Any:
         import av
         from av.error import FFmpegError
 
-        if not self.path.is_file():
-            raise RecordingError(f"There is no video {self.path}.")
+        try:
+            checked_size(self.path, SOUND_BYTES)
+        except FileNotFoundError:
+            raise RecordingError(f"There is no video {self.path}.") from None
+        except OSError as error:
+            raise RecordingError(f"{self.path} cannot be read ({error.strerror or error}); check the file.") from None
         try:
             container = av.open(str(self.path))
         except FFmpegError as error:
@@ -75,6 +93,14 @@ class VideoFrames:
         return self._container.streams.video[0]
 
     def _read_stamps(self) -> np.ndarray:
+        from av.error import FFmpegError
+
+        try:
+            return self._stamps_of_packets()
+        except FFmpegError as error:
+            raise RecordingError(f"{self.path} cannot be read as a video ({error}); is it cut short?") from error
+
+    def _stamps_of_packets(self) -> np.ndarray:
         stamps = [packet.pts for packet in self._container.demux(self._stream()) if packet.pts is not None]
         if not stamps:
             raise RecordingError(f"{self.path} has a video stream without a single frame.")

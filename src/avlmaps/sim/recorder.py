@@ -21,6 +21,7 @@ from avlmaps.core.progress import progress, say
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.layout import DESCRIPTION
 from avlmaps.recordings.writer import RecordingWriter
+from avlmaps.sim.coverage import FloorCoverage, floor_coverage, require_floor
 from avlmaps.sim.hearing import Recorded, ScheduleRule, Sounding, Synthesised, candidates, schedule
 from avlmaps.sim.render import Renderer
 from avlmaps.sim.scene import Scene
@@ -115,12 +116,14 @@ class SceneRecording:
         frames: how many.
         duration_s: length of the walk.
         heard: the sounds in it.
+        floor: how much of the building's floor was driven along and seen.
     """
 
     path: Path
     frames: int
     duration_s: float
     heard: tuple[Sounding, ...]
+    floor: FloorCoverage
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,7 +135,9 @@ class _Trip:
     duration_s: float
 
 
-def record_scene(scene: Scene, out: Path, settings: RecordSettings | None = None, seed: int = 0) -> SceneRecording:
+def record_scene(
+    scene: Scene, out: Path | str, settings: RecordSettings | None = None, seed: int = 0
+) -> SceneRecording:
     """Drive through a scene and write a recording in our folder format, with its truth beside it.
 
     The same scene, settings and seed give the same bytes, on however many processes.
@@ -144,15 +149,17 @@ def record_scene(scene: Scene, out: Path, settings: RecordSettings | None = None
         seed: of the walk, the sounds and the faults.
 
     Raises:
-        RecordingError: the folder is not empty, or nothing in the scene can be driven through.
+        RecordingError: the folder is not empty, or the scene has no floor to speak of, or is none in metres.
         AudioError: the folder of clips cannot be used.
     """
-    settings = settings or RecordSettings()
+    settings, out = settings or RecordSettings(), Path(out)
     if (out / DESCRIPTION).exists():  # told before the work is done, not after
         raise RecordingError(f"{out} holds a recording already; choose another folder or remove it.")
+    space = require_floor(scene, settings.walk)
     for_walk, for_sounds, for_track, for_frames = np.random.default_rng(seed).spawn(4)
     trip = _trip(scene, settings, for_walk)
     soundings = _soundings(scene, settings, trip, for_sounds)
+    floor = floor_coverage(scene, space, trip.world_from_camera, settings.fov_deg)
     clear_unfinished(out)
     origin = f"avlmaps record of {scene.name}, seed {seed}"
     rig = Rig(settings.camera, settings.camera)
@@ -161,7 +168,7 @@ def record_scene(scene: Scene, out: Path, settings: RecordSettings | None = None
             writer.set_audio(track)
         _write_frames(scene, settings, trip, writer, for_frames)
         write_truth(out, scene, soundings, {"scene": scene.name, "seed": seed, "settings": _plain(settings)})
-    return SceneRecording(out, len(trip.stamps_s), trip.duration_s, tuple(soundings))
+    return SceneRecording(out, len(trip.stamps_s), trip.duration_s, tuple(soundings), floor)
 
 
 def _plain(settings: RecordSettings) -> dict[str, Any]:

@@ -98,4 +98,6 @@ def told(content: Any) -> str:
         case list():
             few = ", ".join(told(each) for each in content[:3])
             return f"[{few}, ... {len(content)} in all]" if len(content) > 3 else f"[{few}]"
+        case float():  # NumPy's are floats, too, and write their type into their repr
+            return repr(float(content))
     return repr(content)

@@ -7,7 +7,7 @@ parts of a recording add up to the map of the whole.
 """
 
 import numpy as np
-from jaxtyping import Float, Float16, Float32
+from jaxtyping import Bool, Float, Float16, Float32
 
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import BackendError, MapError, RecordingError
@@ -15,8 +15,10 @@ from avlmaps.maps.fusion import add_kernels as sums
 from avlmaps.maps.fusion import measure_kernels as kernels
 from avlmaps.maps.fusion.pixel_lookup import PixelLookup, look_up
 from avlmaps.maps.fusion.settings import FusionSettings
-from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
+from avlmaps.maps.fusion.voxel_sums import Evidence, VoxelSums, VoxelTable
 from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.sensor import NONE, SensorModel
+from avlmaps.maps.sensor_kernels import drop_flying
 from avlmaps.maps.types import Voxels
 from avlmaps.recordings.types import Frame
 
@@ -34,19 +36,23 @@ class VoxelAccumulator:
     two accumulators on two threads map two parts at once.
     """
 
-    def __init__(self, grid: GridSpec, dim: int, settings: FusionSettings | None = None) -> None:
+    def __init__(
+        self, grid: GridSpec, dim: int, settings: FusionSettings | None = None, sensor: SensorModel = NONE
+    ) -> None:
         """Begin an empty map.
 
         Args:
             grid: the voxels' size.
             dim: length of a feature; 0 where no pixel features will come.
             settings: depth limits and the weight's width.
+            sensor: error of the depths; by default every depth within the limits is used as it is.
         """
         if dim < 0:
             raise ValueError(f"dim is {dim}; a feature cannot have fewer than 0 numbers")
         self.grid = grid
         self.dim = dim
         self.settings = settings or FusionSettings()
+        self.sensor = sensor
         self._table = VoxelTable(dim)
         self._lookup: tuple[Rig, int, int, PixelLookup] | None = None
         self._scratch = kernels.make_scratch(1, 1)
@@ -78,12 +84,11 @@ class VoxelAccumulator:
         cells, (feature_rows, feature_columns) = self._cells(features)
         lookup = self._lookup_for(frame.rig, feature_rows, feature_columns)
         pose = self._pose_of(frame)
-        limits = self.settings.min_depth_m, self.settings.max_depth_m, 0.5 / self.settings.variance_m2
         traced = kernels.trace(
-            np.require(frame.depth_m, np.float32, ["C", "W"]),
+            self._depth_of(frame),
             (lookup.x, lookup.y),
             pose,
-            (self.grid.voxel_size_m, *limits),
+            self._limits(),
             np.require(frame.rgb, np.uint8, ["C", "W"]).reshape(-1, 3),
             lookup.tables,
             lookup.projection,
@@ -118,13 +123,39 @@ class VoxelAccumulator:
         """
         return self._table.sums(feature_out)
 
-    def voxels(self, feature_out: Float16[np.ndarray, "n d"] | None = None) -> Voxels:
+    def evidence(self) -> Evidence:
+        """Return what is known of each voxel's surface, sorted by index: what `cleaning.clean` decides on."""
+        return self._table.evidence()
+
+    def voxels(
+        self, feature_out: Float16[np.ndarray, "k d"] | None = None, kept: Bool[np.ndarray, " n"] | None = None
+    ) -> Voxels:
         """Return the means, sorted by index: features of unit length, colours.
 
         Args:
+            kept: which voxels of `evidence` to return; all by default.
             feature_out: where to write the features, such as a memory-mapped file; by default a new array.
         """
-        return self._table.voxels(feature_out)
+        return self._table.voxels(feature_out, kept)
+
+    def _limits(self) -> tuple[float, ...]:
+        """Return what `fusion_kernels.trace` takes as limits."""
+        settings, sensor, half = self.settings, self.sensor, 0.5 * self.grid.voxel_size_m
+        farthest = min(settings.max_depth_m, sensor.farthest_m(self.grid.voxel_size_m))
+        noise = sensor.noise_m / half, sensor.noise_per_m / half
+        return (self.grid.voxel_size_m, settings.min_depth_m, farthest, 0.5 / settings.variance_m2, *noise)
+
+    def _depth_of(self, frame: Frame) -> Float32[np.ndarray, "h w"]:
+        """Return the depths of a frame without flying pixels."""
+        depth = np.require(frame.depth_m, np.float32, ["C", "W"])
+        sensor, camera = self.sensor, frame.rig.depth
+        if not np.isfinite(sensor.edge_sigmas):
+            return depth
+        kept = np.empty_like(depth)
+        slope = np.tan(np.deg2rad(sensor.steepest_deg))
+        steps = slope / camera.fx, slope / camera.fy
+        drop_flying(depth, steps, sensor.noise, sensor.edge_sigmas, kept)
+        return kept
 
     def _cells(self, features: np.ndarray | None) -> tuple[Float32[np.ndarray, "cells d"], tuple[int, int]]:
         """Return the features as rows of cells, and how many rows and columns of cells there are."""

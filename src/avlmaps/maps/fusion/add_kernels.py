@@ -8,7 +8,7 @@ and reading and writing rows of 2 KB, is what limits fusion.
 import numpy as np
 from numba import njit
 
-from avlmaps.maps.fusion.measure_kernels import BLUE, GREEN, HITS, OFFSET_BITS, REACH_VOXELS, RED, RGB_WEIGHT
+from avlmaps.maps.fusion.measure_kernels import BLUE, GREEN, HITS, OFFSET_BITS, REACH_VOXELS, RED, RGB_WEIGHT, SHARP
 from avlmaps.maps.fusion.voxel_kernels import OPTIONS, REASSOCIATING, find_or_insert
 
 
@@ -22,13 +22,13 @@ def commit(voxels, scratch, origin, stamp_s, slots, geometry, count):
         origin: (3,) the camera's voxel.
         stamp_s: when the frame was taken.
         slots: hash table of the map, with room.
-        geometry: (index, rgb_sum, rgb_weight, hits, last_seen_s) of the map, added to.
+        geometry: (index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s) of the map, added to.
         count: voxels of the map so far.
 
     Returns:
         Count of voxels now.
     """
-    index, rgb_sum, rgb_weight, hits, last_seen_s = geometry
+    index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s = geometry
     lowest = (1 << OFFSET_BITS) - 1
     for voxel in range(voxels):
         key = scratch.voxel_key[voxel]
@@ -45,6 +45,8 @@ def commit(voxels, scratch, origin, stamp_s, slots, geometry, count):
         rgb_sum[row, 2] += scratch.voxel_sum[voxel, BLUE]
         rgb_weight[row] += scratch.voxel_sum[voxel, RGB_WEIGHT]
         hits[row] += np.int64(scratch.voxel_sum[voxel, HITS])
+        views[row] += 1
+        sharp[row] += np.int64(scratch.voxel_sum[voxel, SHARP])
     return count
 
 

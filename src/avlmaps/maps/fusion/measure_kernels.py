@@ -21,8 +21,10 @@ RECENT_PAIRS = 1 << 13
 # The hash table of the frame's voxels begins with this many slots and doubles when it is half full.
 FIRST_SLOTS = 1 << 11
 # Columns of what a frame adds to each voxel.
-RED, GREEN, BLUE, RGB_WEIGHT, HITS = range(5)
+RED, GREEN, BLUE, RGB_WEIGHT, HITS, SHARP = range(6)
 SUM_COLUMNS = 8  # one cache line
+# How exact a hit is, from 0 to 1, is counted in these units: sums of whole numbers are the same in any order.
+SHARP_UNITS = 256
 
 # exp(-e) = table[n] · exp(-r) with n = floor(64 e) and r in [0, 1/64); five terms are right to 2e-14, and four
 # times faster than a call of exp, because the loop is vectorised.
@@ -34,16 +36,17 @@ _EXPONENTIALS = np.exp(-np.arange(STEPS * (int(GREATEST_EXPONENT) + 1) + 1) / ST
 class Scratch(NamedTuple):
     """What the kernels keep between their steps, for pictures of one size; only the touched part costs memory.
 
-    Of each pixel of a row: ``key`` (of its voxel), ``weight``, ``picture`` (its colour pixel), ``cell`` (its cell of
-    the feature map), the latter two linear indices, -1 outside. Of the frame's voxels: a hash table (``slot_key``,
-    ``slot_voxel``), ``voxel_key``, ``voxel_sum`` (what the frame adds), ``voxel_row`` (where in the map),
-    ``voxel_start`` (where their pairs begin in ``grouped_cell`` and ``grouped_weight``). Of each pair, as they are
-    met: ``pair_voxel``, ``pair_cell``, ``pair_weight``; ``recent`` remembers those used last. Of one voxel:
-    ``live_cell`` and ``live_weight``, the pairs that have a feature.
+    Of each pixel of a row: ``key`` (of its voxel), ``weight``, ``sharp`` (how exact its depth is), ``picture``
+    (its colour pixel), ``cell`` (its cell of the feature map), the latter two linear indices, -1 outside. Of the
+    frame's voxels: a hash table (``slot_key``, ``slot_voxel``), ``voxel_key``, ``voxel_sum`` (what the frame
+    adds), ``voxel_row`` (where in the map), ``voxel_start`` (where their pairs begin in ``grouped_cell`` and
+    ``grouped_weight``). Of each pair, as they are met: ``pair_voxel``, ``pair_cell``, ``pair_weight``; ``recent``
+    remembers those used last. Of one voxel: ``live_cell`` and ``live_weight``, the pairs that have a feature.
     """
 
     key: np.ndarray
     weight: np.ndarray
+    sharp: np.ndarray
     picture: np.ndarray
     cell: np.ndarray
     slot_key: np.ndarray
@@ -69,6 +72,7 @@ def make_scratch(height: int, width: int) -> Scratch:
     return Scratch(
         key=np.empty(width, np.int64),
         weight=np.empty(width, np.float64),
+        sharp=np.empty(width, np.int64),
         picture=np.empty(width, np.int32),
         cell=np.empty(width, np.int32),
         slot_key=np.empty(slots, np.int64),
@@ -89,10 +93,10 @@ def make_scratch(height: int, width: int) -> Scratch:
 
 
 @njit(**OPTIONS)
-def _measure_row(depth, x, y, pose, limits, key, weight):
-    """Find the voxel (as an offset key, -1 without depth) and the weight of every pixel of a row."""
+def _measure_row(depth, x, y, pose, limits, key, weight, sharp):
+    """Find the voxel (as an offset key, -1 without depth), the weight and the exactness of every pixel of a row."""
     rotation, translation, origin = pose
-    voxel_size, nearest, farthest, falloff = limits
+    voxel_size, nearest, farthest, falloff, noise, noise_growth = limits
     half = np.int64(REACH_VOXELS)
     bx = rotation[0, 1] * y + rotation[0, 2]
     by = rotation[1, 1] * y + rotation[1, 2]
@@ -113,7 +117,10 @@ def _measure_row(depth, x, y, pose, limits, key, weight):
         step = np.int32(exponent * STEPS)
         r = exponent - step * (1.0 / STEPS)
         series = 1.0 - r * (1.0 - r * (1 / 2 - r * (1 / 6 - r * (1 / 24 - r * (1 / 120)))))
-        weight[u] = _EXPONENTIALS[np.uint32(step)] * series
+        error = noise + noise_growth * z * z
+        exact = 1.0 / (1.0 + error * error)
+        weight[u] = _EXPONENTIALS[np.uint32(step)] * series * exact
+        sharp[u] = np.int64(SHARP_UNITS * exact + 0.5)
 
 
 @njit(**OPTIONS)
@@ -189,14 +196,16 @@ def _add_pair(voxel, cell, amount, recent, pair_voxel, pair_cell, pair_weight, p
 
 
 @njit(**OPTIONS)
-def _add_run(u, keys, cells, weights, picture, rgb, voxel, voxel_sum):
+def _add_run(u, keys, cells, weights, sharp, picture, rgb, voxel, voxel_sum):
     """Add the pixels from ``u`` on that share voxel and cell to the voxel; return where they end and their weight."""
     key, cell = keys[u], cells[u]
     start = u
     total = red = green = blue = seen = 0.0
+    exact = np.int64(0)
     while u < keys.shape[0] and keys[u] == key and cells[u] == cell:
         weight = weights[u]
         total += weight
+        exact += sharp[u]
         pixel = picture[u]
         if pixel >= 0:
             seen += weight
@@ -209,6 +218,7 @@ def _add_run(u, keys, cells, weights, picture, rgb, voxel, voxel_sum):
     voxel_sum[voxel, BLUE] += blue
     voxel_sum[voxel, RGB_WEIGHT] += seen
     voxel_sum[voxel, HITS] += u - start
+    voxel_sum[voxel, SHARP] += exact
     return u, total
 
 
@@ -220,7 +230,8 @@ def trace(depth, rays, pose, limits, rgb, tables, projection, scratch):
         depth: (h, w) float32, metres.
         rays: (x (w,), y (h,)), camera-frame direction of each column and row at z = 1.
         pose: (rotation (3, 3), translation (3,), origin (3,) int64: the camera's voxel).
-        limits: (voxel size, least and greatest depth in metres, 1 / (2 variance)).
+        limits: (voxel size, least and greatest depth in metres, 1 / (2 variance), error of a depth in half voxels at
+            0 m and its growth with the depth's square).
         rgb: (H * W, 3) uint8.
         tables: see `pixel_lookup.PixelLookup`.
         projection: likewise.
@@ -231,6 +242,7 @@ def trace(depth, rays, pose, limits, rgb, tables, projection, scratch):
     """
     # Single arrays go to the innermost functions: a whole scratch would have each of its arrays counted as held.
     keys, cells, weights, picture = scratch.key, scratch.cell, scratch.weight, scratch.picture
+    sharp = scratch.sharp
     slot_key, slot_voxel, voxel_sum = scratch.slot_key, scratch.slot_voxel, scratch.voxel_sum
     recent, pair_voxel, pair_cell, pair_weight = (
         scratch.recent,
@@ -244,7 +256,7 @@ def trace(depth, rays, pose, limits, rgb, tables, projection, scratch):
     points = voxels = pairs = voxel = np.int64(0)
     last_key = np.int64(-1)
     for v in range(depth.shape[0]):
-        _measure_row(depth[v], rays[0], rays[1][v], pose, limits, keys, weights)
+        _measure_row(depth[v], rays[0], rays[1][v], pose, limits, keys, weights, sharp)
         if projection[0]:
             _project_row(depth[v], rays[0], rays[1][v], projection, picture, cells)
         else:
@@ -265,7 +277,7 @@ def trace(depth, rays, pose, limits, rgb, tables, projection, scratch):
                     voxel = voxels
                     mask = _enter_voxel(slot, key, scratch, voxels, mask)
                     voxels += 1
-            end, weight = _add_run(u, keys, cells, weights, picture, rgb, voxel, voxel_sum)
+            end, weight = _add_run(u, keys, cells, weights, sharp, picture, rgb, voxel, voxel_sum)
             points += end - u
             u = end
             if cell >= 0:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from avlmaps.core.errors import MapError
+from avlmaps.maps.sensor import SensorModel, SensorName
 
 PAPERS_VARIANCE_M2 = 0.6
 
@@ -20,6 +21,10 @@ class FusionSettings:
     weight_variance_m2: float | None = None
     """The 0.6 of the weight exp(−d² / (2·0.6)), d the distance from the camera in metres. None takes what the profile's
     pixel encoder is best at: the paper's 0.6 for most."""
+    sensor: SensorName | SensorModel = "auto"
+    """The depth camera, whose error decides which depths are used and how much they count. `auto` measures the error in
+    the frames and takes the nearest of kinect, realsense and perfect; `none` uses every depth as it is, like the
+    paper."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.min_depth_m < self.max_depth_m < np.inf:

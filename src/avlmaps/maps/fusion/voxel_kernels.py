@@ -33,6 +33,19 @@ def find_or_insert(i, j, k, table, index, count):
 
 
 @njit(**OPTIONS)
+def find_row(i, j, k, table, index):
+    """Return the row of a voxel, -1 where it is not in the table."""
+    mask = table.shape[0] - 1
+    slot = _hash(i, j, k) & mask
+    while table[slot] >= 0:
+        row = table[slot]
+        if index[row, 0] == i and index[row, 1] == j and index[row, 2] == k:
+            return row
+        slot = (slot + 1) & mask
+    return np.int32(-1)
+
+
+@njit(**OPTIONS)
 def rehash(table, index, count):
     """Enter the first ``count`` voxels into an empty (all -1) table."""
     mask = table.shape[0] - 1
@@ -48,9 +61,9 @@ def add_rows(part, table, sums, feature_sum, weight, count):
     """Add voxels of another map to this one; the table and the sums must have room for all of them.
 
     Args:
-        part: (index, rgb_sum, rgb_weight, hits, last_seen_s, feature_sum, weight) of the other's voxels.
+        part: (index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s, feature_sum, weight) of the other's voxels.
         table: hash table of rows.
-        sums: (index, rgb_sum, rgb_weight, hits, last_seen_s), added to.
+        sums: (index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s), added to.
         feature_sum: (rows, d), added to.
         weight: (rows,), added to.
         count: voxels of this map so far.
@@ -58,8 +71,9 @@ def add_rows(part, table, sums, feature_sum, weight, count):
     Returns:
         Count of voxels now.
     """
-    index, rgb_sum, rgb_weight, hits, last_seen_s = sums
-    part_index, part_rgb, part_rgb_weight, part_hits, part_last_seen, part_feature, part_weight = part
+    index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s = sums
+    part_index, part_rgb, part_rgb_weight, part_hits, part_views, part_sharp, part_last_seen = part[:7]
+    part_feature, part_weight = part[7:]
     for n in range(part_index.shape[0]):
         row = find_or_insert(part_index[n, 0], part_index[n, 1], part_index[n, 2], table, index, count)
         last_seen_s[row] = part_last_seen[n] if row == count else max(last_seen_s[row], part_last_seen[n])
@@ -69,6 +83,8 @@ def add_rows(part, table, sums, feature_sum, weight, count):
             rgb_sum[row, colour] += part_rgb[n, colour]
         rgb_weight[row] += part_rgb_weight[n]
         hits[row] += part_hits[n]
+        views[row] += part_views[n]
+        sharp[row] += part_sharp[n]
         weight[row] += part_weight[n]
         for column in range(feature_sum.shape[1]):
             feature_sum[row, column] += part_feature[n, column]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int32, Int64
+from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 from avlmaps.core.errors import MapError
 from avlmaps.maps.fusion import voxel_kernels as kernels
@@ -26,6 +26,8 @@ class VoxelSums:
         rgb_sum: sum of weight times colour (0 to 255).
         rgb_weight: sum of the weights of the pixels with a colour.
         hits: how many pixels fell into it, with a feature and a colour or without.
+        views: how many frames have a pixel in it.
+        sharp: sum over its pixels of how exact their depths are, 1 / (1 + (σ / half a voxel)²), in units of 1/256.
         last_seen_s: when a pixel last fell into it.
     """
 
@@ -35,6 +37,8 @@ class VoxelSums:
     rgb_sum: Float64[np.ndarray, "n 3"]
     rgb_weight: Float64[np.ndarray, " n"]
     hits: Int64[np.ndarray, " n"]
+    views: Int32[np.ndarray, " n"]
+    sharp: Int64[np.ndarray, " n"]
     last_seen_s: Float64[np.ndarray, " n"]
 
     def __post_init__(self) -> None:
@@ -46,6 +50,8 @@ class VoxelSums:
             "rgb_sum": (np.float64, (count, 3)),
             "rgb_weight": (np.float64, (count,)),
             "hits": (np.int64, (count,)),
+            "views": (np.int32, (count,)),
+            "sharp": (np.int64, (count,)),
             "last_seen_s": (np.float64, (count,)),
         }
         for name, (dtype, shape) in expected.items():
@@ -55,6 +61,23 @@ class VoxelSums:
 
     def __len__(self) -> int:
         return len(self.index)
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """How well each voxel was seen; the fields are those of `VoxelSums`."""
+
+    index: Int32[np.ndarray, "n 3"]
+    hits: Int64[np.ndarray, " n"]
+    views: Int32[np.ndarray, " n"]
+    sharp: Int64[np.ndarray, " n"]
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def only(self, kept: Bool[np.ndarray, " n"]) -> "Evidence":
+        """Return some of the voxels."""
+        return Evidence(self.index[kept], self.hits[kept], self.views[kept], self.sharp[kept])
 
 
 class VoxelTable:
@@ -79,12 +102,14 @@ class VoxelTable:
         self.rgb_sum = np.zeros((SMALLEST_ROOM, 3))
         self.rgb_weight = np.zeros(SMALLEST_ROOM)
         self.hits = np.zeros(SMALLEST_ROOM, np.int64)
+        self.views = np.zeros(SMALLEST_ROOM, np.int32)
+        self.sharp = np.zeros(SMALLEST_ROOM, np.int64)
         self.last_seen_s = np.zeros(SMALLEST_ROOM)
 
     @property
     def geometry(self) -> tuple[np.ndarray, ...]:
         """All sums but the features', as the kernels take them."""
-        return self.index, self.rgb_sum, self.rgb_weight, self.hits, self.last_seen_s
+        return self.index, self.rgb_sum, self.rgb_weight, self.hits, self.views, self.sharp, self.last_seen_s
 
     def reserve(self, extra: int) -> None:
         """Make room for so many new voxels."""
@@ -110,8 +135,9 @@ class VoxelTable:
             )
         for rows in blocks(len(part), self.dim):
             # Copies: of a bounded size, and never read-only (which would compile the kernel a second time).
-            arrays = (part.index, part.rgb_sum, part.rgb_weight, part.hits, part.last_seen_s, part.feature_sum)
-            block = tuple(np.array(array[rows], order="C") for array in (*arrays, part.weight))
+            arrays = (part.index, part.rgb_sum, part.rgb_weight, part.hits, part.views, part.sharp)
+            every = (*arrays, part.last_seen_s, part.feature_sum, part.weight)
+            block = tuple(np.array(array[rows], order="C") for array in every)
             self.reserve(len(block[0]))
             self.count = kernels.add_rows(block, self.slots, self.geometry, self.feature_sum, self.weight, self.count)
 
@@ -140,21 +166,29 @@ class VoxelTable:
             rgb_sum=self.rgb_sum[rows],
             rgb_weight=self.rgb_weight[rows],
             hits=self.hits[rows],
+            views=self.views[rows],
+            sharp=self.sharp[rows],
             last_seen_s=self.last_seen_s[rows],
         )
 
-    def voxels(self, feature_out: np.ndarray | None = None) -> Voxels:
+    def evidence(self) -> Evidence:
+        """Return what is known of each voxel's surface, sorted."""
+        rows = self.sorted_rows()
+        return Evidence(self.index[rows], self.hits[rows], self.views[rows], self.sharp[rows])
+
+    def voxels(self, feature_out: np.ndarray | None = None, kept: Bool[np.ndarray, " n"] | None = None) -> Voxels:
         """Return the means, sorted; see `VoxelAccumulator.voxels`."""
         rows = self.sorted_rows()
-        feature = feature_array(feature_out, (self.count, self.dim), np.float16)
-        parts = blocks(self.count, self.dim)
+        rows = rows if kept is None else rows[kept]
+        feature = feature_array(feature_out, (len(rows), self.dim), np.float16)
+        parts = blocks(len(rows), self.dim)
         buffer = np.empty((parts[0].stop if parts else 0, self.dim), np.float32)
         for block in parts:
             unit = buffer[: block.stop - block.start]
             kernels.unit_rows(self.feature_sum, rows[block], unit)
             feature[block] = unit
         rgb_weight = self.rgb_weight[rows, None]
-        rgb = np.divide(self.rgb_sum[rows], rgb_weight, out=np.zeros((self.count, 3)), where=rgb_weight > 0.0)
+        rgb = np.divide(self.rgb_sum[rows], rgb_weight, out=np.zeros((len(rows), 3)), where=rgb_weight > 0.0)
         return Voxels(
             index=self.index[rows],
             feature=feature,

@@ -2,15 +2,20 @@
 
 from collections.abc import Iterator
 from contextlib import suppress
+from typing import Literal
 
 import numpy as np
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.maps.gravity.floor import GroundedRecording, find_ground
+from avlmaps.maps.gravity.floor import FoundFloor, GroundedRecording, find_ground
+from avlmaps.maps.gravity.floor_choice import Evidence, Expected
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.manifest import UpInfo
-from avlmaps.recordings.types import Frame, Recording
+from avlmaps.maps.store.manifest import FloorGuess, FloorInfo, GroundInfo, UpInfo
+from avlmaps.recordings.types import Frame, Ground, Recording
 
+_LEAVES_OPEN = 0.7  # a floor of a lower confidence gets a notice,
+_FEW_CAMERAS = 0.1  # if more than this share of the cameras stood over it
+_MUCH_BELOW = 0.1  # a floor that the user gave gets one when more surface than this share lies below it
 _RANDOMNESS = 1  # number of the stage as a source of randomness (keyframes have 2)
 
 
@@ -29,14 +34,99 @@ def look_for_up(recording: Recording, settings: BuildSettings) -> UpInfo:
     return UpInfo.of(up.direction, "planes", float(up.support))
 
 
+def spread(recording: Recording, count: int) -> list[int]:
+    """Return the numbers of frames evenly spread over the recording."""
+    return np.unique(np.linspace(0, len(recording) - 1, count).round().astype(int)).tolist()
+
+
 def spread_frames(recording: Recording, count: int) -> Iterator[Frame]:
-    """Read frames evenly spread over the recording; what cannot be read is told when it comes to fusing."""
-    for index in np.unique(np.linspace(0, len(recording) - 1, count).round().astype(int)):
+    """Read frames evenly spread over the recording; fusing reports what cannot be read."""
+    for index in spread(recording, count):
         with suppress(RecordingError):
             yield recording.frame(int(index))
 
 
+def look_for_ground(recording: Recording, settings: BuildSettings, up: UpInfo) -> tuple[Ground, GroundInfo]:
+    """Return the floor under each camera height, and what is known of it for the manifest."""
+    expected, known_from = _expected(recording, settings, up)
+    found = find_ground(spread_frames(recording, settings.gravity.frames), up.vector(), expected)
+    cameras = len(found.ground.camera_m)
+    return found.ground, GroundInfo(
+        known_from=known_from,
+        floors=tuple(
+            FloorInfo(
+                best=_guess(floor.choice.best, floor.confidence, floor.camera_height_m),
+                runner_up=_runner_up(floor),
+                cameras=len(floor.cameras_m) / cameras,
+            )
+            for floor in found.floors
+        ),
+    )
+
+
+def _expected(
+    recording: Recording, settings: BuildSettings, up: UpInfo
+) -> tuple[Expected | None, Literal["surfaces", "user", "recording"]]:
+    """Return what the user or the recording says about the floor at the start."""
+    start_m = float(recording.world_from_camera[0, :3, 3] @ up.vector()) if len(recording) else 0.0
+    given_m, base = settings.gravity.camera_height_m, recording.base_height
+    if given_m is not None:
+        return Expected(start_m - given_m, given_m), "user"
+    if base is not None:
+        expected = Expected(start_m - base.below_camera_m, base.below_camera_m, base.on_floor)
+        return expected, "recording" if base.on_floor else "surfaces"
+    return None, "surfaces"
+
+
+def _guess(evidence: Evidence, confidence: float, camera_height_m: float) -> FloorGuess:
+    return FloorGuess(
+        height_m=round(evidence.height_m, 4),
+        camera_height_m=round(camera_height_m, 4),
+        confidence=round(confidence, 4),
+        in_view=evidence.seen,
+        level_m2=round(evidence.level_m2, 2),
+        below=round(evidence.below, 4),
+    )
+
+
+def _runner_up(floor: FoundFloor) -> FloorGuess | None:
+    second = floor.choice.runner_up
+    if second is None:
+        return None
+    camera_height_m = floor.camera_height_m + floor.height_m - second.height_m
+    return _guess(second, floor.choice.runner_up_confidence, camera_height_m)
+
+
+def ground_notices(ground: GroundInfo) -> Iterator[str]:
+    """Yield a sentence for each floor that most of its evidence leaves open."""
+    remedy = "give the camera's height over the floor with --camera-height-m if that is wrong"
+    for floor in ground.floors if ground.known_from == "surfaces" else ():
+        best, second = floor.best, floor.runner_up
+        if floor.cameras < _FEW_CAMERAS or (best.confidence >= _LEAVES_OPEN and best.in_view):
+            continue
+        if not best.in_view:
+            yield (
+                f"No floor is in view: it is taken to be {best.camera_height_m:.2f} m under the camera (confidence "
+                f"{best.confidence:.2f}); {remedy}."
+            )
+        elif second is not None and second.in_view and second.confidence > best.confidence / 3:
+            yield (
+                f"Two floors explain what is in view about equally well: {best.camera_height_m:.2f} m under the camera "
+                f"(taken, confidence {best.confidence:.2f}) or {second.camera_height_m:.2f} m "
+                f"({second.confidence:.2f}); {remedy}."
+            )
+        else:
+            yield (
+                f"The floor may not be in view: the lowest level surface lies {best.camera_height_m:.2f} m under the "
+                f"camera (confidence {best.confidence:.2f}); {remedy}."
+            )
+    if ground.known_from == "user" and (main := ground.main().best).below > _MUCH_BELOW:
+        yield (
+            f"{main.below:.0%} of what is in view lies below the floor that was given ({main.camera_height_m:.2f} m "
+            "under the camera); check --camera-height-m."
+        )
+
+
 def grounded(recording: Recording, settings: BuildSettings) -> Recording:
-    """Return the recording with its frames told where up and the floor are; the same on every machine."""
-    up = np.array(look_for_up(recording, settings).direction)
-    return GroundedRecording(recording, find_ground(spread_frames(recording, settings.gravity.frames), up))
+    """Return the recording with up and the floor in its frames; the same on every machine."""
+    return GroundedRecording(recording, look_for_ground(recording, settings, look_for_up(recording, settings))[0])

@@ -17,6 +17,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.progress import progress as shown
 from avlmaps.core.progress import say, silenced
 from avlmaps.core.version import __version__
+from avlmaps.maps.fusion.measure_kernels import SHARP_UNITS
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.import_reference.frames import Walk, read_walk
@@ -38,6 +39,7 @@ from avlmaps.maps.store.manifest import (
     Timings,
     UpInfo,
     parse_manifest,
+    read_manifest,
 )
 from avlmaps.maps.store.reader import PARTS, StoredMap, open_stored
 from avlmaps.maps.store.writer import MapContent, is_map_or_free, write_map
@@ -125,7 +127,7 @@ def _finished(path: Path, key: str, overwrite: bool) -> bool:
     manifest = path / MANIFEST
     if overwrite or not manifest.is_file():
         return False
-    there = parse_manifest(manifest.read_bytes(), manifest)
+    there = parse_manifest(read_manifest(manifest), manifest)
     if there.build_key != key:
         raise MapError(
             f"{path} is a finished map already, of {there.recording.name}; give another --out, or replace it with "
@@ -203,5 +205,7 @@ def _sums(part: VoxelRows, rows: Int[np.ndarray, " p"], index: Int32[np.ndarray,
         rgb_sum=np.where(coloured[:, None], weight[:, None] * part.rgb[rows], 0.0),
         rgb_weight=np.where(coloured, weight, 0.0),
         hits=np.full(len(rows), PIXELS_PER_VOXEL, np.int64),
+        views=np.ones(len(rows), np.int32),
+        sharp=np.full(len(rows), PIXELS_PER_VOXEL * SHARP_UNITS, np.int64),
         last_seen_s=np.zeros(len(rows)),
     )

@@ -17,11 +17,14 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.errors import MapError
-from avlmaps.core.files import sha256_of_file, sync_folder
+from avlmaps.core.files import checked_size, sha256_of_file, sync_folder
+from avlmaps.core.npy import load_npy
 
 SMALL_BYTES = 1 << 20  # files up to this size are read whole and always compared with their checksum
+MOST_BYTES = 1 << 42
+_QUOTED = 200  # characters of what a damaged manifest says
 _CHUNK_BYTES = 1 << 24
-_MEND = "restore it from a copy, or build the map again with --overwrite"
+MEND = "repair it with `avlmaps info MAP --repair --recording REC`, or restore it from a copy"
 
 
 class FileInfo(msgspec.Struct, frozen=True, kw_only=True):
@@ -125,18 +128,18 @@ def read_array(folder: Path, info: FileInfo, *, verify: bool = False) -> np.ndar
     """
     path = checked_path(folder, info, verify=verify)
     try:
-        array = np.load(path, mmap_mode=None if info.bytes <= SMALL_BYTES else "r", allow_pickle=False)
+        array = load_npy(path, info.bytes, mapped=info.bytes > SMALL_BYTES)
     except PermissionError as fault:
         raise MapError(f"{path} cannot be read ({fault.strerror}); check its permissions.") from fault
-    except (ValueError, OSError, EOFError) as fault:
-        raise MapError(f"{path} is damaged: it is not an array that numpy can read ({fault}); {_MEND}.") from fault
+    except (ValueError, OSError) as fault:
+        raise MapError(f"{path} is damaged: it is not an array that numpy can read ({fault}); {MEND}.") from fault
     if array.dtype.str != info.dtype or array.shape != info.shape:
         raise MapError(
             f"{path} is damaged: it holds {array.dtype} of {array.shape}, the map says {_type_name(info.dtype)} of "
-            f"{info.shape}; {_MEND}."
+            f"{info.shape}; {MEND}."
         )
     if not array.flags.c_contiguous:
-        raise MapError(f"{path} is damaged: its elements are not in the order that avlmaps writes; {_MEND}.")
+        raise MapError(f"{path} is damaged: its elements are not in the order that avlmaps writes; {MEND}.")
     return array
 
 
@@ -145,7 +148,7 @@ def _type_name(said: str) -> str:
     try:
         return str(np.dtype(said))
     except TypeError:
-        return said
+        return said[:_QUOTED]
 
 
 def checked_path(folder: Path, info: FileInfo, *, verify: bool = False) -> Path:
@@ -156,13 +159,18 @@ def checked_path(folder: Path, info: FileInfo, *, verify: bool = False) -> Path:
     """
     parts = PurePosixPath(info.path).parts
     if not parts or ".." in parts or "\\" in info.path or ":" in info.path or info.path.startswith("/"):
-        raise MapError(f"{folder} names a file outside itself ({info.path}); do not use a map from that source.")
+        raise MapError(
+            f"{folder} names a file outside itself ({info.path[:_QUOTED]}); do not use a map from that source."
+        )
     path = folder.joinpath(*parts)
-    if not path.is_file():
-        raise MapError(f"{path} is missing from the map; {_MEND}.")
-    size = path.stat().st_size
+    try:
+        size = checked_size(path, MOST_BYTES)
+    except FileNotFoundError:
+        raise MapError(f"{path} is missing from the map; {MEND}.") from None
+    except OSError as fault:
+        raise MapError(f"{path} cannot be read ({fault.strerror or fault}); {MEND}.") from fault
     if size != info.bytes:
-        raise MapError(f"{path} is damaged: it has {size} bytes, {info.bytes} were written; {_MEND}.")
+        raise MapError(f"{path} is damaged: it has {size} bytes, {info.bytes} were written; {MEND}.")
     if (verify or size <= SMALL_BYTES) and sha256_of_file(path) != info.sha256:
-        raise MapError(f"{path} is damaged: its checksum is not the one that was written; {_MEND}.")
+        raise MapError(f"{path} is damaged: its checksum is not the one that was written; {MEND}.")
     return path

@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.errors import MapError
-from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.files import MANIFEST_BYTES, decode_json, read_regular, write_bytes_atomically
 from avlmaps.maps.store.array_files import (
     FileInfo,
     checked_path,
@@ -100,8 +100,8 @@ def load_checkpoint(folder: Path, facts: type[F], key: str | None = None, *, ver
     """
     path = folder / DONE
     try:
-        done = msgspec.json.decode(path.read_bytes(), type=_Done)
-        said = msgspec.json.decode(done.facts, type=facts)
+        done = decode_json(read_regular(path, MANIFEST_BYTES), _Done)
+        said = decode_json(bytes(done.facts), facts)
     except OSError as fault:
         raise MapError(f"{folder} holds no finished part of a map (no readable {DONE}).") from fault
     except (msgspec.DecodeError, UnicodeDecodeError) as fault:

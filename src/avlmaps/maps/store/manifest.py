@@ -9,7 +9,8 @@ from jaxtyping import Float
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
-from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.files import MANIFEST_BYTES, decode_json, read_regular, write_bytes_atomically
+from avlmaps.maps.sensor import SensorModel
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.array_files import FileInfo, writing_into
 from avlmaps.perception.models.names import public_choice, public_name
@@ -137,6 +138,87 @@ class UpInfo(msgspec.Struct, frozen=True, kw_only=True):
         return np.array(self.direction, np.float64)
 
 
+class FloorGuess(msgspec.Struct, frozen=True, kw_only=True):
+    """One hypothesis of where a floor is.
+
+    Attributes:
+        height_m: of the floor along up, in the recording's world.
+        camera_height_m: of the cameras over it, their median.
+        confidence: how likely the floor lies within 0.12 m of that height under all the evidence, in [0, 1].
+        in_view: whether level surface was seen there; False says that no floor is in view, so that it was put at the
+            bottom of what is in view or where cameras usually have it.
+        level_m2: area of level surface seen there.
+        below: share of the surface in view that lies below it, in [0, 1]; near 0 for a floor.
+    """
+
+    height_m: float
+    camera_height_m: float
+    confidence: float
+    in_view: bool
+    level_m2: float
+    below: float
+
+
+class FloorInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """A floor that cameras stood over.
+
+    Attributes:
+        best: the hypothesis that was taken.
+        runner_up: the best one at another height, None where there is none.
+        cameras: share of the cameras that stood over this floor, in [0, 1].
+    """
+
+    best: FloorGuess
+    runner_up: FloorGuess | None
+    cameras: float
+
+
+class GroundInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """The floors under the cameras, lowest first, and how they are known.
+
+    Attributes:
+        known_from: the surfaces in view, a height that the user gave, or the recording's own (a robot's frames).
+        floors: every floor, step and landing that a camera stood over.
+    """
+
+    known_from: Literal["surfaces", "user", "recording"]
+    floors: tuple[FloorInfo, ...]
+
+    def main(self) -> FloorInfo:
+        """Return the floor that most cameras stood over."""
+        return max(self.floors, key=lambda floor: floor.cameras)
+
+
+class SensorInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """Which depth camera was assumed.
+
+    Attributes:
+        name: of the model; ``custom`` for one that was given.
+        known_from: the settings, or what the frames show.
+        noise_per_m: measured growth of the error with the square of the depth, 1/m; None where it was not measured.
+        model: all its numbers.
+    """
+
+    name: str
+    known_from: Literal["settings", "frames"]
+    noise_per_m: float | None
+    model: SensorModel
+
+
+class Removed(msgspec.Struct, frozen=True, kw_only=True):
+    """How many voxels were removed.
+
+    Attributes:
+        seen_through: frames see through them.
+        smeared: a much better seen voxel is within their error.
+        specks: in small groups that stand alone and that hardly a frame hit.
+    """
+
+    seen_through: int = 0
+    smeared: int = 0
+    specks: int = 0
+
+
 class BadFrame(msgspec.Struct, frozen=True, kw_only=True):
     """A frame that could not be read and was left out, with the sentence that told why."""
 
@@ -185,11 +267,14 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
         build_key: hash of everything that went in (recording, settings, models); another build has another one.
         voxel_size_m: the grid.
         up: which way is up.
+        ground: where the floors are; None in maps of older releases and in imported ones.
         rig: the recording's cameras.
         profile: which models perceived.
         models: their cards, by module.
         settings: resolved, defaults included.
         seed: of everything that was drawn at random.
+        sensor: which depth camera was assumed; None in maps that use every depth as it is.
+        removed: voxels that were no surface.
         recording: what was recorded.
         counts: how much there is.
         bounding_box_m: where the voxels are.
@@ -206,6 +291,7 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
     build_key: str
     voxel_size_m: float
     up: UpInfo
+    ground: GroundInfo | None = None
     rig: RigInfo
     profile: str
     models: dict[str, ModelInfo]
@@ -219,6 +305,8 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
     files: dict[str, FileInfo] = {}
     bytes: int = 0
     timings: Timings
+    sensor: SensorInfo | None = None
+    removed: Removed = Removed()
 
 
 class _Ident(msgspec.Struct):
@@ -233,6 +321,21 @@ def write_manifest(folder: Path, info: MapInfo) -> None:
         write_bytes_atomically(folder / MANIFEST, content + b"\n")
 
 
+def read_manifest(path: Path) -> bytes:
+    """Return the content of ``map.json``.
+
+    Raises:
+        FileNotFoundError, NotADirectoryError: there is none.
+        MapError: it cannot be read, or is no regular file of a possible size.
+    """
+    try:
+        return read_regular(path, MANIFEST_BYTES)
+    except (FileNotFoundError, NotADirectoryError):
+        raise
+    except OSError as fault:
+        raise MapError(f"{path} cannot be read ({fault.strerror or fault}); check the file.") from fault
+
+
 def parse_manifest(content: bytes, path: Path) -> MapInfo:
     """Return what ``map.json`` says.
 
@@ -244,7 +347,7 @@ def parse_manifest(content: bytes, path: Path) -> MapInfo:
         MapError: it is not JSON, not UTF-8, of no map, of another schema version, or lacks something.
     """
     try:
-        ident = msgspec.json.decode(content, type=_Ident)
+        ident = decode_json(content, _Ident)
     except (msgspec.DecodeError, UnicodeDecodeError) as fault:
         raise MapError(f"{path} is damaged: it is not JSON in UTF-8 ({fault}); restore it from a copy.") from fault
     if ident.format != "avlmap":
@@ -255,6 +358,6 @@ def parse_manifest(content: bytes, path: Path) -> MapInfo:
             f"{path} has schema version {ident.schema_version}, this avlmaps reads version {SCHEMA_VERSION}; {how}."
         )
     try:
-        return msgspec.json.decode(content, type=MapInfo)
+        return decode_json(content, MapInfo)
     except (msgspec.DecodeError, ValueError, MapError) as fault:
         raise MapError(f"{path} is damaged: {str(fault).rstrip('.')}; restore it from a copy.") from fault

@@ -5,17 +5,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import BackendError, MapError
+from avlmaps.core.poses import FRAME, rotation_to_level
 from avlmaps.core.registry import Kind
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.store.array_files import FileInfo, checked_path, read_array
-from avlmaps.maps.store.array_validation import array_fields, assembled, check_order
+from avlmaps.maps.integrity import Guard
+from avlmaps.maps.store.array_files import MEND, FileInfo, checked_path, read_array
+from avlmaps.maps.store.array_validation import array_fields, assembled, check_extent, check_order, content_fault
 from avlmaps.maps.store.lock import is_locked
-from avlmaps.maps.store.manifest import MANIFEST, MapInfo, parse_manifest
+from avlmaps.maps.store.manifest import MANIFEST, GroundInfo, MapInfo, parse_manifest, read_manifest
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 from avlmaps.perception.models.names import public_choice, public_name
 from avlmaps.perception.profiles import Profile, profile
@@ -23,6 +26,7 @@ from avlmaps.perception.profiles import Profile, profile
 PARTS = "parts"
 STATE = "keyframes/state/"
 CLIPS = "sounds/clips/"
+_GUARDED = frozenset({"voxels", "keyframes", "sounds", "place_state"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +44,7 @@ class StoredMap:
         sounds: what was heard; ``clip_path`` finds a clip.
         profile: which models perceived.
         rig: the recording's cameras.
+        guard: watches over the large files; reading voxels or keyframes waits until they are known to be whole.
     """
 
     path: Path
@@ -52,6 +57,13 @@ class StoredMap:
     sounds: HeardSounds
     profile: Profile
     rig: Rig
+    guard: Guard
+
+    def __getattribute__(self, name: str) -> Any:
+        value = object.__getattribute__(self, name)
+        if name in _GUARDED:
+            object.__getattribute__(self, "guard").require_whole()
+        return value
 
     def clip_path(self, sound: int) -> Path:
         """Return the FLAC file of a sound, by its number in ``sounds``."""
@@ -119,11 +131,9 @@ def has_unfinished_build(path: Path | str) -> bool:
 
 def _manifest_content(path: Path) -> bytes:
     try:
-        return (path / MANIFEST).read_bytes()
+        return read_manifest(path / MANIFEST)
     except (FileNotFoundError, NotADirectoryError):
         pass
-    except OSError as fault:
-        raise MapError(f"{path / MANIFEST} cannot be read ({fault.strerror}); check its permissions.") from fault
     if is_locked(path):
         raise MapError(f"{path} is being built at this moment; wait until the build has finished.")
     if has_unfinished_build(path):
@@ -136,20 +146,31 @@ def _manifest_content(path: Path) -> bytes:
     raise MapError(f"{path} is not there, or is not a map's folder; make one with `avlmaps build`.")
 
 
-def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
+def profile_of_map(path: Path, info: MapInfo) -> Profile:
+    """Return the models that a map was built with, whatever the profile of that name has come to hold since.
+
+    Raises:
+        MapError: the profile is not known here.
+    """
     try:
-        # The models that it was built with, whatever the profile of that name has come to hold since.
-        used_profile = profile(info.profile).remembered(
+        return profile(info.profile).remembered(
             {kind: public_choice(model.backend) for kind, model in info.models.items()}
         )
     except BackendError as fault:
         raise MapError(f"{path / MANIFEST} is of a profile that is not known here. {fault}") from fault
+
+
+def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
+    used_profile = profile_of_map(path, info)
     try:
         grid, rig = GridSpec(info.voxel_size_m), info.rig.rig()
     except ValueError as fault:
         raise MapError(f"{path / MANIFEST} is damaged: {fault}; restore it from a copy.") from fault
     names = info.files
-    arrays = {name: read_array(path, file, verify=verify) for name, file in names.items() if file.dtype}
+    arrays = {name: read_array(path, file) for name, file in names.items() if file.dtype}
+    for name, array in arrays.items():
+        if not isinstance(array, np.memmap) and (fault := content_fault(name, array)):
+            raise MapError(f"{path / names[name].path} is damaged: {fault}; {MEND}.")
     voxels = assembled(Voxels, _of(arrays, Voxels, "voxels/"), f"{path}/voxels")
     keyframes = assembled(Keyframes, _of(arrays, Keyframes, "keyframes/"), f"{path}/keyframes")
     clips = tuple(_clip(path, names[name], verify) for name in sorted(names) if name.startswith(CLIPS))
@@ -163,10 +184,13 @@ def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
         counts.sounds,
     ):
         raise MapError(f"{path / MANIFEST} is damaged: its counts are not those of the arrays; restore it from a copy.")
+    guard = Guard(path, names, trusting=not verify)
+    check_extent(np.asarray(voxels.index), grid.voxel_size_m, f"{path}/voxels")
     if verify:
+        guard.require_whole()
         check_order(voxels, f"{path}/voxels")
     state = {name.removeprefix(STATE): array for name, array in arrays.items() if name.startswith(STATE)}
-    return StoredMap(path, info, grid, info.up.vector(), voxels, keyframes, state, sounds, used_profile, rig)
+    return StoredMap(path, info, grid, info.up.vector(), voxels, keyframes, state, sounds, used_profile, rig, guard)
 
 
 def _of(arrays: Mapping[str, np.ndarray], kind: type, prefix: str) -> dict[str, Any]:
@@ -185,6 +209,8 @@ def describe(stored: StoredMap) -> dict[str, Any]:
     """
     info, sounds = stored.info, stored.sounds
     tracks = np.split(np.asarray(sounds.track, np.float64), sounds.track_offsets[1:-1]) if len(sounds) else []
+    level_from_recording = np.eye(4)
+    level_from_recording[:3, :3] = rotation_to_level(info.up.vector())
     return {
         "path": str(stored.path),
         "frames": info.counts.frames,
@@ -206,6 +232,11 @@ def describe(stored: StoredMap) -> dict[str, Any]:
         "up_in_world": list(info.up.direction),
         "up_known_from": info.up.known_from,
         "up_support": info.up.support,
+        "ground": None if info.ground is None else _describe_ground(info.ground),
+        "sensor": None if info.sensor is None else info.sensor.name,
+        "sensor_known_from": None if info.sensor is None else info.sensor.known_from,
+        "sensor_noise_per_m": None if info.sensor is None else info.sensor.noise_per_m,
+        "voxels_removed": msgspec.structs.asdict(info.removed),
         "bounding_box_m": [list(info.bounding_box_m.low), list(info.bounding_box_m.high)],
         "duration_s": info.recording.duration_s,
         "recording": info.recording.name,
@@ -217,4 +248,19 @@ def describe(stored: StoredMap) -> dict[str, Any]:
         "avlmaps_version": info.avlmaps_version,
         "seed": info.seed,
         "finished": info.timings.finished,
+        "frame": FRAME,
+        "level_from_recording": level_from_recording.tolist(),
+    }
+
+
+def _describe_ground(ground: GroundInfo) -> dict[str, Any]:
+    """Return the floor that most cameras stood over, and all of them."""
+    main = ground.main()
+    return {
+        "camera_height_m": main.best.camera_height_m,
+        "confidence": main.best.confidence,
+        "in_view": main.best.in_view,
+        "known_from": ground.known_from,
+        "runner_up": None if main.runner_up is None else msgspec.to_builtins(main.runner_up),
+        "floors": [{**msgspec.to_builtins(floor.best), "cameras": round(floor.cameras, 4)} for floor in ground.floors],
     }

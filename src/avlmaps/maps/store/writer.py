@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from avlmaps.maps.integrity import remember_checked
 from avlmaps.maps.store.array_files import FileInfo, sync_names, write_array, write_copy
 from avlmaps.maps.store.array_validation import array_fields
 from avlmaps.maps.store.lock import LOCK
@@ -60,6 +61,7 @@ def write_map(path: Path, content: MapContent, info: MapInfo) -> MapInfo:
     whole = msgspec.structs.replace(info, files=dict(sorted(files.items())), bytes=size)
     sync_names(path, files.values())
     write_manifest(path, whole)
+    remember_checked(path, files.values())  # their checksums are those of what was written just now
     sweep(path, whole)
     return whole
 

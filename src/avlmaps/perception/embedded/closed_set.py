@@ -6,8 +6,10 @@ from typing import cast
 import numpy as np
 from jaxtyping import Float32
 
+from avlmaps.core import lexicon as words_known
 from avlmaps.core.registry import Kind, load
-from avlmaps.perception.embedded.codes import Lexicon, word_codes
+from avlmaps.perception.embedded.codes import word_codes
+from avlmaps.perception.embedded.meanings import Meanings
 from avlmaps.perception.embedded.scene_network import SceneNetwork, load_network
 from avlmaps.perception.protocols import WordEncoder
 
@@ -28,12 +30,13 @@ class NamedEncoder:
         self.codes = word_codes(self.names, self._words)
 
     @cached_property
-    def lexicon(self) -> Lexicon:
+    def meanings(self) -> Meanings:
         """Which of the names a phrase means."""
         notes = self._network.notes
         called = tuple((name, *notes.called.get(name, ())) for name in self.names)
-        return Lexicon(self.names, called, notes.kinds, self._words)
+        kind = words_known.Kind.ROOM if self.names == notes.rooms else words_known.Kind.THING
+        return Meanings(self.names, called, notes.kinds, self._words, kind)
 
     def meant(self, word: str) -> Float32[np.ndarray, " k"]:
         """Return for each of ``names`` how much a phrase means it, 1 for the most meant; zero where it means none."""
-        return self.lexicon.meant(word)
+        return self.meanings.meant(word)

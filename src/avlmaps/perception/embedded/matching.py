@@ -9,6 +9,8 @@ from avlmaps.perception.embedded.rootsift import DESCRIPTOR_DIM
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
 
 RATIO = 0.85
+# Half the squared distance of two float32 unit vectors is not known better than this: nearer ones are the same.
+_ROUNDING = 1e-6
 
 
 class MutualRatio:
@@ -49,7 +51,8 @@ def matched(
     likeness[rows, nearest] = -np.inf
     second = likeness.max(axis=1)
     # Unit vectors: squared distance = 2 - 2 likeness.
-    kept = rows[mutual & (1.0 - best < ratio**2 * (1.0 - second))]
+    nearer = np.maximum(1.0 - best, _ROUNDING) < ratio**2 * np.maximum(1.0 - second, _ROUNDING)
+    kept = rows[mutual & nearer]
     _, first = np.unique(nearest[kept], return_index=True)  # equal likeness could take the same b twice
     kept = kept[np.sort(first)]
     return np.stack([kept, nearest[kept]], axis=1)

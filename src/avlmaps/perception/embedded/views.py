@@ -40,7 +40,7 @@ class EmbeddedViews(NamedEncoder):
         """Return a unit vector for each phrase; one that means no kind of room lies across all of them."""
         vectors = np.zeros((len(words), self.card.dim), np.float32)
         for row, word in enumerate(words):
-            meant = self.lexicon.meant(word)
+            meant = self.meanings.meant(word)
             vector = features_of(meant / meant.sum(), self.codes) if meant.any() else self._across(word)
             vectors[row] = vector / np.linalg.norm(vector)
         return vectors

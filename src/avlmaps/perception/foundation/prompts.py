@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float, Float32
 
+from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.perception.cache.text_features import KeptWords
 
 # The subset of seven of its ImageNet sentences that the authors of CLIP found to do as well as all eighty.
@@ -35,20 +36,7 @@ TIPS_PROMPTS = (
     "a photo of {}s.",
 )
 # Things of homes and offices, as the embedded encoder knows them.
-THINGS = (
-    "wall", "floor", "ceiling", "column", "stairs", "railing", "chair", "armchair", "office chair", "stool", "bench",
-    "sofa", "ottoman", "dining table", "coffee table", "desk", "side table", "console table", "bed", "crib", "bunk bed",
-    "nightstand", "wardrobe", "chest of drawers", "bookshelf", "cabinet", "tv cabinet", "shoe rack", "wall shelf",
-    "filing cabinet", "coat rack", "kitchen counter", "kitchen cabinet", "kitchen island", "refrigerator", "stove",
-    "microwave", "dishwasher", "range hood", "kettle", "toaster", "coffee machine", "sink", "toilet", "bathtub",
-    "shower", "mirror", "towel", "washing machine", "radiator", "air conditioner", "fan", "vacuum cleaner", "fireplace",
-    "ironing board", "water heater", "tv", "monitor", "laptop", "computer", "printer", "loudspeaker", "keyboard",
-    "telephone", "clock", "picture", "lamp", "chandelier", "curtain", "carpet", "plant", "vase", "cushion", "blinds",
-    "candle", "door", "window", "folding door", "book", "bottle", "cup", "bowl", "pot", "box", "basket", "trash can",
-    "bag", "toy", "shoes", "laundry basket", "tableware", "piano", "guitar", "fitness equipment", "dumbbell", "ball",
-    "bicycle", "pool table", "rocking horse", "baby stroller", "mat", "play tent", "aquarium", "pet bed", "whiteboard",
-    "partition", "locker", "water dispenser",
-)  # fmt: skip
+THINGS = tuple(entry.name for entry in lexicon().entries(Kind.THING) if entry.split == "training")
 
 _REMEMBERED = 4096
 

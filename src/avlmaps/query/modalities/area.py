@@ -7,10 +7,13 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Float32, Int
 
+from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Part
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.protocols import NamedViewEncoder, ScaledEncoder, ViewEncoder
 from avlmaps.query.heatmap import HeatSettings, NearAnchors, normalised
+from avlmaps.query.question import FOUND_AT
+from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.voxel_space import Space
 
 # What a place may be, if it is not what was asked for.
@@ -22,29 +25,6 @@ AREA_NAMES = (
 
 # For an encoder that does not tell by how much its cosines count.
 _UNKNOWN_TEMPERATURE = 0.05
-
-# Other words for one of them, or for one another: they name the same and do not compete. The features of such words are
-# not always close (two words of one sense lie as far apart as kitchen and dining room for some models).
-_SAME_PLACE = (
-    ("living room", "lounge", "sitting room", "family room"),
-    ("corridor", "hallway", "hall", "passage", "passageway"),
-    ("staircase", "stairs", "stairway", "stairwell"),
-    ("entrance hall", "hall", "entrance", "entryway", "foyer", "lobby", "vestibule"),
-    ("bathroom", "toilet", "restroom", "washroom", "shower room", "lavatory"),
-    ("bedroom", "sleeping room"),
-    ("children's room", "bedroom", "nursery", "playroom"),
-    ("dining room", "dining area", "dining hall"),
-    ("kitchen", "kitchenette", "cooking area"),
-    ("office", "study", "home office", "workroom"),
-    ("laundry room", "laundry", "utility room"),
-    ("storage room", "storage", "storeroom", "closet", "pantry"),
-    ("gym", "fitness room", "exercise room"),
-    ("meeting room", "conference room"),
-    ("laboratory", "lab"),
-    ("waiting area", "waiting room", "lobby", "lounge"),
-    ("balcony", "terrace", "patio"),
-    ("garden", "yard", "backyard"),
-)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,14 +146,22 @@ def pooled(
 
 
 def same_place(area: str, asked: str) -> bool:
-    """Return whether an area's name and an asked phrase mean the same kind of place, or the phrase one such place.
+    """Return whether an area's name and a wanted phrase mean the same kind of place, or the phrase one such place.
 
-    A "large kitchen" is a kitchen: the bare name would beat the phrase wherever it is right.
+    A "large kitchen" is a kitchen: the bare name would beat the phrase wherever it is right. The lexicon says which
+    names mean the same: the features of two words of one sense lie as far apart as kitchen and dining room for some
+    models.
     """
-    area, asked = area.casefold(), " ".join(word for word in asked.casefold().split() if word not in ("a", "an", "the"))
-    if area == asked or asked.endswith(f" {area}"):
+    words = " ".join(word for word in asked.casefold().split() if word not in ("a", "an", "the"))
+    known, name = lexicon(), area.casefold()
+    if name == words or words.endswith(f" {name}"):
         return True
-    return any(area in names and asked in names for names in _SAME_PLACE)
+    ours, theirs = known.senses(name, Kind.ROOM), known.senses(words, Kind.ROOM)
+    if any(entry in theirs for entry in ours):
+        return True
+    return any(
+        not wide.generic and wide in theirs for entry in ours for wide in known.wider(entry.name, Kind.ROOM)
+    ) or any(wide in ours for entry in theirs for wide in known.wider(entry.name, Kind.ROOM))
 
 
 def _cosine(rows: Float[np.ndarray, "n d"], row: Float[np.ndarray, " d"]) -> Float[np.ndarray, " n"]:
@@ -224,11 +212,12 @@ def area_factor(
     anchors = np.asarray(places, np.float64).reshape(-1, 3)
     posterior, scores = area_scores(np.asarray(keyframes.view), encoder, part.query, settings, anchors)
     best = float(posterior.max(initial=0.0))
-    note = "" if best >= 0.5 else f"no view is like {part.query!r}; the best score is {best:.2f}, below 0.50"
+    missed = f"no view is like {part.query!r}; the best score is {best:.2f}, below {FOUND_AT:.2f}"
+    note = "" if best >= FOUND_AT else missed
     if isinstance(encoder, NamedViewEncoder) and not encoder.meant(part.query).any():
-        note = f"the view encoder knows no room like {part.query!r}; it knows: {', '.join(encoder.names)}"
+        note = f"{unknown_note(part.query, Kind.ROOM)}; it knows: {', '.join(encoder.names)}"
     if not len(keyframes):
         note = "the map holds no keyframes"
     group = modes(space.level(anchors)[:, :2], scores, settings.link_m)
     falloff = heat.falloff_per_m(part.role)
-    return NearAnchors(space, part, falloff, anchors, scores, group, best >= 0.5, part.query, note)
+    return NearAnchors(space, part, falloff, anchors, scores, group, best >= FOUND_AT, part.query, note)

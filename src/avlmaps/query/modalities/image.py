@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from avlmaps.query.locate import Located
 
 
+# A guess stays a guess, however few keypoints agree with it.
+_LEAST_CERTAINTY = 0.01
+
+
 def read_picture(path: Path) -> UInt8[np.ndarray, "h w 3"]:
     """Read a picture as RGB.
 
@@ -52,7 +56,8 @@ def require_fitting(rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None)
 def image_factor(space: Space, located: "Located", part: Part, heat: HeatSettings) -> NearAnchors:
     """Return the heat of a picture: one anchor of score 1 at the camera.
 
-    Where it was not located, the anchor is at the best guess, if there is one, and the heat is not "found".
+    Where it was not located, the anchor is at the best guess, if there is one; the heat is not "found", and its
+    confidence is that of the location, below 0.5.
     """
     sure = located.world_from_camera is not None
     pose = located.world_from_camera if sure else located.guess
@@ -70,4 +75,5 @@ def image_factor(space: Space, located: "Located", part: Part, heat: HeatSetting
         sure,
         part.query,
         note,
+        1.0 if sure else max(float(located.score), _LEAST_CERTAINTY),
     )

@@ -11,12 +11,16 @@ import numpy as np
 from jaxtyping import Bool, Float, Float16, Float32, Int, UInt8
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Part
+from avlmaps.core.spelling import squeezed
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.colour_filter import Tint, is_tinted, tint_of, tinted_share
 from avlmaps.query.heatmap import HeatSettings, NearThings
 from avlmaps.query.instance_merging import joined_pieces, likeliest, without_specks
+from avlmaps.query.question import FOUND_AT
 from avlmaps.query.synonyms import fitting, is_a, is_open
+from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.voxel_space import Space
 
 _CHUNK = 16_384
@@ -256,13 +260,14 @@ def object_factor(
     Raises:
         QueryError: the encoder understands nothing of the word.
     """
-    tint = tint_of(part.query) if rgb is not None and isinstance(encoder, NamedPixelEncoder) else None
+    compound = " " in part.query.strip() and lexicon().find(part.query, Kind.THING) is not None  # a white board
+    tint = tint_of(part.query) if rgb is not None and isinstance(encoder, NamedPixelEncoder) and not compound else None
     if tint and rgb is not None and not tint.thing:
         return colour_factor(space, rgb, tint, part, settings, heat)
     asked = Asked.of(encoder, tint.thing if tint else part.query)
     understood = f"{tint.text} {asked.understood}" if tint and asked.understood else asked.understood
     if not len(asked.rows) and isinstance(encoder, NamedPixelEncoder):
-        note = f"the pixel encoder knows nothing like {part.query!r}"
+        note = unknown_note(tint.thing if tint else part.query)
         nothing = np.zeros(0, np.int64), np.zeros(0, np.float32), False, "", note
         return NearThings(space, part, heat.falloff_per_m(part.role), np.zeros(len(feature), bool), *nothing)
     if not len(asked.rows):
@@ -279,12 +284,13 @@ def object_factor(
             share = tinted_share(rgb, pieces.mask, pieces.instance, tint)
             pieces = replace(pieces, confidence=pieces.confidence * share)
         best = float(pieces.confidence.max(initial=0.0)) if tint else pieces.best
-        note = "" if best >= 0.5 else _absence(part.query, len(pieces.mask), pieces.won, best)
-        if understood and understood != part.query.strip().lower():
+        note = "" if best >= FOUND_AT else _absence(part.query, len(pieces.mask), pieces.won, best)
+        if understood and squeezed(understood) != squeezed(part.query):
             note = f"understood only {understood!r} of {part.query!r}" + ("; " + note if note else "")
         falloff, alone = heat.falloff_per_m(part.role), None if in_company else lambda: things(True)
+        found = best >= FOUND_AT
         return NearThings(
-            space, part, falloff, pieces.mask, pieces.instance, pieces.confidence, best >= 0.5, understood, note, alone
+            space, part, falloff, pieces.mask, pieces.instance, pieces.confidence, found, understood, note, alone
         )
 
     alone = things(False)
@@ -305,9 +311,9 @@ def colour_factor(
     confidence = instance_confidence(np.ones(len(instance)), instance, space.grid.voxel_size_m, settings)
     mask, instance, confidence = without_specks(mask, instance, confidence, settings.least_confidence)
     best = float(confidence.max(initial=0.0))
-    note = "" if best >= 0.5 else f"nothing of some size is {tint.text}"
+    note = "" if best >= FOUND_AT else f"nothing of some size is {tint.text}"
     falloff = heat.falloff_per_m(part.role)
-    return NearThings(space, part, falloff, mask, instance, confidence, best >= 0.5, tint.text, note)
+    return NearThings(space, part, falloff, mask, instance, confidence, best >= FOUND_AT, tint.text, note)
 
 
 @dataclass(frozen=True, slots=True)
@@ -395,4 +401,5 @@ def _absence(word: str, voxels: int, won: int, best: float) -> str:
         return "the map holds no voxels"
     if not won:
         return f"no voxel is closer to {word!r} than to other things"
-    return f"the best of the {won} voxels closest to {word!r} make an instance of confidence {best:.2f}, below 0.50"
+    best_of = f"the best of the {won} voxels closest to {word!r} make an instance of confidence"
+    return f"{best_of} {best:.2f}, below {FOUND_AT:.2f}"

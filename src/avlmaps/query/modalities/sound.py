@@ -12,6 +12,7 @@ from avlmaps.core.errors import AudioError, QueryError
 from avlmaps.core.question import Part
 from avlmaps.maps.types import HeardSounds
 from avlmaps.query.heatmap import HeatSettings, NearAnchors, normalised
+from avlmaps.query.question import FOUND_AT
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import Sound
 
@@ -57,15 +58,16 @@ def sound_factor(
     note = ""
     if not len(sounds):
         note = "the map holds no sounds"
-    elif best < 0.5:
+    elif best < FOUND_AT:
         note = (
-            f"none of the {len(sounds)} heard sounds is like {part.query!r}; the best score is {best:.2f}, below 0.50"
+            f"none of the {len(sounds)} heard sounds is like {part.query!r}; the best score is {best:.2f}, "
+            f"below {FOUND_AT:.2f}"
         )
     used = normalised(np.asarray(scores, np.float64)) if settings.normalise == "min-max" else np.clip(scores, 0.0, 1.0)
     which = np.repeat(np.arange(len(sounds)), np.diff(sounds.track_offsets))
     anchors = np.asarray(sounds.track, np.float64).reshape(-1, 3)
     return NearAnchors(
-        space, part, heat.falloff_per_m(part.role), anchors, used[which], which, best >= 0.5, part.query, note
+        space, part, heat.falloff_per_m(part.role), anchors, used[which], which, best >= FOUND_AT, part.query, note
     )
 
 

@@ -21,6 +21,7 @@ The sequences below ``audio_video/`` open as well: 25 frames/s, colour without d
 ``output_level_N.wav`` as sound track.
 """
 
+import os
 from pathlib import Path
 from typing import Literal
 
@@ -31,6 +32,7 @@ from jaxtyping import Float
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names, settle
@@ -167,10 +169,10 @@ def read_camera_file(path: Path) -> tuple[CameraFile, list[str]]:
     Raises:
         RecordingError: the file is damaged.
     """
-    if not path.exists():
+    if not os.path.lexists(path):
         return CameraFile(), [f"The stamps are counted at {RATE_HZ:g} frames/s, since poses.txt has none."]
     try:
-        given = msgspec.json.decode(path.read_bytes(), type=CameraFile)
+        given = decode_json(read_regular(path, DESCRIPTION_BYTES), CameraFile)
     except (msgspec.DecodeError, UnicodeDecodeError, OSError) as error:
         raise RecordingError(f"{path} is not as it should be ({error}); mend the file.") from None
     if not given.rate_hz > 0.0:

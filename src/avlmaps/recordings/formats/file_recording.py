@@ -15,7 +15,9 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings import images
 from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.content import add_files, stamp_of
 from avlmaps.recordings.faults import Fault, Report
+from avlmaps.recordings.plausible import date_fault, plausible_walk
 from avlmaps.recordings.types import Frame, Recording
 from avlmaps.recordings.video import VideoFrames
 
@@ -85,11 +87,19 @@ def settle(
     shots = shots.take(kept)
     if pose_file is not None:
         shots = _orthonormal(shots, report, [pose_file(int(i)) for i in kept])
+    if fault := date_fault(shots.stamps_s, "frames"):
+        report(Fault(f"{path}: {fault}", path))
     order = timeline.in_order(shots.stamps_s, "frames")
     shots = shots.take(order.index)
+    walk = plausible_walk(shots.stamps_s, shots.world_from_camera[:, :3, 3], shots.names)
+    shots = shots.take(walk.index)
+    for sentence in walk.notices:
+        report(Fault(f"{path}: {sentence}", path, fatal=False))
+    if walk.fault:
+        report(Fault(f"{path}: {walk.fault}", path))
     if len(shots.names) == 0:
         report(Fault(f"{path} has no frame with a usable pose, so there is nothing to map.", path))
-    return shots, (*notices, *order.notices, *timeline.gap_notices(shots.stamps_s, "frames"))
+    return shots, (*notices, *order.notices, *walk.notices, *timeline.gap_notices(shots.stamps_s, "frames"))
 
 
 def _orthonormal(shots: Shots, report: Report, pose_files: Sequence[Path]) -> Shots:
@@ -193,19 +203,26 @@ class FileRecording(Recording):
 
     @cached_property
     def fingerprint(self) -> str:
-        """A hex SHA-256 over poses, stamps, cameras, and every file's name and size; see ``Recording.fingerprint``."""
+        """A hex SHA-256 over poses, stamps, cameras and every file's content; see ``Recording.fingerprint``."""
         digest = hashlib.sha256(f"{self.format} {_numbers(self.rig)} {self.depth_units}".encode())
         up = np.zeros(3) if self.up_in_world is None else self.up_in_world
         for numbers in (up, self.stamps_s, self.world_from_camera):
             # Rounded, so that another machine's last bit makes no other recording; + 0.0 turns -0.0 into 0.0.
             digest.update(np.ascontiguousarray(np.round(numbers, 9) + 0.0, "<f8").tobytes())
-        folder = f"{self.path}{os.sep}"  # joining a million paths the long way takes seconds
-        video = [self.video.path.name] if self.video is not None else []
-        for name in (*video, *self.shots.colour, *self.shots.depth):
-            digest.update(f"{name}\0{_size(f'{folder}{name}')}\n".encode())
+        names = (*self._video_names(), *self.shots.colour, *self.shots.depth)
+        add_files(digest, self.path, names)
         if self.audio is not None:
-            digest.update(f"{self.audio.path.name}\0{_size(self.audio.path)}\0{self.audio.start_s}".encode())
+            add_files(digest, self.audio.path.parent, [self.audio.path.name])
+            digest.update(f"{self.audio.start_s}".encode())
         return digest.hexdigest()
+
+    def change_stamp(self) -> str:
+        """Return a hash over every file's size and time of change; see ``Recording.change_stamp``."""
+        files = [self.audio.path] if self.audio is not None else []
+        return stamp_of(self.path, (*self._video_names(), *self.shots.colour, *self.shots.depth), files)
+
+    def _video_names(self) -> list[str]:
+        return [self.video.path.name] if self.video is not None else []
 
 
 def _numbers(rig: Rig) -> list[float]:
@@ -213,13 +230,6 @@ def _numbers(rig: Rig) -> list[float]:
         return [c.fx, c.fy, c.cx, c.cy, float(c.width), float(c.height)]
 
     return [*camera(rig.rgb), *camera(rig.depth), *map(float, rig.rgb_from_depth.ravel())]
-
-
-def _size(path: Path | str) -> int:
-    try:
-        return os.stat(path).st_size  # noqa: PTH116
-    except OSError:
-        return -1
 
 
 def list_names(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
@@ -251,4 +261,5 @@ def open_audio(folder: Path) -> AudioTrack | None:
 
 def find_audio(folder: Path) -> Path | None:
     """Return the folder's ``audio.flac``, ``audio.wav`` or ``audio.ogg``, the first that is there."""
-    return next((p for p in (folder / f"audio.{kind}" for kind in ("flac", "wav", "ogg")) if p.is_file()), None)
+    # A broken link or a folder of that name is found as well, and is then an error, not a recording without sound.
+    return next((p for p in (folder / f"audio.{kind}" for kind in ("flac", "wav", "ogg")) if os.path.lexists(p)), None)

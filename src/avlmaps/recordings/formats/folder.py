@@ -1,5 +1,6 @@
 """Reading our own folder format; `layout.py` tells what is in it, `writer.py` writes it."""
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -9,13 +10,14 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from avlmaps.core import poses, timeline
-from avlmaps.core.errors import AudioError, RecordingError
+from avlmaps.core.errors import NoAudioStreamError, RecordingError
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names, settle
 from avlmaps.recordings.formats.tables import read_table, text_lines
 from avlmaps.recordings.layout import Description
+from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault
 from avlmaps.recordings.video import VideoFrames
 
 # Stamps beyond this are a date (seconds since 1970), not seconds from the start of a recording.
@@ -42,6 +44,7 @@ def open_folder(path: Path, report: Report = stop_at_first) -> FileRecording:
     known = _read_poses(path, report)
     video = _find_video(path, description)
     found = _find_pictures(path, description, known, video, report)
+    _check_clocks(path, description, found, known)
     shots, notices, start_s = _pose_pictures(found, known)
     shots, more = settle(path, shots, report, pose_file=None)
     audio_start_s = description.audio_start_s - (start_s if description.audio_start_s > _DATE_S else 0.0)
@@ -59,13 +62,32 @@ def open_folder(path: Path, report: Report = stop_at_first) -> FileRecording:
     )
 
 
+def _check_clocks(folder: Path, description: Description, found: "_Pictures", known: "_Poses") -> None:
+    """Raise ``RecordingError`` where the stamps of poses or frames are in another unit than seconds."""
+    poses_s = np.sort(known.stamps_s[np.isfinite(known.stamps_s)])
+    interval_s = 1.0 / description.pose_rate_hz if description.pose_rate_hz else None
+    fault = ""
+    if found.stamps_s is not None:
+        frames_s = np.sort(found.stamps_s[np.isfinite(found.stamps_s)])
+        fault = clock_fault(frames_s, "frames", poses_s, f"poses of {layout.POSES}")
+        interval_s = interval_s if np.array_equal(frames_s, poses_s) else None
+        rate_s = 1.0 / description.rgb_rate_hz if description.rgb_rate_hz else interval_s
+        fault = fault or pace_fault(frames_s, "frames", rate_s)
+    else:
+        rate_s = 1.0 / description.rgb_rate_hz if description.rgb_rate_hz else interval_s
+        fault = date_fault(poses_s, f"poses of {layout.POSES}")
+        fault = fault or pace_fault(poses_s, f"poses of {layout.POSES}", rate_s)
+    if fault:
+        raise RecordingError(f"{folder}: {fault}")
+
+
 def _open_audio(path: Path, start_s: float, video: VideoFrames | None) -> AudioTrack | None:
     """Open the sound track: a file of its own, else the video's (most have none, which is no fault)."""
     file = find_audio(path)
     if file is not None:
         return AudioTrack.open(file, start_s=start_s)
     if video is not None:
-        with suppress(AudioError):
+        with suppress(NoAudioStreamError):
             return AudioTrack.open(video.path, start_s=start_s)
     return None
 
@@ -92,7 +114,7 @@ class _Pictures:
 
 def _read_poses(folder: Path, report: Report) -> _Poses:
     path = folder / layout.POSES
-    if not path.is_file():
+    if not os.path.lexists(path):
         raise RecordingError(f"{path} is missing; the recording needs it.")
     table = read_table(path, (8,), report, header=True)
     stamps_s, translation, quaternion = table.values[:, 0], table.values[:, 1:4], table.values[:, 4:8]
@@ -128,7 +150,7 @@ def _read_poses(folder: Path, report: Report) -> _Poses:
 def _find_video(folder: Path, description: Description) -> VideoFrames | None:
     """Open ``rgb.mp4`` (or another container) where there is no ``rgb/``."""
     files = [folder / f"rgb{suffix}" for suffix in layout.VIDEO_SUFFIXES]
-    file = next((f for f in files if f.is_file()), None)
+    file = next((f for f in files if os.path.lexists(f)), None)
     if file is None or (folder / "rgb").is_dir():
         return None
     video, camera = VideoFrames(file), description.intrinsics.rgb
@@ -154,7 +176,7 @@ def _find_pictures(
             "each frame needs its depth."
         )
     path = folder / layout.FRAMES
-    if path.exists():
+    if os.path.lexists(path):
         rows = list(_listed(path, report))
         names = [name for name, _ in rows]
         stamps_s: Float[np.ndarray, " n"] | None = np.array([stamp for _, stamp in rows], np.float64)
@@ -165,7 +187,7 @@ def _find_pictures(
         stamps_s = video.stamps_s if video else _stamps_without_list(folder, names, description, known, report)
     colour = [f"rgb/{found.get(name, name + '.png')}" for name in names]
     if description.frames is not None and description.frames != len(names):
-        where = path.name if path.exists() else "rgb/"
+        where = path.name if os.path.lexists(path) else "rgb/"
         sentence = f"{folder / layout.DESCRIPTION} tells of {description.frames} frames, but {where} has {len(names)}."
         report(Fault(sentence, folder / layout.DESCRIPTION, fatal=False))
     depth = [f"depth/{name}.png" for name in names]
@@ -241,5 +263,9 @@ def _interpolated(
         world_from_camera[covered] = trajectory.at(stamps_s[covered])
     if not covered.all():
         lost = int((~covered).sum())
-        notices.append(f"{lost} frame(s) lie outside the poses of {layout.POSES} or in a gap of them; left out.")
+        span = f"{known.stamps_s[rows].min():.2f} to {known.stamps_s[rows].max():.2f} s" if len(rows) else "none"
+        notices.append(
+            f"{lost} of {len(stamps_s)} frame(s) lie outside the poses of {layout.POSES} ({span}) or in a gap of them; "
+            "left out."
+        )
     return covered, world_from_camera, notices

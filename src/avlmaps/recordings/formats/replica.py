@@ -6,6 +6,7 @@ pixel at (0, 0), so that half a pixel is added here, and the depth's scale (6553
 z up. The sequences have no clock; 30 frames/s are assumed.
 """
 
+import os
 from pathlib import Path
 
 import msgspec
@@ -13,6 +14,7 @@ import numpy as np
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, settle
 from avlmaps.recordings.formats.tables import read_table
@@ -89,12 +91,12 @@ def _number(name: str) -> int | None:
 def _camera(path: Path, shots: Shots) -> tuple[Rig, float, tuple[str, ...]]:
     """Read ``cam_params.json``, or take the numbers of the published scenes."""
     places = (path / "cam_params.json", path.parent / "cam_params.json")
-    file = next((place for place in places if place.is_file()), None)
+    file = next((place for place in places if os.path.lexists(place)), None)
     given = _Camera()
     if file is not None:
         try:
-            given = msgspec.json.decode(file.read_bytes(), type=_Parameters).camera
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            given = decode_json(read_regular(file, DESCRIPTION_BYTES), _Parameters).camera
+        except (msgspec.DecodeError, UnicodeDecodeError, OSError) as error:
             raise RecordingError(f"{file} is not as it should be ({error}); mend the file.") from None
     try:
         camera = Pinhole(given.fx, given.fy, given.cx + 0.5, given.cy + 0.5, given.w, given.h)

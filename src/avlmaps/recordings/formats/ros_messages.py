@@ -11,7 +11,8 @@ from jaxtyping import Float, Float32, UInt8
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.poses import from_quaternion
+from avlmaps.core.poses import MAX_ROTATION_FAULT, from_quaternion
+from avlmaps.recordings.images import MOST_PIXELS, decoded, encoded_size
 
 _COLOUR_ENCODINGS = {
     "rgb8": (3, (0, 1, 2)),
@@ -34,14 +35,14 @@ def header_stamp_s(rawdata: bytes, is_ros2: bool) -> float:
     return seconds + nanoseconds * 1e-9
 
 
-def colour_of(message: Any, name: str) -> UInt8[np.ndarray, "h w 3"]:
+def colour_of(message: Any, name: str, camera: Pinhole | None = None) -> UInt8[np.ndarray, "h w 3"]:
     """Return the colour picture of an Image or a CompressedImage.
 
     Raises:
         RecordingError: its encoding is not one of a colour picture, or its bytes are cut short.
     """
     if "CompressedImage" in message.__msgtype__:
-        return _decoded(message.data, name, colour=True)[..., ::-1]
+        return _decoded(message.data, name, camera, colour=True)[..., ::-1]
     if message.encoding not in _COLOUR_ENCODINGS:
         known = ", ".join(_COLOUR_ENCODINGS)
         raise RecordingError(f"The picture {name} has encoding {message.encoding!r}; colour is read from: {known}.")
@@ -50,14 +51,14 @@ def colour_of(message: Any, name: str) -> UInt8[np.ndarray, "h w 3"]:
     return np.ascontiguousarray(pixels[..., list(order)])
 
 
-def depth_of(message: Any, name: str) -> Float32[np.ndarray, "h w"]:
+def depth_of(message: Any, name: str, camera: Pinhole | None = None) -> Float32[np.ndarray, "h w"]:
     """Return z-depth in metres, 0 where there is none, of an Image or a `compressedDepth` CompressedImage.
 
     Raises:
         RecordingError: its encoding is not one of a depth picture, or its bytes are cut short.
     """
     if "CompressedImage" in message.__msgtype__:
-        return _decompressed_depth(message, name)
+        return _decompressed_depth(message, name, camera)
     order = ">" if message.is_bigendian else "<"
     if message.encoding in ("16UC1", "mono16"):
         return _rows(message, np.dtype(order + "u2"), 1, name)[..., 0].astype(np.float32) / np.float32(1000.0)
@@ -82,12 +83,20 @@ def _rows(message: Any, dtype: np.dtype, channels: int, name: str) -> np.ndarray
     return lines.view(dtype).reshape(height, width, channels)
 
 
-def _decoded(content: Any, name: str, colour: bool) -> np.ndarray:
+def _decoded(content: Any, name: str, camera: Pinhole | None, colour: bool) -> np.ndarray:
+    """Decode a compressed picture whose header was compared with the camera before."""
     import cv2
 
     flag = cv2.IMREAD_COLOR if colour else cv2.IMREAD_UNCHANGED
-    raw = np.asarray(content, np.uint8)
-    picture = cv2.imdecode(raw, flag) if len(raw) else None
+    raw = np.asarray(content, np.uint8).tobytes()
+    size = encoded_size(raw)
+    expected = size if camera is None else (camera.width, camera.height)
+    if size is not None and (size != expected or size[0] * size[1] > MOST_PIXELS):
+        raise RecordingError(
+            f"The compressed picture {name} says that it is {size[0]}x{size[1]}; its calibration says "
+            f"{'another size' if camera is None else f'{camera.width}x{camera.height}'}."
+        )
+    picture = decoded(raw, flag) if size is not None else None
     if picture is None:
         raise RecordingError(
             f"The compressed picture {name} ({len(raw)} bytes) cannot be decoded; it is cut short or damaged."
@@ -95,14 +104,16 @@ def _decoded(content: Any, name: str, colour: bool) -> np.ndarray:
     return picture
 
 
-def _decompressed_depth(message: Any, name: str) -> Float32[np.ndarray, "h w"]:
+def _decompressed_depth(message: Any, name: str, camera: Pinhole | None) -> Float32[np.ndarray, "h w"]:
     """Undo `compressed_depth_image_transport`: a 12-byte header, then PNG; 32FC1 travels as quantised inverse depth."""
     if "rvl" in message.format.lower():
         raise RecordingError(
             f"The depth {name} is RVL-compressed; republish it as PNG compressedDepth or as raw images."
         )
     raw = np.asarray(message.data, np.uint8)
-    picture = _decoded(raw[12:] if "compressedDepth" in message.format else raw, name, colour=False)
+    picture = _decoded(raw[12:] if "compressedDepth" in message.format else raw, name, camera, colour=False)
+    if picture.ndim != 2 or picture.dtype != np.uint16:
+        raise RecordingError(f"The depth {name} is no 16-bit picture of one channel; republish it as 16UC1 or 32FC1.")
     if not message.format.startswith("32FC1"):
         return picture.astype(np.float32) / np.float32(1000.0)
     _, a, b = struct.unpack_from("<iff", raw.tobytes(), 0)
@@ -141,6 +152,6 @@ def pose_of(message: Any) -> Float[np.ndarray, "4 4"]:
     rotation = getattr(message, "orientation", None) or message.rotation
     xyz = np.array([translation.x, translation.y, translation.z], np.float64)
     xyzw = np.array([rotation.x, rotation.y, rotation.z, rotation.w], np.float64)
-    if not (np.isfinite(xyz).all() and np.isfinite(xyzw).all() and np.linalg.norm(xyzw) > 1e-6):
+    if not (np.isfinite(xyz).all() and abs(np.linalg.norm(xyzw) - 1.0) <= MAX_ROTATION_FAULT):  # NaN is not
         return np.full((4, 4), np.nan)
     return from_quaternion(xyz, xyzw)

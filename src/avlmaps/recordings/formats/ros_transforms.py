@@ -1,5 +1,6 @@
 """The tree of frames of a ROS recording: who is mounted on whom, and where it was when."""
 
+from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,21 +28,48 @@ class TransformTree:
 
     def __init__(self) -> None:
         self._edges: dict[str, _Edge] = {}
+        self._broken: Counter[tuple[str, str]] = Counter()
+        self._moved: set[str] = set()
 
     def add(
         self, parent: str, child: str, parent_from_child: Float[np.ndarray, "4 4"], stamp_s: float, static: bool
     ) -> None:
-        """Add one transform; a broken one (NaN) is left out."""
+        """Add one transform; one that is none (NaN, no rotation, a frame in itself) is left out and told."""
         parent, child = parent.lstrip("/"), child.lstrip("/")
         if not np.isfinite(parent_from_child).all() or not child or parent == child:
+            self._broken[parent, child] += 1
             return
         edge = self._edges.setdefault(child, _Edge(parent, static))
+        if edge.parent != parent:
+            self._moved.add(f"{child!r} is in {edge.parent!r} and in {parent!r}")
         edge.parent = parent
         if static:
             edge.static, edge.stamps_s, edge.parent_from_child = True, [0.0], [parent_from_child]
         else:
             edge.stamps_s.append(stamp_s)
             edge.parent_from_child.append(parent_from_child)
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """A sentence for each pair of frames with broken transforms, and for frames with two parents."""
+        broken = (
+            f"{count} transform(s) from {child!r} to {parent!r} are none (NaN, or no rotation) and left out."
+            for (parent, child), count in sorted(self._broken.items())
+        )
+        return (*broken, *(f"The frame {words}; only one of them is used." for words in sorted(self._moved)))
+
+    def cycle(self, frame: str) -> str:
+        """Return the frames that go round in a circle above a frame, in words, or nothing."""
+        chain = self._chain(frame)
+        if not chain or self._edges[chain[-1]].parent not in chain:
+            return ""
+        again = self._edges[chain[-1]].parent
+        return " -> ".join([*chain[chain.index(again) :], again])
+
+    def span_s(self, frame: str) -> tuple[float, float] | None:
+        """Return from when to when all that moves a frame is known, None where nothing moves it."""
+        moving = [self._edges[name].stamps_s for name in self._chain(frame) if not self._edges[name].static]
+        return (max(map(min, moving)), min(map(max, moving))) if moving else None
 
     def moves(self, frame: str) -> bool:
         """Say whether the frame moves relative to its tree's root."""

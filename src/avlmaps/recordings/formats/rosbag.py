@@ -7,9 +7,11 @@ or a pose topic together with the static transforms from the body to the camera.
 """
 
 import hashlib
+import os
 import tempfile
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -18,13 +20,16 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.camera import Rig
-from avlmaps.core.errors import RecordingError
+from avlmaps.core.errors import AvlmapsError, RecordingError
+from avlmaps.core.files import DESCRIPTION_BYTES, SAMPLED_BYTES, checked_size
 from avlmaps.core.timeline import associate, gap_notices, in_order
 from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.formats.ros_audio import extract_audio
+from avlmaps.recordings.content import add_files, stamp_of
+from avlmaps.recordings.formats.ros_audio import STAMPED, Pcm, extract_audio
 from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of, header_stamp_s, pose_of
 from avlmaps.recordings.formats.ros_transforms import TransformTree
-from avlmaps.recordings.types import Frame, Recording
+from avlmaps.recordings.plausible import plausible_walk
+from avlmaps.recordings.types import BaseHeight, Frame, Recording
 
 _IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _INFO_TYPES = ("sensor_msgs/msg/CameraInfo",)
@@ -35,7 +40,7 @@ _POSE_TYPES = (
 )
 _TRANSFORM_TYPE = "geometry_msgs/msg/TransformStamped"
 _AUDIO_INFO_TYPES = ("audio_common_msgs/msg/AudioInfo",)
-_AUDIO_TYPES = ("audio_common_msgs/msg/AudioData", "audio_common_msgs/msg/AudioDataStamped")
+_AUDIO_TYPES = ("audio_common_msgs/msg/AudioData", "audio_common_msgs/msg/AudioDataStamped", STAMPED)
 # A colour and a depth picture at most this far apart are taken for one moment.
 PAIRING_TOLERANCE_S = 0.05
 
@@ -48,13 +53,15 @@ class RosTopics:
         rgb: colour images (raw or compressed).
         depth: depth images (raw or compressedDepth).
         pose: odometry, or poses of the camera or the body; empty: /tf first.
-        audio: audio data.
+        audio: audio data; ``none`` leaves the sound out.
+        audio_pcm: no topic: ``16000,1`` says that audio data are plain 16-bit samples, 16,000 a second, in one channel.
     """
 
     rgb: str = ""
     depth: str = ""
     pose: str = ""
     audio: str = ""
+    audio_pcm: str = ""
 
 
 def open_rosbag(path: Path, topics: Mapping[str, str] | None = None) -> "RosbagRecording":
@@ -93,8 +100,8 @@ class _Bag:
                 reader.open()
             except Exception as error:  # rosbags, sqlite and yaml raise their own kinds
                 raise RecordingError(
-                    f"{self.path} cannot be read as a ROS bag ({type(error).__name__}: {error}); if it was cut off "
-                    "while recording, mend it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
+                    f"{self.path} cannot be read as a ROS bag ({type(error).__name__}: {_first_line(error)}); if it "
+                    "was cut off while recording, mend it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
                 ) from error
             self._local.reader = reader
         return self._local.reader
@@ -110,26 +117,46 @@ class _Bag:
         """Yield (receive time in ns, message) of a topic."""
         connections = self.connections(topic)
         if connections:
-            for connection, received_ns, raw in self.reader.messages(connections=connections):
-                yield received_ns, self.reader.deserialize(raw, connection.msgtype)
+            with self._readable(topic):
+                for connection, received_ns, raw in self.reader.messages(connections=connections):
+                    yield received_ns, self.reader.deserialize(raw, connection.msgtype)
+
+    @contextmanager
+    def _readable(self, topic: str) -> Iterator[None]:
+        """Turn what rosbags, sqlite and decompressors raise over damaged messages into one sentence."""
+        try:
+            yield
+        except (AvlmapsError, GeneratorExit):
+            raise
+        except Exception as error:
+            raise RecordingError(
+                f"A message of {topic} in {self.path} cannot be read ({type(error).__name__}: {_first_line(error)}); "
+                "the bag is damaged: copy it, or mend it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
+            ) from error
 
     def stamps(self, topic: str) -> tuple[np.ndarray, np.ndarray]:
         """Return the header stamps (s) and receive times (ns) of a topic's messages."""
         stamps_s: list[float] = []
         received: list[int] = []
-        for _, received_ns, raw in self.reader.messages(connections=self.connections(topic)):
-            stamps_s.append(header_stamp_s(raw, self.reader.is2))
-            received.append(received_ns)
+        with self._readable(topic):
+            for _, received_ns, raw in self.reader.messages(connections=self.connections(topic)):
+                stamps_s.append(header_stamp_s(raw, self.reader.is2))
+                received.append(received_ns)
         return np.array(stamps_s), np.array(received, np.int64)
 
     def message_at(self, topic: str, received_ns: int, stamp_s: float) -> Any:
-        found = self.reader.messages(connections=self.connections(topic), start=received_ns, stop=received_ns + 1)
-        for connection, _, raw in found:
-            if abs(header_stamp_s(raw, self.reader.is2) - stamp_s) < 1e-6:
-                return self.reader.deserialize(raw, connection.msgtype)
+        with self._readable(topic):
+            found = self.reader.messages(connections=self.connections(topic), start=received_ns, stop=received_ns + 1)
+            for connection, _, raw in found:
+                if abs(header_stamp_s(raw, self.reader.is2) - stamp_s) < 1e-6:
+                    return self.reader.deserialize(raw, connection.msgtype)
         raise RecordingError(
             f"{self.path} lost the message of {topic} at {stamp_s:.6f} s; was the bag changed meanwhile?"
         )
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().split("\n")[0][:200].rstrip(".") or "no reason given"
 
 
 class RosbagRecording(Recording):
@@ -138,8 +165,7 @@ class RosbagRecording(Recording):
     format = "rosbag"
 
     def __init__(self, path: Path, topics: RosTopics) -> None:
-        if not path.exists():
-            raise RecordingError(f"There is no bag at {path}.")
+        _check_files(path)
         self.path = path
         self._bag = _Bag(path)
         self._rgb_topic, self._depth_topic = _image_topics(self._bag, topics)
@@ -155,24 +181,33 @@ class RosbagRecording(Recording):
         if len(a) < len(depth):
             notices.append(f"{len(depth) - len(a)} of {len(depth)} depth images have no colour image within 50 ms.")
         stamps_s = depth_s[depth][a]
-        _add_motion(self._bag, topics, camera_frame, tree)
+        pose_topic = _add_motion(self._bag, topics, camera_frame, tree)
+        self.topics = {"rgb": self._rgb_topic, "depth": self._depth_topic, "pose": pose_topic}
+        if cycle := tree.cycle(camera_frame):
+            raise RecordingError(
+                f"The transforms of {path} go round in a circle ({cycle}), so that the camera {camera_frame!r} is "
+                "nowhere; record /tf with one parent for each frame, or name odometry (pose=/odom)."
+            )
         poses, known = tree.root_from(camera_frame, stamps_s)
         if not known.any():
-            raise RecordingError(
-                f"{path} tells no pose of its camera frame {camera_frame!r} at the time of any of its {len(stamps_s)} "
-                "images; record /tf, /tf_static or odometry, or name the topic (pose=/odom)."
-            )
+            raise RecordingError(_no_pose(path, camera_frame, stamps_s, tree))
         if not known.all():
             notices.append(
                 f"{int((~known).sum())} of {len(known)} frames lie outside of the known poses and are left out."
             )
         rows = np.flatnonzero(known)
+        walk = plausible_walk(stamps_s[rows], poses[rows, :3, 3], [f"{i:06d}" for i in range(len(rows))])
+        if walk.fault:
+            raise RecordingError(f"{path}: {walk.fault}")
+        rows = rows[walk.index]
+        notices += [*tree.notices, *walk.notices]
         self._start_s = float(stamps_s[rows[0]])
         self.stamps_s = stamps_s[rows] - self._start_s
         self.world_from_camera = poses[rows]
         self._rgb_at = [(int(rgb_ns[rgb[i]]), float(rgb_s[rgb[i]])) for i in b[rows]]
         self._depth_at = [(int(depth_ns[depth[i]]), float(depth_s[depth[i]])) for i in a[rows]]
         self.up_in_world = np.array([0.0, 0.0, 1.0])
+        self.base_height = _base_height(tree, camera_frame, float(stamps_s[rows[0]]))
         self.audio, audio_notices = self._read_audio(topics)
         self.notices = (*notices, *gap_notices(self.stamps_s, "frames"), *audio_notices)
 
@@ -180,10 +215,10 @@ class RosbagRecording(Recording):
         """Read one frame."""
         received_ns, stamp_s = self._rgb_at[index]
         name = f"{self._rgb_topic} at {stamp_s:.3f} s"
-        rgb = colour_of(self._bag.message_at(self._rgb_topic, received_ns, stamp_s), name)
+        rgb = colour_of(self._bag.message_at(self._rgb_topic, received_ns, stamp_s), name, self.rig.rgb)
         received_ns, stamp_s = self._depth_at[index]
         name = f"{self._depth_topic} at {stamp_s:.3f} s"
-        depth_m = depth_of(self._bag.message_at(self._depth_topic, received_ns, stamp_s), name)
+        depth_m = depth_of(self._bag.message_at(self._depth_topic, received_ns, stamp_s), name, self.rig.depth)
         for picture, camera in ((rgb, self.rig.rgb), (depth_m, self.rig.depth)):
             if picture.shape[:2] != (camera.height, camera.width):
                 raise RecordingError(
@@ -198,25 +233,69 @@ class RosbagRecording(Recording):
     def fingerprint(self) -> str:
         """See ``Recording.fingerprint``."""
         digest = hashlib.sha256()
-        files = sorted(self.path.rglob("*")) if self.path.is_dir() else [self.path]
-        for file in files:
-            if file.is_file():
-                digest.update(f"{file.name} {file.stat().st_size}\n".encode())
+        for file in self._files():
+            add_files(digest, file.parent, [file.name])
         digest.update(self.stamps_s.tobytes() + self.world_from_camera.tobytes() + repr(self.rig).encode())
         return digest.hexdigest()
 
+    def change_stamp(self) -> str:
+        """See ``Recording.change_stamp``."""
+        return stamp_of(self.path.parent, (), self._files())
+
+    def _files(self) -> list[Path]:
+        return sorted(file for file in self.path.rglob("*") if file.is_file()) if self.path.is_dir() else [self.path]
+
     def _read_audio(self, topics: RosTopics) -> tuple[AudioTrack | None, tuple[str, ...]]:
-        found = [topics.audio] if topics.audio else self._bag.topics_of(_AUDIO_TYPES)
-        if not found:
+        pcm = Pcm.parsed(topics.audio_pcm) if topics.audio_pcm else None
+        known = self._bag.topics_of(_AUDIO_TYPES)
+        found = [topics.audio] if topics.audio else known
+        if not found or topics.audio == "none":
             return None, ()
-        if not self._bag.connections(found[0]):
-            raise RecordingError(f"{self.path} has no topic {found[0]!r}; name one that it has (audio=TOPIC).")
+        if found[0] not in known:
+            has = ", ".join(known) or "none"
+            raise RecordingError(f"{self.path} has no sound topic {found[0]!r} (it has: {has}); name one of them.")
+        self.topics = {**self.topics, "audio": found[0]}
         # The bag's sound goes to a file of its own for as long as this recording is open: a track is read by pieces.
         self._folder = tempfile.TemporaryDirectory(prefix="avlmaps-rosbag-")
         infos = self._bag.topics_of(_AUDIO_INFO_TYPES)
         info = next((message for topic in infos for _, message in self._bag.messages(topic)), None)
         folder = Path(self._folder.name)
-        return extract_audio(self._bag.messages(found[0]), info, found[0], folder, self._start_s)
+        return extract_audio(self._bag.messages(found[0]), info, found[0], folder, self._start_s, pcm)
+
+
+def _check_files(path: Path) -> None:
+    """Raise ``RecordingError`` unless a bag and what lies in its folder are regular files."""
+    if not os.path.lexists(path):
+        raise RecordingError(f"There is no bag at {path}.")
+    for file in sorted(entry for entry in path.iterdir() if not entry.is_dir()) if path.is_dir() else [path]:
+        try:
+            checked_size(file, DESCRIPTION_BYTES if file.suffix == ".yaml" else SAMPLED_BYTES)
+        except OSError as error:
+            raise RecordingError(f"{file} cannot be read ({error.strerror or error}); check the file.") from None
+
+
+def _no_pose(path: Path, camera_frame: str, stamps_s: np.ndarray, tree: TransformTree) -> str:
+    span = tree.span_s(camera_frame)
+    when = f" (they go from {stamps_s[0]:.3f} to {stamps_s[-1]:.3f} s)" if len(stamps_s) else ""
+    poses = f"; its poses go from {span[0]:.3f} to {span[1]:.3f} s, so check that both use one clock" if span else ""
+    return (
+        f"{path} tells no pose of its camera frame {camera_frame!r} at the time of any of its {len(stamps_s)} "
+        f"images{when}{poses}; record /tf, /tf_static or odometry, or name the topic (pose=/odom)."
+    )
+
+
+def _base_height(tree: TransformTree, camera_frame: str, stamp_s: float) -> BaseHeight | None:
+    """Return how far the robot's base lies below the camera; by REP 120 ``base_footprint`` lies on the floor."""
+    at_s = np.array([stamp_s])
+    camera, _ = tree.root_from(camera_frame, at_s)
+    for name, on_floor in (("base_footprint", True), ("base_link", False)):
+        if tree.root(name) != tree.root(camera_frame):  # the bag has no such frame, or not in this tree
+            continue
+        base, known = tree.root_from(name, at_s)
+        below_m = float(camera[0, 2, 3] - base[0, 2, 3])
+        if known[0] and below_m > 0.0:
+            return BaseHeight(below_m, on_floor)
+    return None
 
 
 def _image_topics(bag: _Bag, topics: RosTopics) -> tuple[str, str]:
@@ -306,12 +385,12 @@ def _check_pose_topic(bag: _Bag, topic: str) -> None:
         )
 
 
-def _add_motion(bag: _Bag, topics: RosTopics, camera_frame: str, tree: TransformTree) -> None:
-    """Add to the tree of mounts what moves the camera: /tf, else odometry or a pose topic."""
+def _add_motion(bag: _Bag, topics: RosTopics, camera_frame: str, tree: TransformTree) -> str:
+    """Add to the tree of mounts what moves the camera: /tf, else odometry or a pose topic; return which."""
     if not topics.pose:
         _add_tf(bag, "/tf", tree)
         if tree.moves(camera_frame):
-            return
+            return "/tf"
     if topics.pose:
         _check_pose_topic(bag, topics.pose)
     candidates = [topics.pose] if topics.pose else bag.topics_of(_POSE_TYPES)
@@ -332,3 +411,4 @@ def _add_motion(bag: _Bag, topics: RosTopics, camera_frame: str, tree: Transform
             f"{bag.path} has poses of {body!r} on {candidates[0]} but no static transform from there to the camera "
             f"{camera_frame!r}; record /tf_static."
         )
+    return candidates[0]

@@ -9,7 +9,12 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import DESCRIPTION_BYTES, TABLE_BYTES, open_regular, read_regular
 from avlmaps.recordings.faults import Fault, Report
+
+# A line holds 16 numbers or a name; without a limit a file of zeros would be one line of gigabytes.
+_LINE_BYTES = 1 << 14
+_QUOTED = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +36,7 @@ def text_lines(path: Path, report: Report) -> Iterator[tuple[int, str]]:
     Lines that are not UTF-8 are reported and passed over.
     """
     try:
-        stream = path.open("rb")
+        stream = open_regular(path, TABLE_BYTES)
     except FileNotFoundError:
         report(Fault(f"{path} is missing; the recording needs it.", path))
         return
@@ -39,7 +44,10 @@ def text_lines(path: Path, report: Report) -> Iterator[tuple[int, str]]:
         report(Fault(f"{path} cannot be read ({error.strerror or error}); check the file.", path))
         return
     with stream:
-        for number, raw in enumerate(stream, start=1):
+        for number, raw in enumerate(iter(lambda: stream.readline(_LINE_BYTES), b""), start=1):
+            if len(raw) >= _LINE_BYTES:
+                report(Fault(f"{path}, line {number}: it has {_LINE_BYTES} bytes or more; mend it.", path, number))
+                return
             try:
                 text = raw.decode("utf-8-sig" if number == 1 else "utf-8").strip()
             except UnicodeDecodeError:
@@ -102,7 +110,7 @@ def read_matrix(path: Path, rows: int, columns: int) -> Float[np.ndarray, "rows 
         RecordingError: the file is missing, is not text, or holds another count of numbers.
     """
     try:
-        fields = path.read_bytes().decode("utf-8-sig").replace(",", " ").split()
+        fields = read_regular(path, DESCRIPTION_BYTES).decode("utf-8-sig").replace(",", " ").split()
         numbers = [_number(field) for field in fields]
     except FileNotFoundError:
         raise RecordingError(f"{path} is missing; the recording needs it.") from None
@@ -111,7 +119,8 @@ def read_matrix(path: Path, rows: int, columns: int) -> Float[np.ndarray, "rows 
     except UnicodeDecodeError:
         raise RecordingError(f"{path} is not UTF-8 text; save the file as UTF-8.") from None
     except ValueError as error:
-        raise RecordingError(f"{path} does not hold numbers only ({error}); mend the file.") from None
+        reason = str(error) if len(str(error)) < _QUOTED else f"{str(error)[:_QUOTED]}..."
+        raise RecordingError(f"{path} does not hold numbers only ({reason}); mend the file.") from None
     if len(numbers) != rows * columns:
         raise RecordingError(f"{path} holds {len(numbers)} numbers where {rows}x{columns} belong; mend the file.")
     return np.array(numbers).reshape(rows, columns)

@@ -18,6 +18,7 @@ from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, open_audio, settle
 from avlmaps.recordings.formats.tables import read_table, text_lines
 from avlmaps.recordings.images import first_picture_size
+from avlmaps.recordings.plausible import clock_fault, date_fault
 
 UNITS_PER_M = 5000.0
 # Half the interval of a 30 Hz camera, and a little: what the benchmark's own association uses.
@@ -94,6 +95,8 @@ def _stream(folder: Path, name: str, report: Report) -> _Stream:
             report(Fault(sentence, path, number))
     if not files:
         raise RecordingError(f"{path} lists no picture, so there is nothing to map.")
+    if fault := date_fault(np.array(stamps), f"the pictures of {name}"):
+        raise RecordingError(f"{path}: {fault}")
     order = timeline.in_order(np.array(stamps), f"pictures of {name}")
     return _Stream(np.array(stamps)[order.index], [files[i] for i in order.index], order.notices)
 
@@ -109,6 +112,8 @@ def _pairs(
             f"({len(depth.files)}); check that both use one clock."
         )
     stamps_s, known_s = depth.stamps_s[of_depth], trajectory.stamps_s
+    if fault := clock_fault(stamps_s, "pictures", known_s, "poses of groundtruth.txt"):
+        raise RecordingError(f"{path}: {fault}")
     covered = trajectory.covers(stamps_s)
     if not covered.any():
         raise RecordingError(

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.sim.hearing.sound_paths import Air
 from avlmaps.sim.scene import Area, Scene, SceneObject
 
@@ -30,12 +31,6 @@ _AIR_PER_M = np.array([0.0001, 0.0003, 0.0006, 0.001, 0.002, 0.007, 0.025])  # e
 # What a light inner wall holds back, dB.
 WALL_DB = np.array([20.0, 29.0, 36.0, 41.0, 43.0, 44.0, 46.0])
 
-_WET = frozenset({"bathroom", "toilet", "kitchen", "kitchenette", "laundry room", "garage"})
-_SOFT_THINGS = frozenset({
-    "sofa", "armchair", "bed", "bunk bed", "crib", "curtain", "cushion", "ottoman", "pet bed", "play tent", "towel",
-    "laundry basket", "office chair", "mat",
-})  # fmt: skip
-_FLAT_THINGS = frozenset({"carpet", "rug"})
 _STRUCTURE = frozenset({"wall", "floor", "ceiling", "column", "stairs", "railing", "window", "door", "folding door"})
 _DOOR_M = 2.0
 _WIDE_M = 1.6  # an opening wider than this has no lintel
@@ -68,7 +63,8 @@ class Rooms:
         volume, surface = size[:, 0] * height, 2 * size[:, 0] + size[:, 1] * height
         absorbing = np.zeros((len(BANDS_HZ), len(areas)))
         for index, area in enumerate(areas):
-            floor = _TILES if area.kind in _WET else _BOARDS
+            entry = lexicon().find(area.kind, Kind.ROOM)
+            floor = _TILES if entry is not None and entry.tiled else _BOARDS
             absorbing[:, index] = size[index, 0] * (floor + _PLASTER) + size[index, 1] * height[index] * _PLASTER
             absorbing[:, index] += 4.0 * _AIR_PER_M * volume[index]
             absorbing[:, index] += sum((_taken_by(thing) for thing in _things(scene, area)), np.zeros(len(BANDS_HZ)))
@@ -119,9 +115,10 @@ def _taken_by(thing: SceneObject) -> Float[np.ndarray, " b"]:
     x, y, z = thing.size
     if thing.category in _STRUCTURE:
         return np.zeros(len(BANDS_HZ))
-    if thing.category in _FLAT_THINGS:
+    entry = lexicon().find(thing.category, Kind.THING)
+    if entry is not None and entry.name == "carpet":
         return x * y * _RUG
-    return (x * y + (x + y) * z) * (_SOFT if thing.category in _SOFT_THINGS else _WOODEN)
+    return (x * y + (x + y) * z) * (_SOFT if entry is not None and entry.soft else _WOODEN)
 
 
 def _joints(air: Air, height_m: Float[np.ndarray, " r"]) -> Float[np.ndarray, "b r r"]:

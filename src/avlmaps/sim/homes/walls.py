@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.sim.furniture import Families, Piece
 from avlmaps.sim.furniture.openings import door, folding_door, window
 from avlmaps.sim.furniture.recipe_helpers import chance, draw, pick
@@ -17,7 +18,6 @@ from avlmaps.sim.shapes import polygon as flat_polygon
 
 _FACES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]], np.int32)
 _FACE_LOOK = (2, 2, 1, 0, 2, 2)  # of a wall's block: its left side, its right side, and the rest
-_WET = ("bathroom", "toilet", "laundry room", "shower room")
 _FALLBACK = {"plaster": "painted", "tile": "ceramic", "parquet": "wood", "wallpaper": "painted", "brick": "stone",
              "concrete": "stone", "marble": "stone", "carpet": "fabric"}  # fmt: skip
 
@@ -56,7 +56,8 @@ def _pale(rng: np.random.Generator) -> Triple:
 
 def looks_of(rng: np.random.Generator, room: Room, home: Looks | None) -> Looks:
     """Draw what a room looks like; what the home has in common is kept in most rooms."""
-    wet = room.kind in _WET
+    entry = lexicon().find(room.kind, Kind.ROOM)
+    wet = entry is not None and entry.wet
     floor_kind = pick(rng, ("tile", "tile", "stone", "marble") if wet else
                       ("parquet", "parquet", "parquet", "wood", "carpet", "tile", "stone", "concrete"))  # fmt: skip
     wall_kind = pick(rng, ("plaster", "plaster", "painted", "painted", "wallpaper", "brick", "concrete"))

@@ -1,0 +1,28 @@
+"""Says so where the first run on a machine compiles its loops, which takes up to a minute; later runs load them."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from avlmaps.core.progress import say
+
+NOTICE = "compiling once (up to a minute or two; later runs skip this)"
+
+
+@contextmanager
+def announced() -> Iterator[None]:
+    """Print one line on standard error when a loop is not in the cache and is compiled, in this process or a fork."""
+    from numba.core import event
+
+    class Listener(event.Listener):
+        told = False
+
+        def on_start(self, event: object) -> None:
+            if not self.told:
+                type(self).told = True
+                say(NOTICE)
+
+        def on_end(self, event: object) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Listener()):
+        yield

@@ -1,0 +1,357 @@
+"""The words that this project knows: things, rooms and sounds, with what is usual about each (`lexicon.toml`).
+
+Every table that needs a name, a synonym or a wider kind reads it here. Look-ups ignore case, hyphens, blanks and the
+plural, so "Arm-chairs" is an armchair. How to add a thing stands in ``docs/guides/add-a-thing.md``.
+"""
+
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cache, cached_property
+from importlib.resources import files
+from typing import Any, Literal
+
+from avlmaps.core.inflection import plural_of, singulars_of
+from avlmaps.core.spelling import Speller, squeezed
+
+Range = tuple[float, float]
+Mount = Literal["floor", "wall", "ceiling", "top", "built in"]
+Split = Literal["training", "held out"]
+
+_DEFAULTS = "all"
+# After one of these a phrase describes; what is named stands before it: "a bottle of wine" is a bottle.
+_LINKS = frozenset({
+    "of", "with", "without", "for", "on", "in", "at", "from", "under", "to", "that", "which", "where", "beside", "next",
+    "near", "above", "below", "behind", "by", "over", "between", "full", "made", "used", "like", "when", "inside",
+    "against", "opposite", "across", "who",
+})  # fmt: skip
+
+
+class Kind(StrEnum):
+    """What an entry names."""
+
+    THING = "thing"
+    ROOM = "room"
+    SOUND = "sound"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Entry:
+    """One thing, room or sound.
+
+    Attributes:
+        name: what answers call it, singular where it has one.
+        kind: thing, room or sound.
+        plural: of the name; the name itself where it has no other.
+        synonyms: other names of the same, British and American.
+        learnt: phrases that the encoders which ship were trained with or carry in their notes for it; most are
+            synonyms, some name what the encoder takes for it: a tap for a sink.
+        wider: the kinds that it belongs to, nearest first, each an entry of its own: a chair is a seat.
+        compounds: names of special ones that are no entry of their own: a dining chair is a chair.
+        mount: where it usually is: on the floor, on a wall, on the ceiling, on top of another thing, or built in.
+        size_m: the usual width, depth and height, each from least to greatest, metres; None where it varies too much.
+        soft: whether it swallows sound.
+        sounds: names of the sounds that it makes, for a thing.
+        makers: names of the things that make it, the likeliest first, for a sound.
+        rooms: names of the rooms where it usually is; for a sound, where it is also heard without its makers.
+        like: what an encoder that does not know it may take it for, since they look alike: a freezer, a refrigerator.
+        generic: whether it says too little to look for: an object, an appliance; what it is stands beside it.
+        wet: of a room, whether its walls get wet.
+        tiled: of a room, whether its floor is hard.
+        spoken: what people mostly say for it where that is not the name, else ``""``.
+        split: ``training`` where an encoder which ships was trained to tell it; ``held out`` for all others.
+    """
+
+    name: str
+    kind: Kind
+    plural: str = ""
+    synonyms: tuple[str, ...] = ()
+    learnt: tuple[str, ...] = ()
+    wider: tuple[str, ...] = ()
+    compounds: tuple[str, ...] = ()
+    mount: Mount = "floor"
+    size_m: tuple[Range, Range, Range] | None = None
+    soft: bool = False
+    sounds: tuple[str, ...] = ()
+    makers: tuple[str, ...] = ()
+    rooms: tuple[str, ...] = ()
+    like: tuple[str, ...] = ()
+    generic: bool = False
+    wet: bool = False
+    tiled: bool = False
+    spoken: str = ""
+    split: Split = "held out"
+
+    @property
+    def spellings(self) -> tuple[str, ...]:
+        """The name, its synonyms and its compounds."""
+        return (self.name, *self.synonyms, *self.compounds)
+
+    def __repr__(self) -> str:
+        return f"Entry({self.name!r}, {self.kind.value})"
+
+
+class Lexicon:
+    """All entries, with look-ups; `lexicon` returns the one that ships.
+
+    Args:
+        source: the parsed file: tables ``thing``, ``room`` and ``sound`` of groups of entries, and lists of adjectives.
+
+    Attributes:
+        colours: names of colours.
+        materials: adjectives that say what a thing is made of.
+        ambiguous: spellings that name several entries of a kind, squeezed, with the names, the likeliest first.
+    """
+
+    def __init__(self, source: Mapping[str, Any]) -> None:
+        self.colours = _listed(source.get("colours", ""))
+        self.materials = _listed(source.get("materials", ""))
+        self.ambiguous: dict[Kind, dict[str, tuple[str, ...]]] = {
+            kind: {squeezed(word): _listed(names) for word, names in source.get("ambiguous", {}).get(kind, {}).items()}
+            for kind in Kind
+        }
+        self._said = {kind: dict(_flat(source.get(kind, {}))) for kind in Kind}
+        self._index = {kind: self._indexed(kind) for kind in Kind}
+        self._known: dict[Kind, dict[str, Entry]] = {kind: {} for kind in Kind}
+
+    def entries(self, kind: Kind | None = None) -> tuple[Entry, ...]:
+        """Return the entries, or those of one kind, in the order of the file."""
+        kinds = Kind if kind is None else (kind,)
+        return tuple(self._entry(each, name) for each in kinds for name in self._said[each])
+
+    def named(self, name: str, kind: Kind) -> Entry:
+        """Return the entry of exactly this name.
+
+        Raises:
+            KeyError: there is none; whoever lists names of entries finds out at once.
+        """
+        if name not in self._said[kind]:
+            raise KeyError(f"the lexicon has no {kind} {name!r}; add it to core/lexicon.toml")
+        return self._entry(kind, name)
+
+    def find(self, phrase: str, kind: Kind | None = None) -> Entry | None:
+        """Return the entry that a phrase names exactly, by any of its spellings; None where there is none.
+
+        Without a kind things come before rooms and rooms before sounds. An ambiguous word names its likeliest entry.
+
+        Args:
+            phrase: ``Sofas``, ``arm-chair`` or ``couch``; no article.
+            kind: only entries of this kind.
+        """
+        for key in (squeezed(phrase), *(squeezed(single) for single in singulars_of(phrase))):
+            for each in Kind if kind is None else (kind,):
+                if (name := self._index[each].get(key)) is not None:
+                    return self._entry(each, name)
+        return None
+
+    def senses(self, phrase: str, kind: Kind | None = None) -> tuple[Entry, ...]:
+        """Return every entry that a phrase can name, the likeliest first: several for an ambiguous word."""
+        out: dict[str, Entry] = {}
+        for each in Kind if kind is None else (kind,):
+            if (found := self.find(phrase, each)) is not None:
+                out[f"{each} {found.name}"] = found
+            for single in (phrase, *singulars_of(phrase)):
+                for name in self.ambiguous[each].get(squeezed(single), ()):
+                    out.setdefault(f"{each} {name}", self._entry(each, name))
+        return tuple(out.values())
+
+    def head(self, phrase: str, kind: Kind | None = None) -> Entry | None:
+        """Return the entry that the longest known tail of a phrase names; None where even its last word is unknown.
+
+        A description after the noun is left out: "bottle of wine" is a bottle, "red chest of drawers" a chest of
+        drawers.
+
+        Args:
+            phrase: ``red kitchen table`` is a table.
+            kind: only entries of this kind.
+        """
+        words = phrase.split()
+        link = _link(words)
+        for end in (len(words), link) if link < len(words) else (link,):
+            for start in range(link):
+                if (found := self.find(" ".join(words[start:end]), kind)) is not None:
+                    return found
+        return None
+
+    def wider(self, name: str, kind: Kind | None = None) -> tuple[Entry, ...]:
+        """Return all kinds that an entry belongs to, nearest first: an armchair is a chair, a seat and furniture."""
+        entry = self.find(name, kind)
+        out: dict[str, Entry] = {}
+        todo = [entry] if entry is not None else []
+        for each in todo:
+            for parent in (self._entry(each.kind, wide) for wide in each.wider):
+                if parent.name not in out:
+                    out[parent.name] = parent
+                    todo.append(parent)
+        return tuple(out.values())
+
+    def members(self, wider: str) -> tuple[Entry, ...]:
+        """Return all entries that a wider kind takes in, in the order of the file: "seat" takes in chair and sofa."""
+        return tuple(entry for each in self.senses(wider) for entry in self._members[each.kind].get(each.name, ()))
+
+    def is_a(self, other: str, wanted: str, kind: Kind | None = None) -> bool:
+        """Return whether what one phrase names is what another wants.
+
+        Args:
+            other: ``red office chair``; its head counts.
+            wanted: ``chair``, ``chairs`` or ``seat``; a chair is no office chair.
+            kind: compare only entries of this kind.
+        """
+        for want in self.senses(wanted, kind):
+            named = self.senses(other, want.kind) or tuple(filter(None, (self.head(other, want.kind),)))
+            # A dining chair is a chair; an armchair is a chair too, and no dining chair.
+            wide = squeezed(wanted) not in map(squeezed, want.compounds)
+            if any(want is entry or (wide and want in self.wider(entry.name, want.kind)) for entry in named):
+                return True
+        return _ends_with(other, wanted)
+
+    def suggest(self, word: str, kind: Kind | None = None, most: int = 3) -> tuple[str, ...]:
+        """Return known spellings close to a word that may be misspelt, the closest first: "labtop" gives laptop.
+
+        Args:
+            word: one that `find` does not know; a phrase is compared whole.
+            kind: only spellings of entries of this kind.
+            most: how many at most.
+        """
+        return tuple(spelling for spelling, _ in self.scored_suggestions(word, kind, most))
+
+    def scored_suggestions(self, word: str, kind: Kind | None = None, most: int = 3) -> tuple[tuple[str, float], ...]:
+        """Return what `suggest` does, each with how alike it is: 1 is the word itself, 0 nothing in common."""
+        return self._spellers[kind].suggest(word, most)
+
+    def words(self) -> frozenset[str]:
+        """Return every known word in small letters: of all spellings, joined ones too, colours and materials."""
+        return self._words
+
+    @cached_property
+    def _words(self) -> frozenset[str]:
+        phrases = [*self.colours, *self.materials]
+        for entry in self.entries():
+            phrases += [*entry.spellings, entry.plural]
+        single = {word for phrase in phrases for word in phrase.lower().replace("-", " ").split()}
+        return frozenset(single | {squeezed(phrase) for phrase in phrases})
+
+    @cached_property
+    def _spellers(self) -> "dict[Kind | None, Speller]":
+        # What encoders were trained to tell is what people mostly ask for; it wins where two words are as near.
+        entries = sorted(self.entries(), key=lambda entry: entry.split != "training")
+        kinds: tuple[Kind | None, ...] = (None, *Kind)
+        return {
+            kind: Speller(word for entry in entries if kind in (None, entry.kind) for word in entry.spellings)
+            for kind in kinds
+        }
+
+    @cached_property
+    def _members(self) -> dict[Kind, dict[str, tuple[Entry, ...]]]:
+        out: dict[Kind, dict[str, tuple[Entry, ...]]] = {kind: {} for kind in Kind}
+        for entry in self.entries():
+            for parent in self.wider(entry.name, entry.kind):
+                out[entry.kind][parent.name] = (*out[entry.kind].get(parent.name, ()), entry)
+        return out
+
+    def _indexed(self, kind: Kind) -> dict[str, str]:
+        """Return the name of the entry that each spelling means, by the squeezed spelling.
+
+        Names come first, then what the file calls ambiguous, then other spellings, then what encoders take for it.
+        """
+        said = self._said[kind]
+        index = {squeezed(name): name for name in said}
+        for key, names in self.ambiguous[kind].items():
+            index.setdefault(key, names[0])
+        for field in ("plural", "also", "such_as", "learnt"):
+            for name, own in said.items():
+                if field in own:
+                    for key in squeezed(own[field]).split(","):
+                        index.setdefault(key, name)
+        return index
+
+    def _entry(self, kind: Kind, name: str) -> Entry:
+        if (known := self._known[kind].get(name)) is None:
+            known = self._known[kind][name] = self._made(kind, name, self._said[kind][name])
+        return known
+
+    def _made(self, kind: Kind, name: str, said: Mapping[str, Any]) -> Entry:
+        learnt = _listed(said.get("learnt", ""))
+        # An encoder may take other things for one of its own: a tap for a sink. They are no synonyms.
+        special = _listed(said.get("such_as", ""))
+        keys = {squeezed(word): word for word in reversed(learnt) if word not in special}
+        same = (word for key, word in reversed(keys.items()) if self._index[kind][key] == name)
+        return Entry(
+            name=name,
+            kind=kind,
+            plural=said.get("plural") or (name if kind is Kind.SOUND else plural_of(name)),
+            synonyms=(*same, *_listed(said.get("also", ""))),
+            learnt=learnt,
+            wider=_listed(said.get("wider", "")),
+            compounds=special,
+            mount=said.get("mount", "floor"),
+            size_m=_size(said["size"]) if "size" in said else None,
+            soft=said.get("soft", False),
+            sounds=self._sounds_of.get(name, ()) if kind is Kind.THING else (),
+            makers=_listed(said.get("makers", "")),
+            rooms=_listed(said.get("rooms", "")),
+            like=_listed(said.get("like", "")),
+            generic=said.get("generic", False),
+            wet=said.get("wet", False),
+            tiled=said.get("tiled", False),
+            spoken=said.get("spoken", ""),
+            split="training" if said.get("trained", False) else "held out",
+        )
+
+    @cached_property
+    def _sounds_of(self) -> dict[str, tuple[str, ...]]:
+        """The sounds that each thing makes, from what makes each sound."""
+        out: dict[str, tuple[str, ...]] = {}
+        for name, said in self._said[Kind.SOUND].items():
+            for maker in _listed(said.get("makers", "")):
+                out[maker] = (*out.get(maker, ()), name)
+        return out
+
+
+@cache
+def lexicon() -> Lexicon:
+    """Return the lexicon that ships, read once."""
+    text = files("avlmaps.core").joinpath("lexicon.toml").read_text(encoding="utf-8")
+    return Lexicon(tomllib.loads(text))
+
+
+def noun_of(phrase: str) -> str:
+    """Return the word that says what a phrase is about, known or not: "blue zebra in a cage" is a zebra."""
+    return undescribed(phrase).split()[-1] if phrase.split() else ""
+
+
+def undescribed(phrase: str) -> str:
+    """Return a phrase without the description after its noun: "bottle of wine" is "bottle"."""
+    words = phrase.split()
+    return " ".join(words[: _link(words)])
+
+
+def _link(words: Sequence[str]) -> int:
+    """Return the index of the word at which the description after the noun begins."""
+    return next((at for at, word in enumerate(words) if at and word.lower() in _LINKS), len(words))
+
+
+def _flat(groups: Mapping[str, Any]) -> Iterable[tuple[str, Mapping[str, Any]]]:
+    """Return each entry's name with what its group and itself say of it."""
+    for group in groups.values():
+        usual = group.get(_DEFAULTS, {})
+        for name, said in group.items():
+            if name != _DEFAULTS:
+                yield name, {**usual, **said}
+
+
+def _listed(text: str) -> tuple[str, ...]:
+    return tuple(text.split(", ")) if text else ()
+
+
+def _size(text: str) -> tuple[Range, Range, Range]:
+    """Return the three ranges of ``0.4-0.6 x 0.4-0.6 x 0.8-1.1``: width, depth, height."""
+    width, depth, height = ((float(low), float(high)) for low, _, high in (p.partition("-") for p in text.split(" x ")))
+    return width, depth, height
+
+
+def _ends_with(phrase: str, tail: str) -> bool:
+    """Return whether a phrase is another one, or ends in it: an office chair is a chair."""
+    phrase, tail = " ".join(phrase.lower().split()), " ".join(tail.lower().split())
+    return bool(tail) and (phrase == tail or phrase.endswith(f" {tail}"))

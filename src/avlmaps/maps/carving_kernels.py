@@ -1,0 +1,106 @@
+"""The compiled loops over all voxels of a map that decide which of them are no surface."""
+
+import numpy as np
+from numba import njit
+
+from avlmaps.maps.fusion.voxel_kernels import OPTIONS, find_row
+
+
+@njit(**OPTIONS)
+def count_through(index, voxel_size, clear, size, camera, pose, through):
+    """Add 1 to each voxel that a view sees through: all rays that may meet it go on for a voxel's edge behind it.
+
+    Args:
+        index: (n, 3) int32.
+        voxel_size: metres.
+        clear: (rows, columns) uint16, millimetres, as `sensor_kernels.clear_blocks` wrote it.
+        size: edge of a block, pixels.
+        camera: (fx, fy, cx, cy, width, height).
+        pose: (4, 4) world_from_camera.
+        through: (n,) int32, added to.
+    """
+    fx, fy, cx, cy, width, height = camera
+    radius = 0.5 * np.sqrt(3.0) * voxel_size
+    behind = radius + voxel_size
+    for n in range(index.shape[0]):
+        x = (index[n, 0] + 0.5) * voxel_size - pose[0, 3]
+        y = (index[n, 1] + 0.5) * voxel_size - pose[1, 3]
+        z = (index[n, 2] + 0.5) * voxel_size - pose[2, 3]
+        depth = pose[0, 2] * x + pose[1, 2] * y + pose[2, 2] * z
+        if depth <= 2.0 * radius:
+            continue
+        right = pose[0, 0] * x + pose[1, 0] * y + pose[2, 0] * z
+        down = pose[0, 1] * x + pose[1, 1] * y + pose[2, 1] * z
+        a, b = right / depth, down / depth
+        u, v = fx * a + cx, fy * b + cy
+        # a rectangle that holds the picture of the sphere round the voxel
+        wide = fx * radius * (1.0 + abs(a)) / (depth - radius)
+        high = fy * radius * (1.0 + abs(b)) / (depth - radius)
+        if u - wide < 0.0 or v - high < 0.0 or u + wide >= width or v + high >= height:
+            continue
+        far = np.int64((depth + behind) * 1000.0) + 1
+        if clear[np.int64(v) // size, np.int64(u) // size] < far:
+            continue
+        free = True
+        for i in range(np.int64(v - high) // size, np.int64(v + high) // size + 1):
+            for j in range(np.int64(u - wide) // size, np.int64(u + wide) // size + 1):
+                free = free and clear[i, j] >= far
+        if free:
+            through[n] += 1
+
+
+@njit(**OPTIONS)
+def mark_smeared(index, sharp, reach, ratio, table, smeared):
+    """Mark each voxel that has a much better seen one within its reach.
+
+    Args:
+        index: (n, 3) int32.
+        sharp: (n,) int64.
+        reach: (n,) how far to look, voxels.
+        ratio: how many times better.
+        table: hash table of the rows.
+        smeared: (n,) bool, filled in.
+    """
+    for n in range(index.shape[0]):
+        limit = reach[n] * reach[n]
+        most = np.int64(reach[n])
+        enough = ratio * sharp[n]
+        found = False
+        for i in range(-most, most + 1):
+            for j in range(-most, most + 1):
+                for k in range(-most, most + 1):
+                    if found or i * i + j * j + k * k > limit:
+                        continue
+                    row = find_row(index[n, 0] + i, index[n, 1] + j, index[n, 2] + k, table, index)
+                    found = row >= 0 and row != n and sharp[row] >= enough
+        smeared[n] = found
+
+
+@njit(**OPTIONS)
+def group(index, table, parent):
+    """Give voxels that touch, at a corner at least, the same group: the lowest row among them.
+
+    Args:
+        index: (n, 3) int32.
+        table: hash table of the rows.
+        parent: (n,) int64, filled in with each voxel's group.
+    """
+    for n in range(index.shape[0]):
+        parent[n] = n
+    for n in range(index.shape[0]):
+        for step in range(14, 27):  # half of the neighbours; the other half meets this voxel as theirs
+            i, j, k = step // 9 - 1, step // 3 % 3 - 1, step % 3 - 1
+            row = find_row(index[n, 0] + i, index[n, 1] + j, index[n, 2] + k, table, index)
+            if row >= 0:
+                a, b = _root(parent, n), _root(parent, row)
+                parent[max(a, b)] = min(a, b)
+    for n in range(index.shape[0]):
+        parent[n] = _root(parent, n)
+
+
+@njit(**OPTIONS)
+def _root(parent, n):
+    while parent[n] != n:
+        parent[n] = parent[parent[n]]
+        n = parent[n]
+    return n

@@ -1,0 +1,108 @@
+"""Where cameras saw freely: one small picture a frame, of how far all rays of each block of pixels are free.
+
+It costs some 10 KB a frame, parts of a recording put theirs one after the other, and what is counted with them does
+not depend on the order: that is how parts of a map can be carved as one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int32, UInt16
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.core.progress import progress
+from avlmaps.maps import carving_kernels
+from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.sensor import SensorModel
+from avlmaps.maps.sensor_kernels import clear_blocks
+from avlmaps.recordings.types import Frame
+
+BLOCKS_WIDE = 80
+
+
+@dataclass(frozen=True, slots=True)
+class FreeViews:
+    """How far the frames of one part see freely.
+
+    Attributes:
+        clear_mm: for each block of pixels the depth, in millimetres, up to which all its rays are free; 0 where a pixel
+            has no depth.
+        clear_pose: world_from_camera of each frame.
+    """
+
+    clear_mm: UInt16[np.ndarray, "k rows columns"]
+    clear_pose: Float64[np.ndarray, "k 4 4"]
+
+    def __len__(self) -> int:
+        return len(self.clear_mm)
+
+
+def block_size(camera: Pinhole) -> int:
+    """Return the edge of a block, pixels."""
+    return max(1, -(-camera.width // BLOCKS_WIDE))
+
+
+class FreeViewCollector:
+    """Collects the free views of frames."""
+
+    def __init__(self, camera: Pinhole, sensor: SensorModel) -> None:
+        """Begin without frames.
+
+        Args:
+            camera: that measures depth.
+            sensor: its error; without carving nothing is collected.
+        """
+        self._size, self._sensor = block_size(camera), sensor
+        self._shape = -(-camera.height // self._size), -(-camera.width // self._size)
+        self._clear: list[np.ndarray] = []
+        self._pose: list[np.ndarray] = []
+
+    def add(self, frame: Frame) -> None:
+        """Add a frame."""
+        if not self._sensor.carve:
+            return
+        clear = np.zeros(self._shape, np.uint16)
+        depth = np.require(frame.depth_m, np.float32, ["C", "W"])
+        clear_blocks(depth, self._size, self._sensor.noise, self._sensor.clear_sigmas, clear)
+        self._clear.append(clear)
+        self._pose.append(np.array(frame.world_from_camera, np.float64))
+
+    def views(self) -> FreeViews:
+        """Return what was collected."""
+        clear = np.stack(self._clear) if self._clear else np.zeros((0, *self._shape), np.uint16)
+        return FreeViews(clear, np.stack(self._pose) if self._pose else np.zeros((0, 4, 4)))
+
+
+def joined(parts: Sequence[FreeViews]) -> FreeViews:
+    """Put the views of parts one after the other."""
+    clear, pose = [part.clear_mm for part in parts], [part.clear_pose for part in parts]
+    return FreeViews(np.concatenate(clear), np.concatenate(pose))
+
+
+def count_through(
+    index: Int32[np.ndarray, "n 3"], grid: GridSpec, camera: Pinhole, parts: Sequence[FreeViews]
+) -> Int32[np.ndarray, " n"]:
+    """Return how many frames see through each voxel.
+
+    A frame does when every ray that may meet the voxel is free for a voxel's edge behind it; a pixel without depth in
+    the block of such a ray makes that unknown, and the frame does not count.
+
+    Args:
+        index: voxels.
+        grid: their size.
+        camera: of the frames.
+        parts: the frames' free views.
+    """
+    through = np.zeros(len(index), np.int32)
+    intrinsics = (float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy), camera.width, camera.height)
+    index = np.ascontiguousarray(index)
+
+    def every():
+        for part in parts:
+            for clear, pose in zip(part.clear_mm, part.clear_pose, strict=True):
+                yield np.array(clear), np.array(pose)
+
+    for clear, pose in progress(every(), "carving", total=sum(map(len, parts))):
+        carving_kernels.count_through(index, grid.voxel_size_m, clear, block_size(camera), intrinsics, pose, through)
+    return through

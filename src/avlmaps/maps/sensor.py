@@ -1,0 +1,97 @@
+"""How wrong a depth camera is, and which of its depths are used; apart from the kernels: help needs no compiler.
+
+The error of a camera that measures depth as a shift between two views (structured light, stereo) grows with the square
+of the depth: σ(z) = noise_m + noise_per_m · z².
+
+* kinect: σ = 0.0012 + 0.0019 (z − 0.4)² m, measured by Nguyen, Izadi and Lovell, Modeling Kinect Sensor Noise for
+  Improved 3D Reconstruction and Tracking (3DIMPVT 2012); rounded up here to 0.0019 z². Khoshelham and Elberink
+  (Sensors 2012) measured 0.0014 z².
+* realsense: σ = s z² / (f b), with a subpixel error s = 0.08 px, the focal length f = 424 px of a D435 at 848 columns
+  and its baseline b = 0.05 m: 0.0038 z² (the formula and s are from Intel's tuning guide of the D400 family).
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from avlmaps.core.errors import MapError
+
+SensorName = Literal["auto", "kinect", "realsense", "perfect", "none"]
+
+
+@dataclass(frozen=True, slots=True)
+class SensorModel:
+    """The error of a depth camera, and what follows from it. The defaults are those of a camera without error."""
+
+    noise_m: float = 0.0
+    """σ of a depth of 0 m, metres."""
+    noise_per_m: float = 0.0
+    """How σ grows with the square of the depth: σ(z) = noise_m + noise_per_m · z²."""
+    worst_voxels: float = np.inf
+    """Leave out a depth whose σ is greater than this many voxel edges."""
+    edge_sigmas: float = np.inf
+    """Leave out a pixel between a nearer and a farther surface, each more than this many σ away: a flying pixel."""
+    steepest_deg: float = 90.0
+    """Leave out a pixel on a surface that the camera sees at a more grazing angle than this (0: face on)."""
+    clear_sigmas: float = 3.0
+    """A ray is free up to this many σ before its depth."""
+    carve: bool = True
+    """Remove voxels that frames see through."""
+    smear_sigmas: float = 0.0
+    """Remove a voxel when another, up to this many of its own σ away, is much better seen; 0 removes none."""
+    smear_ratio: float = 4.0
+    """Much better: this many times the sum of how exact the hits are."""
+    speck_voxels: int = 0
+    """Remove groups of up to this many voxels that stand alone and that no more than 2 frames hit."""
+
+    def __post_init__(self) -> None:
+        finite = np.isfinite([self.noise_m, self.noise_per_m, self.clear_sigmas, self.smear_sigmas]).all()
+        positive = min(self.worst_voxels, self.edge_sigmas, self.steepest_deg, self.smear_ratio) > 0.0
+        errors = self.noise_m, self.noise_per_m, self.clear_sigmas, self.smear_sigmas, self.speck_voxels
+        if not (finite and positive and min(errors) >= 0.0):
+            raise MapError(
+                f"The sensor model {self} is not usable; choose finite errors of 0 or more and limits greater than 0."
+            )
+        if self.steepest_deg > 90.0:
+            raise MapError(f"steepest_deg is {self.steepest_deg}; choose an angle up to 90 degrees.")
+
+    @property
+    def noise(self) -> tuple[float, float]:
+        """σ at 0 m and its growth with the square of the depth, as the kernels take them."""
+        return self.noise_m, self.noise_per_m
+
+    def sigma_m(self, depth_m: float) -> float:
+        """Return the standard deviation of a depth, metres."""
+        return self.noise_m + self.noise_per_m * depth_m * depth_m
+
+    def farthest_m(self, voxel_size_m: float) -> float:
+        """Return the depth beyond which the error is more than a voxel can bear; infinity where it never is."""
+        spare = self.worst_voxels * voxel_size_m - self.noise_m
+        if self.noise_per_m == 0.0 or not np.isfinite(spare):
+            return np.inf if spare >= 0.0 else 0.0
+        return float(np.sqrt(max(spare, 0.0) / self.noise_per_m))
+
+
+PERFECT = SensorModel()
+KINECT = SensorModel(
+    0.0012, 0.0019, worst_voxels=1.25, edge_sigmas=4.0, steepest_deg=85.0, smear_sigmas=2.0, speck_voxels=4
+)
+REALSENSE = SensorModel(
+    0.001,
+    0.0038,
+    worst_voxels=1.5,
+    edge_sigmas=4.0,
+    steepest_deg=85.0,
+    smear_sigmas=2.0,
+    smear_ratio=6.0,
+    speck_voxels=4,
+)
+NONE = SensorModel(carve=False)
+
+MODELS: dict[SensorName, SensorModel] = {
+    "kinect": KINECT,
+    "realsense": REALSENSE,
+    "perfect": PERFECT,
+    "none": NONE,
+}

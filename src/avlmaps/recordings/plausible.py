@@ -1,0 +1,223 @@
+"""Whether clocks fit one another and poses can be those of one walk, before a map is made of them.
+
+Stamps in milliseconds where seconds belong, or one pose a thousand kilometres away, make a wrong map without a word.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float, Int
+
+# Faster than any robot, or anybody who carries a camera through a building.
+MAX_SPEED_M_S = 20.0
+# A correction of drift or a relocalisation may move a pose by as much at once.
+MAX_JUMP_M = 3.0
+# Further, what follows the jump is in another world.
+MAX_SHIFT_M = 100.0
+# The frames of one map lie within it; larger maps ask for more memory than there is.
+MAX_EXTENT_M = 2_000.0
+# Beyond it, places kept in single precision are off by more than a millimetre.
+MAX_FROM_ORIGIN_M = 20_000.0
+# A pose that is one of few that are out of place is left out; of more, none is to be trusted.
+MAX_STRAY_SHARE = 0.05
+MAX_STRAYS = 5
+# Seconds since 1970 stay below it until the year 2286.
+_LATEST_DATE_S = 1e10
+# Frames further apart than this, at an even pace, are no walk.
+SLOWEST_PACE_S = 10.0
+_UNITS = ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"))
+# Spans of two clocks in one unit differ by less than this factor, with a unit of 1000 between them by more.
+_ALIKE = 4.0
+_SPARSE = 30.0
+_SHOWN = 3
+
+
+def date_fault(stamps_s: Float[np.ndarray, " n"], what: str) -> str:
+    """Return a sentence where stamps can only be a date in another unit than seconds, else nothing."""
+    finite = stamps_s[np.isfinite(stamps_s)]
+    latest = float(finite.max(initial=0.0))
+    if latest <= _LATEST_DATE_S:
+        return ""
+    unit = next((name for factor, name in _UNITS if latest / factor <= _LATEST_DATE_S), "another unit")
+    return f"The stamps of {what} reach {latest:.6g}, which are {unit} since 1970, not seconds; write them in seconds."
+
+
+def clock_fault(a_s: Float[np.ndarray, " n"], a: str, b_s: Float[np.ndarray, " m"], b: str) -> str:
+    """Return a sentence where two streams of one walk can be on one clock only if their units differ, else nothing.
+
+    One clock runs a thousand times (or a million, or 1e9 times) as fast where, in seconds, the streams would last as
+    long as one another only then, and where the faster has hardly a sample for each of the other's.
+
+    Args:
+        a_s: rising stamps of the one stream.
+        a: what they are, in the plural (``frames``).
+        b_s: rising stamps of the other.
+        b: what they are.
+    """
+    for stamps_s, what in ((a_s, a), (b_s, b)):
+        if fault := date_fault(stamps_s, what):
+            return fault
+    if len(a_s) < 2 or len(b_s) < 2:
+        return ""
+    for (slow_s, slow), (fast_s, fast) in (((a_s, a), (b_s, b)), ((b_s, b), (a_s, a))):
+        length_s, long_s = float(slow_s[-1] - slow_s[0]), float(fast_s[-1] - fast_s[0])
+        unit = next((name for f, name in _UNITS if 1 / _ALIKE < long_s / max(length_s, 1e-12) / f < _ALIKE), None)
+        pace_s, fast_pace_s = float(np.median(np.diff(slow_s))), float(np.median(np.diff(fast_s)))
+        if unit is not None and fast_pace_s > _SPARSE * pace_s:
+            return (
+                f"The {len(fast_s)} {fast} go from {fast_s[0]:.6g} to {fast_s[-1]:.6g} s and the {len(slow_s)} {slow} "
+                f"from {slow_s[0]:.6g} to {slow_s[-1]:.6g} s: the stamps of the {fast} look like {unit}; write them in "
+                "seconds."
+            )
+    return ""
+
+
+def pace_fault(stamps_s: Float[np.ndarray, " n"], what: str, expected_s: float | None = None) -> str:
+    """Return a sentence where frames come at an even pace that is far too slow for a walk, else nothing.
+
+    Args:
+        stamps_s: rising.
+        what: the frames, in the plural.
+        expected_s: the interval that the recording itself promises, where it does.
+    """
+    if len(stamps_s) < 3:
+        return ""
+    interval_s = np.diff(stamps_s)
+    pace_s = float(np.median(interval_s))
+    if expected_s is not None:
+        if 1 / 300 < pace_s / expected_s < 300:
+            return ""
+        return f"The {what} are {pace_s:.3g} s apart, the recording says {expected_s:.3g} s; are the stamps in seconds?"
+    if pace_s < SLOWEST_PACE_S or float(np.median(np.abs(interval_s - pace_s))) > 0.2 * pace_s:
+        return ""
+    return (
+        f"The {what} are {pace_s:.4g} s apart, so their stamps look like milliseconds or finer; write them in seconds, "
+        "or confirm the pace where the format has a rate."
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Plausible:
+    """What was found about the poses of a walk.
+
+    Attributes:
+        index: frames that are used, rising.
+        notices: a sentence for each thing that was left out or is odd.
+        fault: why the recording cannot be used, or nothing.
+    """
+
+    index: Int[np.ndarray, " k"]
+    notices: tuple[str, ...] = ()
+    fault: str = ""
+
+
+def plausible_walk(
+    stamps_s: Float[np.ndarray, " n"], positions_m: Float[np.ndarray, "n 3"], names: Sequence[str]
+) -> Plausible:
+    """Leave out poses that are out of place, and find out whether the rest can be one walk.
+
+    Between two frames the camera may move by ``MAX_JUMP_M``, or at ``MAX_SPEED_M_S``. Where it moves further, the
+    frames up to the next such jump are another stretch. The longest stretch is believed, and each other one that can
+    be reached from what is believed. A few frames that cannot are left out; a long stretch that lies at most
+    ``MAX_SHIFT_M`` away is used, and told (tracking began anew).
+
+    Args:
+        stamps_s: rising.
+        positions_m: where the camera was.
+        names: what the recording calls each frame.
+    """
+    every = np.arange(len(stamps_s))
+    if not len(every):
+        return Plausible(every)
+    edges = _edges(stamps_s, positions_m)
+    if len(edges) > 2 and (fault := _speed_fault(stamps_s, positions_m)):
+        return Plausible(every, fault=fault)
+    kept, shifts, fault = _reachable(stamps_s, positions_m, edges, names)
+    strays = np.setdiff1d(every, kept)
+    notices: list[str] = []
+    if len(strays):
+        away_m = np.linalg.norm(positions_m[strays] - np.median(positions_m[kept], axis=0), axis=1)
+        shown = ", ".join(names[i] for i in strays[:_SHOWN].tolist()) + (" ..." if len(strays) > _SHOWN else "")
+        notices.append(
+            f"{len(strays)} frame(s) are up to {away_m.max():,.0f} m from the others, too far to be reached in time; "
+            f"left out: {shown}."
+        )
+    return Plausible(
+        kept, (*notices, *shifts), fault or _extent_fault(positions_m[kept], [names[i] for i in kept.tolist()])
+    )
+
+
+def _edges(stamps_s: Float[np.ndarray, " n"], positions_m: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " e"]:
+    """Return where stretches begin, and the number of frames."""
+    moved_m = np.linalg.norm(np.diff(positions_m, axis=0), axis=1)
+    jumps = np.flatnonzero(moved_m > np.maximum(MAX_JUMP_M, MAX_SPEED_M_S * np.diff(stamps_s)))
+    return np.concatenate([[0], jumps + 1, [len(stamps_s)]])
+
+
+def _speed_fault(stamps_s: Float[np.ndarray, " n"], positions_m: Float[np.ndarray, "n 3"]) -> str:
+    speed = np.linalg.norm(np.diff(positions_m, axis=0), axis=1) / np.maximum(np.diff(stamps_s), 1e-9)
+    median = float(np.median(speed))
+    if len(speed) < 3 or float((speed > MAX_SPEED_M_S).mean()) <= 0.5:  # one far pose of five is half of the steps
+        return ""
+    return (
+        f"The camera would move at {median:,.0f} m/s, half of the time faster; positions must be in metres (not "
+        "millimetres) and stamps in seconds."
+    )
+
+
+def _reachable(
+    stamps_s: Float[np.ndarray, " n"],
+    positions_m: Float[np.ndarray, "n 3"],
+    edges: Int[np.ndarray, " e"],
+    names: Sequence[str],
+) -> tuple[Int[np.ndarray, " k"], list[str], str]:
+    """Return the frames that belong together, notices of shifts between them, and a fault or nothing."""
+    stretches = [np.arange(a, b) for a, b in pairwise(edges.tolist())]
+    longest = int(np.argmax(np.diff(edges)))
+    kept, shifts, fault = [stretches[longest]], [], ""
+    few = max(MAX_STRAYS, int(MAX_STRAY_SHARE * len(stamps_s)))
+    left = 0
+    for order in (range(longest + 1, len(stretches)), range(longest - 1, -1, -1)):
+        end, at = (-1, 0) if order.step > 0 else (0, -1)
+        last = int(stretches[longest][end])
+        for number in order:
+            stretch = stretches[number]
+            first = int(stretch[at])
+            away_m = float(np.linalg.norm(positions_m[first] - positions_m[last]))
+            within_m = max(MAX_JUMP_M, MAX_SPEED_M_S * abs(float(stamps_s[first] - stamps_s[last])))
+            if away_m > within_m and left + len(stretch) <= few and 2 * len(stretch) < len(stamps_s):
+                left += len(stretch)
+                continue
+            if away_m > within_m:
+                apart_s = abs(float(stamps_s[first] - stamps_s[last]))
+                told = (
+                    f"The camera jumps by {away_m:,.4g} m within {apart_s:.3g} s between frames {names[last]} and "
+                    f"{names[first]}"
+                )
+                if away_m > MAX_SHIFT_M:
+                    fault = fault or f"{told}; mend those poses, or cut the recording there."
+                else:
+                    shifts.append(f"{told}; if tracking began anew there, the map shows the place twice.")
+            kept.append(stretch)
+            last = int(stretch[end])
+    return np.sort(np.concatenate(kept)), shifts[:_SHOWN], fault
+
+
+def _extent_fault(positions_m: Float[np.ndarray, "n 3"], names: Sequence[str]) -> str:
+    low, high = positions_m.min(axis=0), positions_m.max(axis=0)
+    extent_m = float((high - low).max())
+    if extent_m > MAX_EXTENT_M:
+        furthest = int(np.argmax(np.linalg.norm(positions_m - np.median(positions_m, axis=0), axis=1)))
+        return (
+            f"The poses extend over {extent_m:,.0f} m, the furthest of frame {names[furthest]}; a map has at most "
+            f"{MAX_EXTENT_M:,.0f} m, so mend the poses or cut the recording."
+        )
+    away_m = float(np.abs(positions_m).max())
+    if away_m > MAX_FROM_ORIGIN_M:
+        return (
+            f"The poses lie {away_m:,.0f} m from the origin, where places are no longer exact to a millimetre; "
+            "subtract the first position from all of them."
+        )
+    return ""

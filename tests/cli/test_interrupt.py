@@ -1,0 +1,35 @@
+"""Ctrl-C ends in a sentence however early it comes."""
+
+import subprocess
+import sys
+
+
+def run(code: str) -> tuple[int, str]:
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    return done.returncode, done.stderr
+
+
+def test_while_the_command_line_is_loading() -> None:
+    interrupt = (
+        "import builtins\nreal = builtins.__import__\n"
+        "def load(name, *rest):\n    if name == 'tyro': raise KeyboardInterrupt\n    return real(name, *rest)\n"
+        "builtins.__import__ = load\nfrom avlmaps.cli import main\nmain(['--help'])"
+    )
+    assert run(interrupt) == (130, "avlmaps: stopped\n")
+
+
+def test_while_the_words_are_read() -> None:
+    interrupt = (
+        "import tyro\ndef cli(*a, **k): raise KeyboardInterrupt\ntyro.cli = cli\n"
+        "from avlmaps.cli import main\nmain(['info', 'x'])"
+    )
+    assert run(interrupt) == (130, "avlmaps: stopped\n")
+
+
+def test_out_of_memory_is_a_sentence() -> None:
+    starved = (
+        "from avlmaps.cli import main\nfrom avlmaps.cli.verbs import Info\n"
+        "def run(self): raise MemoryError\nInfo.run = run\nmain(['info', 'x'])"
+    )
+    status, said = run(starved)
+    assert status == 1 and said.startswith("avlmaps: there is not enough memory") and said.count("\n") == 1

@@ -1,0 +1,122 @@
+"""Under --json every error is one JSON object on standard output; scripts need not read sentences."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from avlmaps.cli.main import VERBS
+from avlmaps.cli.verb import Verb
+from avlmaps.core import errors
+
+ERRORS = (
+    (("demo", "--out", "FILE/below"), 1, "system"),
+    (("record", "--scene", "house:seven", "--out", "OUT"), 1, "scene"),
+    (("record", "--scene", "house:7", "--out", "OUT", "--size", "x"), 2, "usage"),
+    (("add-sounds", "REC", "--clips", "nowhere", "--out", "OUT"), 1, "audio"),
+    (("build", "nowhere", "--out", "OUT"), 1, "recording"),
+    (("build", "REC", "--out", "OUT", "--profile", "magic"), 1, "backend"),
+    (("import-map", "nowhere", "--out", "OUT"), 1, "map"),
+    (("info", "nowhere"), 1, "recording"),
+    (("query", "nowhere.avlmap", "the chair"), 1, "map"),
+    (("query", "MAP", "near near"), 1, "query"),
+    (("query", "MAP"), 2, "usage"),
+    (("query", "MAP", "--object", "red", "--plot", "x.doc"), 1, "query"),
+    (("locate", "MAP", "nothing.png"), 1, "query"),
+    (("go", "nowhere.avlmap", "go to the chair", "--scene", "house:7"), 1, "map"),
+    (("go", "MAP", "gabble gabble the", "--scene", "house:7"), 1, "language"),
+    (("things", "nowhere.avlmap"), 1, "map"),
+    (("export", "nowhere.avlmap", "--out", "OUT.ply"), 1, "map"),
+    (("teach-sound", "x"), 2, "usage"),
+    (("teach-sound", "x", "nothing.wav"), 1, "audio"),
+    (("profiles", "--nonsense"), 2, "usage"),
+    (("bench", "sounds"), 1, "bench"),
+)
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "kind"),
+    ERRORS,
+    ids=lambda value: " ".join(map(str, value))[:40] if isinstance(value, tuple) else "",
+)
+def test_an_error_is_one_json_object(words, status, kind, built: Path, walk: Path, run, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    places = {"MAP": built, "REC": walk, "OUT": tmp_path / "out", "FILE/below": tmp_path / "file" / "below"}
+    code, out, err = run(*[places.get(word, word) for word in words], "--json")
+    assert code == status
+    said = json.loads(out)
+    assert out.count("\n") == 1
+    assert said.keys() == {"error"} and said["error"].keys() == {"kind", "message"}
+    assert said["error"]["kind"] == kind
+    message = said["error"]["message"]
+    assert message and "\n" not in message and not message.startswith("avlmaps:")
+    if status == 1:
+        assert err.rstrip("\n").split("\n")[-1] == f"avlmaps: {message}", "people read the same sentence"
+
+
+def test_every_verb_is_among_them() -> None:
+    assert {words[0] for words, *_ in ERRORS} == set(VERBS)
+
+
+def test_a_command_line_that_cannot_be_read_says_what_is_wrong(run) -> None:
+    for words, told in (
+        (("query", "MAP", "--tpo", "3"), "Unrecognized options: --tpo, 3"),
+        (("query",), "Missing from avlmaps query: PATH The map. (required)"),
+        (("build", "x", "--out", "y", "--voxel-size-m", "abc"), "could not convert string to float: 'abc'"),
+        (("nonsense",), "nonsense"),
+    ):
+        code, out, err = run(*words, "--json")
+        assert code == 2
+        assert told in json.loads(out)["error"]["message"]
+        assert "--help" in err
+
+
+def test_help_and_what_stands_behind_two_dashes_are_no_errors(run) -> None:
+    assert run("query", "--json", "--help")[0] == 0
+    assert run("query", "MAP", "--", "--json")[1] == "", "words behind -- are no options"
+
+
+def test_a_fault_of_ours_is_json_with_its_traceback_on_standard_error(
+    built: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from avlmaps.cli import main
+
+    monkeypatch.setattr("avlmaps.cli.running.describe_path", lambda *_, **__: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        main(["info", str(built), "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert said["error"]["kind"] == "zero-division"
+    assert "division by zero; this is a fault of avlmaps" in said["error"]["message"]
+
+
+def test_each_error_of_the_family_has_a_kind_of_its_own() -> None:
+    from avlmaps.cli.output import kind_named
+
+    family = [name for name in vars(errors) if name.endswith("Error")]
+    assert len({kind_named(name) for name in family}) == len(family) >= 9
+
+
+def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> None:
+    code = (
+        "import numpy as np\n"
+        "from avlmaps.core.compiling import announced\n"
+        "from avlmaps.query.kernels import best_two, widen\n"
+        "with announced():\n"
+        "    for kind in (np.float32, np.float64):\n"
+        "        widen(np.zeros((2, 2), np.uint16), np.zeros((2, 2), kind))\n"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    told = [
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment).stderr
+        for _ in range(2)
+    ]
+    assert told == ["compiling once (up to a minute or two; later runs skip this)\n", ""]
+
+
+def test_verbs_that_run_compiled_loops_say_so(run, monkeypatch: pytest.MonkeyPatch) -> None:
+    compile_something = {"demo", "record", "build", "query", "locate", "go", "bench", "things", "export"}
+    assert {name for name, verb in VERBS.items() if verb.compiles} == compile_something
+    assert not Verb.compiles

@@ -1,0 +1,33 @@
+"""A share of the fuzz campaign: no case ends otherwise than in a plausible map or in one sentence."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+if sys.platform == "win32":
+    pytest.skip("cases run in forked processes", allow_module_level=True)
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from campaign import report, run_case
+from seeds import write_seeds
+
+CASES = 120
+BLOCKS = 4
+
+
+@pytest.fixture(scope="module")
+def seeds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    return write_seeds(tmp_path_factory.mktemp("seeds"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", range(BLOCKS))
+def test_broken_inputs_end_in_a_plausible_map_or_in_one_sentence(
+    block: int, seeds: dict[str, Path], tmp_path: Path
+) -> None:
+    each = CASES // BLOCKS
+    lines = [run_case(number, seeds, tmp_path) for number in range(block * each, (block + 1) * each)]
+    assert not [line for line in lines if line["verdict"] == "finding"], report(lines)
+    assert {"map", "sentence"} <= {str(line["verdict"]) for line in lines}

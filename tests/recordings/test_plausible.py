@@ -1,0 +1,119 @@
+"""Clocks in another unit, poses out of place and walks that no camera makes are seen before a map is made of them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from recording_scenes import write_folder
+
+from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.open import open_recording
+from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault, plausible_walk
+
+FRAMES_S = np.arange(150) / 30.0
+
+
+@pytest.mark.parametrize("rate_hz", [10.0, 30.0, 100.0, 1000.0])
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")])
+def test_poses_in_another_unit_are_named(rate_hz: float, factor: float, unit: str) -> None:
+    poses_s = np.arange(0.0, 5.0, 1.0 / rate_hz)
+    fault = clock_fault(FRAMES_S, "frames", poses_s * factor, "poses")
+    assert unit in fault and ("the stamps of the poses look like" in fault or "since 1970" in fault)
+    assert not clock_fault(FRAMES_S, "frames", poses_s, "poses")
+
+
+def test_frames_in_milliseconds_are_named_as_well() -> None:
+    fault = clock_fault(FRAMES_S * 1e3, "frames", np.arange(500) / 100, "poses")
+    assert "the stamps of the frames look like milliseconds" in fault
+
+
+@given(st.floats(0.0, 1e9), st.floats(1.0, 3000.0), st.floats(0.5, 1000.0), st.floats(2.0, 3600.0))
+def test_streams_in_seconds_are_never_refused(start_s: float, rate_hz: float, pose_hz: float, length_s: float) -> None:
+    """Whatever the rates, and though the poses go on for minutes before and after the frames."""
+    frames_s = start_s + np.arange(0.0, length_s, max(1.0 / rate_hz, length_s / 500))
+    poses_s = start_s + np.arange(-60.0, length_s + 60.0, max(1.0 / pose_hz, length_s / 500))
+    assert not clock_fault(frames_s, "frames", poses_s, "poses")
+
+
+def test_dates_are_seconds() -> None:
+    assert "milliseconds since 1970" in date_fault(np.array([1.7e12]), "frames")
+    assert "nanoseconds since 1970" in date_fault(np.array([1.7e18]), "frames")
+    assert not date_fault(np.array([1.7e9, np.nan]), "frames") and not date_fault(np.zeros(0), "frames")
+
+
+def test_an_even_pace_of_half_a_minute_is_no_walk_unless_the_recording_says_so() -> None:
+    assert "look like milliseconds" in pace_fault(FRAMES_S * 1e3, "frames")
+    assert not pace_fault(FRAMES_S, "frames") and not pace_fault(FRAMES_S * 1e3, "frames", 33.0)
+    stops_s = np.cumsum(np.random.default_rng(0).uniform(5.0, 60.0, 40))  # scans at stops
+    assert not pace_fault(stops_s, "frames")
+
+
+def _walk(count: int = 200) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    stamps_s = np.arange(count) / 30.0
+    positions = np.stack([0.8 * stamps_s, np.sin(stamps_s), np.full(count, 1.2)], axis=1)
+    return stamps_s, positions, [f"{i:06d}" for i in range(count)]
+
+
+@pytest.mark.parametrize("away_m", [10.0, 1e4, 1e5, 1e6])
+@pytest.mark.parametrize("at", [[0], [57], [199], [57, 58, 120]])
+def test_far_poses_are_left_out_by_name(away_m: float, at: list[int]) -> None:
+    stamps_s, positions, names = _walk()
+    positions[at, 0] += away_m
+    found = plausible_walk(stamps_s, positions, names)
+    assert not found.fault and np.array_equal(found.index, np.setdiff1d(np.arange(200), at))
+    assert len(found.notices) == 1 and names[at[0]] in found.notices[0] and "left out" in found.notices[0]
+
+
+def test_a_plain_walk_is_used_whole() -> None:
+    stamps_s, positions, names = _walk()
+    found = plausible_walk(stamps_s, positions, names)
+    assert len(found.index) == 200 and not found.notices and not found.fault
+    assert not len(plausible_walk(stamps_s[:0], positions[:0], []).index)
+
+
+def test_millimetres_are_named() -> None:
+    stamps_s, positions, names = _walk()
+    assert "positions must be in metres (not millimetres)" in plausible_walk(stamps_s, positions * 1e3, names).fault
+
+
+def test_a_shift_of_metres_is_told_and_one_of_kilometres_is_refused() -> None:
+    stamps_s, positions, names = _walk()
+    positions[100:] += 5.0
+    found = plausible_walk(stamps_s, positions, names)
+    assert len(found.index) == 200 and "between frames 000099 and 000100" in found.notices[0] and not found.fault
+    positions[100:] += 1e4
+    assert "between frames 000099 and 000100; mend those poses" in plausible_walk(stamps_s, positions, names).fault
+
+
+def test_walks_too_wide_or_too_far_from_the_origin_are_refused() -> None:
+    stamps_s, positions, names = _walk()
+    assert "subtract the first position" in plausible_walk(stamps_s, positions + 5e6, names).fault
+    long = np.stack([np.linspace(0, 3000, 3000), np.zeros(3000), np.zeros(3000)], axis=1)
+    assert "a map has at most 2,000 m" in plausible_walk(np.arange(3000.0), long, [str(i) for i in range(3000)]).fault
+
+
+def test_a_folder_with_poses_in_milliseconds_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    path = write_folder(tmp_path / "walk", count=8)
+    (path / "frames.csv").write_text("name,stamp_s\n" + "".join(f"{i:06d},{i / 10}\n" for i in range(8)))
+    lines = (path / "poses.csv").read_text().splitlines()
+    for factor, unit in ((1e3, "milliseconds"), (1e9, "nanoseconds")):
+        scaled = [f"{float(a) * factor!r},{b}" for a, b in (line.split(",", 1) for line in lines[1:])]
+        (path / "poses.csv").write_text("\n".join([lines[0], *scaled]))
+        with pytest.raises(
+            RecordingError, match=f"the stamps of the poses of poses.csv look like {unit}; write them in"
+        ):
+            open_recording(path)
+    (path / "frames.csv").unlink()  # the poses' stamps are the frames' then
+    with pytest.raises(RecordingError, match="apart, so their stamps look like milliseconds or finer"):
+        open_recording(path)
+
+
+def test_a_far_pose_of_a_folder_is_a_notice(tmp_path: Path) -> None:
+    path = write_folder(tmp_path / "walk", count=8)
+    lines = (path / "poses.csv").read_text().splitlines()
+    stamp, _, rest = lines[4].split(",", 2)
+    (path / "poses.csv").write_text("\n".join([*lines[:4], f"{stamp},1e6,{rest}", *lines[5:]]))
+    recording = open_recording(path)
+    assert len(recording) == 7 and "000003" in recording.notices[0] and "1,000,000 m" in recording.notices[0]
