@@ -149,7 +149,7 @@ class VoxelAccumulator:
         """Return the depths of a frame without flying pixels."""
         depth = np.require(frame.depth_m, np.float32, ["C", "W"])
         sensor, camera = self.sensor, frame.rig.depth
-        if not np.isfinite(sensor.edge_sigmas):
+        if sensor.edge_sigmas is None:
             return depth
         kept = np.empty_like(depth)
         slope = np.tan(np.deg2rad(sensor.steepest_deg))
