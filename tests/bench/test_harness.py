@@ -62,7 +62,7 @@ def test_clips_with_a_fold_trained_the_encoder_and_are_left_out(tmp_path: Path):
 
 def test_a_folder_that_does_not_say_what_was_trained_on_is_refused(tmp_path: Path):
     (tmp_path / "bare").mkdir()
-    with pytest.raises(AudioError, match="--clips all"):
+    with pytest.raises(AudioError, match="--sound-clips all"):
         unheard_rows(tmp_path / "bare")
     with pytest.raises(AudioError, match="without a fold"):
         unheard_rows(clips(tmp_path / "c", [("a/1.flac", "rain", "2")]))

@@ -406,6 +406,9 @@ def test_a_whole_run_makes_tables_and_a_second_one_makes_nothing_again(tmp_path:
     with pytest.raises(TaskError, match="no longer the scene"):
         run(replace(settings, save=None), tmp_path / "other" / "work", lambda spec: home(swap=True, moved_m=0.5))
     assert set(first.weights) == {"pixels", "sounds", "local", "place", "matcher"}
+    recorded = replace(first.tasks.recorded, sounds="esc")
+    heard_clips = tables(replace(first, tasks=replace(first.tasks, recorded=recorded)))["Clips that were heard"]
+    assert sum(row[1] for row in heard_clips["rows"]) == len(first.scenes[0].clips) > 0
     made = tables(first)
     by_name = {row[0]: row for row in made["Table III: an object in an area"]["rows"]}
     asked = sum(task.kind is TaskKind.AREA for task in first.tasks.tasks)

@@ -408,6 +408,15 @@ def test_a_table_of_hand_made_runs_holds_their_figures():
     assert figures["contacts that the map could have foretold"][1] == 1
 
 
+def test_the_clips_that_were_heard_are_named_where_sounds_are_recordings():
+    made = outcome([], (Series.PAIRS,))
+    recorded = replace(made.missions.recorded, sounds="esc")
+    facts = replace(made.scenes[0], clips=(("rain", "esc/a.ogg"),))
+    named = tables(replace(made, missions=replace(made.missions, recorded=recorded), scenes=(facts,)))
+    assert named["Clips that were heard"]["rows"] == [["rain", 1, "a.ogg"]]
+    assert "Clips that were heard" not in tables(made)
+
+
 def test_the_pairs_table_holds_every_row_of_the_papers():
     made = tables(outcome([], (Series.PAIRS,)))[TITLE[Series.PAIRS]]
     rows = {row[0]: dict(zip(made["columns"], row, strict=True)) for row in made["rows"]}

@@ -27,7 +27,7 @@ class Indexing:
     """Camera whose faults colour and depth have."""
     rules: Literal["ours", "paper"] = "ours"
     """Rules of mapping and querying: ours, or the paper's throughout (docs/paper-models.md)."""
-    clips: Literal["unheard", "all"] = "unheard"
+    sound_clips: Literal["unheard", "all"] = "unheard"
     """Clips of --sounds: those that the embedded sound encoder was not trained on, or all."""
     frames: int = 600
     """Limit of frames a scene."""
@@ -123,7 +123,7 @@ class Bench(ModelVerb):
             rules=chosen.rules,
             hearing=chosen.hearing,
             sounds=self.sounds,
-            clips=chosen.clips,
+            clips=chosen.sound_clips,
             sensor=chosen.sensor,
             frames=chosen.frames,
             tasks_a_scene=chosen.tasks_a_scene,
@@ -147,7 +147,7 @@ class Bench(ModelVerb):
             rules=scenes.rules,
             hearing=scenes.hearing,
             sounds=self.sounds,
-            clips=scenes.clips,
+            clips=scenes.sound_clips,
             sensor=scenes.sensor,
             frames=scenes.frames,
             sequences=chosen.sequences,

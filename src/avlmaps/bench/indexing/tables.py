@@ -5,7 +5,7 @@ from typing import Any
 
 from avlmaps.bench.harness.chosen import chosen_on
 from avlmaps.bench.harness.paper import paper_figures
-from avlmaps.bench.harness.provenance import shown_scene
+from avlmaps.bench.harness.provenance import clip_table, shown_scene
 from avlmaps.bench.indexing.configurations import OURS, configurations
 from avlmaps.bench.indexing.metrics import LIMITS_M, Score, scored
 from avlmaps.bench.indexing.runs import Outcome

@@ -80,7 +80,7 @@ def surface_regions(frame: Frame) -> Int[np.ndarray, "h w"]:
     large = [n for n in np.argsort(-area, kind="stable") if n > 0 and area[n] >= _LEAST_SHARE * edge.size]
     number = np.zeros(count, np.int64)
     number[large[:_MOST_REGIONS]] = np.arange(1, len(large[:_MOST_REGIONS]) + 1)
-    return number[parts]
+    return number[np.asarray(parts, np.int64)]
 
 
 def _neighbours(values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
