@@ -60,11 +60,18 @@ def test_clips_with_a_fold_trained_the_encoder_and_are_left_out(tmp_path: Path):
     assert unheard_folder(source, tmp_path / "work") == made
 
 
+def test_clips_of_recordings_that_the_weights_name_are_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    rows = [("a/4-1234-A-3.flac", "rain", ""), ("a/4-1235-A-3.flac", "rain", ""), ("a/mine.flac", "rain", "")]
+    source = clips(tmp_path / "c", rows)
+    monkeypatch.setattr("avlmaps.bench.harness.clips.trained_sources", lambda: frozenset({1234}))
+    assert [row["path"] for row in unheard_rows(source)] == ["a/4-1235-A-3.flac", "a/mine.flac"]
+
+
 def test_a_folder_that_does_not_say_what_was_trained_on_is_refused(tmp_path: Path):
     (tmp_path / "bare").mkdir()
     with pytest.raises(AudioError, match="--sound-clips all"):
         unheard_rows(tmp_path / "bare")
-    with pytest.raises(AudioError, match="without a fold"):
+    with pytest.raises(AudioError, match="not trained on"):
         unheard_rows(clips(tmp_path / "c", [("a/1.flac", "rain", "2")]))
 
 
