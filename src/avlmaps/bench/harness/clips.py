@@ -1,8 +1,8 @@
 """The clips of a folder that the shipped sound encoder was not trained on.
 
-A clip of an ``index.csv`` is unheard where it has no ``fold`` (every clip with one may have trained the weights) and where
-it was cut from none of the recordings that the weights' notes name: freesound's numbers, ``sources``, which the clips of
-ESC-50 carry in their file names.
+A clip of an ``index.csv`` is unheard where it has no ``fold`` (every clip with one may have trained the weights) and
+where it was cut from none of the recordings that the weights' notes name: freesound's numbers, ``sources``, which the
+clips of ESC-50 carry in their file names.
 """
 
 import csv
@@ -23,7 +23,7 @@ _SOURCE = re.compile(r"\d-(\d+)-[A-Z]")
 
 @cache
 def trained_sources() -> frozenset[int]:
-    """Return freesound's numbers of the recordings that trained the shipped weights, as far as their notes name them."""
+    """Return freesound's numbers of the recordings that trained the shipped weights, where their notes name them."""
     notes = files("avlmaps.perception.embedded") / "weights" / "sounds.json"
     return frozenset(json.loads(notes.read_text(encoding="utf-8")).get("sources", ()))
 
