@@ -58,21 +58,21 @@ ENTRIES = (
     Entry("segmentation", "Sounds in a track", "avlmaps bench segmentation --sounds SOUNDS --out OUT", 0.3),
     Entry("locate", "Position of a photo", "avlmaps bench locate --scenes RECORDING --out OUT", 0.2),
     Entry("house", "Objects of an artist's house", "avlmaps bench objects --scenes HOUSE --out OUT", 0.3),
-    Entry("objects", "Objects of twelve held-out homes", "avlmaps bench objects --out OUT", 2.0),
+    Entry("objects", "Objects of twelve held-out homes", "avlmaps bench objects --out OUT", 1.0),
     Entry("indexing", "The paper's Tables III to V", "avlmaps bench indexing --out OUT", 1.5, _INDEXING),
     Entry(
-        "indexing-clips", "The same with recorded sounds", "avlmaps bench indexing --sounds SOUNDS --out OUT", 3.5,
+        "indexing-clips", "The same with recorded sounds", "avlmaps bench indexing --sounds SOUNDS --out OUT", 2.5,
         "The sounds above come from the generator that also made training sounds of the embedded encoder. These are "
         "recordings that it was not trained on.",
     ),
     Entry(
-        "indexing-paper", "The same by the paper's rules", "avlmaps bench indexing --rules paper --out OUT", 2.0,
+        "indexing-paper", "The same by the paper's rules", "avlmaps bench indexing --rules paper --out OUT", 1.5,
         "The paper's pipeline whole, with our encoders ([the rules](paper-models.md#the-papers-rules)).",
     ),
     Entry("navigation", "The paper's Tables I, II and VI", "avlmaps bench navigation --out OUT", 5.0, _NAVIGATION),
     Entry(
         "navigation-clips", "The same with recorded sounds",
-        "avlmaps bench navigation --sounds SOUNDS --series sounds-1 sounds-2 sounds-3 pairs --out OUT", 5.0,
+        "avlmaps bench navigation --sounds SOUNDS --series sounds-1 sounds-2 sounds-3 pairs --out OUT", 4.0,
     ),
 )  # fmt: skip
 
