@@ -139,14 +139,14 @@ def plausible_walk(
     notices: list[str] = []
     if len(strays):
         away_m = np.linalg.norm(positions_m[strays] - np.median(positions_m[kept], axis=0), axis=1)
-        shown = ", ".join(names[i] for i in strays[:_SHOWN].tolist()) + (" ..." if len(strays) > _SHOWN else "")
+        first: list[int] = strays[:_SHOWN].tolist()
+        shown = ", ".join(names[i] for i in first) + (" ..." if len(strays) > _SHOWN else "")
         notices.append(
             f"{len(strays)} frame(s) are up to {away_m.max():,.0f} m from the others, too far to be reached in time; "
             f"left out: {shown}."
         )
-    return Plausible(
-        kept, (*notices, *shifts), fault or _extent_fault(positions_m[kept], [names[i] for i in kept.tolist()])
-    )
+    rows: list[int] = kept.tolist()
+    return Plausible(kept, (*notices, *shifts), fault or _extent_fault(positions_m[kept], [names[i] for i in rows]))
 
 
 def _edges(stamps_s: Float[np.ndarray, " n"], positions_m: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " e"]:
