@@ -171,7 +171,8 @@ def page(measured: Mapping[str, Any], shipped: Mapping[str, str]) -> str:
 def _section(entry: Entry, found: Mapping[str, Any] | None, shipped: Mapping[str, str]) -> str:
     lines = [f"## {entry.title}", "", *([entry.about, ""] if entry.about else []), f"    {entry.command}", ""]
     if found is None:
-        hours = f" It takes about {entry.hours:g} hours on two quiet cores." if entry.hours else ""
+        unit = "hour" if entry.hours <= 1 else "hours"
+        hours = f" It takes about {entry.hours:g} {unit} on two quiet cores." if entry.hours else ""
         return "\n".join([*lines, f"Not measured yet.{hours}", ""])
     measured_on = f"Measured on {found['date']} with avlmaps {found['avlmaps']} on {found['machine']}."
     if not entry.is_suite:
