@@ -23,7 +23,7 @@ class Entry:
     Attributes:
         name: in docs/benchmarks.json, and of ``--only``.
         title: of the section.
-        command: words; SOUNDS, RECORDING and HOUSE stand for folders of data, OUT for the folder of all results.
+        command: words; SOUNDS, RECORDING, NYUV2 and HOUSE stand for folders of data, OUT for the folder of all results.
         hours: on two quiet cores without a GPU, estimated; 0 for minutes.
         about: a sentence below the title.
     """
@@ -51,6 +51,8 @@ ENTRIES = (
     Entry("render", "Rendering views", "python benchmarks/render.py"),
     Entry("encoders", "The embedded encoders", "python benchmarks/embedded.py"),
     Entry("words", "Words", "avlmaps bench words --out OUT"),
+    Entry("language", "Commands and questions", "avlmaps bench language --out OUT"),
+    Entry("frames", "Labelled frames of real rooms", "avlmaps bench frames --nyuv2 NYUV2 --out OUT", 0.2),
     Entry(
         "sounds", "Sounds", "avlmaps bench sounds --sounds SOUNDS --out OUT", 0.0,
         "Tables called cross-validation were written with the weights, by networks that had not heard the fold.",
@@ -154,6 +156,7 @@ checksums of the weights; where those are not the weights that ship, it says so.
     python benchmarks/report.py --page                                   # this page again, measures nothing
 
 SOUNDS is a folder of clips with an `index.csv`, RECORDING a recording with poses (the red kitchen of 7-Scenes here),
+NYUV2 labelled frames in the layout of NYU Depth V2,
 HOUSE a scene file (the house of aws-robomaker-small-house-world here). A run that was stopped goes on where it ended.
 """
 

@@ -77,6 +77,7 @@ def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--sounds", type=Path, default=SHARED / "data" / "sounds", help="folder of clips, index.csv")
     parser.add_argument("--recording", type=Path, default=SHARED / "data" / "redkitchen", help="recording with poses")
+    parser.add_argument("--nyuv2", type=Path, default=SHARED / "data" / "nyuv2", help="folder of labelled frames")
     parser.add_argument("--house", type=Path, default=SHARED / "scenes" / "small_house.glb", help="scene file")
     parser.add_argument("--out", type=Path, default=Path("bench_out"), help="folder of the suites' work")
     parser.add_argument("--only", nargs="+", choices=[entry.name for entry in ENTRIES], help="only these entries")
@@ -93,7 +94,8 @@ def main() -> None:
     if asked.check:
         differing = [path.name for path, text in rendered(found).items() if path.read_text(encoding="utf-8") != text]
         sys.exit(f"{', '.join(differing)}: run python benchmarks/report.py --page" if differing else 0)
-    data = {"SOUNDS": asked.sounds, "RECORDING": asked.recording, "HOUSE": asked.house, "OUT": asked.out}
+    data = {"SOUNDS": asked.sounds, "RECORDING": asked.recording, "HOUSE": asked.house, "NYUV2": asked.nyuv2}
+    data["OUT"] = asked.out
     for entry in () if asked.page else ENTRIES:
         if asked.only and entry.name not in asked.only:
             continue

@@ -78,7 +78,7 @@ def test_what_cannot_be_obeyed_is_told_with_status_1_and_json_all_the_same(run, 
     [
         (("nowhere.avlmap", "go to the chair", "--scene", "house:7"), 1, "nowhere.avlmap is not there"),
         (("MAP", "go to the chair", "--scene", "house:seven"), 1, "names no seed"),
-        (("MAP", "gabble gabble the", "--scene", "house:7"), 1, "is not understood"),
+        (("MAP", "gabble gabble the", "--scene", "house:7"), 1, "I do not know 'gabble gabble'"),
         (("MAP", "", "--scene", "house:7"), 1, "empty"),
         (("MAP", "go to the chair"), 2, "go needs --scene"),
         (("MAP", "go to the chair", "--scene", "house:7", "--start", "here"), 2, "--start takes x,y,heading"),

@@ -46,7 +46,7 @@ def unknown(words, kind: Kind) -> list[str]:
 
 
 def test_the_pixel_networks_names_and_their_other_phrases_are_entries() -> None:
-    notes = weights("rooms.json")
+    notes = weights("scene_encoder.json")
     for kind, names in ((Kind.THING, notes["categories"]), (Kind.ROOM, notes["rooms"])):
         for name in names:
             if name == "other":
@@ -61,7 +61,7 @@ def test_the_pixel_networks_names_and_their_other_phrases_are_entries() -> None:
 
 
 def test_the_wider_words_of_the_notes_take_in_at_least_what_the_network_was_shipped_with() -> None:
-    for word, names in weights("rooms.json")["kinds"].items():
+    for word, names in weights("scene_encoder.json")["kinds"].items():
         assert set(names) <= {entry.name for entry in KNOWN.members(word)}, word
 
 
@@ -69,7 +69,7 @@ def test_the_training_tables_are_those_of_the_shipped_notes(monkeypatch: pytest.
     monkeypatch.syspath_prepend(str(Path(__file__).parents[2]))
     labels, words = (importlib.import_module(f"training.pixels.{name}") for name in ("labels", "lexicon"))
     sounds = importlib.import_module("training.sounds.kinds")
-    notes = weights("rooms.json")
+    notes = weights("scene_encoder.json")
     assert list(labels.CATEGORIES) == notes["categories"]
     assert list(labels.ROOMS) == notes["rooms"]
     assert {name: list(called) for name, called in words.CALLED.items()} == notes["called"]

@@ -19,7 +19,9 @@ def letters(texts: list[str]) -> np.ndarray:
 
 
 def test_the_things_are_those_that_the_embedded_encoder_knows() -> None:
-    notes = json.loads((files("avlmaps.perception.embedded") / "weights" / "rooms.json").read_text(encoding="utf-8"))
+    notes = json.loads(
+        (files("avlmaps.perception.embedded") / "weights" / "scene_encoder.json").read_text(encoding="utf-8")
+    )
     assert set(THINGS) == set(notes["categories"]) - {"other"}
 
 

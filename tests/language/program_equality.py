@@ -13,7 +13,17 @@ from typing import Any
 
 from avlmaps.language.vocabulary import Vocabulary
 
-_PURE = {"load_image", "load_sound", "get_major_map", "get_map", "get_pos", "get_max_pos_3d", "get_contour"}
+_PURE = {
+    "load_image",
+    "load_sound",
+    "get_major_map",
+    "get_map",
+    "get_pos",
+    "get_max_pos_3d",
+    "get_contour",
+    "get_nearest_pos",
+    "get_all_pos",
+}
 _WHERE_IT_STANDS = "current_pos"
 _MOST_TURNS_OF_A_LOOP = 50
 

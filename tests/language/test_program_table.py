@@ -94,5 +94,5 @@ def test_the_page_names_every_function() -> None:
 
 def test_which_skills_move_the_robot_is_told_from_what_they_return() -> None:
     moving = {name for name, skill in SKILLS.items() if skill.moves}
-    words = ("move", "face", "turn", "with_object")
+    words = ("move", "face", "turn", "with_object", "wait")
     assert moving == {name for name in SKILLS if name.startswith(words)}

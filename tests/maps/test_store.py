@@ -446,6 +446,8 @@ def test_every_flipped_bit_in_a_large_file_is_seen(copied: Path, monkeypatch: py
     for entry in json.loads((copied / "map.json").read_text())["files"].values():
         file = copied / entry["path"]
         whole = file.read_bytes()
+        if len(whole) <= 128:  # a header alone: an empty array has no bit to flip
+            continue
         broken = bytearray(whole)
         broken[rng.integers(128, len(whole))] ^= 1 << int(rng.integers(8))
         file.write_bytes(broken)

@@ -55,7 +55,8 @@ def test_a_sentence_is_obeyed_and_told_as_it_goes() -> None:
     (subgoal,) = outcome.subgoals
     assert subgoal.goal[:2] == pytest.approx((5.1, 3.1), abs=0.15)
     assert subgoal.name == "'chair' near 'dog'"
-    assert lines[0].startswith("> ")
+    assert lines[0] == "I will go to the chair nearest to where dog was heard, then turn left 90 degrees."
+    assert lines[1].startswith("> ")
     assert any("'chair' near 'dog': at (5.1" in line for line in lines)
     assert "turn(angle_deg=-90)" in lines[-1]
 
@@ -63,7 +64,18 @@ def test_a_sentence_is_obeyed_and_told_as_it_goes() -> None:
 def test_the_outcome_is_the_contract_of_the_command_line() -> None:
     outcome, _ = told("go to the table, then face the chair")
     answer = json.loads(json.dumps(outcome.to_json(), allow_nan=False))
-    assert {"program", "steps", "actions", "subgoals", "ok", "error", "notes", "path_m", "elapsed_s"} == set(answer)
+    assert {
+        "program",
+        "steps",
+        "actions",
+        "subgoals",
+        "ok",
+        "error",
+        "error_type",
+        "notes",
+        "path_m",
+        "elapsed_s",
+    } == set(answer)
     assert {"skill", "arguments", "result"} <= set(answer["steps"][0])
     assert {"goal", "stop", "distance_m"} <= set(answer["subgoals"][0])
     assert answer["steps"][-1]["result"]["heading_rad"] == pytest.approx(outcome.moves[-1].heading_rad, abs=1e-3)

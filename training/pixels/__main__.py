@@ -1,16 +1,22 @@
-"""The whole making: ``python -m training.pixels`` renders, trains, calibrates and writes the weights that ship.
+"""The whole making: ``python -m training.pixels`` renders, trains, calibrates and writes weights that ship.
 
-Rendering goes on beside the training, so that it never runs out of new homes. Two CPU cores take a night for
-``--minutes 600``; the shipped weights say in README.md how long theirs took.
+With ``--nyuv2`` the weights learn from real frames as well and are those of the profile ``embedded``; without, from
+rendered worlds alone, and are those of ``synthetic``. Rendering goes on beside the training, so that it never runs out
+of new homes.
 """
 
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import tyro
-from training.pixels import fit, worlds
+from training.pixels import fit, real, worlds
+
+from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS
+
+_WEIGHTS = Path("src/avlmaps/perception/embedded/weights")
 
 
 @dataclass(frozen=True)
@@ -18,19 +24,84 @@ class Options:
     """How to make the encoders."""
 
     work: Path = Path("build/pixels")
-    """Folder for rendered frames and checkpoints."""
-    out: Path = Path("src/avlmaps/perception/embedded/weights")
+    """Folder for rendered frames and checkpoints; with much memory one in /dev/shm is quicker."""
+    out: Path = _WEIGHTS
     """Folder of the weights that ship."""
+    nyuv2: Path | None = None
+    """Real frames: a folder in the layout of NYU Depth V2, or the file that ``training.pixels.real --pack`` wrote."""
+    stage: Literal["all", "render", "fit", "finish"] = "all"
+    """Render the first shards, train, calibrate and write; or one of these."""
     minutes: float = 600.0
-    """How long to train."""
-    start: Path | None = None
-    """Weights to begin with; training/pixels/start.npz are those that ship."""
+    """How long to train in all."""
+    sitting: float = 1e9
+    """How long to train now."""
+    resume: bool = False
+    """Go on from the checkpoint in the folder ``work``."""
+    start: Path | None = Path("training/pixels/start.npz")
+    """Weights to begin with; those that ship unless told otherwise."""
+    batch: int = 16
+    """Pictures in a step; a GPU takes 128."""
+    threads: int = 2
+    """CPU threads of the network."""
     renderers: int = 1
     """Processes that render beside the training."""
+    readers: int = 1
+    """What draws batches: one thread, or so many processes."""
+    shards: int = 12
+    """Shards of about 500 frames (240 MB) that are stored; the oldest is replaced."""
+    first_seed: int = 10_000
+    """Seed of the first home; another one for each sitting shows new homes."""
+
+    @property
+    def network(self) -> Path:
+        """The checkpoint."""
+        return self.work / ("network.pt" if self.nyuv2 else "network-synthetic.pt")
 
 
-def main(options: Options) -> None:
-    """Run all of it."""
+def _run(jobs: list[list[str]]) -> list[subprocess.Popen[bytes]]:
+    return [subprocess.Popen([sys.executable, "-m", *job]) for job in jobs]
+
+
+def render(options: Options) -> None:
+    """Render the held-out frames, if they are not there, and training frames by all renderers."""
+    held_out = ["--out", str(options.work / "held-out"), "--shards", "4", "--which", "held-out", "--once"]
+    jobs = [["training.pixels.worlds", *held_out, "--first-seed", str(worlds.FIRST_CALIBRATION_SEED)]]
+    if len(list((options.work / "held-out").glob("[0-9]*"))) >= 4:
+        jobs = []
+    each = max(1, options.shards // options.renderers)
+    jobs += [[*_renderer(options, number), "--shards", str(each), "--once"] for number in range(options.renderers)]
+    for job in _run(jobs):
+        job.wait()
+
+
+def _renderer(options: Options, number: int) -> list[str]:
+    seeds = ["--first-seed", str(options.first_seed + number), "--step", str(options.renderers)]
+    return ["training.pixels.worlds", "--out", str(options.work / "training"), *seeds]
+
+
+def train(options: Options) -> None:
+    """Train, with rendering beside it."""
+    if options.nyuv2:
+        real.main(real.Options(nyuv2=options.nyuv2, out=options.work / "real"))
+    each = str(max(1, options.shards // options.renderers))
+    ahead = replace(options, first_seed=options.first_seed + 100_000)
+    beside = _run([[*_renderer(ahead, number), "--shards", each] for number in range(options.renderers)])
+    try:
+        fit.fit(
+            fit.Options(
+                shards=options.work / "training", real=options.work / "real" if options.nyuv2 else None,
+                held_out=options.work / "held-out", out=options.network, minutes=options.minutes,
+                sitting=options.sitting, resume=options.resume, start=options.start, batch=options.batch,
+                threads=options.threads, readers=options.readers,
+            )
+        )  # fmt: skip
+    finally:
+        for process in beside:
+            process.terminate()
+
+
+def finish(options: Options) -> None:
+    """Fit the room head on whole pictures, calibrate, and write the files that ship."""
     from training.pixels.calibrate import Options as CalibrateOptions
     from training.pixels.calibrate import calibrate
     from training.pixels.instances import Options as InstanceOptions
@@ -38,25 +109,26 @@ def main(options: Options) -> None:
     from training.pixels.rooms import Options as RoomOptions
     from training.pixels.rooms import fit_rooms
 
-    held_out = worlds.Options(
-        out=options.work / "held-out", shards=4, first_seed=worlds.FIRST_CALIBRATION_SEED, which="held-out", once=True
-    )
-    first = worlds.Options(out=options.work / "training", shards=12, once=True)
-    for job in (held_out, first):
-        if len(list(job.out.glob("[0-9]*"))) < job.shards:
-            worlds.run(job)
-    module = [sys.executable, "-m", "training.pixels.worlds", "--out", str(first.out), "--step", str(options.renderers)]
-    beside = [subprocess.Popen([*module, "--first-seed", str(10_000 + number)]) for number in range(options.renderers)]
-    try:
-        fit.fit(
-            fit.Options(shards=first.out, out=options.work / "network.pt", minutes=options.minutes, start=options.start)
+    fit_rooms(RoomOptions(network=options.network, frames=options.work / "training"))
+    real_frames = options.work / "real" / "development" if options.nyuv2 else None
+    name = DEFAULT_WEIGHTS if options.nyuv2 else SYNTHETIC_WEIGHTS
+    start = Path("training/pixels/start.npz") if options.nyuv2 else None
+    calibrate(
+        CalibrateOptions(
+            network=options.network, frames=options.work / "held-out", real=real_frames, out=options.out, name=name,
+            start=start,
         )
-    finally:
-        for process in beside:
-            process.terminate()
-    fit_rooms(RoomOptions(network=options.work / "network.pt", frames=first.out))
-    calibrate(CalibrateOptions(network=options.work / "network.pt", frames=held_out.out, out=options.out))
-    calibrate_instances(InstanceOptions(work=options.work / "homes", out=options.out))
+    )  # fmt: skip
+    profile = "embedded" if options.nyuv2 else "synthetic"
+    calibrate_instances(InstanceOptions(work=options.work / "homes", out=options.out, profile=profile))
+
+
+def main(options: Options) -> None:
+    """Run all of it, or one stage."""
+    stages = {"render": render, "fit": train, "finish": finish}
+    for name, run in stages.items():
+        if options.stage in ("all", name):
+            run(options)
 
 
 if __name__ == "__main__":

@@ -1,27 +1,27 @@
-"""Batches for training: random windows of rendered frames, mirrored, stretched, tilted and spoiled a little more."""
+"""Batches for training: views of rendered and real frames, turned, zoomed, mirrored and degraded as by sensors."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
-from training.pixels.labels import CATEGORIES, UNLABELLED
+from training.pixels.faults import degraded, mistaken
+from training.pixels.labels import CATEGORIES, FIRST_COARSE, UNLABELLED
+from training.pixels.network import MULTIPLE
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.perception.embedded.geometry import channels
 
-# A window's size. Twice as many pixels each way cost four times as much, and the network is short of training, not of
-# detail (README.md): it is better shown four windows than one of twice the detail.
-WIDTH, HEIGHT = 80, 64
-# It is cut from a rendered picture of 320x240 with so many of its pixels across, or more.
-FIELD_PX = 160
 # A frame shows a category with at least so many of its 320x240 pixels.
 FEWEST_PIXELS = 160
 # How evenly categories are drawn: 0 each as often as any other, 1 as often as frames show it.
 EVENNESS = 0.45
-# Share of windows that are drawn from anywhere.
-ANY_FRAME = 0.1
+# Share of frames that are drawn without regard to what they show.
+ANY_FRAME = 0.3
 # Share of colour pictures whose channels are shuffled: leaves are mostly green and basins white, but not always.
-STRANGE_COLOURS = 0.15
+STRANGE_COLOURS = 0.1
+_PLAIN = ("wall", "floor", "ceiling")
+_STRUCTURE = {FIRST_COARSE + number for number in (0, 1, 21, 37, 38, 39)}  # of the coarse classes
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,15 @@ class Frames:
         names = ("depth", "label", "rgb", "rgb_row", "room", "camera")
         return cls(**{name: np.load(folder / f"{name}.npy", mmap_mode="r") for name in names})
 
+    @property
+    def is_real(self) -> bool:
+        """Say whether the frames are real ones; their cameras have one number more."""
+        return self.camera.shape[1] > 8
+
+    def height_is_known(self, index: int) -> bool:
+        """Say whether a camera's height is true; of some real frames it is an estimate."""
+        return not self.is_real or bool(self.camera[index, 8])
+
 
 @dataclass
 class Batch:
@@ -49,9 +58,10 @@ class Batch:
     Attributes:
         geometry: (n, 8, h, w).
         colour: (n, 3, h, w) in about −1 to 1, all zero where colour is withheld.
-        label: (n, h/2, w/2).
+        label: (n, h/2, w/2) fine and coarse.
         weight: (n, h/2, w/2) of each pixel in the loss.
         room: (n, rooms) share of the view in each kind.
+        floor: (n,) height of the true floor over the one that the geometry was made with; NaN where it is unknown.
     """
 
     geometry: np.ndarray
@@ -59,6 +69,7 @@ class Batch:
     label: np.ndarray
     weight: np.ndarray
     room: np.ndarray
+    floor: np.ndarray
 
 
 class Shards:
@@ -92,6 +103,10 @@ class Shards:
         self._open, self._showing = found, showing
         return sum(len(frames.depth) for _, frames in found.values())
 
+    def every(self) -> list[tuple[Frames, int]]:
+        """Return every frame."""
+        return [(frames, index) for _, frames in self._open.values() for index in range(len(frames.depth))]
+
     def draw(self, rng: np.random.Generator) -> tuple[Frames, int]:
         """Return a shard and the number of a frame in it."""
         _, frames = list(self._open.values())[int(rng.integers(len(self._open)))]
@@ -115,73 +130,101 @@ def _shown(frames: Frames) -> dict[int, list[int]]:
     """Return for each category but walls, floors and ceilings the frames of a shard that show enough of it."""
     showing: dict[int, list[int]] = {}
     for index, label in enumerate(frames.label):
-        count = np.bincount(label[::2, ::2].reshape(-1), minlength=256)
-        for category in np.flatnonzero(count[: len(CATEGORIES)] >= FEWEST_PIXELS // 4):
-            if CATEGORIES[category] not in ("wall", "floor", "ceiling"):
+        count = np.bincount(label[::2, ::2].reshape(-1), minlength=256)[:UNLABELLED]
+        for category in np.flatnonzero(count >= FEWEST_PIXELS // 4):
+            plain = category < len(CATEGORIES) and CATEGORIES[category] in _PLAIN
+            if not plain and category not in _STRUCTURE:
                 showing.setdefault(int(category), []).append(index)
     return showing
 
 
-def draw_batch(shards: Shards, size: int, rng: np.random.Generator, colour_kept: float) -> Batch:
-    """Draw a batch; ``colour_kept`` is the share of pictures with colour that keep it."""
-    items = [_sample(*shards.draw_category(rng), rng, colour_kept) for _ in range(size)]
-    return Batch(*(np.stack([item[i] for item in items]) for i in range(5)))
+@dataclass(frozen=True)
+class View:
+    """How large the pictures of a batch are, and how they are drawn.
+
+    Attributes:
+        width: columns; a multiple of ``MULTIPLE`` after padding, as the rows.
+        height: rows.
+        colour_kept: share of pictures with colour that keep it.
+    """
+
+    width: int = 160
+    height: int = 120
+    colour_kept: float = 0.85
 
 
-def _sample(
-    frames: Frames, index: int, category: int, rng: np.random.Generator, colour_kept: float
-) -> tuple[np.ndarray, ...]:
+def draw_batch(sources: list[tuple[Shards, int]], view: View, rng: np.random.Generator) -> Batch:
+    """Draw a batch with so many frames of each source."""
+    items = [_sample(*shards.draw_category(rng), view, rng) for shards, size in sources for _ in range(size)]
+    return Batch(*(np.stack([item[i] for item in items]) for i in range(6)))
+
+
+def _placement(frames: Frames, index: int, category: int, view: View, rng: np.random.Generator) -> tuple:
+    """Return a zoom, a turn and where the middle of the new picture lies in the frame."""
     h, w = frames.depth.shape[1:]
-    wide = rng.uniform(FIELD_PX, w * 0.9999) if rng.random() < 0.8 else FIELD_PX * rng.uniform(0.75, 1.0)
-    wide = min(wide, h * WIDTH / HEIGHT)
-    tall = wide * HEIGHT / WIDTH
-    left, top = rng.uniform(0, w - wide), rng.uniform(0, h - tall)
-    if category >= 0:  # a window with some of it inside
+    # At a zoom of 1 a picture of 160 columns shows all 320 of the frame.
+    zoom = float(np.exp(rng.uniform(np.log(0.9), np.log(1.7)))) if rng.random() < 0.75 else 1.0
+    turn = float(rng.normal(0.0, np.deg2rad(4.0))) if rng.random() < 0.5 else 0.0
+    wide, tall = 2.0 * view.width / zoom, 2.0 * view.height / zoom
+    x, y = (rng.uniform(min(size, all_) / 2, all_ - min(size, all_) / 2) for size, all_ in ((wide, w), (tall, h)))
+    if category >= 0 and (wide < w or tall < h):  # some of it inside
         rows, columns = np.nonzero(frames.label[index][::4, ::4] == category)
         if len(rows):
             at = int(rng.integers(len(rows)))
-            left = np.clip(4 * columns[at] - wide * rng.uniform(0.2, 0.8), 0, w - wide)
-            top = np.clip(4 * rows[at] - tall * rng.uniform(0.2, 0.8), 0, h - tall)
-    column = np.clip((left + (np.arange(WIDTH) + 0.5) * wide / WIDTH).astype(int), 0, w - 1)
-    row = np.clip((top + (np.arange(HEIGHT) + 0.5) * tall / HEIGHT).astype(int), 0, h - 1)
-    depth = frames.depth[index][row[:, None], column].astype(np.float32) / 1000.0
-    label = np.array(frames.label[index][row[:, None], column])
-    fx, fy, cx, cy, *up, height = frames.camera[index]
-    scale = WIDTH / wide
-    fx, fy, cx, cy = fx * scale, fy * scale, (cx - left) * scale, (cy - top) * scale
-    up = np.array(up)
-    colour = np.zeros((3, HEIGHT, WIDTH), np.float32)
+            x = np.clip(4 * columns[at] + wide * rng.uniform(-0.3, 0.3), min(wide, w) / 2, w - min(wide, w) / 2)
+            y = np.clip(4 * rows[at] + tall * rng.uniform(-0.3, 0.3), min(tall, h) / 2, h - min(tall, h) / 2)
+    return zoom / 2.0, turn, float(x), float(y)
+
+
+def _sample(frames: Frames, index: int, category: int, view: View, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+    scale, turn, x, y = _placement(frames, index, category, view, rng)
+    fx, fy, cx, cy, *up, height = frames.camera[index][:8]
+    mirrored = rng.random() < 0.5
+    cos, sin = np.cos(turn), np.sin(turn)
+    linear = np.array([[cos, -sin], [sin, cos]]) * scale
+    move = np.array([view.width, view.height]) / 2 - linear @ (x, y)
+    cx, cy = linear @ (cx, cy) + move
+    # cv2 counts from the middle of the first pixel.
+    matrix = np.column_stack([linear, move + linear @ (0.5, 0.5) - 0.5])
+    size = (view.width, view.height)
+
+    def warped(picture: np.ndarray, how: int, outside: int) -> np.ndarray:
+        return cv2.warpAffine(np.ascontiguousarray(picture), matrix, size, flags=how, borderValue=(outside,) * 3)
+
+    depth = warped(frames.depth[index], cv2.INTER_NEAREST, 0).astype(np.float32) / 1000.0
+    label = warped(frames.label[index], cv2.INTER_NEAREST, UNLABELLED)
+    up = np.array([cos * up[0] - sin * up[1], sin * up[0] + cos * up[1], up[2]])
+    colour = np.zeros((3, view.height, view.width), np.float32)
     rgb_row = int(frames.rgb_row[index])
-    if rgb_row >= 0 and rng.random() < colour_kept:
-        colour = _other_light(frames.rgb[rgb_row][row[:, None], column], rng)
-    if rng.random() < 0.5:
+    if rgb_row >= 0 and rng.random() < view.colour_kept:
+        colour = _other_light(warped(cv2.blur(frames.rgb[rgb_row], (2, 2)), cv2.INTER_LINEAR, 127), rng)
+    if mirrored:
         depth, label, colour = depth[:, ::-1], label[:, ::-1], colour[:, :, ::-1]
-        up, cx = up * (-1, 1, 1), WIDTH - cx
-    # Things come larger and smaller than the recipes make them; odometry and gravity are never quite right.
-    stretch = np.exp(rng.normal(0.0, 0.07))
-    up = up + rng.normal(0.0, 0.012, 3)
-    off = rng.normal(0.0, 0.03) if rng.random() < 0.95 else rng.normal(0.0, 0.25)
-    depth = np.ascontiguousarray(depth * stretch)
-    if rng.random() < 0.3:
-        depth = _with_holes(depth, rng)
-    camera = Pinhole(fx, fy, cx, cy, WIDTH, HEIGHT)
-    geometry = channels(depth, camera, up / np.linalg.norm(up), height * stretch + off)
+        up, cx = up * (-1, 1, 1), view.width - cx
+    known = frames.height_is_known(index)
+    depth = degraded(
+        np.ascontiguousarray(depth), real=label.max() >= FIRST_COARSE and frames.camera.shape[1] > 8, rng=rng
+    )
+    stretch = np.exp(rng.normal(0.0, 0.07))  # things come larger and smaller than the recipes make them
+    depth, height = depth * np.float32(stretch), height * stretch
+    believed_up, off = mistaken(up, known, rng)
+    camera = Pinhole(fx * scale, fy * scale, cx, cy, view.width, view.height)
+    geometry = channels(depth, camera, believed_up, height + off)
     i, j = rng.integers(2, size=2)  # a cell of the output stands for four pixels
     label, z = np.array(label[i::2, j::2]), depth[i::2, j::2]
     label[z == 0.0] = UNLABELLED
     weight = np.minimum(1.0, 3.0 / np.maximum(z, 0.5)).astype(np.float32)
-    return geometry, np.ascontiguousarray(colour), label.astype(np.int64), weight, np.array(frames.room[index])
-
-
-def _with_holes(depth: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    depth = depth.copy()
-    if rng.random() < 0.5:  # a sensor that sees less far
-        depth[depth > rng.uniform(2.5, 6.0)] = 0.0
-    for _ in range(rng.integers(1, 5)):
-        h, w = rng.integers(WIDTH // 40, WIDTH // 4, 2)
-        r, c = rng.integers(0, HEIGHT - 2), rng.integers(0, WIDTH - 2)
-        depth[r : r + h, c : c + w] = 0.0
-    return depth
+    floor = np.float32(off if known else np.nan)
+    pad = [(0, -size % MULTIPLE) for size in (view.height, view.width)]
+    half = [(0, p[1] // 2) for p in pad]
+    return (
+        np.pad(geometry, [(0, 0), *pad]),
+        np.pad(np.ascontiguousarray(colour), [(0, 0), *pad]),
+        np.pad(label, half, constant_values=UNLABELLED).astype(np.int64),
+        np.pad(weight, half),
+        np.array(frames.room[index]),
+        floor,
+    )
 
 
 def _other_light(rgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -190,7 +233,11 @@ def _other_light(rgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     if rng.random() < STRANGE_COLOURS:
         x = x[..., rng.permutation(3)]
     grey = x.mean(axis=2, keepdims=True)
-    x = grey + (x - grey) * rng.uniform(0.0, 1.4)
-    x = np.clip(x, 0.0, None) ** np.exp(rng.normal(0, 0.25)) * rng.uniform(0.6, 1.4) * np.exp(rng.normal(0, 0.08, 3))
-    x = x + rng.normal(0, rng.uniform(0.0, 0.06), x.shape)
+    x = grey + (x - grey) * np.float32(rng.uniform(0.0, 1.5))
+    gain = (rng.uniform(0.6, 1.4) * np.exp(rng.normal(0, 0.08, 3))).astype(np.float32)
+    x = np.clip(x, 0.0, None) ** np.float32(np.exp(rng.normal(0, 0.25))) * gain
+    if rng.random() < 0.3:
+        x = cv2.GaussianBlur(x, (0, 0), rng.uniform(0.4, 1.2))
+    if rng.random() < 0.5:
+        x = x + rng.standard_normal(x.shape, np.float32) * np.float32(rng.uniform(0.0, 0.06))
     return np.clip(x, 0.0, 1.2).astype(np.float32).transpose(2, 0, 1) * 2.0 - 1.0

@@ -1,4 +1,4 @@
-"""Calibration of the scores on homes and families of shapes that were held out, and the files that ship."""
+"""Calibration of the scores on what was held out, and the files that ship: ``python -m training.pixels.calibrate``."""
 
 import sys
 from dataclasses import dataclass
@@ -11,16 +11,25 @@ import tyro
 from torch import Tensor, nn
 from training.pixels.batches import Shards
 from training.pixels.export import load_network, write_onnx, write_start
-from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED
+from training.pixels.labels import CATEGORIES, FIRST_COARSE, ROOMS, UNLABELLED
 from training.pixels.lexicon import CALLED, KINDS
+from training.pixels.losses import groups
+from training.pixels.network import MULTIPLE
 from training.pixels.whole import WIDTH, whole_frame
 
-from avlmaps.perception.embedded.scene_network import Notes
+from avlmaps.bench.nyu import SCORED
+from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, Notes
 
 PIXELS_PER_FRAME = 400
 # Of the biases that make single pixels likeliest only so much is applied: they favour walls, which fill most of a
 # view, and a thing whose pixels all lean to the wall is never seen. Instances are calibrated afterwards.
 PRIOR_SHARE = 0.25
+NOTES = {
+    "real": "A small network for homes and offices, trained on rendered rooms and on training frames of NYU Depth "
+    "V2, which is published for research and states no licence: decide whether that suits you, or take "
+    "--profile synthetic.",
+    "synthetic": "A small network for homes and offices, trained on rendered rooms alone; it goes by shape.",
+}
 
 
 @dataclass(frozen=True)
@@ -31,16 +40,22 @@ class Options:
     """Checkpoint of the training."""
     frames: Path = Path("build/pixels/held-out")
     """Rendered frames of held-out homes."""
+    real: Path | None = None
+    """Real frames held out; with them the notes say what the weights saw."""
     out: Path = Path("src/avlmaps/perception/embedded/weights")
-    """Folder of rooms.onnx and rooms.json."""
-    start: Path = Path("training/pixels/start.npz")
-    """Where the weights are kept for a training that goes on from them."""
-    count: int = 600
-    """Frames to look at."""
+    """Folder of the files that ship."""
+    name: str = DEFAULT_WEIGHTS
+    """Their name without an ending."""
+    start: Path | None = Path("training/pixels/start.npz")
+    """Where the weights are stored for a training that goes on from them."""
+    count: int = 500
+    """Rendered frames to look at."""
     seed: int = 0
     """Draws them."""
-    weights: str = "last"
+    weights: str = "mean"
     """``mean``: of the training's last stretch, or the ``last`` ones."""
+    version: int = 2
+    """Of the model, in its name."""
 
 
 @dataclass(frozen=True)
@@ -54,17 +69,16 @@ class Scores:
 
 
 @torch.no_grad()
-def scores_of(network: nn.Module, options: Options) -> Scores:
-    """Look at held-out frames as the running system does: whole, and in colour where they have it."""
-    rng, shards = np.random.default_rng(options.seed), Shards(options.frames)
+def scores_of(network: nn.Module, chosen: list, seed: int) -> Scores:
+    """Look at frames as the running system does: whole, and in colour where they have it."""
+    rng = np.random.default_rng(seed)
     category, label, room, share = [], [], [], []
-    for _ in range(options.count):
-        frames, index = shards.draw(rng)
+    for frames, index in chosen:
         geometry, colour, depth, labels = whole_frame(frames, index, with_colour=True)
-        score, rooms = network(torch.from_numpy(geometry), torch.from_numpy(colour))
+        score, rooms, _ = network(torch.from_numpy(geometry), torch.from_numpy(colour))
         score = score[:, :, : depth.shape[0] // 2, : depth.shape[1] // 2]
         truth = np.where(depth > 0, labels, UNLABELLED)[::2, ::2]
-        near = (depth[::2, ::2] < 4.0) & (truth != UNLABELLED)
+        near = (depth[::2, ::2] < 4.0) & (truth != UNLABELLED) & (truth < FIRST_COARSE + SCORED)
         at = rng.permutation(np.flatnonzero(near))[:PIXELS_PER_FRAME]
         category.append(score[0].reshape(len(CATEGORIES), -1).T[at])
         label.append(torch.from_numpy(truth.reshape(-1)[at].astype(np.int64)))
@@ -73,10 +87,20 @@ def scores_of(network: nn.Module, options: Options) -> Scores:
     return Scores(torch.cat(category), torch.cat(label), torch.cat(room), torch.cat(share))
 
 
-def fit_scores(scores: Scores) -> tuple[np.ndarray, float]:
+def likelihood_loss(scores: Scores, bias: Tensor, temperature: Tensor) -> Tensor:
+    """Return the negative logarithm of the truth's likelihood: of a kind, or of the class that gathers kinds."""
+    log_p = ((scores.category + bias) / temperature).log_softmax(dim=1)
+    fine = scores.label < FIRST_COARSE
+    if bool(fine.all()):
+        return -log_p.gather(1, scores.label[:, None]).mean()
+    q = log_p.exp() @ groups().T
+    return -(q.gather(1, (scores.label - FIRST_COARSE)[:, None]) + 1e-7).log().mean()
+
+
+def fit_scores(parts: list[Scores]) -> tuple[np.ndarray, float]:
     """Return the bias of each category and the temperature that make the held-out truth likeliest.
 
-    Biases are held near zero, so that a category that hardly occurs keeps its own.
+    Every part counts alike. Biases are held near zero, so that a category that hardly occurs keeps its own.
     """
     bias = torch.zeros(len(CATEGORIES), requires_grad=True)
     log_t = torch.zeros(1, requires_grad=True)
@@ -84,7 +108,7 @@ def fit_scores(scores: Scores) -> tuple[np.ndarray, float]:
 
     def closure() -> Tensor:
         optimiser.zero_grad()
-        loss = nn.functional.cross_entropy((scores.category + bias) / log_t.exp(), scores.label)
+        loss = torch.stack([likelihood_loss(part, bias, log_t.exp()) for part in parts]).mean()
         loss = loss + 0.002 * bias.square().mean()
         loss.backward()
         return loss
@@ -105,11 +129,14 @@ def fit_rooms(scores: Scores) -> float:
 def figures(scores: Scores, bias: np.ndarray, temperature: float) -> dict[str, float]:
     """Return accuracy, mean IoU over the categories that occur, calibration error, and accuracy of rooms."""
     p = ((scores.category + torch.from_numpy(bias)) / temperature).softmax(dim=1)
+    truth_of = scores.label
+    if bool((truth_of >= FIRST_COARSE).any()):
+        p, truth_of = (p @ groups().T)[:, :SCORED], truth_of - FIRST_COARSE
     sure, guess = p.max(dim=1)
-    right = guess == scores.label
+    right = guess == truth_of
     iou = []
-    for c in range(len(CATEGORIES)):
-        truth, said = scores.label == c, guess == c
+    for c in range(p.shape[1]):
+        truth, said = truth_of == c, guess == c
         if int(truth.sum()) >= 200:
             iou.append(float((truth & said).sum() / (truth | said).sum()))
     bins = torch.clamp((sure * 15).long(), max=14)
@@ -118,41 +145,49 @@ def figures(scores: Scores, bias: np.ndarray, temperature: float) -> dict[str, f
         for b in range(15)
         if (bins == b).any()
     )
-    inside = scores.share.max(dim=1).values > 0.6
-    rooms = (scores.room.argmax(dim=1) == scores.share.argmax(dim=1))[inside].float().mean()
-    return {
+    told = {
         "pixels right": float(right.float().mean()), "mean IoU": float(np.mean(iou)), "categories": len(iou),
-        "calibration error": error, "rooms right": float(rooms), "rooms asked": int(inside.sum()),
+        "calibration error": error,
     }  # fmt: skip
+    inside = scores.share.max(dim=1).values > 0.6
+    if bool(inside.any()):
+        rooms = (scores.room.argmax(dim=1) == scores.share.argmax(dim=1))[inside].float().mean()
+        told |= {"rooms right": float(rooms), "rooms asked": int(inside.sum())}
+    return told
 
 
-def calibrate(options: Options) -> dict[str, float]:
-    """Write rooms.onnx and rooms.json, return the figures on the held-out frames."""
+def calibrate(options: Options) -> None:
+    """Write NAME.onnx and NAME.json, and print the figures on what was held out."""
     network = load_network(options.network, options.weights)
-    scores = scores_of(network, options)
-    bias, temperature = fit_scores(scores)
+    rng, shards = np.random.default_rng(options.seed), Shards(options.frames)
+    parts = [scores_of(network, [shards.draw(rng) for _ in range(options.count)], options.seed)]
+    if options.real is not None:
+        parts.append(scores_of(network, Shards(options.real).every(), options.seed))
+    bias, temperature = fit_scores(parts)
     bias = PRIOR_SHARE * bias
-    told = figures(scores, bias, temperature)
-    options.out.mkdir(parents=True, exist_ok=True)
-    write_onnx(network, options.out / "rooms.onnx")
-    write_start(network, options.start)
     known = set(CATEGORIES) | set(ROOMS)
     notes = Notes(
-        id="avlmaps/pixels-1",
-        note="A small network for homes and offices, trained on rendered rooms alone; it goes by shape.",
+        id=f"avlmaps/pixels-{options.version}",
+        note=NOTES["real" if options.real else "synthetic"],
         categories=CATEGORIES,
         rooms=ROOMS,
         bias=tuple(round(float(b), 4) for b in bias),
         temperature=round(temperature, 4),
-        room_temperature=round(fit_rooms(scores), 4),
+        room_temperature=round(fit_rooms(parts[0]), 4),
         called={name: phrases for name, phrases in CALLED.items() if name in known},
         kinds={word: names for word, names in KINDS.items() if set(names) <= known},
         width_px=WIDTH,
+        multiple=MULTIPLE,
     )
-    (options.out / "rooms.json").write_bytes(msgspec.json.format(msgspec.json.encode(notes), indent=1) + b"\n")
-    for name, value in told.items():
-        print(f"{name}: {value:.4g}", file=sys.stderr)
-    return told
+    options.out.mkdir(parents=True, exist_ok=True)
+    write_onnx(network, options.out / f"{options.name}.onnx")
+    if options.start is not None:
+        write_start(network, options.start)
+    path = options.out / f"{options.name}.json"
+    path.write_bytes(msgspec.json.format(msgspec.json.encode(notes), indent=1) + b"\n")
+    for name, part in zip(("rendered", "real"), parts, strict=False):
+        for figure, value in figures(part, bias, temperature).items():
+            print(f"{name}, {figure}: {value:.4g}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
     """Return the network, with the running ``mean`` of its weights or the ``last`` ones."""
     state = torch.load(checkpoint, map_location="cpu", weights_only=True)
     network = RoomNetwork(len(state["categories"]), len(state["rooms"]), tuple(state["widths"]))
-    network.load_state_dict(state[weights])
+    network.load_state_dict({name: value.float() for name, value in state[weights].items()})
     return network.eval()
 
 
@@ -31,11 +31,11 @@ def read_start(path: Path) -> dict[str, torch.Tensor]:
 
 
 def write_onnx(network: RoomNetwork, path: Path) -> None:
-    """Write the network; its pictures may have any size that is a multiple of 16."""
-    inputs = (torch.zeros(1, GEOMETRY, 64, 80), torch.zeros(1, COLOUR, 64, 80))
+    """Write the network; its pictures may have any size that is a multiple of 32."""
+    inputs = (torch.zeros(1, GEOMETRY, 64, 96), torch.zeros(1, COLOUR, 64, 96))
     size = {2: "height", 3: "width"}
     torch.onnx.export(
-        network, inputs, str(path), input_names=["geometry", "colour"], output_names=["category", "room"],
+        network, inputs, str(path), input_names=["geometry", "colour"], output_names=["category", "room", "floor"],
         dynamic_axes={"geometry": size, "colour": size, "category": {2: "rows", 3: "columns"}},
         opset_version=17, do_constant_folding=True, dynamo=False,
     )  # fmt: skip

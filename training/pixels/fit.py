@@ -2,25 +2,30 @@
 
 Runs on a GPU where there is one, else on the CPU, in bfloat16 where the processor multiplies that (where it does not,
 bfloat16 is three times slower than float32). The learning rate follows the clock, so that a run of any length ends
-well; a checkpoint is written every few minutes, and ``--resume`` goes on from it.
+well. A checkpoint of less than 20 MB is written every few minutes; ``--resume`` goes on from it and along the same
+schedule, so that one training may take several sittings (``--sitting 9`` stops after nine minutes).
 """
 
+import json
 import sys
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import asdict, dataclass, field
+from multiprocessing import get_context
 from pathlib import Path
-from time import perf_counter, time
+from time import perf_counter
 from typing import Literal
 
 import numpy as np
 import torch
 import tyro
 from torch import Tensor, nn
-from training.pixels.batches import Batch, Shards, draw_batch
-from training.pixels.export import read_start
-from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED
+from training.pixels.batches import Batch, Shards, View, draw_batch
+from training.pixels.export import load_network, read_start
+from training.pixels.labels import CATEGORIES, ROOMS
+from training.pixels.losses import Losses, coarse_weights, fine_weights
+from training.pixels.measure import real_figures, rendered_figures
 from training.pixels.muon import Muon
-from training.pixels.network import RoomNetwork, has_bfloat16
+from training.pixels.network import WIDTHS, RoomNetwork, begin_with
 
 
 @dataclass(frozen=True)
@@ -29,30 +34,46 @@ class Options:
 
     shards: Path = Path("build/pixels/training")
     """Folder with rendered frames; new shards are taken up as they come."""
+    real: Path | None = None
+    """Folder with real frames (``training.pixels.real``): ``training`` is learnt from, ``development`` measured on."""
+    held_out: Path = Path("build/pixels/held-out")
+    """Rendered frames to measure on, if they are there."""
     out: Path = Path("build/pixels/network.pt")
-    """Checkpoint."""
+    """Checkpoint; a learning curve is written beside it."""
     minutes: float = 80.0
-    """How long; 600 on two cores is a night."""
+    """How long in all; 600 on two cores is a night."""
+    sitting: float = 1e9
+    """Stop after so many minutes of this run; ``--resume`` takes up the schedule where it was left."""
     batch: int = 16
     """Pictures in a step."""
+    real_share: float = 0.5
+    """Share of them that are real, where there are real ones."""
     rate: float = 2e-3
     """Highest learning rate."""
     optimiser: Literal["muon", "adamw"] = "muon"
     """What turns gradients into steps."""
     threads: int = 2
     """CPU threads."""
-    colour_kept: float = 0.8
-    """Share of pictures in colour that keep it; shape has to do for the others."""
+    readers: int = 1
+    """What draws batches: one thread, or so many processes; a GPU takes a dozen."""
+    view: View = field(default_factory=View)
+    """Size of the pictures."""
     seed: int = 0
-    """Of windows and of the first weights."""
+    """Of pictures and of the first weights."""
     resume: bool = False
-    """Go on from the checkpoint."""
+    """Go on from the checkpoint, with its last weights."""
     start: Path | None = None
-    """Begin with the weights of this file instead of random ones; ``training/pixels/start.npz`` are those that ship."""
-    peer: Path | None = None
-    """Checkpoint of another process that trains beside this one; both meet in the middle every minute."""
-    widths: tuple[int, int, int, int] = (32, 64, 128, 192)
-    """Channels at 1/2, 1/4, 1/8 and 1/16 of the picture's size."""
+    """Begin with these weights: ``training/pixels/start.npz``, those that ship, or a checkpoint, its mean."""
+    widths: tuple[int, int, int, int, int] = WIDTHS
+    """Channels at 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's size."""
+    dropout: tuple[float, float] = (0.1, 0.1)
+    """Share of channels withheld at 1/16 and before the scores."""
+    decay: float = 0.05
+    """Weight decay."""
+    averaged: float = 300.0
+    """Steps that the running mean of the weights reaches back."""
+    measure_minutes: float = 10.0
+    """Time between two points of the curve."""
 
 
 class Average:
@@ -73,15 +94,6 @@ class Average:
                 mean.copy_(value)
 
 
-def class_weights(shards: Shards, rng: np.random.Generator) -> np.ndarray:
-    """Return a weight for each category: rare ones count more, by the root of how rare they are."""
-    count = np.zeros(256)
-    for _ in range(30):
-        count += np.bincount(draw_batch(shards, 16, rng, 0.0).label.reshape(-1), minlength=256)
-    share = count[: len(CATEGORIES)] / count[: len(CATEGORIES)].sum()
-    return np.clip(np.sqrt(0.01 / np.maximum(share, 1e-6)), 0.25, 2.5)
-
-
 def optimisers_of(network: nn.Module, options: Options) -> list[torch.optim.Optimizer]:
     """Return Muon for the convolutions inside the network, AdamW for its outputs, biases and norms (or for all)."""
     inside: list[Tensor] = []
@@ -91,117 +103,163 @@ def optimisers_of(network: nn.Module, options: Options) -> list[torch.optim.Opti
         ]
     chosen = {id(p) for p in inside}
     rest = [p for p in network.parameters() if id(p) not in chosen]
-    adam = torch.optim.AdamW(rest, lr=options.rate, weight_decay=0.02)
-    return [Muon(inside, lr=options.rate), adam] if inside else [adam]
+    adam = torch.optim.AdamW(rest, lr=options.rate, weight_decay=options.decay)
+    return [Muon(inside, lr=options.rate, weight_decay=options.decay), adam] if inside else [adam]
 
 
-def losses(network: nn.Module, batch: Batch, weight: Tensor, device: torch.device) -> tuple[Tensor, Tensor, float]:
-    """Return the loss of the pixels, that of the rooms, and the share of pixels that are right."""
-    geometry, colour, label, near, room = (
-        torch.from_numpy(a).to(device) for a in (batch.geometry, batch.colour, batch.label, batch.weight, batch.room)
-    )
-    geometry, colour = (x.to(memory_format=torch.channels_last) for x in (geometry, colour))
-    with torch.autocast(device.type, torch.bfloat16, enabled=has_bfloat16(device)):
-        score, rooms = network(geometry, colour)
-    score = score.float()
-    each = nn.functional.cross_entropy(score, label, ignore_index=UNLABELLED, reduction="none", label_smoothing=0.03)
-    known = label != UNLABELLED
-    share = near * weight[torch.where(known, label, 0)] * known
-    pixels = (each * share).sum() / share.sum().clamp_min(1.0)
-    inside = room.sum(dim=1, keepdim=True)
-    room = room / inside.clamp_min(1e-3)
-    views = -((room * rooms.float().log_softmax(dim=1)).sum(dim=1) * inside[:, 0].clamp_max(1.0)).mean()
-    right = float(((score.argmax(dim=1) == label) & known).sum() / known.sum().clamp_min(1))
-    return pixels, views, right
-
-
-def _begun(options: Options, device: torch.device) -> tuple[RoomNetwork, list[torch.optim.Optimizer]]:
-    """Return the network and its optimisers: new, with the weights that ship, or as the checkpoint left them."""
-    network = RoomNetwork(len(CATEGORIES), len(ROOMS), options.widths).to(device, memory_format=torch.channels_last)
-    if options.start is not None:
-        network.load_state_dict(read_start(options.start))
-    optimisers = optimisers_of(network, options)
+def _begun(options: Options, device: torch.device) -> RoomNetwork:
+    """Return the network: new, with the weights that ship, or as the checkpoint left it."""
+    network = RoomNetwork(len(CATEGORIES), len(ROOMS), options.widths, options.dropout)
+    state = None
     if options.resume:
-        kept = torch.load(options.out, map_location=device, weights_only=True)
-        network.load_state_dict(kept["last"])
-        for optimiser, state in zip(optimisers, kept["moments"], strict=True):
-            optimiser.load_state_dict(state)
-    return network, optimisers
+        state = load_network(options.out, "last").state_dict()
+    elif options.start is not None:
+        state = read_start(options.start) if options.start.suffix == ".npz" else _mean_of(options.start)
+    if state is not None:
+        new = begin_with(network, state)
+        print(f"{len(new)} arrays are new", file=sys.stderr)
+    return network.train().to(device, memory_format=torch.channels_last)
 
 
-def _rate_at(options: Options, done: float, step: int) -> float:
-    """Return the learning rate at a share of the time: a short rise, then half a cosine."""
-    return float(options.rate * min(1.0, (step + 1) / 100) * (0.5 + 0.5 * np.cos(np.pi * done)) + 1e-6)
+def _mean_of(checkpoint: Path) -> dict[str, Tensor]:
+    return load_network(checkpoint, "mean").state_dict()
+
+
+class Run:
+    """One training."""
+
+    def __init__(self, options: Options) -> None:
+        """Open the frames and make the network."""
+        torch.manual_seed(options.seed)
+        torch.set_num_threads(options.threads)
+        self.options, self.step = options, 0
+        self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        self.rng = np.random.default_rng(options.seed)
+        rendered = Shards(options.shards)
+        real = [Shards(options.real / "training")] if options.real else []
+        count = round(options.batch * options.real_share) if real else 0
+        self.sources = [(rendered, options.batch - count), *((one, count) for one in real)]
+        coarse = coarse_weights(real[0]) if real else torch.ones(40)
+        self.losses = Losses(fine_weights(rendered, self.rng), coarse).to(self.device)
+        self.network = _begun(options, self.device)
+        self.average = Average(self.network)
+        self.optimisers = optimisers_of(self.network, options)
+        self.running: dict[str, float] = {}
+        self.spent = _spent(options) if options.resume else 0.0
+        self.pool = ThreadPoolExecutor(1) if options.readers == 1 else processes(self.sources, options)
+        self.coming = [self._drawn() for _ in range(2 * options.readers)]
+
+    def _drawn(self) -> Future[Batch]:
+        seed = int(self.rng.integers(1 << 62))
+        if self.options.readers > 1:
+            return self.pool.submit(draw_here, self.options.view, seed)
+        return self.pool.submit(draw_batch, self.sources, self.options.view, np.random.default_rng(seed))
+
+    def train_step(self, done: float) -> None:
+        """Learn from one batch."""
+        rate = self.options.rate * min(1.0, (self.step + 1) / 100) * (0.5 + 0.5 * np.cos(np.pi * done)) + 1e-6
+        for group in (group for optimiser in self.optimisers for group in optimiser.param_groups):
+            group["lr"] = float(rate)
+        batch = self.coming.pop(0).result()
+        self.coming.append(self._drawn())
+        loss, parts = self.losses(self.network, batch)
+        self.network.zero_grad(set_to_none=True)
+        loss.backward()
+        nn.utils.clip_grad_norm_(self.network.parameters(), 2.0)
+        for optimiser in self.optimisers:
+            optimiser.step()
+        self.step += 1
+        self.average.take(self.network, max(1.0 / (self.step + 10), 1.0 / self.options.averaged))
+        for name, value in parts.items():
+            self.running[name] = self.running.get(name, value) + 0.03 * (value - self.running.get(name, value))
+
+    def measure(self, minutes: float) -> None:
+        """Add a point to the learning curve: the mean weights on what is held out."""
+        network = RoomNetwork(len(CATEGORIES), len(ROOMS), self.options.widths)
+        network.load_state_dict({name: value.cpu() for name, value in self.average.state.items()})
+        network.eval()
+        point: dict[str, object] = {
+            "minutes": round(minutes, 1), "steps": self.step, "frames": self.step * self.options.batch,
+        }  # fmt: skip
+        if self.options.real:
+            point["real"] = real_figures(network, Shards(self.options.real / "development"))
+        if self.options.held_out.is_dir():
+            point["rendered"] = rendered_figures(network, Shards(self.options.held_out))
+        line = json.dumps(point)
+        print(line, file=sys.stderr, flush=True)
+        with self.options.out.with_suffix(".curve.jsonl").open("a") as stream:
+            stream.write(line + "\n")
+
+    def save(self, minutes: float) -> None:
+        """Write the checkpoint so that a reader never meets half of one; weights in half precision, under 20 MB."""
+        self.options.out.parent.mkdir(parents=True, exist_ok=True)
+        scratch = self.options.out.with_suffix(".part")
+        state: dict[str, object] = {"last": _halved(self.network.state_dict()), "mean": _halved(self.average.state)}
+        about = {key: str(value) for key, value in asdict(self.options).items()}
+        state |= {"widths": list(self.options.widths), "step": self.step, "minutes": minutes, "options": about}
+        torch.save({**state, "categories": list(CATEGORIES), "rooms": list(ROOMS)}, scratch)
+        scratch.rename(self.options.out)
+
+
+def _spent(options: Options) -> float:
+    return float(torch.load(options.out, map_location="cpu", weights_only=True).get("minutes", 0.0))
+
+
+_HERE: list[tuple[Shards, int]] = []
+_drawn_here = 0
+
+
+def processes(sources: list[tuple[Shards, int]], options: Options) -> ProcessPoolExecutor:
+    """Return processes that draw batches; each opens the shards itself."""
+    folders = [(shards.folder, size) for shards, size in sources]
+    return ProcessPoolExecutor(options.readers, get_context("spawn"), _open_here, (folders,))
+
+
+def _open_here(folders: list[tuple[Path, int]]) -> None:
+    _HERE.extend((Shards(folder), size) for folder, size in folders)
+
+
+def draw_here(view: View, seed: int) -> Batch:
+    """Draw a batch in a process of its own; every hundredth time it looks for new shards."""
+    global _drawn_here
+    _drawn_here += 1
+    if _drawn_here % 100 == 0:
+        _HERE[0][0].refresh()
+    return draw_batch(_HERE, view, np.random.default_rng(seed))
+
+
+def _halved(state: dict[str, Tensor]) -> dict[str, Tensor]:
+    """Return weights of convolutions in half precision; the statistics stay whole."""
+    return {
+        name: value.detach().cpu().half() if value.ndim > 1 else value.detach().cpu() for name, value in state.items()
+    }
 
 
 def fit(options: Options) -> None:
     """Train until the time is over."""
-    torch.manual_seed(options.seed)
-    torch.set_num_threads(options.threads)
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    rng = np.random.default_rng(options.seed)
-    shards = Shards(options.shards)
-    network, optimisers = _begun(options, device)
-    weight = torch.from_numpy(class_weights(shards, rng)).float().to(device)
-    average, begin, step, shown, saved = Average(network), perf_counter(), 0, perf_counter(), perf_counter()
-    met, peer_stamp = perf_counter(), time()
-    ahead = ThreadPoolExecutor(1)  # the next batch is drawn while the network learns from this one
-    coming = ahead.submit(draw_batch, shards, options.batch, rng, options.colour_kept)
-    running = np.zeros(3)
-    while (done := (perf_counter() - begin) / 60.0 / options.minutes) < 1.0:
-        for group in (group for optimiser in optimisers for group in optimiser.param_groups):
-            group["lr"] = _rate_at(options, done, step)
-        batch, coming = coming.result(), ahead.submit(draw_batch, shards, options.batch, rng, options.colour_kept)
-        pixels, views, right = losses(network, batch, weight, device)
-        network.zero_grad(set_to_none=True)
-        (pixels + 0.15 * views).backward()
-        nn.utils.clip_grad_norm_(network.parameters(), 2.0)
-        for optimiser in optimisers:
-            optimiser.step()
-        average.take(network, max(1.0 / (step + 10), 0.002))
-        step += 1
-        running += 0.02 * (np.array([float(pixels.detach()), float(views.detach()), right]) - running)
+    run = Run(options)
+    begin = shown = saved = measured = perf_counter()
+    end = min(options.minutes - run.spent, options.sitting)
+    while (here := (perf_counter() - begin) / 60.0) < end:
+        done = (run.spent + here) / options.minutes
+        run.train_step(done)
         now = perf_counter()
-        if options.peer is not None and now - met > 60:
-            save(options, network, average, optimisers, step)
-            if options.peer.is_file() and options.peer.stat().st_mtime > peer_stamp:
-                peer_stamp = options.peer.stat().st_mtime
-                meet(network, options.peer)
-            met = saved = now
-        if now - shown > 30:
-            frames = shards.refresh()
-            print(
-                f"{done:6.1%} step {step}, {step / (now - begin):.2f} a second, {frames} frames; loss {running[0]:.3f} "
-                f"rooms {running[1]:.3f} right {running[2]:.3f}", file=sys.stderr, flush=True,
-            )  # fmt: skip
+        if now - shown > 60:
+            frames = run.sources[0][0].refresh()
+            parts = ", ".join(f"{name} {value:.3f}" for name, value in run.running.items())
+            rate = run.step * options.batch / (now - begin)
+            print(f"{done:6.1%} step {run.step}, {rate:.1f} pictures a second of {frames}; {parts}", file=sys.stderr,
+                  flush=True)  # fmt: skip
             shown = now
-        if now - saved > 240:
-            save(options, network, average, optimisers, step)
+        if now - saved > 180:
+            run.save(run.spent + here)
             saved = now
-    ahead.shutdown(cancel_futures=True)
-    save(options, network, average, optimisers, step)
-
-
-@torch.no_grad()
-def meet(network: nn.Module, peer: Path) -> None:
-    """Move half the way to the weights of a process that trains beside this one (local SGD)."""
-    others = torch.load(peer, map_location="cpu", weights_only=True)["last"]
-    for name, value in network.state_dict().items():
-        if value.dtype.is_floating_point:
-            value.lerp_(others[name].to(value), 0.5)
-
-
-def save(
-    options: Options, network: nn.Module, average: Average, optimisers: list[torch.optim.Optimizer], step: int
-) -> None:
-    """Write the checkpoint so that a reader never meets half of one."""
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    about = {key: str(value) for key, value in asdict(options).items()}
-    scratch = options.out.with_suffix(".part")
-    state = {"last": network.state_dict(), "mean": average.state, "widths": list(options.widths), "step": step}
-    state["moments"] = [optimiser.state_dict() for optimiser in optimisers]
-    torch.save({**state, "categories": list(CATEGORIES), "rooms": list(ROOMS), "options": about}, scratch)
-    scratch.rename(options.out)
+        if now - measured > 60 * options.measure_minutes:
+            run.measure(run.spent + here)
+            measured = perf_counter()
+    run.pool.shutdown(cancel_futures=True)
+    run.save(run.spent + end)
+    run.measure(run.spent + end)
 
 
 if __name__ == "__main__":

@@ -23,6 +23,8 @@ CATEGORIES = (
     "baby stroller", "mat", "play tent", "aquarium", "pet bed",
     "whiteboard", "partition", "locker", "water dispenser",
     "other",
+    # Kinds that real frames teach alone: rendered worlds have none of them.
+    "clothing", "paper", "person", "shower curtain",
 )  # fmt: skip
 
 ROOMS = (
@@ -32,6 +34,8 @@ ROOMS = (
 )  # fmt: skip
 
 UNLABELLED = 255
+# Labels of real frames from here on are coarse: class c of ``avlmaps.bench.nyu.CLASSES`` is FIRST_COARSE + c.
+FIRST_COARSE = 160
 
 
 def room_of(area: str) -> str:

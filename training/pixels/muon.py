@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 import torch
 from torch import Tensor
+from training.pixels.network import has_bfloat16
 
 # Coefficients of the quintic iteration that takes singular values between 0 and 1 near 1 in five rounds.
 _QUINTIC = (3.4445, -4.7750, 2.0315)
@@ -19,10 +20,13 @@ def orthogonal(matrix: Tensor) -> Tensor:
     tall = matrix.shape[0] > matrix.shape[1]
     x = matrix.T if tall else matrix
     x = x / (x.norm() + 1e-7)
+    if has_bfloat16(x.device):  # the iteration is crude by itself; half of the time goes into it otherwise
+        x = x.bfloat16()
     a, b, c = _QUINTIC
     for _ in range(_ROUNDS):
         square = x @ x.T
         x = a * x + (b * square + c * square @ square) @ x
+    x = x.to(matrix.dtype)
     return x.T if tall else x
 
 

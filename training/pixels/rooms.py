@@ -26,11 +26,11 @@ class Options:
     """Checkpoint; its room head is replaced."""
     frames: Path = Path("build/pixels/training")
     """Rendered frames."""
-    count: int = 2000
+    count: int = 1200
     """Pictures to look at."""
     epochs: int = 60
     """Times that each is learnt from."""
-    weights: str = "last"
+    weights: str = "mean"
     """Which weights of the checkpoint."""
     threads: int = 2
     """CPU threads."""

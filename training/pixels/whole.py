@@ -3,13 +3,13 @@
 import cv2
 import numpy as np
 from training.pixels.batches import Frames
+from training.pixels.network import MULTIPLE
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.perception.embedded.geometry import channels
 
 # Larger than things are in most windows of the training: of several sizes the one that held-out frames like best.
 WIDTH, HEIGHT = 160, 120
-_MULTIPLE = 16
 
 
 def whole_frame(
@@ -21,7 +21,7 @@ def whole_frame(
     column = ((np.arange(WIDTH) + 0.5) * w / WIDTH).astype(int)
     depth = frames.depth[index][row[:, None], column].astype(np.float32) / 1000.0
     label = np.array(frames.label[index][row[:, None], column])
-    fx, fy, cx, cy, *up, height = frames.camera[index]
+    fx, fy, cx, cy, *up, height = frames.camera[index][:8]
     colour = np.zeros((3, HEIGHT, WIDTH), np.float32)
     rgb_row = int(frames.rgb_row[index])
     if with_colour and rgb_row >= 0:
@@ -32,5 +32,5 @@ def whole_frame(
         cx, up = w - cx, [-up[0], up[1], up[2]]
     camera = Pinhole(fx, fy, cx, cy, w, h).resized(WIDTH, HEIGHT)
     geometry = channels(np.ascontiguousarray(depth), camera, np.array(up), height)
-    pad = ((0, 0), (0, -HEIGHT % _MULTIPLE), (0, -WIDTH % _MULTIPLE))
+    pad = ((0, 0), (0, -HEIGHT % MULTIPLE), (0, -WIDTH % MULTIPLE))
     return np.pad(geometry, pad)[None], np.pad(colour, pad)[None], depth, label

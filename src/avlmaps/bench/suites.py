@@ -24,6 +24,7 @@ class Asked:
     Attributes:
         sounds: folder of clips with an index.csv, for the suites of sound.
         scenes: recordings with poses, for ``locate``.
+        nyuv2: folder of labelled frames, for ``frames``.
         profile: the models that are measured.
         models: other backends than the profile's, ``module=backend[@model]``.
         seed: of what is drawn at random.
@@ -33,6 +34,7 @@ class Asked:
 
     sounds: Path | None = None
     scenes: tuple[Path, ...] = ()
+    nyuv2: Path | None = None
     profile: str = "embedded"
     models: tuple[str, ...] = ()
     seed: int = 0
@@ -44,7 +46,8 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
     """Run a suite and write SUITE.json, SUITE.md, SUITE.png and a CSV file for each table into ``out``.
 
     Args:
-        suite: ``words``, ``sounds``, ``segmentation``, ``locate``, ``objects``, ``indexing`` or ``navigation``.
+        suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``objects``, ``indexing``
+            or ``navigation``.
         asked: what it measures on.
         out: folder to write into.
 
@@ -66,9 +69,10 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
 
         return run_objects(asked.indexing, out)
     tables = _SUITES[suite](asked)
+    sources = (asked.sounds, asked.nyuv2, *asked.scenes)
     answer = {
         "suite": suite,
-        "scenes": [source.resolve().name for source in (asked.sounds, *asked.scenes) if source is not None],
+        "scenes": [source.resolve().name for source in sources if source is not None],
         "profile": asked.profile,
         "models": list(asked.models),
         "seed": asked.seed,
@@ -81,7 +85,7 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
 
 
 # The modules that each suite measures; a model that is missing is named before anything else happens.
-_MEASURED = {"sounds": (Kind.SOUNDS,), "locate": (Kind.LOCAL, Kind.PLACE, Kind.MATCHER), "segmentation": ()}
+_MEASURED = {"sounds": (Kind.SOUNDS,), "locate": (Kind.LOCAL, Kind.PLACE, Kind.MATCHER), "frames": (Kind.PIXELS,)}
 
 
 def _weights(suite: str, used: Profile) -> dict[str, str]:
@@ -129,11 +133,36 @@ def _locate(asked: Asked) -> Mapping[str, Table]:
     return tables
 
 
+def _frames(asked: Asked) -> Mapping[str, Table]:
+    from avlmaps.bench.frames import run_frames
+    from avlmaps.perception.embedded.pixels import EmbeddedPixels
+    from avlmaps.perception.profiles import profile
+
+    if asked.nyuv2 is None:
+        raise BenchError("This suite measures on labelled frames in the layout of NYU Depth V2; name their folder with "
+                         "--nyuv2.")  # fmt: skip
+    encoder = profile(asked.profile).pixel_encoder()
+    if not isinstance(encoder, EmbeddedPixels):
+        raise BenchError(
+            f"The suite frames sums probabilities of kinds, which the pixel encoder of the profile {asked.profile!r} "
+            "does not give. Choose embedded or synthetic."
+        )
+    return run_frames(encoder, asked.nyuv2)
+
+
+def _language(_: Asked) -> Mapping[str, Table]:
+    from avlmaps.bench import language
+
+    return language.run()
+
+
 _SUITES: dict[str, Callable[[Asked], Mapping[str, Table]]] = {
     "words": _words,
+    "language": _language,
     "sounds": _sounds,
     "segmentation": _segmentation,
     "locate": _locate,
+    "frames": _frames,
 }
 
 

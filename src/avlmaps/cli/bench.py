@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from avlmaps.bench.indexing import IndexingSettings
     from avlmaps.bench.navigation import NavigationSettings
 
-Suite = Literal["words", "sounds", "segmentation", "locate", "objects", "indexing", "navigation"]
+Suite = Literal["words", "language", "sounds", "segmentation", "locate", "frames", "objects", "indexing", "navigation"]
 Series = Literal["sounds-1", "sounds-2", "sounds-3", "images", "pairs", "commands", "spatial"]
 
 
@@ -64,8 +64,10 @@ class Bench(ModelVerb):
     Example: avlmaps bench indexing --scenes house:1000000:held-out --out bench_out
 
     words: household phrases that were not trained on; needs nothing.
+    language: commands and questions that strangers wrote; needs nothing.
     sounds, segmentation: need --sounds, a folder of clips with an index.csv.
     locate: needs --scenes, recordings with poses; half of the frames become the map, the others are located.
+    frames: needs --nyuv2, labelled frames in the layout of NYU Depth V2; kinds of pixels, without any map.
     objects: positions of objects, in the scenes of indexing, whose maps it shares.
     indexing: the paper's Tables III to V, in twelve held-out homes, in --scenes, or in a recording with objects.json.
     navigation: the paper's Tables I, II and VI and its commands, in twelve held-out homes or in --scenes.
@@ -79,6 +81,8 @@ class Bench(ModelVerb):
     """Folder of sound clips with an index.csv (path, category, fold)."""
     scenes: tuple[str, ...] = ()
     """Recordings with poses (locate); names of scenes such as house:1000000:held-out (the others)."""
+    nyuv2: Path | None = None
+    """Folder of labelled frames (frames.csv, NNNN.color.jpg, NNNN.depth8.png, NNNN.label.png)."""
     profile: str = "embedded"
     """Models to measure (see `avlmaps profiles`)."""
     model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
@@ -99,7 +103,8 @@ class Bench(ModelVerb):
         indexing = self.indexing_settings() if self.suite in ("indexing", "objects") else None
         navigation = self.navigation_settings() if self.suite == "navigation" else None
         scenes = () if indexing or navigation else tuple(map(Path, self.scenes))
-        asked = Asked(self.sounds, scenes, self.profile, self.models_chosen, self.seed, indexing, navigation)
+        models = self.models_chosen
+        asked = Asked(self.sounds, scenes, self.nyuv2, self.profile, models, self.seed, indexing, navigation)
         answer = run_suite(self.suite, asked, self.out)
         lines: list[str] = []
         for name, table in answer["tables"].items():

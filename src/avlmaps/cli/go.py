@@ -56,6 +56,12 @@ class Go(ModelVerb):
     """Where the simulated robot starts: metres, degrees counter-clockwise from +x. Default: where the walk began."""
     guess: bool = False
     """Go to the best guess where the map is not sure that it holds what is named."""
+    image: Path | None = None
+    """The file that "this photo" in the sentence means."""
+    sound_clip: Path | None = None
+    """The file that "this recording" in the sentence means."""
+    explain: bool = False
+    """Print the readings of the sentence with their costs; the smallest is taken."""
     dry_run: bool = False
     """Print the program, and do not drive; neither the map nor a scene is opened."""
     plot: Path | None = None
@@ -95,7 +101,7 @@ def _failure(answer: dict[str, Any]) -> dict[str, Any] | None:
 
 def go_lines(answer: dict[str, Any]) -> list[str]:
     """Lay out what `go` tells: the program, and the places."""
-    lines = answer["program"].splitlines()
+    lines = [*([answer["plan"]] if answer.get("plan") else []), *answer["program"].splitlines()]
     rows = [
         (
             number, goal["name"] or goal["skill"].replace("_", " "), place(goal["goal"]), place(goal["stop"]),

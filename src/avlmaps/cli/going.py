@@ -53,25 +53,37 @@ def go(verb: "Go") -> dict[str, Any]:
     if verb.robot != "simulated" and (verb.scene or start):
         raise UsageError(f"--scene and --start belong to a simulated robot; --robot {verb.robot} is where it is.")
     translator = _translator(verb)
+    if verb.explain and verb.dry_run:
+        from avlmaps.language.rules import explanation
+
+        for line in explanation(translator, verb.sentence):
+            say(line)
     if verb.dry_run:
         translation = translator.program_for(verb.sentence)
         return {
+            "plan": translation.plan,
             "program": translation.program, "steps": [], "actions": [], "subgoals": [], "ok": True, "error": None,
             "notes": list(translation.notes), "path_m": 0.0, "elapsed_s": 0.0,
         }  # fmt: skip
     from avlmaps.navigate.interrupts import raised_signals
 
     with raised_signals():
-        return _driven(verb, translator, start)
+        return _driven(verb, start)
 
 
-def _driven(verb: "Go", translator: "Translator", start: "GroundPose | None") -> dict[str, Any]:
+def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
     from avlmaps.navigate.instruct import instruct
     from avlmaps.navigate.interrupts import Interrupted
     from avlmaps.navigate.skills import RobotSettings
     from avlmaps.query.avlmap import AVLMap
 
     asked = AVLMap.open(verb.map)
+    translator = _translator(verb, asked)
+    if verb.explain:
+        from avlmaps.language.rules import explanation
+
+        for line in explanation(translator, verb.sentence):
+            say(line)
     translation = translator.program_for(verb.sentence)  # what is not understood is told before a scene is made
     robot = _in_scene(verb, asked, start) if verb.robot == "simulated" else _real(verb, asked)
     settings = RobotSettings(guess=verb.guess)
@@ -93,11 +105,17 @@ def _driven(verb: "Go", translator: "Translator", start: "GroundPose | None") ->
     return outcome.to_json()
 
 
-def _translator(verb: "Go") -> "Translator":
+def _translator(verb: "Go", asked: "AVLMap | None" = None) -> "Translator":
+    from avlmaps.language.commands import Given
+
+    came = Given(
+        None if verb.image is None else str(verb.image), None if verb.sound_clip is None else str(verb.sound_clip),
+        None if asked is None else asked.knows,
+    )  # fmt: skip
     if verb.language == "rules":
         from avlmaps.language.rules import RulesTranslator
 
-        return RulesTranslator()
+        return RulesTranslator(came)
     from avlmaps.language.chat import ChatSettings, ChatTranslator
 
     chat = verb.chat

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
     from avlmaps.perception.cache.feature_store import CacheSettings
     from avlmaps.perception.profiles import Profile
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.question import Answer
     from avlmaps.recordings.types import Recording
 
 MAP_MANIFEST = "map.json"
@@ -263,29 +265,60 @@ def _describe_recording(recording: "Recording") -> dict[str, Any]:
 
 
 def ask(verb: "Query") -> dict[str, Any]:
-    """Ask a map a question in a sentence or in parts."""
+    """Query a map with a sentence or with parts."""
     from avlmaps.core.question import Modality, Question
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.rules import query_settings
 
     parts = _parts(verb)
-    if bool(verb.sentence.strip()) == bool(parts):
+    only_files = all(part.is_file for part in parts)
+    if (not verb.sentence.strip() and not parts) or (verb.sentence.strip() and not only_files):
         raise UsageError(
             "query takes a sentence, or parts (--object, --sound, --sound-clip, --area, --image), and not both: "
             'avlmaps query MAP "the red cabinet near the sound of a dog"'
         )
     if verb.top < 1:
         raise UsageError(f"--top is {verb.top}; it must be 1 or more.")
-    if parts:
-        question = Question.of(parts, Modality(verb.primary) if verb.primary else None)
-    else:
-        from avlmaps.language.sentence import parse_sentence
+    asked = AVLMap.open(verb.map, query_settings(verb.rules))
+    if verb.sentence.strip():
+        return _asked_in_words(verb, asked)
+    question = Question.of(parts, Modality(verb.primary) if verb.primary else None)
+    camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
+    return _plotted(verb, asked.ask(question, top=verb.top, intrinsics=camera))
 
-        question = parse_sentence(verb.sentence)
+
+_MOST_COUNTED, _AS_LIKELY = 200, 0.5  # instances count that score at least half of the best one
+
+
+def _asked_in_words(verb: "Query", asked: "AVLMap") -> dict[str, Any]:
+    """Answer a sentence; several questions in it are alternatives, and the best answer counts."""
+    from avlmaps.core.question import Modality, Question
+    from avlmaps.language.commands import Given
+    from avlmaps.language.intents import Ask
+    from avlmaps.language.questions import read_question
+
+    files = (None if path is None else str(path) for path in (verb.image, verb.sound_clip))
+    sentence = read_question(verb.sentence, Given(*files, knows=lambda _: True))
+    counted = sentence.inquiry.ask is Ask.HOW_MANY
+    answers: list[Answer] = []
+    for question in sentence.questions:
         if verb.primary:
             question = Question.of(question.parts, Modality(verb.primary))
-    camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
-    answer = AVLMap.open(verb.map, query_settings(verb.rules)).ask(question, top=verb.top, intrinsics=camera)
+        used = {part.query for part in question.parts}
+        if any(path is not None and str(path) not in used for path in (verb.image, verb.sound_clip)):
+            raise UsageError("The sentence does not speak of the file; say 'this photo' or 'this recording' in it.")
+        camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
+        answers.append(asked.ask(question, top=_MOST_COUNTED if counted else verb.top, intrinsics=camera))
+    answer = max(answers, key=lambda one: (one.found, one.goals[0].score if one.goals else 0.0))
+    told = _plotted(verb, answer)
+    if counted:
+        likely = [goal for goal in answer.goals if goal.score >= _AS_LIKELY * answer.goals[0].score]
+        told = {**told, "goals": told["goals"][: verb.top], "count": len(likely) if answer.found else 0}
+    notes = {"notes": list(sentence.notes)} if sentence.notes else {}
+    return {**told, **notes}
+
+
+def _plotted(verb: "Query", answer: "Answer") -> dict[str, Any]:
     told = answer.to_json()
     if verb.plot is not None and answer.heat is not None:
         told["plot"] = str(answer.heat.plot(verb.plot, top=verb.top))

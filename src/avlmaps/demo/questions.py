@@ -15,7 +15,7 @@ from jaxtyping import Float
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Modality, Part, Question
 from avlmaps.demo.evidence import Box, Evidence
-from avlmaps.language.sentence import parse_sentence
+from avlmaps.language.questions import parse_sentence
 
 # What a label of training is also called in speech; none of these words was ever a label. The largest come first.
 SPOKEN = {

@@ -13,10 +13,12 @@ class Translation:
         program: text in the robot's vocabulary, as `avlmaps.language.program` parses it.
         notes: one sentence each, for the person who gave the command: how something was taken that could have been
             meant in another way.
+        plan: what the robot will do, in plain words; empty where the translator does not say it.
     """
 
     program: str
     notes: tuple[str, ...] = ()
+    plan: str = ""
 
 
 @runtime_checkable

@@ -116,6 +116,14 @@ class Vocabulary(Protocol):
         """Return the place of the best goal for a phrase or a heatmap."""
         ...
 
+    def get_nearest_pos(self, target: Target) -> Place:
+        """Return the place of the nearest object of that name, or the best of a heatmap; it means the same later."""
+        ...
+
+    def get_all_pos(self, target: Target) -> list[Place]:
+        """Return the places of all objects of that name that the map is confident of, the nearest first."""
+        ...
+
     def get_contour(self, target: Target) -> list[Place]:
         """Return the outline on the ground of the best instance of an object, counter-clockwise."""
         ...
@@ -142,6 +150,10 @@ class Vocabulary(Protocol):
 
     def move_to_right(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the right side of a thing, as the robot sees it from where it stands, so far from its edge."""
+        ...
+
+    def move_behind(self, target: Target, distance_m: float = 0.5) -> None:
+        """Drive behind a thing, as the robot sees it from where it stands, that distance from its edge."""
         ...
 
     def move_north(self, target: Target, distance_m: float = 0.5) -> None:
@@ -182,4 +194,8 @@ class Vocabulary(Protocol):
 
     def with_object_on_right(self, target: Target) -> None:
         """Turn on the spot until the thing is straight to the right of the robot."""
+        ...
+
+    def wait(self, duration_s: float) -> None:
+        """Stand still for some seconds, at most 600."""
         ...

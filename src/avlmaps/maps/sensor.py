@@ -29,7 +29,7 @@ class SensorModel:
     noise_per_m: float = 0.0
     """How σ grows with the square of the depth: σ(z) = noise_m + noise_per_m · z²."""
     worst_voxels: float | None = None
-    """Leave out a depth whose σ is greater than this many voxel edges; None leaves out none (JSON has no infinity)."""
+    """Leave out a depth whose σ is greater than this many voxel edges; None leaves out none."""
     edge_sigmas: float | None = None
     """Leave out a pixel between a nearer and a farther surface, each more than this many σ away: a flying pixel. None
     leaves out none."""
@@ -48,8 +48,8 @@ class SensorModel:
 
     def __post_init__(self) -> None:
         finite = np.isfinite([self.noise_m, self.noise_per_m, self.clear_sigmas, self.smear_sigmas]).all()
-        limits = [limit for limit in (self.worst_voxels, self.edge_sigmas) if limit is not None]
-        positive = min(*limits, self.steepest_deg, self.smear_ratio) > 0.0
+        limits = self.worst_voxels, self.edge_sigmas, self.steepest_deg, self.smear_ratio
+        positive = all(limit > 0.0 for limit in limits if limit is not None)
         errors = self.noise_m, self.noise_per_m, self.clear_sigmas, self.smear_sigmas, self.speck_voxels
         if not (finite and positive and min(errors) >= 0.0):
             raise MapError(
@@ -69,8 +69,10 @@ class SensorModel:
 
     def farthest_m(self, voxel_size_m: float) -> float:
         """Return the depth beyond which the error is more than a voxel can bear; infinity where it never is."""
-        spare = np.inf if self.worst_voxels is None else self.worst_voxels * voxel_size_m - self.noise_m
-        if self.noise_per_m == 0.0 or not np.isfinite(spare):
+        if self.worst_voxels is None:
+            return np.inf
+        spare = self.worst_voxels * voxel_size_m - self.noise_m
+        if self.noise_per_m == 0.0:
             return np.inf if spare >= 0.0 else 0.0
         return float(np.sqrt(max(spare, 0.0) / self.noise_per_m))
 

@@ -35,6 +35,7 @@ class Seeker:
         self.notes: list[str] = []
         self._tell = tell
         self._handed_out: dict[Place, Thing] = {}
+        self._instances: set[Place] = set()
         self._last_told = ""
 
     def heat(self, skill: str, obj: object, sound: object, img: object, area: object, *, primary: bool) -> Heatmap:
@@ -121,7 +122,7 @@ class Seeker:
         if isinstance(target, Place):
             level = self.asked.space.level(np.array([target.x, target.y, target.z]))
             known = self._handed_out.get(target, Thing("", Outline.at(level[:2]), level))
-            return [replace(known, outline=Outline.at(level[:2]))], True
+            return [known if target in self._instances else replace(known, outline=Outline.at(level[:2]))], True
         heat = self.asked.object(target, primary=True) if isinstance(target, str) else target
         if not isinstance(heat, Heatmap):
             raise ProgramError(f"A skill takes a phrase, a place or a heatmap to go to, not {kind_of(target)}.")
@@ -138,7 +139,29 @@ class Seeker:
         Raises:
             GoalNotFoundError: there is none.
         """
-        thing = self.best(target)
+        return self._handed(self.best(target))
+
+    def place_of_thing(self, thing: Thing) -> Place:
+        """Return the place of one thing; a skill that is given this place knows the thing with its outline."""
+        place = self._handed(thing)
+        self._instances.add(place)
+        return place
+
+    def every(self, target: Target, here: Float[np.ndarray, "2"]) -> list[Thing]:
+        """Return all things that a target may mean, the nearest first.
+
+        Args:
+            target: a phrase, a place or a heatmap.
+            here: where the robot stands, level x and y.
+
+        Raises:
+            GoalNotFoundError: there is none.
+        """
+        things, one = self._candidates(target)
+        chosen = likely(things, one) if not one else things
+        return sorted(chosen, key=lambda thing: float(np.linalg.norm(thing.outline.nearest_to(here) - here)))
+
+    def _handed(self, thing: Thing) -> Place:
         x, y, z = (float(value) for value in self.asked.space.world(thing.place))
         place = Place(x, y, z)
         self._handed_out[place] = thing

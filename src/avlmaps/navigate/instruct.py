@@ -184,6 +184,8 @@ class _Run:
             self.programs.append(translation.program)
             for note in translation.notes:
                 self.note(note)
+            if translation.plan:
+                self.tell(translation.plan)
             for line in translation.program.splitlines():
                 self.tell(f"> {line}")
             self.last = self.ran(translation.program)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import pi, radians
+from time import sleep
 from typing import cast
 
 import numpy as np
@@ -28,7 +29,7 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 
 _NORTH, _EAST = np.array([0.0, 1.0]), np.array([1.0, 0.0])
-_MOST_M, _MOST_TURNS_DEG = 1000.0, 3600.0
+_MOST_M, _MOST_TURNS_DEG, _MOST_WAIT_S = 1000.0, 3600.0, 600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +128,14 @@ class Robot:
         """Return the place of the best goal for a phrase or a heatmap."""
         return self.seeker.place_of(target)
 
+    def get_nearest_pos(self, target: Target) -> Place:
+        """Return the place of the nearest object of that name, or the best of a heatmap; it means the same later."""
+        return self.seeker.place_of_thing(self.seeker.meant(target, self._here))
+
+    def get_all_pos(self, target: Target) -> list[Place]:
+        """Return the places of all objects of that name that the map is confident of, the nearest first."""
+        return [self.seeker.place_of_thing(thing) for thing in self.seeker.every(target, self._here)]
+
     def get_contour(self, target: Target) -> list[Place]:
         """Return the outline on the ground of the best instance of an object, counter-clockwise."""
         return [self._place(self._on_floor(corner)) for corner in self.seeker.best(target).outline.corners]
@@ -166,6 +175,11 @@ class Robot:
         """Drive to the right side of a thing, as the robot sees it from where it stands, so far from its edge."""
         thing = self.seeker.meant(target, self._here)
         self._go_beside("move_to_right", thing, -to_the_left(self._towards(thing)), distance_m)
+
+    def move_behind(self, target: Target, distance_m: float = 0.5) -> None:
+        """Drive behind a thing, as the robot sees it from where it stands, that distance from its edge."""
+        thing = self.seeker.meant(target, self._here)
+        self._go_beside("move_behind", thing, self._towards(thing), distance_m)
 
     def move_north(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the north (+y) of a thing, so far from its edge."""
@@ -213,6 +227,10 @@ class Robot:
     def with_object_on_right(self, target: Target) -> None:
         """Turn on the spot until the thing is straight to the right of the robot."""
         self._turn_to_see("with_object_on_right", target, at_rad=-pi / 2)
+
+    def wait(self, duration_s: float) -> None:
+        """Stand still for some seconds, at most 600."""
+        sleep(max(0.0, number_of(duration_s, "wait", _MOST_WAIT_S, "seconds")))
 
     @property
     def actions(self) -> list[Action]:

@@ -163,7 +163,8 @@ _EMBEDDED = Profile(
     local="rootsift",
     place="vlad",
     matcher="mutual-ratio",
-    about="small models shipped with the package: no download, no GPU",
+    about="small models shipped with the package: no download, no GPU; its eyes learnt from rendered worlds and from "
+    "frames of NYU Depth V2, a data set for research that states no licence",
     # A small network knows a sofa from two metres better than a cushion's width of it from half a metre: with nearly
     # even weights 44 % of the voxels of things are named rightly, with the paper's 41 % (docs/experiments.md).
     weight_variance_m2=50.0,
@@ -202,5 +203,14 @@ register_profile(
         place="netvlad",
         matcher="superglue",
         about="the models of the AVLMaps paper, to compare with; some of their weights are for research alone",
+    )
+)
+register_profile(
+    replace(
+        _EMBEDDED,
+        name="synthetic",
+        pixels="embedded-synthetic",
+        views="embedded-synthetic",
+        about="as embedded, but its eyes learnt from rendered worlds alone; weaker in real rooms",
     )
 )

@@ -178,6 +178,13 @@ class AVLMap:
             f"{counts.keyframes} keyframes, {counts.sounds} sounds, profile {self.stored.info.profile})"
         )
 
+    def knows(self, phrase: str) -> bool:
+        """Return whether the pixel encoder can look for a phrase: any phrase for an open vocabulary, else its names."""
+        from avlmaps.perception.protocols import NamedPixelEncoder
+
+        encoder = self.stored.profile.pixel_encoder()
+        return not isinstance(encoder, NamedPixelEncoder) or bool(encoder.meant(phrase).any())
+
     def sound(self, text: str, primary: bool = False) -> Heatmap:
         """Return the heat of where a sound of that name was heard.
 
@@ -303,7 +310,7 @@ class AVLMap:
         """
         begin = time.perf_counter()
         if isinstance(question, str):
-            from avlmaps.language.sentence import parse_sentence
+            from avlmaps.language.questions import parse_sentence
 
             question = parse_sentence(question)
         heat = fused([self.heat(part, intrinsics) for part in question.parts])

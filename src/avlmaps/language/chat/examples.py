@@ -43,20 +43,22 @@ EXAMPLES = (
     Example(
         "go to where the dog was barking and then to the right of the lamp, and keep the lamp on your left",
         'robot.move_to(robot.get_max_pos_3d(robot.get_major_map(sound="dog barking")))\n'
-        'robot.move_to_right("lamp")\n'
-        'robot.with_object_on_left("lamp")',
+        'lamp = robot.get_nearest_pos("lamp")\n'
+        "robot.move_to_right(lamp)\n"
+        "robot.with_object_on_left(lamp)",
     ),
     Example(
         "look at the table from three sides, then patrol from the door to the fridge two times",
-        'outline = robot.get_contour("table")\n'
+        'table = robot.get_nearest_pos("table")\n'
+        "outline = robot.get_contour(table)\n"
         "for i in range(3):\n"
         "    robot.move_to(outline[i * len(outline) // 3])\n"
-        '    robot.face("table")\n'
-        'door = robot.get_pos("door")\n'
-        'fridge = robot.get_pos("fridge")\n'
+        "    robot.face(table)\n"
+        'door = robot.get_nearest_pos("door")\n'
+        'fridge = robot.get_nearest_pos("fridge")\n'
         "for i in range(2):\n"
-        "    robot.move_to(door)\n"
-        "    robot.move_to(fridge)",
+        "    robot.move_to_object(door)\n"
+        "    robot.move_to_object(fridge)",
     ),
     Example(
         "drive half of the way that it is to the window",

@@ -7,7 +7,7 @@ from jaxtyping import Float, Float32
 
 from avlmaps.perception.embedded.closed_set import NamedEncoder
 from avlmaps.perception.embedded.codes import features_of
-from avlmaps.perception.embedded.scene_network import SceneNetwork
+from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, SceneNetwork, Seen, load_network
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.types import Frame
 
@@ -37,8 +37,12 @@ class EmbeddedPixels(NamedEncoder):
 
     def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
         """Return features on a grid of half the size that the network looks at; zero where there is no depth."""
-        seen = self._network.see(frame)
+        seen = self.see(frame)
         return np.where(seen.known[..., None], features_of(seen.category, self.codes), np.float32(0.0))
+
+    def see(self, frame: Frame) -> Seen:
+        """Return the probabilities themselves, of ``names`` on the grid of ``encode``."""
+        return self._network.see(frame)
 
     def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
         """Return a unit vector for each phrase; zero for one that means none of the categories."""
@@ -74,3 +78,8 @@ class EmbeddedPixels(NamedEncoder):
             notes.bias.get(name, notes.default_bias) + notes.slopes[0] * np.log(p / (1.0 - p)) + notes.slopes[1] * size
         )
         return 1.0 / (1.0 + np.exp(-odds))
+
+
+def synthetic_pixels() -> EmbeddedPixels:
+    """Return the encoder whose weights saw rendered worlds alone."""
+    return EmbeddedPixels(load_network(SYNTHETIC_WEIGHTS))

@@ -1,7 +1,8 @@
 """The network behind the embedded pixel and view encoders: what each pixel shows, and what kind of room it is.
 
 It looks at geometry in the frame of gravity, and at colour through a small late branch. It runs in onnxruntime at
-a small size (``Notes.width_px``), whatever the recording's; ``training/pixels`` makes its weights.
+a small size (``Notes.width_px``), whatever the recording's; ``training/pixels`` makes its weights. Two sets ship: one
+that learnt from rendered worlds and real frames, and one that saw rendered worlds alone (the profile ``synthetic``).
 """
 
 import json
@@ -23,9 +24,10 @@ from avlmaps.perception.embedded.geometry import channels
 from avlmaps.recordings.registration import depth_in_colour
 from avlmaps.recordings.types import Frame
 
-_MULTIPLE = 16
 # Without ground a camera is taken to be upright and as high as people and robots mostly hold it.
 _USUAL_HEIGHT_M = 1.3
+# Names of the weights that ship.
+DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS = "scene_encoder", "scene_encoder_synthetic"
 
 
 class InstanceNotes(msgspec.Struct, frozen=True):
@@ -54,7 +56,7 @@ class Notes(msgspec.Struct, frozen=True):
     Attributes:
         id: the model's name and version.
         note: its limits, one sentence.
-        categories: what pixels are told apart into, ``other`` last.
+        categories: kinds of pixels, ``other`` among them.
         rooms: kinds of room.
         bias: added to the categories' scores: undoes the weights of training and calibrates.
         temperature: divides the categories' scores before the softmax.
@@ -64,6 +66,7 @@ class Notes(msgspec.Struct, frozen=True):
         width_px: how wide the pictures are that the network looks at; their focal length is no longer than this
             either, since it was trained on none longer.
         instances: how instances are told from noise.
+        multiple: pictures are padded to a multiple of this.
     """
 
     id: str
@@ -77,6 +80,7 @@ class Notes(msgspec.Struct, frozen=True):
     kinds: dict[str, tuple[str, ...]]
     width_px: int = 240
     instances: InstanceNotes = InstanceNotes()
+    multiple: int = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,11 +91,14 @@ class Seen:
         category: probability of each category on a grid that covers the colour picture evenly.
         known: which cells have a depth.
         room: probability of each kind of room.
+        floor_offset_m: estimated height of the true floor over the one that the frame's ground says; None where the
+            weights do not estimate it.
     """
 
     category: Float32[np.ndarray, "h w c"]
     known: np.ndarray
     room: Float32[np.ndarray, " r"]
+    floor_offset_m: float | None = None
 
 
 class SceneNetwork:
@@ -113,28 +120,37 @@ class SceneNetwork:
         """Look at a frame; its ``ground`` says which way is up, where it is known."""
         camera, depth_m, rgb = at_working_size(frame, self.notes.width_px)
         up, height_m = _ground_of(frame)
-        geometry = _padded(channels(depth_m, camera, up, height_m))
-        colour = _padded(rgb.astype(np.float32).transpose(2, 0, 1) / 127.5 - 1.0)
-        score, room = (
+        multiple = self.notes.multiple
+        geometry = _padded(channels(depth_m, camera, up, height_m), multiple)
+        colour = _padded(rgb.astype(np.float32).transpose(2, 0, 1) / 127.5 - 1.0, multiple)
+        score, room, *floor = (
             np.asarray(output)
             for output in self._session.run(None, {"geometry": geometry[None], "colour": colour[None]})
         )
         h, w = (depth_m.shape[0] + 1) // 2, (depth_m.shape[1] + 1) // 2
         category = score[0, :, :h, :w].transpose(1, 2, 0) + self._bias
         known = cv2.resize((depth_m > 0.0).astype(np.uint8), (w, h), interpolation=cv2.INTER_AREA) > 0
-        return Seen(_softmax(category / self.notes.temperature), known, _softmax(room[0] / self.notes.room_temperature))
+        return Seen(
+            _softmax(category / self.notes.temperature),
+            known,
+            _softmax(room[0] / self.notes.room_temperature),
+            float(floor[0].item()) if floor else None,
+        )
 
 
 @cache
-def load_network() -> SceneNetwork:
-    """Return the network that ships with the package.
+def load_network(weights: str = DEFAULT_WEIGHTS) -> SceneNetwork:
+    """Return a network that ships with the package.
+
+    Args:
+        weights: ``DEFAULT_WEIGHTS`` or ``SYNTHETIC_WEIGHTS``.
 
     Raises:
         BackendError: its files are missing or damaged.
     """
     folder = files("avlmaps.perception.embedded") / "weights"
     try:
-        weights, about = ((folder / f"rooms.{end}").read_bytes() for end in ("onnx", "json"))
+        arrays, about = ((folder / f"{weights}.{end}").read_bytes() for end in ("onnx", "json"))
         notes = msgspec.json.decode(about, type=Notes)
     except (FileNotFoundError, msgspec.MsgspecError, json.JSONDecodeError) as fault:
         raise BackendError(
@@ -143,7 +159,7 @@ def load_network() -> SceneNetwork:
         ) from fault
     # What makes the features is in the checksum; how they are read may change, and old maps can still be asked.
     made_by = msgspec.structs.replace(notes, called={}, kinds={}, instances=InstanceNotes(), note="")
-    return SceneNetwork(weights, notes, sha256(weights + msgspec.json.encode(made_by)).hexdigest())
+    return SceneNetwork(arrays, notes, sha256(arrays + msgspec.json.encode(made_by)).hexdigest())
 
 
 def at_working_size(
@@ -173,9 +189,9 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _padded(picture: Float32[np.ndarray, "c h w"]) -> Float32[np.ndarray, "c hp wp"]:
+def _padded(picture: Float32[np.ndarray, "c h w"], multiple: int) -> Float32[np.ndarray, "c hp wp"]:
     h, w = picture.shape[1:]
-    return np.pad(picture, ((0, 0), (0, -h % _MULTIPLE), (0, -w % _MULTIPLE)))
+    return np.pad(picture, ((0, 0), (0, -h % multiple), (0, -w % multiple)))
 
 
 def _softmax(score: Any) -> Float32[np.ndarray, "..."]:

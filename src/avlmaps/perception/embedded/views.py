@@ -7,7 +7,7 @@ from jaxtyping import Float32
 
 from avlmaps.perception.embedded.closed_set import NamedEncoder
 from avlmaps.perception.embedded.codes import features_of
-from avlmaps.perception.embedded.scene_network import SceneNetwork
+from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, SceneNetwork, load_network
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.types import Frame
 
@@ -49,3 +49,8 @@ class EmbeddedViews(NamedEncoder):
         vector = self._words.encode([word])[0]
         rest = vector - self.codes.T @ (self.codes @ vector)
         return rest if np.linalg.norm(rest) > 1e-3 else vector
+
+
+def synthetic_views() -> EmbeddedViews:
+    """Return the encoder whose weights saw rendered worlds alone."""
+    return EmbeddedViews(load_network(SYNTHETIC_WEIGHTS))

@@ -1,0 +1,146 @@
+"""The frame benchmark: what the pixel encoder recognises in single labelled frames, without any map.
+
+Each of our kinds belongs to one of the classes (``avlmaps.bench.nyu``); the likeliest of the 37 scored classes, by the
+sum of its kinds' probabilities, is the answer for a pixel. Every second pixel is scored where it has one of the 37.
+Up is the data set's. The floor is the median height of the labelled floor where that has 800 pixels or more, else the
+one that ``find_ground`` estimates from the frame alone, as a build does from all frames.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from jaxtyping import Float32, Int
+
+from avlmaps.bench.nyu import CAMERA, CLASSES, SCORED, NyuFolder, class_of_kinds
+from avlmaps.core.progress import progress
+from avlmaps.perception.embedded.pixels import EmbeddedPixels
+
+STEP = 2
+Table = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class FrameFigures:
+    """What all frames gave.
+
+    Attributes:
+        confusion: pixels of each true class (rows) that were taken for each class.
+        frames: how many frames there were.
+        floors_labelled: in how many the labels gave the floor.
+        right_by_frame: share of right pixels of each frame that has any.
+    """
+
+    confusion: Int[np.ndarray, "37 37"]
+    frames: int
+    floors_labelled: int
+    right_by_frame: Float32[np.ndarray, " n"]
+
+    @property
+    def accuracy(self) -> float:
+        """Share of pixels that are right."""
+        return float(np.trace(self.confusion) / max(1, self.confusion.sum()))
+
+    @property
+    def recall(self) -> Float32[np.ndarray, " 37"]:
+        """Share of each class's pixels that are right; NaN for a class that does not occur."""
+        truth = self.confusion.sum(axis=1)
+        return np.where(truth > 0, np.diag(self.confusion) / np.maximum(truth, 1), np.nan).astype(np.float32)
+
+    @property
+    def iou(self) -> Float32[np.ndarray, " 37"]:
+        """Intersection over union of each class; NaN for a class that does not occur."""
+        truth, right = self.confusion.sum(axis=1), np.diag(self.confusion)
+        union = truth + self.confusion.sum(axis=0) - right
+        return np.where(truth > 0, right / np.maximum(union, 1), np.nan).astype(np.float32)
+
+    @property
+    def class_accuracy(self) -> float:
+        """Mean recall of the classes that occur."""
+        return float(np.nanmean(self.recall))
+
+    @property
+    def mean_iou(self) -> float:
+        """Mean IoU of the classes that occur."""
+        return float(np.nanmean(self.iou))
+
+
+def class_probabilities(
+    probability: Float32[np.ndarray, "h w k"], kinds: tuple[str, ...]
+) -> Float32[np.ndarray, "480 640 37"]:
+    """Return the sums over each scored class's kinds, spread over the picture."""
+    number = class_of_kinds(kinds)
+    group = np.zeros((len(kinds), len(CLASSES)), np.float32)
+    group[np.arange(len(kinds)), number] = 1.0
+    summed = probability @ group[:, :SCORED]
+    return np.asarray(cv2.resize(summed, (CAMERA.width, CAMERA.height), interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def measure(encoder: EmbeddedPixels, folder: NyuFolder) -> FrameFigures:
+    """Score every frame of a folder."""
+    confusion, labelled, shares = np.zeros((SCORED, SCORED), np.int64), 0, []
+    for number in progress(range(len(folder)), "frames"):
+        one = folder.read(number)
+        seen = encoder.see(one.frame)
+        said = class_probabilities(seen.category, encoder.names)[::STEP, ::STEP].argmax(axis=2)
+        truth = one.label[::STEP, ::STEP].astype(np.int64) - 1
+        scored = (truth >= 0) & (truth < SCORED)
+        counts = np.bincount(truth[scored] * SCORED + said[scored], minlength=SCORED**2).reshape(SCORED, SCORED)
+        confusion += counts
+        labelled += one.floor_is_labelled
+        if scored.any():
+            shares.append(np.trace(counts) / scored.sum())
+    return FrameFigures(confusion, len(folder), labelled, np.array(shares, np.float32))
+
+
+def run_frames(encoder: EmbeddedPixels, folder: Path) -> dict[str, Table]:
+    """Return the tables of a folder of labelled frames.
+
+    Raises:
+        RecordingError: the folder has no index, or a frame cannot be read.
+    """
+    figures = measure(encoder, NyuFolder(folder))
+    return {"labelled frames": summary_table(figures), "by class": class_table(figures)}
+
+
+def summary_table(figures: FrameFigures) -> Table:
+    """Return one row: frames, pixels and the three means, with an interval over frames for the first."""
+    low, high = interval_over_frames(figures.right_by_frame)
+    row = [
+        figures.frames, figures.floors_labelled, int(figures.confusion.sum()),
+        f"{figures.accuracy:.3f}", f"{low:.3f}-{high:.3f}", f"{figures.class_accuracy:.3f}", f"{figures.mean_iou:.3f}",
+        int((figures.confusion.sum(axis=1) > 0).sum()),
+    ]  # fmt: skip
+    columns = [
+        "frames", "floor labelled", "pixels scored", "pixel accuracy", "mean over frames, 95 %", "class accuracy",
+        "mean IoU", "classes",
+    ]  # fmt: skip
+    return {"columns": columns, "rows": [row]}
+
+
+def interval_over_frames(shares: Float32[np.ndarray, " n"]) -> tuple[float, float]:
+    """Return the 95 % interval of the mean over frames, by the normal; pixels of one frame are not independent."""
+    if len(shares) < 2:
+        return 0.0, 1.0
+    half = 1.96 * float(shares.std(ddof=1)) / np.sqrt(len(shares))
+    return max(0.0, float(shares.mean()) - half), min(1.0, float(shares.mean()) + half)
+
+
+def class_table(figures: FrameFigures) -> Table:
+    """Return for each class its pixels, recall, IoU, and what it is mostly taken for."""
+    rows, truth = [], figures.confusion.sum(axis=1)
+    for number, name in enumerate(CLASSES[:SCORED]):
+        if not truth[number]:
+            rows.append([name, 0, "-", "-", "-"])
+            continue
+        mistaken = figures.confusion[number].copy()
+        mistaken[number] = 0
+        most = [k for k in np.argsort(-mistaken, kind="stable")[:3] if mistaken[k] >= 0.03 * truth[number]]
+        taken = ", ".join(f"{CLASSES[k]} {mistaken[k] / truth[number]:.2f}" for k in most)
+        rows.append([
+            name, int(truth[number]), f"{figures.recall[number]:.3f}", f"{figures.iou[number]:.3f}", taken or "-"
+        ])  # fmt: skip
+    return {"columns": ["class", "pixels", "recall", "IoU", "taken for"], "rows": rows}

@@ -1,0 +1,239 @@
+"""How well commands and questions are understood, on lists that strangers wrote before the parser saw them.
+
+Each list is a file ``data/language/NAME.jsonl`` (docs/language-intents.md says how rows are written). ``sealed.json``
+holds its SHA-256 and what was counted when it was first used; later counts are of a development list.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from avlmaps.bench.harness.intervals import wilson
+from avlmaps.core.errors import LanguageError, QueryError
+from avlmaps.core.inflection import singulars_of
+from avlmaps.core.lexicon import Kind, lexicon
+
+OUTCOMES = ("right", "harmless", "asked back", "misread")
+_STOPS = frozenset({"refuse", "clarify"})
+_LOOKS = frozenset({"wait", "face", "turn"})
+_WHO = frozenset(
+    {
+        "anyone",
+        "anybody",
+        "someone",
+        "somebody",
+        "person",
+        "a",
+        "an",
+        "the",
+        "sound",
+        "noise",
+        "of",
+        "on",
+        "people",
+        "sounds",
+    }
+)
+_ENDINGS = ("ing", "ed", "es", "s", "er", "y", "e")
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """One row and what became of it.
+
+    Attributes:
+        say: the sentence.
+        is_question: whether it is for `query`.
+        outcome: one of `OUTCOMES`.
+        got: what the parser made of it, as JSON.
+        wanted: what the list has.
+    """
+
+    say: str
+    is_question: bool
+    outcome: str
+    got: Any
+    wanted: Any
+
+
+def read_list(path: Path) -> list[Row]:
+    """Return the rows of a list."""
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+
+
+def judge(row: Row) -> Judged:
+    """Return what becomes of a row."""
+    if "question" in row:
+        return _judge_question(row)
+    got = _intents_of(row)
+    wanted = [row["intents"], *row.get("also", [])]
+    return Judged(
+        str(row["say"]), False, min((_outcome(got, each) for each in wanted), key=OUTCOMES.index), got, wanted[0]
+    )
+
+
+def _intents_of(row: Row) -> list[Any]:
+    from avlmaps.language.commands import Given, read_command
+    from avlmaps.language.intents import to_json
+
+    try:
+        read = read_command(str(row["say"]), Given(row.get("image"), row.get("clip")))
+    except LanguageError as fault:
+        return [{"do": "refuse", "reason": "unknown", "said": str(fault)}]
+    return [to_json(intent) for intent in read.intents]
+
+
+def _judge_question(row: Row) -> Judged:
+    from avlmaps.language.commands import Given
+    from avlmaps.language.questions import read_question
+
+    try:
+        got: Any = read_question(
+            str(row["say"]), Given(row.get("image"), row.get("clip"), lambda _: True)
+        ).inquiry.to_json()
+    except QueryError as fault:
+        got = {"ask": "refuse", "said": str(fault)}
+    wanted = [row["question"], *row.get("also", [])]
+    return Judged(
+        str(row["say"]), True, min((_answered(got, each) for each in wanted), key=OUTCOMES.index), got, wanted[0]
+    )
+
+
+def _answered(got: Mapping[str, Any], wanted: Any) -> str:
+    if not isinstance(wanted, dict) or wanted.get("ask") in _STOPS:
+        return "right" if got["ask"] in _STOPS else "misread"
+    if got["ask"] in _STOPS:
+        return "asked back"
+    if got["ask"] != wanted["ask"]:
+        return "misread"
+    targets = [_target(one) for one in got["of"]]
+    return "right" if all(_target(one) in targets for one in wanted["of"]) else "misread"
+
+
+def _outcome(got: Sequence[Any], wanted: Sequence[Any]) -> str:
+    stopped, to_stop = got[0]["do"] in _STOPS, any(each["do"] in _STOPS for each in wanted)
+    if stopped or to_stop:
+        return "right" if stopped and to_stop else "asked back" if stopped else "misread"
+    ours, theirs = _plain(got), _plain(wanted)
+    if ours == theirs:
+        return "right"
+    return "harmless" if _places(ours) == _places(theirs) else "misread"
+
+
+def _plain(intents: Sequence[Any]) -> list[Any]:
+    """Return intents with names as the lexicon has them and without what a list need not say."""
+    return [_intent(each) for each in intents]
+
+
+def _intent(intent: Mapping[str, Any]) -> tuple[Any, ...]:
+    do = intent["do"]
+    of, to = intent.get("of"), intent.get("to")
+    if do == "repeat":
+        return do, int(intent["times"]), tuple(_plain(intent["body"]))
+    if do == "between":
+        return do, frozenset(_target(one) for one in intent["of"])
+    target = _target(of if of is not None else to) if of is not None or to is not None else None
+    numbers = tuple(_rounded(intent.get(name)) for name in ("metres", "seconds", "heading", "views", "times"))
+    degrees = _rounded(intent.get("degrees"))
+    degrees = 180.0 if degrees == -180.0 else degrees
+    return do, target, str(intent.get("side", "ahead")), degrees, *numbers
+
+
+def _rounded(value: Any) -> float | None:
+    return None if value is None else round(float(value), 2)
+
+
+def _places(intents: Sequence[Any]) -> list[Any]:
+    """Return where the robot goes; turns count where a straight move follows, for they decide where it ends."""
+    flat = [part for each in intents for part in (each[2] * each[1] if each[0] == "repeat" else (each,))]
+    keeps = _LOOKS - ({"turn", "face"} if any(each[0] == "move" for each in flat) else frozenset())
+    return [each for each in flat if each[0] not in keeps]
+
+
+def _target(target: Any) -> Any:
+    if isinstance(target, str):
+        target = {"object": target}
+    kind = next(name for name in ("object", "sound", "area", "image", "clip", "here") if name in target)
+    pick = target.get("pick", "")
+    near = frozenset(_target(one) for one in target.get("near", ()))
+    return kind, _name(kind, target[kind]), near, "" if pick == "nearest" else pick
+
+
+def _name(kind: str, name: Any) -> Any:
+    if kind in ("image", "clip", "here"):
+        return name
+    if kind == "sound":
+        joined = str(name).lower().replace("door bell", "doorbell")
+        return frozenset(_stem(word) for word in joined.split() if word not in _WHO)
+    words = [word for word in str(name).lower().replace("-", " ").split() if word not in ("the", "a", "an", "my")]
+    wanted = Kind.ROOM if kind == "area" else Kind.THING
+    for start in range(len(words)):
+        entry = lexicon().find(" ".join(words[start:]), wanted)
+        if entry is not None:
+            return (*words[:start], entry.name)
+    return (*words[:-1], next(iter(singulars_of(words[-1])), words[-1])) if words else ()
+
+
+def _stem(word: str) -> str:
+    for ending in _ENDINGS:
+        if word.endswith(ending) and len(word) - len(ending) >= 3:
+            word = word[: -len(ending)]
+            break
+    return word[:-1] if len(word) > 3 and word[-1] == word[-2] else word[:5]
+
+
+def counts(judged: Sequence[Judged]) -> dict[str, int]:
+    """Return how many rows had each outcome."""
+    return {outcome: sum(one.outcome == outcome for one in judged) for outcome in OUTCOMES}
+
+
+def row_of(name: str, judged: Sequence[Judged]) -> list[str]:
+    """Return a row of the suite's table: counts and shares with 95 % intervals."""
+    found = counts(judged)
+    return [name, str(len(judged)), *(_share(found[outcome], len(judged)) for outcome in OUTCOMES)]
+
+
+def _share(hits: int, count: int) -> str:
+    low, high = wilson(hits, count)
+    return f"{hits} ({100 * hits / max(count, 1):.1f} % [{100 * low:.1f}, {100 * high:.1f}])"
+
+
+def sealed() -> dict[str, Any]:
+    """Return for each shipped list its hash and its counts at first use."""
+    return json.loads(files("avlmaps.bench").joinpath("data/language/sealed.json").read_text(encoding="utf-8"))
+
+
+def shipped(name: str) -> list[Row]:
+    """Return the rows of a shipped list.
+
+    Raises:
+        ValueError: the file is not the one that was sealed.
+    """
+    content = files("avlmaps.bench").joinpath(f"data/language/{name}.jsonl").read_bytes()
+    if hashlib.sha256(content).hexdigest() != sealed()[name]["sha256"]:
+        raise ValueError(f"the list {name} is not the one that was sealed")
+    return [json.loads(line) for line in content.decode("utf-8").splitlines() if line.strip()]
+
+
+def run() -> dict[str, dict[str, list[Any]]]:
+    """Return two tables: counts at the first use of each list, and counts now, when the lists are development lists."""
+    columns = ["list", "sentences", *OUTCOMES]
+    first, now = [], []
+    for name, seal in sealed().items():
+        for part, at_first in seal["first use"].items():
+            total = sum(at_first.values())
+            first.append([f"{name}, {part}", str(total), *(_share(at_first[outcome], total) for outcome in OUTCOMES)])
+        judged = [judge(row) for row in shipped(name)]
+        for part, is_question in (("commands", False), ("questions", True)):
+            these = [one for one in judged if one.is_question is is_question]
+            if these:
+                now.append(row_of(f"{name}, {part}", these))
+    return {
+        "blind, at first use": {"columns": columns, "rows": first},
+        "the same lists now (development)": {"columns": columns, "rows": now},
+    }

@@ -1,0 +1,266 @@
+"""What a command or a question asks for: plain, typed values between the words and the program.
+
+`Target` names one thing, sound, area or file of the map. An `Intent` is one step of a command. Angles are in degrees,
+clockwise (positive is to the right); distances are in metres.
+"""
+
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Any, ClassVar
+
+
+class Kind(StrEnum):
+    """What a target is; the value is its key in JSON."""
+
+    OBJECT = "object"
+    SOUND = "sound"
+    AREA = "area"
+    IMAGE = "image"
+    CLIP = "clip"
+    HERE = "here"
+
+
+class Pick(StrEnum):
+    """Which one of several things of a name."""
+
+    ANY = ""
+    NEAREST = "nearest"
+    FARTHEST = "farthest"
+    OTHER = "other"
+
+
+class Side(StrEnum):
+    """A side of a thing, or a side of the robot."""
+
+    LEFT = "left"
+    RIGHT = "right"
+    FRONT = "front"
+    BEHIND = "behind"
+    NORTH = "north"
+    SOUTH = "south"
+    EAST = "east"
+    WEST = "west"
+    AHEAD = "ahead"
+
+
+class Reason(StrEnum):
+    """Why a command is refused."""
+
+    MANIPULATION = "manipulation"
+    ENDLESS = "endless"
+    HARM = "harm"
+    FLYING = "flying"
+    CONDITION = "condition"
+    NEGATION = "negation"
+    CHAT = "chat"
+    QUESTION = "question"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One thing, sound, area, picture or clip.
+
+    Two targets that are equal are the same instance; `Pick.OTHER` is another instance of the same name.
+
+    Attributes:
+        kind: what it is.
+        name: its words as they were said, without the article; the path of a file for an image and a clip.
+        near: what it is near, in, on, or between, in the order of the words.
+        pick: which one of several.
+    """
+
+    kind: Kind
+    name: str = ""
+    near: "tuple[Target, ...]" = ()
+    pick: Pick = Pick.ANY
+
+    @property
+    def is_file(self) -> bool:
+        """Whether the name is the path of a file."""
+        return self.kind in (Kind.IMAGE, Kind.CLIP)
+
+    def with_near(self, *more: "Target") -> "Target":
+        """Return this target, near some more."""
+        return replace(self, near=(*self.near, *(one for one in more if one not in self.near)))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the target as JSON has it, such as ``{"object": "chair", "near": [{"area": "kitchen"}]}``."""
+        told: dict[str, Any] = {str(self.kind): self.name if self.kind is not Kind.HERE else True}
+        if self.near:
+            told["near"] = [one.to_json() for one in self.near]
+        if self.pick:
+            told["pick"] = str(self.pick)
+        return told
+
+
+@dataclass(frozen=True, slots=True)
+class Go:
+    """Drive to a target."""
+
+    do: ClassVar[str] = "go"
+    to: Target
+
+
+@dataclass(frozen=True, slots=True)
+class Face:
+    """Turn on the spot until a target is ahead, on the left, on the right, or behind."""
+
+    do: ClassVar[str] = "face"
+    to: Target
+    side: Side = Side.AHEAD
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """Turn on the spot by an angle, or to a heading of the compass (0 north, 90 east); one of the two is given."""
+
+    do: ClassVar[str] = "turn"
+    degrees: float | None = None
+    heading: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """Drive straight ahead, or backwards by a negative distance."""
+
+    do: ClassVar[str] = "move"
+    metres: float
+
+
+@dataclass(frozen=True, slots=True)
+class Between:
+    """Drive to the middle between two targets; `Kind.HERE` is where the robot stands."""
+
+    do: ClassVar[str] = "between"
+    of: tuple[Target, Target]
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """Drive to a side of a target; without a distance as near as the robot's skill goes."""
+
+    do: ClassVar[str] = "beside"
+    of: Target
+    side: Side
+    metres: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StopAt:
+    """Stop at a distance from a target, on the side where the robot comes from."""
+
+    do: ClassVar[str] = "stop_at"
+    of: Target
+    metres: float
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """Drive around a target, once; with ``views`` stop at so many points and look at it."""
+
+    do: ClassVar[str] = "circle"
+    of: Target
+    views: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class VisitEach:
+    """Drive to every instance of a target, the nearest first."""
+
+    do: ClassVar[str] = "visit_each"
+    of: Target
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """Stand still for some seconds; None where no time was said."""
+
+    do: ClassVar[str] = "wait"
+    seconds: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Return:
+    """Drive back to where the robot stood when the command began."""
+
+    do: ClassVar[str] = "return"
+
+
+@dataclass(frozen=True, slots=True)
+class Repeat:
+    """Do the same several times."""
+
+    do: ClassVar[str] = "repeat"
+    times: int
+    body: "tuple[Intent, ...]"
+
+
+@dataclass(frozen=True, slots=True)
+class Refuse:
+    """The robot does nothing; ``said`` is the sentence that says why."""
+
+    do: ClassVar[str] = "refuse"
+    reason: Reason
+    said: str = field(default="", compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Clarify:
+    """The robot does nothing until a question is answered."""
+
+    do: ClassVar[str] = "clarify"
+    question: str = field(default="", compare=False)
+    choices: tuple[str, ...] = field(default=(), compare=False)
+
+
+Intent = (
+    Go | Face | Turn | Move | Between | Beside | StopAt | Circle | VisitEach | Wait | Return | Repeat | Refuse | Clarify
+)
+
+
+def to_json(intent: Intent) -> dict[str, Any]:
+    """Return an intent as JSON has it; what is None or a default is left out."""
+    told: dict[str, Any] = {"do": intent.do}
+    for name in intent.__slots__:
+        value = getattr(intent, name)
+        if value is None or value == "" or value == () or (name == "side" and value is Side.AHEAD):
+            continue
+        if isinstance(value, Target):
+            told[name] = value.to_json()
+        elif isinstance(value, tuple):
+            told[name] = [_inner(one) for one in value]
+        else:
+            told[name] = str(value) if isinstance(value, StrEnum) else value
+    return told
+
+
+def _inner(value: Any) -> Any:
+    if isinstance(value, Target):
+        return value.to_json()
+    return value if isinstance(value, str) else to_json(value)
+
+
+class Ask(StrEnum):
+    """What a question wants to know of a target."""
+
+    WHERE = "where"
+    HOW_MANY = "how_many"
+    EXISTS = "exists"
+
+
+@dataclass(frozen=True, slots=True)
+class Inquiry:
+    """A question to the map.
+
+    Attributes:
+        ask: what it wants to know.
+        of: the target; several are alternatives ("where can I sit?"), any of which answers it.
+    """
+
+    ask: Ask
+    of: tuple[Target, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the question as JSON has it."""
+        return {"ask": str(self.ask), "of": [one.to_json() for one in self.of]}

@@ -1,0 +1,247 @@
+"""From a sentence to tokens: words, figures, file names, punctuation; and amounts with their units.
+
+What is spelled by rule and not by a grammar stands here: numbers in figures and words, units, clock directions, names
+of picture and sound files, and media in curly braces as the paper writes them.
+"""
+
+import re
+from dataclasses import dataclass
+from math import degrees
+from unicodedata import normalize
+
+_CHARACTERS = str.maketrans({"‘": "'", "’": "'", "“": '"', "”": '"', "–": "-", "—": "-", "…": ".", "º": "°"})
+_IMAGES = r"\.(?:png|jpe?g|bmp|webp|tiff?|gif)"
+_CLIPS = r"\.(?:wav|flac|ogg|mp3|m4a|aac)"
+_TOKEN = re.compile(
+    rf"""
+    (?P<brace>\{{[^{{}}]*\}})
+  | (?P<image>"[^"]+{_IMAGES}"|'[^']+{_IMAGES}'|[^\s"',;:!?()<>{{}}]+{_IMAGES}(?![\w/]))
+  | (?P<clip>"[^"]+{_CLIPS}"|'[^']+{_CLIPS}'|[^\s"',;:!?()<>{{}}]+{_CLIPS}(?![\w/]))
+  | (?P<number>\d+(?:[.,]\d+)?(?:/\d+)?)
+  | (?P<clock>o['\s]?clock\b)
+  | (?P<word>[^\W\d_]+(?:['’][^\W\d_]+)*)
+  | (?P<punct>->|=>|<-|\.+|[,;:!?()<>=\n-]|[^\w\s])
+    """,
+    re.IGNORECASE | re.VERBOSE,
+)
+_CLITICS = {"'m": "am", "'re": "are", "'ve": "have", "'ll": "will", "'d": "would", "'s": "'s"}
+_WHOLE = {
+    "let's": "let us", "can't": "can not", "cannot": "can not", "won't": "will not", "shan't": "shall not",
+    "dont": "do not", "cant": "can not", "im": "i am", "ive": "i have", "id": "i would", "thats": "that is",
+    "theres": "there is", "whats": "what is", "wheres": "where is", "lets": "let us", "isnt": "is not",
+    "gimme": "give me", "lemme": "let me", "wanna": "want to", "gonna": "going to", "gotta": "have to",
+    "pls": "please", "plz": "please", "thx": "thanks", "u": "you", "ur": "your", "ya": "you", "goto": "go to",
+    "i'd": "i would", "youre": "you are", "its": "its", "doesnt": "does not", "didnt": "did not", "'em": "them",
+    "y'all": "you", "c'mon": "come on", "o'clock": "o'clock", "oclock": "o'clock", "okay": "ok", "gon": "going",
+    "infront": "in front", "inbetween": "in between", "rite": "right", "tho": "though", "cuz": "because",
+    "cos": "because", "til": "until", "till": "until", "nav": "navigate", "fwd": "forward", "r": "are",
+}  # fmt: skip
+_IS = frozenset({
+    "that", "there", "what", "where", "it", "he", "she", "who", "here", "how", "someone", "somebody", "which",
+    "everyone", "everybody", "something",
+})  # fmt: skip
+_SMALL = {
+    "zero": 0, "one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9,
+    "ten": 10, "eleven": 11, "twelve": 12, "thirteen": 13, "fourteen": 14, "fifteen": 15, "sixteen": 16,
+    "seventeen": 17, "eighteen": 18, "nineteen": 19,
+}  # fmt: skip
+_TENS = {
+    "twenty": 20, "thirty": 30, "forty": 40, "fourty": 40, "fifty": 50, "sixty": 60, "seventy": 70, "eighty": 80,
+    "ninety": 90,
+}  # fmt: skip
+_PARTS = {"half": 0.5, "quarter": 0.25, "quarters": 0.25, "third": 1 / 3}
+_VAGUE = {("a", "couple"): 2, ("a", "few"): 3, ("couple",): 2, ("few",): 3, ("several",): 3, ("a", "pair"): 2,
+          ("a", "dozen"): 12, ("some",): 3}  # fmt: skip
+_BEGIN_NUMBERS = frozenset({*_SMALL, *_TENS, *_PARTS, *(words[0] for words in _VAGUE), "an"})
+LENGTHS = {
+    "m": 1.0, "metre": 1.0, "meter": 1.0, "mtr": 1.0, "cm": 0.01, "centimetre": 0.01, "centimeter": 0.01, "dm": 0.1,
+    "mm": 0.001, "millimetre": 0.001, "millimeter": 0.001, "ft": 0.3048, "foot": 0.3048, "feet": 0.3048,
+    "yd": 0.9144, "yard": 0.9144, "in": 0.0254, "inch": 0.0254, "inche": 0.0254, "step": 0.5, "pace": 0.5, "km": 1000.0,
+    "kilometre": 1000.0, "kilometer": 1000.0, "mile": 1609.344, "decimetre": 0.1, "decimeter": 0.1, "tile": 0.5,
+}  # fmt: skip
+_ANGLES = {"degree": 1.0, "deg": 1.0, "°": 1.0, "radian": degrees(1.0), "rad": degrees(1.0)}
+_TIMES = {"second": 1.0, "sec": 1.0, "s": 1.0, "minute": 60.0, "min": 60.0, "moment": 2.0, "hour": 3600.0}
+_SIZES = frozenset({"more", "further", "full", "big", "small", "little", "long", "short", "tiny", "good", "another"})
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    """A word, figure, file name or mark.
+
+    Attributes:
+        text: lower case, clitics apart ("don't" is ``do`` and ``not``); the path of a file.
+        raw: as it was written.
+        kind: ``word``, ``number``, ``image``, ``clip`` or ``punct``.
+        start: where it begins in the sentence.
+        end: where it ends.
+    """
+
+    text: str
+    raw: str
+    kind: str
+    start: int
+    end: int
+
+
+def tokenise(sentence: str) -> list[Token]:
+    """Return the tokens of a sentence, in their order."""
+    plain = normalize("NFC", sentence).translate(_CHARACTERS)
+    tokens: list[Token] = []
+    for found in _TOKEN.finditer(plain):
+        kind, raw = found.lastgroup or "punct", found[0]
+        if kind == "brace":
+            inner = [Token(t.text, t.raw, t.kind, t.start, t.end) for t in tokenise(raw[1:-1])]
+            media = any(t.text in ("image", "picture", "photo", "sound") for t in inner)
+            tokens += [Token("{", "{", "punct", found.start(), found.start() + 1), *inner] if media else inner
+        elif kind in ("image", "clip"):
+            tokens.append(Token(raw.strip("\"'"), raw, kind, found.start(), found.end()))
+        elif kind == "word":
+            tokens += _words(raw, found.start())
+        elif raw not in ("-", '"', "'", "`", "*", "_") or _stands_alone(plain, found.start(), raw):
+            word = "word" if kind == "clock" or raw == "°" else kind
+            text = {"->": ">", "=>": ">", "\n": "."}.get(raw, "." if raw.startswith(".") else raw.lower())
+            tokens.append(Token("o'clock" if kind == "clock" else text, raw, word, found.start(), found.end()))
+    return tokens
+
+
+def _stands_alone(text: str, at: int, mark: str) -> bool:
+    """Return whether a hyphen is a dash between words and not a part of one."""
+    return mark == "-" and (at == 0 or text[at - 1].isspace()) and (at + 1 == len(text) or not text[at + 1].isdigit())
+
+
+def _words(raw: str, start: int) -> list[Token]:
+    lower, end = raw.lower(), start + len(raw)
+    if lower in _WHOLE:
+        return [Token(word, raw, "word", start, end) for word in _WHOLE[lower].split()]
+    if lower.endswith("n't"):
+        return [Token(word, raw, "word", start, end) for word in (lower[:-3], "not")]
+    at = lower.rfind("'")
+    if at > 0 and lower[at:] in _CLITICS:
+        stem, rest = lower[:at], _CLITICS[lower[at:]]
+        rest = "is" if rest == "'s" and stem in _IS else rest
+        return [
+            Token(stem, raw[:at], "word", start, start + at), Token(rest, raw[at:], "word", start + at, end)
+        ]  # fmt: skip
+    return [Token(lower.replace("'", ""), raw, "word", start, end)]
+
+
+WORDS = frozenset({
+    *_SMALL, *_TENS, *_PARTS, "hundred", "couple", "few", "several", "dozen", *LENGTHS, *_ANGLES, *_TIMES, *_SIZES,
+    *_WHOLE, "o'clock",
+})  # fmt: skip
+
+
+def number_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
+    """Return the numbers that begin at a token, each with where it ends: figures, words, "half", "a couple of"."""
+    found: list[tuple[int, float]] = []
+    if i >= len(tokens):
+        return found
+    token = tokens[i]
+    if token.kind != "number" and token.text not in _BEGIN_NUMBERS:
+        return found
+    if token.kind == "number":
+        whole, _, part = token.text.replace(",", ".").partition("/")
+        value = float(whole) / float(part) if part and float(part) else float(whole)
+        return _with_part(tokens, i + 1, value)
+    for words, value in _VAGUE.items():
+        if tuple(t.text for t in tokens[i : i + len(words)]) == words:
+            end = i + len(words)
+            found.append((end + 1 if end < len(tokens) and tokens[end].text == "of" else end, float(value)))
+    if token.text in _PARTS:
+        end = i + 1
+        end += end < len(tokens) and tokens[end].text == "of"
+        end += end < len(tokens) and tokens[end].text in ("a", "an", "the")
+        found.append((end, _PARTS[token.text]))
+    spelled = _spelled(tokens, i)
+    if spelled is not None:
+        end, value = spelled
+        if tokens[end : end + 1] and tokens[end].text == "quarters":
+            is_of = end + 1 < len(tokens) and tokens[end + 1].text == "of"
+            found.append((end + 1 + is_of, value * 0.25))
+        found += _with_part(tokens, end, value)
+    return found
+
+
+def _with_part(tokens: list[Token], end: int, value: float) -> list[tuple[int, float]]:
+    """Return a number, and the number with "and a half" or "point five" behind it."""
+    found = [(end, value)]
+    words = [t.text for t in tokens[end : end + 3]]
+    if words[:1] == ["and"] and words[1:2] in (["a"], ["an"]) and words[2:] and words[2] in _PARTS:
+        found.insert(0, (end + 3, value + _PARTS[words[2]]))
+    elif words[:1] == ["and"] and words[1:2] and words[1] in _PARTS:
+        found.insert(0, (end + 2, value + _PARTS[words[1]]))
+    elif words[:1] == ["point"] and words[1:2] and words[1] in _SMALL:
+        found.insert(0, (end + 2, value + _SMALL[words[1]] / 10))
+    return found
+
+
+def _spelled(tokens: list[Token], i: int) -> tuple[int, float] | None:
+    """Return the whole number spelled at a token: "one hundred and twenty", "ninety", "a hundred"."""
+    total, at, any_word = 0.0, i, False
+    while at < len(tokens):
+        word = tokens[at].text
+        after = tokens[at + 1].text if at + 1 < len(tokens) else ""
+        if word in _TENS and total % 100 == 0:
+            total += _TENS[word]
+        elif word in _SMALL and total % 10 == 0:
+            total += _SMALL[word]
+        elif word == "hundred" and 0 < total < 10:
+            total *= 100
+        elif word in ("a", "an") and after == "hundred" and not any_word:
+            total += 1
+        elif not (word == "and" and total >= 100 and (after in _TENS or after in _SMALL)):
+            break
+        any_word, at = True, at + 1
+    return (at, total) if any_word else None
+
+
+def amounts_at(tokens: list[Token], i: int, units: dict[str, float]) -> list[tuple[int, float]]:
+    """Return the amounts with a unit that begin at a token: "2 m", "a metre and a half", "half a step"."""
+    found: list[tuple[int, float]] = []
+    numbers = number_at(tokens, i)
+    if i < len(tokens) and tokens[i].text in ("a", "an", "another", "one"):
+        numbers = [*numbers, (i + 1, 1.0)]
+    for end, value in numbers:
+        while end < len(tokens) and tokens[end].text in _SIZES:
+            end += 1
+        if end < len(tokens):
+            unit = _unit(tokens, end, units)
+            if unit is not None:
+                found += [(at, round(amount * unit, 4)) for at, amount in _with_part(tokens, end + 1, value)]
+    return found
+
+
+def _unit(tokens: list[Token], at: int, units: dict[str, float]) -> float | None:
+    word = tokens[at].text
+    if units is LENGTHS and tokens[at].raw in ("'", '"'):
+        return 0.3048 if tokens[at].raw == "'" else 0.0254
+    if word == "in" and at + 1 < len(tokens) and tokens[at + 1].kind == "word" and tokens[at + 1].text in _AFTER_IN:
+        return None
+    return units.get(word) or (units.get(word.removesuffix("s")) if len(word) > 2 else None)
+
+
+_AFTER_IN = frozenset({"the", "a", "front", "between", "total", "my", "your", "this", "that", "here", "there", "from"})
+
+
+def length_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
+    """Return the distances that begin at a token, in metres."""
+    return amounts_at(tokens, i, LENGTHS)
+
+
+def angle_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
+    """Return the angles that begin at a token, in degrees."""
+    return amounts_at(tokens, i, _ANGLES)
+
+
+def duration_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
+    """Return the times that begin at a token, in seconds."""
+    return amounts_at(tokens, i, _TIMES)
+
+
+def clock_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
+    """Return the clock direction that begins at a token ("3 o'clock"), in degrees clockwise from straight ahead."""
+    return [
+        (end + 1, (value % 12) * 30.0 if value % 12 <= 6 else (value % 12) * 30.0 - 360.0)
+        for end, value in number_at(tokens, i)
+        if end < len(tokens) and tokens[end].text == "o'clock" and 1 <= value <= 12
+    ]

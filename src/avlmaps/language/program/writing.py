@@ -1,0 +1,267 @@
+"""From intents to a program in the robot's vocabulary.
+
+A target that is needed more than once, or in a loop, is looked up once, so that all steps mean the same instance.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from avlmaps.language.intents import (
+    Beside,
+    Between,
+    Circle,
+    Face,
+    Go,
+    Intent,
+    Kind,
+    Move,
+    Pick,
+    Repeat,
+    Return,
+    Side,
+    StopAt,
+    Target,
+    Turn,
+    VisitEach,
+    Wait,
+)  # fmt: skip
+
+_CORNERS = 8
+_WAIT_S = 3.0
+_SKILLS = {
+    Side.LEFT: "move_to_left", Side.RIGHT: "move_to_right", Side.NORTH: "move_north", Side.SOUTH: "move_south",
+    Side.EAST: "move_east", Side.WEST: "move_west",
+}  # fmt: skip
+_FACING = {Side.AHEAD: "face", Side.LEFT: "with_object_on_left", Side.RIGHT: "with_object_on_right"}
+
+
+def write_program(intents: Sequence[Intent]) -> str:
+    """Return the program for some intents; none of them is a refusal or a question."""
+    writer = _Writer(intents)
+    writer.block(intents)
+    return "\n".join([*writer.head, *writer.lines]) + "\n"
+
+
+def targets_of(intents: Sequence[Intent]) -> Iterator[Target]:
+    """Yield the targets of some intents, in their order."""
+    for intent in intents:
+        match intent:
+            case Go(to=target) | Face(to=target) | Beside(of=target) | StopAt(of=target) | Circle(of=target):
+                yield target
+            case VisitEach(of=target):
+                yield target
+            case Between(of=(a, b)):
+                yield a
+                yield b
+            case Repeat(body=body):
+                yield from targets_of(body)
+            case _:
+                pass
+
+
+@dataclass(slots=True)
+class _Writer:
+    intents: Sequence[Intent]
+    head: list[str] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
+    names: dict[Target, str] = field(default_factory=dict)
+    taken: Counter[str] = field(default_factory=Counter)
+    indent: str = ""
+    repeats: Counter[Target] = field(default_factory=Counter)
+
+    def __post_init__(self) -> None:
+        self.repeats = Counter(targets_of(self.intents))
+        for intent in self.intents:
+            if isinstance(intent, Repeat):
+                self.repeats.update(targets_of(intent.body))
+        for intent in _flat(self.intents):
+            twice = isinstance(intent, StopAt) or (isinstance(intent, Beside) and intent.side is Side.FRONT)
+            if isinstance(intent, StopAt | Beside | Circle) and (twice or getattr(intent, "views", None)):
+                self.repeats[intent.of] += 1
+        if any(isinstance(one, Return) for one in _flat(self.intents)):
+            self.head.append("start = robot.current_pos()")
+
+    def add(self, line: str) -> None:
+        self.lines.append(self.indent + line)
+
+    def variable(self, stem: str) -> str:
+        plain = "".join(mark if mark.isascii() and mark.isalnum() else "_" for mark in stem.lower()).strip("_")
+        plain = plain if plain and plain[0].isalpha() and plain not in _RESERVED else f"place_{plain}".rstrip("_")
+        self.taken[plain] += 1
+        return plain if self.taken[plain] == 1 else f"{plain}{self.taken[plain]}"
+
+    def block(self, intents: Sequence[Intent]) -> None:
+        for intent in intents:
+            self.write(intent)
+
+    def write(self, intent: Intent) -> None:  # noqa: C901
+        match intent:
+            case Go(to=target):
+                self.go(target)
+            case Face(to=target, side=side):
+                self.face(target, side)
+            case Turn(degrees=degrees, heading=None):
+                self.add(f"robot.turn({degrees or 0:g})")
+            case Turn(heading=heading):
+                self.add(f"robot.turn_absolute({heading:g})")
+            case Move(metres=metres):
+                self.add(f"robot.move_forward({metres:g})")
+            case Between(of=(a, b)):
+                self.between(a, b)
+            case Beside():
+                self.beside(intent)
+            case StopAt(of=target, metres=metres):
+                self.go(target)
+                self.add(f"robot.face({self.value(target)})")
+                self.add(f"robot.move_forward({-metres:g})")
+            case Circle():
+                self.circle(intent)
+            case VisitEach(of=target):
+                self.add(f"for place in robot.get_all_pos({self.query(target)}):")
+                self.add("    robot.move_to(place)")
+            case Wait(seconds=seconds):
+                self.add(f"robot.wait({_WAIT_S if seconds is None else seconds:g})")
+            case Return():
+                self.add("robot.move_to(start)")
+            case Repeat():
+                self.repeat(intent)
+            case _:
+                raise ValueError(f"{intent!r} has no program")
+
+    def go(self, target: Target) -> None:
+        value = self.value(target)
+        plain = target.kind is Kind.OBJECT and not target.near
+        if not plain and target not in self.names:
+            value = f"robot.get_max_pos_3d({value})"
+        self.add(f"robot.move_to_object({value})" if plain else f"robot.move_to({value})")
+
+    def face(self, target: Target, side: Side) -> None:
+        value = self.value(target)
+        self.add(f"robot.{_FACING.get(side, 'face')}({value})")
+        if side is Side.BEHIND:
+            self.add("robot.turn(180)")
+
+    def between(self, a: Target, b: Target) -> None:
+        if Kind.HERE in (a.kind, b.kind):
+            other = b if a.kind is Kind.HERE else a
+            self.add(f"robot.move_to((robot.current_pos() + robot.get_pos({self.value(other)})) / 2)")
+            return
+        self.add(f"robot.move_in_between({self.value(a)}, {self.value(b)})")
+
+    def beside(self, intent: Beside) -> None:
+        target, side, metres = intent.of, intent.side, intent.metres
+        if side in _SKILLS:
+            away = "" if metres is None else f", {metres:g}"
+            self.add(f"robot.{_SKILLS[side]}({self.value(target)}{away})")
+        elif side is Side.FRONT:
+            self.go(target)
+            self.add(f"robot.face({self.value(target)})")
+            if metres is not None:
+                self.add(f"robot.move_forward({-metres:g})")
+                self.add(f"robot.face({self.value(target)})")
+        elif metres is None:
+            place = self.bound(target)
+            self.add(f"robot.move_to({place})")
+            self.add(f"robot.move_to(2 * {place} - robot.current_pos())")
+        else:
+            self.add(f"robot.move_behind({self.value(target)}, {metres:g})")
+
+    def circle(self, intent: Circle) -> None:
+        count = intent.views or _CORNERS
+        contour = self.variable("outline")
+        self.add(f"{contour} = robot.get_contour({self.value(intent.of)})")
+        self.add(f"for i in range({count}):")
+        self.add(f"    robot.move_to({contour}[i * len({contour}) // {count}])")
+        if intent.views:
+            self.add(f"    robot.face({self.value(intent.of)})")
+
+    def repeat(self, intent: Repeat) -> None:
+        for target in dict.fromkeys(targets_of(intent.body)):
+            visited = {one.of for one in _flat(intent.body) if isinstance(one, VisitEach)}
+            if target.kind is not Kind.HERE and target not in visited:
+                self.value(target)
+        self.add(f"for {self.variable('i')} in range({intent.times}):")
+        self.indent += "    "
+        self.block(intent.body)
+        self.indent = self.indent[:-4]
+
+    def bound(self, target: Target) -> str:
+        """Return the variable that holds the place of a target, written where it is first needed."""
+        if target not in self.names:
+            if target.pick in (Pick.OTHER, Pick.FARTHEST):
+                every = self.variable(f"{target.name.split()[-1]}s")
+                self.add(f"{every} = robot.get_all_pos({self.query(Target(target.kind, target.name, target.near))})")
+                at = "1" if target.pick is Pick.OTHER else f"len({every}) - 1"
+                name = self.variable(target.name.split()[-1])
+                self.add(f"{name} = {every}[{at}]")
+            elif target.kind is Kind.OBJECT and not target.near:
+                name = self.variable(target.name.split()[-1])
+                self.add(f"{name} = robot.get_nearest_pos({self.query(target)})")
+            else:
+                heat = self.query(target)
+                name = self.variable(target.name.split()[-1] if not target.is_file else "place")
+                skill = "get_nearest_pos" if target.kind is Kind.OBJECT else "get_max_pos_3d"
+                self.add(f"{name} = robot.{skill}({heat})")
+            self.names[target] = name
+        return self.names[target]
+
+    def value(self, target: Target) -> str:
+        """Return what a skill is given for a target: a phrase, a heatmap's best place, or its variable."""
+        if target.kind is Kind.HERE:
+            return "robot.current_pos()"
+        if target in self.names or self.repeats[target] > 1 or target.pick in (Pick.OTHER, Pick.FARTHEST):
+            return self.bound(target)
+        if target.kind is Kind.OBJECT and not target.near:
+            return _quoted(target.name)
+        return self.query(target)
+
+    def query(self, target: Target) -> str:
+        """Return the phrase of a thing, or the variable or expression of a heatmap."""
+        if target.kind is Kind.OBJECT and not target.near:
+            return _quoted(target.name)
+        factors = [
+            f"robot.get_major_map({_argument(target)})",
+            *(f"robot.get_map({_argument(n)})" for n in target.near),
+        ]
+        if len(factors) == 1:
+            return factors[0]
+        self.taken["heat"] += 1
+        heat = f"heat{self.taken['heat']}"
+        self.add(f"{heat} = {' * '.join(factors)}")
+        return heat
+
+
+_RESERVED = frozenset({
+    "robot", "start", "place", "for", "in", "if", "and", "or", "not", "is", "range", "len", "def", "pass", "while",
+    "from",
+    "import", "with", "as", "none", "true", "false", "class", "return", "else", "elif", "del", "try", "lambda", "abs",
+    "min",
+    "max", "print",
+})  # fmt: skip
+
+
+def _flat(intents: Sequence[Intent]) -> Iterator[Intent]:
+    for intent in intents:
+        yield intent
+        if isinstance(intent, Repeat):
+            yield from _flat(intent.body)
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
+
+
+def _argument(target: Target) -> str:
+    match target.kind:
+        case Kind.OBJECT:
+            return f"obj={_quoted(target.name)}"
+        case Kind.SOUND:
+            return f"sound={_quoted(target.name)}"
+        case Kind.AREA:
+            return f"area={_quoted(target.name)}"
+        case Kind.IMAGE:
+            return f"img=robot.load_image({_quoted(target.name)})"
+        case _:
+            return f"sound=robot.load_sound({_quoted(target.name)})"

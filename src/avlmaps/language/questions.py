@@ -1,0 +1,178 @@
+"""From a sentence to a question for the map: where something is, how many there are, whether there is one."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from avlmaps.core.errors import QueryError
+from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
+from avlmaps.language.chart import Tree
+from avlmaps.language.commands import Given, unknown
+from avlmaps.language.grammar import load_grammar
+from avlmaps.language.intents import Ask, Clarify, Inquiry, Kind, Pick, Target
+from avlmaps.language.readings import Sentence
+from avlmaps.language.targets import Memory, UnresolvedError, resolve
+
+_EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
+_MODALITIES = {
+    Kind.OBJECT: Modality.OBJECT, Kind.SOUND: Modality.SOUND, Kind.CLIP: Modality.SOUND, Kind.AREA: Modality.AREA,
+    Kind.IMAGE: Modality.IMAGE,
+}  # fmt: skip
+_SKIP, _FILLER, _REMARK, _WORST = 3.6, 0.2, 0.15, 3.5
+_REMARKS = frozenset({"i", "it", "they", "we", "my", "he", "she", "its", "like", "because", "cos", "im", "so"})
+_NO_STARTS = frozenset(
+    {
+        ("what", "is"),
+        ("what", "colour"),
+        ("what", "color"),
+        ("what", "are"),
+        ("what", "time"),
+        ("how", "long"),
+        ("how", "big"),
+        ("how", "far"),
+        ("how", "high"),
+    }
+)
+_NO_QUESTIONS = frozenset({"who", "why", "when", "whose"})
+_MEANING = frozenset({"not", "no", "without", "except", "never", "unless", "or", "if", "but"})
+
+
+@dataclass(frozen=True, slots=True)
+class AskedSentence:
+    """What a sentence asks the map.
+
+    Attributes:
+        inquiry: what is to be known, of which targets.
+        notes: one sentence each: how words were taken.
+    """
+
+    inquiry: Inquiry
+    notes: tuple[str, ...] = ()
+
+    @property
+    def questions(self) -> tuple[Question, ...]:
+        """One question for each target; any of them answers."""
+        return tuple(question_of(target) for target in self.inquiry.of)
+
+
+def parse_sentence(sentence: str) -> Question:
+    """Return the question that a sentence asks; its first part is sought, the others say where it is.
+
+    Raises:
+        QueryError: the sentence is empty, too long, or not understood; it says which words.
+    """
+    return read_question(sentence, Given(knows=lambda _: True)).questions[0]
+
+
+def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
+    """Return what a sentence asks.
+
+    Raises:
+        QueryError: the sentence is empty, too long, or not understood; it says which words.
+    """
+    given = given or Given()
+    if not any(mark.isalnum() for mark in sentence):
+        raise QueryError(f"The sentence is empty; say what is sought, such as: {_EXAMPLE}.")
+    if len(sentence) > MOST_CHARACTERS:
+        raise QueryError(
+            f"The sentence has {len(sentence)} characters, more than {MOST_CHARACTERS}; say it shorter, like: "
+            f"{_EXAMPLE}."
+        )
+    read = Sentence(sentence, given.knows)
+    tree, words = _best(read)
+    starts = tuple(token.text for token in read.tokens[:2])
+    if starts[0] in _NO_QUESTIONS or starts in _NO_STARTS:
+        raise QueryError(f"A map knows where things and sounds are, and how many; ask it like: {_EXAMPLE}.")
+    if tree is None:
+        raise QueryError(f"{words} is not understood; say it like: {_EXAMPLE}.")
+    try:
+        targets = _targets(tree)
+    except UnresolvedError as fault:
+        raise QueryError(fault.question.question) from None
+    notes: list[str] = []
+    checked = tuple(_checked(target, read, given, notes) for target in targets)
+    return AskedSentence(Inquiry(Ask(tree.get("ask")), checked), tuple(notes))
+
+
+def question_of(target: Target) -> Question:
+    """Return a target as a question to the map."""
+    parts = [Part(_MODALITIES[one.kind], one.name, is_file=one.is_file) for one in (target, *target.near)]
+    return Question.of(parts)
+
+
+def _best(read: Sentence) -> tuple[Tree | None, str]:
+    """Return the cheapest reading of a whole sentence, or the words that are not understood."""
+    tokens, chart = read.tokens, read.chart
+    count = len(tokens)
+    best: tuple[float, Tree] | None = None
+    longest = 0
+    skips = [_skip(read, i) for i in range(count)]
+    for at in range(count):
+        for edge in chart.edges("question", at):
+            around = [*tokens[:at], *tokens[edge.end :]]
+            longest = max(longest, edge.end)
+            if any(token.text in _MEANING for token in around) or edge.value.rule != "question":
+                continue
+            remark = edge.end < count and tokens[edge.end].text in _REMARKS
+            after = sum(min(cost, _REMARK) if remark else cost for cost in skips[edge.end :])
+            opening = at > 0 and tokens[0].text in _REMARKS
+            before = sum(min(cost, _REMARK) if opening else cost for cost in skips[:at])
+            if best is None or before + edge.cost + after < best[0]:
+                best = (before + edge.cost + after, edge.value)
+    if best is None or best[0] > _WORST:
+        rest = read.words(longest, count)
+        return None, repr((rest if any(mark.isalnum() for mark in rest) else read.text)[:80])
+    return best[1], ""
+
+
+def _skip(read: Sentence, at: int) -> float:
+    """Return what it costs to leave out a token."""
+    if read.tokens[at].kind == "punct":
+        return 0.02
+    for before in range(max(0, at - 4), at + 1):
+        for name in ("GREETING", "FILLER", "POLITE"):
+            if any(edge.end > at for edge in read.chart.terminal(name, before)):
+                return _FILLER
+    return _SKIP
+
+
+def _targets(tree: Tree) -> tuple[Target, ...]:
+    if tree.get("use") is not None:
+        return _for_use(str(tree.get("use")))
+    memory = Memory()
+    base = tree.get("of")
+    target = Target(Kind.IMAGE) if tree.get("picture") else resolve(base, memory)
+    if tree.get("at_in") is not None:
+        inside = resolve(tree.get("at_in"), memory)
+        target = target.with_near(replace(inside, near=()), *inside.near)
+    for at in tree.all("at"):
+        whole = resolve(Tree("target", (("at", at),), 0, 0), memory)
+        target = target.with_near(replace(whole, near=()), *whole.near)
+    if target.pick in (Pick.FARTHEST, Pick.OTHER):
+        raise UnresolvedError(Clarify(f"'{target.pick} {target.name}' cannot be asked of a map; say what it is near."))
+    return (target,)
+
+
+def _for_use(use: str) -> tuple[Target, ...]:
+    """Return the things that serve a purpose."""
+    uses = load_grammar().lists["uses"]
+    key = max((key for key in uses if use.startswith(key)), key=len, default=None)
+    if key is None:
+        raise UnresolvedError(Clarify(f"What serves to {use} is not known; name the thing."))
+    return tuple(Target(Kind.OBJECT, name.strip()) for name in uses[key].split(","))
+
+
+def _checked(target: Target, read: Sentence, given: Given, notes: list[str]) -> Target:
+    if target.is_file and not target.name:
+        path: str | None = given.image if target.kind is Kind.IMAGE else given.clip
+        if path is None:
+            option = "--image" if target.kind is Kind.IMAGE else "--sound-clip"
+            raise QueryError(f"The sentence speaks of a file that is not given; add {option} FILE.")
+        target = replace(target, name=path)
+    elif not read.names.known(target):
+        raise QueryError(unknown(target.name).question)
+    if target.name in read.names.mended:
+        notes.append(f"'{read.names.mended[target.name]}' is read as '{target.name}'.")
+    return replace(target, near=tuple(_checked(one, read, given, notes) for one in target.near))
+
+
+Knows = Callable[[str], bool]

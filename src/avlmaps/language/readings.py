@@ -1,0 +1,244 @@
+"""All readings of a sentence: its clauses, in order, with what joins them and what had to be skipped.
+
+A reading is a path over the sentence: orders, names alone, statements, joining words and skipped words, each with a
+cost. The cheapest readings come first; a skipped word costs much, a word that changes the meaning far more.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from avlmaps.language import lexer
+from avlmaps.language.chart import BuiltIn, Chart
+from avlmaps.language.grammar import load_grammar
+from avlmaps.language.lexer import Token
+from avlmaps.language.names import Names
+from avlmaps.language.spelling import respelt
+
+MOST_READINGS = 4
+_RUN_ON_REMARK = 0.9
+_RUN_ON, _BARE, _MENTION, _REMARK, _REMARK_WORD = 0.8, 1.1, 0.9, 1.15, 0.04
+_SKIP, _SKIP_MARK, _SKIP_MEANING, _ORDER = 2.6, 0.05, 6.0, 0.3
+_LISTED = 0.6  # a name alone costs so much less where an order goes before
+_SILENT = frozenset({"THEN", "BUT", "mark", "POLITE", "GREETING", "FILLER", "INSTEAD_END"})
+_HARD = frozenset({".", "!", "?", ";"})
+_BREAKS = frozenset({*_HARD, ",", ":", "-", ">"})
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One part of a reading.
+
+    Attributes:
+        kind: ``order``, ``bare``, ``mention``, ``repeat``, ``refuse``, ``chat``, ``inquire``, ``remark``, ``skip``,
+            ``slow``, or the class of words that joins two parts.
+        value: the tree of a rule, else None.
+        start: its first token.
+        end: behind its last.
+    """
+
+    kind: str
+    value: Any
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One way to read a sentence."""
+
+    items: tuple[Item, ...]
+    cost: float
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """A reading up to a token."""
+
+    cost: float
+    fresh: bool
+    item: Item | None
+    before: "_State | None"
+    trail: tuple[Any, ...] = ()  # the items that mean something
+
+
+class Sentence:
+    """A tokenised sentence and its chart."""
+
+    def __init__(self, text: str, knows: Callable[[str], bool] | None = None) -> None:
+        """Take a sentence, and what besides the lexicon says that it knows a word."""
+        self.text = text
+        self.tokens, self.respelt = respelt(lexer.tokenise(text))
+        self.names = Names(self.tokens, knows)
+        self.chart = Chart(load_grammar(), self.tokens, _built_in(self.tokens, self.names))
+
+    def words(self, start: int, end: int) -> str:
+        """Return the words of some tokens, as they were written."""
+        if start >= end:
+            return ""
+        return self.text[self.tokens[start].start : self.tokens[end - 1].end]
+
+
+def _built_in(tokens: list[Token], names: Names) -> dict[str, BuiltIn]:
+    def amounts(read: Callable[[list[Token], int], list[tuple[int, float]]]) -> BuiltIn:
+        return lambda at: [(end, 0.0, value) for end, value in read(tokens, at)]
+
+    def files(kind: str) -> BuiltIn:
+        return lambda at: [(at + 1, 0.0, tokens[at].text)] if tokens[at].kind == kind else []
+
+    return {
+        "NUMBER": amounts(lexer.number_at), "LENGTH": amounts(lexer.length_at), "ANGLE": amounts(lexer.angle_at),
+        "DURATION": amounts(lexer.duration_at), "CLOCK": amounts(lexer.clock_at), "IMAGE": files("image"),
+        "CLIP": files("clip"), "NAME": names.names, "OPEN": names.open_names, "NOISE": names.noises,
+        "ROOM": names.rooms,
+        "WORDS": lambda at: list(_rest(tokens, at)),
+    }  # fmt: skip
+
+
+def _rest(tokens: list[Token], at: int) -> Iterator[tuple[int, float, str]]:
+    """Yield where the rest of a clause may end: before a mark, "and" or "then", and at the end of the sentence."""
+    for end in range(at, len(tokens) + 1):
+        stop = end == len(tokens) or tokens[end].text in _BREAKS or tokens[end].text in ("and", "then", "so")
+        if stop and end > at:
+            yield end, 0.02 * (end - at), ""
+        if end < len(tokens) and tokens[end].text in _HARD:
+            return
+
+
+def readings(sentence: Sentence) -> list[Reading]:
+    """Return the readings of a sentence, the cheapest first."""
+    count = len(sentence.tokens)
+    best: list[list[_State]] = [[] for _ in range(count + 1)]
+    best[0] = [_State(0.0, True, None, None)]
+    for at in range(count):
+        states = _pruned(best[at])
+        steps = list(_steps(sentence, at)) if states else []
+        for state in states:
+            for item, cost, fresh, needs_fresh in steps:
+                extra = _RUN_ON if item.kind in ("order", "bare") and not state.fresh else 0.0
+                if needs_fresh and not state.fresh:
+                    if item.kind not in ("remark", "mention"):
+                        continue
+                    extra = _RUN_ON_REMARK
+                if item.kind == "bare" and any(kind in ("order", "bare") for kind, _ in state.trail):
+                    extra -= _LISTED
+                keeps = state.fresh if fresh is None else fresh
+                trail = state.trail if item.kind in _SILENT else (*state.trail, (item.kind, item.value))
+                best[item.end].append(_State(state.cost + cost + extra, keeps, item, state, trail))
+    return [_reading(state) for state in sorted(_pruned(best[count]), key=lambda state: state.cost)[:MOST_READINGS]]
+
+
+def _pruned(states: list[_State]) -> list[_State]:
+    kept: list[_State] = []
+    for fresh in (True, False):
+        trails: set[tuple[Any, ...]] = set()
+        for state in sorted((s for s in states if s.fresh is fresh), key=lambda s: s.cost):
+            if state.trail not in trails:
+                trails.add(state.trail)
+                kept.append(state)
+            if len(trails) == MOST_READINGS:
+                break
+    return kept
+
+
+def _reading(state: _State) -> Reading:
+    items: list[Item] = []
+    cost, at = state.cost, state
+    while at.before is not None:
+        assert at.item is not None
+        items.append(at.item)
+        at = at.before
+    return Reading(tuple(reversed(items)), cost)
+
+
+_RULES = (
+    ("order", _ORDER, False, False), ("bare", _BARE, False, True), ("mention", _MENTION, False, True),
+    ("repeat", 0.2, None, False),
+    ("amount", 0.8, False, True), ("chat", 0.6, False, True), ("inquire", 0.6, False, True),
+)  # fmt: skip
+_JOINS = {
+    "THEN": (0.0, True), "BUT_FIRST": (0.0, True), "BUT": (0.25, True), "BEFORE": (0.1, True), "AFTER": (0.1, True),
+    "CORRECT": (0.15, True),
+    "POLITE": (0.05, True), "GREETING": (0.12, None), "FILLER": (0.2, None), "SLOW": (0.1, None),
+    "INSTEAD_END": (0.4, None),
+    "MAKE_IT": (0.5, True), "THOUGH": (0.25, None),
+}  # fmt: skip
+
+
+def _steps(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | None, bool]]:
+    """Yield what may begin at a token: the item, its cost, whether a clause may follow, whether it begins one."""
+    chart, tokens = sentence.chart, sentence.tokens
+    for rule, cost, fresh, needs in _RULES:
+        for edge in chart.edges(rule, at):
+            kind = "refuse" if getattr(edge.value, "rule", "") == "refuse" else rule
+            anywhere = kind == "refuse" and edge.value.get("reason") in ("condition", "negation", "endless")
+            after = edge.value.get("next") == "yes" or None if rule == "repeat" else fresh
+            if getattr(edge.value, "rule", "") in ("lead", "arrive"):
+                after = True
+            if kind == "refuse" and not anywhere:
+                needs = True
+            yield Item(kind, edge.value, at, edge.end), cost + edge.cost, after, needs
+    for name, (cost, fresh) in _JOINS.items():
+        for edge in chart.terminal(name, at):
+            yield Item(name, edge.value, at, edge.end), cost, fresh, name == "POLITE"
+    yield from _remarks(sentence, at)
+    mark = tokens[at].kind == "punct"
+    if mark and chart.terminal("THEN", at):
+        return
+    begins = chart.begins(at)
+    cost = _SKIP_MARK if mark else _SKIP_MEANING if not begins.isdisjoint(("NEGATION", "IF")) else _SKIP
+    yield Item("mark" if mark else "skip", None, at, at + 1), cost, True if mark else None, False
+
+
+_ORDERS = frozenset({"GO", "DIRECT", "TURN", "FACE", "POLITE", "CIRCLE", "BACK_UP", "WAIT"})
+
+
+def _begins_order(sentence: Sentence, at: int) -> bool:
+    """Return whether an order may begin at a token."""
+    return at < len(sentence.tokens) and not sentence.chart.begins(at).isdisjoint(_ORDERS)
+
+
+def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | None, bool]]:
+    """Yield the statements that begin at a token: what people say about themselves, or why."""
+    chart, tokens = sentence.chart, sentence.tokens
+    because = tokens[at].text in (
+        "because",
+        "since",
+        "as",
+        "so",
+        "before",
+        "while",
+        "until",
+        "which",
+        "where",
+        "when",
+        "in",
+        "by",
+        "within",
+    )
+    starts = chart.terminal("SUBJECT", at)
+    if not starts:
+        return
+    words: list[str] = []
+    finite = tokens[at].text in ("its", "like", "cos", "cause")
+    for end in range(at, len(tokens)):
+        token = tokens[end]
+        words.append(token.text)
+        finite = (
+            finite
+            or bool(chart.terminal("FINITE", end))
+            or token.text in ("minute", "moment", "o'clock", "noon", "arrive", "arrives", "starts", "sleep")
+        )
+        if end > at and token.text in ("not", "never", "if", "unless") and "you" in words:
+            return
+        after = tokens[end + 1].text if end + 1 < len(tokens) else "."
+        if end > at and finite and (after in _BREAKS or after in ("so", "and", "but", "please", "go", "can", "could")):
+            orders = "you" in words and not because and words[:2] != ["you", "are"]
+            yield (
+                Item("remark", None, at, end + 1),
+                _REMARK + _REMARK_WORD * len(words) + 1.5 * orders, after in _BREAKS or None, not because,
+            )  # fmt: skip
+        if after in _BREAKS or (
+            after in ("so", "and", "but", "please") and finite and _begins_order(sentence, end + 2)
+        ):
+            return

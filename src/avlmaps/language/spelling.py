@@ -1,0 +1,70 @@
+"""Misspelt words of a sentence: letters that are drawn out, words written as they sound, single wrong letters.
+
+A word that neither the grammar nor the lexicon has becomes the one known word that is a single letter away; where
+several are, it stays as it is, and its name is asked about later.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from string import ascii_lowercase
+
+from avlmaps.core.lexicon import lexicon
+from avlmaps.language.grammar import load_grammar
+from avlmaps.language.lexer import WORDS, Token
+from avlmaps.language.names import sounding_words
+
+_SHORTEST = 5  # shorter words have too many neighbours
+
+
+def respelt(tokens: list[Token]) -> tuple[list[Token], dict[str, str]]:
+    """Return the tokens with misspelt words put right, and which words those were."""
+    changed: dict[str, str] = {}
+    found: list[Token] = []
+    for token in tokens:
+        better = _better(token.text) if token.kind == "word" else None
+        if better is not None:
+            changed[token.text] = better
+        found.append(token if better is None else replace(token, text=better))
+    return found, changed
+
+
+@cache
+def _better(word: str) -> str | None:
+    heard = dict(pair.split("=") for pair in load_grammar().lists["heard_as"].split())
+    if word in heard:
+        return heard[word]
+    if not word.isascii() or word in _known() or word.removesuffix("s") in _known():
+        return None
+    for drawn in (re.sub(r"(.)\1{2,}", r"\1", word), re.sub(r"(.)\1{2,}", r"\1\1", word)):
+        if drawn != word and drawn in _known():
+            return drawn
+    if len(word) < _SHORTEST:
+        return None
+    near = {other for other in _neighbours(word) if other in _known()}
+    plain = {other for other in near if other.rstrip("s") not in near or other == other.rstrip("s")}
+    return plain.pop() if len(plain) == 1 else None
+
+
+def _neighbours(word: str) -> Iterator[str]:
+    """Yield the words that are one letter away: one more, one less, one other, or two in the other order."""
+    for at in range(len(word) + 1):
+        before, after = word[:at], word[at:]
+        if after:
+            yield before + after[1:]
+        if len(after) > 1:
+            yield before + after[1] + after[0] + after[2:]
+        for letter in ascii_lowercase:
+            yield before + letter + after
+            if after:
+                yield before + letter + after[1:]
+
+
+@cache
+def _known() -> frozenset[str]:
+    """Return all words that the grammar and the lexicon have."""
+    grammar = load_grammar()
+    listed = (word for text in grammar.lists.values() if isinstance(text, str) for word in text.split())
+    classes = (word for phrases in grammar.words.values() for phrase in phrases for word in phrase.split())
+    return frozenset({*listed, *classes, *lexicon().words(), *grammar.literals, *WORDS, *sounding_words()})

@@ -1,0 +1,120 @@
+"""Intents in plain words, for the person to read before the robot moves."""
+
+from collections.abc import Sequence
+
+from avlmaps.language.intents import (
+    Beside,
+    Between,
+    Circle,
+    Clarify,
+    Face,
+    Go,
+    Intent,
+    Kind,
+    Move,
+    Pick,
+    Refuse,
+    Repeat,
+    Return,
+    Side,
+    StopAt,
+    Target,
+    Turn,
+    VisitEach,
+    Wait,
+)  # fmt: skip
+
+_COMPASS = {0: "north", 45: "north-east", 90: "east", 135: "south-east", 180: "south", 225: "south-west", 270: "west",
+            315: "north-west"}  # fmt: skip
+_TIMES = {1: "once", 2: "twice"}
+_SIDES = {
+    Side.LEFT: "to the left of", Side.RIGHT: "to the right of", Side.FRONT: "in front of", Side.BEHIND: "behind",
+    Side.NORTH: "to the north of", Side.SOUTH: "to the south of", Side.EAST: "to the east of",
+    Side.WEST: "to the west of",
+}  # fmt: skip
+
+
+def verbalise(intents: Sequence[Intent]) -> str:
+    """Return one sentence that says what the robot will do, or why it does nothing."""
+    if intents and isinstance(intents[0], Refuse):
+        return intents[0].said
+    if intents and isinstance(intents[0], Clarify):
+        return intents[0].question
+    return f"I will {_steps(intents)}."
+
+
+def _steps(intents: Sequence[Intent]) -> str:
+    said: list[str] = []
+    for intent in intents:
+        step = _step(intent)
+        said.append(step)
+    return ", then ".join(said)
+
+
+def _step(intent: Intent) -> str:
+    match intent:
+        case Go(to=target):
+            return f"go to {phrase(target)}"
+        case Face(to=target, side=Side.AHEAD):
+            return f"face {phrase(target)}"
+        case Face(to=target, side=side):
+            where = "behind me" if side is Side.BEHIND else f"on my {side}"
+            return f"turn until {phrase(target)} is {where}"
+        case Turn(degrees=None, heading=heading):
+            return f"turn to {_COMPASS.get(round(heading or 0), f'{heading:g} degrees on the compass')}"
+        case Turn(degrees=degrees):
+            return _turn(degrees or 0.0)
+        case Move(metres=metres):
+            return f"move {'forward' if metres > 0 else 'back'} {abs(metres):g} m"
+        case Between(of=(a, b)):
+            return f"stop between {phrase(a)} and {phrase(b)}"
+        case Beside(of=target, side=side, metres=metres):
+            return f"stop {'' if metres is None else f'{metres:g} m '}{_SIDES[side]} {phrase(target)}"
+        case StopAt(of=target, metres=metres):
+            return f"stop {metres:g} m from {phrase(target)}"
+        case _:
+            return _other(intent)
+
+
+def _other(intent: Intent) -> str:
+    match intent:
+        case Circle(of=target, views=None):
+            return f"drive around {phrase(target)}"
+        case Circle(of=target, views=views):
+            return f"look at {phrase(target)} from {views} points around it"
+        case VisitEach(of=target):
+            return f"go to each of these, the nearest first: {phrase(target)}"
+        case Wait(seconds=seconds):
+            return "wait a moment" if seconds is None else f"wait {seconds:g} seconds"
+        case Return():
+            return "come back here"
+        case Repeat(times=times, body=body):
+            return f"{_TIMES.get(times, f'{times} times')}: {_steps(body)}"
+        case _:
+            return str(intent)
+
+
+def _turn(degrees: float) -> str:
+    if abs(degrees) == 180.0:
+        return "turn around"
+    return f"turn {'right' if degrees > 0 else 'left'} {abs(degrees):g} degrees"
+
+
+def phrase(target: Target) -> str:
+    """Return a target in words: "the chair nearest to where breathing was heard"."""
+    pick = {Pick.OTHER: "other ", Pick.FARTHEST: "farthest "}.get(target.pick, "")
+    match target.kind:
+        case Kind.OBJECT | Kind.AREA:
+            own = f"the {pick}{target.name}"
+        case Kind.SOUND:
+            own = f"where {target.name} was heard"
+        case Kind.IMAGE:
+            own = f"where the picture {target.name} was taken"
+        case Kind.CLIP:
+            own = f"where a sound like {target.name} was heard"
+        case Kind.HERE:
+            return "here"
+    areas = [one for one in target.near if one.kind is Kind.AREA]
+    others = [one for one in target.near if one.kind is not Kind.AREA]
+    near = f" nearest to {' and '.join(phrase(one) for one in others)}" if others else ""
+    return own + near + "".join(f" in {phrase(one)}" for one in areas)

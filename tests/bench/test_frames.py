@@ -1,0 +1,164 @@
+"""The frame benchmark: the kinds of its classes, the reader of its folders, and its arithmetic on known answers."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from avlmaps.bench.frames import class_probabilities, class_table, interval_over_frames, measure, summary_table
+from avlmaps.bench.nyu import (
+    CAMERA,
+    CLASSES,
+    KINDS_OF_CLASS,
+    MARGIN_PX,
+    METRES_A_STEP,
+    SCORED,
+    NyuFolder,
+    class_of_kinds,
+    smooth_depth,
+)
+from avlmaps.bench.suites import Asked, BenchError, run_suite
+from avlmaps.core.errors import RecordingError
+from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS, load_network
+
+CHAIR, FLOOR, OTHER_PROP = (CLASSES.index(name) for name in ("chair", "floor", "other prop"))
+
+
+def write_frame(folder: Path, name: str, label: np.ndarray, depth: np.ndarray | None = None) -> None:
+    """Write one frame; its depth is a floor 1.2 m under a level camera, unless one is given."""
+    rows = np.arange(CAMERA.height) + 0.5
+    below = np.clip(1.2 * CAMERA.fy / np.maximum(rows - CAMERA.cy, 1.0), 0.5, 5.0)
+    flat = np.repeat(np.rint(below / METRES_A_STEP).astype(np.uint8)[:, None], CAMERA.width, axis=1)
+    cv2.imwrite(str(folder / f"{name}.color.jpg"), np.full((CAMERA.height, CAMERA.width, 3), 90, np.uint8))
+    cv2.imwrite(str(folder / f"{name}.depth8.png"), flat if depth is None else depth)
+    cv2.imwrite(str(folder / f"{name}.label.png"), label)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Return a folder of two frames: one of floor and a chair, one of things without a class."""
+    (tmp_path / "frames.csv").write_text("frame,up_x,up_y,up_z\n0001,0,-1,0\n0002,0,-1,0\n")
+    label = np.zeros((CAMERA.height, CAMERA.width), np.uint8)
+    label[400:470, 20:620] = FLOOR + 1
+    label[100:300, 200:400] = CHAIR + 1
+    write_frame(tmp_path, "0001", label)
+    write_frame(tmp_path, "0002", np.full_like(label, OTHER_PROP + 1))
+    return tmp_path
+
+
+def encoder_of(kinds: tuple[str, ...], said: np.ndarray):
+    """Return an encoder that sees the same in every frame; ``said`` names a kind for each cell of (60, 80)."""
+    probability = np.eye(len(kinds), dtype=np.float32)[said]
+    return SimpleNamespace(names=kinds, see=lambda frame: SimpleNamespace(category=probability))
+
+
+@pytest.mark.parametrize("weights", [DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS])
+def test_every_kind_of_the_encoders_belongs_to_one_class(weights: str) -> None:
+    listed = [kind for kinds in KINDS_OF_CLASS.values() for kind in kinds]
+    assert len(listed) == len(set(listed))
+    assert set(load_network(weights).notes.categories) <= set(listed)
+    assert tuple(KINDS_OF_CLASS) == CLASSES and len(CLASSES) == 40
+    assert all(KINDS_OF_CLASS[name] for name in CLASSES)
+
+
+def test_an_encoder_that_is_right_is_right_in_every_figure(folder: Path) -> None:
+    kinds = ("floor", "office chair", "wall")
+    said = np.zeros((60, 80), int)
+    said[10:40, 22:54] = 1
+    figures = measure(encoder_of(kinds, said), NyuFolder(folder))  # pyright: ignore[reportArgumentType]
+    assert (figures.accuracy, figures.class_accuracy, figures.mean_iou) == (1.0, 1.0, 1.0)
+    assert figures.confusion.sum() == 35 * 300 + 100 * 100
+    row = summary_table(figures)["rows"][0]
+    assert row[0] == 2 and row[-1] == 2
+
+
+def test_a_chair_taken_for_floor_costs_what_it_covers(folder: Path) -> None:
+    figures = measure(encoder_of(("floor", "chair"), np.zeros((60, 80), int)), NyuFolder(folder))  # pyright: ignore[reportArgumentType]
+    floor, chair = 35 * 300, 100 * 100
+    assert figures.accuracy == pytest.approx(floor / (floor + chair))
+    assert figures.class_accuracy == pytest.approx(0.5)
+    assert figures.mean_iou == pytest.approx(0.5 * floor / (floor + chair), rel=1e-6)
+    rows = {row[0]: row for row in class_table(figures)["rows"]}
+    assert rows["chair"][-1] == "floor 1.00" and rows["sofa"][1] == 0
+
+
+def test_kinds_of_a_class_add_up_against_a_likelier_kind_of_another() -> None:
+    kinds = ("sofa", "chair", "armchair", "kettle")
+    p = np.tile(np.array([0.3, 0.2, 0.15, 0.35], np.float32), (6, 8, 1))
+    summed = class_probabilities(p, kinds)
+    assert summed.shape == (480, 640, SCORED)
+    assert (summed.argmax(axis=2) == CHAIR).all()
+    assert summed.sum(axis=2).max() == pytest.approx(0.65, abs=1e-5)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.sampled_from([k for ks in KINDS_OF_CLASS.values() for k in ks]), min_size=1, max_size=20))
+def test_the_sums_of_classes_keep_all_probability_that_is_scored(kinds: list[str]) -> None:
+    p = np.full((4, 4, len(kinds)), 1.0 / len(kinds), np.float32)
+    scored = float((class_of_kinds(tuple(kinds)) < SCORED).mean())
+    np.testing.assert_allclose(class_probabilities(p, tuple(kinds)).sum(axis=2), scored, atol=1e-5)
+
+
+def test_the_labelled_floor_gives_the_height_of_the_camera(folder: Path) -> None:
+    one = NyuFolder(folder).read(0)
+    assert one.floor_is_labelled and one.frame.ground is not None
+    assert one.frame.ground.camera_height_m(np.eye(4)) == pytest.approx(1.2, abs=0.03)
+    other = NyuFolder(folder).read(1)
+    assert not other.floor_is_labelled and other.frame.ground is not None
+
+
+def test_steps_of_depth_are_smoothed_and_edges_stay() -> None:
+    columns = np.linspace(50.0, 60.0, CAMERA.width)
+    value = np.rint(np.tile(columns, (CAMERA.height, 1))).astype(np.uint8)
+    value[:, 400:] += 40
+    depth = smooth_depth(value)
+    truth = (columns + 40 * (np.arange(CAMERA.width) >= 400)) * METRES_A_STEP
+    row = depth[240]
+    inside = np.r_[20:390, 410:620]
+    assert np.abs(row[inside] - truth[inside]).max() < 0.75 * METRES_A_STEP
+    assert np.abs(np.diff(row[20:390])).max() < 0.4 * METRES_A_STEP
+    assert row[405] - row[395] > 1.4
+    assert (depth[:MARGIN_PX] == 0).all() and (depth[:, -MARGIN_PX:] == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        (lambda f: (f / "frames.csv").unlink(), "There is no"),
+        (lambda f: (f / "frames.csv").write_text("frame,up_x,up_y,up_z\n"), "names no frame"),
+        (lambda f: (f / "frames.csv").write_text("frame,up_x\n0001,0\n"), "Line 2"),
+        (lambda f: (f / "frames.csv").write_text("frame,up_x,up_y,up_z\n0001,0,-3,0\n"), "length 3"),
+        (lambda f: (f / "0001.depth8.png").unlink(), "missing or damaged"),
+        (lambda f: cv2.imwrite(str(f / "0001.label.png"), np.zeros((10, 10), np.uint8)), "480 rows"),
+        (lambda f: cv2.imwrite(str(f / "0001.label.png"), np.full((480, 640), 77, np.uint8)), "classes 0 to 40"),
+    ],
+)
+def test_a_damaged_folder_is_refused_in_one_sentence(folder: Path, damage, says: str) -> None:
+    damage(folder)
+    with pytest.raises(RecordingError, match=says):
+        NyuFolder(folder).read(0)
+
+
+def test_the_suite_needs_a_folder_and_an_encoder_of_kinds(tmp_path: Path, folder: Path) -> None:
+    with pytest.raises(BenchError, match="--nyuv2"):
+        run_suite("frames", Asked(), tmp_path)
+    with pytest.raises(BenchError, match="colours"):
+        run_suite("frames", Asked(nyuv2=folder, profile="colours"), tmp_path)
+
+
+def test_the_suite_writes_its_tables_in_every_form(tmp_path: Path, folder: Path) -> None:
+    answer = run_suite("frames", Asked(nyuv2=folder, profile="synthetic"), tmp_path / "out")
+    assert set(answer["tables"]) == {"labelled frames", "by class"}
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"frames.json", "frames.md", "frames.png", "frames-labelled-frames.csv", "frames-by-class.csv"}
+    assert (tmp_path / "out" / "frames-by-class.csv").read_text().startswith("class,pixels,recall,IoU,taken for\n")
+
+
+@given(st.lists(st.floats(0, 1, width=32), min_size=2, max_size=30))
+def test_the_interval_over_frames_holds_their_mean(shares: list[float]) -> None:
+    low, high = interval_over_frames(np.array(shares, np.float32))
+    assert 0.0 <= low <= np.mean(shares) + 1e-6 and np.mean(shares) - 1e-6 <= high <= 1.0

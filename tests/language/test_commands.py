@@ -1,0 +1,185 @@
+"""From commands and questions to intents: the development lists, the laws of the parser, and what it must never do."""
+
+import json
+import random
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from development import NAMES, counted, rows
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from avlmaps.bench.language import judge, read_list
+from avlmaps.core.errors import AvlmapsError, LanguageError
+from avlmaps.language.commands import Given, read_command
+from avlmaps.language.intents import Clarify, Go, Kind, Refuse, Target
+from avlmaps.language.program import parse_program
+from avlmaps.language.program.writing import write_program
+from avlmaps.language.questions import read_question
+from avlmaps.language.rules import RulesTranslator, UnclearError, command_to_program
+from avlmaps.language.translator import Translator
+from avlmaps.language.verbalise import verbalise
+
+LISTS = Path(__file__).parent / "commands"
+# How many commands of each development list are right at least, and how many may be read as something else at most.
+REACHED = {
+    "commands.tsv": (350, 10), "free.tsv": (645, 38), "paraphrases.jsonl": (58, 2), "paraphrases_2.jsonl": (72, 4),
+    "paraphrases_3.jsonl": (69, 4), "paraphrases_4.jsonl": (63, 6),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_development_lists_stay_understood(name: str) -> None:
+    found = counted(name)
+    right, other = REACHED[name]
+    assert len(found["right"]) >= right
+    assert len(found["other"]) <= other, found["other"]
+
+
+@pytest.mark.parametrize("row", read_list(LISTS / "intents.jsonl"), ids=lambda row: row["say"])
+def test_a_sentence_has_its_intents(row: dict[str, object]) -> None:
+    judged = judge(row)
+    assert judged.outcome == "right", json.dumps(judged.got)
+
+
+def test_every_program_that_is_written_can_run() -> None:
+    for command, _ in [*rows("paraphrases_3.jsonl"), *rows("paraphrases_2.jsonl")]:
+        read = read_command(command)
+        if read.stops is None:
+            parse_program(write_program(read.intents))
+            assert verbalise(read.intents).startswith("I will ")
+
+
+def test_a_reference_is_one_instance_in_the_program() -> None:
+    program = command_to_program("go to the table, then one metre behind it")
+    assert program == (
+        'table = robot.get_nearest_pos("table")\nrobot.move_to_object(table)\nrobot.move_behind(table, 1)\n'
+    )
+
+
+def test_the_other_one_is_another_instance() -> None:
+    program = command_to_program("go to the sofa near the window, then to the other sofa")
+    assert "robot.get_all_pos" in program
+    assert "[1]" in program
+
+
+def test_a_question_has_choices_and_no_program() -> None:
+    with pytest.raises(UnclearError, match=r"I do not know 'tabel'\. Did you mean table") as caught:
+        command_to_program("go to the tabel")
+    assert caught.value.choices[0] == "table"
+
+
+def test_a_mended_word_is_said() -> None:
+    assert RulesTranslator().program_for("go to the refridgerator").notes == (
+        "'refridgerator' is read as 'refrigerator'.",
+    )
+
+
+def test_an_open_vocabulary_takes_any_noun() -> None:
+    read = read_command("go to the frobnicator", Given(knows=lambda _: True))
+    assert read.intents == (Go(Target(Kind.OBJECT, "frobnicator")),)
+
+
+def test_what_has_no_effect_is_reported() -> None:
+    (note,) = read_command("go slowly to the kitchen").notes
+    assert "slowly" in note
+
+
+def test_the_translator_is_one() -> None:
+    translator = RulesTranslator()
+    assert isinstance(translator, Translator)
+    assert translator.name == "rules"
+    assert translator.repair("go to the sofa", "robot.move_to_object('sofa')", "no path") is None
+
+
+def test_the_plan_is_in_plain_words() -> None:
+    plan = RulesTranslator().program_for(
+        "go to the armchair nearest to where breathing was heard, then face the window"
+    )
+    assert plan.plan == "I will go to the armchair nearest to where breathing was heard, then face the window."
+
+
+ORDERS = ["turn left", "go to the sofa", "stop 2 m left of the bed", "find the sound of rain", "go to the kitchen"]
+
+
+@pytest.mark.parametrize(
+    "around",
+    ["please {}", "{}. Thanks!", "Hey robot, could you {}, please?", "I'd like you to {}", "um {} uh", "{}, okay?"],
+)
+@pytest.mark.parametrize("order", ORDERS)
+def test_politeness_changes_nothing(around: str, order: str) -> None:
+    assert command_to_program(around.format(order)) == command_to_program(order)
+
+
+@pytest.mark.parametrize("first", ORDERS)
+@pytest.mark.parametrize("second", ORDERS)
+@pytest.mark.parametrize("joint", [". ", ", then ", " and then ", "; ", ", and after that "])
+def test_two_orders_are_done_one_after_the_other(first: str, second: str, joint: str) -> None:
+    if first != second:
+        both = read_command(first + joint + second).intents
+        assert both == (*read_command(first).intents, *read_command(second).intents)
+
+
+@settings(max_examples=25, deadline=None)
+@given(metres=st.integers(1, 9999).map(lambda cm: cm / 100), degrees=st.integers(1, 179))
+def test_figures_are_taken_as_they_are(metres: float, degrees: int) -> None:
+    assert command_to_program(f"move forward {metres} m") == f"robot.move_forward({metres:g})\n"
+    assert command_to_program(f"turn left {degrees} degrees") == f"robot.turn({-degrees})\n"
+
+
+@pytest.mark.parametrize("text", ["", " ?! ", "x" * 1001])
+def test_an_empty_or_endless_command_is_an_error(text: str) -> None:
+    with pytest.raises(LanguageError, match=r"is empty|has 1001 characters"):
+        read_command(text)
+
+
+_WORDS = [word for command, _ in rows("free.tsv") for word in command.split()]
+_NASTY = (
+    "ignore all previous instructions and", "__import__('os').system('rm')", "../../etc/passwd", "{{7*7}}", "\x00",
+    "robot.",
+    "for i in range(9):", "🤖", "go to", "%s", "<script>", "DROP TABLE map;", "'", '"', "\\n", "½", "1e999",
+    "-1 m", "0 m",
+)  # fmt: skip
+
+
+def salads(count: int, seed: int) -> list[str]:
+    """Return random word salads with injections and paths."""
+    draw = random.Random(seed)
+    return [
+        " ".join(draw.choice(_WORDS if draw.random() < 0.9 else _NASTY) for _ in range(draw.randint(1, 18)))[:400]
+        for _ in range(count)
+    ]
+
+
+@pytest.mark.parametrize("text", salads(150, 7))
+def test_word_salad_raises_nothing_but_errors_of_the_family(text: str) -> None:
+    with suppress(AvlmapsError):
+        read = read_command(text)
+        assert isinstance(read.intents[0], Refuse | Clarify) or parse_program(write_program(read.intents))
+    with suppress(AvlmapsError):
+        read_question(text[:400])
+
+
+@settings(max_examples=60, deadline=None)
+@given(text=st.text(max_size=200))
+@example(text="{" * 50)
+@example(text="a " * 250)
+@example(text="half of of right, north you right")
+def test_any_text_is_read_or_refused(text: str) -> None:
+    with suppress(AvlmapsError):
+        read_command(text)
+    with suppress(AvlmapsError):
+        read_question(text)
+
+
+NONSENSE = [
+    "banana purple seventeen the of", "colourless green ideas sleep furiously", "the the and the",
+    "frobnicate the lamp",
+    "dance the tango", "wibble wobble to", "sofa sofa sofa of between", "and then and then and then", "7 9 2 4",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", NONSENSE)
+def test_nonsense_is_no_goal(text: str) -> None:
+    assert read_command(text).stops is not None

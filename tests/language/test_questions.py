@@ -1,0 +1,81 @@
+import re
+
+import pytest
+
+from avlmaps.core.errors import QueryError
+from avlmaps.core.question import Role
+from avlmaps.language.questions import parse_sentence
+
+UNDERSTOOD = {
+    "the chair": [("object", "chair")],
+    "chair": [("object", "chair")],
+    "Where is the red cabinet?": [("object", "red cabinet")],
+    "Please go to the red cabinet.": [("object", "red cabinet")],
+    "could you find the bottle of milk": [("object", "bottle of milk")],
+    "the leg of the table": [("object", "leg"), ("object", "table")],
+    "the chair near the sound of glass breaking": [("object", "chair"), ("sound", "glass breaking")],
+    "the chair next to the glass breaking sound": [("object", "chair"), ("sound", "glass breaking")],
+    "the chair where a dog bark was heard": [("object", "chair"), ("sound", "dog bark")],
+    "the chair near where the dog barking can be heard": [("object", "chair"), ("sound", "dog barking")],
+    "the chair where you heard the dog bark": [("object", "chair"), ("sound", "dog bark")],
+    "the chair where I heard the sound of rain": [("object", "chair"), ("sound", "rain")],
+    "the chair near the sound of typing on a keyboard": [("object", "chair"), ("sound", "typing on keyboard")],
+    "where someone was heard knocking on the door": [("sound", "knocking on door")],
+    "the cup on the table": [("object", "cup"), ("object", "table")],
+    "where a baby was heard crying": [("sound", "baby crying")],
+    "go to the barking of a dog": [("sound", "dog barking")],
+    "the sound of a baby crying": [("sound", "baby crying")],
+    "the table in the kitchen": [("object", "table"), ("area", "kitchen")],
+    "the kitchen table": [("object", "kitchen table")],
+    "show me the living room": [("area", "living room")],
+    "the milk in the fridge": [("object", "milk"), ("object", "fridge")],
+    "the chair near this photo ./x.png": [("object", "chair"), ("image", "./x.png")],
+    'the chair beside "my photos/a b.JPG"': [("object", "chair"), ("image", "my photos/a b.JPG")],
+    "the picture of a dog": [("object", "picture"), ("object", "dog")],
+    "the red cabinet near the picture shots/view.jpeg and the sound of rain in the office": [
+        ("object", "red cabinet"), ("image", "shots/view.jpeg"), ("sound", "rain"), ("area", "office"),
+    ],
+    "the chair near the fridge and the sofa": [("object", "chair"), ("object", "fridge"), ("object", "sofa")],
+    "the black and white chair by the window": [("object", "black and white chair"), ("object", "window")],
+    "the chair near the sound bark.ogg": [("object", "chair"), ("sound", "bark.ogg")],
+    "the chair, near the table, and in the kitchen": [("object", "chair"), ("object", "table"), ("area", "kitchen")],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("sentence", UNDERSTOOD)
+def test_a_sentence_becomes_its_parts_in_order(sentence: str) -> None:
+    question = parse_sentence(sentence)
+    assert [(str(part.modality), part.query) for part in question.parts] == UNDERSTOOD[sentence]
+
+
+@pytest.mark.parametrize("sentence", UNDERSTOOD)
+def test_only_the_first_part_is_sought(sentence: str) -> None:
+    roles = [part.role for part in parse_sentence(sentence).parts]
+    assert roles == [Role.PRIMARY] + [Role.CONTEXT] * (len(roles) - 1)
+
+
+def test_pictures_and_clips_are_files() -> None:
+    parts = parse_sentence("the chair near the sound bark.ogg and the photo x.png").parts
+    assert [part.is_file for part in parts] == [False, True, True]
+
+
+@pytest.mark.parametrize("sentence", ["", "  ?! "])
+def test_an_empty_sentence_is_refused(sentence: str) -> None:
+    expected = (
+        "The sentence is empty; say what is sought, such as: the chair near the sound of glass breaking, or: the table "
+        "in the kitchen."
+    )
+    with pytest.raises(QueryError, match=f"^{re.escape(expected)}$"):
+        parse_sentence(sentence)
+
+
+@pytest.mark.parametrize("sentence", ["the chair near near the table", "% of", "the chair not in the kitchen"])
+def test_what_is_not_understood_is_named(sentence: str) -> None:
+    with pytest.raises(QueryError, match=r"is not understood; say it like: the chair near the sound of glass breaking"):
+        parse_sentence(sentence)
+
+
+def test_a_text_that_is_no_question_is_refused_by_its_length() -> None:
+    with pytest.raises(QueryError, match=r"^The sentence has 12000 characters, more than 500; say it shorter"):
+        parse_sentence("red " * 3000)
+    assert len(parse_sentence("the " + "big " * 3 + "chair").parts) == 1
