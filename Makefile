@@ -80,8 +80,8 @@ $(VENV)-docs/.ready: requirements/docs.txt
 fuzz: $(READY)  ## Break 10,000 recordings and maps in seeded ways (a night; goes on where it was stopped): fuzz_out/.
 	$(RUN)/python tests/fuzz/campaign.py --cases $(or $(CASES),10000) --out fuzz_out
 
-bench: $(READY)  ## Measure speed and quality; writes docs/benchmarks.md.
-	$(RUN)/python benchmarks/report.py --out docs/benchmarks.md
+bench: $(READY)  ## Measure speed and accuracy; writes docs/benchmarks.md and the table of the README (two nights).
+	$(RUN)/python benchmarks/report.py
 
 train: $(VENV)-training/.ready  ## Train the embedded encoders again (CPU, a night; SOUNDS=folder of clips with an index.csv).
 	$(VENV)-training/bin/python -m training.words

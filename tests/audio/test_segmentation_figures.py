@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from avlmaps.bench.intervals import poisson, wilson
+from avlmaps.bench.harness.intervals import poisson, wilson
 from avlmaps.bench.segmentation import COLUMNS, Tally, clips_to_test, measure
 from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings
 

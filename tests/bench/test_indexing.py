@@ -10,26 +10,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from avlmaps.bench.harness.evidence import MARGIN_M, NEAR_M, Box, Event, Evidence, Photo, alone_near
+from avlmaps.bench.harness.factors import near_polygon, true_regions
+from avlmaps.bench.harness.settings import Recorded, TaskError
+from avlmaps.bench.harness.true_voxels import TrueVoxels
+from avlmaps.bench.harness.weak_sounds import WeakSounds
 from avlmaps.bench.indexing.configurations import CONFIGURATIONS, configurations
-from avlmaps.bench.indexing.factors import near_polygon, true_regions
 from avlmaps.bench.indexing.metrics import LIMITS_M, Answered, bootstrapped_mean, judged, scored
-from avlmaps.bench.indexing.rules import (
-    MARGIN_M,
-    NEAR_M,
-    Event,
-    Evidence,
-    Photo,
-    alone_near,
-    area_tasks,
-    photo_tasks,
-    sound_tasks,
-)
+from avlmaps.bench.indexing.rules import area_tasks, near_sound_tasks, photo_tasks, sound_tasks
 from avlmaps.bench.indexing.runs import IndexingSettings, run
 from avlmaps.bench.indexing.scene_queries import AskedScene
 from avlmaps.bench.indexing.tables import tables
-from avlmaps.bench.indexing.tasks import Box, Recorded, Task, TaskError, TaskKind, TaskSet, load_tasks, save_tasks
-from avlmaps.bench.indexing.true_voxels import TrueVoxels
-from avlmaps.bench.indexing.weak_sounds import WeakSounds
+from avlmaps.bench.indexing.tasks import Task, TaskKind, TaskSet, load_tasks, save_tasks
 from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
@@ -147,7 +139,7 @@ def test_nothing_is_near_among_nothing():
 
 def test_a_sound_beside_one_of_two_chairs_makes_a_task_for_that_chair():
     evidence = evidence_of([(0, 0), (6, 0)], (Event("snoring", (5.0, 0.5, 1.3)),))
-    (task,) = sound_tasks(evidence, np.random.default_rng(0), 10)
+    (task,) = near_sound_tasks(evidence, np.random.default_rng(0), 10)
     assert task.targets == (evidence.box(1),)
     assert task.rivals == 1
     assert task.sentence == "the chair near the sound of snoring"
@@ -165,23 +157,48 @@ def test_a_sound_beside_one_of_two_chairs_makes_a_task_for_that_chair():
 )
 def test_no_task_is_made_where_the_answer_is_not_the_only_one_or_needs_no_sound(chairs, sounds):
     evidence = evidence_of(chairs, tuple(Event("snoring", (x, y, 1.3)) for x, y in sounds))
-    assert sound_tasks(evidence, np.random.default_rng(0), 10) == []
+    assert near_sound_tasks(evidence, np.random.default_rng(0), 10) == []
 
 
 def test_a_chair_that_the_recording_does_not_show_is_neither_asked_for_nor_a_rival():
     evidence = evidence_of([(0, 0), (6, 0)], (Event("snoring", (5.0, 0.5, 1.3)),))
     for hidden in (0, 1):
         seen = np.where(np.arange(2) == hidden, 0, 100)
-        assert sound_tasks(replace(evidence, seen=seen), np.random.default_rng(0), 10) == []
+        assert near_sound_tasks(replace(evidence, seen=seen), np.random.default_rng(0), 10) == []
 
 
 def test_what_stands_on_another_storey_is_no_rival():
     evidence = evidence_of([(0, 0), (6, 0), (6, 0)], (Event("snoring", (5.0, 0.5, 1.3)),))
     above = replace(evidence.objects[2], low=(5.8, -0.2, 3.0), high=(6.2, 0.2, 3.9))
     stacked = replace(evidence, objects=(*evidence.objects[:2], above))
-    assert sound_tasks(stacked, np.random.default_rng(0), 10) == []
-    (task,) = sound_tasks(replace(stacked, storey_m=(-0.4, 2.6)), np.random.default_rng(0), 10)
+    assert near_sound_tasks(stacked, np.random.default_rng(0), 10) == []
+    (task,) = near_sound_tasks(replace(stacked, storey_m=(-0.4, 2.6)), np.random.default_rng(0), 10)
     assert task.targets == (evidence.box(1),)
+
+
+def test_a_sound_heard_at_two_places_of_which_one_is_near_an_object_makes_a_task_for_that_place():
+    near, far = (4.6, 0.5, 1.3), (-5.0, 0.0, 1.3)
+    passing = tuple((x, 0.5, 1.3) for x in (4.4, 4.6, 4.8))
+    events = (Event("snoring", far), Event("snoring", near, passing), Event("doorbell", near))
+    (task,) = sound_tasks(evidence_of([(5.5, 0)], events), np.random.default_rng(0), 10)
+    assert (task.category, task.context, task.rivals) == ("snoring", "chair", 1)
+    assert (task.sound_name, task.object_name) == ("snoring", "chair")
+    assert task.sentence == "the sound of snoring near the chair"
+    assert task.off_m((4.8, 0.5, 0.0)) == 0.0  # anywhere along the way on which the sound was heard
+    assert task.off_m((5.5, 0.0, 0.0)) > 0.5  # the object itself is no answer
+
+
+@pytest.mark.parametrize(
+    "places",
+    [
+        [(0.5, 0.5)],  # heard once: no context is needed
+        [(0.5, 0.5), (0.0, 1.0)],  # both are near the chair
+        [(6.0, 0.0), (9.0, 0.0)],  # none is
+    ],
+)
+def test_no_task_for_a_sound_is_made_where_the_object_does_not_tell_its_places_apart(places):
+    events = tuple(Event("snoring", (x, y, 1.3)) for x, y in places)
+    assert sound_tasks(evidence_of([(0, 0)], events), np.random.default_rng(0), 10) == []
 
 
 def test_a_photo_asks_only_for_what_it_shows():
@@ -278,6 +295,7 @@ def all_tasks(home: _Perfect) -> list[Task]:
     share = np.full(len(home.scene.objects), 0.1)
     return [
         *area_tasks(home.evidence, rng, 10),
+        *near_sound_tasks(home.evidence, rng, 10),
         *sound_tasks(home.evidence, rng, 10),
         *photo_tasks(home.evidence, [Photo(pose, share)] * 3, rng, 10),
     ]
@@ -285,7 +303,8 @@ def all_tasks(home: _Perfect) -> list[Task]:
 
 @pytest.mark.parametrize("swap", [False, True])
 def test_true_perception_answers_every_task_within_a_voxel(swap: bool):
-    made = perfect(home(swap), (heard("snoring", (1.5, 1.5, 1.3)), heard("doorbell", (8.0, 2.0, 1.3))))
+    places = (("snoring", (1.5, 1.5, 1.3)), ("doorbell", (8.0, 2.0, 1.3)), ("doorbell", (3.5, 0.6, 1.3)))
+    made = perfect(home(swap), tuple(heard(*one) for one in places))
     tasks = all_tasks(made)
     assert {task.kind for task in tasks} == set(TaskKind)
     for task in tasks:
@@ -338,7 +357,7 @@ def test_tasks_come_back_from_a_file_as_they_were(kitchen_and_bedroom: _Perfect,
         (b"{", "damaged"),
         (b"[]", "damaged"),
         (b'{"schema_version": 99}', "of schema 99"),
-        (b'{"schema_version": 1, "scenes": []}', "damaged"),
+        (b'{"schema_version": 2, "scenes": []}', "damaged"),
     ],
 )
 def test_a_file_that_holds_no_tasks_is_refused_in_one_sentence(content: bytes, told: str, tmp_path: Path):
@@ -354,7 +373,7 @@ def test_a_file_that_is_not_there_is_told(tmp_path: Path):
 
 
 def test_a_whole_run_makes_tables_and_a_second_one_makes_nothing_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("avlmaps.bench.indexing.weak_sounds._EXAMPLES", 2)  # its ear has a test of its own
+    monkeypatch.setattr("avlmaps.bench.harness.weak_sounds._EXAMPLES", 2)  # its ear has a test of its own
     opened: list[str] = []
 
     def open_spec(spec: str) -> Scene:
@@ -382,10 +401,16 @@ def test_a_whole_run_makes_tables_and_a_second_one_makes_nothing_again(tmp_path:
     shutil.copytree(tmp_path / "work", tmp_path / "other" / "work")
     for photo in (tmp_path / "other").rglob("photos"):
         shutil.rmtree(photo)
+    for answers in (tmp_path / "other").rglob("answers-*.json"):
+        answers.unlink()
     with pytest.raises(TaskError, match="no longer the scene"):
         run(replace(settings, save=None), tmp_path / "other" / "work", lambda spec: home(swap=True, moved_m=0.5))
+    assert set(first.weights) == {"pixels", "sounds", "local", "place", "matcher"}
+    recorded = replace(first.tasks.recorded, sounds="esc")
+    heard_clips = tables(replace(first, tasks=replace(first.tasks, recorded=recorded)))["Clips that were heard"]
+    assert sum(row[1] for row in heard_clips["rows"]) == len(first.scenes[0].clips) > 0
     made = tables(first)
-    by_name = {row[0]: row for row in made["Table III: area-object"]["rows"]}
+    by_name = {row[0]: row for row in made["Table III: an object in an area"]["rows"]}
     asked = sum(task.kind is TaskKind.AREA for task in first.tasks.tasks)
     assert asked > 0
     assert by_name["true perception"][1:3] == [asked, 100.0]

@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.bench.indexing.rules import Event, Evidence, Photo, photo_tasks, sound_tasks
-from avlmaps.bench.indexing.tasks import Box, Recorded, TaskError, TaskKind
+from avlmaps.bench.harness.evidence import Box, Event, Evidence, Photo
+from avlmaps.bench.harness.settings import Recorded, TaskError
+from avlmaps.bench.indexing.rules import near_sound_tasks, photo_tasks
+from avlmaps.bench.indexing.tasks import TaskKind
 from avlmaps.bench.navigation import Episode, Leg, MissionSet, Outcome, load_missions, save_missions
 from avlmaps.bench.navigation.commands import COMMANDS, SPATIAL, command_missions
 from avlmaps.bench.navigation.configurations import CEILING, CONFIGURATIONS, OURS, configurations
@@ -170,7 +172,7 @@ def ground() -> Ground:
     evidence = Evidence("made", scene.objects, seen, scene.areas, events, (-0.4, 2.6))
     photos = tuple(photo(x, y, len(scene.objects)) for x, y in ((2.0, 1.5), (6.0, 1.5), (6.0, 4.0), (1.5, 4.2)))
     rng = np.random.default_rng(0)
-    tasks = (*sound_tasks(evidence, rng, 20), *photo_tasks(evidence, photos, rng, 20))
+    tasks = (*near_sound_tasks(evidence, rng, 20), *photo_tasks(evidence, photos, rng, 20))
     return Ground(evidence, floor, photos, tasks)
 
 
@@ -398,13 +400,32 @@ def test_a_table_of_hand_made_runs_holds_their_figures():
     assert [ours[f"{k} in a row %"] for k in (1, 2, 3, 4)] == [100.0, 100.0, 50.0, 50.0]
     assert (ours["sequences"], ours["subgoals %"], ours["SPL"]) == (2, 87.5, round(6.5 / 8, 3))
     assert (ours["path m"], ours["actions"], ours["contacts"], ours["foretold"]) == (4.5, 40.0, 4, 1)
-    assert rows["weaker ear"]["sequences"] == 0
+    assert rows["weaker sound encoder"]["sequences"] == 0
     (paper,) = [row for name, row in rows.items() if "paper" in name]
     assert [paper["4 in a row %"], paper["subgoals %"]] == [33.0, 77.5]
-    figures = {row[0]: row for row in made["Figures to reach"]["rows"]}
-    assert figures["widest range: four in a row, %"][1:3] == [50.0, 50.0]
-    assert figures["true perception: reachable subgoals, %"][2:] == [100.0, "100.0 to 100.0", 7]
-    assert figures["contacts that the map could have foretold"][2] == 1
+    figures = {row[0]: row for row in made["All experiments"]["rows"]}
+    assert figures["true perception: reachable subgoals that were reached, %"][1:] == [100.0, "100.0 to 100.0", 7]
+    assert figures["contacts that the map could have foretold"][1] == 1
+
+
+def test_the_clips_that_were_heard_are_named_where_sounds_are_recordings():
+    made = outcome([], (Series.PAIRS,))
+    recorded = replace(made.missions.recorded, sounds="esc")
+    facts = replace(made.scenes[0], clips=(("rain", "esc/a.ogg"),))
+    named = tables(replace(made, missions=replace(made.missions, recorded=recorded), scenes=(facts,)))
+    assert named["Clips that were heard"]["rows"] == [["rain", 1, "a.ogg"]]
+    assert "Clips that were heard" not in tables(made)
+
+
+def test_the_pairs_table_holds_every_row_of_the_papers():
+    made = tables(outcome([], (Series.PAIRS,)))[TITLE[Series.PAIRS]]
+    rows = {row[0]: dict(zip(made["columns"], row, strict=True)) for row in made["rows"]}
+    paper = {name.partition(", paper")[0]: row for name, row in rows.items() if "paper" in name}
+    assert paper["AudioCLIP"]["sound %"] == 16.9
+    assert paper["VLMaps"]["object %"] == 27.1
+    assert paper["VLMaps + wav2clip"]["2 in a row %"] == 12.7
+    assert paper["VLMaps + AudioCLIP (AVLMaps)"]["1 in a row %"] == 46.2
+    assert {"objects only", "sounds only", "weaker sound encoder", OURS, CEILING} <= rows.keys()
 
 
 def test_kinds_of_goals_are_told_apart_in_pairs():
@@ -427,7 +448,8 @@ def test_every_series_has_ours_and_a_ceiling_and_the_experiments_of_the_paper_a_
         names = [one.name for one in configurations(series)]
         assert {OURS, CEILING} <= set(names)
         assert len(names) == len(set(names))
-    assert {series for one in CONFIGURATIONS if one.name == "weaker ear" for series in one.series} >= {Series.PAIRS}
+    weaker = {series for one in CONFIGURATIONS if one.name == "weaker sound encoder" for series in one.series}
+    assert weaker >= {Series.PAIRS}
 
 
 def test_settings_that_run_nothing_are_refused():
@@ -473,7 +495,7 @@ def test_a_touch_is_foretold_where_the_map_shows_something_within_the_radius(wal
 
 
 def test_ambiguous_things_are_those_of_the_indexing_benchmark(ground: Ground):
-    things = ground.ambiguous_things(TaskKind.SOUND)
+    things = ground.ambiguous_things(TaskKind.NEAR_SOUND)
     assert things
     for goal, task in things:
         assert goal.boxes == task.targets

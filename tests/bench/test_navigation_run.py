@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from avlmaps.bench.indexing.tasks import Box
-from avlmaps.bench.indexing.true_voxels import TrueVoxels
+from avlmaps.bench.harness.evidence import Box
+from avlmaps.bench.harness.true_voxels import TrueVoxels
 from avlmaps.bench.navigation.configurations import CEILING, Configuration, configurations
 from avlmaps.bench.navigation.episode_runner import Pilot
 from avlmaps.bench.navigation.episodes import Episode

@@ -27,7 +27,7 @@ ERRORS = (
     (("query", "MAP", "--object", "red", "--plot", "x.doc"), 1, "query"),
     (("locate", "MAP", "nothing.png"), 1, "query"),
     (("go", "nowhere.avlmap", "go to the chair", "--scene", "house:7"), 1, "map"),
-    (("go", "MAP", "gabble gabble the", "--scene", "house:7"), 1, "language"),
+    (("go", "MAP", "gabble gabble the", "--scene", "house:7"), 1, "unclear"),
     (("things", "nowhere.avlmap"), 1, "map"),
     (("export", "nowhere.avlmap", "--out", "OUT.ply"), 1, "map"),
     (("teach-sound", "x"), 2, "usage"),

@@ -187,11 +187,12 @@ def test_profiles_lists_every_backend_with_its_state(answer, run) -> None:
     assert "avlmaps/colour-words" in run("profiles")[1]
 
 
-def test_the_words_bench_writes_json_markdown_and_a_picture(answer, tmp_path: Path) -> None:
+def test_the_words_bench_writes_json_markdown_csv_and_a_picture(answer, tmp_path: Path) -> None:
     told = answer("bench", "words", "--out", tmp_path)
     assert {"suite", "scenes", "tables"} <= told.keys()
     assert json.loads((tmp_path / "words.json").read_text())["tables"] == told["tables"]
-    assert (tmp_path / "words.md").read_text().startswith("###")
+    assert "weights words" in (tmp_path / "words.md").read_text()
+    assert (tmp_path / "words-phrases-kept-out-of-training.csv").read_text().startswith("queries,encoder,first")
     assert cv2.imread(str(tmp_path / "words.png")) is not None
 
 
@@ -202,6 +203,7 @@ WRONG_WORDS = (
     (("query", "MAP", "--object", "red", "--intrinsics", "1,2,3,4"), "--intrinsics belongs to a photo"),
     (("teach-sound", "x"), "teach-sound takes clips to learn from, or --forget"),
     (("info", "REC", "--plot", "x.png"), "--plot draws a map"),
+    (("build", "REC", "--out", "x.avlmap", "--rules", "paper", "--sensor", "kinect"), "use every depth as it is"),
 )
 
 
@@ -231,6 +233,9 @@ KNOWN_ERRORS = (
     (("build", "REC", "--out", "OUT", "--audio", "nothing.wav"), 1, "nothing.wav"),
     (("add-sounds", "REC", "--clips", "nowhere", "--out", "OUT"), 1, "nowhere"),
     (("bench", "sounds"), 1, "name it with --sounds"),
+    (("bench", "indexing", "--out", "OUT", "--model", "eyes=clip"), 1, "the modules are pixels"),
+    (("bench", "indexing", "--out", "OUT", "--profile", "magic"), 1, "no profile called 'magic'"),
+    (("bench", "indexing", "--out", "OUT", "--scenes", "house:1", "--sounds", "nowhere"), 1, "nowhere"),
     (("nonsense",), 2, ""),
 )
 

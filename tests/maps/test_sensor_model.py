@@ -12,7 +12,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
 from avlmaps.maps.fusion.accumulator import FusionSettings, VoxelAccumulator
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.sensor import KINECT, NONE, PERFECT, REALSENSE, SensorModel
+from avlmaps.maps.sensor import KINECT, MODELS, NONE, PERFECT, REALSENSE, SensorModel
 from avlmaps.maps.sensor_kernels import drop_flying
 from avlmaps.maps.sensor_stage import measure_noise, nearest_model
 from avlmaps.recordings.types import Frame
@@ -161,3 +161,10 @@ def test_where_too_little_is_in_view_the_error_is_not_known():
 def test_models_of_no_camera_are_refused(wrong):
     with pytest.raises(MapError, match="choose"):
         SensorModel(**wrong)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_model_comes_back_from_the_manifest_as_it_was(name) -> None:
+    import msgspec
+
+    assert msgspec.json.decode(msgspec.json.encode(MODELS[name]), type=SensorModel) == MODELS[name]

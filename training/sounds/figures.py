@@ -10,7 +10,7 @@ from training.sounds.crossvalidate import LEFT_OUT, ROOM_S, Answers, Held
 from training.sounds.fit import EncodeWords
 from training.sounds.kinds import CALLED, ESC10, KINDS, NAMES, RECORDED
 
-from avlmaps.bench.intervals import wilson
+from avlmaps.bench.harness.intervals import wilson
 from avlmaps.bench.sound_clips import paraphrases
 from avlmaps.perception.embedded.sound_calibration import Calibration, log_odds, sigmoid
 

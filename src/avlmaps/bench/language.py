@@ -12,7 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from avlmaps.bench.intervals import wilson
+from avlmaps.bench.harness.intervals import wilson
 from avlmaps.core.errors import LanguageError, QueryError
 from avlmaps.core.inflection import singulars_of
 from avlmaps.core.lexicon import Kind, lexicon

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from avlmaps.bench.intervals import wilson
+from avlmaps.bench.harness.intervals import wilson
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.core.progress import progress
@@ -77,7 +77,7 @@ def run(
     steps: Sequence[int] = (2, 10, 50),
     photos: int = 250,
     foreign: Iterable[UInt8[np.ndarray, "h w 3"]] | None = None,
-    profile_name: str = "embedded",
+    used: Profile | None = None,
     settings: LocateSettings = _LOCATING,
 ) -> dict[str, Any]:
     """Measure on one recording, once for each density of the map.
@@ -92,7 +92,7 @@ def run(
         photos: at most so many are asked.
         foreign: photos of another place, as large as the recording's; None takes the photos themselves, mirrored:
             a place that is not there, through the same camera.
-        profile_name: whose encoders.
+        used: whose encoders; the embedded ones if None.
         settings: thresholds.
 
     Returns:
@@ -100,11 +100,12 @@ def run(
         Intervals are Wilson's.
     """
     rows: list[list[object]] = []
+    used = used or profile("embedded")
     foreign = None if foreign is None else list(foreign)
     for step in steps:
         kept = np.arange(0, len(recording), step)
         asked = _spread(np.setdiff1d(np.arange(len(recording)), kept), photos)
-        stored = map_of(Subset(recording, kept), profile(profile_name), np.random.default_rng(seed))
+        stored = map_of(Subset(recording, kept), used, np.random.default_rng(seed))
         name = f"every {step}th frame" if step > 2 else "every other frame"
         errors = errors_of(stored, recording, asked, seed, settings)
         rows.append([name, len(stored.keyframes), len(asked), "yes", *_figures(errors)])

@@ -9,12 +9,15 @@ from those that are not (area under the ROC curve). Truth: boxes of things, of w
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from avlmaps.bench.intervals import wilson
+from avlmaps.bench.harness.chosen import chosen_on
+from avlmaps.bench.harness.intervals import wilson
+from avlmaps.bench.harness.provenance import in_words, provenance, shown_scene
+from avlmaps.bench.output import draw, markdown, write_answer
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.progress import progress
 from avlmaps.sim.scene import SceneObject
@@ -132,26 +135,35 @@ def _distance(position: Sequence[float], things: Sequence[SceneObject]) -> float
     return float(min(np.linalg.norm(gap) for gap in gaps))
 
 
-def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, dict[str, list]]:
+def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, Any]:
     """Map scenes, or take the maps that the suite ``indexing`` left in the same folder, and measure each.
 
     Args:
         settings: which scenes, how they are recorded, with which models they are mapped.
-        out: recordings and maps are kept in its folder ``work``.
+        out: recordings and maps stay in its folder ``work``.
+
+    Raises:
+        BackendError: a model is missing; nothing is recorded then.
     """
-    from avlmaps.bench.indexing.prepared import SceneJob, Workplace
+    from avlmaps.bench.harness.workplace import Workplace, scene_jobs
     from avlmaps.bench.indexing.runs import IndexingSettings
     from avlmaps.sim.scenes import open_scene
 
     settings = settings or IndexingSettings()
+    weights = settings.checked()
     figures = []
-    for spec in progress(settings.scenes, "measuring", unit="scene"):
-        place = Workplace(
-            SceneJob(spec, settings.recorded, settings.sounds, settings.profile, out / "work"), open_scene
-        )
-        figures.append(measure(place.asked, place.truth.objects, _same(place.truth.objects), spec))
+    jobs = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
+    for job in progress(jobs, "measuring", unit="scene"):
+        place = Workplace(job, open_scene)
+        figures.append(measure(place.asked, place.truth.objects, _same(place.truth.objects), shown_scene(job.spec)))
     missed = {"columns": ["scene", "category", "first goal, m from a true one"], "rows": _missed(figures)}
-    return {"objects found by their names": table_of(figures), "categories whose first goal is elsewhere": missed}
+    named = {"objects found by their names": table_of(figures), "categories whose first goal is elsewhere": missed}
+    chosen = chosen_on(settings.scenes)
+    tables = {name: {**table, "chosen on": chosen} if chosen else table for name, table in named.items()}
+    answer = {"suite": "objects", **provenance(settings, settings.recorded, settings.scenes, weights), "tables": tables}
+    written = write_answer(answer, out, f"{in_words(answer)}\n\n{markdown(tables)}")
+    draw(tables, out / "objects.png")
+    return written
 
 
 def _same(things: Sequence[SceneObject]) -> dict[str, str]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32
 
-from avlmaps.bench.intervals import poisson, wilson
+from avlmaps.bench.harness.intervals import poisson, wilson
 from avlmaps.core.progress import progress
 from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings, segment
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Float32
 
-from avlmaps.bench.intervals import wilson
+from avlmaps.bench.harness.intervals import wilson
 from avlmaps.bench.sound_categories import CATEGORIES, ESC10
 from avlmaps.core.errors import AudioError
 from avlmaps.perception.embedded.sounds import EmbeddedSounds

@@ -1,26 +1,20 @@
 """The suites behind `avlmaps bench`: run one, write its tables as JSON, Markdown and a picture."""
 
-import csv
-import io
-import json
-import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from avlmaps.core.errors import AvlmapsError, RecordingError
-from avlmaps.core.files import write_bytes_atomically
+from avlmaps.bench.harness.models import checksums, chosen_profile, shipped_checksums
+from avlmaps.bench.harness.provenance import in_words
+from avlmaps.bench.output import BenchError, Table, draw, markdown, write_answer
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.registry import Kind
+from avlmaps.perception.profiles import Profile
 
 if TYPE_CHECKING:
     from avlmaps.bench.indexing import IndexingSettings
     from avlmaps.bench.navigation import NavigationSettings
-
-Table = Mapping[str, Any]  # {"columns": [...], "rows": [[...]]}
-
-
-class BenchError(AvlmapsError):
-    """A suite cannot be run: what it measures on was not given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +26,8 @@ class Asked:
         clips: the same, for ``sounds``: clips that are asked for by name, dry and in rooms.
         scenes: recordings with poses, for ``locate``.
         nyuv2: folder of labelled frames, for ``frames``.
-        profile: which models are measured.
+        profile: the models that are measured.
+        models: other backends than the profile's, ``module=backend[@model]``.
         seed: of what is drawn at random.
         indexing: what the suites ``indexing`` and ``objects`` are run on; its own defaults if None.
         navigation: what the suite ``navigation`` is run on; its own defaults if None.
@@ -43,17 +38,18 @@ class Asked:
     scenes: tuple[Path, ...] = ()
     nyuv2: Path | None = None
     profile: str = "embedded"
+    models: tuple[str, ...] = ()
     seed: int = 0
     indexing: "IndexingSettings | None" = None
     navigation: "NavigationSettings | None" = None
 
 
 def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
-    """Run a suite and write SUITE.json, SUITE.md, SUITE.png and a SUITE-TABLE.csv for each table into ``out``.
+    """Run a suite and write SUITE.json, SUITE.md, SUITE.png and a CSV file for each table into ``out``.
 
     Args:
-        suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``,
-            ``objects``, ``indexing`` or ``navigation``.
+        suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``objects``, ``indexing``
+            or ``navigation``.
         asked: what it measures on.
         out: folder to write into.
 
@@ -68,31 +64,38 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
         from avlmaps.bench.navigation.suite import run_navigation
 
         return run_navigation(asked.navigation, out)
-    given = (asked.sounds, asked.clips, asked.nyuv2, *asked.scenes)
-    scenes = [source.resolve().name for source in given if source is not None]
+    used = chosen_profile(asked.profile, asked.models)
+    weights = _weights(suite, used)
     if suite == "objects":
-        from avlmaps.bench.indexing import DEFAULT_SCENES
         from avlmaps.bench.objects import run_objects
 
-        tables = run_objects(asked.indexing, out)
-        scenes = list(asked.indexing.scenes if asked.indexing else DEFAULT_SCENES)
-    else:
-        tables = _SUITES[suite](asked)
+        return run_objects(asked.indexing, out)
+    tables = _SUITES[suite](asked)
+    sources = (asked.sounds, asked.clips, asked.nyuv2, *asked.scenes)
     answer = {
         "suite": suite,
-        "scenes": scenes,
+        "scenes": [source.resolve().name for source in sources if source is not None],
         "profile": asked.profile,
+        "models": list(asked.models),
         "seed": asked.seed,
-        "tables": {name: dict(table) for name, table in tables.items()},
+        "weights": weights,
+        "tables": tables,
     }
-    out.mkdir(parents=True, exist_ok=True)
-    write_bytes_atomically(out / f"{suite}.json", (json.dumps(answer, indent=1) + "\n").encode())
-    write_bytes_atomically(out / f"{suite}.md", markdown(tables).encode())
-    for name, table in tables.items():
-        slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
-        write_bytes_atomically(out / f"{suite}-{slug}.csv", as_csv(table).encode())
+    written = write_answer(answer, out, f"{in_words(answer)}\n\n{markdown(tables)}")
     draw(tables, out / f"{suite}.png")
-    return answer
+    return written
+
+
+# The modules that each suite measures; a model that is missing is named before anything else happens.
+_MEASURED = {"sounds": (Kind.SOUNDS,), "locate": (Kind.LOCAL, Kind.PLACE, Kind.MATCHER), "frames": (Kind.PIXELS,)}
+
+
+def _weights(suite: str, used: Profile) -> dict[str, str]:
+    """Return the checksums of the models that a suite measures, by module."""
+    if suite == "words":
+        return {"words": shipped_checksums()["words"]}
+    known = checksums(used)
+    return {kind.value: known[kind.value] for kind in _MEASURED.get(suite, ()) if kind.value in known}
 
 
 def _words(asked: Asked) -> Mapping[str, Table]:
@@ -129,7 +132,7 @@ def _locate(asked: Asked) -> Mapping[str, Table]:
         if len(recording) < 20:
             raise RecordingError(f"{path} has {len(recording)} frames; half as map and half as photos takes 20.")
         tables[f"photos located in {path.resolve().name}"] = locate.run(
-            recording, asked.seed, profile_name=asked.profile
+            recording, asked.seed, used=chosen_profile(asked.profile, asked.models)
         )
     return tables
 
@@ -176,48 +179,3 @@ def _clips(asked: Asked) -> Path:
 def _embedded_only(asked: Asked, suite: str) -> None:
     if asked.profile != "embedded":
         raise BenchError(f"The suite {suite} measures the embedded encoder; it has no figures for {asked.profile!r}.")
-
-
-def markdown(tables: Mapping[str, Table]) -> str:
-    """Write tables as Markdown."""
-    blocks: list[str] = []
-    for name, table in tables.items():
-        lines = [_row(table["columns"]), _row(["---"] * len(table["columns"])), *[_row(row) for row in table["rows"]]]
-        blocks.append(f"### {name}\n\n" + "\n".join(lines) + "\n")
-    return "\n".join(blocks)
-
-
-def as_csv(table: Table) -> str:
-    """Write one table as CSV."""
-    stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerows([table["columns"], *table["rows"]])
-    return stream.getvalue()
-
-
-def _row(cells: Sequence[object]) -> str:
-    return "| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |"
-
-
-def draw(tables: Mapping[str, Table], path: Path) -> None:
-    """Draw tables as a picture, to be pasted where Markdown is not shown."""
-    from matplotlib.figure import Figure
-
-    heights = [0.35 * (len(table["rows"]) + 1) + 0.6 for table in tables.values()]
-    figure = Figure(figsize=(12, sum(heights)))
-    panes = figure.subplots(len(tables), 1, height_ratios=heights, squeeze=False)[:, 0]
-    for axes, (name, table) in zip(panes, tables.items(), strict=True):
-        axes.axis("off")
-        axes.set_title(name, loc="left", fontsize=11, fontweight="bold")
-        if not table["rows"]:
-            continue
-        cells = [[str(cell) for cell in row] for row in table["rows"]]
-        columns = [str(column) for column in table["columns"]]
-        drawn = axes.table(cells, colLabels=columns, loc="upper left", cellLoc="left")
-        drawn.auto_set_font_size(False)
-        drawn.set_fontsize(9)
-        drawn.auto_set_column_width(list(range(len(columns))))
-        for (row, _), cell in drawn.get_celld().items():
-            cell.set_edgecolor("#dddddd")
-            if row == 0:
-                cell.set_text_props(fontweight="bold")
-    figure.savefig(path, dpi=110, bbox_inches="tight")

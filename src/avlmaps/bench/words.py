@@ -10,7 +10,7 @@ from time import thread_time
 
 import numpy as np
 
-from avlmaps.bench.intervals import wilson
+from avlmaps.bench.harness.intervals import wilson
 from avlmaps.perception.embedded.words import EmbeddedWords
 
 _FIVE = 5

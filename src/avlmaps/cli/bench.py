@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from tyro.conf import OmitArgPrefixes, Positional
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from avlmaps.cli.output import emit, table_lines
 from avlmaps.cli.verb import ModelVerb
@@ -19,56 +19,64 @@ Series = Literal["sounds-1", "sounds-2", "sounds-3", "images", "pairs", "command
 
 @dataclass(frozen=True, kw_only=True)
 class Indexing:
-    """How the suites indexing, objects and navigation make, record and ask their scenes."""
+    """Scenes of the suites indexing, objects and navigation."""
 
     hearing: Literal["overlay", "acoustic"] = "overlay"
     """How sounds reach the microphone: mixed in as the paper did, or through rooms and doorways."""
     sensor: Literal["clean", "kinect", "realsense"] = "clean"
-    """Whose faults colour and depth have."""
+    """Camera whose faults colour and depth have."""
+    rules: Literal["ours", "paper"] = "ours"
+    """Rules of mapping and querying: ours, or the paper's throughout (docs/paper-models.md)."""
+    sound_clips: Literal["unheard", "all"] = "unheard"
+    """Clips of --sounds: those that the embedded sound encoder was not trained on, or all."""
     frames: int = 600
-    """At most so many frames a scene."""
+    """Limit of frames a scene."""
     tasks_a_scene: int = 20
-    """At most so many tasks a scene and table (indexing)."""
+    """Limit of tasks a scene and table (indexing)."""
+    size: Literal["paper", "all"] = "paper"
+    """Tasks a table, over all scenes (indexing): as many as the paper has (100, 119, 159), or all that there are."""
     jobs: int = 0
-    """Scenes side by side; 0 takes as many as there are cores."""
+    """Scenes side by side. Default: one a core."""
     tasks: Path | None = None
-    """Ask the tasks (or run the missions) of this file instead of making some."""
+    """Ask the tasks (or run the missions) of this file instead of new ones."""
     save_tasks: Path | None = None
     """Write the tasks (or missions) and their truth into this file."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Navigation:
-    """What robots are told in the suite navigation."""
+    """Commands of the suite navigation."""
 
     sequences: int = 200
     """Sequences of four sounds (at each range), and of an image and two objects; pairs are 119 for each 200."""
     series: tuple[Series, ...] = ()
-    """Which experiments; all by default."""
+    """Experiments to run. Default: all."""
     language: Literal["rules", "chat", "none"] = "rules"
-    """What turns sentences into programs; none gives robots the programs themselves."""
+    """Translator of sentences into programs; none gives robots the programs."""
     guess: bool = True
-    """Let robots go to the best guess where the map is not sure, as the paper's always do."""
+    """Send robots to the best guess where the map is not confident, as in the paper."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Bench(ModelVerb):
-    """Measure how good the parts are, with counts and 95 % intervals.
+    """Measure the accuracy of the parts, with counts and 95 % intervals.
 
-    words: household phrases kept out of training; needs nothing.
+    Example: avlmaps bench indexing --scenes house:1000000:held-out --out bench_out
+
+    words: household phrases that were not trained on; needs nothing.
     language: commands and questions that strangers wrote; needs nothing.
     sounds, segmentation: need --sounds, a folder of clips with an index.csv.
-    locate: needs --scenes, recordings with poses; half of the frames become the map, the others are asked.
+    locate: needs --scenes, recordings with poses; half of the frames become the map, the others are located.
     frames: needs --nyuv2, labelled frames in the layout of NYU Depth V2; kinds of pixels, without any map.
-    objects: are things where the map says, in the same scenes as indexing, whose maps it shares.
-    indexing: objects told apart by sounds, photos and areas, in twelve held-out homes or in --scenes by name.
-    navigation: robots sent from sentence to place, in twelve held-out homes or in --scenes by name.
+    objects: positions of objects, in the scenes of indexing, whose maps it shares.
+    indexing: the paper's Tables III to V, in twelve held-out homes, in --scenes, or in a recording with objects.json.
+    navigation: the paper's Tables I, II and VI and its commands, in twelve held-out homes or in --scenes.
     """
 
     compiles: ClassVar[bool] = True
 
     suite: Positional[Suite]
-    """What to measure."""
+    """Suite to run."""
     sounds: Path | None = None
     """Folder of sound clips with an index.csv (path, category, fold)."""
     clips: Path | None = None
@@ -78,11 +86,13 @@ class Bench(ModelVerb):
     nyuv2: Path | None = None
     """Folder of labelled frames (frames.csv, NNNN.color.jpg, NNNN.depth8.png, NNNN.label.png)."""
     profile: str = "embedded"
-    """Which models are measured."""
+    """Models to measure (see `avlmaps profiles`)."""
+    model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
+    """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
     out: Path = Path("bench_out")
     """Folder for SUITE.json, SUITE.md, SUITE.png and a CSV file for each table."""
     seed: int = 0
-    """Seed of what is drawn at random."""
+    """Seed of all random choices."""
     indexing: Annotated[Indexing, OmitArgPrefixes] = field(default_factory=Indexing)
     """Of the suites indexing, objects and navigation."""
     navigation: Annotated[Navigation, OmitArgPrefixes] = field(default_factory=Navigation)
@@ -95,26 +105,38 @@ class Bench(ModelVerb):
         indexing = self.indexing_settings() if self.suite in ("indexing", "objects") else None
         navigation = self.navigation_settings() if self.suite == "navigation" else None
         scenes = () if indexing or navigation else tuple(map(Path, self.scenes))
-        asked = Asked(self.sounds, self.clips, scenes, self.nyuv2, self.profile, self.seed, indexing, navigation)
+        models = self.models_chosen
+        asked = Asked(
+            self.sounds, self.clips, scenes, self.nyuv2, self.profile, models, self.seed, indexing, navigation
+        )
         answer = run_suite(self.suite, asked, self.out)
         lines: list[str] = []
         for name, table in answer["tables"].items():
             lines += [name, *["  " + line for line in table_lines(table["columns"], table["rows"])]]
         emit(answer, [*lines, f"wrote {self.out}"], self.json)
 
+    @property
+    def models_chosen(self) -> tuple[str, ...]:
+        """The words of all --model."""
+        return tuple(word for words in self.model for word in words)
+
     def indexing_settings(self) -> "IndexingSettings":
-        """Return what the suite indexing is run on."""
-        from avlmaps.bench.indexing import DEFAULT_SCENES, IndexingSettings
+        """Return the settings of the suites indexing and objects."""
+        from avlmaps.bench.indexing import DEFAULT_SCENES, PAPER_SIZES, IndexingSettings
 
         chosen = self.indexing
         return IndexingSettings(
             scenes=self.scenes or DEFAULT_SCENES,
             profile=self.profile,
+            models=self.models_chosen,
+            rules=chosen.rules,
             hearing=chosen.hearing,
             sounds=self.sounds,
+            clips=chosen.sound_clips,
             sensor=chosen.sensor,
             frames=chosen.frames,
             tasks_a_scene=chosen.tasks_a_scene,
+            sizes=PAPER_SIZES if chosen.size == "paper" else None,
             jobs=chosen.jobs,
             seed=self.seed,
             load=chosen.tasks,
@@ -122,7 +144,7 @@ class Bench(ModelVerb):
         )
 
     def navigation_settings(self) -> "NavigationSettings":
-        """Return what the suite navigation is run on."""
+        """Return the settings of the suite navigation."""
         from avlmaps.bench import navigation
 
         chosen, scenes = self.navigation, self.indexing
@@ -130,8 +152,11 @@ class Bench(ModelVerb):
             scenes=self.scenes or navigation.DEFAULT_SCENES,
             series=tuple(map(navigation.Series, chosen.series)) or tuple(navigation.Series),
             profile=self.profile,
+            models=self.models_chosen,
+            rules=scenes.rules,
             hearing=scenes.hearing,
             sounds=self.sounds,
+            clips=scenes.sound_clips,
             sensor=scenes.sensor,
             frames=scenes.frames,
             sequences=chosen.sequences,

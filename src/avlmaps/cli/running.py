@@ -88,13 +88,18 @@ def _size(words: str) -> tuple[int, int]:
 
 def build(verb: "Build") -> dict[str, Any]:
     """Build a map and describe it."""
-    from avlmaps.maps.build import build_map, describe
+    from avlmaps.maps.build import build_map
     from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings, GravitySettings
+    from avlmaps.query.rules import build_settings
     from avlmaps.recordings.open import open_recording
 
     begin = perf_counter()
     if verb.resume and verb.fresh:
         raise UsageError("--resume goes on with a stopped build and --fresh begins anew; choose one of them.")
+    if verb.rules == "paper" and verb.sensor not in ("auto", "none"):
+        raise UsageError(
+            f"The paper's rules use every depth as it is; leave out --sensor {verb.sensor} or --rules paper."
+        )
     used, cache = (
         _chosen_profile(verb.profile, [word for words in verb.model for word in words]),
         _cache(verb.feature_cache, verb.feature_cache_gb),
@@ -113,12 +118,12 @@ def build(verb: "Build") -> dict[str, Any]:
         recording,
         verb.out,
         used,
-        settings,
+        build_settings(verb.rules, settings),
         cache=cache,
         resume=not verb.fresh,
         overwrite=verb.overwrite,
     )
-    return {**with_sound_names(describe(stored), stored), "elapsed_s": round(perf_counter() - begin, 3)}
+    return {**_described(stored), "elapsed_s": round(perf_counter() - begin, 3)}
 
 
 def _chosen_profile(name: str, words: "Sequence[str]") -> "Profile":
@@ -193,15 +198,23 @@ def repair(verb: "Info") -> dict[str, Any]:
 
 
 def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]:
-    from avlmaps.maps.store.reader import describe, open_stored
+    from avlmaps.maps.store.reader import open_stored
 
     stored = open_stored(path, verify=verify)
-    told = with_sound_names(describe(stored), stored)
+    told = _described(stored)
     if plot is not None:
         from avlmaps.query.plots import plot_map
 
         told["plot"] = str(plot_map(stored, plot))
     return told
+
+
+def _described(stored: "StoredMap") -> dict[str, Any]:
+    """Describe a map, the names of its sounds, and the rules that it was built by."""
+    from avlmaps.maps.store.reader import describe
+    from avlmaps.query.rules import rules_of
+
+    return {**with_sound_names(describe(stored), stored), "rules": rules_of(stored.info.settings)}
 
 
 def with_sound_names(told: dict[str, Any], stored: "StoredMap") -> dict[str, Any]:
@@ -255,6 +268,7 @@ def ask(verb: "Query") -> dict[str, Any]:
     """Query a map with a sentence or with parts."""
     from avlmaps.core.question import Modality, Question
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.rules import query_settings
 
     parts = _parts(verb)
     only_files = all(part.is_file for part in parts)
@@ -265,7 +279,7 @@ def ask(verb: "Query") -> dict[str, Any]:
         )
     if verb.top < 1:
         raise UsageError(f"--top is {verb.top}; it must be 1 or more.")
-    asked = AVLMap.open(verb.map)
+    asked = AVLMap.open(verb.map, query_settings(verb.rules))
     if verb.sentence.strip():
         return _asked_in_words(verb, asked)
     question = Question.of(parts, Modality(verb.primary) if verb.primary else None)

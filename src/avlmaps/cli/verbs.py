@@ -177,6 +177,8 @@ class Build(ModelVerb):
     """Which models perceive (see `avlmaps profiles`)."""
     model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
     """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
+    rules: Literal["ours", "paper"] = "ours"
+    """Rules of mapping: ours, or the paper's with any models (docs/paper-models.md)."""
     batch: int | None = None
     """Frames that go through a large model at once. Default: AVLMAPS_BATCH, or as the model likes (1 on a CPU)."""
     feature_cache: Annotated[str, arg(metavar="auto|off|DIR")] = "auto"
@@ -279,6 +281,8 @@ class Query(ModelVerb):
     """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: the map's own colour camera."""
     primary: Literal["object", "sound", "image", "area"] | None = None
     """Which part is the goal itself; the others say where it is. Default: the first of object, image, sound, area."""
+    rules: Literal["ours", "paper"] = "ours"
+    """Rules of scores and heat: ours, or the paper's with any models (docs/paper-models.md)."""
     top: int = 3
     """How many goals to tell."""
     plot: Path | None = None

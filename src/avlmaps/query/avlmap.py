@@ -179,11 +179,11 @@ class AVLMap:
         )
 
     def knows(self, phrase: str) -> bool:
-        """Return whether the pixel encoder can look for a phrase: any phrase for an open vocabulary, else its names."""
-        from avlmaps.perception.protocols import NamedPixelEncoder
+        """Return whether the pixel encoder can look for a phrase: any phrase for an open vocabulary, else its words."""
+        from avlmaps.query.synonyms import is_open
 
         encoder = self.stored.profile.pixel_encoder()
-        return not isinstance(encoder, NamedPixelEncoder) or bool(encoder.meant(phrase).any())
+        return is_open(encoder) or bool(encoder.understood(phrase))
 
     def sound(self, text: str, primary: bool = False) -> Heatmap:
         """Return the heat of where a sound of that name was heard.

@@ -1,10 +1,12 @@
 """The cross-modal indexing benchmark: the paper's Tables III, IV and V on homes made by rule."""
 
-from avlmaps.bench.indexing.runs import DEFAULT_SCENES, IndexingSettings, Outcome, run
-from avlmaps.bench.indexing.tasks import Box, Task, TaskKind, TaskSet, load_tasks, save_tasks
+from avlmaps.bench.harness.evidence import Box
+from avlmaps.bench.indexing.runs import DEFAULT_SCENES, PAPER_SIZES, IndexingSettings, Outcome, run
+from avlmaps.bench.indexing.tasks import Task, TaskKind, TaskSet, load_tasks, save_tasks
 
 __all__ = [
     "DEFAULT_SCENES",
+    "PAPER_SIZES",
     "Box",
     "IndexingSettings",
     "Outcome",

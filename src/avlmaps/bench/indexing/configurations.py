@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 from avlmaps.bench.indexing.scene_queries import AskedScene
 from avlmaps.bench.indexing.tasks import Task, TaskKind
@@ -48,40 +47,62 @@ class Configuration:
         return goals[0].position if goals else None
 
 
-_CAMERA, _CENTRE = (partial(AskedScene.map_area, anchor=anchor) for anchor in ("camera", "centre"))
 _PIXELS, _SOUNDS = (Kind.PIXELS,), (Kind.PIXELS, Kind.SOUNDS)
 _VIEWS = (Kind.PIXELS, Kind.VIEWS)
 _PHOTOS = (Kind.PIXELS, Kind.LOCAL, Kind.PLACE, Kind.MATCHER)
-_object = AskedScene.map_object
+_object, _sound, _weak = AskedScene.map_object, AskedScene.map_sound, AskedScene.weak_sound
+_area, _true_object, _true_sound = AskedScene.map_area, AskedScene.true_object, AskedScene.true_sound
 
-CONFIGURATIONS: tuple[Configuration, ...] = (
-    Configuration(TaskKind.AREA, "object only", (_object,), _PIXELS, "baseline"),
-    Configuration(TaskKind.AREA, "+ area by the object encoder", (_object, AskedScene.area_as_object), _PIXELS),
-    Configuration(TaskKind.AREA, "+ pixel-aligned view features", (_object, AskedScene.pixel_views), _VIEWS),
-    Configuration(TaskKind.AREA, "+ sparse view map, camera (the paper's)", (_object, _CAMERA), _VIEWS),
-    Configuration(TaskKind.AREA, "+ sparse view map (ours)", (_object, _CENTRE), _VIEWS, OURS),
-    Configuration(TaskKind.AREA, "+ true region map", (_object, AskedScene.true_area), _PIXELS),
-    Configuration(TaskKind.AREA, "true objects + sparse view map", (AskedScene.true_object, _CENTRE), (Kind.VIEWS,)),
-    Configuration(TaskKind.AREA, CEILING, (AskedScene.true_object, AskedScene.true_area), (), "ceiling"),
-    Configuration(TaskKind.SOUND, "object only", (_object,), _PIXELS, "baseline"),
-    Configuration(TaskKind.SOUND, "sound only, weak", (AskedScene.weak_sound,), (), "baseline"),
-    Configuration(TaskKind.SOUND, "sound only", (AskedScene.map_sound,), (Kind.SOUNDS,), "baseline"),
-    Configuration(TaskKind.SOUND, "object + sound, weak", (_object, AskedScene.weak_sound), _PIXELS),
-    Configuration(TaskKind.SOUND, "object + sound (ours)", (_object, AskedScene.map_sound), _SOUNDS, OURS),
-    Configuration(TaskKind.SOUND, "object + true sound", (_object, AskedScene.true_sound), _PIXELS),
-    Configuration(
-        TaskKind.SOUND, "true objects + sound", (AskedScene.true_object, AskedScene.map_sound), (Kind.SOUNDS,)
-    ),
-    Configuration(TaskKind.SOUND, CEILING, (AskedScene.true_object, AskedScene.true_sound), (), "ceiling"),
-    Configuration(TaskKind.PHOTO, "object only", (_object,), _PIXELS, "baseline"),
-    Configuration(TaskKind.PHOTO, "image only", (AskedScene.map_photo,), _PHOTOS[1:], "baseline"),
-    Configuration(
-        TaskKind.PHOTO, "object + most alike keyframe, not located", (_object, AskedScene.alike_keyframe), _PHOTOS
-    ),
-    Configuration(TaskKind.PHOTO, "object + image (ours)", (_object, AskedScene.map_photo), _PHOTOS, OURS),
-    Configuration(TaskKind.PHOTO, "object + true camera", (_object, AskedScene.true_camera), _PIXELS),
-    Configuration(TaskKind.PHOTO, "true objects + image", (AskedScene.true_object, AskedScene.map_photo), _PHOTOS[1:]),
-    Configuration(TaskKind.PHOTO, CEILING, (AskedScene.true_object, AskedScene.true_camera), (), "ceiling"),
+_AREA_ROWS = (
+    ("object only", (_object,), _PIXELS, "baseline"),
+    ("+ area by the object encoder", (_object, AskedScene.area_as_object), _PIXELS, "variant"),
+    ("+ whole views in each voxel", (_object, AskedScene.pixel_views), _VIEWS, "variant"),
+    ("+ ConceptFusion: regions and views in each voxel", (_object, AskedScene.region_views), _VIEWS, "variant"),
+    ("+ sparse view map by the paper's rules", (_object, AskedScene.paper_area), _VIEWS, "variant"),
+    ("+ sparse view map (ours)", (_object, _area), _VIEWS, OURS),
+    ("+ true region map", (_object, AskedScene.true_area), _PIXELS, "variant"),
+    ("true objects + sparse view map", (_true_object, _area), (Kind.VIEWS,), "variant"),
+    (CEILING, (_true_object, AskedScene.true_area), (), "ceiling"),
+)
+# What is sought stands first: here the sound.
+_SOUND_ROWS = (
+    ("sound only, weaker encoder", (_weak,), (), "baseline"),
+    ("sound only", (_sound,), (Kind.SOUNDS,), "baseline"),
+    ("object + sound, weaker encoder", (_weak, _object), _PIXELS, "variant"),
+    ("object + sound (ours)", (_sound, _object), _SOUNDS, OURS),
+    ("object + true sound", (_true_sound, _object), _PIXELS, "variant"),
+    ("true objects + sound", (_sound, _true_object), (Kind.SOUNDS,), "variant"),
+    (CEILING, (_true_sound, _true_object), (), "ceiling"),
+)
+_PHOTO_ROWS = (
+    ("object only", (_object,), _PIXELS, "baseline"),
+    ("image only", (AskedScene.map_photo,), _PHOTOS[1:], "baseline"),
+    ("object + most alike keyframe, not located", (_object, AskedScene.alike_keyframe), _PHOTOS, "variant"),
+    ("object + image (ours)", (_object, AskedScene.map_photo), _PHOTOS, OURS),
+    ("object + true camera", (_object, AskedScene.true_camera), _PIXELS, "variant"),
+    ("true objects + image", (_true_object, AskedScene.map_photo), _PHOTOS[1:], "variant"),
+    (CEILING, (_true_object, AskedScene.true_camera), (), "ceiling"),
+)
+_NEAR_SOUND_ROWS = (
+    ("object only", (_object,), _PIXELS, "baseline"),
+    ("sound only, weaker encoder", (_weak,), (), "baseline"),
+    ("sound only", (_sound,), (Kind.SOUNDS,), "baseline"),
+    ("object + sound, weaker encoder", (_object, _weak), _PIXELS, "variant"),
+    ("object + sound (ours)", (_object, _sound), _SOUNDS, OURS),
+    ("object + true sound", (_object, _true_sound), _PIXELS, "variant"),
+    ("true objects + sound", (_true_object, _sound), (Kind.SOUNDS,), "variant"),
+    (CEILING, (_true_object, _true_sound), (), "ceiling"),
+)
+_ROWS = {
+    TaskKind.AREA: _AREA_ROWS,
+    TaskKind.SOUND: _SOUND_ROWS,
+    TaskKind.PHOTO: _PHOTO_ROWS,
+    TaskKind.NEAR_SOUND: _NEAR_SOUND_ROWS,
+}
+CONFIGURATIONS: tuple[Configuration, ...] = tuple(
+    Configuration(kind, name, sources, needs, role)
+    for kind, rows in _ROWS.items()
+    for name, sources, needs, role in rows
 )
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from avlmaps.bench.harness.intervals import wilson
 from avlmaps.bench.indexing.tasks import Task
-from avlmaps.bench.intervals import wilson
 from avlmaps.sim.mesh import Triple
 
 LIMITS_M = (0.5, 1.0, 1.5, 2.0)

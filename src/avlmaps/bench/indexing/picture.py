@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from avlmaps.bench.harness.paper import paper_figures
 from avlmaps.bench.indexing.configurations import configurations
 from avlmaps.bench.indexing.metrics import LIMITS_M, scored
 from avlmaps.bench.indexing.runs import Outcome
-from avlmaps.bench.indexing.tables import NUMBER, paper_figures
+from avlmaps.bench.indexing.tables import TITLE
 from avlmaps.bench.indexing.tasks import TaskKind
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ def draw_recalls(outcome: Outcome, path: Path) -> None:
     """Draw a bar for every configuration: solid within 0.5 m with its interval, pale within 2 m."""
     from matplotlib.figure import Figure
 
-    rows = [len(configurations(kind)) + len(paper_figures()["tables"][str(kind)]) for kind in TaskKind]
+    rows = [len(configurations(kind)) + len(paper_figures("indexing")["tables"][str(kind)]) for kind in TaskKind]
     figure = Figure(figsize=(10, 0.36 * sum(rows) + 2.6), layout="constrained")
     panes = figure.subplots(len(rows), 1, height_ratios=rows, sharex=True)
     for axes, kind in zip(panes, TaskKind, strict=True):
@@ -30,7 +31,7 @@ def draw_recalls(outcome: Outcome, path: Path) -> None:
     recorded = outcome.tasks.recorded
     figure.suptitle(
         f"Cross-modal indexing: {len(outcome.tasks.scenes)} scenes, profile {outcome.settings.profile}, "
-        f"hearing {recorded.hearing}, sensor {recorded.sensor}",
+        f"rules {outcome.settings.rules}, hearing {recorded.hearing}, sensor {recorded.sensor}",
         fontsize=11,
     )
     figure.savefig(path, dpi=110)
@@ -49,7 +50,7 @@ def _draw(axes: "Axes", outcome: Outcome, kind: TaskKind) -> None:
             low, high = (100 * bound for bound in score.recall_interval(LIMITS_M[0]))
             _bar(axes, row, near, far, _COLOURS[one.role], high)
             axes.plot([low, high], [row, row], color="#333333", linewidth=1.2)
-    for paper in paper_figures()["tables"][str(kind)]:
+    for paper in paper_figures("indexing")["tables"][str(kind)]:
         figures = paper["recall_percent"]
         names.append(f"{paper['name']} (paper, other data)")
         if figures[0] is not None:
@@ -57,7 +58,7 @@ def _draw(axes: "Axes", outcome: Outcome, kind: TaskKind) -> None:
     axes.set_yticks(np.arange(len(names)), names, fontsize=8)
     axes.invert_yaxis()
     axes.set_xlim(0, 108)
-    axes.set_title(f"{NUMBER[kind]}: {kind}, {count} tasks", loc="left", fontsize=10, fontweight="bold")
+    axes.set_title(f"{TITLE[kind]}, {count} tasks", loc="left", fontsize=10, fontweight="bold")
     axes.spines[["top", "right"]].set_visible(False)
 
 

@@ -1,29 +1,25 @@
 """One scene as it is asked: its map, its truth, and every source of heat that a configuration may join."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float32, Int, UInt8
 
-from avlmaps.bench.indexing.baselines import WeakHearing, alike_keyframe
-from avlmaps.bench.indexing.factors import VoxelHeat, true_places, true_regions, true_things
+from avlmaps.bench.harness.baselines import WeakHearing, alike_keyframe
+from avlmaps.bench.harness.factors import VoxelHeat, true_places, true_regions, true_things
 from avlmaps.bench.indexing.tasks import Task
+from avlmaps.bench.indexing.voxel_views import region_features, view_features
 from avlmaps.core.errors import QueryError
-from avlmaps.core.poses import apply
 from avlmaps.core.question import Modality, Part, Role
-from avlmaps.core.registry import Kind
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.area import area_factor, area_scores
+from avlmaps.query.rules import PAPER_AREAS
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.types import Recording
 from avlmaps.sim.truth import Truth
-
-_STRIDE_PX = 3
-_SEEN_TO_M = 6.0
 
 
 @dataclass(eq=False)
@@ -61,10 +57,6 @@ class AskedScene:
         high = np.array([thing.high for thing in self.truth.objects])[:, :2].max(axis=0)
         return float(np.linalg.norm(high - low))
 
-    def has(self, kinds: Sequence[Kind]) -> bool:
-        """Tell whether the map's profile has models for all of these."""
-        return all(self.asked.stored.profile.backend_name(kind) for kind in kinds)
-
     def _once(self, key: tuple[object, ...], make: Callable[[], Heatmap | None]) -> Heatmap | None:
         if key not in self._kept:
             self._kept[key] = make()
@@ -79,11 +71,12 @@ class AskedScene:
     def map_object(self, task: Task, role: Role) -> Heatmap | None:
         """The category, as the map's pixel features tell it; raises ``QueryError`` where they know no such word."""
         primary = role is Role.PRIMARY
-        return self._once(("object", task.category, role), lambda: self.asked.object(task.category, primary))
+        return self._once(("object", task.object_name, role), lambda: self.asked.object(task.object_name, primary))
 
     def map_sound(self, task: Task, role: Role) -> Heatmap | None:
         """The sound, as the map's sound features tell it."""
-        return self._once(("sound", task.context, role), lambda: self.asked.sound(task.context, role is Role.PRIMARY))
+        primary = role is Role.PRIMARY
+        return self._once(("sound", task.sound_name, role), lambda: self.asked.sound(task.sound_name, primary))
 
     def map_photo(self, task: Task, role: Role) -> Heatmap | None:
         """The photo, located in the map."""
@@ -91,24 +84,26 @@ class AskedScene:
             ("photo", task.name, role), lambda: self.asked.image(self.photo_of(task), primary=role is Role.PRIMARY)
         )
 
-    def map_area(self, task: Task, role: Role, anchor: Literal["camera", "centre"]) -> Heatmap | None:
-        """The area, as the keyframes' view features tell it."""
+    def map_area(self, task: Task, role: Role) -> Heatmap | None:
+        """The area, as the keyframes' view features tell it, by the rules of the map."""
+        return self._once(("area", task.context, role), lambda: self.asked.area(task.context, role is Role.PRIMARY))
+
+    def paper_area(self, task: Task, role: Role) -> Heatmap | None:
+        """The area by the paper's rules: from the camera's place, cosines stretched, every view for itself."""
 
         def make() -> Heatmap:
             part, _ = self._part(Modality.AREA, task.context, role)
-            stored, settings = self.asked.stored, self.asked.settings
-            encoder = stored.profile.view_encoder()
-            alone = {"pool_m": 0.0} if anchor == "camera" else {}  # the paper's views speak each for itself
-            areas = replace(settings.areas, anchor=anchor, **alone)
-            return Heatmap.of(area_factor(self.space, stored.keyframes, encoder, part, areas, settings.heat))
+            stored = self.asked.stored
+            encoder, heat = stored.profile.view_encoder(), self.asked.settings.heat
+            return Heatmap.of(area_factor(self.space, stored.keyframes, encoder, part, PAPER_AREAS, heat))
 
-        return self._once(("area", task.context, role, anchor), make)
+        return self._once(("paper area", task.context, role), make)
 
     # What the paper's baselines make of the same recording.
 
     def weak_sound(self, task: Task, role: Role) -> Heatmap | None:
         """The sound, as a weaker ear tells it."""
-        return self._once(("weak", task.context, role), lambda: self._weak_hearing.heat(task.context, role))
+        return self._once(("weak", task.sound_name, role), lambda: self._weak_hearing.heat(task.sound_name, role))
 
     @cached_property
     def _weak_hearing(self) -> WeakHearing:
@@ -133,20 +128,32 @@ class AskedScene:
         return self._once(("area as object", task.context, role), make)
 
     def pixel_views(self, task: Task, role: Role) -> Heatmap | None:
-        """The area, each voxel having the mean view feature of the keyframes that saw it (ConceptFusion's idea)."""
+        """The area, each voxel with the mean feature of the whole views that saw it."""
+        return self._by_voxel("pixel views", task, role, lambda: self._voxel_views)
 
+    def region_views(self, task: Task, role: Role) -> Heatmap | None:
+        """The area by ConceptFusion's way: features of regions, mixed with their view's, averaged in each voxel."""
+        return self._by_voxel("region views", task, role, lambda: self._region_views)
+
+    def _by_voxel(
+        self, name: str, task: Task, role: Role, features: Callable[[], Float32[np.ndarray, "n d"]]
+    ) -> Heatmap | None:
         def make() -> Heatmap:
             part, _ = self._part(Modality.AREA, task.context, role)
-            encoder = self.asked.stored.profile.view_encoder()
-            _, scores = area_scores(self._voxel_views, encoder, task.context, self.asked.settings.areas)
-            heat = np.where(self._voxel_views.any(axis=1), scores, 0.0).astype(np.float32)
+            encoder, rows = self.asked.stored.profile.view_encoder(), features()
+            _, scores = area_scores(rows, encoder, task.context, self.asked.settings.areas)
+            heat = np.where(rows.any(axis=1), scores, 0.0).astype(np.float32)
             return Heatmap.of(VoxelHeat(self.space, part, heat, bool((heat >= 0.5).any())))
 
-        return self._once(("pixel views", task.context, role), make)
+        return self._once((name, task.context, role), make)
 
     @cached_property
     def _voxel_views(self) -> Float32[np.ndarray, "n d"]:
-        return voxel_views(self.asked, self.recording)
+        return view_features(self.asked, self.recording)
+
+    @cached_property
+    def _region_views(self) -> Float32[np.ndarray, "n d"]:
+        return region_features(self.asked, self.recording)
 
     # What is truly there.
 
@@ -154,22 +161,22 @@ class AskedScene:
         """The things of the category, their voxels truly known."""
 
         def make() -> Heatmap:
-            part, falloff = self._part(Modality.OBJECT, task.category, role)
-            own = [i for i, thing in enumerate(self.truth.objects) if thing.category == task.category]
+            part, falloff = self._part(Modality.OBJECT, task.object_name, role)
+            own = [i for i, thing in enumerate(self.truth.objects) if thing.category == task.object_name]
             return Heatmap.of(true_things(self.space, part, falloff, self.label, own))
 
-        return self._once(("true object", task.category, role), make)
+        return self._once(("true object", task.object_name, role), make)
 
     def true_sound(self, task: Task, role: Role) -> Heatmap | None:
         """Where the sound was truly heard (overlay) or came from (acoustic)."""
 
         def make() -> Heatmap:
-            part, falloff = self._part(Modality.SOUND, task.context, role)
-            events = [event for event in self.truth.events if event.category == task.context]
+            part, falloff = self._part(Modality.SOUND, task.sound_name, role)
+            events = [event for event in self.truth.events if event.category == task.sound_name]
             tracks = [np.array([event.source if self.hearing == "acoustic" else event.robot]) for event in events]
             return Heatmap.of(true_places(self.space, part, falloff, tracks))
 
-        return self._once(("true sound", task.context, role), make)
+        return self._once(("true sound", task.sound_name, role), make)
 
     def true_camera(self, task: Task, role: Role) -> Heatmap | None:
         """Where the photo was truly taken."""
@@ -184,30 +191,3 @@ class AskedScene:
             return Heatmap.of(true_regions(self.space, part, self.truth.areas))
 
         return self._once(("true area", task.context, role), make)
-
-
-def voxel_views(asked: AVLMap, recording: Recording) -> Float32[np.ndarray, "n d"]:
-    """Return for each voxel the mean view feature of the keyframes that saw it, unit length; zero where none did."""
-    stored = asked.stored
-    index = np.asarray(stored.voxels.index, np.int64)
-    key = _packed(index)
-    total = np.zeros((len(index), stored.keyframes.view.shape[1]), np.float32)
-    frame_of = np.searchsorted(recording.stamps_s, np.asarray(stored.keyframes.stamp_s) - 1e-6)
-    for number, view in zip(np.minimum(frame_of, len(recording) - 1), stored.keyframes.view, strict=True):
-        frame = recording.frame(int(number))
-        depth_m = frame.depth_m[::_STRIDE_PX, ::_STRIDE_PX].astype(np.float64)
-        row, column = np.nonzero((depth_m > 0.0) & (depth_m < _SEEN_TO_M))
-        z, camera = depth_m[row, column], frame.rig.depth
-        x = (column * _STRIDE_PX + 0.5 - camera.cx) / camera.fx * z
-        y = (row * _STRIDE_PX + 0.5 - camera.cy) / camera.fy * z
-        points = apply(frame.world_from_camera, np.stack([x, y, z], axis=1))
-        seen = np.unique(_packed(stored.grid.index_of(points)))
-        at = np.minimum(np.searchsorted(key, seen), max(len(key) - 1, 0))
-        total[at[key[at] == seen]] += np.asarray(view, np.float32)
-    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
-
-
-def _packed(index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
-    """Pack voxel indices into one number each, in the order of the map (x, then y, then z)."""
-    shifted = np.asarray(index, np.int64) + (1 << 20)
-    return (shifted[:, 0] << 42) | (shifted[:, 1] << 21) | shifted[:, 2]

@@ -1,48 +1,45 @@
 """The suite as ``avlmaps bench indexing`` runs it: tables as JSON, Markdown and a picture, and every answer."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from avlmaps.bench.harness.paper import paper_source
+from avlmaps.bench.harness.provenance import in_words, provenance
 from avlmaps.bench.indexing.picture import draw_recalls
 from avlmaps.bench.indexing.runs import IndexingSettings, Outcome, run
-from avlmaps.bench.indexing.tables import paper_figures, tables
-from avlmaps.bench.suites import markdown
+from avlmaps.bench.indexing.tables import tables
+from avlmaps.bench.output import markdown, write_answer
 from avlmaps.core.files import write_bytes_atomically
 
 NOTE = (
-    "An answer is the first goal. Its distance is horizontal, to the nearest point of the box round the right thing; "
+    "An answer is the first goal. Its distance is horizontal, to the nearest point of the box round the right thing, "
+    "or to where the robot was while the right sound was heard; "
     "no answer counts as the largest distance in the scene. Intervals are 95 %: Wilson's for recalls, bootstrapped for "
     "means, both over tasks as if each stood for itself."
 )
 
 
 def run_indexing(settings: IndexingSettings | None, out: Path) -> dict[str, Any]:
-    """Run the benchmark and write ``indexing.json``, ``.md``, ``.png`` and ``indexing_answers.json`` into a folder.
+    """Run the benchmark; write its tables (JSON, Markdown, CSV), ``indexing.png`` and ``indexing_answers.json``.
 
-    Recordings and maps are kept in its folder ``work``.
+    Recordings, maps, tasks and answers stay in the folder ``work`` of ``out``.
     """
     settings = settings or IndexingSettings()
     outcome = run(settings, out / "work")
-    made = tables(outcome)
     answer = {
         "suite": "indexing",
-        "scenes": list(outcome.tasks.scenes),
-        "profile": settings.profile,
-        "seed": outcome.tasks.recorded.seed,
-        "recorded": msgspec.to_builtins(outcome.tasks.recorded),
+        **provenance(settings, outcome.tasks.recorded, outcome.tasks.scenes, outcome.weights),
         "note": NOTE,
-        "paper": paper_figures()["source"] + ". " + paper_figures()["note"],
-        "tables": made,
+        "paper": paper_source("indexing"),
+        "tables": tables(outcome),
     }
-    out.mkdir(parents=True, exist_ok=True)
-    write_bytes_atomically(out / "indexing.json", (json.dumps(answer, indent=1) + "\n").encode())
+    page = f"# Cross-modal indexing\n\n{in_words(answer)}\n\n{NOTE}\n\nPaper: {answer['paper']}\n\n"
+    written = write_answer(answer, out, page + markdown(answer["tables"]))
     write_bytes_atomically(out / "indexing_answers.json", _answers(outcome))
-    write_bytes_atomically(out / "indexing.md", _markdown(answer).encode())
     draw_recalls(outcome, out / "indexing.png")
-    return answer
+    return written
 
 
 def _answers(outcome: Outcome) -> bytes:
@@ -63,14 +60,3 @@ def _answers(outcome: Outcome) -> bytes:
         for task in outcome.tasks.tasks
     ]
     return msgspec.json.format(msgspec.json.encode(listed), indent=1) + b"\n"
-
-
-def _markdown(answer: dict[str, Any]) -> str:
-    recorded = answer["recorded"]
-    sounds = f"clips of {recorded['sounds']}" if recorded["sounds"] else "sounds made by rule"
-    head = (
-        f"# Cross-modal indexing\n\nProfile {answer['profile']}, seed {answer['seed']}, {len(answer['scenes'])} scenes "
-        f"({', '.join(answer['scenes'])}), at most {recorded['frames']} frames each, sensor {recorded['sensor']}, "
-        f"hearing {recorded['hearing']}, {sounds}.\n\n{answer['note']}\n\nPaper: {answer['paper']}\n\n"
-    )
-    return head + markdown(answer["tables"])

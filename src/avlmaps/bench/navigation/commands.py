@@ -10,8 +10,8 @@ from math import pi
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.bench.indexing.rules import Photo
-from avlmaps.bench.indexing.tasks import Box, Task, TaskKind
+from avlmaps.bench.harness.evidence import Box, Photo
+from avlmaps.bench.indexing.tasks import Task, TaskKind
 from avlmaps.bench.navigation.evidence import Ground, camera_of, renumbered
 from avlmaps.bench.navigation.goals import Goal, GoalKind, beside, between, left_of
 from avlmaps.bench.navigation.missions import Mission, Series
@@ -159,7 +159,7 @@ _SOURCES: dict[str, Callable[[Ground], _Found]] = {
     ],
     AREA: lambda ground: _alone(ground.areas),
     SINGLE: lambda ground: _alone(ground.single),
-    BY_SOUND: lambda ground: _tasks(ground, TaskKind.SOUND),
+    BY_SOUND: lambda ground: _tasks(ground, TaskKind.NEAR_SOUND),
     BY_IMAGE: lambda ground: _tasks(ground, TaskKind.PHOTO),
     BY_AREA: lambda ground: _tasks(ground, TaskKind.AREA),
     SOUND_BY: lambda ground: [(goal, photo) for goal, photo in ground.ambiguous_sounds() if photo is None],

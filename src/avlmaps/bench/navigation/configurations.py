@@ -30,7 +30,7 @@ class Configuration:
 
 
 CONFIGURATIONS: tuple[Configuration, ...] = (
-    Configuration("weaker ear", Senses(sounds="weak"), _SOUNDS),
+    Configuration("weaker sound encoder", Senses(sounds="weak"), _SOUNDS),
     Configuration(OURS, Senses(), _SOUNDS, (Kind.SOUNDS,)),
     Configuration(CEILING, _TRUE, _SOUNDS),
     Configuration("objects only", Senses(sounds="none", images="none"), (Series.IMAGES,), (Kind.PIXELS,)),
@@ -38,9 +38,10 @@ CONFIGURATIONS: tuple[Configuration, ...] = (
     Configuration(OURS, Senses(), (Series.IMAGES,), (Kind.PIXELS, *_PHOTOS)),
     Configuration(CEILING, _TRUE, (Series.IMAGES,)),
     Configuration("objects only", Senses(sounds="none", images="none"), (Series.PAIRS,), (Kind.PIXELS,)),
-    Configuration("weaker ear", Senses(sounds="weak"), (Series.PAIRS,), (Kind.PIXELS,)),
+    Configuration("sounds only", Senses(objects="none", images="none"), (Series.PAIRS,), (Kind.SOUNDS,)),
+    Configuration("weaker sound encoder", Senses(sounds="weak"), (Series.PAIRS,), (Kind.PIXELS,)),
     Configuration(OURS, Senses(), (Series.PAIRS,), (Kind.PIXELS, Kind.SOUNDS)),
-    Configuration("true objects, our ear", Senses(objects="true"), (Series.PAIRS,), (Kind.SOUNDS,)),
+    Configuration("true objects, our sounds", Senses(objects="true"), (Series.PAIRS,), (Kind.SOUNDS,)),
     Configuration(CEILING, _TRUE, (Series.PAIRS,)),
     Configuration(OURS, Senses(), (Series.COMMANDS, Series.SPATIAL), (Kind.PIXELS, Kind.SOUNDS)),
     Configuration(CEILING, _TRUE, (Series.COMMANDS, Series.SPATIAL)),

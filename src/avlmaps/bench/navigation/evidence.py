@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from avlmaps.bench.indexing.rules import Evidence, Photo, alone_near
-from avlmaps.bench.indexing.tasks import Box, Task, TaskKind
+from avlmaps.bench.harness.evidence import Box, Evidence, Photo, alone_near, shown_boxes
+from avlmaps.bench.indexing.tasks import Task, TaskKind
 from avlmaps.bench.navigation.floor import Floor
 from avlmaps.bench.navigation.goals import Goal
 from avlmaps.bench.navigation.phrases import (
@@ -22,7 +22,6 @@ from avlmaps.bench.navigation.phrases import (
     sound_near_image,
     sound_near_object,
 )
-from avlmaps.sim.free_space import STRUCTURE
 from avlmaps.sim.mesh import Triple
 
 _SHOWN = 0.02  # of a photo's pixels that a thing fills, to count
@@ -65,13 +64,7 @@ class Ground:
     @cached_property
     def boxes(self) -> dict[str, list[Box]]:
         """The things of each category of which the recording shows some; also those of them that it does not show."""
-        low, high = self.evidence.storey_m
-        found: dict[str, list[int]] = {}
-        for instance, thing in enumerate(self.evidence.objects):
-            if thing.category not in STRUCTURE and low <= thing.centre[2] <= high:
-                found.setdefault(thing.category, []).append(instance)
-        shown = {name: own for name, own in sorted(found.items()) if any(map(self.evidence.shows, own))}
-        return {name: [self.evidence.box(i) for i in own] for name, own in shown.items()}
+        return shown_boxes(self.evidence)
 
     @cached_property
     def objects(self) -> list[Goal]:
@@ -110,7 +103,7 @@ class Ground:
         for task in self.tasks:
             if task.kind is not kind:
                 continue
-            if kind is TaskKind.SOUND:
+            if kind is TaskKind.NEAR_SOUND:
                 goal = near_sound(task.category, task.context, task.targets)
             elif kind is TaskKind.PHOTO:
                 goal = near_image(task.category, 0, task.targets)

@@ -8,7 +8,7 @@ from math import atan2, pi
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.bench.indexing.tasks import Box
+from avlmaps.bench.harness.evidence import Box
 from avlmaps.core.motion import GroundPose, wrapped
 from avlmaps.sim.mesh import Triple
 

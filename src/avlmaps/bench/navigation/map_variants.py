@@ -8,8 +8,8 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from avlmaps.bench.indexing.baselines import WeakHearing, alike_keyframe
-from avlmaps.bench.indexing.factors import VoxelHeat, true_places, true_regions, true_things
+from avlmaps.bench.harness.baselines import WeakHearing, alike_keyframe
+from avlmaps.bench.harness.factors import VoxelHeat, true_places, true_regions, true_things
 from avlmaps.bench.navigation.phrases import spoken
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import QueryError
@@ -27,7 +27,7 @@ class Senses:
     """Where each modality's heat comes from.
 
     Attributes:
-        objects: ``ours`` or ``true``.
+        objects: ``ours``, ``true`` or ``none``.
         sounds: ``ours``, ``weak`` (a plainer ear), ``true`` or ``none``.
         images: ``ours``, ``weak`` (the most alike keyframe's place, nothing matched), ``true`` or ``none``.
         areas: ``ours``, ``true`` or ``none``.
@@ -74,6 +74,8 @@ class Perceived(AVLMap):
 
     def object(self, word: str, primary: bool = False, vocabulary: Sequence[str] | None = None) -> Heatmap:
         """Return the heat of a thing."""
+        if self._senses.objects == "none":
+            return self._nothing(Modality.OBJECT, word, primary)
         if self._senses.objects == "ours":
             return self._once(("object", word, primary), lambda: self._scene.asked.object(word, primary))
         return self._once(("true object", word, primary), lambda: self._true_object(word, primary))
@@ -152,7 +154,7 @@ class Perceived(AVLMap):
 
     def _nothing(self, modality: Modality, query: str, primary: bool) -> Heatmap:
         if primary:
-            raise QueryError(f"The {modality} {query!r} means nothing to a robot without that sense; name a thing.")
+            raise QueryError(f"The {modality} {query!r} means nothing to a robot without that sense; name another.")
         part = Part(modality, query, Role.CONTEXT, modality is Modality.IMAGE)
         return Heatmap.of(VoxelHeat(self.space, part, np.ones(len(self.space), np.float32)))
 

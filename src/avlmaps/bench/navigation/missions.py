@@ -10,7 +10,8 @@ import msgspec
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.bench.indexing.tasks import Recorded, load_versioned, save_versioned
+from avlmaps.bench.harness.settings import Recorded
+from avlmaps.bench.harness.versioned import load_versioned, save_versioned
 from avlmaps.bench.navigation.goals import Goal
 from avlmaps.core.motion import GroundPose
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from avlmaps.bench.indexing.tasks import Box
+from avlmaps.bench.harness.evidence import Box
 from avlmaps.bench.navigation.goals import Goal, GoalKind
 from avlmaps.sim.mesh import Triple
 

@@ -5,17 +5,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from avlmaps.bench.harness.paper import paper_figures
 from avlmaps.bench.navigation.configurations import CEILING, OURS, configurations
 from avlmaps.bench.navigation.missions import Series
 from avlmaps.bench.navigation.runs import Outcome
 from avlmaps.bench.navigation.scores import Share, scored
-from avlmaps.bench.navigation.tables import LENGTH, TITLE, of, paper_figures
+from avlmaps.bench.navigation.tables import LENGTH, TITLE, of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_COLOURS = {OURS: "#e07b39", CEILING: "#5d8a66", "paper": "#b9a5d6"}
-_BASELINES = ("#b8c0c8", "#7fa6c9", "#8d99a6")
+_COLOURS = {OURS: "#e07b39", CEILING: "#5d8a66"}
+_BASELINES = ("#b8c0c8", "#7fa6c9", "#8d99a6", "#55708a")
+_PAPERS = ("#efe8f7", "#e0d5ef", "#cdbde4", "#b9a5d6")
 
 
 def draw_rates(outcome: Outcome, path: Path) -> None:
@@ -48,10 +50,11 @@ def _draw(axes: "Axes", outcome: Outcome, series: Series) -> None:
             score = scored(episodes, length, outcome.settings.seed)
             shares = [*score.rows, *([] if length else [score.whole]), score.subgoals]
             bars.append((one.name, colour, [share.percent for share in shares], shares))
-    paper = paper_figures()["tables"].get(str(series))
-    if paper and length:
-        figures = [*paper["in_a_row_percent"], paper["independent_percent"] or 0.0]
-        bars.append(("paper, other goals", _COLOURS["paper"], figures, []))
+    papers = paper_figures("navigation")["tables"].get(str(series), ())
+    for paper, shade in zip(papers, _PAPERS[-len(papers) :], strict=False):
+        figures = [*paper["in_a_row_percent"], paper["independent_percent"]] if length else [paper["all_percent"], None]
+        if any(figure is not None for figure in figures):
+            bars.append((f"{paper['name']} (paper)", shade, [figure or 0.0 for figure in figures], []))
     width = 0.8 / max(len(bars), 1)
     for number, (name, colour, heights, shares) in enumerate(bars):
         at = np.arange(len(labels)) + (number - (len(bars) - 1) / 2) * width

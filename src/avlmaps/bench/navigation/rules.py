@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from avlmaps.bench.indexing.rules import Photo
+from avlmaps.bench.harness.evidence import Photo
 from avlmaps.bench.indexing.tasks import TaskKind
 from avlmaps.bench.navigation.evidence import Ground, camera_of, renumbered
 from avlmaps.bench.navigation.goals import Goal
@@ -68,7 +68,7 @@ def pair_missions(ground: Ground, rng: np.random.Generator, most: int) -> list[M
     several, and only one is near another sound; where a scene has no such thing, near a photo.
     """
     sounds = ground.ambiguous_sounds()
-    by_sound = ground.ambiguous_things(TaskKind.SOUND)
+    by_sound = ground.ambiguous_things(TaskKind.NEAR_SOUND)
     things = [(goal, None) for goal, _ in by_sound] or [
         (goal, Photo(task.world_from_photo, np.zeros(0))) for goal, task in ground.ambiguous_things(TaskKind.PHOTO)
     ]

@@ -1,16 +1,15 @@
 """Running the benchmark: first all scenes' missions are made, then robots are sent, every scene in its own process."""
 
-import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
-from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from avlmaps.bench.indexing.prepared import SceneJob
-from avlmaps.bench.indexing.tasks import TaskError
+from avlmaps.bench.harness.own_recording import is_recording
+from avlmaps.bench.harness.settings import TaskError
+from avlmaps.bench.harness.workers import side_by_side
+from avlmaps.bench.harness.workplace import SceneJob, scene_jobs
 from avlmaps.bench.navigation.configurations import Configuration, configurations
 from avlmaps.bench.navigation.episodes import Episode, Journal
 from avlmaps.bench.navigation.missions import (
@@ -23,16 +22,13 @@ from avlmaps.bench.navigation.missions import (
 )
 from avlmaps.bench.navigation.scene_setup import NavigationPlace
 from avlmaps.bench.navigation.settings import NavigationSettings
-from avlmaps.core.progress import progress, say, silence
 from avlmaps.core.version import __version__
 from avlmaps.language.translator import Translator
 from avlmaps.navigate.bodies import BASE
 from avlmaps.sim.scene import Scene
 from avlmaps.sim.scenes import open_scene
 
-_RECIPE = 1  # raised when missions are made, or robots sent, in another way
-_LOOK_S = 2.0
-T = TypeVar("T")
+_RECIPE = 2  # raised when missions are made, or robots sent, in another way
 OpenSpec = Callable[[str], Scene]
 
 
@@ -46,6 +42,7 @@ class SceneFacts:
         voxels: how many it has.
         sounds: how many sounds were heard, and how many there were.
         episodes: what became of its missions, by mission and then configuration.
+        clips: sound and clip of every event.
     """
 
     scene: str
@@ -53,6 +50,7 @@ class SceneFacts:
     voxels: int
     sounds: tuple[int, int]
     episodes: tuple[Episode, ...]
+    clips: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +60,7 @@ class Outcome:
     settings: NavigationSettings
     missions: MissionSet
     scenes: tuple[SceneFacts, ...]
+    weights: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def episodes(self) -> list[Episode]:
@@ -91,7 +90,14 @@ def run(settings: NavigationSettings, out: Path, open_spec: OpenSpec = open_scen
 
     Raises:
         TaskError: the missions cannot be read, do not fit, or no scene yields any.
+        BackendError: a model is missing.
     """
+    weights = settings.checked()
+    if recordings := [scene for scene in settings.scenes if is_recording(scene)]:
+        raise TaskError(
+            f"{recordings[0]} is a recording; robots are sent only through scenes whose geometry is known. Give "
+            "house:SEED or a scene file, or run the suite indexing or objects."
+        )
     missions = _missions(settings, out, open_spec)
     kept = tuple(mission for mission in missions.missions if mission.series in settings.series)
     if not kept:
@@ -107,13 +113,16 @@ def run(settings: NavigationSettings, out: Path, open_spec: OpenSpec = open_scen
         for job in _jobs(settings, missions, out)
     ]
     total = sum(len(_pairs(one.missions)) for one in todo)
-    scenes = _side_by_side(_sent, todo, settings.jobs, "navigation", lambda: _count(todo), total)
-    return Outcome(settings, missions, tuple(scenes))
+    scenes = side_by_side(_sent, todo, settings.jobs, "navigation", _named, lambda: _count(todo), total)
+    return Outcome(settings, missions, tuple(scenes), weights)
 
 
 def _jobs(settings: NavigationSettings, missions: MissionSet, out: Path) -> list[SceneJob]:
-    work = out / "work"
-    return [SceneJob(name, missions.recorded, settings.sounds, settings.profile, work) for name in missions.scenes]
+    return scene_jobs(settings, missions.recorded, missions.scenes, out / "work")
+
+
+def _named(todo: _Todo) -> str:
+    return todo.job.spec
 
 
 def _journal(out: Path, job: SceneJob) -> Path:
@@ -137,8 +146,8 @@ def _missions(settings: NavigationSettings, out: Path, open_spec: OpenSpec) -> M
             raise TaskError(f"The missions {settings.load} were made with other sounds; {wanted} --sounds.")
         return given
     asked = asked_for(
-        settings.recorded, settings.scenes, settings.series, settings.sequences, settings.profile, BASE, __version__,
-        _RECIPE,
+        settings.recorded, settings.scenes, settings.series, settings.sequences, settings.profile, settings.models,
+        settings.rules, BASE, __version__, _RECIPE,
     )  # fmt: skip
     path = out / "navigation_missions.json"
     if path.exists():
@@ -147,7 +156,7 @@ def _missions(settings: NavigationSettings, out: Path, open_spec: OpenSpec) -> M
             return before
     empty = MissionSet(settings.recorded, settings.scenes, BASE.radius_m, (), asked)
     todo = [_Todo(job, settings, (), _journal(out, job), open_spec) for job in _jobs(settings, empty, out)]
-    made = _side_by_side(_made, todo, settings.jobs, "mapping", None, len(todo))
+    made = side_by_side(_made, todo, settings.jobs, "mapping", _named)
     own = [mission for series in settings.series for mission in _shared_out(settings, series, made)]
     missions = replace(empty, missions=tuple(own))
     save_missions(missions, path)
@@ -170,9 +179,9 @@ def _sent(todo: _Todo) -> SceneFacts:
     settings, journal = todo.settings, Journal(todo.journal)
     done = journal.read()
     place = NavigationPlace(todo.job, settings, todo.open_spec)
-    asked = place.work.asked_scene
-    pairs = [(mission, one) for mission, one in _pairs(todo.missions) if asked.has(one.needs)]
-    keyed = [(_key(settings, mission, one), mission, one) for mission, one in pairs]
+    pairs = [(mission, one) for mission, one in _pairs(todo.missions) if place.work.has(one.needs)]
+    built = place.work.asked.stored.info.build_key
+    keyed = [(_key(settings, built, mission, one), mission, one) for mission, one in pairs]
     if any(key not in done for key, _, _ in keyed):
         pilot = place.pilot(list(todo.missions), translator_named(settings.language))
         for key, mission, one in keyed:
@@ -182,11 +191,13 @@ def _sent(todo: _Todo) -> SceneFacts:
     info = place.work.asked.stored.info.counts
     sounds = (info.sounds, len(place.work.truth.events))
     episodes = tuple(done[key] for key, _, _ in keyed)
-    return SceneFacts(todo.job.spec, info.frames, info.voxels, sounds, episodes)
+    clips = tuple((event.category, event.clip) for event in place.work.truth.events)
+    return SceneFacts(todo.job.spec, info.frames, info.voxels, sounds, episodes, clips)
 
 
-def _key(settings: NavigationSettings, mission: Mission, one: Configuration) -> str:
-    facts = (mission.fingerprint, repr(one), settings.profile, settings.language, settings.guess, repr(BASE))
+def _key(settings: NavigationSettings, built: str, mission: Mission, one: Configuration) -> str:
+    """Return the name of an episode: of all that it depends on, the map's build among it."""
+    facts = (mission.fingerprint, repr(one), built, settings.rules, settings.language, settings.guess, repr(BASE))
     return sha256("\n".join(map(str, (*facts, settings.recorded, __version__, _RECIPE))).encode()).hexdigest()[:24]
 
 
@@ -201,46 +212,3 @@ def translator_named(language: str) -> Translator | None:
     from avlmaps.language.rules import RulesTranslator
 
     return RulesTranslator()
-
-
-def _side_by_side(
-    do: Callable[[_Todo], T], todo: Sequence[_Todo], jobs: int, label: str, done: Callable[[], int] | None, total: int
-) -> list[T]:
-    """Do something for every scene, in processes of their own where there are several, and show how far it is.
-
-    Args:
-        do: what.
-        todo: for each scene.
-        jobs: at most so many at once; 0 for as many as there are cores.
-        label: of the progress bar.
-        done: tells how many parts are done; None where a scene is one part.
-        total: how many parts there are.
-    """
-    workers = min(jobs or os.cpu_count() or 1, len(todo))
-    unit = "scene" if done is None else "episode"
-    if workers < 2:
-        results: list[T] = []
-        for one in todo:
-            results.append(do(one))
-            say(f"{label}: {one.job.spec} is done, {len(results)} of {len(todo)}")
-        return results
-    with ProcessPoolExecutor(workers, get_context("spawn"), silence) as pool:
-        futures = [pool.submit(do, one) for one in todo]
-        for _ in progress(_ticks(futures, done), label, total=total, unit=unit):
-            pass
-        return [future.result() for future in futures]
-
-
-def _ticks(futures: Sequence[Future[T]], done: Callable[[], int] | None) -> Iterator[None]:
-    """Yield once for each part that is done; a process that fails ends all."""
-    shown, waiting = 0, set(futures)
-    while waiting:
-        over, waiting = wait(waiting, _LOOK_S, FIRST_COMPLETED)
-        for future in over:
-            if future.exception() is not None:
-                for other in waiting:
-                    other.cancel()
-                future.result()
-        count = len(futures) - len(waiting) if done is None else done()
-        yield from [None] * max(count - shown, 0)
-        shown = max(shown, count)

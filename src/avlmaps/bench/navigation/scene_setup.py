@@ -7,9 +7,9 @@ from math import ceil
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.bench.indexing.baselines import WeakHearing
-from avlmaps.bench.indexing.prepared import SceneJob, Workplace
-from avlmaps.bench.indexing.rules import area_tasks, photo_tasks, sound_tasks
+from avlmaps.bench.harness.baselines import WeakHearing
+from avlmaps.bench.harness.workplace import SceneJob, Workplace
+from avlmaps.bench.indexing.rules import area_tasks, near_sound_tasks, photo_tasks
 from avlmaps.bench.navigation.commands import command_missions
 from avlmaps.bench.navigation.contact_monitor import Foreknowledge, WatchedBody
 from avlmaps.bench.navigation.episode_runner import Pilot
@@ -74,7 +74,7 @@ class NavigationPlace:
         evidence, rng = self.work.evidence, self._rng(0)
         photos = tuple(self.work.photos(_PHOTOS))
         tasks = (
-            *sound_tasks(evidence, rng, _TASKS), *photo_tasks(evidence, photos, rng, _TASKS),
+            *near_sound_tasks(evidence, rng, _TASKS), *photo_tasks(evidence, photos, rng, _TASKS),
             *area_tasks(evidence, rng, _TASKS),
         )  # fmt: skip
         return Ground(evidence, self.floor, photos, tasks)
@@ -115,7 +115,7 @@ class NavigationPlace:
             files = [self.work.photo_file(pose) for pose in mission.world_from_photos]
             photos |= dict(zip([file.name for file in files], mission.world_from_photos, strict=True))
             names[mission.name] = tuple(f"./{file.name}" for file in files)
-        label, seed = self.work.asked_scene.label, self.job.recorded.seed
+        label, seed = self.work.label, self.job.recorded.seed
         hearing = _once(lambda: WeakHearing(asked, seed))
         known = KnownScene(asked, self.work.truth, label, self.job.recorded.hearing, photos, hearing)
         return Pilot(

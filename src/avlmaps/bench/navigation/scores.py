@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from avlmaps.bench.intervals import wilson
+from avlmaps.bench.harness.intervals import wilson
 from avlmaps.bench.navigation.episodes import Episode, Leg
 from avlmaps.bench.navigation.goals import GoalKind
 from avlmaps.bench.navigation.metrics import grouped_interval, in_a_row, independent

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Literal
 
-from avlmaps.bench.indexing.tasks import SceneSettings, TaskError
+from avlmaps.bench.harness.settings import SceneSettings, TaskError
 from avlmaps.bench.navigation.missions import Series
 
 DEFAULT_SCENES = tuple(f"house:{seed}:held-out" for seed in range(1_000_001, 1_000_013))

@@ -1,17 +1,18 @@
 """The suite as ``avlmaps bench navigation`` runs it: tables as JSON, Markdown and a picture, and every stop."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from avlmaps.bench.harness.paper import paper_source
+from avlmaps.bench.harness.provenance import in_words, provenance
 from avlmaps.bench.navigation.episodes import Episode
 from avlmaps.bench.navigation.picture import draw_rates
-from avlmaps.bench.navigation.runs import Outcome, run
+from avlmaps.bench.navigation.runs import run
 from avlmaps.bench.navigation.settings import NavigationSettings
-from avlmaps.bench.navigation.tables import paper_figures, tables
-from avlmaps.bench.suites import markdown
+from avlmaps.bench.navigation.tables import tables
+from avlmaps.bench.output import markdown, write_answer
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.navigate.bodies import BASE
 
@@ -25,46 +26,31 @@ NOTE = (
 
 
 def run_navigation(settings: NavigationSettings | None, out: Path) -> dict[str, Any]:
-    """Run the benchmark; write ``navigation.json``, ``.md``, ``.png`` and ``navigation_episodes.jsonl`` into a folder.
+    """Run the benchmark; write its tables (JSON, Markdown, CSV), ``navigation.png`` and ``navigation_episodes.jsonl``.
 
-    Recordings and maps are kept in its folder ``work``, what robots did in ``episodes``.
+    Recordings and maps stay in the folder ``work`` of ``out``, what robots did in ``episodes``.
     """
     settings = settings or NavigationSettings()
     outcome = run(settings, out)
     answer = {
         "suite": "navigation",
-        "scenes": list(outcome.missions.scenes),
-        "profile": settings.profile,
-        "seed": outcome.missions.recorded.seed,
+        **provenance(settings, outcome.missions.recorded, outcome.missions.scenes, outcome.weights),
         "language": settings.language,
         "guess": settings.guess,
         "body": {"radius_m": BASE.radius_m, "height_m": BASE.height_m},
-        "recorded": msgspec.to_builtins(outcome.missions.recorded),
         "note": NOTE,
-        "paper": paper_figures()["source"] + ". " + paper_figures()["note"],
+        "paper": paper_source("navigation"),
         "tables": tables(outcome),
     }
-    out.mkdir(parents=True, exist_ok=True)
-    write_bytes_atomically(out / "navigation.json", (json.dumps(answer, indent=1) + "\n").encode())
+    language = "Programs are given." if settings.language == "none" else f"Language by {settings.language}."
+    head = f"{in_words(answer)} {language} {len(outcome.episodes)} episodes."
+    page = f"# Navigation\n\n{head}\n\n{NOTE}\n\nPaper: {answer['paper']}\n\n"
+    written = write_answer(answer, out, page + markdown(answer["tables"]))
     write_bytes_atomically(out / "navigation_episodes.jsonl", _lines(outcome.episodes))
-    write_bytes_atomically(out / "navigation.md", _markdown(outcome, answer).encode())
     draw_rates(outcome, out / "navigation.png")
-    return answer
+    return written
 
 
 def _lines(episodes: list[Episode]) -> bytes:
     """Return every episode, in the order of the missions, to look into failures."""
     return b"".join(msgspec.json.encode(episode) + b"\n" for episode in episodes)
-
-
-def _markdown(outcome: Outcome, answer: dict[str, Any]) -> str:
-    recorded = answer["recorded"]
-    sounds = f"clips of {recorded['sounds']}" if recorded["sounds"] else "sounds made by rule"
-    told = "programs given directly" if answer["language"] == "none" else f"language by {answer['language']}"
-    head = (
-        f"# Navigation\n\nProfile {answer['profile']}, seed {answer['seed']}, {len(answer['scenes'])} scenes "
-        f"({', '.join(answer['scenes'])}), at most {recorded['frames']} frames each, sensor {recorded['sensor']}, "
-        f"hearing {recorded['hearing']}, {sounds}, {told}; {len(outcome.episodes)} episodes.\n\n"
-        f"{answer['note']}\n\nPaper: {answer['paper']}\n\n"
-    )
-    return head + markdown(answer["tables"])

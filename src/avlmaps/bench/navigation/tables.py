@@ -1,10 +1,10 @@
 """Tables I, II and VI and the lists of commands from episodes, with the paper's own figures beside them."""
 
-import json
-from functools import cache
-from importlib.resources import files
 from typing import Any
 
+from avlmaps.bench.harness.chosen import chosen_on
+from avlmaps.bench.harness.paper import paper_figures
+from avlmaps.bench.harness.provenance import clip_table, shown_scene
 from avlmaps.bench.navigation.commands import COMMANDS, SPATIAL
 from avlmaps.bench.navigation.configurations import CEILING, OURS, configurations
 from avlmaps.bench.navigation.episodes import Episode
@@ -43,7 +43,10 @@ def tables(outcome: Outcome) -> dict[str, dict[str, Any]]:
     made = {TITLE[series]: _table(outcome, series) for series in shown}
     if {Series.COMMANDS, Series.SPATIAL} & set(shown):
         made["Commands and spatial goals, form by form"] = _forms(outcome)
-    return {**made, "Figures to reach": _figures(outcome), "Scenes": _scenes(outcome)}
+    made = {**made, "All experiments": _figures(outcome), "Scenes": _scenes(outcome)}
+    if outcome.missions.recorded.sounds:
+        made["Clips that were heard"] = clip_table(clip for one in outcome.scenes for clip in one.clips)
+    return made
 
 
 def columns(series: Series) -> list[str]:
@@ -63,8 +66,9 @@ def _table(outcome: Outcome, series: Series) -> dict[str, Any]:
             rows.append(_row(one.name, series, score, _kind_shares(outcome, series, episodes)))
         else:
             rows.append([one.name, 0, *[""] * (len(columns(series)) - 2)])
-    paper = paper_figures()["tables"].get(str(series))
-    return {"columns": columns(series), "rows": [*rows, *([_paper_row(series, paper)] if paper else [])]}
+    paper = [_paper_row(series, row) for row in paper_figures("navigation")["tables"].get(str(series), ())]
+    chosen = chosen_on(outcome.missions.scenes)
+    return {"columns": columns(series), "rows": [*rows, *paper], **({"chosen on": chosen} if chosen else {})}
 
 
 def _kind_shares(outcome: Outcome, series: Series, episodes: list[Episode]) -> list[Share]:
@@ -77,13 +81,6 @@ def _row(name: str, series: Series, score: Score, kinds: list[Share]) -> list[An
     spl = [round(score.spl, 3), "{:.3f} to {:.3f}".format(*score.spl_interval)]
     means = [round(score.path_m, 2), round(score.actions, 1)]
     return [name, score.sequences, *cells, *spl, *means, score.contacts, score.foretold]
-
-
-@cache
-def paper_figures() -> dict[str, Any]:
-    """Return the paper's own figures, and where they are from."""
-    text = (files("avlmaps.bench") / "data" / "paper_navigation.json").read_text(encoding="utf-8")
-    return json.loads(text)
 
 
 def _paper_row(series: Series, paper: dict[str, Any]) -> list[Any]:
@@ -116,42 +113,28 @@ def _whole(episodes: list[Episode]) -> object:
 
 
 def _figures(outcome: Outcome) -> dict[str, Any]:
-    """Return how ours stands to what the issue asks for."""
-    seed = outcome.settings.seed
-    rows: list[list[Any]] = []
-
-    def add(what: str, asked: float, share: Share) -> None:
-        if share.count:
-            rows.append([what, asked, share.percent, share.bounds, share.count])
-
-    widest = of(outcome, Series.SOUNDS_3, OURS)
-    if widest:
-        score = scored(widest, LENGTH[Series.SOUNDS_3], seed)
-        add("widest range: subgoals, %", 85.0, score.subgoals)
-        add("widest range: four in a row, %", 50.0, score.rows[3])
-    add("image and objects: subgoals, %", 75.0, share_of(of(outcome, Series.IMAGES, OURS), lambda leg: True, seed))
-    pairs = of(outcome, Series.PAIRS, OURS)
-    add("ambiguous pairs: sound, %", 70.0, share_of(pairs, of_kind(GoalKind.SOUND), seed))
-    add("ambiguous pairs: object, %", 75.0, share_of(pairs, of_kind(GoalKind.OBJECT), seed))
-    if pairs:
-        add("ambiguous pairs: both, %", 55.0, scored(pairs, 2, seed).whole)
+    """Return what holds for all experiments together."""
     true = [one for one in outcome.episodes if one.configuration == CEILING]
-    add("true perception: reachable subgoals, %", 98.0, share_of(true, is_reachable, seed))
-    foretold = sum(one.foretold for one in outcome.episodes)
-    rows.append(["contacts that the map could have foretold", 0, foretold, "", len(outcome.episodes)])
-    told = [one.understood for one in outcome.episodes]
-    rows.append(["missions whose commands were understood", len(told), sum(told), "", len(told)])
-    return {"columns": ["figure", "asked for", "measured", "95 %", "of"], "rows": rows}
+    reachable = share_of(true, is_reachable, outcome.settings.seed)
+    rows: list[list[Any]] = []
+    if reachable.count:
+        row = ["true perception: reachable subgoals that were reached, %", reachable.percent, reachable.bounds]
+        rows.append([*row, reachable.count])
+    predicted = sum(one.foretold for one in outcome.episodes)
+    rows.append(["contacts that the map could have foretold", predicted, "", len(outcome.episodes)])
+    understood = [one.understood for one in outcome.episodes]
+    rows.append(["missions whose commands were understood", sum(understood), "", len(understood)])
+    return {"columns": ["figure", "measured", "95 %", "of"], "rows": rows}
 
 
 def _scenes(outcome: Outcome) -> dict[str, Any]:
-    """Return what the scenes were, and how many missions each gave."""
+    """Return the scenes, and the number of missions of each."""
     shown = [series for series in Series if series in outcome.settings.series]
     rows: list[list[Any]] = []
     for one in outcome.scenes:
         own = [mission for mission in outcome.missions.missions if mission.scene == one.scene]
         counts = [sum(mission.series is series for mission in own) for series in shown]
-        rows.append([one.scene, one.frames, one.voxels, f"{one.sounds[0]} of {one.sounds[1]}", *counts])
+        rows.append([shown_scene(one.scene), one.frames, one.voxels, f"{one.sounds[0]} of {one.sounds[1]}", *counts])
     total = [sum(row[column] for row in rows) for column in (1, 2)]
     counts = [sum(row[4 + column] for row in rows) for column in range(len(shown))]
     return {

@@ -33,7 +33,7 @@ class AreaSettings:
 
     anchor: Literal["camera", "centre"] = "centre"
     """Where a keyframe's heat falls from: the camera (the paper), or the middle of what the camera saw (things are
-    found where they were asked for in 45 % of 191 tasks, with the camera's place in 35 %; docs/benchmarks.md)."""
+    found where they were asked for in 45 % of 191 tasks, with the camera's place in 35 %; docs/experiments.md)."""
     score: Literal["posterior", "min-max"] = "posterior"
     """``posterior`` asks how likely the name is among all area names; ``min-max`` stretches the cosines (the paper)."""
     temperature: float | None = None

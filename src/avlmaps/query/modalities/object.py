@@ -46,7 +46,7 @@ class ObjectSettings:
     """Instances below this are noise (one or two voxels of 5 cm) and give no heat; 0 keeps all, as the paper does."""
     least_in_company: float = 0.02
     """The same where the word is asked together with what it is near: then a weak instance there is likelier than a
-    sure one elsewhere (docs/benchmarks.md)."""
+    sure one elsewhere (docs/experiments.md)."""
     score_in_company: float = 0.5
     """And there a voxel counts that scores at least this part of its best rival's score, for an encoder of names."""
     link_m: float = 0.1

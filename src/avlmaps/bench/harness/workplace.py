@@ -1,35 +1,41 @@
-"""Making a scene ready to be asked: recorded, mapped, its voxels labelled, its photos drawn; all kept on the disk."""
+"""Making a scene ready: recorded, mapped, its voxels labelled, its photos drawn; all of it stays on the disk."""
 
 import json
 import os
 import shutil
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 
 import msgspec
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 
-from avlmaps.bench.indexing.rules import Event, Evidence, Photo, area_tasks, photo_tasks, sound_tasks
-from avlmaps.bench.indexing.scene_queries import AskedScene
-from avlmaps.bench.indexing.tasks import Recorded, Task, TaskError, TaskKind
-from avlmaps.bench.indexing.true_voxels import TrueVoxels
+from avlmaps.bench.harness.clips import unheard_folder
+from avlmaps.bench.harness.evidence import Event, Evidence, Photo
+from avlmaps.bench.harness.models import chosen_profile
+from avlmaps.bench.harness.own_recording import OwnRecording, is_recording
+from avlmaps.bench.harness.settings import Recorded, SceneSettings, TaskError
+from avlmaps.bench.harness.true_voxels import TrueVoxels
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
+from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.modalities.image import read_picture
+from avlmaps.query.rules import Rules, build_settings, query_settings
 from avlmaps.recordings.types import Recording
+from avlmaps.sim.hearing.kinds import kind_of
+from avlmaps.sim.mesh import Triple
 from avlmaps.sim.recorder import RecordSettings, record_scene
 from avlmaps.sim.scene import NOTHING, Scene, SceneObject
-from avlmaps.sim.truth import Truth, read_truth
+from avlmaps.sim.truth import OBJECTS, HeardEvent, Truth, read_truth
 
 _FPS = 5.0
-_PHOTOS_A_TASK = 12  # so many are tried for each that is wanted
 _STOREY_BELOW_M, _STOREY_ABOVE_M = 1.7, 1.3  # from the camera's height
 _RECIPE = 1  # raised when what a folder of work holds is made in another way
 
@@ -42,8 +48,10 @@ class SceneJob:
         spec: the scene's name.
         recorded: how it is recorded.
         sounds: the folder of clips; None for sounds made by rule.
-        profile: which models map it.
+        profile: the models that map it.
         work: where all scenes' work is kept.
+        models: other backends than the profile's, ``module=backend[@model]``.
+        rules: how it is mapped and queried.
     """
 
     spec: str
@@ -51,11 +59,25 @@ class SceneJob:
     sounds: Path | None
     profile: str
     work: Path
+    models: tuple[str, ...] = ()
+    rules: Rules = "ours"
+
+    @property
+    def used(self) -> Profile:
+        """The profile with the models that were chosen."""
+        return chosen_profile(self.profile, self.models)
+
+    @property
+    def map_name(self) -> str:
+        """Name of the map's folder: one for each choice of models and rules."""
+        others = f"-{sha256(repr(sorted(self.models)).encode()).hexdigest()[:8]}" if self.models else ""
+        return f"{self.profile}{others}{'' if self.rules == 'ours' else '-' + self.rules}.avlmap"
 
     @property
     def folder(self) -> Path:
         """This scene's own folder, named by everything that its recording depends on."""
         source = Path(self.spec)
+        source = source / OBJECTS if is_recording(self.spec) else source
         content = sha256(source.read_bytes()).hexdigest() if source.is_file() else ""
         facts = [self.spec, content, msgspec.to_builtins(self.recorded), __version__, _RECIPE]
         name = "".join(c if c.isalnum() else "-" for c in self.spec)[-40:]
@@ -69,11 +91,28 @@ class SceneJob:
     @property
     def record_settings(self) -> RecordSettings:
         """The settings of the recording."""
-        wanted = self.recorded
+        wanted, sounds = self.recorded, self.sounds
+        if sounds is not None and wanted.clips == "unheard":
+            sounds = unheard_folder(sounds, self.work)
         return RecordSettings(
-            fps=_FPS, sensor=wanted.sensor, hearing=wanted.hearing, sounds=self.sounds, sources=wanted.sources,  # pyright: ignore[reportArgumentType]
+            fps=_FPS, sensor=wanted.sensor, hearing=wanted.hearing, sounds=sounds, sources=wanted.sources,  # pyright: ignore[reportArgumentType]
             ambiguous=wanted.ambiguous, max_frames=wanted.frames, workers=1,
         )  # fmt: skip
+
+
+def scene_jobs(settings: SceneSettings, recorded: Recorded, names: Sequence[str], work: Path) -> list[SceneJob]:
+    """Return one job for each scene.
+
+    Args:
+        settings: the folder of clips, the models and the rules.
+        recorded: how scenes are recorded, which saved tasks may decide.
+        names: of scenes.
+        work: where all scenes' work is kept.
+    """
+    return [
+        SceneJob(name, recorded, settings.sounds, settings.profile, work, settings.models, settings.rules)
+        for name in names
+    ]
 
 
 @dataclass(eq=False)
@@ -90,7 +129,16 @@ class Workplace:
 
     @cached_property
     def scene(self) -> Scene:
-        """The scene itself; making it takes seconds, and a second run needs it only for new photos."""
+        """The scene itself; making it takes seconds, and a second run needs it only for new photos.
+
+        Raises:
+            TaskError: it is not the scene that was recorded, or a recording, of which no geometry is known.
+        """
+        if self.own is not None:
+            raise TaskError(
+                f"{self.job.spec} is a recording: its geometry is not known beyond its boxes. Give house:SEED or "
+                "a scene file."
+            )
         scene = self.open_spec(self.job.spec)
         folder = self.job.folder / "recording"
         if folder.exists() and not _same_things(scene.objects, read_truth(folder).objects):
@@ -99,6 +147,11 @@ class Workplace:
                 f"remove {self.job.folder} and run again."
             )
         return scene
+
+    @cached_property
+    def own(self) -> OwnRecording | None:
+        """The user's recording, where the job names one; None for a scene to be simulated."""
+        return OwnRecording.open(Path(self.job.spec)) if is_recording(self.job.spec) else None
 
     @cached_property
     def _renderer(self):
@@ -111,6 +164,8 @@ class Workplace:
         """The recording, made if need be."""
         from avlmaps.recordings.open import open_recording
 
+        if self.own is not None:
+            return self.own.mapped
         folder = self.job.folder / "recording"
         if not folder.exists():
             unfinished = _fresh(self.job.folder / f"recording-unfinished-{os.getpid()}")
@@ -121,19 +176,24 @@ class Workplace:
 
     @cached_property
     def truth(self) -> Truth:
-        """What is truly there."""
-        return read_truth(self.recording.path)
+        """What is truly there; sounds by the names that people call them, whatever a collection calls its clips."""
+        truth = read_truth(self.recording.path) if self.own is None else self.own.truth
+        named = tuple(replace(event, category=called(event.category)) for event in truth.events)
+        return replace(truth, events=named)
 
     @cached_property
     def asked(self) -> AVLMap:
         """The map, built if need be."""
         from avlmaps.maps.build import build_map
 
-        path = self.job.folder / f"{self.job.profile}.avlmap"
-        try:  # one that is there already is taken as it is
-            return AVLMap(build_map(self.recording, path, self.job.profile, progress=False))
+        path, rules, used = self.job.folder / self.job.map_name, self.job.rules, self.job.used
+        settings = build_settings(rules)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:  # a finished one is taken as it is
+            stored = build_map(self.recording, path, used, settings, progress=False)
         except MapError:  # by another release, or with other settings
-            return AVLMap(build_map(self.recording, path, self.job.profile, overwrite=True, progress=False))
+            stored = build_map(self.recording, path, used, settings, overwrite=True, progress=False)
+        return AVLMap(stored, query_settings(rules))
 
     @cached_property
     def _true_voxels(self) -> TrueVoxels:
@@ -148,15 +208,19 @@ class Workplace:
             return TrueVoxels(kept["key"], kept["instance"])
 
     @cached_property
-    def asked_scene(self) -> AskedScene:
-        """The scene, ready to be asked."""
-        label = self._true_voxels.label(np.asarray(self.asked.stored.voxels.index))
-        hearing, seed = self.job.recorded.hearing, self.job.recorded.seed
-        return AskedScene(self.asked, self.recording, self.truth, label, hearing, self.photo_of, seed)
+    def label(self) -> Int[np.ndarray, " n"]:
+        """The true thing of each voxel of the map, -1 for none."""
+        if self.own is not None:
+            return self.own.label(self.asked.space.centres, self.asked.stored.up_in_world)
+        return self._true_voxels.label(np.asarray(self.asked.stored.voxels.index))
 
-    def photo_of(self, task: Task) -> UInt8[np.ndarray, "h w 3"]:
-        """Return a task's photo, drawn if need be."""
-        return read_picture(self.photo_file(task.world_from_photo))
+    def has(self, kinds: Sequence[Kind]) -> bool:
+        """Return whether the map's profile has models for all of these."""
+        return all(self.asked.stored.profile.backend_name(kind) for kind in kinds)
+
+    def photo(self, world_from_camera: Float[np.ndarray, "4 4"]) -> UInt8[np.ndarray, "h w 3"]:
+        """Return the photo taken from a pose, drawn if need be."""
+        return read_picture(self.photo_file(world_from_camera))
 
     def photo_file(self, world_from_camera: Float[np.ndarray, "4 4"]) -> Path:
         """Return the file of a photo taken from a pose, drawn if need be."""
@@ -166,8 +230,11 @@ class Workplace:
             import cv2
 
             path.parent.mkdir(parents=True, exist_ok=True)
-            view = self._renderer.render(self.camera, world_from_camera)
-            content = cv2.imencode(".png", np.ascontiguousarray(view.rgb[..., ::-1]))[1].tobytes()
+            if self.own is None:
+                rgb = self._renderer.render(self.camera, world_from_camera).rgb
+            else:
+                rgb = self.own.picture(world_from_camera)
+            content = cv2.imencode(".png", np.ascontiguousarray(rgb[..., ::-1]))[1].tobytes()
             write_bytes_atomically(path, content)
         return path
 
@@ -179,26 +246,26 @@ class Workplace:
     @property
     def evidence(self) -> Evidence:
         """What tasks are made of."""
-        label, truth = self.asked_scene.label, self.truth
+        label, truth = self.label, self.truth
         seen = np.bincount(label[label != NOTHING], minlength=len(truth.objects))
-        acoustic = self.job.recorded.hearing == "acoustic"
-        events = tuple(Event(e.category, e.source if acoustic else e.robot) for e in truth.events)
         eye_m = float(np.median(self.recording.world_from_camera[:, 2, 3]))
         storey_m = (eye_m - _STOREY_BELOW_M, eye_m + _STOREY_ABOVE_M)
+        events = tuple(map(self._event, truth.events))
         return Evidence(self.job.spec, truth.objects, seen, truth.areas, events, storey_m)
 
-    def tasks(self, most: int) -> list[Task]:
-        """Make this scene's tasks, at most so many of each kind."""
-        evidence = self.evidence
-        photos = self.photos(_PHOTOS_A_TASK * most)
-        return [
-            *area_tasks(evidence, self.job.rng(1), most),
-            *sound_tasks(evidence, self.job.rng(2), most),
-            *photo_tasks(evidence, photos, self.job.rng(3), most),
-        ]
+    def _event(self, event: HeardEvent) -> Event:
+        """Return a sound with its true places: its source, or where the robot was while it was heard (the paper's)."""
+        if self.job.recorded.hearing == "acoustic":
+            return Event(event.category, event.source)
+        stamps_s = self.recording.stamps_s
+        during = np.flatnonzero((stamps_s >= event.onset_s) & (stamps_s <= event.offset_s))
+        places: list[Triple] = [tuple(p) for p in self.recording.world_from_camera[during, :3, 3].tolist()]
+        return Event(event.category, event.robot, tuple(places))
 
     def photos(self, count: int) -> Sequence[Photo]:
         """Look from places where the robot never stood, held out from the walk; only on the floor that it walked."""
+        if self.own is not None:
+            return self.own.photos(count)
         from avlmaps.sim.views import random_views
 
         views = random_views(self.scene, self.job.rng(4), count, self.camera)
@@ -226,6 +293,6 @@ def _fresh(folder: Path) -> Path:
     return folder
 
 
-def kinds_of(tasks: Sequence[Task]) -> dict[TaskKind, int]:
-    """Count tasks by kind."""
-    return {kind: sum(task.kind is kind for task in tasks) for kind in TaskKind}
+def called(sound: str) -> str:
+    """Return our name of a kind of sound: ``door knock`` for clips of ``door wood knock``; other names stay."""
+    return kind_of(sound).names[0] or sound

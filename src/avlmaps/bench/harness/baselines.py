@@ -5,8 +5,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import UInt8
 
-from avlmaps.bench.indexing.factors import true_places
-from avlmaps.bench.indexing.weak_sounds import weak_ear
+from avlmaps.bench.harness.factors import true_places
+from avlmaps.bench.harness.weak_sounds import weak_ear
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap

@@ -1,0 +1,255 @@
+"""What docs/benchmarks.md and the README's table show, made from docs/benchmarks.json alone."""
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from avlmaps.bench.harness.provenance import in_words, outdated
+from avlmaps.bench.output import table_markdown
+
+ROOT = Path(__file__).resolve().parents[1]
+FIGURES, PAGE, README = ROOT / "docs" / "benchmarks.json", ROOT / "docs" / "benchmarks.md", ROOT / "README.md"
+BEGIN, END = "<!-- figures: begin (python benchmarks/report.py --page) -->", "<!-- figures: end -->"
+NOT_YET = "not measured yet"
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One section of the page: one command.
+
+    Attributes:
+        name: in docs/benchmarks.json, and of ``--only``.
+        title: of the section.
+        command: words; SOUNDS, RECORDING, NYUV2 and HOUSE stand for folders of data, OUT for the folder of all results.
+        hours: on two quiet cores without a GPU, estimated; 0 for minutes.
+        about: a sentence below the title.
+    """
+
+    name: str
+    title: str
+    command: str
+    hours: float = 0.0
+    about: str = ""
+
+    @property
+    def is_suite(self) -> bool:
+        """Whether it is a suite of ``avlmaps bench``, with tables; other commands print text."""
+        return self.command.startswith("avlmaps bench")
+
+
+_INDEXING = "[How tasks are made](indexing.md)."
+_NAVIGATION = "[How missions are made and judged](navigation-benchmark.md)."
+ENTRIES = (
+    Entry("fusion", "Fusion", "python benchmarks/fusion.py"),
+    Entry("memory", "Memory of fusion", "python benchmarks/fusion_memory.py"),
+    Entry("queries", "Queries", "python benchmarks/queries.py"),
+    Entry("locating", "Time to locate a photo", "python benchmarks/locate.py"),
+    Entry("store", "Writing and opening a map", "python benchmarks/store.py"),
+    Entry("render", "Rendering views", "python benchmarks/render.py"),
+    Entry("encoders", "The embedded encoders", "python benchmarks/embedded.py"),
+    Entry("words", "Words", "avlmaps bench words --out OUT"),
+    Entry("language", "Commands and questions", "avlmaps bench language --out OUT"),
+    Entry("frames", "Labelled frames of real rooms", "avlmaps bench frames --nyuv2 NYUV2 --out OUT", 0.2),
+    Entry(
+        "sounds", "Sounds", "avlmaps bench sounds --sounds SOUNDS --out OUT", 0.0,
+        "Tables called cross-validation were written with the weights, by networks that had not heard the fold.",
+    ),
+    Entry("segmentation", "Sounds in a track", "avlmaps bench segmentation --sounds SOUNDS --out OUT", 0.3),
+    Entry("locate", "Position of a photo", "avlmaps bench locate --scenes RECORDING --out OUT", 0.2),
+    Entry("house", "Objects of an artist's house", "avlmaps bench objects --scenes HOUSE --out OUT", 0.3),
+    Entry("objects", "Objects of twelve held-out homes", "avlmaps bench objects --out OUT", 1.0),
+    Entry("indexing", "The paper's Tables III to V", "avlmaps bench indexing --out OUT", 1.5, _INDEXING),
+    Entry(
+        "indexing-clips", "The same with recorded sounds", "avlmaps bench indexing --sounds SOUNDS --out OUT", 2.5,
+        "The sounds above come from the generator that also made training sounds of the embedded encoder. These are "
+        "recordings that it was not trained on.",
+    ),
+    Entry(
+        "indexing-paper", "The same by the paper's rules", "avlmaps bench indexing --rules paper --out OUT", 1.5,
+        "The paper's pipeline whole, with our encoders ([the rules](paper-models.md#the-papers-rules)).",
+    ),
+    Entry("navigation", "The paper's Tables I, II and VI", "avlmaps bench navigation --out OUT", 5.0, _NAVIGATION),
+    Entry(
+        "navigation-clips", "The same with recorded sounds",
+        "avlmaps bench navigation --sounds SOUNDS --series sounds-1 sounds-2 sounds-3 pairs --out OUT", 4.0,
+    ),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One row of the README's table: cells of a table, or a match in a text.
+
+    Attributes:
+        label: what is measured.
+        entry: name of the entry.
+        table: start of the table's name; ``""`` for a text.
+        row: start of the row's cells, joined by " | "; for a text a regular expression with groups.
+        form: shows cells by ``{column}``, intervals by ``{+column}``; for a text ``{1}`` and so on.
+    """
+
+    label: str
+    entry: str
+    table: str
+    row: str
+    form: str
+
+
+_RECALL = "**{R@1 < 0.5 m %} %** of {tasks} within 0.5 m ({+R@1 < 0.5 m %})"
+README_FIGURES = (
+    Figure(
+        "fusion, 640x480 depth, 512-d features, one core", "fusion", "",
+        r"every pixel, depth registered to colour +\S+ +(\S+) +\S+ +(\S+)",
+        "{1} frames/s, {2} times the per-point loop",
+    ),
+    Figure(
+        "a word queried over 1,000,000 x 512 features", "queries", "",
+        r"one word over 1,000,000 x 512 float16 +(\S+)", "{1} ms",
+    ),
+    Figure(
+        "photos located, half of a real kitchen as the map", "locate", "photos located",
+        "every other frame | * | * | yes",
+        "{within 5 cm and 5° %} % of {photos} within 5 cm and 5°, median {median error cm} cm",
+    ),
+    Figure(
+        "sounds detected in a track, 10 dB over white noise", "segmentation", "sounds found",
+        "folds 4 and 5 | white | 10", "{found %} % of {sounds} ({+found %})",
+    ),
+    Figure(
+        "sounds by words, ten kinds, cross-validated", "sounds", "cross-validation: asked by words", "clean",
+        "{first} of {of}, {%} % ({+%})",
+    ),
+    Figure("Table III, an object in an area", "indexing", "Table III", "+ sparse view map (ours)", _RECALL),
+    Figure("Table IV, a sound near an object", "indexing", "Table IV", "object + sound (ours)", _RECALL),
+    Figure(
+        "the same, recordings that the encoder was not trained on", "indexing-clips", "Table IV",
+        "object + sound (ours)", _RECALL,
+    ),
+    Figure("Table V, an object near a photo", "indexing", "Table V", "object + image (ours)", _RECALL),
+    Figure(
+        "Table VI, an ambiguous sound, then an ambiguous object", "navigation", "Table VI", "ours",
+        "both {2 in a row %} % of {sequences}; sounds {sound %} %, objects {object %} %",
+    ),
+)  # fmt: skip
+
+
+def read_figures(path: Path = FIGURES) -> dict[str, Any]:
+    """Return what was measured, by the name of the entry."""
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+INTRODUCTION = """# Benchmarks
+
+`make bench` writes this page from [benchmarks.json](benchmarks.json), which holds what each command below printed.
+Nothing here is typed by hand; what was tried on the way is on [a page of its own](experiments.md).
+
+Speed is a ratio against another way in the same run, since machines differ and are busy. Accuracy comes with counts and
+95 % intervals. Below a table stand the choices that were made on the same data. Each section names its command and the
+checksums of the weights; where those are not the weights that ship, it says so.
+
+    python benchmarks/report.py --sounds SOUNDS --recording RECORDING --house HOUSE    # all of it: two nights
+    python benchmarks/report.py --only words sounds ...                 # some of it
+    python benchmarks/report.py --stale ...                                        # what other weights measured
+    python benchmarks/report.py --page                                   # this page again, measures nothing
+
+SOUNDS is a folder of clips with an `index.csv`, RECORDING a recording with poses (the red kitchen of 7-Scenes here),
+NYUV2 labelled frames in the layout of NYU Depth V2,
+HOUSE a scene file (the house of aws-robomaker-small-house-world here). A run that was stopped goes on where it ended.
+"""
+
+
+def page(measured: Mapping[str, Any], shipped: Mapping[str, str]) -> str:
+    """Return docs/benchmarks.md.
+
+    Args:
+        measured: what docs/benchmarks.json holds.
+        shipped: checksums of the weights that ship, by module.
+    """
+    return "\n".join([INTRODUCTION, *(_section(entry, measured.get(entry.name), shipped) for entry in ENTRIES)])
+
+
+def _section(entry: Entry, found: Mapping[str, Any] | None, shipped: Mapping[str, str]) -> str:
+    lines = [f"## {entry.title}", "", *([entry.about, ""] if entry.about else []), f"    {entry.command}", ""]
+    if found is None:
+        unit = "hour" if entry.hours <= 1 else "hours"
+        hours = f" It takes about {entry.hours:g} {unit} on two quiet cores." if entry.hours else ""
+        return "\n".join([*lines, f"Not measured yet.{hours}", ""])
+    measured_on = f"Measured on {found['date']} with avlmaps {found['avlmaps']} on {found['machine']}."
+    if not entry.is_suite:
+        return "\n".join([*lines, measured_on, "", "```", found["text"].rstrip(), "```", ""])
+    answer = found["answer"]
+    lines += [measured_on + " " + in_words(answer), "", *_warning(answer, shipped)]
+    lines += [answer["note"], ""] if answer.get("note") else []
+    lines += [f"Paper: {answer['paper']}", ""] if answer.get("paper") else []
+    for name, table in answer["tables"].items():
+        lines += [f"### {name}", "", table_markdown(table)]
+    return "\n".join(lines)
+
+
+def _warning(answer: Mapping[str, Any], shipped: Mapping[str, str]) -> list[str]:
+    """Return one paragraph where a table was not measured with the weights that ship, else nothing."""
+    weights = answer.get("weights")
+    if answer.get("profile") != "embedded" or answer.get("models"):
+        return []
+    if weights is None:
+        return ["**The weights of this measurement were not recorded.** Run the command again.", ""]
+    others = outdated(weights, shipped)
+    if not others:
+        return []
+    return [f"**Not measured with the weights that ship** (other weights: {', '.join(others)}). Run it again.", ""]
+
+
+def stale(entry: Entry, found: Mapping[str, Any] | None, shipped: Mapping[str, str]) -> bool:
+    """Return whether an entry was never measured, or with other weights than those that ship."""
+    return found is None or (entry.is_suite and bool(_warning(found["answer"], shipped)))
+
+
+def readme_table(measured: Mapping[str, Any]) -> str:
+    """Return the README's table of figures."""
+    rows = [f"| {one.label} | {_shown(one, measured.get(one.entry))} |" for one in README_FIGURES]
+    return "\n".join(["| what | measured |", "|---|---|", *rows])
+
+
+def _shown(figure: Figure, found: Mapping[str, Any] | None) -> str:
+    if found is None:
+        return NOT_YET
+    if not figure.table:
+        match = re.search(figure.row, found["text"])
+        return NOT_YET if match is None else figure.form.format("", *match.groups())
+    for name, table in found["answer"]["tables"].items():
+        if name.startswith(figure.table):
+            for row in table["rows"]:
+                if _is_row(row, figure.row):
+                    return _filled(figure.form, table["columns"], row)
+    return NOT_YET
+
+
+def _is_row(row: list[Any], wanted: str) -> bool:
+    cells = wanted.split(" | ")
+    return all(want in ("*", str(cell), str(cell).removesuffix(".0")) for want, cell in zip(cells, row, strict=False))
+
+
+def _filled(form: str, columns: list[str], row: list[Any]) -> str:
+    """Replace each ``{column}`` by its cell, and ``{+column}`` by the cell right of it: its interval."""
+
+    def cell(match: re.Match[str]) -> str:
+        right = match.group(1).startswith("+")
+        return str(row[columns.index(match.group(1).removeprefix("+")) + right])
+
+    return re.sub(r"\{([^}]+)\}", cell, form)
+
+
+def with_figures(readme: str, table: str) -> str:
+    """Return the README with the table between its markers.
+
+    Raises:
+        ValueError: the markers are not there.
+    """
+    before, begin, rest = readme.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise ValueError(f"README.md lacks {BEGIN} ... {END}")
+    return f"{before}{BEGIN}\n{table}\n{END}{after}"

@@ -1,0 +1,1 @@
+"""What the suites share: scenes made ready, work in several processes, files, intervals and output."""

@@ -1,0 +1,63 @@
+"""Work on several scenes, in processes of their own where there are several; ends at the first that fails."""
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from multiprocessing import get_context
+from typing import TypeVar
+
+from avlmaps.core.progress import progress, say, silence
+
+S = TypeVar("S")
+T = TypeVar("T")
+_LOOK_S = 2.0
+
+
+def side_by_side(
+    do: Callable[[S], T],
+    todo: Sequence[S],
+    jobs: int,
+    label: str,
+    name: Callable[[S], str],
+    done: Callable[[], int] | None = None,
+    total: int | None = None,
+) -> list[T]:
+    """Return what becomes of every scene, in their order, and show the progress.
+
+    Args:
+        do: the work, a function of a module.
+        todo: one entry for each scene.
+        jobs: processes at once, at most; 0 for one a core.
+        label: of the progress bar.
+        name: what a scene is called.
+        done: counts the parts that are done, where a scene has several.
+        total: the number of parts.
+    """
+    workers = min(jobs or os.cpu_count() or 1, len(todo))
+    unit = "scene" if done is None else "episode"
+    if workers < 2:
+        results: list[T] = []
+        for one in todo:
+            results.append(do(one))
+            say(f"{label}: {name(one)} is done, {len(results)} of {len(todo)}")
+        return results
+    with ProcessPoolExecutor(workers, get_context("spawn"), silence) as pool:
+        futures = [pool.submit(do, one) for one in todo]
+        for _ in progress(_ticks(futures, done), label, total=total or len(todo), unit=unit):
+            pass
+        return [future.result() for future in futures]
+
+
+def _ticks(futures: Sequence[Future[T]], done: Callable[[], int] | None) -> Iterator[None]:
+    """Yield once for each part that is done; a process that fails ends all."""
+    shown, waiting = 0, set(futures)
+    while waiting:
+        over, waiting = wait(waiting, _LOOK_S, FIRST_COMPLETED)
+        for future in over:
+            if future.exception() is not None:
+                for other in waiting:
+                    other.cancel()
+                future.result()
+        count = len(futures) - len(waiting) if done is None else done()
+        yield from [None] * max(count - shown, 0)
+        shown = max(shown, count)
