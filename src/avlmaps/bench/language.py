@@ -6,6 +6,7 @@ holds its SHA-256 and what was counted when it was first used; later counts are 
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -224,16 +225,28 @@ def run() -> dict[str, dict[str, list[Any]]]:
     """Return two tables: counts at the first use of each list, and counts now, when the lists are development lists."""
     columns = ["list", "sentences", *OUTCOMES]
     first, now = [], []
+    parts = {"commands": False, "questions": True}
+    at_first_use = {part: Counter[str]() for part in parts}
+    every: list[Judged] = []
     for name, seal in sealed().items():
         for part, at_first in seal["first use"].items():
-            total = sum(at_first.values())
-            first.append([f"{name}, {part}", str(total), *(_share(at_first[outcome], total) for outcome in OUTCOMES)])
+            at_first_use[part].update(at_first)
+            first.append(_counted(f"{name}, {part}", at_first))
         judged = [judge(row) for row in shipped(name)]
-        for part, is_question in (("commands", False), ("questions", True)):
-            these = [one for one in judged if one.is_question is is_question]
-            if these:
-                now.append(row_of(f"{name}, {part}", these))
+        every += judged
+        now += [row_of(f"{name}, {part}", these) for part, these in _by_part(judged, parts).items() if these]
+    first += [_counted(f"all, {part}", count) for part, count in at_first_use.items()]
+    now += [row_of(f"all, {part}", these) for part, these in _by_part(every, parts).items()]
     return {
         "blind, at first use": {"columns": columns, "rows": first},
         "the same lists now (development)": {"columns": columns, "rows": now},
     }
+
+
+def _counted(name: str, count: Mapping[str, int]) -> list[str]:
+    total = sum(count.values())
+    return [name, str(total), *(_share(count.get(outcome, 0), total) for outcome in OUTCOMES)]
+
+
+def _by_part(judged: Sequence[Judged], parts: Mapping[str, bool]) -> dict[str, list[Judged]]:
+    return {part: [one for one in judged if one.is_question is question] for part, question in parts.items()}
