@@ -47,11 +47,11 @@ class ImportMap(ModelVerb):
 
 
 def _imported(verb: ImportMap) -> dict[str, Any]:
+    from avlmaps.cli.running import described
     from avlmaps.maps.import_reference.convert import ImportSettings, import_reference_map
-    from avlmaps.maps.store.reader import describe
 
     settings = ImportSettings(verb.cell_size_m, verb.max_bad_share, verb.sounds, verb.hear_with)
     stored = import_reference_map(
         verb.source, verb.out, settings, areas=verb.areas, poses=verb.poses, overwrite=verb.overwrite
     )
-    return describe(stored)
+    return described(stored)

@@ -123,7 +123,7 @@ def build(verb: "Build") -> dict[str, Any]:
         resume=not verb.fresh,
         overwrite=verb.overwrite,
     )
-    return {**_described(stored), "elapsed_s": round(perf_counter() - begin, 3)}
+    return {**described(stored), "elapsed_s": round(perf_counter() - begin, 3)}
 
 
 def _chosen_profile(name: str, words: "Sequence[str]") -> "Profile":
@@ -201,7 +201,7 @@ def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]
     from avlmaps.maps.store.reader import open_stored
 
     stored = open_stored(path, verify=verify)
-    told = _described(stored)
+    told = described(stored)
     if plot is not None:
         from avlmaps.query.plots import plot_map
 
@@ -209,7 +209,7 @@ def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]
     return told
 
 
-def _described(stored: "StoredMap") -> dict[str, Any]:
+def described(stored: "StoredMap") -> dict[str, Any]:
     """Describe a map, the names of its sounds, and the rules that it was built by."""
     from avlmaps.maps.store.reader import describe
     from avlmaps.query.rules import rules_of
