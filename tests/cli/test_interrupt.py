@@ -28,7 +28,7 @@ def test_while_the_words_are_read() -> None:
 
 def test_out_of_memory_is_a_sentence() -> None:
     starved = (
-        "from avlmaps.cli import main\nfrom avlmaps.cli.verbs import Info\n"
+        "from avlmaps.cli import main\nfrom avlmaps.cli.info import Info\n"
         "def run(self): raise MemoryError\nInfo.run = run\nmain(['info', 'x'])"
     )
     status, said = run(starved)

@@ -84,7 +84,7 @@ def test_a_fault_of_ours_is_json_with_its_traceback_on_standard_error(
 ) -> None:
     from avlmaps.cli import main
 
-    monkeypatch.setattr("avlmaps.cli.running.describe_path", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("avlmaps.cli.info.describe_path", lambda *_, **__: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         main(["info", str(built), "--json"])
     said = json.loads(capsys.readouterr().out)

@@ -126,8 +126,8 @@ def _child(name: str, case: Path, out: Path, write: int) -> None:
 
 def build(case: Path, out: Path) -> int:
     """Build a map as ``avlmaps build`` does, and look whether it is plausible."""
+    from avlmaps.cli.build import Build
     from avlmaps.cli.main import _run
-    from avlmaps.cli.verbs import Build
 
     status = _run(Build(recording=case, out=out, profile=PROFILE, feature_cache="off", max_bad_share=0.5))
     return status or look_into_map(out)
@@ -135,8 +135,8 @@ def build(case: Path, out: Path) -> int:
 
 def look_into_map(path: Path) -> int:
     """Open a map as ``avlmaps info`` does, read all of it, and raise where it cannot be that of a small room."""
+    from avlmaps.cli.info import Info
     from avlmaps.cli.main import _run
-    from avlmaps.cli.verbs import Info
 
     if status := _run(Info(path=path, json=True)):
         return status

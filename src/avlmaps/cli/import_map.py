@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 
+from avlmaps.cli.info import described, info_lines
 from avlmaps.cli.output import emit
 from avlmaps.cli.verb import ModelVerb
-from avlmaps.cli.verbs import info_lines
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +47,6 @@ class ImportMap(ModelVerb):
 
 
 def _imported(verb: ImportMap) -> dict[str, Any]:
-    from avlmaps.cli.running import described
     from avlmaps.maps.import_reference.convert import ImportSettings, import_reference_map
 
     settings = ImportSettings(verb.cell_size_m, verb.max_bad_share, verb.sounds, verb.hear_with)

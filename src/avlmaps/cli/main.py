@@ -10,15 +10,22 @@ from typing import Annotated, Any, Union
 
 import tyro
 
+from avlmaps.cli.add_sounds import AddSounds
 from avlmaps.cli.bench import Bench
+from avlmaps.cli.build import Build
+from avlmaps.cli.demo import Demo
 from avlmaps.cli.export import Export
 from avlmaps.cli.go import Go
 from avlmaps.cli.import_map import ImportMap
+from avlmaps.cli.info import Info
+from avlmaps.cli.locate import Locate
 from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_of
 from avlmaps.cli.profiles import Profiles
+from avlmaps.cli.query import Query
+from avlmaps.cli.record import Record
+from avlmaps.cli.teach_sound import TeachSound
 from avlmaps.cli.things import Things
 from avlmaps.cli.verb import Verb, models_in_force
-from avlmaps.cli.verbs import AddSounds, Build, Demo, Info, Locate, Query, Record, TeachSound
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars

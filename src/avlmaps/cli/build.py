@@ -1,0 +1,156 @@
+"""`avlmaps build`: build a map from a recording."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+from avlmaps.cli.info import described, info_lines
+from avlmaps.cli.output import UsageError, emit
+from avlmaps.cli.verb import ModelVerb
+from avlmaps.core.progress import say
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from avlmaps.perception.cache.feature_store import CacheSettings
+    from avlmaps.perception.profiles import Profile
+
+
+@dataclass(frozen=True, kw_only=True)
+class Build(ModelVerb):
+    """Build a map from a recording. A build that was stopped goes on where it ended, with the same map as result.
+
+    Examples:
+    avlmaps build REC --out kitchen.avlmap
+    avlmaps build REC --out kitchen.avlmap --profile foundation --model pixels=clip-patches views=clip
+    """
+
+    compiles: ClassVar[bool] = True
+
+    recording: Positional[Path]
+    """Our folder, 7-Scenes/3DMatch, AVLMaps/VLMaps, TUM RGB-D, Replica, ScanNet, a ROS 1 or 2 bag, MCAP."""
+    out: Path
+    """The map's folder, by custom NAME.avlmap."""
+    profile: str = "embedded"
+    """Which models perceive (see `avlmaps profiles`)."""
+    model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
+    """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
+    rules: Literal["ours", "paper"] = "ours"
+    """Rules of mapping: ours, or the paper's with any models (docs/paper-models.md)."""
+    batch: int | None = None
+    """Frames that go through a large model at once. Default: AVLMAPS_BATCH, or as the model likes (1 on a CPU)."""
+    feature_cache: Annotated[str, arg(metavar="auto|off|DIR")] = "auto"
+    """Keep features, so that another build of the same frames encodes nothing again: auto for large models in the
+    user's cache folder, off, or a folder for those of every model."""
+    feature_cache_gb: float = 20.0
+    """Room for them, GB; what was used longest ago goes first."""
+    voxel_size_m: float = 0.05
+    """Edge of a voxel, metres."""
+    format: str = "auto"
+    """Format of the recording, where it cannot be told from its files."""
+    audio: Path | None = None
+    """A sound file to use in place of the recording's own track."""
+    topics: tuple[str, ...] = ()
+    """Topics of a ROS bag that are not to be found by type: rgb=, depth=, pose= or audio=TOPIC."""
+    frame_step: int = 1
+    """Fuse every n-th frame."""
+    max_bad_share: float = 0.05
+    """Stop when more than this share of the frames cannot be read; fewer are left out and told."""
+    max_depth_m: float = 10.0
+    """Ignore depth beyond this, metres."""
+    camera_height_m: Annotated[float | None, arg(aliases=("--floor-height",), metavar="METRES")] = None
+    """Height of the depth camera over the floor in the first frame, metres. Default: found from the frames; give it
+    where `build` reports the floor with a low confidence."""
+    sensor: Literal["auto", "kinect", "realsense", "perfect", "none"] = "auto"
+    """Depth camera: its error decides which depths are used. auto measures it; none uses all, as the paper does."""
+    resume: bool = False
+    """Go on with a stopped build. This is what happens anyway; the flag is for scripts that say so."""
+    fresh: bool = False
+    """Begin anew, whatever a stopped build had finished."""
+    overwrite: bool = False
+    """Replace a finished map at --out that was built from something else."""
+    seed: int = 0
+    """Seed of what is drawn at random (visual words, RANSAC)."""
+
+    def run(self) -> None:
+        """Build the map."""
+        answer = build(self)
+        emit(answer, info_lines(answer), self.json)
+
+
+def build(verb: "Build") -> dict[str, Any]:
+    """Build a map and describe it."""
+    from avlmaps.maps.build import build_map
+    from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings, GravitySettings
+    from avlmaps.query.rules import build_settings
+    from avlmaps.recordings.open import open_recording
+
+    begin = perf_counter()
+    if verb.resume and verb.fresh:
+        raise UsageError("--resume goes on with a stopped build and --fresh begins anew; choose one of them.")
+    if verb.rules == "paper" and verb.sensor not in ("auto", "none"):
+        raise UsageError(
+            f"The paper's rules use every depth as it is; leave out --sensor {verb.sensor} or --rules paper."
+        )
+    used, cache = (
+        _chosen_profile(verb.profile, [word for words in verb.model for word in words]),
+        _cache(verb.feature_cache, verb.feature_cache_gb),
+    )
+    recording = open_recording(verb.recording, format=verb.format, audio=verb.audio, topics=_topics(verb.topics))
+    for notice in recording.notices:
+        say(f"note: {notice}")
+    settings = BuildSettings(
+        voxel_size_m=verb.voxel_size_m,
+        frames=FrameSettings(step=verb.frame_step, max_bad_share=verb.max_bad_share),
+        fusion=FusionSettings(max_depth_m=verb.max_depth_m, sensor=verb.sensor),
+        gravity=GravitySettings(camera_height_m=verb.camera_height_m),
+        seed=verb.seed,
+    )
+    stored = build_map(
+        recording,
+        verb.out,
+        used,
+        build_settings(verb.rules, settings),
+        cache=cache,
+        resume=not verb.fresh,
+        overwrite=verb.overwrite,
+    )
+    return {**described(stored), "elapsed_s": round(perf_counter() - begin, 3)}
+
+
+def _chosen_profile(name: str, words: "Sequence[str]") -> "Profile":
+    """Return the profile with the backends and models that were chosen instead of its own."""
+    from avlmaps.core.registry import Kind
+    from avlmaps.perception.profiles import profile
+
+    perceived = {kind.value: kind for kind in Kind if kind is not Kind.WORDS}
+    choices: dict[Kind, str] = {}
+    for word in words:
+        module, _, backend = word.partition("=")
+        if module not in perceived or not backend.partition("@")[0]:
+            raise UsageError(
+                f"--model takes words like pixels=clip-patches@openai/clip-vit-large-patch14, not {word!r}; the "
+                f"modules are {', '.join(perceived)}."
+            )
+        if perceived[module] in choices:
+            raise UsageError(f"--model names {module} twice; choose one.")
+        choices[perceived[module]] = backend
+    return profile(name).choosing(choices)
+
+
+def _cache(place: str, limit_gb: float) -> "CacheSettings":
+    from avlmaps.perception.cache.feature_store import CacheSettings
+
+    if place in ("auto", "off"):
+        return CacheSettings(place, limit_gb)
+    return CacheSettings(Path(place).expanduser(), limit_gb)
+
+
+def _topics(words: tuple[str, ...]) -> dict[str, str]:
+    for word in words:
+        if not all(word.partition("=")):
+            raise UsageError(f"--topics takes words like rgb=/camera/color/image_raw, not {word!r}.")
+    return dict(word.split("=", 1) for word in words)

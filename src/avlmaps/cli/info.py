@@ -1,0 +1,197 @@
+"""`avlmaps info`: describe a map or a recording, verify it, repair it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tyro.conf import Positional
+
+from avlmaps.cli.output import UsageError, emit, ground_lines, place, size_of
+from avlmaps.cli.verb import Verb
+from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.progress import say
+
+if TYPE_CHECKING:
+    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.recordings.types import Recording
+
+MAP_MANIFEST = "map.json"
+# `info` opens so many pictures of a recording, spread evenly; `info --verify` opens them all.
+DECODED_BY_INFO = 100
+# Further names of a sound are shown from this score on.
+_LIKELY = 0.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Info(Verb):
+    """Tell what is in a recording or a map, and every fault that is found in it."""
+
+    path: Positional[Path]
+    """A recording or a map."""
+    format: str = "auto"
+    """Format of the recording, where it cannot be told from its files."""
+    verify: bool = False
+    """Check every file of a map against its checksum, or every picture of a recording."""
+    repair: bool = False
+    """Check every file of a map, and build the damaged ones again from --recording."""
+    recording: Path | None = None
+    """The recording that the map was built from, for --repair."""
+    audio: Path | None = None
+    """The sound file that the map was built with, if it was given to `build --audio`; for --repair."""
+    plot: Path | None = None
+    """Draw the map from above, with the walk and the sounds, into this picture."""
+
+    def run(self) -> None:
+        """Describe it."""
+        if self.recording is not None and not self.repair:
+            raise UsageError("--recording belongs to --repair.")
+        repaired = repair(self) if self.repair else {}
+        answer = describe_path(self.path, self.format, verify=self.verify, plot=self.plot) | repaired
+        emit(answer, info_lines(answer), self.json)
+
+
+def describe_path(path: Path, format: str, verify: bool, plot: Path | None) -> dict[str, Any]:
+    """Describe a map or a recording."""
+    if (path / MAP_MANIFEST).exists() or path.suffix == ".avlmap":
+        return _describe_map(path, verify, plot)
+    if plot is not None:
+        raise UsageError(f"--plot draws a map, and {path} is a recording; build one first.")
+    from avlmaps.recordings.open import find_format, open_recording
+    from avlmaps.recordings.validate import validate
+
+    find_format(path, format)  # a place that holds no recording has no faults to list
+    faults = [str(fault) for fault in validate(path, format, None if verify else DECODED_BY_INFO)]
+    try:
+        recording = open_recording(path, format=format)
+    except AvlmapsError:
+        for fault in faults:
+            say(f"fault: {fault}")
+        raise
+    return {**_describe_recording(recording), "faults": faults}
+
+
+def repair(verb: "Info") -> dict[str, Any]:
+    """Build the damaged files of a map again and name them."""
+    from avlmaps.maps.repair import repair_map
+    from avlmaps.recordings.open import open_recording
+
+    recording = None
+    if verb.recording is not None:
+        recording = open_recording(verb.recording, format=verb.format, audio=verb.audio)
+    done = repair_map(verb.path, recording)
+    if not done.files:
+        say(f"every file of {verb.path} is whole; there is nothing to repair.")
+    elif done.rebuilt:
+        say(f"note: the whole map was built again: {verb.path} now differs in last bits from what it was.")
+    return {"repaired": list(done.files)}
+
+
+def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]:
+    from avlmaps.maps.store.reader import open_stored
+
+    stored = open_stored(path, verify=verify)
+    told = described(stored)
+    if plot is not None:
+        from avlmaps.query.plots import plot_map
+
+        told["plot"] = str(plot_map(stored, plot))
+    return told
+
+
+def described(stored: "StoredMap") -> dict[str, Any]:
+    """Describe a map, the names of its sounds, and the rules that it was built by."""
+    from avlmaps.maps.store.reader import describe
+    from avlmaps.query.rules import rules_of
+
+    return {**with_sound_names(describe(stored), stored), "rules": rules_of(stored.info.settings)}
+
+
+def with_sound_names(told: dict[str, Any], stored: "StoredMap") -> dict[str, Any]:
+    """Return what is told of a map, each sound with the names that fit it best, where its sound model is here."""
+    from avlmaps.query.avlmap import AVLMap
+
+    if not told["sounds"]:
+        return told
+    try:
+        heard = AVLMap(stored).sounds()
+    except AvlmapsError as error:
+        say(f"note: the sounds have no names here. {error}")
+        return told
+    sounds = [
+        {**sound, "names": list(event.names), "confidences": list(event.confidences)}
+        for sound, event in zip(told["sounds"], heard, strict=True)
+    ]
+    return {**told, "sounds": sounds}
+
+
+def _describe_recording(recording: "Recording") -> dict[str, Any]:
+    rig, audio = recording.rig, recording.audio
+    up = recording.up_in_world
+    return {
+        "path": str(recording.path),
+        "format": recording.format,
+        "frames": len(recording),
+        "duration_s": round(recording.duration_s, 3),
+        "rgb": f"{rig.rgb.width}x{rig.rgb.height}",
+        "depth": f"{rig.depth.width}x{rig.depth.height}",
+        "intrinsics": {
+            name: {"fx": camera.fx, "fy": camera.fy, "cx": camera.cx, "cy": camera.cy}
+            for name, camera in (("rgb", rig.rgb), ("depth", rig.depth))
+        },
+        "up_in_world": None if up is None else [float(value) for value in up],
+        "topics": dict(recording.topics),
+        "audio": None
+        if audio is None
+        else {
+            "file": audio.path.name,
+            "rate_hz": audio.rate_hz,
+            "duration_s": audio.duration_s,
+            "start_s": audio.start_s,
+        },
+        "notices": list(recording.notices),
+        "fingerprint": recording.fingerprint,
+    }
+
+
+def info_lines(answer: dict[str, Any]) -> list[str]:
+    """Lay out what `build` and `info` report; entries without a layout of their own are printed as they are."""
+    lines: list[str] = []
+    for key, value in answer.items():
+        if value in (None, [], {}) and key != "sounds":
+            continue
+        if key in _LAYOUTS:
+            lines += _LAYOUTS[key](value)
+        elif isinstance(value, list) and isinstance(value[0], str):
+            lines += [f"{key}:", *[f"  {line}" for line in value]]
+        else:
+            lines.append(f"{key.replace('_', ' ')}: {f'{value:.6g}' if isinstance(value, float) else value}")
+    return lines
+
+
+def _sound_lines(sounds: list[dict[str, Any]]) -> list[str]:
+    rows = [f"  {s['onset_s']:8.2f} - {s['offset_s']:.2f} s at {place(s['position'])}{_names_of(s)}" for s in sounds]
+    return [f"sounds: {len(sounds)}", *rows]
+
+
+# How the entries of `info` are laid out, where a plain line would not do.
+_LAYOUTS: dict[str, Callable[[Any], list[str]]] = {
+    "sounds": _sound_lines,
+    "topics": lambda topics: ["topics:", *[f"  {use}: {topic}" for use, topic in topics.items()]],
+    "plot": lambda path: [f"wrote {path}"],
+    "ground": ground_lines,
+    "bytes": lambda count: [f"size: {size_of(count)}"],
+    "voxels_removed": lambda removed: [
+        "voxels removed: " + ", ".join(f"{count} {why.replace('_', ' ')}" for why, count in removed.items())
+    ],
+    "level_from_recording": lambda rows: [
+        "level from recording:", *["  " + " ".join(f"{value:7.4f}" for value in row) for row in rows]
+    ],
+}  # fmt: skip
+
+
+def _names_of(sound: dict[str, Any]) -> str:
+    """Lay out the best names of a sound; those that are hardly likely only where there is no better one."""
+    names = list(zip(sound.get("names", []), sound.get("confidences", []), strict=True))
+    shown = [pair for pair in names if pair[1] >= _LIKELY] or names[:1]
+    return ": " + ", ".join(f"{name} {confidence:.2f}" for name, confidence in shown) if shown else ""

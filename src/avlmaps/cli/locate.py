@@ -1,0 +1,78 @@
+"""`avlmaps locate`: find the camera pose of a photo."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from tyro.conf import Positional
+
+from avlmaps.cli.output import UsageError, emit
+from avlmaps.cli.verb import ModelVerb
+from avlmaps.core.progress import say
+
+if TYPE_CHECKING:
+    from avlmaps.core.camera import Pinhole
+
+
+@dataclass(frozen=True, kw_only=True)
+class Locate(ModelVerb):
+    """Tell where a photo was taken: the 6-DoF pose of its camera in the map, or that it was not taken there."""
+
+    compiles: ClassVar[bool] = True
+
+    map: Positional[Path]
+    """The map."""
+    image: Positional[Path]
+    """The photo."""
+    intrinsics: str | None = None
+    """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: the map's own colour camera."""
+
+    def run(self) -> None:
+        """Locate the photo."""
+        answer = locate_photo(self.map, self.image, self.intrinsics)
+        emit(answer, locate_lines(answer), self.json)
+
+
+def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[str, Any]:
+    """Locate a photo."""
+    from avlmaps.core.poses import FRAME
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.modalities.image import read_picture
+
+    rgb = read_picture(picture)
+    given = None if intrinsics is None else camera_of(intrinsics, rgb.shape[1], rgb.shape[0])
+    found = AVLMap.open(map_path).locate(rgb, given)
+    pose, camera = found.world_from_camera, found.camera
+    if pose is not None and given is not None and camera != given:
+        say(f"note: the focal length {given.fx:g} does not fit the photo; {camera.fx:.1f} was used.")
+    return {
+        "world_from_camera": None if pose is None else [[float(value) for value in row] for row in pose],
+        "inliers": int(found.inliers),
+        "reference": found.reference_stamp_s,
+        "frame": FRAME,
+        "score": found.score,
+        "intrinsics": [camera.fx, camera.fy, camera.cx, camera.cy],
+        "elapsed_ms": found.elapsed_ms,
+    }
+
+
+def camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":
+    """Read ``fx,fy,cx,cy`` in pixels for a picture of this size."""
+    from avlmaps.core.camera import Pinhole
+
+    try:
+        fx, fy, cx, cy = (float(word) for word in intrinsics.split(","))
+        return Pinhole(fx, fy, cx, cy, width=width, height=height)
+    except ValueError:
+        raise UsageError(
+            f"--intrinsics takes fx,fy,cx,cy in pixels, such as 525,525,320,240; not {intrinsics!r}."
+        ) from None
+
+
+def locate_lines(answer: dict[str, Any]) -> list[str]:
+    """Lay out what `locate` tells."""
+    pose = answer["world_from_camera"]
+    if pose is None:
+        return [f"not located: {answer['inliers']} points agree, too few to tell a place"]
+    rows = ["  " + " ".join(f"{value:9.4f}" for value in row) for row in pose]
+    return [f"located, {answer['inliers']} points agree; world_from_camera (frame: {answer['frame']}):", *rows]

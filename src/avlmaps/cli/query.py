@@ -1,0 +1,167 @@
+"""`avlmaps query`: ask a map for places."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+from tyro.conf import Positional
+
+from avlmaps.cli.locate import camera_of
+from avlmaps.cli.output import UsageError, emit, place, table_lines
+from avlmaps.cli.verb import ModelVerb
+
+if TYPE_CHECKING:
+    from avlmaps.core.camera import Pinhole
+    from avlmaps.core.question import Part
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.question import Answer
+
+
+@dataclass(frozen=True, kw_only=True)
+class Query(ModelVerb):
+    """Ask a map, in a sentence or part by part; the parts are fused into one heatmap.
+
+    Examples:
+    avlmaps query MAP "the red cabinet near the sound of a dog barking"
+    avlmaps query MAP --object "red cabinet" --sound-clip bark.ogg --plot heat.png
+    """
+
+    compiles: ClassVar[bool] = True
+
+    map: Positional[Path]
+    """The map."""
+    sentence: Positional[str] = ""
+    """What is asked, in words; or leave it out and name the parts."""
+    object: str | None = None
+    """The object."""
+    sound: str | None = None
+    """The sound, in words."""
+    sound_clip: Path | None = None
+    """The sound, as a recording of one like it."""
+    area: str | None = None
+    """The area: a room, a part of the building."""
+    image: Path | None = None
+    """A photo taken there."""
+    intrinsics: str | None = None
+    """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: the map's own colour camera."""
+    primary: Literal["object", "sound", "image", "area"] | None = None
+    """Which part is the goal itself; the others say where it is. Default: the first of object, image, sound, area."""
+    rules: Literal["ours", "paper"] = "ours"
+    """Rules of scores and heat: ours, or the paper's with any models (docs/paper-models.md)."""
+    top: int = 3
+    """How many goals to tell."""
+    plot: Path | None = None
+    """Draw the heat of each part and of the whole, with the goals numbered, into this picture."""
+
+    def run(self) -> None:
+        """Ask."""
+        answer = ask(self)
+        emit(answer, query_lines(answer), self.json)
+
+
+def ask(verb: "Query") -> dict[str, Any]:
+    """Query a map with a sentence or with parts."""
+    from avlmaps.core.question import Modality, Question
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.rules import query_settings
+
+    parts = _parts(verb)
+    only_files = all(part.is_file for part in parts)
+    if (not verb.sentence.strip() and not parts) or (verb.sentence.strip() and not only_files):
+        raise UsageError(
+            "query takes a sentence, or parts (--object, --sound, --sound-clip, --area, --image), and not both: "
+            'avlmaps query MAP "the red cabinet near the sound of a dog"'
+        )
+    if verb.top < 1:
+        raise UsageError(f"--top is {verb.top}; it must be 1 or more.")
+    asked = AVLMap.open(verb.map, query_settings(verb.rules))
+    if verb.sentence.strip():
+        return _asked_in_words(verb, asked)
+    question = Question.of(parts, Modality(verb.primary) if verb.primary else None)
+    camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
+    return _plotted(verb, asked.ask(question, top=verb.top, intrinsics=camera))
+
+
+_MOST_COUNTED, _AS_LIKELY = 200, 0.5  # instances count that score at least half of the best one
+
+
+def _asked_in_words(verb: "Query", asked: "AVLMap") -> dict[str, Any]:
+    """Answer a sentence; several questions in it are alternatives, and the best answer counts."""
+    from avlmaps.core.question import Modality, Question
+    from avlmaps.language.commands import Given
+    from avlmaps.language.intents import Ask
+    from avlmaps.language.questions import read_question
+
+    files = (None if path is None else str(path) for path in (verb.image, verb.sound_clip))
+    sentence = read_question(verb.sentence, Given(*files, knows=lambda _: True))
+    counted = sentence.inquiry.ask is Ask.HOW_MANY
+    answers: list[Answer] = []
+    for question in sentence.questions:
+        if verb.primary:
+            question = Question.of(question.parts, Modality(verb.primary))
+        used = {part.query for part in question.parts}
+        if any(path is not None and str(path) not in used for path in (verb.image, verb.sound_clip)):
+            raise UsageError("The sentence does not speak of the file; say 'this photo' or 'this recording' in it.")
+        camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
+        answers.append(asked.ask(question, top=_MOST_COUNTED if counted else verb.top, intrinsics=camera))
+    answer = max(answers, key=lambda one: (one.found, one.goals[0].score if one.goals else 0.0))
+    told = _plotted(verb, answer)
+    if counted:
+        likely = [goal for goal in answer.goals if goal.score >= _AS_LIKELY * answer.goals[0].score]
+        told = {**told, "goals": told["goals"][: verb.top], "count": len(likely) if answer.found else 0}
+    notes = {"notes": list(sentence.notes)} if sentence.notes else {}
+    return {**told, **notes}
+
+
+def _plotted(verb: "Query", answer: "Answer") -> dict[str, Any]:
+    told = answer.to_json()
+    if verb.plot is not None and answer.heat is not None:
+        told["plot"] = str(answer.heat.plot(verb.plot, top=verb.top))
+    return told
+
+
+def _parts(verb: "Query") -> list["Part"]:
+    from avlmaps.core.question import Modality, Part
+
+    named = (
+        (Modality.OBJECT, verb.object, False),
+        (Modality.IMAGE, verb.image, True),
+        (Modality.SOUND, verb.sound, False),
+        (Modality.SOUND, verb.sound_clip, True),
+        (Modality.AREA, verb.area, False),
+    )
+    return [Part(modality, str(query), is_file=is_file) for modality, query, is_file in named if query is not None]
+
+
+def _first_image(parts: "tuple[Part, ...]") -> Path | None:
+    from avlmaps.core.question import Modality
+
+    return next((Path(part.query) for part in parts if part.modality is Modality.IMAGE), None)
+
+
+def _camera_for(picture: Path | None, intrinsics: str | None) -> "Pinhole | None":
+    """Read ``fx,fy,cx,cy`` for a picture; None stays None."""
+    if intrinsics is None:
+        return None
+    if picture is None:
+        raise UsageError("--intrinsics belongs to a photo (--image); there is none.")
+    from avlmaps.query.modalities.image import read_picture
+
+    height, width = read_picture(picture).shape[:2]
+    return camera_of(intrinsics, width, height)
+
+
+def query_lines(answer: dict[str, Any]) -> list[str]:
+    """Lay out what `query` tells."""
+    asked = ", ".join(f"{part['modality']} {part['query']!r} ({part['role']})" for part in answer["parts"])
+    lines = [f"asked: {asked}"]
+    lines += [f"note: {part['note']}" for part in answer["parts"] if part.get("note")]
+    rows = [
+        (i, place(goal["position"]), f"{goal['score']:.2f}", " x ".join(f"{side:.2f}" for side in goal["size"]))
+        for i, goal in enumerate(answer["goals"], start=1)
+    ]
+    lines += [f"note: {note}" for note in answer.get("notes", [])]
+    lines += [f"count: {answer['count']}"] if "count" in answer else []
+    lines.append("found" if answer["found"] else "not found here" + (": the best guesses are" if rows else ""))
+    lines += table_lines(("", f"place ({answer['frame']} frame)", "score", "size in m"), rows) if rows else []
+    return [*lines, f"wrote {answer['plot']}"] if "plot" in answer else lines

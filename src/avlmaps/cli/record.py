@@ -1,0 +1,135 @@
+"""`avlmaps record`: record a simulated walk."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from tyro.conf import arg
+
+from avlmaps.cli.output import UsageError, emit, place, table_lines
+from avlmaps.cli.verb import Verb
+
+if TYPE_CHECKING:
+    pass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record(Verb):
+    """Drive a simulated robot through a building and record what it sees and hears, with the truth beside it.
+
+    The same scene, settings and seed give the same bytes. Example:
+
+    avlmaps record --scene house:7 --out REC --hearing acoustic
+    """
+
+    compiles: ClassVar[bool] = True
+
+    scene: str
+    """house:SEED or office:SEED, made by rule, or a file: .glb, or Matterport3D's .glb with its _semantic.ply."""
+    out: Path
+    """Where the recording goes (our folder format)."""
+    sounds: Path | None = None
+    """Folder of sound files, as `avlmaps add-sounds` reads it. Default: sounds made by rule."""
+    category: tuple[str, ...] = ()
+    """Only sounds of these categories. Default: all that homes make."""
+    sources: int | None = None
+    """How many sounds are heard. Default: one for every 12 seconds of the walk, as far as there is room."""
+    ambiguous: int = 0
+    """How many kinds of sound are heard in two places."""
+    hearing: Literal["overlay", "acoustic", "none"] = "overlay"
+    """overlay: dry clips, as the paper mixed them; acoustic: distance, walls and reverberation follow the building."""
+    sensor: Literal["clean", "kinect", "realsense"] = "clean"
+    """Whose faults colour and depth have."""
+    drift: bool = False
+    """Let the poses stray as odometry does; true_poses.csv keeps the true ones."""
+    seed: int = 0
+    """Another seed drives another way and hears other sounds."""
+    size: Annotated[str, arg(metavar="WxH")] = "320x240"
+    """Columns and rows of the pictures."""
+    fov_deg: float = 63.0
+    """Horizontal field of view, degrees."""
+    fps: float = 10.0
+    """Frames a second."""
+    max_frames: int | None = None
+    """Keep so many frames of a longer walk, evenly."""
+    semantic: bool = False
+    """Write which object each pixel shows into semantic/ as well (16-bit PNG: instance + 1, 0 for nothing)."""
+    colour: Literal["png", "jpg"] = "png"
+    """File type of the colour pictures; jpg takes a tenth of the space."""
+    workers: int = 0
+    """Processes that draw. Default: as many as there are cores."""
+
+    def run(self) -> None:
+        """Record."""
+        answer = record(self)
+        rows = [
+            (f"{e['onset_s']:.2f}", f"{e['offset_s']:.2f}", e["category"], place(e["source"]), e["object"] or "-")
+            for e in answer["events"]
+        ]
+        lines = table_lines(("onset_s", "offset_s", "category", "sounds at", "made by"), rows) if rows else []
+        said = f"wrote {self.out}: {answer['frames']} frames, {answer['duration_s']:.1f} s"
+        floor = answer["floor"]
+        shares = ", ".join(f"{floor[f'{name}_share']:.0%} {name}" for name in ("reached", "driven", "seen"))
+        lines.append(f"of {floor['walkable_m2']:.1f} m² of walkable floor: {shares}")
+        emit(answer, [*lines, f"{said}, in {answer['elapsed_s']:.1f} s"], self.json)
+
+
+def record(verb: "Record") -> dict[str, Any]:
+    """Record a simulated walk and tell what was heard."""
+    from avlmaps.sim.recorder import RecordSettings, record_scene
+    from avlmaps.sim.scenes import open_scene
+    from avlmaps.sim.sensor_settings import OdometryFaults
+
+    begin = perf_counter()
+    if verb.seed < 0:
+        raise UsageError(f"--seed takes a number of 0 or more, not {verb.seed}.")
+    settings = RecordSettings(
+        size=_size(verb.size),
+        fov_deg=verb.fov_deg,
+        fps=verb.fps,
+        sensor=verb.sensor,
+        hearing=verb.hearing,
+        sounds=verb.sounds,
+        categories=verb.category,
+        sources=verb.sources,
+        ambiguous=verb.ambiguous,
+        drift=OdometryFaults() if verb.drift else None,
+        max_frames=verb.max_frames,
+        semantic=verb.semantic,
+        colour=verb.colour,
+        workers=verb.workers,
+    )
+    scene = open_scene(verb.scene)
+    made = record_scene(scene, verb.out, settings, verb.seed)
+    names = [*(thing.name for thing in scene.objects), None]  # an instance of -1 is no object
+    events = [
+        {
+            "onset_s": round(s.onset_s, 4),
+            "offset_s": round(s.offset_s, 4),
+            "category": s.source.category,
+            "clip": s.source.clip,
+            "position": [round(value, 4) for value in s.robot],
+            "source": [round(value, 4) for value in s.source.position],
+            "object": names[s.source.instance],
+        }
+        for s in made.heard
+    ]
+    return {
+        "recording": str(verb.out),
+        "scene": scene.name,
+        "frames": made.frames,
+        "duration_s": round(made.duration_s, 3),
+        "hearing": verb.hearing,
+        "sounds": len(events),
+        "events": events,
+        "floor": made.floor.to_json(),
+        "elapsed_s": round(perf_counter() - begin, 3),
+    }
+
+
+def _size(words: str) -> tuple[int, int]:
+    width, _, height = words.lower().partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise UsageError(f"--size takes columns and rows such as 320x240, not {words!r}.")
+    return int(width), int(height)
