@@ -25,8 +25,8 @@ from avlmaps.demo.svg import Sheet, wave
 
 if TYPE_CHECKING:
     from avlmaps.demo.evidence import Evidence
+    from avlmaps.demo.outcome import DemoReport, Step
     from avlmaps.demo.questions import PhotoView
-    from avlmaps.demo.run import DemoReport, Step
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.question import Answer
     from avlmaps.recordings.types import Recording
