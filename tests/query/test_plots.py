@@ -123,3 +123,14 @@ def test_a_photo_that_is_only_guessed_is_no_certainty() -> None:
     assert factor.shown.max() <= 0.3
     located.world_from_camera = np.eye(4)
     assert Heatmap.of(image_factor(space, located, part, HeatSettings())).goals(1)[0].score == 1.0  # pyright: ignore
+
+
+def test_names_of_things_are_drawn_over_the_map(tmp_path: Path) -> None:
+    from avlmaps.query.avlmap import AVLMap
+
+    opened = AVLMap(furnished_map())
+    plain = cv2.imread(str(plot_map(opened.stored, tmp_path / "plain.png")))
+    again = cv2.imread(str(plot_map(opened.stored, tmp_path / "again.png")))
+    named = cv2.imread(str(plot_map(opened.stored, tmp_path / "named.png", opened.things(least_confidence=0.0))))
+    assert (plain == again).all()
+    assert 100 < (plain != named).any(axis=2).sum() < 0.05 * plain.shape[0] * plain.shape[1]

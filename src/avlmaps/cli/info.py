@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 MAP_MANIFEST = "map.json"
 # `info` opens so many pictures of a recording, spread evenly; `info --verify` opens them all.
 DECODED_BY_INFO = 100
+# Rooms with a lower confidence are not named in the picture.
+LEAST_ROOM = 0.5
 # Further names of a sound are shown from this score on.
 _LIKELY = 0.1
 
@@ -40,7 +42,7 @@ class Info(Verb):
     audio: Path | None = None
     """The sound file that the map was built with, if it was given to `build --audio`; for --repair."""
     plot: Path | None = None
-    """Draw the map from above, with the walk and the sounds, into this picture."""
+    """Draw the map from above, with the path, the sounds, and the names of things and rooms, into this picture."""
 
     def run(self) -> None:
         """Describe it."""
@@ -93,10 +95,23 @@ def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]
     stored = open_stored(path, verify=verify)
     told = described(stored)
     if plot is not None:
-        from avlmaps.query.plots import plot_map
-
-        told["plot"] = str(plot_map(stored, plot))
+        told["plot"] = str(_plotted(stored, plot))
     return told
+
+
+def _plotted(stored: "StoredMap", plot: Path) -> Path:
+    """Draw a map with the names of its things and rooms, as far as its models are here."""
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.plots import plot_map
+
+    opened, models = AVLMap(stored), stored.info.models
+    things, rooms = [], []
+    try:
+        things = opened.things() if "pixels" in models else []
+        rooms = opened.rooms(LEAST_ROOM) if "views" in models else []
+    except AvlmapsError as error:  # a map can be looked at without the models that made it
+        say(f"note: the picture has no names: {error}")
+    return plot_map(stored, plot, things, rooms)
 
 
 def described(stored: "StoredMap") -> dict[str, Any]:

@@ -21,7 +21,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.contents import Room, Thing
 
+# Names of more things would cover one another.
+MOST_NAMES = 30
 _PAPER = "#f6f5f1"
 INK = "#26292e"
 _PATH = "#2f6fb0"
@@ -72,8 +75,16 @@ def draw_heat(heat: Heatmap, goals: Sequence[Goal]) -> "Figure":
     return figure
 
 
-def plot_map(stored: "StoredMap", path: Path | str) -> Path:
-    """Write a picture of a map from above, with the path walked and the sounds heard.
+def plot_map(
+    stored: "StoredMap", path: Path | str, things: "Sequence[Thing]" = (), rooms: "Sequence[Room]" = ()
+) -> Path:
+    """Write a top-down picture of a map, with the camera's path, the sounds, and the names of things and rooms.
+
+    Args:
+        stored: the map.
+        path: PNG, JPEG, SVG or PDF, by its suffix.
+        things: get their names; of more than ``MOST_NAMES`` those that cover most ground.
+        rooms: get their names, larger.
 
     Raises:
         QueryError: the picture cannot be written there.
@@ -89,10 +100,25 @@ def plot_map(stored: "StoredMap", path: Path | str) -> Path:
         mark(axes[0], track.mean(axis=0), f"{sounds.onset_s[k]:.0f} s", _SOUND)
     if len(sounds):
         axes[0].plot([], [], color=_SOUND, linewidth=5, alpha=0.45, label="where a sound was heard, and when")
+    _draw_names(axes[0], space, things, rooms)
     title = f"{plot_text(Path(stored.path).name)}: {len(space):,} voxels, {len(sounds)} sounds"
     axes[0].set_title(title, fontsize=10, color=INK, loc="left", fontweight="bold")
     finish(figure, axes, with_heat=False)
     return save(figure, Path(path))
+
+
+def _draw_names(ax: "Axes", space: Space, things: "Sequence[Thing]", rooms: "Sequence[Room]") -> None:
+    """Write names where things and rooms are."""
+    from matplotlib.patheffects import withStroke
+
+    halo = [withStroke(linewidth=2.5, foreground="white", alpha=0.85)]
+    style = {"ha": "center", "va": "center", "path_effects": halo, "clip_on": True}
+    for thing in sorted(things, key=lambda one: -one.size[0] * one.size[1])[:MOST_NAMES]:
+        x, y, _ = space.level(np.array(thing.position))
+        ax.text(x, y, plot_text(thing.name), fontsize=6.5, color=INK, zorder=8, **style)
+    for room in rooms:
+        x, y, _ = space.level(np.array(room.position))
+        ax.text(x, y, plot_text(room.name).upper(), fontsize=9, color=_PATH, fontweight="bold", zorder=9, **style)
 
 
 def panels(view: TopDown, count: int) -> "tuple[Figure, list[Axes]]":
