@@ -75,6 +75,7 @@ def test_the_outcome_is_the_contract_of_the_command_line() -> None:
         "notes",
         "path_m",
         "elapsed_s",
+        "frame",
     } == set(answer)
     assert {"skill", "arguments", "result"} <= set(answer["steps"][0])
     assert {"goal", "stop", "distance_m"} <= set(answer["subgoals"][0])

@@ -139,7 +139,7 @@ def go(verb: "Go") -> dict[str, Any]:
         return {
             "plan": translation.plan,
             "program": translation.program, "steps": [], "actions": [], "subgoals": [], "ok": True, "error": None,
-            "notes": list(translation.notes), "path_m": 0.0, "elapsed_s": 0.0,
+            "notes": list(translation.notes), "path_m": 0.0, "elapsed_s": 0.0, "frame": "recording",
         }  # fmt: skip
     from avlmaps.navigate.interrupts import raised_signals
 

@@ -13,6 +13,7 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import LanguageError, ProgramError
 from avlmaps.core.motion import Action
+from avlmaps.core.poses import FRAME
 from avlmaps.language.program import Budget, Step, Trace, parse_program, run_program
 from avlmaps.language.translator import Translation, Translator
 from avlmaps.navigate.driver import Driver
@@ -114,6 +115,7 @@ class Outcome:
             "notes": list(self.notes),
             "path_m": round(self.path_m, 3),
             "elapsed_s": round(self.elapsed_s, 3),
+            "frame": FRAME,
         }
 
 
