@@ -51,11 +51,12 @@ test-foundation: $(TORCH)/.ready  ## Run the tests of the models on torch (in a 
 types-foundation: $(TORCH)/.ready  ## Check the types of the models on torch.
 	$(TORCH)/bin/basedpyright -p requirements/pyright-foundation.json
 
-lint: $(READY)  ## Check style, types and the order of imports.
+lint: $(READY)  ## Check style, types, the order of imports and the words of the prose.
 	$(RUN)/ruff check .
 	$(RUN)/ruff format --check .
 	$(RUN)/basedpyright
 	$(RUN)/lint-imports
+	$(RUN)/python tests/helpers/vocabulary.py
 
 # torch is pinned without a hash, because each platform has its own build of a version.
 $(TORCH)/.ready: requirements/lock.txt requirements/foundation.txt pyproject.toml
