@@ -145,31 +145,31 @@ class Vocabulary(Protocol):
         ...
 
     def move_to_left(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the left side of a thing, as the robot sees it from where it stands, so far from its edge."""
+        """Drive to the left side of a thing, as seen from the robot, that distance from its edge."""
         ...
 
     def move_to_right(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the right side of a thing, as the robot sees it from where it stands, so far from its edge."""
+        """Drive to the right side of a thing, as seen from the robot, that distance from its edge."""
         ...
 
     def move_behind(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive behind a thing, as the robot sees it from where it stands, that distance from its edge."""
+        """Drive behind a thing, as seen from the robot, that distance from its edge."""
         ...
 
     def move_north(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the north (+y) of a thing, so far from its edge."""
+        """Drive to the north (+y) of a thing, that distance from its edge."""
         ...
 
     def move_south(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the south (−y) of a thing, so far from its edge."""
+        """Drive to the south (−y) of a thing, that distance from its edge."""
         ...
 
     def move_east(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the east (+x) of a thing, so far from its edge."""
+        """Drive to the east (+x) of a thing, that distance from its edge."""
         ...
 
     def move_west(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the west (−x) of a thing, so far from its edge."""
+        """Drive to the west (−x) of a thing, that distance from its edge."""
         ...
 
     def face(self, target: Target) -> None:

@@ -167,34 +167,34 @@ class Robot:
         self._go("move_in_between", both, both.place)
 
     def move_to_left(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the left side of a thing, as the robot sees it from where it stands, so far from its edge."""
+        """Drive to the left side of a thing, as seen from the robot, that distance from its edge."""
         thing = self.seeker.meant(target, self._here)
         self._go_beside("move_to_left", thing, to_the_left(self._towards(thing)), distance_m)
 
     def move_to_right(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the right side of a thing, as the robot sees it from where it stands, so far from its edge."""
+        """Drive to the right side of a thing, as seen from the robot, that distance from its edge."""
         thing = self.seeker.meant(target, self._here)
         self._go_beside("move_to_right", thing, -to_the_left(self._towards(thing)), distance_m)
 
     def move_behind(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive behind a thing, as the robot sees it from where it stands, that distance from its edge."""
+        """Drive behind a thing, as seen from the robot, that distance from its edge."""
         thing = self.seeker.meant(target, self._here)
         self._go_beside("move_behind", thing, self._towards(thing), distance_m)
 
     def move_north(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the north (+y) of a thing, so far from its edge."""
+        """Drive to the north (+y) of a thing, that distance from its edge."""
         self._go_beside("move_north", self.seeker.meant(target, self._here), _NORTH, distance_m)
 
     def move_south(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the south (−y) of a thing, so far from its edge."""
+        """Drive to the south (−y) of a thing, that distance from its edge."""
         self._go_beside("move_south", self.seeker.meant(target, self._here), -_NORTH, distance_m)
 
     def move_east(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the east (+x) of a thing, so far from its edge."""
+        """Drive to the east (+x) of a thing, that distance from its edge."""
         self._go_beside("move_east", self.seeker.meant(target, self._here), _EAST, distance_m)
 
     def move_west(self, target: Target, distance_m: float = 0.5) -> None:
-        """Drive to the west (−x) of a thing, so far from its edge."""
+        """Drive to the west (−x) of a thing, that distance from its edge."""
         self._go_beside("move_west", self.seeker.meant(target, self._here), -_EAST, distance_m)
 
     def face(self, target: Target) -> None:

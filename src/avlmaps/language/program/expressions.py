@@ -238,10 +238,10 @@ def _comprehension(line: int) -> ProgramError:
 
 def _attribute(line: int, asked: Token) -> ProgramError:
     if asked.text in ("append", "extend", "insert"):
-        return refused(line, f"`.{asked.text}` cannot be asked of a value; write `name = name + [element]`")
+        return refused(line, f"`.{asked.text}` does not work on a value; write `name = name + [element]`")
     written = asked.text if asked.form is Form.NAME else "..."
     return refused(
         line,
-        f"`.{written}` cannot be asked of a value; the only dot is that of `{ROBOT}.SKILL(...)`, and a Place is added, "
+        f"`.{written}` does not work on a value; the only dot is that of `{ROBOT}.SKILL(...)`, and a Place is added, "
         "subtracted and scaled whole",
     )

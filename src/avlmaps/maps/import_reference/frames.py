@@ -104,7 +104,7 @@ def read_walk(scene: SceneFiles, needs_first_pose: bool) -> Walk:
     first = listed if len(listed) else body
     if needs_first_pose and not len(first):
         raise MapError(
-            f"{scene.voxels} does not tell where its grid lies in the world: that is the first pose of the scene's "
+            f"{scene.voxels} does not say where its grid lies in the world: that is the first pose of the scene's "
             f"poses.txt, and neither that nor {AREAS} is in {scene.folder}; give it with --poses FILE."
         )
     world_from_camera, notice = camera_poses(body, given)

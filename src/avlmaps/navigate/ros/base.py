@@ -68,7 +68,7 @@ class RosDriver(ABC):
             clock: seconds, by which poses age and the loop's own stalls are measured; replaced in tests.
 
         Raises:
-            NavigationError: there is no bridge, or the robot does not tell where it is.
+            NavigationError: there is no bridge, or the robot does not report its pose.
             BackendError: roslibpy is not installed.
         """
         self.frames = frames or Frames()

@@ -46,7 +46,7 @@ class Contact:
             clock: seconds, by which the age of a pose is measured; replaced in tests.
 
         Raises:
-            NavigationError: there is no bridge, or the robot does not tell where it is.
+            NavigationError: there is no bridge, or the robot does not report its pose.
             BackendError: roslibpy is not installed.
         """
         self.frames, self.settings = frames, settings
@@ -57,7 +57,7 @@ class Contact:
         if self.pose_within(settings.pose_timeout_s) is None:
             self.link.close()
             raise NavigationError(
-                f"The robot at {self.link.url} does not tell where it is: {self.unseen(closed=True)}; start its "
+                f"The robot at {self.link.url} does not report its pose: {self.unseen(closed=True)}; start its "
                 "localisation, give it its initial pose, and name its frames as docs/robots.md shows."
             )
 
