@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from avlmaps.maps.grid import GridSpec
-from avlmaps.query.heatmap import anchor_heat, object_heat
+from avlmaps.query.factors import anchor_heat, object_heat
 from avlmaps.query.kernels import feature_scores, margins, share
 from avlmaps.query.modalities.object import Rivals
 from avlmaps.query.voxel_space import Space

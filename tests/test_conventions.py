@@ -12,10 +12,9 @@ from avlmaps.core.poses import MAX_ROTATION_FAULT
 from avlmaps.maps.fusion.measure_kernels import GREATEST_EXPONENT
 from avlmaps.maps.fusion.settings import PAPERS_VARIANCE_M2
 from avlmaps.perception.profiles import profile
+from avlmaps.query.factors import FOUND_AT, ROUNDING, HeatSettings
 from avlmaps.query.goals import LEAST_TOGETHER
-from avlmaps.query.heatmap import ROUNDING, HeatSettings
 from avlmaps.query.modalities.object import ObjectSettings
-from avlmaps.query.question import FOUND_AT
 from avlmaps.recordings.layout import Description
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs" / "conventions.md").read_text(encoding="utf-8")

@@ -16,9 +16,9 @@ from avlmaps.demo import run_demo
 from avlmaps.demo.drive import Drive, command_for
 from avlmaps.demo.evidence import Box, Evidence
 from avlmaps.demo.home import choose_home, fits
-from avlmaps.demo.outcome import REACH_M, DemoReport, Step
+from avlmaps.demo.outcome import DemoReport, Step
 from avlmaps.demo.pictures import colour_of, envelope, from_above
-from avlmaps.demo.questions import FURNITURE, RARE, SMALL, SPOKEN, PhotoView, choose_questions
+from avlmaps.demo.questions import FURNITURE, RARE, REACH_M, SMALL, SPOKEN, PhotoView, choose_questions
 from avlmaps.demo.run import DemoSettings, record_settings
 from avlmaps.demo.svg import Sheet
 from avlmaps.language.rules import command_to_program

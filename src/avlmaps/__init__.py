@@ -26,14 +26,16 @@ if TYPE_CHECKING:
     from avlmaps.navigate.bodies import BodyShape
     from avlmaps.navigate.skills import Robot
     from avlmaps.perception.profiles import Profile, profile
+    from avlmaps.query.answer import Answer
     from avlmaps.query.avlmap import AVLMap, QuerySettings
     from avlmaps.query.contents import Room, SoundEvent, Thing
-    from avlmaps.query.heatmap import Heatmap, HeatSettings
+    from avlmaps.query.factors import HeatSettings
+    from avlmaps.query.goals import Goal
+    from avlmaps.query.heatmap import Heatmap
     from avlmaps.query.locate import Located
     from avlmaps.query.modalities.area import AreaSettings
     from avlmaps.query.modalities.object import ObjectSettings
     from avlmaps.query.modalities.sound import SoundSettings
-    from avlmaps.query.question import Answer, Goal
     from avlmaps.recordings.audio import Sound
     from avlmaps.recordings.open import open_recording
     from avlmaps.recordings.types import Frame, Recording
@@ -44,7 +46,7 @@ if TYPE_CHECKING:
 # Where each public name lives.
 _HOMES = {
     "AVLMap": "avlmaps.query.avlmap",
-    "Answer": "avlmaps.query.question",
+    "Answer": "avlmaps.query.answer",
     "AreaSettings": "avlmaps.query.modalities.area",
     "AudioError": "avlmaps.core.errors",
     "AvlmapsError": "avlmaps.core.errors",
@@ -54,8 +56,8 @@ _HOMES = {
     "Frame": "avlmaps.recordings.types",
     "FrameSettings": "avlmaps.maps.settings",
     "FusionSettings": "avlmaps.maps.settings",
-    "Goal": "avlmaps.query.question",
-    "HeatSettings": "avlmaps.query.heatmap",
+    "Goal": "avlmaps.query.goals",
+    "HeatSettings": "avlmaps.query.factors",
     "Heatmap": "avlmaps.query.heatmap",
     "LanguageError": "avlmaps.core.errors",
     "Located": "avlmaps.query.locate",

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from avlmaps.bench.objects import auroc, measure, table_of
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
-from avlmaps.query.goals import find_goals
-from avlmaps.query.heatmap import Heatmap, NearThings
+from avlmaps.query.factors import NearThings
+from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.voxel_space import Space
 from avlmaps.sim.scene import SceneObject
 
@@ -83,7 +83,7 @@ def test_names_that_count_as_one_are_asked_as_one() -> None:
 
 
 def test_the_first_goal_of_a_map_lies_in_the_surest_instance() -> None:
-    goals = find_goals(AskedMap({"chair": [(0, 0.6), (1, 0.9)]}).object("chair"), 2)
+    goals = AskedMap({"chair": [(0, 0.6), (1, 0.9)]}).object("chair").goals(2)
     assert [round(goal.position[0]) for goal in goals] == [2, 0]
 
 

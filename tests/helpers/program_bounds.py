@@ -147,6 +147,7 @@ def main(count: int, seed: int) -> dict[str, Any]:
 
     from avlmaps.core.errors import ProgramError
     from avlmaps.language.program import parse_program, run_program
+    from avlmaps.language.program.text import program_text
     from helpers.recording_robot import RecordingRobot
 
     random, told, worst_s, worst = Random(seed), Counter[str](), 0.0, ""
@@ -159,7 +160,7 @@ def main(count: int, seed: int) -> dict[str, Any]:
         began = process_time()
         try:
             program = parse_program(text)
-            program.to_text()
+            program_text(program)
             trace = run_program(program, RecordingRobot())
             json.dumps(trace.to_json(), allow_nan=False)
             trace.lines()

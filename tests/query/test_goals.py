@@ -7,7 +7,8 @@ from query_fakes import UP, furnished_map, keyframes_at, sounds_of
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap, QuerySettings
-from avlmaps.query.heatmap import Heatmap, NearAnchors
+from avlmaps.query.factors import NearAnchors
+from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.area import AreaSettings, modes
 from avlmaps.query.voxel_space import Space
 

@@ -6,7 +6,8 @@ from hypothesis.extra import numpy as hnp
 
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
-from avlmaps.query.heatmap import Heatmap, HeatSettings, NearAnchors, anchor_heat, fused, normalised, object_heat
+from avlmaps.query.factors import HeatSettings, NearAnchors, anchor_heat, normalised, object_heat
+from avlmaps.query.heatmap import Heatmap, fused
 from avlmaps.query.voxel_space import Space
 
 SIZE_M = 0.05

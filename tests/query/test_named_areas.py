@@ -11,7 +11,7 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedViewEncoder
-from avlmaps.query.heatmap import HeatSettings
+from avlmaps.query.factors import HeatSettings
 from avlmaps.query.modalities.area import AreaSettings, area_factor, area_scores, pooled
 from avlmaps.query.voxel_space import Space
 

@@ -10,7 +10,8 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
 from avlmaps.query.colour_filter import tint_of
-from avlmaps.query.heatmap import Heatmap, HeatSettings, NearAnchors
+from avlmaps.query.factors import HeatSettings, NearAnchors
+from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.object import Asked, ObjectSettings, Rivals, object_factor
 from avlmaps.query.voxel_space import Space
 

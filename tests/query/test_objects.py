@@ -8,7 +8,7 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
-from avlmaps.query.heatmap import HeatSettings
+from avlmaps.query.factors import HeatSettings
 from avlmaps.query.kernels import feature_scores, linked
 from avlmaps.query.modalities.object import ObjectSettings, Rivals, instance_confidence, object_factor, object_margins
 from avlmaps.query.voxel_space import Space

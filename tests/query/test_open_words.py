@@ -9,9 +9,9 @@ from query_fakes import UP, box
 from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
-from avlmaps.query.heatmap import HeatSettings
-from avlmaps.query.modalities.object import ObjectSettings, Rivals, instance_confidence, object_factor
-from avlmaps.query.synonyms import fitting, is_a, is_open
+from avlmaps.query.factors import HeatSettings
+from avlmaps.query.modalities.object import ObjectSettings, Rivals, fitting, instance_confidence, object_factor
+from avlmaps.query.synonyms import is_a, is_open
 from avlmaps.query.voxel_space import Space
 
 WORDS = ("chair", "office chair", "dining table", "sofa", "bed", "lamp", "door", "floor", "other", "couch", "table")

@@ -13,7 +13,8 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.heatmap import Heatmap, HeatSettings, NearThings
+from avlmaps.query.factors import HeatSettings, NearThings
+from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.image import image_factor
 from avlmaps.query.plots import HEAT_LABEL, plot_map
 from avlmaps.query.topdown import TopDown

@@ -13,8 +13,8 @@ from avlmaps.cli.verb import ModelVerb
 if TYPE_CHECKING:
     from avlmaps.core.camera import Pinhole
     from avlmaps.core.question import Part
+    from avlmaps.query.answer import Answer
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.question import Answer
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,8 +10,7 @@ import numpy as np
 
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.motion import GroundPose
-from avlmaps.demo.outcome import REACH_M
-from avlmaps.demo.questions import MAP, Ask
+from avlmaps.demo.questions import MAP, REACH_M, Ask
 from avlmaps.demo.svg import Sheet
 
 if TYPE_CHECKING:

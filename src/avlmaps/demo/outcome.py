@@ -2,15 +2,10 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from avlmaps.demo.questions import MAP, Ask
-
-if TYPE_CHECKING:
-    from avlmaps.demo.drive import Drive
-
-# A first goal within this distance of a true place, horizontally, is right (the paper's success radius).
-REACH_M = 1.0
+from avlmaps.demo.drive import Drive
+from avlmaps.demo.questions import MAP, REACH_M, Ask
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +78,7 @@ class DemoReport:
     built: dict[str, Any]
     located: tuple[float, float] | None
     seconds: dict[str, float] = field(default_factory=dict)
-    drive: "Drive | None" = None
+    drive: Drive | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return it as `avlmaps demo --json` prints it."""

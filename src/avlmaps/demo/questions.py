@@ -40,6 +40,8 @@ _RULES = ((FURNITURE, NEAR_M, MARGIN_M), (FURNITURE, 3.5, 0.8), (SMALL, NEAR_M, 
 APART_M = 1.0
 LEAST_PHOTO_SHARE = 0.02
 CLIP, PHOTO, MAP = "another_recording.wav", "photo.png", "home.avlmap"
+# A first goal within this distance of a true place, horizontally, is right (the paper's success radius).
+REACH_M = 1.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from avlmaps.demo.evidence import Evidence
     from avlmaps.demo.outcome import DemoReport, Step
     from avlmaps.demo.questions import PhotoView
+    from avlmaps.query.answer import Answer
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.question import Answer
     from avlmaps.recordings.types import Recording
     from avlmaps.sim.scene import Scene
 

@@ -21,8 +21,8 @@ from avlmaps.demo.questions import CLIP, MAP, PHOTO, Ask
 if TYPE_CHECKING:
     from avlmaps.demo.evidence import Evidence
     from avlmaps.demo.questions import PhotoView
+    from avlmaps.query.answer import Answer
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.question import Answer
     from avlmaps.recordings.types import Recording
     from avlmaps.sim.recorder import RecordSettings
     from avlmaps.sim.scene import Scene

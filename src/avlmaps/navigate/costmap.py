@@ -149,10 +149,9 @@ def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE) -> Obstacles:
 
 
 def _voxels_called(avlmap: "AVLMap", word: str) -> Bool[np.ndarray, " n"]:
-    from avlmaps.query.goals import lead_of
-    from avlmaps.query.heatmap import NearThings
+    from avlmaps.query.factors import NearThings
 
-    things = lead_of(avlmap.object(word))
+    things = avlmap.object(word).lead
     return things.mask if isinstance(things, NearThings) else np.zeros(len(avlmap.space), bool)
 
 

@@ -8,9 +8,9 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import GoalNotFoundError
 from avlmaps.navigate.footprint import Outline
-from avlmaps.query.goals import lead_of
-from avlmaps.query.heatmap import Factor, Heatmap, NearThings
-from avlmaps.query.question import Goal
+from avlmaps.query.factors import Factor, NearThings
+from avlmaps.query.goals import Goal
+from avlmaps.query.heatmap import Heatmap
 
 # From this on an instance is more likely what was asked for than not.
 SURE = 0.5
@@ -38,14 +38,14 @@ class Thing:
 
 def named(heat: Heatmap) -> str:
     """Return what a heatmap asks for in words: ``'chair' near 'glass breaking'``."""
-    lead = lead_of(heat)
+    lead = heat.lead
     others = [f"{factor.part.query!r}" for factor in heat.factors if factor is not lead]
     return f"{lead.part.query!r}" + (f" near {' and '.join(others)}" if others else "")
 
 
 def tells_one(heat: Heatmap) -> bool:
     """Tell whether a heatmap says which one is meant, rather than only what it is called."""
-    return len(heat.factors) > 1 or not isinstance(lead_of(heat), NearThings)
+    return len(heat.factors) > 1 or not isinstance(heat.lead, NearThings)
 
 
 def things_in(heat: Heatmap, guess: bool = False) -> list[Thing]:
@@ -63,13 +63,13 @@ def things_in(heat: Heatmap, guess: bool = False) -> list[Thing]:
     for tried in tries:
         goals = tried.goals(_MOST_GOALS)
         if goals:
-            return [_thing(tried, lead_of(tried), goal) for goal in goals]
+            return [_thing(tried, tried.lead, goal) for goal in goals]
     raise GoalNotFoundError(why_not(heat, guess))
 
 
 def _guesses(heat: Heatmap) -> Iterator[Heatmap]:
     """Yield what may be meant by a heatmap, the surest first."""
-    lead = Heatmap.of(lead_of(heat))
+    lead = Heatmap.of(heat.lead)
     yield heat
     yield heat.with_unsure()
     if len(heat.factors) > 1:

@@ -14,7 +14,9 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import PixelEncoder
-from avlmaps.query.heatmap import Factor, Heatmap, HeatSettings, NearAnchors, fused
+from avlmaps.query.answer import Answer, PartAnswer
+from avlmaps.query.factors import Factor, HeatSettings, NearAnchors
+from avlmaps.query.heatmap import Heatmap, fused
 from avlmaps.query.modalities.area import AreaSettings, area_factor
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
 from avlmaps.query.modalities.object import Asked, ObjectSettings, Pieces, Rivals, object_factor, object_pieces
@@ -25,7 +27,6 @@ from avlmaps.query.modalities.sound import (
     sound_factor,
     sound_features,
 )
-from avlmaps.query.question import Answer, PartAnswer
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import Sound
 
@@ -131,19 +132,19 @@ class AVLMap:
         """Return the things of the map, most confident first; see ``contents.find_things``."""
         from avlmaps.query.contents import find_things
 
-        return find_things(self, names, least_confidence, structure)
+        return find_things(self.stored, self.space, self.pieces, names, least_confidence, structure)
 
     def sounds(self, most_names: int = 3) -> list["SoundEvent"]:
         """Return the sounds of the map in the order of their onset; see ``contents.find_sounds``."""
         from avlmaps.query.contents import find_sounds
 
-        return find_sounds(self, most_names)
+        return find_sounds(self.stored, most_names)
 
     def rooms(self, least_confidence: float = 0.0) -> list["Room"]:
         """Return the rooms of the map, those with most views first; see ``contents.find_rooms``."""
         from avlmaps.query.contents import find_rooms
 
-        return find_rooms(self, least_confidence)
+        return find_rooms(self.stored, self.space, self.settings.areas, least_confidence)
 
     @property
     def points(self) -> Float[np.ndarray, "n 3"]:

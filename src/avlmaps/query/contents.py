@@ -4,7 +4,7 @@ A thing is a connected group of voxels that a word of the vocabulary wins (``mod
 claim the same voxels ("chair", "office chair"); the most confident claim stands, and what overlaps it is left out.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,12 +15,13 @@ from jaxtyping import Float, Int, UInt8
 from avlmaps.core.errors import QueryError
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedViewEncoder
-from avlmaps.query.modalities.area import AREA_NAMES, area_distribution, modes
+from avlmaps.query.modalities.area import AREA_NAMES, AreaSettings, area_distribution, modes
 from avlmaps.query.modalities.object import Pieces
 from avlmaps.query.modalities.sound import sound_features
+from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
-    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.maps.store.reader import StoredMap
 
 # Surfaces that make up a building; they are everywhere, and listed only on request.
 STRUCTURE = ("wall", "floor", "ceiling", "column", "stairs", "railing")
@@ -127,12 +128,19 @@ class Room:
 
 
 def find_things(
-    asked: "AVLMap", names: Sequence[str] | None = None, least_confidence: float = 0.5, structure: bool = False
+    stored: "StoredMap",
+    space: Space,
+    pieces_of: Callable[[str], Pieces],
+    names: Sequence[str] | None = None,
+    least_confidence: float = 0.5,
+    structure: bool = False,
 ) -> list[Thing]:
     """Return the things of a map, most confident first.
 
     Args:
-        asked: the map.
+        stored: the map.
+        space: its voxels' places.
+        pieces_of: returns the voxels and instances of a word (``AVLMap.pieces``).
         names: what to list; by default the pixel encoder's vocabulary.
         least_confidence: things below it are left out, in [0, 1].
         structure: list walls, floors and the like as well.
@@ -143,17 +151,17 @@ def find_things(
     """
     if not 0.0 <= least_confidence <= 1.0:
         raise QueryError(f"The least confidence is {least_confidence:g}; it must lie between 0 and 1.")
-    vocabulary = asked.stored.profile.pixel_encoder().vocabulary if names is None else names
+    vocabulary = stored.profile.pixel_encoder().vocabulary if names is None else names
     wanted = [name for name in vocabulary if structure or name not in STRUCTURE]
-    claims = [claim for name in wanted for claim in _claims(name, asked.pieces(name), least_confidence)]
+    claims = [claim for name in wanted for claim in _claims(name, pieces_of(name), least_confidence)]
     claims.sort(key=lambda claim: (-claim[1], -len(claim[2]), claim[0]))
-    owned = np.zeros(len(asked.space), bool)
+    owned = np.zeros(len(space), bool)
     things: list[Thing] = []
     for name, confidence, rows in claims:
         if owned[rows].mean() >= _SAME_SHARE:
             continue
         owned[rows] = True
-        things.append(_thing(asked, name, confidence, rows))
+        things.append(_thing(stored, space, name, confidence, rows))
     return things
 
 
@@ -165,25 +173,25 @@ def _claims(name: str, pieces: Pieces, least: float) -> Iterator[tuple[str, floa
         yield name, float(pieces.confidence[number]), rows[order[bounds[number] : bounds[number + 1]]]
 
 
-def _thing(asked: "AVLMap", name: str, confidence: float, rows: Int[np.ndarray, " m"]) -> Thing:
-    points = asked.space.centres[rows]
-    extent = np.ptp(asked.space.level(points), axis=0) + asked.space.grid.voxel_size_m
-    colors: UInt8[np.ndarray, "m 3"] = np.asarray(asked.stored.voxels.rgb)[rows]
+def _thing(stored: "StoredMap", space: Space, name: str, confidence: float, rows: Int[np.ndarray, " m"]) -> Thing:
+    points = space.centres[rows]
+    extent = np.ptp(space.level(points), axis=0) + space.grid.voxel_size_m
+    colors: UInt8[np.ndarray, "m 3"] = np.asarray(stored.voxels.rgb)[rows]
     r, g, b = (int(value) for value in colors.mean(axis=0).round())
     return Thing(name, round(confidence, 3), _middle(points), _triple(extent), (r, g, b), rows, points)
 
 
-def find_sounds(asked: "AVLMap", most_names: int = 3) -> list[SoundEvent]:
+def find_sounds(stored: "StoredMap", most_names: int = 3) -> list[SoundEvent]:
     """Return the sounds of a map in the order of their onset, each with its likeliest names.
 
     Args:
-        asked: the map.
+        stored: the map.
         most_names: names for each sound.
 
     Raises:
         MapError: the map was built with another sound encoder than is installed.
     """
-    stored, heard = asked.stored, asked.stored.sounds
+    heard = stored.sounds
     if not len(heard):
         return []
     stored.require_model(Kind.SOUNDS)
@@ -208,19 +216,20 @@ def find_sounds(asked: "AVLMap", most_names: int = 3) -> list[SoundEvent]:
     return events
 
 
-def find_rooms(asked: "AVLMap", least_confidence: float = 0.0) -> list[Room]:
+def find_rooms(stored: "StoredMap", space: Space, settings: AreaSettings, least_confidence: float = 0.0) -> list[Room]:
     """Return the rooms of a map, those with most views first.
 
     A room is a group of keyframes with the same likeliest name, whose views' places lie close to one another.
 
     Args:
-        asked: the map.
+        stored: the map.
+        space: its voxels' places.
+        settings: how views are scored and grouped.
         least_confidence: rooms below it are left out, in [0, 1].
 
     Raises:
         BackendError: the map's profile has no view encoder.
     """
-    stored, settings = asked.stored, asked.settings.areas
     if not len(stored.keyframes):
         return []
     encoder = stored.profile.view_encoder()
@@ -233,7 +242,7 @@ def find_rooms(asked: "AVLMap", least_confidence: float = 0.0) -> list[Room]:
     for number in np.unique(likeliest):
         of_name = np.flatnonzero(likeliest == number)
         confidence = share[of_name, number]
-        group = modes(asked.space.level(places[of_name])[:, :2], confidence, settings.link_m)
+        group = modes(space.level(places[of_name])[:, :2], confidence, settings.link_m)
         for k in range(int(group.max(initial=-1)) + 1):
             members = of_name[group == k]
             mean = float(share[members, number].mean())

@@ -4,14 +4,14 @@ The lead factor is the primary one. Its instances divide the heated voxels among
 to the instance that its lead heat comes from. A goal is the highest place of the product in an instance's share.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Float32, Int
 
-from avlmaps.core.question import Role
-from avlmaps.query.heatmap import Factor, Heatmap, NearThings
-from avlmaps.query.question import FOUND_AT, Goal
+from avlmaps.query.factors import FOUND_AT, Factor, NearThings, lead_of
 
 # Where everything asked for is in the map, but nowhere together by at least this much heat, the whole is not found.
 LEAST_TOGETHER = 0.1
@@ -19,6 +19,33 @@ LEAST_TOGETHER = 0.1
 SEPARATION_M = 1.0
 # Heat that differs by less is a plateau, whose middle is taken.
 _SAME = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """One distinct place that answers a question.
+
+    Attributes:
+        position: metres, world: on the object where one is asked for, else where the sound was heard or the camera was.
+        score: in [0, 1]: the heat there times the confidence that the primary thing is what was asked for.
+        size: extent of the instance along the axes of the level frame (x and y horizontal, z up), metres. For an
+            object its voxels' box; for a sound or an area the box of the places it was heard or seen from.
+        parts: heat of each modality there; a second part of a modality is called ``object_2`` and so on.
+    """
+
+    position: tuple[float, float, float]
+    score: float
+    size: tuple[float, float, float]
+    parts: dict[str, float]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the goal as the command line prints it."""
+        return {
+            "position": list(self.position),
+            "score": self.score,
+            "size": list(self.size),
+            "parts": dict(self.parts),
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,47 +67,40 @@ class _Shares:
     peak: Float[np.ndarray, " i"]
 
 
-def lead_of(heat: Heatmap) -> Factor:
-    """Return the factor whose instances are the goals: the primary one, else the first object, else the first."""
-    factors = heat.factors
-    primary = next((f for f in factors if f.part.role is Role.PRIMARY), None)
-    return primary or next((f for f in factors if isinstance(f, NearThings)), factors[0])
-
-
-def _shares(heat: Heatmap, lead: Factor) -> _Shares:
-    if isinstance(lead, NearThings) and len(heat.factors) == 1:
+def _shares(factors: Sequence[Factor], values: Float32[np.ndarray, " n"], lead: Factor) -> _Shares:
+    if isinstance(lead, NearThings) and len(factors) == 1:
         rows = np.flatnonzero(lead.mask)
         instance = lead.instance
     else:
-        rows = np.flatnonzero(heat.values > 0.0) if len(lead.anchors) else np.zeros(0, np.int64)
+        rows = np.flatnonzero(values > 0.0) if len(lead.anchors) else np.zeros(0, np.int64)
         instance = lead.instance[lead.anchor_of(rows)] if len(rows) else np.zeros(0, np.int64)
-    points, values = heat.space.centres[rows], heat.values[rows].astype(np.float64)
+    points, heat = lead.space.centres[rows], values[rows].astype(np.float64)
     if lead.flat:
         at_anchors = np.ones(len(lead.anchors))
-        for factor in heat.factors:
+        for factor in factors:
             at_anchors *= factor.at(lead.anchors)
         points = np.concatenate([points, lead.anchors])
-        values, instance = np.append(values, at_anchors), np.append(instance, lead.instance)
+        heat, instance = np.append(heat, at_anchors), np.append(instance, lead.instance)
     peak = np.zeros(len(lead.confidence))
-    np.maximum.at(peak, instance, values)
-    return _Shares(points, len(rows), values, instance, peak)
+    np.maximum.at(peak, instance, heat)
+    return _Shares(points, len(rows), heat, instance, peak)
 
 
-def is_found(heat: Heatmap) -> bool:
-    """Tell whether all that was asked for is in the map and comes together around a likely instance of the lead."""
-    if not all(factor.found for factor in heat.factors):
+def is_found(factors: Sequence[Factor], values: Float32[np.ndarray, " n"]) -> bool:
+    """Return whether all that was queried is in the map and comes together around a likely instance of the lead."""
+    if not all(factor.found for factor in factors):
         return False
-    if len(heat.factors) == 1:
+    if len(factors) == 1:
         return True
-    lead = lead_of(heat)
+    lead = lead_of(factors)
     likely = np.asarray(lead.confidence) >= FOUND_AT
-    return bool((_shares(heat, lead).peak[likely] >= LEAST_TOGETHER).any())
+    return bool((_shares(factors, values, lead).peak[likely] >= LEAST_TOGETHER).any())
 
 
-def find_goals(heat: Heatmap, top: int) -> list[Goal]:
+def find_goals(factors: Sequence[Factor], values: Float32[np.ndarray, " n"], top: int) -> list[Goal]:
     """Return up to ``top`` goals, best first, by heat times the confidence of the lead's instance."""
-    lead = lead_of(heat)
-    shares = _shares(heat, lead)
+    lead = lead_of(factors)
+    shares = _shares(factors, values, lead)
     goals: list[Goal] = []
     taken: list[np.ndarray] = []
     score = np.round(shares.peak * lead.confidence, 3)  # more digits would be noise; of equals the larger leads
@@ -88,35 +108,37 @@ def find_goals(heat: Heatmap, top: int) -> list[Goal]:
     for instance in np.lexsort((-extent, -score)):
         if len(goals) >= top or score[instance] <= 0.0:
             break
-        position = _position(heat, lead, shares, int(instance))
-        ground = heat.space.level(position)[:2]
+        position = _position(factors, lead, shares, int(instance))
+        ground = lead.space.level(position)[:2]
         if lead.flat and any(np.hypot(*(ground - other)) < SEPARATION_M for other in taken):
             continue
         taken.append(ground)
-        goals.append(_goal(heat, lead, int(instance), position, float(score[instance])))
+        goals.append(_goal(factors, lead, int(instance), position, float(score[instance])))
     return goals
 
 
-def _position(heat: Heatmap, lead: Factor, shares: _Shares, instance: int) -> Float[np.ndarray, "3"]:
+def _position(factors: Sequence[Factor], lead: Factor, shares: _Shares, instance: int) -> Float[np.ndarray, "3"]:
     """Return the highest place of a share; the middle one of a plateau, and an anchor rather than a voxel."""
     rows = np.flatnonzero((shares.instance == instance) & (shares.heat >= shares.peak[instance] - _SAME))
     at_anchors = rows[rows >= shares.voxels]
     plateau = shares.points[at_anchors if len(at_anchors) else rows]
     middle = plateau[np.argmin(np.linalg.norm(plateau - plateau.mean(axis=0), axis=1))]
-    if len(at_anchors) or not all(factor.flat for factor in heat.factors):
+    if len(at_anchors) or not all(factor.flat for factor in factors):
         return middle
     # A column: every height is as hot, so the place is put where the anchor was.
-    anchors = heat.space.level(lead.anchors[lead.instance == instance])
-    place = heat.space.level(middle)
+    anchors = lead.space.level(lead.anchors[lead.instance == instance])
+    place = lead.space.level(middle)
     place[2] = anchors[np.argmin(np.linalg.norm(anchors[:, :2] - place[:2], axis=1)), 2]
-    return heat.space.world(place)
+    return lead.space.world(place)
 
 
-def _goal(heat: Heatmap, lead: Factor, instance: int, position: Float[np.ndarray, "3"], score: float) -> Goal:
-    extent = np.ptp(heat.space.level(lead.anchors[lead.instance == instance]), axis=0)
-    size = extent if lead.flat else extent + heat.space.grid.voxel_size_m
+def _goal(
+    factors: Sequence[Factor], lead: Factor, instance: int, position: Float[np.ndarray, "3"], score: float
+) -> Goal:
+    extent = np.ptp(lead.space.level(lead.anchors[lead.instance == instance]), axis=0)
+    size = extent if lead.flat else extent + lead.space.grid.voxel_size_m
     parts: dict[str, float] = {}
-    for factor in heat.factors:
+    for factor in factors:
         name = str(factor.part.modality)
         again = sum(key.split("_")[0] == name for key in parts)
         parts[f"{name}_{again + 1}" if again else name] = float(factor.at(position[None])[0])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from avlmaps.query.heatmap import NearThings
+from avlmaps.query.factors import NearThings
 
 _SPECK_M2 = 0.0199  # a guess shows at least as much surface as a mug
 

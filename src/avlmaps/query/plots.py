@@ -11,8 +11,8 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import plot_text
 from avlmaps.core.question import Modality
-from avlmaps.query.heatmap import Factor, Heatmap, NearAnchors
-from avlmaps.query.question import FOUND_AT, Goal
+from avlmaps.query.factors import FOUND_AT, Factor, NearAnchors
+from avlmaps.query.goals import Goal
 from avlmaps.query.topdown import TopDown, walked
 from avlmaps.query.voxel_space import Space
 
@@ -36,41 +36,36 @@ _DPI = 130
 _ALONG = 0.999999  # cosine: over 20 m such an axis is off by less than 3 cm
 
 
-def plot_heat(heat: Heatmap, path: Path, goals: Sequence[Goal]) -> Path:
-    """Write a picture of a heatmap: a panel for each factor, and one for their product.
+def draw_heat(
+    factors: Sequence[Factor], shown: Float32[np.ndarray, " n"], found: bool, goals: Sequence[Goal]
+) -> "Figure":
+    """Draw a heatmap: a panel for each factor, and one for their product.
 
     The colour of a place is its heat times the confidence that the thing there is what was queried, as a goal's
     score is; what was not found stays dark.
 
     Args:
-        heat: the heat.
-        path: PNG, JPEG, SVG or PDF, by its suffix.
+        factors: one or more, of one map.
+        shown: the product's heat times the confidence, in [0, 1].
+        found: whether all parts are in the map and come together.
         goals: numbered in the last panel, best first.
-
-    Raises:
-        QueryError: the picture cannot be written there.
     """
-    return save(draw_heat(heat, goals), path)
-
-
-def draw_heat(heat: Heatmap, goals: Sequence[Goal]) -> "Figure":
-    """Draw a heatmap as ``plot_heat`` does, for a notebook."""
-    view = TopDown.of(heat.space)
-    count = len(heat.factors) + (len(heat.factors) > 1)
+    space = factors[0].space
+    view = TopDown.of(space)
+    count = len(factors) + (len(factors) > 1)
     figure, axes = panels(view, count)
-    for factor, ax in zip(heat.factors, axes, strict=False):
-        draw_ground(ax, view, heat.space)
+    for factor, ax in zip(factors, axes, strict=False):
+        draw_ground(ax, view, space)
         _draw_heat(ax, view, factor.shown)
         _draw_anchors(ax, factor)
         note = "" if factor.found else f" · not found, at most {factor.shown.max(initial=0.0):.2f}"
         ax.set_title(f"{plot_text(_asked(factor))} ({factor.part.role}){note}", fontsize=10, color=INK, loc="left")
     if count > 1:
-        draw_ground(axes[-1], view, heat.space)
-        shown = heat.shown
+        draw_ground(axes[-1], view, space)
         _draw_heat(axes[-1], view, shown)
-        title = f"all together · peak {shown.max(initial=0.0):.2f}" + ("" if heat.found else " · not found")
+        title = f"all together · peak {shown.max(initial=0.0):.2f}" + ("" if found else " · not found")
         axes[-1].set_title(title, fontsize=10, color=INK, loc="left", fontweight="bold")
-    _draw_goals(axes[-1], heat.space, goals)
+    _draw_goals(axes[-1], space, goals)
     finish(figure, axes, with_heat=True)
     return figure
 

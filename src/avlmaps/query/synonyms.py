@@ -5,14 +5,8 @@ a sofa would win half of its voxels. Words which name the wanted thing, or a kin
 lists them.
 """
 
-from dataclasses import replace
-from typing import TYPE_CHECKING
-
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, ScaledEncoder
-
-if TYPE_CHECKING:
-    from avlmaps.query.modalities.object import ObjectSettings
 
 
 def is_a(other: str, wanted: str) -> bool:
@@ -34,10 +28,3 @@ def is_a(other: str, wanted: str) -> bool:
 def is_open(encoder: PixelEncoder) -> bool:
     """Return whether an encoder takes any word and tells by how much its cosines count."""
     return isinstance(encoder, ScaledEncoder) and not isinstance(encoder, NamedPixelEncoder)
-
-
-def fitting(settings: "ObjectSettings", encoder: PixelEncoder) -> "ObjectSettings":
-    """Return the settings with the margin that an encoder is sure at, in its own cosines."""
-    if isinstance(encoder, ScaledEncoder) and is_open(encoder):
-        return replace(settings, margin_yes=settings.margin_yes_logits / encoder.logit_scale)
-    return settings

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from avlmaps.core.question import Part
-from avlmaps.query.heatmap import Factor, NearAnchors, NearThings
+from avlmaps.query.factors import Factor, NearAnchors, NearThings
 from avlmaps.query.voxel_space import Space
 from avlmaps.sim.scene import Area
 

@@ -275,12 +275,6 @@ class Program:
     statements: tuple[Statement, ...]
     text: str = field(compare=False, repr=False)
 
-    def to_text(self) -> str:
-        """Return the program written out again, in one way of writing: it parses to an equal program."""
-        from avlmaps.language.program.text import program_text
-
-        return program_text(self)
-
     @property
     def skills(self) -> tuple[str, ...]:
         """The skills that the program calls, each once, in the order of its text."""

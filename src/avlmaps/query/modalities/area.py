@@ -11,8 +11,7 @@ from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Part
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.protocols import NamedViewEncoder, ScaledEncoder, ViewEncoder
-from avlmaps.query.heatmap import HeatSettings, NearAnchors, normalised
-from avlmaps.query.question import FOUND_AT
+from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, normalised
 from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.voxel_space import Space
 

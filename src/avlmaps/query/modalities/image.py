@@ -9,7 +9,7 @@ from jaxtyping import UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Part
-from avlmaps.query.heatmap import HeatSettings, NearAnchors
+from avlmaps.query.factors import HeatSettings, NearAnchors
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:

@@ -14,12 +14,11 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Part
 from avlmaps.core.spelling import squeezed
-from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
+from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, ScaledEncoder
 from avlmaps.query.colour_filter import Tint, is_tinted, tint_of, tinted_share
-from avlmaps.query.heatmap import HeatSettings, NearThings
+from avlmaps.query.factors import FOUND_AT, HeatSettings, NearThings
 from avlmaps.query.instance_merging import joined_pieces, likeliest, without_specks
-from avlmaps.query.question import FOUND_AT
-from avlmaps.query.synonyms import fitting, is_a, is_open
+from avlmaps.query.synonyms import is_a, is_open
 from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.voxel_space import Space
 
@@ -403,3 +402,10 @@ def _absence(word: str, voxels: int, won: int, best: float) -> str:
         return f"no voxel is closer to {word!r} than to other things"
     best_of = f"the best of the {won} voxels closest to {word!r} make an instance of confidence"
     return f"{best_of} {best:.2f}, below {FOUND_AT:.2f}"
+
+
+def fitting(settings: ObjectSettings, encoder: PixelEncoder) -> ObjectSettings:
+    """Return the settings with the margin that an encoder is sure at, in its own cosines."""
+    if isinstance(encoder, ScaledEncoder) and is_open(encoder):
+        return replace(settings, margin_yes=settings.margin_yes_logits / encoder.logit_scale)
+    return settings

@@ -11,8 +11,7 @@ from jaxtyping import Float, Float32
 from avlmaps.core.errors import AudioError, QueryError
 from avlmaps.core.question import Part
 from avlmaps.maps.types import HeardSounds
-from avlmaps.query.heatmap import HeatSettings, NearAnchors, normalised
-from avlmaps.query.question import FOUND_AT
+from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, normalised
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import Sound
 

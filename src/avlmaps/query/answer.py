@@ -1,43 +1,12 @@
-"""What a query returns: goals, and what became of each part; with their JSON (a contract of the command line)."""
+"""What a query returns: goals, and the outcome of each part; with their JSON (a contract of the command line)."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from avlmaps.core.poses import FRAME
 from avlmaps.core.question import Part
-
-if TYPE_CHECKING:
-    from avlmaps.query.heatmap import Heatmap
-
-# What has this confidence or more is found: an instance, a sound, a view, the place of a photo.
-FOUND_AT = 0.5
-
-
-@dataclass(frozen=True, slots=True)
-class Goal:
-    """One distinct place that answers a question.
-
-    Attributes:
-        position: metres, world: on the object where one is asked for, else where the sound was heard or the camera was.
-        score: in [0, 1]: the heat there times the confidence that the primary thing is what was asked for.
-        size: extent of the instance along the axes of the level frame (x and y horizontal, z up), metres. For an
-            object its voxels' box; for a sound or an area the box of the places it was heard or seen from.
-        parts: heat of each modality there; a second part of a modality is called ``object_2`` and so on.
-    """
-
-    position: tuple[float, float, float]
-    score: float
-    size: tuple[float, float, float]
-    parts: dict[str, float]
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the goal as the command line prints it."""
-        return {
-            "position": list(self.position),
-            "score": self.score,
-            "size": list(self.size),
-            "parts": dict(self.parts),
-        }
+from avlmaps.query.goals import Goal
+from avlmaps.query.heatmap import Heatmap
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +56,7 @@ class Answer:
     found: bool
     parts: tuple[PartAnswer, ...]
     elapsed_ms: float
-    heat: "Heatmap | None" = field(default=None, repr=False, compare=False)
+    heat: Heatmap | None = field(default=None, repr=False, compare=False)
 
     def to_json(self) -> dict[str, Any]:
         """Return the answer with exactly the keys of the contract; positions are in the frame that ``frame`` names."""

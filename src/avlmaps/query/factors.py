@@ -1,0 +1,302 @@
+"""The heat of one thing that was queried, at every occupied voxel: the paper's equations, evaluated exactly.
+
+There are two kinds of factors: ``NearThings`` (objects: falls with the 3D distance to the nearest voxel) and
+``NearAnchors`` (images, areas, sounds: cones around scored places, falling with the horizontal distance).
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int
+
+from avlmaps.core.question import Part, Role
+from avlmaps.query.voxel_space import Space
+
+# What has this confidence or more is found: an instance, a sound, a view, the place of a photo.
+FOUND_AT = 0.5
+# Scores are products of float32 vectors of unit length. Their last digits depend on the order of summation, which
+# depends on the processor and on how many vectors are multiplied at once; a difference below this means nothing.
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class HeatSettings:
+    """How fast heat falls with distance (the paper's 0.1 and 0.01 a voxel of 5 cm)."""
+
+    primary_falloff_per_m: float = 2.0
+    """For what is sought: reaches 0.5 m."""
+    context_falloff_per_m: float = 0.2
+    """For what says where it is: reaches 5 m."""
+
+    def falloff_per_m(self, role: Role) -> float:
+        """Return ε for a role."""
+        return self.primary_falloff_per_m if role is Role.PRIMARY else self.context_falloff_per_m
+
+
+class Factor(ABC):
+    """The heat of one thing that was asked for.
+
+    Attributes:
+        space: the map's voxels.
+        part: what was asked.
+        falloff_per_m: ε.
+        anchors: (a, 3) places that the heat falls from, metres, world.
+        instance: (a,) number of the distinct thing that each anchor belongs to.
+        confidence: (instances,) in [0, 1]: how sure it is that each is what was asked for; 0.5 and more is yes.
+        found: whether the map holds what was asked for.
+        understood: what the encoder could act on.
+        note: one sentence on why it was not found, or ``""``.
+        flat: whether the heat is the same all the way up and down.
+    """
+
+    space: Space
+    part: Part
+    falloff_per_m: float
+    anchors: Float[np.ndarray, "a 3"]
+    instance: Int[np.ndarray, " a"]
+    confidence: Float[np.ndarray, " i"]
+    found: bool
+    understood: str
+    note: str
+    flat: bool
+
+    @property
+    @abstractmethod
+    def values(self) -> Float32[np.ndarray, " n"]:
+        """Heat in [0, 1] of every voxel."""
+
+    @abstractmethod
+    def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
+        """Return the heat at any points."""
+
+    def in_company(self) -> "Factor":
+        """Return this factor as it counts in a product with others."""
+        return self
+
+    def at_any_rate(self) -> "Factor":
+        """Return this factor with all that may be meant, however unsure."""
+        return self
+
+    @cached_property
+    def shown(self) -> Float32[np.ndarray, " n"]:
+        """Heat times the confidence of the instance that it comes from, in [0, 1]: what pictures show."""
+        return self.weighted(self.values)
+
+    def weighted(self, heat: Float32[np.ndarray, " n"]) -> Float32[np.ndarray, " n"]:
+        """Return heat times the confidence of the instance of this factor that each voxel belongs to."""
+        shown = np.zeros_like(heat)
+        hot = np.flatnonzero((heat > 0.0) & (self.values > 0.0))
+        if len(hot):
+            shown[hot] = heat[hot] * self.confidence[self.instance[self.anchor_of(hot)]]
+        return shown
+
+    @abstractmethod
+    def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+        """Return the anchor that each of these voxels has its heat from; they must have some."""
+
+
+@dataclass(frozen=True, eq=False)
+class NearThings(Factor):
+    """Heat of an object: max(1 − ε·d, 0), d the 3D distance to the nearest of its voxels.
+
+    Attributes:
+        mask: which voxels are the object; the anchors are their middles, in the same order.
+        with_unsure: makes the same with the instances, too, that are too unsure to count where nothing else is asked:
+            what they are near tells whether one of them is meant. None where there are no others.
+    """
+
+    space: Space
+    part: Part
+    falloff_per_m: float
+    mask: Bool[np.ndarray, " n"]
+    instance: Int[np.ndarray, " a"]
+    confidence: Float[np.ndarray, " i"]
+    found: bool
+    understood: str = ""
+    note: str = ""
+    with_unsure: "Callable[[], NearThings] | None" = None
+    flat: bool = field(default=False, init=False)
+
+    def in_company(self) -> "NearThings":
+        """Return what is sought with its unsure instances; what it is near stays what is sure."""
+        return self._with_unsure if self.part.role is Role.PRIMARY else self
+
+    def at_any_rate(self) -> "NearThings":
+        """Return the same with its unsure instances."""
+        return self._with_unsure
+
+    @cached_property
+    def _with_unsure(self) -> "NearThings":
+        return self.with_unsure() if self.with_unsure is not None else self
+
+    @cached_property
+    def anchors(self) -> Float[np.ndarray, "a 3"]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The middles of the object's voxels."""
+        return self.space.centres[self.mask]
+
+    @cached_property
+    def _heat(self) -> Float32[np.ndarray, " n"]:
+        return object_heat(self.space, self.mask, self.falloff_per_m)
+
+    @property
+    def values(self) -> Float32[np.ndarray, " n"]:
+        """Heat of every voxel."""
+        return self._heat
+
+    @cached_property
+    def _tree(self):
+        from scipy.spatial import KDTree
+
+        return KDTree(self.anchors, balanced_tree=False, compact_nodes=False)
+
+    def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
+        """Return the heat at any points."""
+        if not len(self.anchors):
+            return np.zeros(len(points_world))
+        distance = self._tree.query(points_world)[0]
+        return np.maximum(1.0 - self.falloff_per_m * distance, 0.0)
+
+    def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+        """Return the nearest voxel of the object."""
+        bound = 1.0 / self.falloff_per_m + self.space.grid.voxel_size_m
+        return np.asarray(self._tree.query(self.space.centres[voxels], distance_upper_bound=bound)[1])
+
+
+@dataclass(frozen=True, eq=False)
+class NearAnchors(Factor):
+    """Heat of an image, an area or a sound: max over anchors of s − ε·d_xy, floored at 0.
+
+    Attributes:
+        scores: (a,) in [0, 1], one for each anchor.
+        certainty: the confidence of every instance: 1 where the scores are calibrated already.
+    """
+
+    space: Space
+    part: Part
+    falloff_per_m: float
+    anchors: Float[np.ndarray, "a 3"]
+    scores: Float[np.ndarray, " a"]
+    instance: Int[np.ndarray, " a"]
+    found: bool
+    understood: str = ""
+    note: str = ""
+    certainty: float = 1.0
+    flat: bool = field(default=True, init=False)
+
+    def __post_init__(self) -> None:
+        if len(self.anchors) != len(self.scores) or len(self.anchors) != len(self.instance):
+            raise ValueError(f"{len(self.anchors)} anchors, {len(self.scores)} scores, {len(self.instance)} instances")
+        if len(self.scores) and not (np.min(self.scores) >= 0.0 and np.max(self.scores) <= 1.0):
+            raise ValueError("an anchor's score is outside [0, 1] or NaN")
+        if not 0.0 <= self.certainty <= 1.0:
+            raise ValueError(f"certainty is {self.certainty}; it must lie in [0, 1]")
+
+    @cached_property
+    def confidence(self) -> Float[np.ndarray, " i"]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The certainty, for each instance."""
+        return np.full(int(self.instance.max(initial=-1)) + 1, self.certainty)
+
+    @cached_property
+    def _heat_and_winner(self) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+        return anchor_heat(self.space, self.anchors, self.scores, self.falloff_per_m)
+
+    @property
+    def values(self) -> Float32[np.ndarray, " n"]:
+        """Heat of every voxel."""
+        return self._heat_and_winner[0]
+
+    def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
+        """Return the heat at any points."""
+        heat = np.zeros(len(points_world))
+        points, anchors = self.space.level(points_world)[:, :2], self.space.level(self.anchors)[:, :2]
+        for anchor, score in zip(anchors, self.scores, strict=True):
+            np.maximum(heat, score - self.falloff_per_m * np.hypot(*(points - anchor).T), out=heat)
+        return heat
+
+    def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+        """Return the anchor whose cone is highest there."""
+        return self._heat_and_winner[1][voxels]
+
+
+def lead_of(factors: Sequence[Factor]) -> Factor:
+    """Return the factor whose instances are the goals: the primary one, else the first object, else the first."""
+    primary = next((factor for factor in factors if factor.part.role is Role.PRIMARY), None)
+    return primary or next((factor for factor in factors if isinstance(factor, NearThings)), factors[0])
+
+
+def normalised(scores: Float[np.ndarray, " a"]) -> Float[np.ndarray, " a"]:
+    """Stretch scores to [0, 1] as the paper does, lowest to 0 and highest to 1.
+
+    Where all are equal within rounding (or there is one only) no anchor is better than another, and all become 1;
+    that of nothing is nothing. Only order survives: use it for scores that are not calibrated.
+
+    Raises:
+        ValueError: a score is NaN or infinite.
+    """
+    if not np.isfinite(scores).all():
+        raise ValueError("a score is NaN or infinite")
+    low, high = np.min(scores, initial=np.inf), np.max(scores, initial=-np.inf)
+    if high - low <= ROUNDING * max(1.0, abs(low), abs(high)):
+        return np.ones(len(scores))
+    return np.clip((scores - low) / (high - low), 0.0, 1.0)
+
+
+def object_heat(space: Space, mask: Bool[np.ndarray, " n"], falloff_per_m: float) -> Float32[np.ndarray, " n"]:
+    """Return max(1 − ε·d, 0) for every voxel, d the 3D distance in metres to the nearest voxel of the mask.
+
+    Works on squared distances between voxel indices, which are whole numbers, so nothing is approximated.
+    """
+    from avlmaps.query.kernels import nearest_squared, share
+
+    voxel_size_m = space.grid.voxel_size_m
+    blocks = space.blocks
+    things = blocks.chosen(mask)
+    reach = min(1.0 / (falloff_per_m * voxel_size_m), 40_000.0)
+    limit = np.int32(int(np.ceil(reach)) ** 2)
+    squared = np.full(len(space), limit, np.int32)
+    if len(things):
+        share(
+            lambda a, b: nearest_squared(
+                blocks.index, blocks.starts, blocks.low, blocks.high,
+                things.index, things.starts, things.low, things.high, limit, squared, a, b,
+            ),
+            len(blocks),
+            least=64,
+        )  # fmt: skip
+    heat = np.empty(len(space), np.float32)
+    near = 1.0 - falloff_per_m * voxel_size_m * np.sqrt(squared, dtype=np.float32)
+    heat[blocks.order] = np.where(squared < limit, np.maximum(near, 0.0), 0.0)
+    return heat
+
+
+def anchor_heat(
+    space: Space, anchors: Float[np.ndarray, "a 3"], scores: Float[np.ndarray, " a"], falloff_per_m: float
+) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+    """Return max over anchors of s − ε·d_xy, floored at 0, for every voxel, and which anchor was highest (−1: none).
+
+    Cones that lie under another everywhere are left out first; that changes nothing.
+    """
+    from avlmaps.query.kernels import cone_heat, share, undominated
+
+    order = np.argsort(-np.asarray(scores, np.float64), kind="stable")
+    ground = np.ascontiguousarray(space.level(np.asarray(anchors, np.float64).reshape(-1, 3))[:, :2])[order]
+    sorted_scores = np.asarray(scores, np.float64)[order]
+    keep = undominated(ground, sorted_scores, float(falloff_per_m))
+    ground, sorted_scores = ground[keep], sorted_scores[keep]
+    heat, winner = np.zeros(len(space), np.float64), np.full(len(space), -1, np.int64)
+    blocks = space.blocks
+    if len(ground):
+        share(
+            lambda a, b: cone_heat(
+                space.horizontal, blocks.starts, ground, sorted_scores, float(falloff_per_m), heat, winner, a, b
+            ),
+            len(blocks),
+            least=64,
+        )
+    values, anchor = np.empty(len(space), np.float32), np.empty(len(space), np.int64)
+    values[blocks.order] = heat
+    anchor[blocks.order] = np.where(winner >= 0, np.append(order[keep], -1)[winner], -1)
+    return values, anchor
