@@ -64,7 +64,7 @@ def test_every_verb_is_among_them() -> None:
 def test_a_command_line_that_cannot_be_read_says_what_is_wrong(run) -> None:
     for words, told in (
         (("query", "MAP", "--tpo", "3"), "Unrecognized options: --tpo, 3"),
-        (("query",), "Missing from avlmaps query: PATH The map. (required)"),
+        (("query",), "Missing from avlmaps query: MAP Map folder (NAME.avlmap). (required)"),
         (("build", "x", "--out", "y", "--voxel-size-m", "abc"), "could not convert string to float: 'abc'"),
         (("nonsense",), "nonsense"),
     ):

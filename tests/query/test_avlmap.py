@@ -59,7 +59,7 @@ def test_asking_gives_what_multiplying_gives(heard: AVLMap) -> None:
 def test_any_part_can_be_the_primary_one() -> None:
     roles = [part.role for part in Question.of([CHAIR, DOG], Modality.SOUND).parts]
     assert roles == [Role.CONTEXT, Role.PRIMARY]
-    with pytest.raises(QueryError, match=r"^The primary part is to be a image, but none is asked for"):
+    with pytest.raises(QueryError, match=r"^The primary part is to be a image, but the query has none"):
         Question.of([CHAIR, DOG], Modality.IMAGE)
 
 
@@ -70,7 +70,7 @@ def test_a_question_without_parts_is_refused() -> None:
 
 @pytest.mark.parametrize("way", ["object", "sound", "area"])
 def test_an_empty_phrase_is_refused(heard: AVLMap, way: str) -> None:
-    with pytest.raises(QueryError, match=rf"^The {way} asked for is empty; name one, such as '"):
+    with pytest.raises(QueryError, match=rf"^The {way} in the query is empty; name one: '"):
         getattr(heard, way)("  ")
 
 
@@ -227,7 +227,9 @@ def test_a_models_mismatch_is_told_before_anything_is_compared() -> None:
 
 
 def test_a_phrase_that_is_a_whole_text_is_refused() -> None:
-    with pytest.raises(QueryError, match=r"^The sound asked for has 10000 characters, more than 500; name it in a few"):
+    with pytest.raises(
+        QueryError, match=r"^The sound in the query has 10000 characters, more than 500; name it in a few"
+    ):
         Part(Modality.SOUND, "x" * 10000)
     assert Part(Modality.IMAGE, "x" * 600 + ".png", is_file=True).is_file
 

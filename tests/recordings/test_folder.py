@@ -97,7 +97,7 @@ def test_a_recording_that_was_cut_short_is_refused_and_can_be_written_again(tmp_
     with pytest.raises(RuntimeError), RecordingWriter(tmp_path / "walk", rig()) as writer:
         writer.add(_frame(0, 0.0))
         raise RuntimeError("the robot fell over")
-    sentence = f"{tmp_path / 'walk'} was never finished: whatever wrote it stopped before its end; record it again."
+    sentence = f"{tmp_path / 'walk'} was never finished: its writer stopped before the end; record it again."
     with pytest.raises(RecordingError, match=re.escape(sentence)):
         open_recording(tmp_path / "walk")
     with RecordingWriter(tmp_path / "walk", rig()) as writer:
@@ -426,7 +426,7 @@ def test_a_recording_whose_writer_was_killed_is_refused(tmp_path: Path):
     here = str(Path(__file__).parent)
     done = subprocess.run([sys.executable, "-c", program, here, str(tmp_path / "walk")], check=False)
     assert done.returncode == -9
-    with pytest.raises(RecordingError, match="walk was never finished: whatever wrote it stopped before its end"):
+    with pytest.raises(RecordingError, match="walk was never finished: its writer stopped before the end"):
         open_recording(tmp_path / "walk")
     (fault,) = validate(tmp_path / "walk")
     assert fault.fatal and fault.file == tmp_path / "walk/UNFINISHED"

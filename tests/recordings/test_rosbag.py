@@ -266,7 +266,7 @@ def test_topics_can_be_named_when_any_recording_is_opened(tmp_path: Path) -> Non
 def test_a_named_topic_of_the_wrong_kind_is_refused(tmp_path: Path) -> None:
     path = write_bag(tmp_path, "ros2")
     with pytest.raises(
-        RecordingError, match="is of the type sensor_msgs/msg/Image, which tells no poses; name a topic"
+        RecordingError, match="is of the type sensor_msgs/msg/Image, which holds no poses; name a topic"
     ):
         open_rosbag(path, {"pose": "/camera/color/image_raw"})
     with pytest.raises(RecordingError, match=r"has no sound topic '/ear' \(it has: none\); name one of them\.$"):

@@ -15,38 +15,37 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class AddSounds(Verb):
-    """Put recorded sounds into the track of a recording; events.csv tells where and when.
+    """Put recorded sounds into the track of a recording; events.csv lists where and when.
 
-    Without options: as many sounds as the walk has room for, no two of them heard within 2 m of one another, as
-    the paper did. In a place too small for three sounds by that rule the 2 m are counted along the walk, and where
-    whole clips leave room for fewer than four, they are cut short (to 2 s at least); notes on standard error tell.
-    The same seed gives the same track. Example:
+    By default the track gets as many sounds as fit, no two of them within 2 m of one another, as in the paper. If a
+    place is too small for three sounds by that rule, the 2 m count along the walk. If whole clips leave room for fewer
+    than four sounds, they are cut short, to 2 s at least. Notes on standard error report both. The same seed gives the
+    same track.
 
-    avlmaps add-sounds REC --clips sounds/ --category "dog bark" sneezing --out REC2
+    Example: avlmaps add-sounds REC --clips sounds/ --category "dog bark" sneezing --out REC2
     """
 
-    recording: Positional[Path]
-    """A recording in any format that `avlmaps build` reads."""
-    clips: Path
+    recording: Annotated[Positional[Path], arg(metavar="REC")]
+    """Recording in any format that `avlmaps build` reads."""
+    clips: Annotated[Path, arg(metavar="DIR")]
     """Folder of sound files: one subfolder a category, or an index.csv with the columns path and category."""
-    out: Path
-    """Where the new recording goes (our folder format)."""
-    category: tuple[str, ...] = ()
-    """Only clips of these categories. Default: all of them."""
-    seed: int = 0
-    """Which clips go where."""
-    interval_s: Annotated[float, arg(name="interval", metavar="S")] = 2.0
+    out: Annotated[Path, arg(metavar="REC")]
+    """Recording folder to write (our format)."""
+    category: Annotated[tuple[str, ...], arg(metavar="NAME ...")] = ()
+    """Use clips of these categories only. Default: all."""
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Seed of the choice of clips and places."""
+    interval_s: Annotated[float, arg(name="interval", metavar="SECONDS")] = 2.0
     """Least silence between two sounds, seconds."""
-    min_distance_m: float = 2.0
-    """Least distance between the places where two sounds are heard, metres; 0 allows any."""
-    loudness_db: float = -20.0
+    min_distance_m: Annotated[float, arg(metavar="METRES")] = 2.0
+    """Least distance between the places where two sounds play, metres; 0 allows any."""
+    loudness_db: Annotated[float, arg(metavar="DB")] = -20.0
     """Loudness of each sound, dB relative to full scale (less for a clip whose peaks would be cut off)."""
-    background: str | None = None
+    background: Annotated[str | None, arg(metavar="NOISE")] = None
     """Background noise: white, pink, room, or a sound file."""
-    snr_db: float | None = None
-    """How much louder every sound is than the background, dB (20 if there is a background; white noise if only this
-    is given)."""
-    format: str = "auto"
+    snr_db: Annotated[float | None, arg(metavar="DB")] = None
+    """Signal-to-noise ratio of each sound, dB. Default: 20 with --background. Alone it adds white noise."""
+    format: Annotated[str, arg(metavar="FORMAT")] = "auto"
     """Format of the recording."""
 
     def run(self) -> None:
@@ -70,6 +69,6 @@ class AddSounds(Verb):
         answer = {"recording": str(self.out), "sounds": len(events), "events": [e.to_json() for e in events]}
         emit(
             answer,
-            [*table_lines(("onset_s", "offset_s", "category", "heard at"), rows), f"wrote {self.out}"],
+            [*table_lines(("onset_s", "offset_s", "category", "robot at"), rows), f"wrote {self.out}"],
             self.json,
         )

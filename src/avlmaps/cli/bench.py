@@ -29,17 +29,17 @@ class Indexing:
     """Rules of mapping and querying: ours, or the paper's throughout (docs/paper-models.md)."""
     sound_clips: Literal["unheard", "all"] = "unheard"
     """Clips of --sounds: those that the embedded sound encoder was not trained on, or all."""
-    frames: int = 600
-    """Limit of frames a scene."""
-    tasks_a_scene: int = 20
-    """Limit of tasks a scene and table (indexing)."""
+    frames: Annotated[int, arg(metavar="N")] = 600
+    """Maximum number of frames per scene."""
+    tasks_a_scene: Annotated[int, arg(metavar="N")] = 20
+    """Maximum number of tasks per scene and table (indexing)."""
     size: Literal["paper", "all"] = "paper"
-    """Tasks a table, over all scenes (indexing): as many as the paper has (100, 119, 159), or all that there are."""
-    jobs: int = 0
-    """Scenes side by side. Default: one a core."""
-    tasks: Path | None = None
-    """Ask the tasks (or run the missions) of this file instead of new ones."""
-    save_tasks: Path | None = None
+    """Tasks per table, over all scenes (indexing): as many as the paper has (100, 119, 159), or all."""
+    jobs: Annotated[int, arg(metavar="N")] = 0
+    """Number of scenes in parallel. Default: one for each core."""
+    tasks: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Use the tasks (or missions) of this file instead of new ones."""
+    save_tasks: Annotated[Path | None, arg(metavar="FILE")] = None
     """Write the tasks (or missions) and their truth into this file."""
 
 
@@ -47,7 +47,7 @@ class Indexing:
 class Navigation:
     """Commands of the suite navigation."""
 
-    sequences: int = 200
+    sequences: Annotated[int, arg(metavar="N")] = 200
     """Sequences of four sounds (at each range), and of an image and two objects; pairs are 119 for each 200."""
     series: tuple[Series, ...] = ()
     """Experiments to run. Default: all."""
@@ -77,26 +77,26 @@ class Bench(ModelVerb):
 
     suite: Positional[Suite]
     """Suite to run."""
-    sounds: Path | None = None
+    sounds: Annotated[Path | None, arg(metavar="DIR")] = None
     """Folder of sound clips with an index.csv (path, category, fold)."""
-    clips: Path | None = None
-    """Folder of clips with an index.csv: asks for each by name, dry and in simulated rooms (sounds)."""
-    scenes: tuple[str, ...] = ()
+    clips: Annotated[Path | None, arg(metavar="DIR")] = None
+    """Folder of clips with an index.csv: queries each by name, dry and in simulated rooms (sounds)."""
+    scenes: Annotated[tuple[str, ...], arg(metavar="SCENE ...")] = ()
     """Recordings with poses (locate); names of scenes such as house:1000000:held-out (the others)."""
-    nyuv2: Path | None = None
+    nyuv2: Annotated[Path | None, arg(metavar="DIR")] = None
     """Folder of labelled frames (frames.csv, NNNN.color.jpg, NNNN.depth8.png, NNNN.label.png)."""
-    profile: str = "embedded"
+    profile: Annotated[str, arg(metavar="PROFILE")] = "embedded"
     """Models to measure (see `avlmaps profiles`)."""
     model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
     """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
-    out: Path = Path("bench_out")
+    out: Annotated[Path, arg(metavar="DIR")] = Path("bench_out")
     """Folder for SUITE.json, SUITE.md, SUITE.png and a CSV file for each table."""
-    seed: int = 0
+    seed: Annotated[int, arg(metavar="N")] = 0
     """Seed of all random choices."""
     indexing: Annotated[Indexing, OmitArgPrefixes] = field(default_factory=Indexing)
-    """Of the suites indexing, objects and navigation."""
+    """Options of the suites indexing, objects and navigation."""
     navigation: Annotated[Navigation, OmitArgPrefixes] = field(default_factory=Navigation)
-    """Of the suite navigation."""
+    """Options of the suite navigation."""
 
     def run(self) -> None:
         """Measure, write the tables, print them."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Build(ModelVerb):
-    """Build a map from a recording. A build that was stopped goes on where it ended, with the same map as result.
+    """Build a map from a recording. A build that was stopped resumes, and the map is the same.
 
     Examples:
     avlmaps build REC --out kitchen.avlmap
@@ -30,50 +30,50 @@ class Build(ModelVerb):
 
     compiles: ClassVar[bool] = True
 
-    recording: Positional[Path]
-    """Our folder, 7-Scenes/3DMatch, AVLMaps/VLMaps, TUM RGB-D, Replica, ScanNet, a ROS 1 or 2 bag, MCAP."""
-    out: Path
-    """The map's folder, by custom NAME.avlmap."""
-    profile: str = "embedded"
-    """Which models perceive (see `avlmaps profiles`)."""
+    recording: Annotated[Positional[Path], arg(metavar="REC")]
+    """Recording: our folder, 7-Scenes/3DMatch, AVLMaps/VLMaps, TUM RGB-D, Replica, ScanNet, a ROS 1 or 2 bag, MCAP."""
+    out: Annotated[Path, arg(metavar="MAP")]
+    """Map folder to write, by custom NAME.avlmap."""
+    profile: Annotated[str, arg(metavar="PROFILE")] = "embedded"
+    """Set of models (see `avlmaps profiles`)."""
     model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
     """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
     rules: Literal["ours", "paper"] = "ours"
     """Rules of mapping: ours, or the paper's with any models (docs/paper-models.md)."""
-    batch: int | None = None
-    """Frames that go through a large model at once. Default: AVLMAPS_BATCH, or as the model likes (1 on a CPU)."""
+    batch: Annotated[int | None, arg(metavar="N")] = None
+    """Frames that go through a large model at once. Default: AVLMAPS_BATCH, or the model's own size (1 on a CPU)."""
     feature_cache: Annotated[str, arg(metavar="auto|off|DIR")] = "auto"
-    """Keep features, so that another build of the same frames encodes nothing again: auto for large models in the
-    user's cache folder, off, or a folder for those of every model."""
-    feature_cache_gb: float = 20.0
-    """Room for them, GB; what was used longest ago goes first."""
-    voxel_size_m: float = 0.05
+    """Store features, so that another build of the same frames encodes nothing again: auto (large models, in the user's
+    cache folder), off, or a folder (all models)."""
+    feature_cache_gb: Annotated[float, arg(metavar="GB")] = 20.0
+    """Size of the feature cache, GB; the features unused for the longest time go first."""
+    voxel_size_m: Annotated[float, arg(metavar="METRES")] = 0.05
     """Edge of a voxel, metres."""
-    format: str = "auto"
-    """Format of the recording, where it cannot be told from its files."""
-    audio: Path | None = None
-    """A sound file to use in place of the recording's own track."""
-    topics: tuple[str, ...] = ()
-    """Topics of a ROS bag that are not to be found by type: rgb=, depth=, pose= or audio=TOPIC."""
-    frame_step: int = 1
+    format: Annotated[str, arg(metavar="FORMAT")] = "auto"
+    """Format of the recording, if its files do not show it."""
+    audio: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Sound file to use instead of the recording's own track."""
+    topics: Annotated[tuple[str, ...], arg(metavar="KIND=TOPIC ...")] = ()
+    """Topics of a ROS bag that their type does not identify: rgb=, depth=, pose= or audio=TOPIC."""
+    frame_step: Annotated[int, arg(metavar="N")] = 1
     """Fuse every n-th frame."""
-    max_bad_share: float = 0.05
-    """Stop when more than this share of the frames cannot be read; fewer are left out and told."""
-    max_depth_m: float = 10.0
+    max_bad_share: Annotated[float, arg(metavar="SHARE")] = 0.05
+    """Stop when more than this share of the frames cannot be read; fewer are left out and reported."""
+    max_depth_m: Annotated[float, arg(metavar="METRES")] = 10.0
     """Ignore depth beyond this, metres."""
     camera_height_m: Annotated[float | None, arg(aliases=("--floor-height",), metavar="METRES")] = None
     """Height of the depth camera over the floor in the first frame, metres. Default: found from the frames; give it
     where `build` reports the floor with a low confidence."""
     sensor: Literal["auto", "kinect", "realsense", "perfect", "none"] = "auto"
-    """Depth camera: its error decides which depths are used. auto measures it; none uses all, as the paper does."""
+    """Depth camera; its error decides which depths are used. auto measures it; none uses all, as the paper does."""
     resume: bool = False
-    """Go on with a stopped build. This is what happens anyway; the flag is for scripts that say so."""
+    """Resume a stopped build. This is the default; the flag lets scripts say so."""
     fresh: bool = False
-    """Begin anew, whatever a stopped build had finished."""
+    """Start again; ignore the stages that a stopped build finished."""
     overwrite: bool = False
-    """Replace a finished map at --out that was built from something else."""
-    seed: int = 0
-    """Seed of what is drawn at random (visual words, RANSAC)."""
+    """Replace a finished map at --out that was built from another recording or with other settings."""
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Seed of all random choices (visual words, RANSAC)."""
 
     def run(self) -> None:
         """Build the map."""

@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from tyro.conf import arg
 
 from avlmaps.cli.output import emit
 from avlmaps.cli.verb import Verb
@@ -13,14 +15,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Demo(Verb):
-    """Drive through a home, hear it, map it, ask it: the whole system in one command, with a report.html."""
+    """Record a simulated home, map it and query the map: the whole system in one command, with a report.html.
+
+    Example: avlmaps demo --out demo_out
+    """
 
     compiles: ClassVar[bool] = True
 
-    out: Path = Path("demo_out")
+    out: Annotated[Path, arg(metavar="DIR")] = Path("demo_out")
     """Folder for the recording, the map, the pictures and report.html."""
-    seed: int = 0
-    """Another seed takes another home, another drive, other sounds and questions."""
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Seed of the home, the drive, the sounds and the questions."""
 
     def run(self) -> None:
         """Run the demonstration."""

@@ -26,7 +26,7 @@ class Export(ModelVerb):
 
     compiles: ClassVar[bool] = True
 
-    map: Positional[Path]
+    map: Annotated[Positional[Path], arg(metavar="MAP")]
     """Map folder (NAME.avlmap)."""
     out: Annotated[Path, arg(metavar="FILE")]
     """File to write; its suffix chooses the format: .ply points, .glb blocks, .pgm occupancy grid, .csv table."""
@@ -39,7 +39,7 @@ class Export(ModelVerb):
     radius_m: Annotated[float, arg(metavar="METRES")] = 0.2
     """Radius of the robot (.pgm)."""
     height_m: Annotated[float, arg(metavar="METRES")] = 1.5
-    """Height of the robot; what is higher is no obstacle (.pgm)."""
+    """Height of the robot; higher voxels are no obstacles (.pgm)."""
     overwrite: bool = False
     """Replace a file that exists."""
 

@@ -27,19 +27,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Chat:
-    """The chat model of --language chat; what is not given is read from AVLMAPS_CHAT_MODEL and its like."""
+    """Options of --language chat; their defaults are AVLMAPS_CHAT_MODEL, AVLMAPS_CHAT_URL and AVLMAPS_CHAT_REPLAY."""
 
-    chat_model: str | None = None
+    chat_model: Annotated[str | None, arg(metavar="NAME")] = None
     """Name of the chat model. Default: the only one that the server has."""
-    chat_url: str | None = None
+    chat_url: Annotated[str | None, arg(metavar="URL")] = None
     """Address of the server, such as http://localhost:11434/v1. Default: OpenAI's own."""
-    chat_replay: Path | None = None
-    """A file of what a chat model answered: made where it is missing, asked instead of the model where it is there."""
+    chat_replay: Annotated[Path | None, arg(metavar="FILE")] = None
+    """A file of a chat model's answers: written where it is missing, else read instead of calling the model."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Go(ModelVerb):
-    """Tell the robot where to go, in a sentence; it writes its program, drives, and tells how near it came.
+    """Drive the robot by a sentence: avlmaps writes a program, runs it, and reports how near each stop came.
 
     The map is all that the robot knows. Its body is simulated in --scene, which must be the scene that was recorded:
     recordings of `avlmaps record` and their maps lie in their scene's frame. A real robot drives with --robot.
@@ -49,38 +49,38 @@ class Go(ModelVerb):
 
     compiles: ClassVar[bool] = True
 
-    map: Positional[Path]
-    """The map."""
-    sentence: Positional[str]
-    """What the robot is to do."""
-    scene: str | None = None
-    """The scene in which the simulated body drives: house:SEED, office:SEED or a file, as for `avlmaps record`."""
+    map: Annotated[Positional[Path], arg(metavar="MAP")]
+    """Map folder (NAME.avlmap)."""
+    sentence: Annotated[Positional[str], arg(metavar="SENTENCE")]
+    """Command for the robot."""
+    scene: Annotated[str | None, arg(metavar="SCENE")] = None
+    """Scene in which the simulated body drives: house:SEED, office:SEED or a file, as for `avlmaps record`."""
     language: Literal["rules", "chat"] = "rules"
-    """Who writes the program: a grammar that needs nothing, or a chat model (pip install 'avlmaps[chat]')."""
+    """Translator of the sentence: a grammar that needs nothing, or a chat model (pip install 'avlmaps[chat]')."""
     chat: Annotated[Chat, OmitArgPrefixes] = field(default_factory=Chat)
-    """Which chat model."""
+    """Chat model."""
     body: Literal["base", "drone"] = "base"
-    """Whose body: what stands in the way of a wheeled base may not be in that of a drone."""
+    """Body of the robot: a wheeled base and a drone have other obstacles."""
     robot: Literal["simulated", "nav2", "move_base"] = "simulated"
-    """What moves: a simulated body, or a real robot over rosbridge (pip install 'avlmaps[ros]')."""
-    ros: str = "ws://localhost:9090"
+    """Robot: a simulated body, or a real robot over rosbridge (pip install 'avlmaps[ros]')."""
+    ros: Annotated[str, arg(metavar="URL")] = "ws://localhost:9090"
     """Address of rosbridge, for --robot nav2 and move_base."""
-    ros_frames: Path | None = None
-    """A JSON file of the robot's frames and settings: namespace, radius, speed, timeouts (docs/robots.md)."""
+    ros_frames: Annotated[Path | None, arg(metavar="FILE")] = None
+    """JSON file of the robot's frames and settings: namespace, radius, speed, timeouts (docs/robots.md)."""
     start: Annotated[str | None, arg(metavar="X,Y,HEADING")] = None
-    """Where the simulated robot starts: metres, degrees counter-clockwise from +x. Default: where the walk began."""
+    """Start of the simulated robot: metres, degrees counter-clockwise from +x. Default: the start of the recording."""
     guess: bool = False
-    """Go to the best guess where the map is not sure that it holds what is named."""
-    image: Path | None = None
-    """The file that "this photo" in the sentence means."""
-    sound_clip: Path | None = None
-    """The file that "this recording" in the sentence means."""
+    """Go to the best guess where the map's confidence is below 0.5."""
+    image: Annotated[Path | None, arg(metavar="FILE")] = None
+    """File that "this photo" in the sentence means."""
+    sound_clip: Annotated[Path | None, arg(metavar="FILE")] = None
+    """File that "this recording" in the sentence means."""
     explain: bool = False
-    """Print the readings of the sentence with their costs; the smallest is taken."""
+    """Print the readings of the sentence with their costs; the cheapest one counts."""
     dry_run: bool = False
-    """Print the program, and do not drive; neither the map nor a scene is opened."""
-    plot: Path | None = None
-    """Draw the way over the map into this picture: start, goals, stops, what was met."""
+    """Print the program without driving; neither the map nor a scene is opened."""
+    plot: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Draw the path over the map into this picture: start, goals, stops, contacts."""
 
     def run(self) -> None:
         """Drive."""
@@ -100,13 +100,13 @@ class Go(ModelVerb):
 
 @dataclass(frozen=True, slots=True)
 class _Ready:
-    """A robot that can be told to go.
+    """A robot that is ready for a program.
 
     Attributes:
         driver: moves it.
         start: where it stands.
-        obstacles: what the map knows to stand in its way.
-        met: tells where it met something that the map does not know.
+        obstacles: the obstacles that the map knows.
+        met: returns where it met something that the map does not know.
         halt: returns how the robot stands after an interrupt.
         close: ends the connection; a real robot stops where it is.
     """
@@ -120,7 +120,7 @@ class _Ready:
 
 
 def go(verb: "Go") -> dict[str, Any]:
-    """Do what the sentence says, and tell of it."""
+    """Do what the sentence says, and return the report."""
     start = _start(verb.start)
     if verb.robot == "simulated" and verb.scene is None and not verb.dry_run:
         raise UsageError(
@@ -160,7 +160,8 @@ def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
 
         for line in explanation(translator, verb.sentence):
             say(line)
-    translation = translator.program_for(verb.sentence)  # what is not understood is told before a scene is made
+    # A sentence that is not understood fails here, before a scene is made.
+    translation = translator.program_for(verb.sentence)
     robot = _in_scene(verb, asked, start) if verb.robot == "simulated" else _real(verb, asked)
     settings = RobotSettings(guess=verb.guess)
     try:
@@ -255,7 +256,7 @@ def _failure(answer: dict[str, Any]) -> dict[str, Any] | None:
 
 
 def go_lines(answer: dict[str, Any]) -> list[str]:
-    """Lay out what `go` tells: the program, and the places."""
+    """Lay out the answer of `go`: the program, and the places."""
     lines = [*([answer["plan"]] if answer.get("plan") else []), *answer["program"].splitlines()]
     rows = [
         (

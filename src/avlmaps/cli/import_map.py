@@ -13,32 +13,32 @@ from avlmaps.cli.verb import ModelVerb
 
 @dataclass(frozen=True, kw_only=True)
 class ImportMap(ModelVerb):
-    """Convert a map that the published AVLMaps/VLMaps code wrote; it lies in the world of the scene's recording.
+    """Convert a map of the published AVLMaps/VLMaps code; the result lies in the frame of the scene's recording.
 
     Voxels (vlmaps.h5df and its relatives) and areas (clip_sparse_map.h5df) are read. The sound map, a pickle, is not;
-    the tracks that it was made from are heard anew with --sounds. Needs pip install 'avlmaps[paper]'. Example:
+    --sounds encodes the tracks that it was made from again. Needs pip install 'avlmaps[paper]'.
 
-    avlmaps import-map avlmaps_dataset/5LpN3gDmAk7_1 --out 5LpN3gDmAk7_1.avlmap --sounds output_level_1.wav
+    Example: avlmaps import-map avlmaps_dataset/5LpN3gDmAk7_1 --out 5LpN3gDmAk7_1.avlmap --sounds output_level_1.wav
     """
 
-    source: Positional[Path]
-    """The scene's folder, with vlmap/vlmaps.h5df, area_map/ and poses.txt in it, or the .h5df file of the voxels."""
-    out: Path
-    """The new map's folder, by custom NAME.avlmap."""
-    cell_size_m: Annotated[float, arg(name="cell-size", metavar="M")] = 0.05
-    """Edge of a cell of the reference's grid, metres; multi-floor and camera maps tell theirs themselves."""
-    poses: Path | None = None
-    """poses.txt, whose first pose the grid lies round. Default: that of the scene."""
-    areas: Path | None = None
-    """clip_sparse_map.h5df. Default: that of the scene."""
+    source: Annotated[Positional[Path], arg(metavar="SCENE")]
+    """Scene folder with vlmap/vlmaps.h5df, area_map/ and poses.txt, or the .h5df file of the voxels."""
+    out: Annotated[Path, arg(metavar="MAP")]
+    """Map folder to write, by custom NAME.avlmap."""
+    cell_size_m: Annotated[float, arg(name="cell-size", metavar="METRES")] = 0.05
+    """Edge of a cell of the reference's grid, metres; multi-floor and camera maps hold theirs."""
+    poses: Annotated[Path | None, arg(metavar="FILE")] = None
+    """File poses.txt, whose first pose is the centre of the grid. Default: the scene's."""
+    areas: Annotated[Path | None, arg(metavar="FILE")] = None
+    """File clip_sparse_map.h5df. Default: the scene's."""
     sounds: Annotated[str, arg(metavar="FILE")] = ""
     """Name of the track in each walk below audio_video/, such as output_level_1.wav. Default: no sounds."""
     hear_with: Annotated[str, arg(metavar="BACKEND")] = "audioclip"
-    """Which sound model hears them (see `avlmaps profiles`)."""
-    max_bad_share: float = 0.0
-    """Stop when more than this share of the voxels holds NaN; fewer are left out and told."""
+    """Sound model that encodes the tracks (see `avlmaps profiles`)."""
+    max_bad_share: Annotated[float, arg(metavar="SHARE")] = 0.0
+    """Stop when more than this share of the voxels holds NaN; fewer are left out and reported."""
     overwrite: bool = False
-    """Replace a finished map at --out that came from something else."""
+    """Replace a finished map at --out that came from another source."""
 
     def run(self) -> None:
         """Convert it."""

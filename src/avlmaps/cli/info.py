@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, emit, ground_lines, place, size_of
 from avlmaps.cli.verb import Verb
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from avlmaps.recordings.types import Recording
 
 MAP_MANIFEST = "map.json"
-# `info` opens so many pictures of a recording, spread evenly; `info --verify` opens them all.
+# `info` opens this many pictures of a recording, spread evenly; `info --verify` opens them all.
 DECODED_BY_INFO = 100
 # Rooms with a lower confidence are not named in the picture.
 LEAST_ROOM = 0.5
@@ -27,22 +27,25 @@ _LIKELY = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class Info(Verb):
-    """Tell what is in a recording or a map, and every fault that is found in it."""
+    """List the contents of a recording or a map, and every fault in it.
 
-    path: Positional[Path]
-    """A recording or a map."""
-    format: str = "auto"
-    """Format of the recording, where it cannot be told from its files."""
+    Example: avlmaps info home.avlmap --plot map.png
+    """
+
+    path: Annotated[Positional[Path], arg(metavar="REC|MAP")]
+    """Recording or map folder."""
+    format: Annotated[str, arg(metavar="FORMAT")] = "auto"
+    """Format of the recording, if its files do not show it."""
     verify: bool = False
     """Check every file of a map against its checksum, or every picture of a recording."""
     repair: bool = False
-    """Check every file of a map, and build the damaged ones again from --recording."""
-    recording: Path | None = None
-    """The recording that the map was built from, for --repair."""
-    audio: Path | None = None
-    """The sound file that the map was built with, if it was given to `build --audio`; for --repair."""
-    plot: Path | None = None
-    """Draw the map from above, with the path, the sounds, and the names of things and rooms, into this picture."""
+    """Check every file of a map, and rebuild the damaged ones from --recording."""
+    recording: Annotated[Path | None, arg(metavar="REC")] = None
+    """Recording that the map was built from (--repair)."""
+    audio: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Sound file that was given to `build --audio`, if any (--repair)."""
+    plot: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Draw a top-down view with the path, the sounds, and the names of things and rooms into this picture."""
 
     def run(self) -> None:
         """Describe it."""
@@ -123,7 +126,7 @@ def described(stored: "StoredMap") -> dict[str, Any]:
 
 
 def with_sound_names(told: dict[str, Any], stored: "StoredMap") -> dict[str, Any]:
-    """Return what is told of a map, each sound with the names that fit it best, where its sound model is here."""
+    """Return the report on a map, each sound with the names that fit it best, where its sound model is here."""
     from avlmaps.query.avlmap import AVLMap
 
     if not told["sounds"]:

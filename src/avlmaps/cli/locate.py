@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, emit
 from avlmaps.cli.verb import ModelVerb
@@ -16,15 +16,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Locate(ModelVerb):
-    """Tell where a photo was taken: the 6-DoF pose of its camera in the map, or that it was not taken there."""
+    """Find the 6-DoF pose of a photo's camera in the map, or report that the photo cannot be located.
+
+    Example: avlmaps locate home.avlmap photo.jpg
+    """
 
     compiles: ClassVar[bool] = True
 
-    map: Positional[Path]
-    """The map."""
-    image: Positional[Path]
-    """The photo."""
-    intrinsics: str | None = None
+    map: Annotated[Positional[Path], arg(metavar="MAP")]
+    """Map folder (NAME.avlmap)."""
+    image: Annotated[Positional[Path], arg(metavar="PHOTO")]
+    """Photo to locate."""
+    intrinsics: Annotated[str | None, arg(metavar="FX,FY,CX,CY")] = None
     """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: the map's own colour camera."""
 
     def run(self) -> None:
@@ -70,9 +73,9 @@ def camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":
 
 
 def locate_lines(answer: dict[str, Any]) -> list[str]:
-    """Lay out what `locate` tells."""
+    """Lay out the answer of `locate`."""
     pose = answer["world_from_camera"]
     if pose is None:
-        return [f"not located: {answer['inliers']} points agree, too few to tell a place"]
+        return [f"not located: {answer['inliers']} points agree, too few to fix a place"]
     rows = ["  " + " ".join(f"{value:9.4f}" for value in row) for row in pose]
     return [f"located, {answer['inliers']} points agree; world_from_camera (frame: {answer['frame']}):", *rows]

@@ -30,7 +30,7 @@ from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars
 
-_DESCRIPTION = """Audio-Visual-Language Maps: what a robot saw and heard, as one 3D map that can be asked.
+_DESCRIPTION = """Audio-Visual-Language Maps: one 3D map of what a robot saw and recorded, which you query with words.
 
 Every verb takes --json (one JSON object on standard output) and --help. Progress goes to standard error.
 Exit status: 0 done, 1 a known error (one sentence says which), 2 a wrong command line.
@@ -79,7 +79,7 @@ def _main(words: list[str]) -> None:
     # One BLAS thread: small matrices, ours among them, run many times slower on several when a machine is busy.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
-    os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # a truncated picture is told in our words
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # avlmaps reports a truncated picture in its own words
     shortly = not words or words[0].startswith("-")
     with _usage_in_json() if _wants_json(words) else nullcontext():
         verb = tyro.cli(_any_verb(shortly), prog="avlmaps", description=_DESCRIPTION, args=words, config=_CONFIG)
@@ -87,7 +87,7 @@ def _main(words: list[str]) -> None:
 
 
 def _wants_json(words: Sequence[str]) -> bool:
-    """Return whether a command line holds --json; told before it is read, since it may not be readable."""
+    """Return whether a command line holds --json; decided before it is read, since it may not be readable."""
     return "--json" in (words[: words.index("--")] if "--" in words else words)
 
 
@@ -109,7 +109,7 @@ def _usage_in_json() -> Iterator[None]:
 
 
 def _any_verb(shortly: bool) -> Any:
-    """Return the union of the verbs; the list of them all tells one line of each."""
+    """Return the union of the verbs; the list of them all shows one line of each."""
 
     def described(name: str, verb: type[Verb]) -> Any:
         first_line = (verb.__doc__ or "").partition("\n")[0]
@@ -128,7 +128,7 @@ def _run(verb: Verb) -> int:
         return _fail(verb, error, str(error), 2)
     except AvlmapsError as error:
         return _fail(verb, error, str(error), 1)
-    except BrokenPipeError:  # the reader of our output has gone (`avlmaps info MAP | head`): nothing to tell
+    except BrokenPipeError:  # the reader of our output has gone (`avlmaps info MAP | head`): nothing to report
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except (OSError, MemoryError) as error:
@@ -153,7 +153,7 @@ def _compiling(verb: Verb) -> AbstractContextManager[None]:
 
 
 def _fail(verb: Verb, error: BaseException, message: str, status: int) -> int:
-    """Tell an error in one sentence on standard error, and as JSON on standard output where that is wanted."""
+    """Print an error in one sentence on standard error, and as JSON on standard output with --json."""
     if verb.json:
         _emit_error(error, message)
     return _complain(message, status)

@@ -9,9 +9,11 @@ from avlmaps.cli.verb import ModelVerb
 
 @dataclass(frozen=True, kw_only=True)
 class Profiles(ModelVerb):
-    """List the profiles and their backends: which are here, and which command brings what another lacks.
+    """List the profiles and their backends: which are installed, and which command installs the others.
 
-    Nothing is fetched, and no large model is opened: its files are looked for in --models and in the hub's cache.
+    Nothing is downloaded, and no large model is opened: only its files are searched in --models and in the hub's cache.
+
+    Example: avlmaps profiles --models models
     """
 
     def run(self) -> None:
@@ -26,7 +28,7 @@ class Profiles(ModelVerb):
 
 
 def list_profiles() -> dict[str, Any]:
-    """Tell every profile's backends, and every other backend that is known."""
+    """Return every profile's backends, and every other backend that is known."""
     from avlmaps.core.registry import Kind, backends
     from avlmaps.perception.models.availability import availability
     from avlmaps.perception.profiles import profiles

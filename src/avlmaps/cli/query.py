@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from avlmaps.cli.locate import camera_of
 from avlmaps.cli.output import UsageError, emit, place, table_lines
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Query(ModelVerb):
-    """Ask a map, in a sentence or part by part; the parts are fused into one heatmap.
+    """Query a map with a sentence, or part by part; the product of the parts' heatmaps gives the goals.
 
     Examples:
     avlmaps query MAP "the red cabinet near the sound of a dog barking"
@@ -28,33 +28,35 @@ class Query(ModelVerb):
 
     compiles: ClassVar[bool] = True
 
-    map: Positional[Path]
-    """The map."""
-    sentence: Positional[str] = ""
-    """What is asked, in words; or leave it out and name the parts."""
-    object: str | None = None
-    """The object."""
-    sound: str | None = None
-    """The sound, in words."""
-    sound_clip: Path | None = None
-    """The sound, as a recording of one like it."""
-    area: str | None = None
-    """The area: a room, a part of the building."""
-    image: Path | None = None
-    """A photo taken there."""
-    intrinsics: str | None = None
+    map: Annotated[Positional[Path], arg(metavar="MAP")]
+    """Map folder (NAME.avlmap)."""
+    sentence: Annotated[Positional[str], arg(metavar="[SENTENCE]")] = ""
+    """Query in words; leave it out to name the parts with options."""
+    object: Annotated[str | None, arg(metavar="NAME")] = None
+    """Object, by name."""
+    sound: Annotated[str | None, arg(metavar="NAME")] = None
+    """Sound, by name."""
+    sound_clip: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Sound, by a sound file of one like it."""
+    area: Annotated[str | None, arg(metavar="NAME")] = None
+    """Area, by name: a room or a part of the building."""
+    image: Annotated[Path | None, arg(metavar="PHOTO")] = None
+    """Photo taken at the place."""
+    intrinsics: Annotated[str | None, arg(metavar="FX,FY,CX,CY")] = None
     """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: the map's own colour camera."""
-    primary: Literal["object", "sound", "image", "area"] | None = None
-    """Which part is the goal itself; the others say where it is. Default: the first of object, image, sound, area."""
+    primary: Annotated[Literal["object", "sound", "image", "area"] | None, arg(metavar="object|sound|image|area")] = (
+        None
+    )
+    """Part that is the goal; the others say where it is. Default: the first of object, image, sound, area."""
     rules: Literal["ours", "paper"] = "ours"
     """Rules of scores and heat: ours, or the paper's with any models (docs/paper-models.md)."""
-    top: int = 3
-    """How many goals to tell."""
-    plot: Path | None = None
-    """Draw the heat of each part and of the whole, with the goals numbered, into this picture."""
+    top: Annotated[int, arg(metavar="N")] = 3
+    """Number of goals to print."""
+    plot: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Draw the heat of each part and of the product, with numbered goals, into this picture."""
 
     def run(self) -> None:
-        """Ask."""
+        """Answer the query."""
         answer = ask(self)
         emit(answer, query_lines(answer), self.json)
 
@@ -152,7 +154,7 @@ def _camera_for(picture: Path | None, intrinsics: str | None) -> "Pinhole | None
 
 
 def query_lines(answer: dict[str, Any]) -> list[str]:
-    """Lay out what `query` tells."""
+    """Lay out the answer of `query`."""
     asked = ", ".join(f"{part['modality']} {part['query']!r} ({part['role']})" for part in answer["parts"])
     lines = [f"asked: {asked}"]
     lines += [f"note: {part['note']}" for part in answer["parts"] if part.get("note")]

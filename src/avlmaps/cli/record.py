@@ -16,49 +16,49 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Record(Verb):
-    """Drive a simulated robot through a building and record what it sees and hears, with the truth beside it.
+    """Record the camera and microphone of a simulated robot that drives through a building, with the truth beside it.
 
-    The same scene, settings and seed give the same bytes. Example:
+    The same scene, settings and seed give the same bytes.
 
-    avlmaps record --scene house:7 --out REC --hearing acoustic
+    Example: avlmaps record --scene house:7 --out REC --hearing acoustic
     """
 
     compiles: ClassVar[bool] = True
 
-    scene: str
-    """house:SEED or office:SEED, made by rule, or a file: .glb, or Matterport3D's .glb with its _semantic.ply."""
-    out: Path
-    """Where the recording goes (our folder format)."""
-    sounds: Path | None = None
+    scene: Annotated[str, arg(metavar="SCENE")]
+    """Building: house:SEED or office:SEED, made by rule, or a .glb file, alone or with Matterport3D's _semantic.ply."""
+    out: Annotated[Path, arg(metavar="REC")]
+    """Recording folder to write (our format)."""
+    sounds: Annotated[Path | None, arg(metavar="DIR")] = None
     """Folder of sound files, as `avlmaps add-sounds` reads it. Default: sounds made by rule."""
-    category: tuple[str, ...] = ()
-    """Only sounds of these categories. Default: all that homes make."""
-    sources: int | None = None
-    """How many sounds are heard. Default: one for every 12 seconds of the walk, as far as there is room."""
-    ambiguous: int = 0
-    """How many kinds of sound are heard in two places."""
+    category: Annotated[tuple[str, ...], arg(metavar="NAME ...")] = ()
+    """Use sounds of these categories only. Default: all that homes make."""
+    sources: Annotated[int | None, arg(metavar="N")] = None
+    """Number of sounds. Default: one for every 12 s of the walk, or fewer if there is no room."""
+    ambiguous: Annotated[int, arg(metavar="N")] = 0
+    """Number of kinds of sound that play in two places."""
     hearing: Literal["overlay", "acoustic", "none"] = "overlay"
     """overlay: dry clips, as the paper mixed them; acoustic: distance, walls and reverberation follow the building."""
     sensor: Literal["clean", "kinect", "realsense"] = "clean"
-    """Whose faults colour and depth have."""
+    """Camera whose faults colour and depth have."""
     drift: bool = False
-    """Let the poses stray as odometry does; true_poses.csv keeps the true ones."""
-    seed: int = 0
-    """Another seed drives another way and hears other sounds."""
+    """Let the poses stray as odometry does; true_poses.csv stores the true ones."""
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Seed of the path and the sounds."""
     size: Annotated[str, arg(metavar="WxH")] = "320x240"
-    """Columns and rows of the pictures."""
-    fov_deg: float = 63.0
+    """Columns and rows of the pictures, pixels."""
+    fov_deg: Annotated[float, arg(metavar="DEGREES")] = 63.0
     """Horizontal field of view, degrees."""
-    fps: float = 10.0
-    """Frames a second."""
-    max_frames: int | None = None
-    """Keep so many frames of a longer walk, evenly."""
+    fps: Annotated[float, arg(metavar="HZ")] = 10.0
+    """Frames per second."""
+    max_frames: Annotated[int | None, arg(metavar="N")] = None
+    """Use this many frames of a longer walk, spread evenly."""
     semantic: bool = False
-    """Write which object each pixel shows into semantic/ as well (16-bit PNG: instance + 1, 0 for nothing)."""
+    """Write the object of each pixel into semantic/ as well (16-bit PNG: instance + 1, 0 for none)."""
     colour: Literal["png", "jpg"] = "png"
     """File type of the colour pictures; jpg takes a tenth of the space."""
-    workers: int = 0
-    """Processes that draw. Default: as many as there are cores."""
+    workers: Annotated[int, arg(metavar="N")] = 0
+    """Number of processes that draw. Default: one for each core."""
 
     def run(self) -> None:
         """Record."""
@@ -76,7 +76,7 @@ class Record(Verb):
 
 
 def record(verb: "Record") -> dict[str, Any]:
-    """Record a simulated walk and tell what was heard."""
+    """Record a simulated walk and return what was recorded."""
     from avlmaps.sim.recorder import RecordSettings, record_scene
     from avlmaps.sim.scenes import open_scene
     from avlmaps.sim.sensor_settings import OdometryFaults

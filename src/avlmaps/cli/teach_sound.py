@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, emit
 from avlmaps.cli.verb import Verb
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class TeachSound(Verb):
-    """Teach a new kind of sound from a few clips of it; it is kept in your own profile folder.
+    """Teach a new kind of sound from a few clips; your own profile folder stores it.
 
     Example: avlmaps teach-sound "our doorbell" bell1.wav bell2.wav bell3.wav
     """
 
-    name: Positional[str]
-    """What you will call it in a query."""
-    clips: Positional[tuple[Path, ...]] = ()
-    """Sound files, three or more for preference."""
+    name: Annotated[Positional[str], arg(metavar="NAME")]
+    """Name of the sound in queries."""
+    clips: Annotated[Positional[tuple[Path, ...]], arg(metavar="CLIP ...")] = ()
+    """Sound files, preferably three or more."""
     forget: bool = False
     """Forget the sound of this name."""
 

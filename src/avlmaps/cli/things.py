@@ -20,7 +20,7 @@ class Things(ModelVerb):
 
     compiles: ClassVar[bool] = True
 
-    map: Positional[Path]
+    map: Annotated[Positional[Path], arg(metavar="MAP")]
     """Map folder (NAME.avlmap)."""
     least: Annotated[float, arg(metavar="CONFIDENCE")] = 0.5
     """List things with at least this confidence, 0 to 1."""

@@ -5,12 +5,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
+
+from tyro.conf import arg
 
 
 @dataclass(frozen=True, kw_only=True)
 class Verb:
-    """What every verb takes."""
+    """Options of every verb."""
 
     json: bool = False
     """Print one JSON object on standard output, and nothing else there."""
@@ -25,14 +27,16 @@ class Verb:
 
 @dataclass(frozen=True, kw_only=True)
 class ModelVerb(Verb):
-    """What every verb takes that runs models; the small ones that ship with the package heed none of it."""
+    """Options of every verb that runs models; the small models that ship with the package ignore them."""
 
-    models: Path | None = None
-    """Folder of models, looked through before the hub's cache. Default: AVLMAPS_MODELS."""
-    device: str | None = None
-    """Where large models run: auto, cpu, cuda, cuda:1, mps. Default: AVLMAPS_DEVICE, or a GPU where there is one."""
-    precision: Literal["auto", "float32", "float16", "bfloat16"] | None = None
-    """Of large models. Default: AVLMAPS_PRECISION, or float16 on CUDA and float32 elsewhere."""
+    models: Annotated[Path | None, arg(metavar="DIR")] = None
+    """Folder of models, searched before the hub's cache. Default: AVLMAPS_MODELS."""
+    device: Annotated[str | None, arg(metavar="DEVICE")] = None
+    """Device of large models: auto, cpu, cuda, cuda:1, mps. Default: AVLMAPS_DEVICE, or a GPU if there is one."""
+    precision: Annotated[
+        Literal["auto", "float32", "float16", "bfloat16"] | None, arg(metavar="auto|float32|float16|bfloat16")
+    ] = None
+    """Precision of large models. Default: AVLMAPS_PRECISION, or float16 on CUDA and float32 elsewhere."""
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-# Focal lengths and principal points beyond so many sizes of the image are mistakes, and would overflow further on.
+# Focal lengths and principal points beyond this many image sizes are mistakes, and would overflow further on.
 _MOST_SIZES = 1e6
 _MOST_PIXELS = 1 << 28
 

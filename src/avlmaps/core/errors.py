@@ -9,7 +9,7 @@ from avlmaps.core.printable import printable
 
 
 class AvlmapsError(Exception):
-    """Base of every error that a user can cause and mend; its sentence is safe to print, whatever text it quotes."""
+    """Base of every error that a user can cause and mend; its sentence is safe to print, including quoted text."""
 
     def __str__(self) -> str:
         return printable(super().__str__())
@@ -32,11 +32,11 @@ class MapError(AvlmapsError):
 
 
 class BackendError(AvlmapsError):
-    """A model backend is unknown, not installed or does not fit what it is asked to do."""
+    """A model backend is unknown, not installed, or does not fit its module."""
 
 
 class QueryError(AvlmapsError):
-    """A question cannot be asked of this map: an empty phrase, an unreadable picture, a missing modality."""
+    """This map cannot answer the query: an empty phrase, an unreadable picture, a missing modality."""
 
 
 class SceneError(AvlmapsError):

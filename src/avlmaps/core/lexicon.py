@@ -60,7 +60,7 @@ class Entry:
         wet: of a room, whether its walls get wet.
         tiled: of a room, whether its floor is hard.
         spoken: what people mostly say for it where that is not the name, else ``""``.
-        split: ``training`` where an encoder which ships was trained to tell it; ``held out`` for all others.
+        split: ``training`` where an encoder which ships was trained to name it; ``held out`` for all others.
     """
 
     name: str
@@ -124,7 +124,7 @@ class Lexicon:
         """Return the entry of exactly this name.
 
         Raises:
-            KeyError: there is none; whoever lists names of entries finds out at once.
+            KeyError: there is none; code that lists names of entries finds out at once.
         """
         if name not in self._said[kind]:
             raise KeyError(f"the lexicon has no {kind} {name!r}; add it to core/lexicon.toml")
@@ -234,7 +234,7 @@ class Lexicon:
 
     @cached_property
     def _spellers(self) -> "dict[Kind | None, Speller]":
-        # What encoders were trained to tell is what people mostly ask for; it wins where two words are as near.
+        # Names that encoders were trained on are the common ones; they win where two words are as near.
         entries = sorted(self.entries(), key=lambda entry: entry.split != "training")
         kinds: tuple[Kind | None, ...] = (None, *Kind)
         return {

@@ -7,7 +7,7 @@ than it has. Everything that prints such text passes it through here.
 
 import re
 
-# All of Cc, Cs, Zl and Zp, and of Cf whatever is invisible or turns the direction of writing. The two joiners U+200C
+# All of Cc, Cs, Zl and Zp, and every Cf that is invisible or turns the direction of writing. The two joiners U+200C
 # and U+200D stay: Persian words, Indian scripts and emoji are spelt with them.
 _UNSAFE = (
     "\x00-\x1f\x7f-\x9f\xad\u0600-\u0605\u061c\u06dd\u070f\u0890\u0891\u08e2\u180e\u200b\u200e\u200f\u2028-\u202e"

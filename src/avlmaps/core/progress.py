@@ -57,10 +57,10 @@ def progress(
     Args:
         items: what to go through.
         label: a verb such as ``fusing``.
-        total: how many there will be in all, where ``len`` cannot tell.
+        total: how many there will be in all, where ``len`` does not say.
         done: how many were done before (a resumed run).
         unit: what one item is.
-        note: asked at each item for a few words to put behind the bar.
+        note: called at each item; returns a few words to put behind the bar.
     """
     from tqdm import tqdm
 

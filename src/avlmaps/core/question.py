@@ -14,7 +14,7 @@ MOST_CHARACTERS = 500
 
 
 class Modality(StrEnum):
-    """The four ways to point at a place; the value is the word on the command line."""
+    """The four kinds of a query's part; the value is the word on the command line."""
 
     OBJECT = "object"
     SOUND = "sound"
@@ -35,7 +35,7 @@ class Part:
 
     Attributes:
         modality: how it points at a place.
-        query: a phrase, or the path of a file for an image and for a sound asked by a clip.
+        query: a phrase, or the path of a file for an image and for a query by sound clip.
         role: primary or context.
         is_file: whether ``query`` is a path (always so for an image).
     """
@@ -47,11 +47,11 @@ class Part:
 
     def __post_init__(self) -> None:
         if not self.query.strip():
-            raise QueryError(f"The {self.modality} asked for is empty; name one, such as {_EXAMPLES[self.modality]}.")
+            raise QueryError(f"The {self.modality} in the query is empty; name one: {_EXAMPLES[self.modality]}.")
         if len(self.query) > MOST_CHARACTERS and not self.is_file:
             raise QueryError(
-                f"The {self.modality} asked for has {len(self.query)} characters, more than {MOST_CHARACTERS}; name it "
-                f"in a few words, such as {_EXAMPLES[self.modality]}."
+                f"The {self.modality} in the query has {len(self.query)} characters, more than {MOST_CHARACTERS}; name "
+                f"it in a few words, such as {_EXAMPLES[self.modality]}."
             )
 
 
@@ -68,7 +68,7 @@ class Question:
     """One primary part and any number of parts of context.
 
     Attributes:
-        parts: in the order in which they were asked; exactly one is primary.
+        parts: in the order of the query; exactly one is primary.
     """
 
     parts: tuple[Part, ...]
@@ -89,6 +89,6 @@ class Question:
         """
         chosen = next((i for i, part in enumerate(parts) if primary in (None, part.modality)), None)
         if parts and chosen is None:
-            raise QueryError(f"The primary part is to be a {primary}, but none is asked for; add one or leave it out.")
+            raise QueryError(f"The primary part is to be a {primary}, but the query has none; add one or leave it out.")
         roles = [Role.PRIMARY if i == chosen else Role.CONTEXT for i in range(len(parts))]
         return cls(tuple(Part(p.modality, p.query, role, p.is_file) for p, role in zip(parts, roles, strict=True)))

@@ -43,7 +43,7 @@ class Backend:
         needs: top-level packages that must be importable.
         model: for a backend that can run several models, the one that it runs unless another is chosen: a hub's id or
             the name of a file; its class is called with it. ``""`` where the class takes no argument.
-        licence: of that model's weights, for ``avlmaps profiles``; ``""`` where the class alone tells it.
+        licence: of that model's weights, for ``avlmaps profiles``; ``""`` where the class alone decides it.
     """
 
     kind: Kind
@@ -148,7 +148,7 @@ _registered: dict[tuple[Kind, str], Backend] = {(b.kind, b.name): b for b in (*_
 
 
 def register(backend: Backend) -> None:
-    """Add a backend for this process (a notebook's, a test's); the entry point is the way for packages."""
+    """Add a backend for this process (a notebook's, a test's); packages use the entry point."""
     _registered[backend.kind, backend.name] = backend
     _load.cache_clear()
 

@@ -1,7 +1,7 @@
 """Clocks: putting streams of different rates on one time line.
 
-Stamps are float64 seconds. Nothing here crashes on a bad clock: stamps that run backwards are sorted or cut and
-told in a sentence.
+Stamps are float64 seconds. Nothing here crashes on a bad clock: stamps that run backwards are sorted or cut, and a
+sentence reports it.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from avlmaps.core import poses
 
 # Messages of one stream may arrive a little out of order; a step back by more is a clock that was set anew.
 MAX_DISORDER_S = 1.0
-# A pause is worth telling when it lasts this long and this many times the usual interval.
+# A pause is worth a report when it lasts this long and this many times the usual interval.
 MIN_GAP_S = 1.0
 MIN_GAP_INTERVALS = 5.0
 # A pose may be held this long past the ends of its stream: a frame of a 30 Hz camera may stick out by one interval.
@@ -25,7 +25,7 @@ class InOrder:
     """A stream's samples in the order of time.
 
     Attributes:
-        index: rows of the stream that were kept; their stamps rise strictly.
+        index: rows of the stream that remain; their stamps rise strictly.
         notices: one sentence for each thing that was done to get there.
     """
 
@@ -34,11 +34,11 @@ class InOrder:
 
 
 def in_order(stamps_s: Float[np.ndarray, " n"], what: str) -> InOrder:
-    """Put a stream in the order of time, whatever its clock did.
+    """Put a stream in the order of time, for any clock.
 
     Stamps that are no number are left out. Where the clock steps back by at most ``MAX_DISORDER_S`` the samples
     are sorted; where it steps back further it was set anew, and only the longest stretch before, between or after
-    such jumps is kept, since one time line cannot hold two of them. Of equal stamps the first is kept.
+    such jumps remains, since one time line cannot hold two of them. Of equal stamps the first remains.
 
     Args:
         stamps_s: the stream's stamps in the order of the file.
@@ -132,7 +132,7 @@ class Trajectory:
     def covers(
         self, stamps_s: Float[np.ndarray, " k"], edge_s: float = EDGE_TOLERANCE_S, max_gap_s: float | None = None
     ) -> Bool[np.ndarray, " k"]:
-        """Say for each stamp whether a pose can be told there.
+        """Return for each stamp whether a pose can be interpolated there.
 
         Args:
             stamps_s: when.

@@ -30,7 +30,7 @@ _LEFT_OUT = "Left out: "
 _USUAL_LENGTH_S = 5.0
 _WANTED = 4  # where whole clips leave room for fewer sounds than this, they are cut short
 _SHORTEST_CUT_S = 2.0
-_SNR_DB = 20.0  # of a background for which none is asked
+_SNR_DB = 20.0  # the default with a background
 _TRIES = 12  # clips that are tried for the last gaps, before the track counts as full
 
 
@@ -94,13 +94,13 @@ def add_sounds(
     """Copy a recording and put sounds into its track; the same seed gives the same bytes.
 
     Sounds follow one another along the walk, each as early as the rule allows, no two at the same time. Categories
-    are drawn without replacement until all were heard, then anew. No two sounds are heard within
+    are drawn without replacement until each has played, then all again. No two sounds play within
     ``min_distance_m`` of each other in a straight line, as in the paper; in a room too small for three sounds
     by that rule the distance is measured along the walk instead. Where whole clips leave room for fewer than
-    four sounds, they are cut short, to no less than two seconds. A notice tells each of these.
+    four sounds, they are cut short, to no less than two seconds. A notice reports each of these.
 
     Args:
-        recording: the walk; a track that it has already is kept below the sounds.
+        recording: the walk; a track that it has already stays below the sounds.
         clips: a folder with a subfolder for each category, or with an index.csv (path, category).
         out: the new recording's folder, in our own format; it must be empty.
         categories: only these.
@@ -125,7 +125,7 @@ def add_sounds(
     _check(interval_s, min_distance_m, loudness_db, snr_db)
     if seed < 0:
         raise AudioError(f"The seed is {seed}; choose 0 or more.")
-    if (out / DESCRIPTION).exists():  # told before the work is done, not after
+    if (out / DESCRIPTION).exists():  # reported before the work is done, not after
         raise RecordingError(f"{out} holds a recording already; choose another folder or remove it.")
     rng = np.random.default_rng(seed)
     found = find_clips(clips, categories)
@@ -249,7 +249,7 @@ def _draws(clips: Sequence[Clip], rng: np.random.Generator) -> Iterator[Clip]:
 
 
 def _equally_loud(placed: list[_Placed], wanted_db: float, notices: list[str]) -> list[_Placed]:
-    """Make every sound as quiet as the quietest, so that each has the signal-to-noise ratio that is asked."""
+    """Attenuate every sound to the level of the quietest, so that each has the requested signal-to-noise ratio."""
     quietest_db = min(sound.loudness_db for sound in placed)
     if quietest_db < wanted_db - 0.5:
         notices.append(

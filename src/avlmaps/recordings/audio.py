@@ -1,4 +1,4 @@
-"""The audio track: float32 mono in [-1, 1], read in pieces, whatever the container."""
+"""The audio track: float32 mono in [-1, 1], read in pieces from any container."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class AudioTrack:
 
     WAV, FLAC and OGG are read by libsndfile, everything else (mp4, mkv, m4a, mp3) by FFmpeg; several channels
     become one, their mean; where they cancel one another in it, the loudest is read alone. Nothing is read before it is
-    asked for, so a track may be hours long.
+    read before it is needed, so a track may be hours long.
 
     Attributes:
         path: the file.
@@ -157,7 +157,7 @@ def write_flac(path: Path, sound: Sound | Iterable[Sound]) -> None:
     first = next(blocks, None)
     if first is None:
         raise AudioError(f"There is no sound to write to {path}; give at least one block.")
-    # Written by name: through a stream of ours, libsndfile would tell of a full disk on standard error by itself.
+    # Written by name: through a stream of ours, libsndfile would report a full disk on standard error by itself.
     with replaced_atomically(path) as stream:
         try:
             with soundfile.SoundFile(stream.name, "w", first.rate_hz, 1, "PCM_16", format="FLAC") as file:

@@ -71,7 +71,7 @@ def find_clips(folder: Path, categories: Sequence[str] | None = None) -> tuple[C
 
 
 def audible(sound: Sound, name: str = "the sound") -> Sound:
-    """Return the sound from where it can first be heard to where it can last be heard.
+    """Return the sound from its first audible sample to its last one.
 
     Heard is what is less than 40 dB below the loudest 10 ms; digital silence, which collections pad short clips
     with, and inaudible ends are cut off.

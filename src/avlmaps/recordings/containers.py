@@ -142,7 +142,7 @@ def _mono(samples: Float32[np.ndarray, "n channels"], channel: int | None = None
 
 def _unreadable(path: Path, error: Exception) -> AudioError:
     reason = str(error).strip().rstrip(".") or type(error).__name__
-    return AudioError(f"{path} cannot be read as sound ({reason}); convert it again, to FLAC for preference.")
+    return AudioError(f"{path} cannot be read as sound ({reason}); convert it again, preferably to FLAC.")
 
 
 def _opened_plain(path: Path) -> "soundfile.SoundFile":
@@ -192,7 +192,7 @@ def _promised_wav_samples(path: Path, channels: int) -> int | None:
 
 
 def _ends_at(file: "soundfile.SoundFile", count: int) -> bool:
-    """Tell whether a file's last sample can be read (a truncated FLAC still promises its full length)."""
+    """Return whether a file's last sample can be read (a truncated FLAC still promises its full length)."""
     if not 0 < count < _UNKNOWN:
         return False
     try:

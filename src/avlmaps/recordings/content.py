@@ -1,10 +1,10 @@
-"""What tells one recording from another: the content of its files, read whole where small and in samples where large.
+"""The fingerprint of a recording: the content of its files, read whole where small and in samples where large.
 
 A file is read whole up to a budget, else in evenly spread blocks that add up to it, its end among them. The budget of a
 file is a share of ``RECORDING_BUDGET_BYTES``: a recording of 2,000 pictures is read wholly but for pictures over 0.5
 MB, one of two million in 4 KB of each. The end of a PNG holds a checksum of all its pixels, so that a changed depth
 picture is always another one. Of JPEG, NPY and bags larger than the budget, a change between the sampled blocks that
-keeps the size is not seen. Times of change make no difference, so that a copy is the same recording.
+preserves the size is not seen. Times of change make no difference, so that a copy is the same recording.
 """
 
 import hashlib

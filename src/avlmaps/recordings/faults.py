@@ -1,4 +1,4 @@
-"""What can be wrong with a recording, and who is told: opening stops at the first, the validator lists them all."""
+"""Faults of a recording and their reports: opening stops at the first fault, the validator lists them all."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -252,7 +252,7 @@ def check_picture(path: Path, camera: Pinhole) -> None:
     """Check a picture's wholeness and size without decoding it.
 
     Raises:
-        RecordingError: as reading it would, as far as that can be told from the outside.
+        RecordingError: as reading it would, if the file's head already shows the fault.
     """
     if path.suffix == ".npy":
         width, height = picture_size(path)

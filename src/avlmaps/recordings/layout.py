@@ -3,10 +3,10 @@
 recording.json    this file's Description; written last, so that a folder without it is unfinished
 rgb/              colour pictures, PNG or JPEG; or one video instead, rgb.mp4 (.mkv, .mov, .webm, .avi)
 depth/            16-bit PNG of the same names; 0 and 65535 say that nothing was measured
-poses.csv         stamp_s,tx,ty,tz,qx,qy,qz,qw: poses of the depth camera, at any rate
+poses.csv         stamp_s,tx,ty,tz,qx,qy,qz,qw: poses of the depth camera, at their own rate
 frames.csv        name,stamp_s: when each picture was taken. It may be left out where poses.csv has one row for
                   each picture (in the order of the names), where rgb_rate_hz is given and names are numbers, or
-                  where a video's own stamps tell; a video's frames are the depth pictures in the order of names
+                  or where a video has stamps of its own; a video's frames are the depth pictures in the order of names
 audio.flac        or .wav, .ogg: the sound track; without it that of the video
 events.csv, semantic/, objects.json   truth, which mapping never reads
 """
@@ -116,7 +116,7 @@ def read_description(folder: Path, report: Report) -> Description:
 
     Raises:
         RecordingError: it is missing, not UTF-8, not JSON, of another version, or a field has the wrong type or
-            an impossible value; whoever listens to faults was told of it before.
+            an impossible value; a caller that listens to faults has received it before.
     """
     path = folder / DESCRIPTION
     try:

@@ -33,7 +33,7 @@ class Format:
         name: its name on the command line.
         looks_for: what makes a folder or file this format, in words.
         matches: the same as a quick test.
-        opener: ``package.module:function``, called with the path (and ``report=`` if it tells faults one by one).
+        opener: ``package.module:function``, called with the path (and ``report=`` if it reports faults one by one).
         tells_faults: whether the opener takes ``report``.
         has_topics: whether the opener takes topics by name.
     """
@@ -134,7 +134,7 @@ def open_recording(
     audio: Path | str | None = None,
     topics: Mapping[str, str] | None = None,
 ) -> Recording:
-    """Open a recording in place: nothing is copied, and no picture is read before it is asked for.
+    """Open a recording in place: nothing is copied, and no picture is read before it is needed.
 
     Args:
         path: a folder or a file.

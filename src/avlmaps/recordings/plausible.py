@@ -18,7 +18,7 @@ MAX_JUMP_M = 3.0
 MAX_SHIFT_M = 100.0
 # The frames of one map lie within it; larger maps ask for more memory than there is.
 MAX_EXTENT_M = 2_000.0
-# Beyond it, places kept in single precision are off by more than a millimetre.
+# Beyond it, places stored in single precision are off by more than a millimetre.
 MAX_FROM_ORIGIN_M = 20_000.0
 # A pose that is one of few that are out of place is left out; of more, none is to be trusted.
 MAX_STRAY_SHARE = 0.05
@@ -119,9 +119,9 @@ def plausible_walk(
     """Leave out poses that are out of place, and find out whether the rest can be one walk.
 
     Between two frames the camera may move by ``MAX_JUMP_M``, or at ``MAX_SPEED_M_S``. Where it moves further, the
-    frames up to the next such jump are another stretch. The longest stretch is believed, and each other one that can
-    be reached from what is believed. A few frames that cannot are left out; a long stretch that lies at most
-    ``MAX_SHIFT_M`` away is used, and told (tracking began anew).
+    frames up to the next such jump are another stretch. The longest stretch is accepted, and each other one that can
+    be reached from an accepted one. A few frames that cannot are left out; a long stretch that lies at most
+    ``MAX_SHIFT_M`` away is used, and reported (tracking began again).
 
     Args:
         stamps_s: rising.

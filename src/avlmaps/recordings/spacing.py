@@ -1,4 +1,4 @@
-"""Where along a walk sounds may be heard: not close to one another in time, nor in place."""
+"""Where along a walk sounds may play: not close to one another in time, nor in place."""
 
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
 _GRID_S = 0.1
-_STRIDE_M = 0.1  # a camera that is held still trembles; only moving on by so much counts as walking
+_STRIDE_M = 0.1  # a camera that is held still trembles; only a move by this distance counts as walking
 
 Measure = Literal["straight", "walked"]
 
@@ -64,7 +64,7 @@ class Placer:
     Attributes:
         walk: the walk.
         spacing: the rule.
-        onsets_s: where sounds were put so far.
+        onsets_s: where sounds are placed already.
         lengths_s: how long they are.
     """
 
@@ -101,7 +101,7 @@ class Placer:
         return bool(np.isinf(nearest_m).all())
 
     def _places(self) -> "KDTree":
-        """Return a tree of every place where a sound is heard so far."""
+        """Return a tree of every place where a sound plays already."""
         from scipy.spatial import KDTree
 
         if self._tree is None or self._in_tree != len(self.onsets_s):
@@ -134,7 +134,7 @@ def chosen_spacing(walk: Walk, spacing: Spacing, length_s: float, wanted: int = 
 
 
 def _walked(position: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " n"]:
-    """Return the length of the way up to each point, in strides, evenly shared out between their ends."""
+    """Return the length of the path up to each point, in strides, evenly shared out between their ends."""
     marks, lengths = [0], [0.0]
     for i, place in enumerate(position):
         stride_m = float(np.linalg.norm(place - position[marks[-1]]))

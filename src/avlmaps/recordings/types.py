@@ -96,7 +96,7 @@ class Recording(ABC):
     """Frames in the order of time, with poses, and perhaps an audio track. Readers subclass it.
 
     Opening one reads the poses and the list of names, never a picture; ``frame(i)`` reads one frame. Frames
-    without a usable pose are not among them and are told in ``notices``.
+    without a usable pose are not among them; ``notices`` reports them.
 
     Attributes:
         path: the folder or file.

@@ -58,7 +58,7 @@ def _check_audio(recording: Recording, report: Report) -> None:
     if lack_s > _MAX_AUDIO_LACK_S:
         sentence = (
             f"{recording.audio.path} ends at {recording.audio.end_s:.2f} s, but the frames go on to "
-            f"{recording.stamps_s[-1]:.2f} s; what was to be heard in the last {lack_s:.2f} s is missing."
+            f"{recording.stamps_s[-1]:.2f} s; the sound of the last {lack_s:.2f} s is missing."
         )
         report(Fault(sentence, recording.audio.path, fatal=False))
     try:
@@ -93,7 +93,7 @@ def _check_files(recording: FileRecording, index: int, report: Report) -> None:
 
 
 def _check_frame(recording: Recording, index: int, report: Report) -> None:
-    """Decode a frame; where that fails, look at its files one by one, so that both are told of."""
+    """Decode a frame; where that fails, check its files one by one and report each."""
     try:
         depth_m = recording.frame(index).depth_m
     except RecordingError as error:

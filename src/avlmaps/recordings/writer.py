@@ -40,7 +40,7 @@ class RecordingWriter:
         path: the folder to make; it must not exist, be empty, or hold an unfinished recording.
         rig: the cameras of every frame.
         up_in_world: unit vector against gravity, or None where it is not known.
-        colour: the files that colour is written to: ``png`` keeps every bit, ``jpg`` takes a tenth of the space.
+        colour: the files that colour is written to: ``png`` preserves every bit, ``jpg`` takes a tenth of the space.
         depth_units_per_m: units of the depth files in a metre; 1000 says millimetres.
         origin: what makes the recording, for its description.
     """

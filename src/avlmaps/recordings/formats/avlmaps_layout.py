@@ -2,7 +2,7 @@
 
 Frames of reference. Poses in the files are in the simulator's world W (x right, y up, z backward). ``T`` turns its
 axes to x forward, y left, z up: (x, y, z) becomes (-z, -x, y). **The world of the recordings opened here is T W: the
-simulator's world with its axes turned and its origin kept**, so z is up and a place (x, y, z) of ours is the
+simulator's world with its axes turned and the same origin**, so z is up and a place (x, y, z) of ours is the
 simulator's (-y, z, -x). Of a pose P_i in the files we make
 
     mobile_base   world_from_camera_i = T P_i C     P_i is the robot's base, C = base_from_camera: the camera at
@@ -105,7 +105,7 @@ def open_avlmaps(path: Path, report: Report = stop_at_first) -> FileRecording:
 
     Args:
         path: the folder with ``poses.txt`` and ``rgb/``.
-        report: is told of every fault.
+        report: called with every fault.
 
     Raises:
         RecordingError: poses and pictures do not match, or a file is damaged.
@@ -141,7 +141,7 @@ def open_avlmaps(path: Path, report: Report = stop_at_first) -> FileRecording:
 def _complete(
     path: Path, colour: dict[int, str], depth: dict[int, str], poses_count: int, report: Report
 ) -> tuple[list[int], list[str]]:
-    """Return the numbers that have all they need, and what is to be told of the others."""
+    """Return the numbers that have all they need, and the notices about the others."""
     numbers = [n for n in sorted(colour) if n < poses_count and (not depth or n in depth)]
     if not numbers:
         raise RecordingError(
@@ -164,7 +164,7 @@ def _numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, str]:
 
 
 def read_camera_file(path: Path) -> tuple[CameraFile, list[str]]:
-    """Return what ``camera.json`` says, or what is assumed where there is none, and what is to be told of that.
+    """Return the content of ``camera.json``, or the defaults where there is none, and the notices about it.
 
     Raises:
         RecordingError: the file is damaged.
@@ -183,7 +183,7 @@ def read_camera_file(path: Path) -> tuple[CameraFile, list[str]]:
 def camera_poses(
     habitat_from_body: Float[np.ndarray, "n 4 4"], given: CameraFile
 ) -> tuple[Float[np.ndarray, "n 4 4"], str]:
-    """Turn poses as they stand in the file into the camera's poses in our world; tell what they were taken for."""
+    """Turn poses as they stand in the file into the camera's poses in our world; return their type in words as well."""
     pose_type, how = given.pose_type, "as camera.json says"
     if pose_type is None:
         upward = habitat_from_body[np.isfinite(habitat_from_body[:, 1, 1]), 1, 1]

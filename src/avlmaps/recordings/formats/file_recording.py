@@ -67,7 +67,7 @@ def settle(
     Args:
         path: the recording, for the sentences.
         shots: as found.
-        report: is told of poses that are none; lost tracking (NaN, infinity) is a notice, not a fault to stop at.
+        report: called with each invalid pose; lost tracking (NaN, infinity) is a notice, not a fault to stop at.
         pose_file: the file that holds the pose of shot i; None where the reader checked the poses itself.
 
     Returns:
@@ -126,7 +126,7 @@ def _some(names: Sequence[str]) -> str:
 
 @dataclass(eq=False)
 class FileRecording(Recording):
-    """Frames whose pictures are files, read when asked for.
+    """Frames whose pictures are files, read on demand.
 
     Attributes:
         path: the folder.

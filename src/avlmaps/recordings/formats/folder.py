@@ -1,4 +1,4 @@
-"""Reading our own folder format; `layout.py` tells what is in it, `writer.py` writes it."""
+"""Reading our own folder format; `layout.py` describes it, `writer.py` writes it."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -31,13 +31,13 @@ def open_folder(path: Path, report: Report = stop_at_first) -> FileRecording:
 
     Args:
         path: the folder.
-        report: is told of every fault; by default the first fatal one ends the opening.
+        report: called with every fault; by default the first fatal one ends the opening.
 
     Raises:
         RecordingError: the recording is unfinished or damaged so that it cannot be used.
     """
     if not (path / layout.DESCRIPTION).exists() and (path / layout.UNFINISHED).exists():
-        sentence = f"{path} was never finished: whatever wrote it stopped before its end; record it again."
+        sentence = f"{path} was never finished: its writer stopped before the end; record it again."
         report(Fault(sentence, path / layout.UNFINISHED))
         raise RecordingError(sentence)
     description = layout.read_description(path, report)
@@ -188,7 +188,7 @@ def _find_pictures(
     colour = [f"rgb/{found.get(name, name + '.png')}" for name in names]
     if description.frames is not None and description.frames != len(names):
         where = path.name if os.path.lexists(path) else "rgb/"
-        sentence = f"{folder / layout.DESCRIPTION} tells of {description.frames} frames, but {where} has {len(names)}."
+        sentence = f"{folder / layout.DESCRIPTION} lists {description.frames} frames, but {where} has {len(names)}."
         report(Fault(sentence, folder / layout.DESCRIPTION, fatal=False))
     depth = [f"depth/{name}.png" for name in names]
     if video is not None:
@@ -225,10 +225,10 @@ def _stamps_without_list(
 
 
 def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, tuple[str, ...], float]:
-    """Give every picture a pose: its own row's, or one interpolated at its stamp where that can be told.
+    """Give every picture a pose: its own row's, or one interpolated at its stamp where the poses allow it.
 
     Returns:
-        The shots, what is to be told of them, and the date that was subtracted from the stamps, seconds.
+        The shots, the notices about them, and the date that was subtracted from the stamps, seconds.
     """
     stamps_s = known.stamps_s if found.stamps_s is None else found.stamps_s
     start_s, notices = 0.0, []
@@ -248,7 +248,7 @@ def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, tuple[str, .
 def _interpolated(
     stamps_s: Float[np.ndarray, " n"], known: _Poses
 ) -> tuple[Bool[np.ndarray, " n"], Float[np.ndarray, "n 4 4"], list[str]]:
-    """Return where a pose can be told, the poses (NaN elsewhere), and sentences about what cannot be used."""
+    """Return where a pose is known, the poses (NaN elsewhere), and sentences about what cannot be used."""
     notices: list[str] = []
     usable = np.flatnonzero(known.usable)
     if len(usable) < len(known.usable):

@@ -42,7 +42,7 @@ def open_replica(path: Path, report: Report = stop_at_first) -> FileRecording:
 
     Args:
         path: the folder with ``traj.txt`` and ``results/``.
-        report: is told of every fault.
+        report: called with every fault.
 
     Raises:
         RecordingError: poses and pictures do not match, or a file is damaged.

@@ -74,7 +74,7 @@ def extract_audio(
         topic: for sentences.
         folder: where the file goes.
         start_s: the recording's start on the clock of the receive times, seconds.
-        pcm: says that the messages are plain 16-bit samples, whatever AudioInfo says.
+        pcm: says that the messages are plain 16-bit samples, against AudioInfo if need be.
 
     Returns:
         The track, or None with a sentence that says why there is none.

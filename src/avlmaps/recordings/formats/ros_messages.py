@@ -27,7 +27,7 @@ _COLOUR_ENCODINGS = {
 
 def header_stamp_s(rawdata: bytes, is_ros2: bool) -> float:
     """Return the header's stamp without deserialising the message (whose first field must be a header)."""
-    if is_ros2:  # CDR: four bytes of encapsulation, then sec, nanosec; the second byte tells the byte order
+    if is_ros2:  # CDR: four bytes of encapsulation, then sec, nanosec; the second byte states the byte order
         order = "<" if rawdata[1] & 1 else ">"
         seconds, nanoseconds = struct.unpack_from(order + "iI", rawdata, 4)
     else:  # seq, secs, nsecs

@@ -34,7 +34,7 @@ class TransformTree:
     def add(
         self, parent: str, child: str, parent_from_child: Float[np.ndarray, "4 4"], stamp_s: float, static: bool
     ) -> None:
-        """Add one transform; one that is none (NaN, no rotation, a frame in itself) is left out and told."""
+        """Add one transform; an invalid one (NaN, no rotation, a frame in itself) is left out and reported."""
         parent, child = parent.lstrip("/"), child.lstrip("/")
         if not np.isfinite(parent_from_child).all() or not child or parent == child:
             self._broken[parent, child] += 1

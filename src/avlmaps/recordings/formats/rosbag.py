@@ -279,7 +279,7 @@ def _no_pose(path: Path, camera_frame: str, stamps_s: np.ndarray, tree: Transfor
     when = f" (they go from {stamps_s[0]:.3f} to {stamps_s[-1]:.3f} s)" if len(stamps_s) else ""
     poses = f"; its poses go from {span[0]:.3f} to {span[1]:.3f} s, so check that both use one clock" if span else ""
     return (
-        f"{path} tells no pose of its camera frame {camera_frame!r} at the time of any of its {len(stamps_s)} "
+        f"{path} has no pose of its camera frame {camera_frame!r} at the time of any of its {len(stamps_s)} "
         f"images{when}{poses}; record /tf, /tf_static or odometry, or name the topic (pose=/odom)."
     )
 
@@ -323,7 +323,7 @@ def _pick(candidates: list[str], better: tuple[str, ...]) -> str:
 
 
 def _read_rig(bag: _Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree) -> tuple[Rig, list[str], str]:
-    """Return the cameras, what is worth telling of them, and the depth camera's frame; ``mounts`` links the two."""
+    """Return the cameras, the notices about them, and the depth camera's frame; ``mounts`` links the two."""
     cameras: dict[str, Any] = {}
     notices: list[str] = []
     frames: dict[str, str] = {}
@@ -381,7 +381,7 @@ def _check_pose_topic(bag: _Bag, topic: str) -> None:
     if not set(found) & {*_POSE_TYPES, _TRANSFORM_TYPE}:
         known = ", ".join(kind.rsplit("/", 1)[1] for kind in (*_POSE_TYPES, _TRANSFORM_TYPE))
         raise RecordingError(
-            f"{topic!r} of {bag.path} is of the type {found[0]}, which tells no poses; name a topic of {known}."
+            f"{topic!r} of {bag.path} is of the type {found[0]}, which holds no poses; name a topic of {known}."
         )
 
 

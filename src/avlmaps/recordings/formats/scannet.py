@@ -25,7 +25,7 @@ def open_scannet(path: Path, report: Report = stop_at_first) -> FileRecording:
 
     Args:
         path: the folder with ``color/``, ``depth/``, ``pose/`` and ``intrinsic/``.
-        report: is told of every fault.
+        report: called with every fault.
 
     Raises:
         RecordingError: no frame is complete, or poses or intrinsics are damaged.

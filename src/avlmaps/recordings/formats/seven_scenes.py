@@ -31,7 +31,7 @@ def open_seven_scenes(path: Path, report: Report = stop_at_first) -> FileRecordi
 
     Args:
         path: the folder with the ``frame-*`` files; ``camera-intrinsics.txt`` may lie there or in the folder above.
-        report: is told of every fault.
+        report: called with every fault.
 
     Raises:
         RecordingError: the sequence holds no complete frame, or a file of poses or intrinsics is damaged.

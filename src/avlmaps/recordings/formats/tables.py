@@ -63,7 +63,7 @@ def read_table(path: Path, columns: tuple[int, ...], report: Report, header: boo
     Args:
         path: the file.
         columns: how many numbers a line may have; the first line decides which of them.
-        report: is told of every line that is not as it should be.
+        report: called with every line that is not as it should be.
         header: whether the first line may name the columns instead.
     """
     values, lines, width = array("d"), array("q"), 0
@@ -104,7 +104,7 @@ def _any_number(fields: list[str]) -> bool:
 
 
 def read_matrix(path: Path, rows: int, columns: int) -> Float[np.ndarray, "rows columns"]:
-    """Read one matrix written row by row, in whatever lines.
+    """Read one matrix written row by row; line breaks may stand anywhere.
 
     Raises:
         RecordingError: the file is missing, is not text, or holds another count of numbers.

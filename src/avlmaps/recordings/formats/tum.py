@@ -40,7 +40,7 @@ def open_tum(path: Path, report: Report = stop_at_first) -> FileRecording:
 
     Args:
         path: the folder with ``rgb.txt``, ``depth.txt`` and ``groundtruth.txt``.
-        report: is told of every fault.
+        report: called with every fault.
 
     Raises:
         RecordingError: a list is missing or damaged, or nothing can be paired.
@@ -104,7 +104,7 @@ def _stream(folder: Path, name: str, report: Report) -> _Stream:
 def _pairs(
     path: Path, colour: _Stream, depth: _Stream, trajectory: timeline.Trajectory
 ) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"], list[str]]:
-    """Pair colour with depth where a pose is known; return the rows of both and what is to be told of the others."""
+    """Pair colour with depth where a pose is known; return the rows of both and the notices about the others."""
     of_colour, of_depth = timeline.associate(colour.stamps_s, depth.stamps_s, _PAIR_TOLERANCE_S)
     if len(of_colour) == 0:
         raise RecordingError(
