@@ -50,6 +50,7 @@ def test_the_files_cover_every_page_but_not_what_is_exempt() -> None:
         ('KEYS = ["told", "was told"]\n', []),
         ('PATTERN = r"what I told you to do"\n', []),
         ('"""Reads `told` and ``so many``; "he told me so" is a command."""\n', []),
+        ('"""F.\n\n    Args:\n        told: was told.\n    """\n', [(4, "told")]),
         ('f"The robot said {told} and {so_many} other words."\n', []),
     ],
 )

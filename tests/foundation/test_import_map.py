@@ -431,7 +431,7 @@ def test_links_to_other_files_are_not_followed(arrays: dict[str, np.ndarray], sc
     source = write_h5(tmp_path / "vlmaps.h5df", _without(arrays, "weight"))
     with h5py.File(source, "a") as file:
         file["weight"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "/weight")
-    with pytest.raises(MapError, match="weight is not an array kept in this file"):
+    with pytest.raises(MapError, match="weight is not an array stored in this file"):
         import_reference_map(source, tmp_path / "m.avlmap", SETTINGS, poses=scene / "poses.txt", progress=False)
 
 

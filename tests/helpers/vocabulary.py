@@ -3,9 +3,9 @@
 The table "Words to avoid" of docs/glossary.md is the list. ``python tests/helpers/vocabulary.py [FILE ...]`` prints
 each hit as ``file:line: word -> better word`` and exits 1 if there is one.
 
-Code, text in backticks and quoted sentences are exempt: they are names, data or the words of somebody else. Strings in
-triple quotes are prose. Other strings count as prose from four words on, because shorter ones are mostly keys, names
-and phrases to be parsed.
+Code, text in backticks, names of arguments and quoted sentences are exempt: they are names, data or the words of
+somebody else. Strings in triple quotes are prose. Other strings count as prose from four words on, because shorter
+ones are mostly keys, names and phrases to be parsed.
 """
 
 import argparse
@@ -26,7 +26,7 @@ LEAST_WORDS = 4
 NOT_YET: tuple[str, ...] = ("src/avlmaps", "benchmarks", "training")
 # The glossary quotes the words, the change log is history, and benchmarks/ (checked) writes the page of results.
 EXEMPT = ("docs/glossary.md", "docs/benchmarks.md", "CHANGELOG.md")
-_QUOTED = re.compile(r"``.*?``|`[^`]*`|\"[^\"\n]{1,120}\"|“[^”]*”", re.DOTALL)
+_QUOTED = re.compile(r"(?m:^[ \t]*\w+:(?=\s))|``.*?``|`[^`]*`|\"[^\"\n]{1,120}\"|“[^”]*”", re.DOTALL)
 _FENCED = re.compile(r"^(```|~~~).*?^\1|^(?: {4}|\t).*?$|<!--.*?-->|\]\([^)]*\)", re.MULTILINE | re.DOTALL)
 _FIELD = re.compile(r"\{[^{}]*\}")
 _SKIPPED = {tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT}

@@ -109,7 +109,7 @@ def test_too_little_surface_is_told(depth):
     with pytest.raises(RecordingError) as error:
         find_up([frame, frame], np.random.default_rng(0))
     assert str(error.value) == (
-        "Which way is up cannot be told: 2 frames show 0 places with a smooth surface within 4.0 m, and 200 are "
+        "The up direction cannot be found: 2 frames show 0 places with a smooth surface within 4.0 m, and 200 are "
         "needed; write the recording's up direction into it."
     )
 

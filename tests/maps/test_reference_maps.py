@@ -186,7 +186,7 @@ def test_what_is_no_map_is_told(source: str, sentence: str, tmp_path: Path) -> N
 
 def test_a_map_of_the_first_demonstration_is_refused_for_its_lost_heights(tmp_path: Path) -> None:
     _touch(tmp_path / "map/grid_lseg_1.npy")
-    with pytest.raises(MapError, match=r"\(map/grid_lseg_1.npy\), seen from above: the heights in it are lost"):
+    with pytest.raises(MapError, match=r"top-down map .*\(map/grid_lseg_1.npy\): the heights in it are lost"):
         find_scene(tmp_path)
 
 

@@ -103,7 +103,7 @@ def test_a_full_disk_is_one_sentence_and_leaves_no_rubbish(tmp_path: Path, monke
         write_array(tmp_path, "a", np.zeros(3))
     assert str(fault.value) == (
         f"Cannot write {tmp_path}: No space left on device; make room or choose another folder, then run the same "
-        "build again: what was finished is kept."
+        "build again: the finished stages are stored."
     )
     assert not list(tmp_path.iterdir())
 

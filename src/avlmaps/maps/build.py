@@ -1,4 +1,4 @@
-"""From a recording to a map. ``build_map`` is the whole of it; each stage keeps what it finished."""
+"""From a recording to a map. ``build_map`` is the whole of it; each stage stores what it finished."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -42,7 +42,7 @@ def build_map(
         path: the map's folder, by custom ``NAME.avlmap``.
         profile: which models perceive: a profile's name, or a profile with others chosen (``Profile.choosing``).
         settings: all that can be chosen.
-        cache: whether features are kept, so that another build of the same frames encodes nothing again.
+        cache: whether features are stored, so that another build of the same frames encodes nothing again.
         parts: folders of ``build_part`` from other machines; their frames are not fused again.
         resume: go on with what a stopped build had finished; otherwise begin anew.
         overwrite: replace a finished map there that came from another recording, or with other settings.

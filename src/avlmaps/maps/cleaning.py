@@ -57,7 +57,7 @@ def _through(
 
 
 def seen_through(through: Int32[np.ndarray, " n"], views: Int32[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
-    """Return which voxels so many frames see through, beside those that hit them, that they are none."""
+    """Return which voxels are none, because too many frames see through them, beside those that hit them."""
     return (through >= FEWEST_THROUGH) & (through > THROUGH_SHARE * views)
 
 

@@ -1,6 +1,6 @@
 """From numbers of frames to frames with features: decoding and encoding each in a thread of its own.
 
-Both run ahead of whoever takes the frames, so that the slowest of decoding, encoding and fusion sets the pace.
+Both run ahead of the code that takes the frames, so that the slowest of decoding, encoding and fusion sets the pace.
 """
 
 from collections.abc import Generator, Iterable, Iterator, Sequence
@@ -23,7 +23,7 @@ Perceived = tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]
 def perceived(
     recording: Recording, stretches: Sequence[Sequence[int]], encoder: PixelEncoder | None
 ) -> Generator[Perceived]:
-    """Yield the frames with their features, in order; one that cannot be read keeps its place.
+    """Yield the frames with their features, in order; one that cannot be read yields its fault in its place.
 
     Args:
         recording: where the frames are.
@@ -43,7 +43,7 @@ def perceived(
 
 
 def decoded(recording: Recording, indices: Iterable[int]) -> Generator[Frame | BadFrame]:
-    """Read frames; what cannot be read comes as the sentence that tells why."""
+    """Read frames; for one that cannot be read, yield the sentence that says why."""
     for index in indices:
         try:
             yield recording.frame(index)
@@ -65,7 +65,7 @@ def encoded(
 
 
 def _next_group(frames: Iterator[Frame | BadFrame], size: int) -> list[Frame | BadFrame]:
-    """Take so many good frames, and the bad ones among them."""
+    """Take ``size`` good frames, and the bad ones among them."""
     group: list[Frame | BadFrame] = []
     good = 0
     for frame in frames:

@@ -1,8 +1,8 @@
 """Whether a map's large files are still what was written, found out once and not at every opening.
 
 Large files are memory-mapped, and comparing them with their checksums takes a second for 1.5 GB. A thread does it when
-a map is opened for the first time, and whoever reads the arrays waits for its outcome. ``.checked.json`` in the map's
-folder then keeps each file's size, inode and times of change; files that have the same when the map is opened again are
+a map is opened for the first time, and code that reads the arrays waits for its outcome. ``.checked.json`` in the map's
+folder then stores each file's size, inode and times of change; files whose entries are the same at the next opening are
 not read again. A copied map is checked anew. ``avlmaps info MAP --verify`` heeds no such note.
 """
 
@@ -43,7 +43,7 @@ def stamp(path: Path | str) -> Stamp | None:
 
 
 def is_large(info: FileInfo) -> bool:
-    """Tell whether a file is so large that opening a map does not compare it with its checksum."""
+    """Return whether a file is so large that opening a map does not compare it with its checksum."""
     return info.bytes > shards.SMALL_BYTES
 
 

@@ -1,4 +1,4 @@
-"""The build's keyframe stage: some keyframes at a time, each lot kept when it has been looked at."""
+"""The build's keyframe stage: some keyframes at a time; each lot is stored when it is done."""
 
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
@@ -27,7 +27,7 @@ from avlmaps.recordings.subset import Subset
 from avlmaps.recordings.types import Frame, Recording
 
 _RANDOMNESS = 2  # number of the stage as a source of randomness (gravity has 1)
-_VIEWS_ON_TORCH = 16  # so many views are handed to a large model at once
+_VIEWS_ON_TORCH = 16  # number of views that go through a large model at once
 _Viewed = tuple[int, Frame, Float32[np.ndarray, " dv"]]
 
 
@@ -127,7 +127,7 @@ def _encoded(
 
 
 def _from_store(plan: Plan) -> str:
-    """Tell how many keyframes need nothing new: whatever they have least of in the store."""
+    """Return how many keyframes the store holds whole: the lowest count of their kinds of features."""
     kinds = (Kind.VIEWS, Kind.LOCAL, Kind.PLACE)
     told = [came_from_store(plan.used, kind) for kind in kinds if plan.used.backend_name(kind)]
     return min((words for words in told if words), key=lambda words: int(words.split()[0]), default="")

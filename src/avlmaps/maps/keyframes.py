@@ -1,4 +1,4 @@
-"""Keyframes: which frames stand for the walk, and what the map keeps of them."""
+"""Keyframes: which frames stand for the walk, and what the map stores of them."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -23,16 +23,16 @@ class KeyframeSettings:
     """When a frame becomes a keyframe."""
 
     translation_m: float = 0.1
-    """The camera moved so far since the last keyframe."""
+    """Distance that the camera moved since the last keyframe, metres."""
 
     rotation_deg: float = 7.0
-    """Or turned so far."""
+    """Or angle that it turned, degrees."""
 
     max_gap_s: float = 5.0
-    """Or so much time went by; a robot that stands still looks again now and then."""
+    """Or time that went by, seconds; a robot that stands still adds a keyframe now and then."""
 
     thumbnail_width_px: int = 320
-    """Width of the small pictures that the map keeps."""
+    """Width of the thumbnails that the map stores."""
 
     max_depth_m: float = 6.0
     """Keypoints farther away get no 3D point: the depth of most sensors is poor out there."""
@@ -56,7 +56,7 @@ def keyframes_by_motion(
     """Return rising frame numbers: the first, the last, and enough between them to cover the walk.
 
     Every frame lies within the settings' distance, angle and time of the last keyframe before it. Where the camera
-    goes beyond them, the frame in the second half of the way that moved least becomes the keyframe, because a
+    goes beyond them, the frame in the second half of the stretch that moved least becomes the keyframe, because a
     camera that moves less blurs less.
 
     Args:
@@ -163,7 +163,7 @@ def learn_places(
 
 @dataclass(frozen=True, slots=True)
 class SeenKeyframe:
-    """All that the map keeps of one keyframe.
+    """All that the map stores of one keyframe.
 
     Attributes:
         stamp_s: when.

@@ -15,7 +15,7 @@ from avlmaps.core.poses import rotation_to_level
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Voxels
 
-STRONG_PEAK = 0.3  # of what the most crowded height has over the median: the lowest one with so much is the floor
+STRONG_PEAK = 0.3  # share of the most crowded height's excess over the median; the lowest height above it is the floor
 MOST_CELLS = 100_000_000
 _FAR_CELLS = 2.0**40  # farther off no grid reaches
 _CARRIED_M = (0.1, 2.3)  # heights over the floor at which a camera is carried by who walks on it
@@ -130,7 +130,7 @@ def find_obstacles(
 
     A cell is occupied where a voxel stands between the body's step and its height over the floor, free where the
     floor was seen and nothing stands, and unknown elsewhere. For a body that flies, what it flies over is as good as
-    a floor, and only what reaches into its height stands in the way. Where the camera was carried the floor is free as
+    a floor, and only voxels that reach into its height are obstacles. Where the camera was carried the floor is free as
     well, though it never looked down there, unless something was seen to stand there.
 
     Args:

@@ -1,4 +1,4 @@
-"""Parts of a map: sums over some frames, kept on disk, that add up to the whole in any order.
+"""Parts of a map: sums over some frames, stored on disk, that add up to the whole in any order.
 
 A stopped build goes on from the parts that it had finished, and machines that share the work bring theirs:
 ``build_part`` on each of them, then ``build_map(..., parts=[...])`` on one.
@@ -139,7 +139,7 @@ def build_part(
         out: the part's folder; a part that is there already, of the same frames and settings, is returned.
         profile: which models perceive.
         settings: the same on all machines.
-        cache: whether features are kept for another build.
+        cache: whether features are stored for another build.
 
     Raises:
         MapError: there are no such frames, or too many of them cannot be read.
@@ -160,7 +160,7 @@ def build_part(
 
 
 def merge_parts(folders: Sequence[Path | str], out: Path | str) -> Part:
-    """Add parts up to one part, in the order of their frames, whatever the order they are given in.
+    """Add parts up to one part, in the order of their frames, for any order of the folders.
 
     Args:
         folders: of ``build_part`` or of this, all of one recording and the same settings.

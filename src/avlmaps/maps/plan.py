@@ -1,4 +1,4 @@
-"""What a build is going to do, and where it keeps what it has finished."""
+"""The plan of a build, and where it stores what it has finished."""
 
 import shutil
 from dataclasses import dataclass
@@ -43,11 +43,11 @@ class Plan:
     fusion_key: str
 
     def folder(self, stage: str, key: str) -> Path:
-        """Return where a stage keeps what it finished, one folder for each key."""
+        """Return where a stage stores what it finished, one folder for each key."""
         return self.path / PARTS / f"{stage}-{key[:12]}"
 
     def rng(self, stage: int) -> np.random.Generator:
-        """Return a stage's own source of randomness, the same in every run, whatever the other stages drew."""
+        """Return a stage's own source of randomness, the same in every run, independent of the other stages."""
         return np.random.default_rng([self.settings.seed, stage])
 
 
@@ -69,7 +69,7 @@ def make_plan(recording: Recording, path: Path, used: Profile, settings: BuildSe
 
 
 def audio_key(recording: Recording) -> list[str | float] | None:
-    """Return what tells one sound track from another: a recording can be given another one."""
+    """Return what identifies a sound track: a recording can be given another one."""
     track = recording.audio
     if track is None:
         return None
@@ -78,7 +78,7 @@ def audio_key(recording: Recording) -> list[str | float] | None:
 
 
 def claim(plan: Plan, resume: bool, overwrite: bool) -> MapInfo | None:
-    """Make sure that the folder may be built into; return the map that is there if it is this very one.
+    """Check that the folder may be built into; return the map that is there if it is this very one.
 
     Args:
         plan: of the build.

@@ -13,7 +13,7 @@ from avlmaps.recordings.types import Frame, Recording
 FRAMES = 12  # looked at, spread evenly
 _FEWEST = 500  # measured places; with fewer the error is not known
 _NEAREST_M = 1.0
-_STEPS_WIDE = 80  # second differences are taken over so many parts of a row: noise that is alike nearby shows as well
+_STEPS_WIDE = 80  # second differences are taken over a row divided by this: noise that is alike nearby shows as well
 _PERFECT_PER_M = 4e-4  # below this a depth is wrong by less than a millimetre at 1.5 m: rounding
 
 

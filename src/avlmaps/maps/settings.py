@@ -16,9 +16,9 @@ class FrameSettings:
     step: int = 1
     """Fuse every n-th frame."""
     per_part: int = 200
-    """So many frames are fused, then kept: what a stopped build goes on from. Fewer lose less, more are quicker."""
+    """Frames that are fused, then stored; a stopped build resumes from there. Fewer lose less, more are quicker."""
     on_bad: Literal["skip", "stop"] = "skip"
-    """What to do with a frame that cannot be read: leave it out and tell it in the map, or stop."""
+    """What to do with a frame that cannot be read: leave it out and note it in the map, or stop."""
     max_bad_share: float = 0.05
     """Stop all the same when more than this share of the frames cannot be read."""
 

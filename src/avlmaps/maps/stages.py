@@ -1,4 +1,4 @@
-"""The stages of a build, each of them from what the earlier ones found to something that is kept."""
+"""The stages of a build, each of which stores what it computes from the earlier ones."""
 
 import shutil
 from collections.abc import Iterator, Sequence
@@ -49,7 +49,7 @@ from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import HeardSounds, Voxels
 from avlmaps.recordings.types import Ground, Recording
 
-# Below this share of agreeing surface the direction that was found is told as a guess.
+# Below this share of agreeing surface the direction that was found is reported as a guess.
 _GUESS = 0.1
 
 

@@ -46,7 +46,7 @@ class Keyframes:
         points_world: the keypoints' 3D points, NaN where there was no depth.
         thumbnail_offsets: (k + 1,) into ``thumbnails``.
         thumbnails: JPEG files one after the other.
-        score: how sure the detector was of each keypoint, in [0, 1]; empty where it does not tell, and in maps written
+        score: the detector's confidence in each keypoint, in [0, 1]; empty where it gives none, and in maps written
             before there was such an array.
     """
 

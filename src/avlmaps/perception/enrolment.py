@@ -1,4 +1,4 @@
-"""Sounds that a person taught: a name and the features of a few clips, kept in their own folder.
+"""Sounds that a person taught: a name and the features of a few clips, stored in the person's own folder.
 
 One folder each, ``sounds/<slug>/`` with ``sound.json`` and ``features.npy``; nothing is ever unpickled.
 """
@@ -47,7 +47,7 @@ class TaughtSound:
 
 
 def sounds_folder(folder: Path | None = None) -> Path:
-    """Return where taught sounds are kept."""
+    """Return the folder of taught sounds."""
     return (user_folder() if folder is None else Path(folder)) / "sounds"
 
 
@@ -107,7 +107,7 @@ def forget_sound(name: str, folder: Path | None = None) -> None:
     if not (place / "sound.json").is_file():
         known = ", ".join(taught.name for taught in taught_sounds(folder)) or "none"
         raise BackendError(f"No sound called {name!r} was taught; taught are: {known}.")
-    (place / "sound.json").unlink()  # first: a folder without notes is no sound, whatever else is left of it
+    (place / "sound.json").unlink()  # first: a folder without notes is no sound, even with other files left in it
     shutil.rmtree(place)
 
 

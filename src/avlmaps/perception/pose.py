@@ -20,7 +20,7 @@ class PoseSettings:
     """A point agrees with a pose when it is seen within this angle of where it should be (6 px at f = 525)."""
 
     max_iterations: int = 2000
-    """RANSAC gives up after so many samples."""
+    """RANSAC stops after this many samples."""
 
 
 def estimate_pose(
@@ -91,7 +91,7 @@ def refined_focal(
     """Let the focal length go along with the pose, and return the camera that fits the points best.
 
     Gauss-Newton with Cauchy weights on the reprojection error, over rotation, translation and the logarithm of one
-    factor on both focal lengths. Points that face the camera flatly tell the focal length badly: let it replace a
+    factor on both focal lengths. Points that face the camera flatly constrain the focal length badly: let it replace a
     given one only where that gains much ``agreement``.
 
     Args:

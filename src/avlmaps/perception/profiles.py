@@ -1,4 +1,4 @@
-"""Profiles: which backend serves which module. A map keeps the name of its profile and every model's card."""
+"""Profiles: which backend serves which module. A map stores the name of its profile and every model's card."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -64,7 +64,7 @@ class Profile:
     def remembered(self, backends: Mapping[str, str]) -> "Profile":
         """Return the profile of exactly these backends (``name`` or ``name@model`` by module), as a map names them.
 
-        None of them need be installed until it is asked for something.
+        None of them need be installed until it is used.
         """
         perceived = [kind for kind in Kind if kind is not Kind.WORDS]
         return replace(self, **{kind.value: backends.get(kind.value, "") for kind in perceived})
@@ -76,7 +76,7 @@ class Profile:
         return f"{name}@{model}" if model else name
 
     def on_torch(self, kind: Kind) -> bool:
-        """Tell whether a module's backend is a large model on torch, as far as the registry knows."""
+        """Return whether a module's backend is a large model on torch, by the registry."""
         name = self.backend_name(kind).partition("@")[0]
         return bool(name) and "torch" in find(kind, name).needs
 

@@ -42,7 +42,7 @@ class WordEncoder(Protocol):
     card: ModelCard
 
     def encode(self, phrases: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each phrase; the same phrase gives the same vector, in whatever company."""
+        """Return a unit vector for each phrase; the same phrase gives the same vector beside any other phrases."""
         ...
 
 
@@ -54,7 +54,7 @@ class PixelEncoder(Protocol):
 
     @property
     def vocabulary(self) -> tuple[str, ...]:
-        """Names that compete with an asked word for a voxel (the paper's class list), without ``other``."""
+        """Names that compete with a queried word for a voxel (the paper's class list), without ``other``."""
         ...
 
     def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
@@ -89,14 +89,14 @@ class BatchPixelEncoder(PixelEncoder, Protocol):
 
 @runtime_checkable
 class NamedPixelEncoder(PixelEncoder, Protocol):
-    """A pixel encoder that tells a closed set of names apart and can say how likely each of them is.
+    """A pixel encoder that distinguishes a closed set of names and can say how likely each of them is.
 
     Its features lie in the span of orthonormal codes, one for each name: Σ √p·code. A phrase may mean several names.
     """
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What it tells apart."""
+        """The names that it distinguishes."""
         ...
 
     @property
@@ -138,11 +138,11 @@ class ViewEncoder(Protocol):
 
 @runtime_checkable
 class NamedViewEncoder(ViewEncoder, Protocol):
-    """A view encoder that tells a closed set of rooms apart; see ``NamedPixelEncoder`` for its features."""
+    """A view encoder that distinguishes a closed set of rooms; see ``NamedPixelEncoder`` for its features."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What it tells apart."""
+        """The names that it distinguishes."""
         ...
 
     @property
@@ -201,7 +201,7 @@ class SoundEncoder(Protocol):
     def score_sounds(
         self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
     ) -> Float32[np.ndarray, " sounds"]:
-        """Return how likely each sound is of the same kind as the asked one, calibrated: in [0, 1], 0.5 is 'yes'."""
+        """Return how likely each sound is of the same kind as the queried one, calibrated: in [0, 1], 0.5 is 'yes'."""
         ...
 
 
@@ -223,7 +223,7 @@ class LocalFeatures:
         xy: image coordinates in pixels, sub-pixel, the centre of the first pixel at (0.5, 0.5).
         descriptors: one row a keypoint, unit length.
         scale: size of each keypoint, pixels; empty where it is not known.
-        score: how sure the detector was of each keypoint, in [0, 1]; empty where it is not known.
+        score: the detector's confidence in each keypoint, in [0, 1]; empty where it is not known.
         size: (width, height) of the picture, pixels; (0, 0) where it is not known. Learned matchers need it.
     """
 
@@ -252,7 +252,7 @@ class PlaceEncoder(Protocol):
     card: ModelCard
 
     def fit(self, local: Sequence[LocalFeatures], rng: np.random.Generator) -> dict[str, np.ndarray]:
-        """Learn what it needs (VLAD: the visual words) from the map's own keyframes; arrays to be kept in the map.
+        """Learn from the map's own keyframes (VLAD: the visual words); the map stores the returned arrays.
 
         What has learnt from others' pictures before returns none.
         """

@@ -1,4 +1,4 @@
-"""Where a person's own things are kept: the sounds they taught, and what can be worked out again."""
+"""The user's folder: the sounds that the user taught, and caches that can be computed again."""
 
 import os
 import sys

@@ -42,7 +42,7 @@ class PartAnswer:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Goals, best first, and whether they are what was asked for.
+    """Goals, best first, and whether they match the query.
 
     Attributes:
         goals: may hold places even where ``found`` is false: the best guesses, with low scores.

@@ -1,4 +1,4 @@
-"""The map as a user meets it: four ways to ask, each a heatmap, and whole questions."""
+"""The map as a user meets it: four modalities, each a heatmap, and whole questions."""
 
 import time
 from collections.abc import Sequence
@@ -60,9 +60,9 @@ class QuerySettings:
 
 
 class AVLMap:
-    """A map that can be asked. Heatmaps of one map multiply: ``m.object("chair", primary=True) * m.sound("dog")``.
+    """A map that can be queried. Heatmaps of one map multiply: ``m.object("chair", primary=True) * m.sound("dog")``.
 
-    The first query by word of an object scores all voxels against the vocabulary and keeps that for later ones.
+    The first query by word of an object scores all voxels against the vocabulary and stores that for later ones.
 
     Attributes:
         stored: the map as it lies on the disk.
@@ -76,7 +76,7 @@ class AVLMap:
 
     @classmethod
     def open(cls, path: str | Path, settings: QuerySettings | None = None) -> "AVLMap":
-        """Open a map's folder; the features stay on the disk until they are asked.
+        """Open a map's folder; the features stay on the disk until a query needs them.
 
         Raises:
             MapError: it is no map, damaged, or of another schema or profile.
@@ -240,7 +240,7 @@ class AVLMap:
         intrinsics: Pinhole | None = None,
         primary: bool = False,
     ) -> Heatmap:
-        """Return the heat of where a picture was taken; where that is not sure, of the best guess, and not ``found``.
+        """Return the heat of where a picture was taken; if it is not located, of the best guess, and not ``found``.
 
         Args:
             picture: a file, or RGB uint8.
@@ -273,7 +273,7 @@ class AVLMap:
         return Panoramas(self.space, stored.voxels.rgb, stored.keyframes)
 
     def locate(self, rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None = None) -> "Located":
-        """Return the pose of the camera that took a picture, or that it could not be told."""
+        """Return the pose of the camera that took a picture, or that it was not located."""
         return self._located(rgb, intrinsics)
 
     def _located(
@@ -303,7 +303,7 @@ class AVLMap:
 
         Args:
             question: a sentence, such as "the chair near the sound of glass breaking", or its parts.
-            top: at most so many goals.
+            top: number of goals at most.
             intrinsics: of the camera that took the question's pictures; by default the map's own.
 
         Raises:

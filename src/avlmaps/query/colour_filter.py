@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float32, Int, UInt8
 
 from avlmaps.perception.embedded.colours import COLOURS, ColourWords
 
-# An instance is of a colour where so many of its voxels are; handles, shade and edges are of others.
+# An instance is of a colour where this share of its voxels is; handles, shade and edges are of others.
 FULL_SHARE = 0.4
 # Words that name no thing of their own: "something red".
 NOTHING = frozenset({"", "thing", "things", "something", "object", "objects", "anything", "stuff", "the", "a", "one"})
@@ -21,7 +21,7 @@ class Tint:
     Attributes:
         text: the words of colour.
         feature: of the colour.
-        thing: what is left, ``""`` where only a colour was asked for.
+        thing: the rest of the phrase, ``""`` where the query names only a colour.
     """
 
     text: str
@@ -46,7 +46,7 @@ def tint_of(phrase: str) -> Tint | None:
 
 
 def is_tinted(rgb: UInt8[np.ndarray, "n 3"], tint: Tint) -> Bool[np.ndarray, " n"]:
-    """Return which voxels' colours are closer to the asked one than to any other term."""
+    """Return which voxels' colours are closer to the queried one than to any other term."""
     words = colour_words()
     colour = words.encode_colours(rgb)
     terms = words.encode_words(COLOURS)
@@ -57,7 +57,7 @@ def is_tinted(rgb: UInt8[np.ndarray, "n 3"], tint: Tint) -> Bool[np.ndarray, " n
 def tinted_share(
     rgb: UInt8[np.ndarray, "n 3"], mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"], tint: Tint
 ) -> Float32[np.ndarray, " i"]:
-    """Return for each instance how far its voxels are of the asked colour: 1 from four in ten on."""
+    """Return for each instance the share of its voxels in the queried colour: 1 from four in ten on."""
     if not len(instance):
         return np.zeros(0, np.float32)
     hits = is_tinted(np.asarray(rgb)[mask], tint)

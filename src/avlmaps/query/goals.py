@@ -13,7 +13,7 @@ from jaxtyping import Float, Float32, Int
 
 from avlmaps.query.factors import FOUND_AT, Factor, NearThings, lead_of
 
-# Where everything asked for is in the map, but nowhere together by at least this much heat, the whole is not found.
+# Where all parts of the query are in the map, but nowhere together by at least this much heat, the whole is not found.
 LEAST_TOGETHER = 0.1
 # Two sounds heard at one place are one place to go to.
 SEPARATION_M = 1.0

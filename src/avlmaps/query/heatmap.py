@@ -23,7 +23,7 @@ class Heatmap:
 
     Attributes:
         space: the map's voxels.
-        factors: what was asked for, one thing each.
+        factors: the parts of the query, one factor each.
         values: the product of the factors' heat.
     """
 
@@ -49,7 +49,7 @@ class Heatmap:
         return Heatmap(self.space, one.factors + two.factors, one.values * two.values)
 
     def with_unsure(self) -> "Heatmap":
-        """Return the heatmap in which things count that are too unsure to be told: for who must guess."""
+        """Return the heatmap that includes instances of low confidence: for a caller that must guess."""
         return fused([Heatmap.of(factor.at_any_rate()) for factor in self.factors])
 
     def _in_company(self) -> "Heatmap":
@@ -76,7 +76,7 @@ class Heatmap:
 
     @property
     def modalities(self) -> tuple[Modality, ...]:
-        """What kinds of things were asked for."""
+        """The modalities of the query's parts."""
         return tuple(factor.part.modality for factor in self.factors)
 
     @property

@@ -13,7 +13,7 @@ _SPECK_M2 = 0.0199  # a guess shows at least as much surface as a mug
 def without_specks(
     mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"], confidence: Float32[np.ndarray, " i"], least: float
 ) -> tuple[Bool[np.ndarray, " n"], Int[np.ndarray, " b"], Float32[np.ndarray, " j"]]:
-    """Return the voxels, instances and confidences of the instances that are sure enough to count."""
+    """Return the voxels, instances and confidences of the instances that are confident enough to count."""
     kept = confidence >= least
     stays = kept[instance]
     thinned = np.zeros(len(mask), bool)
@@ -27,7 +27,7 @@ def joined_pieces(
     """Return for each instance the number of the thing that it is a piece of.
 
     A thing of thin parts comes in pieces: the camera saw a chair's legs and its back and little between. Two
-    pieces are one thing where at least half of the smaller one's columns (of ``cell_m``, seen from above) hold the
+    pieces are one thing where at least half of the smaller one's columns (of ``cell_m``, top-down) hold the
     other too, with nothing else between them and at most ``join_m`` in height.
     """
     from scipy.sparse import coo_array
@@ -49,7 +49,7 @@ def joined_pieces(
 
 
 def likeliest(things: NearThings) -> NearThings:
-    """Return the best guesses among unsure instances: no specks, and at least half as sure as the surest."""
+    """Return the best guesses among uncertain instances: no specks, and at least half of the highest confidence."""
     surface_m2 = np.bincount(things.instance, minlength=len(things.confidence)) * things.space.grid.voxel_size_m**2
     solid = np.where(surface_m2 >= _SPECK_M2, things.confidence, 0.0).astype(np.float32)
     least = max(float(np.max(solid, initial=0.0)) / 2, float(np.finfo(np.float32).tiny))

@@ -117,7 +117,7 @@ def best_two(scores, best, best_word, second, second_word, offset):
 def margins(score, best, best_word, second, second_word, silent, least, out, unsure, start, stop):
     """Write score minus the best rival's, where words that are ``silent`` (by number) do not compete.
 
-    ``unsure`` is set where both kept rivals are silent and a third may be the best one.
+    ``unsure`` is set where both stored rivals are silent and a third may be the best one.
     """
     for i in range(start, stop):
         rival = np.float32(least)
@@ -138,7 +138,7 @@ def undominated(horizontal, score, falloff_per_m):
     """Mark the cones that stick out somewhere; rows must come in falling score.
 
     Cone j lies under cone i everywhere if s_j <= s_i − ε·d(i, j). That relation carries over, so it is enough
-    to compare with the cones kept so far.
+    to compare with the cones selected before.
     """
     keep = np.zeros(len(score), np.bool_)
     kept = np.empty(len(score), np.int64)

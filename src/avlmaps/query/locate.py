@@ -53,17 +53,17 @@ class LocateSettings:
     """
 
     references: int = 5
-    """How many keyframes that look alike are matched where the most alike one alone does not tell enough."""
+    """How many keyframes that look alike are matched where the most alike one alone does not match enough."""
 
     enough_inliers: int = 60
-    """So many keypoints of one keyframe tell enough. More keyframes would not help: the poses of a recording drift,
+    """This many keypoints of one keyframe are enough. More keyframes would not help: the poses of a recording drift,
     so that keyframes farther off pull the answer away (measured: 0.79 cm with five, 0.63 cm with one)."""
 
     nearest_inliers: int = 40
-    """The keyframe nearest to the answer is asked again, alone; so many keypoints must agree for it to be believed."""
+    """The keyframe nearest to the answer is matched again, alone; the pose is accepted if this many keypoints agree."""
 
     min_inliers: int = 15
-    """A pose needs so many keypoints that agree with it (each counted once). Pictures of another place reach 7."""
+    """A pose needs this many keypoints that agree with it (each counted once). Pictures of another place reach 7."""
 
     min_inlier_ratio: float = 0.25
     """And so large a part of the matched keypoints. Mirrored pictures of the place itself, where single things match,
@@ -74,7 +74,7 @@ class LocateSettings:
     the two axes, as a part of width times height; a single poster or logo is no place."""
 
     guess_references: int = 0
-    """Where a picture is not located, match so many keyframes one by one and tell the best of their poses."""
+    """Where a picture is not located, match this many keyframes one by one and return the best of their poses."""
 
     guess_inliers: int = 6
     """Fewer agreeing keypoints guess no better than the place of the keyframe itself. Measured on 48 photos of five
@@ -103,10 +103,10 @@ class Located:
         world_from_camera: pose of the camera that took the picture, None for "not located".
         inliers: keypoints that agree with the best pose, also where they are too few.
         reference_stamp_s: when the keyframe was taken that most of them were seen in; None without any.
-        score: how sure it is, in [0, 1]; at least 0.5 exactly where a pose is given.
+        score: the confidence, in [0, 1]; at least 0.5 exactly where a pose is given.
         elapsed_ms: how long it took.
         camera: the camera that the pose holds for; another than the given one where its focal length was refined.
-        guess: where it was not located, the likeliest pose all the same, if one was asked for: not to be relied on.
+        guess: where it was not located, the likeliest pose all the same, if requested: not to be relied on.
         guess_inliers: keypoints that agree with the guess; 0 where it is only the place of a keyframe.
     """
 

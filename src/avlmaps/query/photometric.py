@@ -5,7 +5,7 @@ colours. From places all over the map a panorama is drawn; the picture is laid o
 the best of these poses are moved until the drawn view is most alike (direct image alignment, as by Lucas and Kanade
 1981, without derivatives). The measure is a correlation, so that exposure does not matter.
 
-What comes out is a guess: rooms may look alike. It answers where keypoints do not, and is never told as sure.
+The result is a guess: rooms may look alike. It answers where keypoints do not, and never counts as located.
 """
 
 from collections.abc import Sequence
@@ -43,7 +43,7 @@ class PhotometricSettings:
     spacing_m: float = 0.5
     """From one place to look from to the next; wider where there would be more than ``most_eyes``."""
     most_eyes: int = 4000
-    """So many panoramas at most; each takes 24 kB."""
+    """Number of panoramas at most; each takes 24 kB."""
     reach_m: float = 1.2
     """A picture was taken so near to where the robot has been."""
     heights_m: tuple[float, ...] = (-0.65, -0.15, 0.3)
@@ -53,9 +53,9 @@ class PhotometricSettings:
     pitches_rad: tuple[float, ...] = tuple(np.deg2rad(np.arange(-32.0, 17.0, 8.0)))
     """Above the horizon, of the pictures that are looked for first."""
     candidates: int = 40
-    """So many poses are moved to fit better."""
+    """Number of poses that are moved to fit better."""
     finalists: int = 6
-    """And so many of these to fit best."""
+    """Number of these that are moved to fit best."""
     least_seen: float = 0.5
     """The map must show this part of the picture."""
     colour_weight: float = 2.0
@@ -63,7 +63,7 @@ class PhotometricSettings:
     inlier_worth: float = 0.015
     """What a keypoint that agrees with a given pose adds to its likeness..."""
     most_inliers: int = 12
-    """...up to so many of them."""
+    """...up to this many of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,7 +282,7 @@ class _Shrunk:
 
     @classmethod
     def of(cls, rgb: UInt8[np.ndarray, "h w 3"], camera: Pinhole, side: int, colour_weight: float) -> "_Shrunk":
-        """Make the longer side so many pixels."""
+        """Scale the longer side to ``side`` pixels."""
         factor = side / max(camera.width, camera.height)
         size = max(1, round(camera.width * factor)), max(1, round(camera.height * factor))
         small = cv2.resize(np.ascontiguousarray(rgb), size, interpolation=cv2.INTER_AREA)

@@ -178,7 +178,7 @@ def recording_axis(direction: Float[np.ndarray, "3"]) -> tuple[str, int] | None:
 
 
 def _draw_recording_axes(ax: "Axes", space: Space) -> None:
-    """Draw where the recording's axes point, seen from above; the one along the line of sight is left out."""
+    """Draw where the recording's axes point in the top-down view; the one along the line of sight is left out."""
     for column, letter in enumerate("xyz"):
         right, up = (float(value) for value in space.level_from_world[:2, column])
         if np.hypot(right, up) < 0.3:
@@ -275,7 +275,7 @@ def _rgb(colour: str) -> Float[np.ndarray, "3"]:
 
 
 def save(figure: "Figure", path: Path) -> Path:
-    """Write a picture, of the kind that its suffix tells.
+    """Write a picture, in the format of its suffix.
 
     Raises:
         QueryError: the picture cannot be written there.

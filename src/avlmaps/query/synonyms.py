@@ -26,5 +26,5 @@ def is_a(other: str, wanted: str) -> bool:
 
 
 def is_open(encoder: PixelEncoder) -> bool:
-    """Return whether an encoder takes any word and tells by how much its cosines count."""
+    """Return whether an encoder takes any word and has a scale for its cosines."""
     return isinstance(encoder, ScaledEncoder) and not isinstance(encoder, NamedPixelEncoder)

@@ -17,7 +17,7 @@ from avlmaps.recordings.audio import Sound
 _WINDOW_S = 0.032
 _OVERLAP = 4
 _SMOOTH_FRAMES, _SMOOTH_BINS = 5, 3
-_STEEPNESS = 1.5  # noise is taken for so much stronger than it is on average, since single frames exceed the average
+_STEEPNESS = 1.5  # noise is assumed to be louder than its average by this factor, since single frames exceed it
 _CHUNK_S = 10.0
 
 
@@ -43,7 +43,7 @@ def noise_profile(quiet: Iterable[Sound]) -> NoiseProfile | None:
         quiet: stretches of one rate.
 
     Returns:
-        The profile, or None where the stretches are too short to tell (less than 0.2 s in all).
+        The profile, or None where the stretches are too short (less than 0.2 s in all).
     """
     powers: list[np.ndarray] = []
     rate_hz = 0
@@ -64,7 +64,7 @@ def denoised(sound: Sound, profile: NoiseProfile, reduction_db: float = 12.0) ->
     Args:
         sound: the sound with its background.
         profile: the background.
-        reduction_db: at most by so much, dB.
+        reduction_db: limit of the reduction, dB.
     """
     samples = [block.samples for block in denoised_blocks([sound], profile, reduction_db)]
     return Sound(np.concatenate(samples) if samples else sound.samples, sound.rate_hz)
@@ -76,7 +76,7 @@ def denoised_blocks(blocks: Iterable[Sound], profile: NoiseProfile, reduction_db
     Args:
         blocks: the track, in the rate of the profile.
         profile: the background.
-        reduction_db: at most by so much, dB.
+        reduction_db: limit of the reduction, dB.
 
     Raises:
         ValueError: a block has another rate than the profile.

@@ -32,10 +32,10 @@ class HearingSettings:
     noise_reduction_db: float = 12.0
     """The background is made quieter by at most this, dB, before a sound is encoded; 0 leaves it as it is."""
     quiet_s: float = 5.0
-    """The background is learnt from so many seconds before a sound and after it, where nothing else sounds."""
+    """Seconds before and after a sound, with no other sound in them, from which the background is learnt."""
     cut: Literal["auto", "energy", "changes"] = "auto"
-    """energy: sounds are what stands out from the background; changes: the whole track is kept, divided where what
-    sounds changes; auto: changes where the sound model gives a feature every few hundredths of a second."""
+    """energy: sounds are what stands out from the background; changes: the whole track is used, divided at its change
+    points; auto: changes where the sound model gives a feature every few hundredths of a second."""
     changes: ChangeSettings = field(default_factory=ChangeSettings)
     """Dividing the track where what sounds changes."""
 
@@ -47,9 +47,9 @@ class HearingSettings:
 
 
 def hear(recording: Recording, encoder: SoundEncoder, settings: HearingSettings, clips_folder: Path) -> HeardSounds:
-    """Find the sounds of a recording, encode each whole, and tell where the robot was while it heard them.
+    """Find the sounds of a recording, encode each whole, and return the robot's path during each.
 
-    An encoder with a feature for each short step of time hears the whole track instead, which is then divided where the
+    An encoder with a feature for each short step of time encodes the whole track, which is then divided where the
     features change (``maps.audio.change_points``); only digital silence, samples that are all zero, is left out.
 
     Args:
@@ -134,7 +134,7 @@ class _Heard:
 
 
 def _cleaned(sound: Sound, track: AudioTrack, found: Sequence[Segment], index: int, settings: HearingSettings) -> Sound:
-    """Return the sound with less of the background that is heard before and after it."""
+    """Return the sound with less of the background that plays before and after it."""
     if settings.noise_reduction_db == 0.0 or settings.quiet_s == 0.0:
         return sound
     profile = noise_profile(_quiet_around(track, found, index, settings.quiet_s))

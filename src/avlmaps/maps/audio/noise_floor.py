@@ -15,10 +15,10 @@ from avlmaps.maps.audio.filterbank import HOP_S, band_lines
 _BLOCK_FRAMES = 50
 _QUANTILES = (0.1, 0.3)
 # Where the background itself comes and goes (waves, a crowd), the higher quantile lies above the lower one, and the
-# background is put as high as that; not more than so many dB higher, since sounds close together have the same effect.
+# background is put as high as that; higher by this limit at most, since sounds close together have the same effect.
 _MOST_RESTLESS_DB = 4.0
 # A low quantile of medians lies below the mean power of steady noise, the more the fewer spectral lines a band has:
-# by about so many dB, divided by the root of their number (measured on white and pink noise, right within 0.2 dB).
+# by about this level, divided by the root of their number (measured on white and pink noise, right within 0.2 dB).
 _BIAS_DB = 2.2
 
 
@@ -55,7 +55,7 @@ def find_noise_floor(
     Args:
         powers: band powers, frame by frame.
         rate_hz: samples a second of the track.
-        window_s: how many seconds around a moment tell its background.
+        window_s: how many seconds around a moment determine its background.
         range_db: the background is never put lower than this below the track's loudest frame, so that in digital
             silence not every whisper is a sound.
     """
@@ -86,7 +86,7 @@ def find_noise_floor(
 def _quantiles(
     levels: Float32[np.ndarray, "blocks bands"], reach: int
 ) -> tuple[Float32[np.ndarray, "blocks bands"], Float32[np.ndarray, "blocks bands"]]:
-    """Return two low quantiles over ``2 reach + 1`` blocks; at the ends over the nearest so many blocks."""
+    """Return two low quantiles over ``2 reach + 1`` blocks; at the ends over the nearest blocks of that number."""
     length = min(2 * reach + 1, len(levels))
     found = np.stack(
         [

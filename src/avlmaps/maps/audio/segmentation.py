@@ -51,9 +51,9 @@ class SegmentationSettings:
     release_db: float = 2.5
     """It lasts as long as it is this much above the background, dB."""
     smoothing_s: float = 0.05
-    """The excess over the background is averaged over so many seconds before it is compared."""
+    """The excess over the background is averaged over this time before it is compared, seconds."""
     background_window_s: float = 40.0
-    """The background is found within so many seconds; what lasts longer is background."""
+    """The background is found within this time, seconds; a longer sound is background."""
     range_db: float = 65.0
     """What is this much below the loudest moment of the track is no sound, however silent the background."""
     tail_db: float = 50.0
@@ -65,7 +65,7 @@ class SegmentationSettings:
     max_length_s: float = 30.0
     """What is longer is cut where it is quietest."""
     padding_s: float = 0.02
-    """So much is added at both ends."""
+    """This time is added at both ends, seconds."""
     silence_threshold: float = 0.0
     """Of method silence: samples beyond this, of either sign, are sound."""
     silence_s: float = 1.0
@@ -158,7 +158,7 @@ def _runs(
 def _closed(
     run: Float32[np.ndarray, "frames 2"], begin: int, onset: float, release: float, settings: SegmentationSettings
 ) -> Iterator[_Run]:
-    """Yield the run, if it passes the onset level, without the ends where only the smoothing keeps it up."""
+    """Yield the run, if it passes the onset level, without the ends where only the smoothing holds it up."""
     if len(run) and float(run[:, 1].max()) > onset:
         audible = max(release, float(run[:, 0].max()) * 10.0 ** (-settings.tail_db / 10.0))
         loud = np.flatnonzero(run[:, 0] > audible)
@@ -166,7 +166,7 @@ def _closed(
 
 
 def _smoothed(excess: Iterable[Float32[np.ndarray, " frames"]], length: int) -> Iterator[Float32[np.ndarray, "_ 2"]]:
-    """Yield each frame's excess and its mean over ``length`` frames around it, whatever the blocks' borders."""
+    """Yield each frame's excess and its mean over ``length`` frames around it, across the blocks' borders."""
     before, after = (length - 1) // 2, length // 2
     waiting = np.ones(before, np.float32)
     kernel = np.full(length, 1.0 / length)

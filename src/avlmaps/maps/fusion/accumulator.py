@@ -31,7 +31,7 @@ class VoxelAccumulator:
     """Adds up frames, or the sums of parts, into sparse voxels without bounds.
 
     Weights are float64 and never fall below 1e-30 (which exp(−d² / 1.2) reaches at 9.1 m), so that what was only
-    ever seen from afar keeps its feature in float32; it counts for nothing beside a nearer look. Memory is that of
+    ever seen from afar has a feature in float32; it counts for nothing beside a nearer look. Memory is that of
     the voxels, 4·dim + 70 bytes each, however many frames there are. Kernels release the interpreter's lock:
     two accumulators on two threads map two parts at once.
     """
@@ -167,7 +167,7 @@ class VoxelAccumulator:
         return cells, (features.shape[0], features.shape[1])
 
     def _lookup_for(self, rig: Rig, feature_rows: int, feature_columns: int) -> PixelLookup:
-        """Return the lookup of this rig and feature map, kept from the frame before where they are the same."""
+        """Return the lookup of this rig and feature map, reused from the frame before where they are the same."""
         if self._lookup is not None:
             known_rig, known_rows, known_columns, lookup = self._lookup
             if known_rig is rig and (known_rows, known_columns) == (feature_rows, feature_columns):

@@ -23,7 +23,7 @@ def commit(voxels, scratch, origin, stamp_s, slots, geometry, count):
         stamp_s: when the frame was taken.
         slots: hash table of the map, with room.
         geometry: (index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s) of the map, added to.
-        count: voxels of the map so far.
+        count: number of voxels in the map already.
 
     Returns:
         Count of voxels now.
@@ -73,7 +73,7 @@ def _group_pairs(voxels, pairs, scratch):
 
 @njit(**OPTIONS)
 def _find_speaking(features, speaks):
-    """Note which cells have a feature that is not all zero; nearly always the first number tells."""
+    """Note which cells have a feature that is not all zero; nearly always the first number decides."""
     for cell in range(features.shape[0]):
         speaks[cell] = features[cell, 0] != 0.0
     for cell in range(features.shape[0]):

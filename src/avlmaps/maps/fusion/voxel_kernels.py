@@ -66,7 +66,7 @@ def add_rows(part, table, sums, feature_sum, weight, count):
         sums: (index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s), added to.
         feature_sum: (rows, d), added to.
         weight: (rows,), added to.
-        count: voxels of this map so far.
+        count: number of voxels in this map already.
 
     Returns:
         Count of voxels now.

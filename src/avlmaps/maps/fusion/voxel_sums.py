@@ -1,4 +1,4 @@
-"""Sums over voxels: what fusion adds up, in a table that grows in place, and in a sorted form that can be kept."""
+"""Sums over voxels: the sums of fusion, in a table that grows in place, and in a sorted form that can be stored."""
 
 from dataclasses import dataclass
 
@@ -88,7 +88,7 @@ class VoxelTable:
 
     Attributes:
         dim: length of a feature.
-        count: voxels so far.
+        count: number of voxels already.
         slots: hash table of rows, -1 free; its length is a power of two and at least twice the count.
     """
 
@@ -112,7 +112,7 @@ class VoxelTable:
         return self.index, self.rgb_sum, self.rgb_weight, self.hits, self.views, self.sharp, self.last_seen_s
 
     def reserve(self, extra: int) -> None:
-        """Make room for so many new voxels."""
+        """Make room for this many new voxels."""
         needed = self.count + extra
         if needed > len(self.weight):
             rows = max(needed, len(self.weight) + len(self.weight) // 8, 2 * SMALLEST_ROOM)

@@ -44,7 +44,7 @@ class FoundFloor:
 
 @dataclass(frozen=True, slots=True)
 class FoundGround:
-    """The floors of a recording, and how sure they are.
+    """The floors of a recording, and their confidence.
 
     Attributes:
         ground: for the height of each camera the floor under it.

@@ -15,22 +15,22 @@ from jaxtyping import Float
 
 from avlmaps.maps.gravity.patches import CELL_M, STEP_X, STEP_Y, Voxelised
 
-# The floor is looked for between so far and so little below the camera, metres.
+# The floor is searched between these distances below the camera, metres.
 DEEPEST_M, HIGHEST_M = 2.6, 0.12
 # Where no floor is in view the camera is taken to be held as people and robots mostly do.
 USUAL_HEIGHT_M = 1.3
-CERTAIN = 0.9  # from this confidence a floor tells how high the camera is in the whole recording
+CERTAIN = 0.9  # from this confidence a floor gives the camera's height in the whole recording
 SAME_M = 0.12  # two heights closer than this are one hypothesis
 _BIN_M, _BLUR_M = 0.02, 0.03  # of the histogram of level heights
 _FEWEST = 3.0  # voxels that make a peak
 _BELOW_M, _BELOW_PER_M = 0.08, 0.02  # a surface lies below a level when it does by this, and this for each metre away
 _DEEP_M = 0.25  # and counts fully when it does by this much more: up is seldom known to a degree
-_REACH_M = 0.25  # a camera stands over what is level within so far of it, seen from above
+_REACH_M = 0.25  # a camera stands over what is level within this horizontal distance
 _FEWEST_UNDER = 3  # voxels that say what a camera stands over
 
 # Weights of the evidence, nats: round numbers, chosen on NYUv2's training frames, the red kitchen and simulated walks.
-_FEW = 20.0  # so many level voxels (0.2 m2) are worth -0.7
-_MANY = 300.0  # so many (3 m2) +0.5
+_FEW = 20.0  # this number of level voxels (0.2 m2) is worth -0.7
+_MANY = 300.0  # this number (3 m2) is worth +0.5
 _BELOW_NATS, _MOST_BELOW = 40.0, 0.25
 # Cameras over a level make it a floor (a landing, a podium) when that many stand over it and it is larger than tables
 # are, or when they are as high over it as they are over other floors.

@@ -1,7 +1,7 @@
 """Finding which way is up from what a depth camera saw, for recordings that do not say.
 
 Floors, table tops and ceilings share one normal. A direction that many surfaces share is found by RANSAC over
-surface normals; which of a room's three directions is up is told by the camera, which people and robots hold nearly
+surface normals; the camera decides which of a room's three directions is up: people and robots hold it nearly
 level: its x axis is horizontal, however far it looks down, and its -y axis points upwards.
 """
 
@@ -46,7 +46,7 @@ def find_up(frames: Iterable[Frame], rng: np.random.Generator) -> Up:
         rng: draws the normals.
 
     Raises:
-        RecordingError: too little surface within 4 m to tell.
+        RecordingError: too little surface within 4 m to find up.
     """
     normals, rotations, count = [], [], 0
     for frame in frames:
@@ -58,7 +58,7 @@ def find_up(frames: Iterable[Frame], rng: np.random.Generator) -> Up:
     normal = np.concatenate(normals) if normals else np.zeros((0, 3))
     if len(normal) < FEWEST_NORMALS:
         raise RecordingError(
-            f"Which way is up cannot be told: {count} frames show {len(normal)} places with a smooth surface within "
+            f"The up direction cannot be found: {count} frames show {len(normal)} places with a smooth surface within "
             f"{MAX_DEPTH_M} m, and {FEWEST_NORMALS} are needed; write the recording's up direction into it."
         )
     direction = _refined(_most_shared(normal, np.stack(rotations), rng), normal)

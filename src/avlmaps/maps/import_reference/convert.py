@@ -48,23 +48,23 @@ from avlmaps.maps.types import Voxels
 IMPORT_VERSION = 1  # raise it when the conversion comes to make something else of the same files
 WEIGHT_VARIANCE_M2 = 0.6
 # Every hundredth pixel of a depth picture is fused by the reference (``depth_sample_rate``), so that a voxel of its map
-# stands for about as many pixels or more; how many it was is not kept.
+# stands for about as many pixels or more; the file does not store their number.
 PIXELS_PER_VOXEL = 100
 LEAST_WEIGHT = 1e-30  # as in fusion: far points' weights vanish in float32, their features must not
 
 
 @dataclass(frozen=True, slots=True)
 class ImportSettings:
-    """What the files do not tell."""
+    """Settings that the files do not hold."""
 
     cell_size_m: float = 0.05
     """Edge of a cell of the reference's grid; the imported map has voxels of this size."""
     max_bad_share: float = 0.0
-    """Stop when more than this share of the voxels holds NaN or infinity; fewer are left out and told."""
+    """Stop when more than this share of the voxels holds NaN or infinity; fewer are left out and reported."""
     track: str = ""
-    """Name of the track in each walk below ``audio_video/`` whose sounds are heard anew; none by default."""
+    """Name of the track in each walk below ``audio_video/`` whose sounds are encoded again; none by default."""
     hear_with: str = "audioclip"
-    """Which sound model hears them."""
+    """Sound model that encodes them."""
 
     def __post_init__(self) -> None:
         if not 0.001 <= self.cell_size_m <= 10.0:
@@ -88,7 +88,7 @@ def import_reference_map(
     Args:
         source: the scene's folder (with ``vlmap/vlmaps.h5df``, ``area_map/`` and ``poses.txt``), or the map's file.
         path: the folder of the new map, by custom ``NAME.avlmap``.
-        settings: what the files do not tell.
+        settings: the settings that the files do not hold.
         areas: ``clip_sparse_map.h5df``, where it lies elsewhere.
         poses: ``poses.txt``, where it lies elsewhere.
         overwrite: replace a finished map there that came from something else.
@@ -123,7 +123,7 @@ def _with_own_cell_size(settings: ImportSettings, voxels: ReferenceVoxels) -> Im
 
 
 def _finished(path: Path, key: str, overwrite: bool) -> bool:
-    """Tell whether this very map is there; another one is refused unless it may be replaced."""
+    """Return whether this very map is there; another one is refused unless it may be replaced."""
     manifest = path / MANIFEST
     if overwrite or not manifest.is_file():
         return False

@@ -64,7 +64,7 @@ class Walk:
         """Return every frame as a keyframe without a picture.
 
         Args:
-            places: middles of the map's voxels, from which is told what each frame saw.
+            places: middles of the map's voxels, which show the part that each frame saw.
         """
         count = len(self.stamp_s)
         each = progress(self.world_from_camera, "looking", total=count) if count else ()

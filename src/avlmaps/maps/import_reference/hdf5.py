@@ -1,4 +1,4 @@
-"""Opening HDF5 files of unknown origin: every fault one sentence, nothing read before it is asked for.
+"""Opening HDF5 files of unknown origin: every fault one sentence, nothing read before it is needed.
 
 h5py comes with the extra ``paper`` and is imported when a file is opened.
 """
@@ -84,7 +84,7 @@ class Hdf5:
         if link is None:
             raise MapError(f"{self.path} has no {name}, as a map of the reference code has (it holds: {has}).")
         if found is None:
-            raise MapError(f"{self.path}: {name} is not an array kept in this file; the reference code writes one.")
+            raise MapError(f"{self.path}: {name} is not an array stored in this file; the reference code writes one.")
         array, has_shape, dtype = found
         fits = len(has_shape) == len(shape) and all(
             wanted in (None, size) for wanted, size in zip(shape, has_shape, strict=True)
@@ -110,7 +110,7 @@ def _listed(names: Iterable[str]) -> str:
 
 
 class Numbers:
-    """A dataset whose shape and kind are checked; rows are read when they are asked for.
+    """A dataset whose shape and kind are checked; rows are read on demand.
 
     Attributes:
         shape: of the whole.

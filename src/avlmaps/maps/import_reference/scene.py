@@ -54,7 +54,7 @@ def find_scene(source: Path, areas: Path | None = None, poses: Path | None = Non
         folder, voxels = _scene_of(source), source
     if voxels is None and (folder / TOP_DOWN).is_file():
         raise MapError(
-            f"{source} holds a map of the first demonstration ({TOP_DOWN}), seen from above: the heights in it are "
+            f"{source} holds a top-down map of the first demonstration ({TOP_DOWN}): the heights in it are "
             f"lost, so that it cannot become a 3D map; let newer code of the papers write {VOXELS[0]}."
         )
     if voxels is None:
@@ -79,7 +79,7 @@ def find_scene(source: Path, areas: Path | None = None, poses: Path | None = Non
 
 
 def _scene_of(file: Path) -> Path:
-    """Return the folder of the scene that a map's file belongs to; the file's own where that cannot be told."""
+    """Return the folder of the scene that a map's file belongs to; the file's own where the scene is not known."""
     near = (file.parent, file.parent.parent)
     return next((folder for folder in near if (folder / POSES).is_file()), near[1] if _is_placed(file) else near[0])
 

@@ -1,4 +1,4 @@
-"""All that one import is made from, and what the new map tells of it."""
+"""The sources of one import, and the new map's notes on them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class Source:
         scene: where its files are.
         voxels: open, unread.
         walk: poses and views.
-        ears: what hears the sounds anew.
+        ears: encodes the sounds again.
     """
 
     scene: SceneFiles
@@ -38,7 +38,7 @@ class Source:
         return models if self.ears.model is None else {**models, Kind.SOUNDS.value: self.ears.model}
 
     def recording(self) -> RecordingInfo:
-        """Return what the map tells of what it was made from."""
+        """Return the map's notes on its source."""
         return RecordingInfo(
             name=self.scene.folder.resolve().name,
             format=self.voxels.path.name,
@@ -67,9 +67,9 @@ class Source:
         if not self.voxels.has_colours:
             yield "The file has no colours (grid_rgb), so that all voxels are black."
         if self.voxels.corner is None:
-            yield "The reference keeps nothing above the camera's height nor below the first pose's floor."
+            yield "The reference stores nothing above the camera's height nor below the first pose's floor."
         if not self.walk.has_views:
-            yield "There is no area map (area_map/clip_sparse_map.h5df), so that areas cannot be asked."
+            yield "There is no area map (area_map/clip_sparse_map.h5df), so that areas cannot be queried."
         yield from self._of_sounds_and_pictures()
 
     def _of_sounds_and_pictures(self) -> Iterator[str]:
@@ -81,12 +81,12 @@ class Source:
         elif self.scene.has_sound_map:
             yield (
                 "The sound map (audio_data*.pkl) was not imported: a pickle can run any code when it is read, and this "
-                "one tells neither when a sound was heard nor what it sounded like; hear the tracks anew with --sounds."
+                "one holds neither the time of a sound nor the sound itself; encode the tracks again with --sounds."
             )
         if self.scene.has_visual_map:
             yield (
                 "The visual map (*_features.h5df) was not imported: it names its pictures by their path on the machine "
-                "that wrote it, and keeps no keypoints."
+                "that wrote it, and stores no keypoints."
             )
         yield "There are no keypoints, so that photos cannot be located in this map."
 

@@ -1,7 +1,7 @@
 """Hearing the sounds of a scene of the data set anew, from the walks below ``audio_video/``.
 
-The reference keeps its sound map as a pickle, which nobody should read who does not know who wrote it, and which tells
-neither when a sound was heard nor what it sounded like. The tracks that it was made from lie beside it; they are heard
+The reference stores its sound map as a pickle, which nobody should read who does not know who wrote it, and which holds
+neither the time of a sound nor the sound itself. The tracks that it was made from lie beside it; they are encoded
 here as in a build. They were recorded on walks of their own, in the world of the scene's poses: their times are made to
 go on from the end of the scene's walk, one walk after the other.
 """
@@ -32,7 +32,7 @@ HEARING = HearingSettings()
 
 @dataclass(frozen=True, slots=True)
 class Ears:
-    """What hears the walks of a scene; without walks, silence.
+    """Encodes the sounds on the walks of a scene; without walks, silence.
 
     Attributes:
         walks: opened with their tracks, in the order of their folders.
@@ -71,7 +71,7 @@ class Ears:
         return cls(walks, start_s, backend, ModelInfo.of(_with_model(backend), card))
 
     def ingredients(self) -> list[Any]:
-        """Return what tells these sounds from others."""
+        """Return what identifies these sounds."""
         return [[walk.fingerprint for walk in self.walks], self.start_s.tolist(), self.model]
 
     def hear(self, clips_folder: Path) -> HeardSounds:

@@ -4,7 +4,7 @@ Datasets (N occupied cells): ``grid_feat`` (N, 512), LSeg features of any length
 ``weight`` (N,); ``grid_rgb`` (N, 3), 0 to 255, absent in early files; ``occupied_ids``, the number of the voxel in each
 cell of the grid, -1 for none, of which only the shape is used here; ``mapped_iter_list`` (F,) fused frames; and in some
 drafts ``init_height_id``, the layer of the base's height. ``vlmaps_multi_floor.h5df`` and ``vlmaps_cam.h5df`` have
-``pcd_min``, ``pcd_max`` (3,) and ``cs`` as well; the first keeps cells as (x, z, y), the second as (x, y, z).
+``pcd_min``, ``pcd_max`` (3,) and ``cs`` as well; the first stores cells as (x, z, y), the second as (x, y, z).
 
 The reference's running mean weighs a voxel's first pixel twice over (by its weight squared), so that a voxel that was
 hit once has the length of its weight; features are scaled to unit length here, which mends the latter.
@@ -31,7 +31,7 @@ ROWS_AT_ONCE = 4096  # 8 MB of features
 
 @dataclass(frozen=True, slots=True)
 class Corner:
-    """What the relatives tell of their grid.
+    """The grid that the relatives hold.
 
     Attributes:
         low: the cloud's lowest corner, metres, in the world of the poses.
@@ -106,7 +106,7 @@ class ReferenceVoxels:
 
     def _check_cells(self) -> None:
         shape = np.array(self.grid_shape)
-        # In the relatives a point below the cloud's corner wraps round in numpy, and keeps its true, negative cell.
+        # In the relatives a point below the cloud's corner wraps round in numpy, and retains its true, negative cell.
         least = -shape if self.corner else np.zeros(3, np.int64)
         outside = ((self.cell < least) | (self.cell >= shape)).any(axis=1)
         if outside.any():
@@ -120,7 +120,7 @@ class ReferenceVoxels:
             raise MapError(f"{self.path} is damaged: grid_pos names the same cell twice.")
 
     def cubes(self, first_habitat_from_base: Float[np.ndarray, "4 4"], cell_size_m: float) -> Cubes:
-        """Return where the voxels' cells lie in our world; a corner tells its own cell size."""
+        """Return where the voxels' cells lie in our world; a corner holds its own cell size."""
         if self.corner is not None:
             cells = self.cell[:, list(self.corner.order)]
             return cubes_from_corner(cells, self.corner.cell_size_m, self.corner.low)
@@ -144,7 +144,7 @@ class ReferenceVoxels:
 
     @property
     def has_colours(self) -> bool:
-        """Whether the file keeps colours."""
+        """Whether the file holds colours."""
         return self._rgb is not None
 
     @cached_property

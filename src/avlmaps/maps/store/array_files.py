@@ -53,7 +53,7 @@ def writing_into(folder: Path) -> Iterator[None]:
     except OSError as fault:
         raise MapError(
             f"Cannot write {fault.filename or folder}: {fault.strerror or fault}; make room or choose another folder, "
-            "then run the same build again: what was finished is kept."
+            "then run the same build again: the finished stages are stored."
         ) from fault
 
 
@@ -67,7 +67,7 @@ def write_array(folder: Path, name: str, array: np.ndarray) -> FileInfo:
     """
     array = np.ascontiguousarray(array, array.dtype.newbyteorder("<")).reshape(array.shape)
     if array.dtype.hasobject:
-        raise ValueError(f"{name} holds Python objects; only numbers can be kept")
+        raise ValueError(f"{name} holds Python objects; only numbers can be stored")
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(header, np.lib.format.header_data_from_array_1_0(array))
     flat = array.reshape(-1).view(np.uint8)
@@ -99,7 +99,7 @@ def _write(folder: Path, name: str, suffix: str, chunks: Iterable[bytes | memory
 
 
 def sync_names(folder: Path, files: Iterable[FileInfo]) -> None:
-    """Put the names of written files on the disk; to be called before the manifest that tells of them is written."""
+    """Put the names of written files on the disk; to be called before the manifest that lists them is written."""
     for parent in sorted({(folder / file.path).parent for file in files}):
         sync_folder(parent)
         sync_folder(parent.parent)
@@ -124,7 +124,7 @@ def read_array(folder: Path, info: FileInfo, *, verify: bool = False) -> np.ndar
         verify: compare large files with their checksums, too.
 
     Raises:
-        MapError: the file is missing, truncated, changed, or not the array that the manifest tells of.
+        MapError: the file is missing, truncated, changed, or not the array that the manifest describes.
     """
     path = checked_path(folder, info, verify=verify)
     try:

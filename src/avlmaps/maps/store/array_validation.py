@@ -31,7 +31,7 @@ def array_fields(kind: type) -> list[str]:
 
 
 def assembled(kind: type[T], values: Mapping[str, Any], where: str) -> T:
-    """Return the dataclass of these fields, each array of the type and shape that its annotation tells.
+    """Return the dataclass of these fields, each array of the type and shape of its annotation.
 
     Args:
         kind: ``Voxels``, ``Keyframes``, ``HeardSounds`` or another dataclass with jaxtyping annotations.
@@ -64,7 +64,7 @@ def _has_default(field: "dataclasses.Field[Any]") -> bool:
 
 
 def _check_array(where: str, array: np.ndarray, declared: Any, sizes: dict[str, int]) -> None:
-    """Compare an array with a jaxtyping annotation; ``sizes`` keeps what each letter stands for."""
+    """Compare an array with a jaxtyping annotation; ``sizes`` stores what each letter stands for."""
     dims = declared.dim_str.split()
     if array.dtype.name not in declared.dtypes or array.ndim != len(dims):
         raise MapError(

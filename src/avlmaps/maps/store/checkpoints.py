@@ -1,4 +1,4 @@
-"""What a stage of a build has finished, kept in a folder of its own so that a stopped build goes on from there.
+"""The result of a finished build stage, stored in a folder of its own so that a stopped build resumes from there.
 
 The arrays are written first and ``done.json`` last: without it the folder does not count. Its ``key`` is the hash of
 everything that the stage's outcome depends on; a checkpoint with another key is another stage's and is passed over.

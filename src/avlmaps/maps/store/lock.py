@@ -63,7 +63,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def is_locked(folder: Path) -> bool:
-    """Tell whether a build is running in the folder at this moment."""
+    """Return whether a build is running in the folder at this moment."""
     try:
         descriptor = os.open(folder / LOCK, os.O_RDWR)
     except OSError:

@@ -26,7 +26,7 @@ class ModelInfo(msgspec.Struct, frozen=True, kw_only=True):
     """A model that made features of this map: its card, and the backend's name in the profile.
 
     ``backend`` is ``name@model`` where a backend can run several. Of a model that was given as a path only the name is
-    kept, here and in ``id``: where it lay is nobody's business. ``normalisation`` is that of the stored features; there
+    stored, here and in ``id``; its folder is private. ``normalisation`` is that of the stored features; there
     is one as yet.
     """
 
@@ -220,7 +220,7 @@ class Removed(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BadFrame(msgspec.Struct, frozen=True, kw_only=True):
-    """A frame that could not be read and was left out, with the sentence that told why."""
+    """A frame that could not be read and was left out, with the sentence that says why."""
 
     index: int
     why: str
@@ -231,7 +231,7 @@ class Counts(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         frames: fused frames.
-        keyframes: kept pictures.
+        keyframes: stored pictures.
         voxels: occupied voxels.
         sounds: heard sounds.
     """

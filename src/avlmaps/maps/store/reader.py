@@ -39,7 +39,7 @@ class StoredMap:
         grid: turns metres into voxels.
         up_in_world: unit vector; the recording's world need not be level.
         voxels: occupied voxels.
-        keyframes: kept pictures.
+        keyframes: stored pictures.
         place_state: what the place encoder learned from the keyframes.
         sounds: what was heard; ``clip_path`` finds a clip.
         profile: which models perceived.
@@ -124,7 +124,7 @@ def verify_stored(path: Path | str) -> StoredMap:
 
 
 def has_unfinished_build(path: Path | str) -> bool:
-    """Tell whether a build was begun in this folder that is not finished, so that building again goes on with it."""
+    """Return whether a build in this folder is not finished, so that building again resumes it."""
     parts = Path(path) / PARTS
     return parts.is_dir() and any(parts.iterdir())
 
@@ -147,7 +147,7 @@ def _manifest_content(path: Path) -> bytes:
 
 
 def profile_of_map(path: Path, info: MapInfo) -> Profile:
-    """Return the models that a map was built with, whatever the profile of that name has come to hold since.
+    """Return the models that a map was built with, even if the profile of that name holds others by now.
 
     Raises:
         MapError: the profile is not known here.
@@ -203,7 +203,7 @@ def _clip(path: Path, file: FileInfo, verify: bool) -> str:
 
 
 def describe(stored: StoredMap) -> dict[str, Any]:
-    """Return what ``avlmaps build`` and ``avlmaps info`` tell of a map; ready for JSON.
+    """Return the report of ``avlmaps build`` and ``avlmaps info`` on a map; ready for JSON.
 
     The position of a sound is the middle of the places from which the robot heard it, metres, world.
     """

@@ -29,7 +29,7 @@ class MapContent:
 
     Attributes:
         voxels: occupied voxels.
-        keyframes: kept pictures.
+        keyframes: stored pictures.
         place_state: what the place encoder learned from them.
         sounds: what was heard; ``clips`` are file names below ``clips_folder``.
         clips_folder: where the clips lie now.
@@ -98,7 +98,7 @@ def sweep(path: Path, info: MapInfo) -> None:
 
 
 def is_map_or_free(path: Path) -> bool:
-    """Tell whether a build may write here: nothing there, an empty folder, or a map, whole or half-built."""
+    """Return whether a build may write here: nothing there, an empty folder, or a map, whole or half-built."""
     if not path.exists():
         return True
     if not path.is_dir():

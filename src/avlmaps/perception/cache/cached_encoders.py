@@ -1,7 +1,7 @@
 """A profile whose models remember: what one of them has made of a frame or a sound it does not make again.
 
-Features of pixels on torch pass through float16 whether they are kept or not, so that a map is the same, bit by bit,
-with the store and without; all others are kept as they are.
+Features of pixels on torch pass through float16 with the store and without, so that a map is the same, bit by bit, in
+both cases; all others are stored as they are.
 """
 
 from collections.abc import Sequence
@@ -36,7 +36,7 @@ class RememberingProfile(Profile):
     """A profile with a store of features behind some of its encoders.
 
     Attributes:
-        store: where features are kept; None keeps none.
+        store: where features are stored; None stores none.
         remembered_kinds: of which modules.
     """
 
@@ -134,7 +134,7 @@ class RememberingPixels(_Remembering):
 
         Args:
             encoder: the real one.
-            store: where its features are kept; None keeps none.
+            store: where its features are stored; None stores none.
             half: round to float16.
         """
         super().__init__(encoder, store)
@@ -142,7 +142,7 @@ class RememberingPixels(_Remembering):
 
     @property
     def vocabulary(self) -> tuple[str, ...]:
-        """Names that compete with an asked word."""
+        """Names that compete with a queried word."""
         return self._encoder.vocabulary
 
     def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
@@ -163,7 +163,7 @@ class RememberingPixels(_Remembering):
         return self.encode_batch([frame])[0]
 
     def encode_batch(self, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
-        """Return the features of each frame; the ones that are not kept are encoded together."""
+        """Return the features of each frame; those that are not in the store are encoded together."""
         keys = ["" if self._store is None else self._key(*_seen_in(frame)) for frame in frames]
         kept = [self._known(key) for key in keys]
         missing = [i for i, features in enumerate(kept) if features is None]
@@ -235,7 +235,7 @@ class RememberingSounds(_Remembering):
     def score_sounds(
         self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
     ) -> Float32[np.ndarray, " sounds"]:
-        """Return how likely each sound is of the same kind as the asked one."""
+        """Return how likely each sound is of the same kind as the queried one."""
         return self._encoder.score_sounds(sounds, asked)
 
 
@@ -272,7 +272,7 @@ class RememberingPlaces(_Remembering):
 
 
 class RememberingKeypoints(_Remembering):
-    """A keypoint encoder that encodes each picture once; kept in float32, because keypoints are sub-pixel."""
+    """A keypoint encoder that encodes each picture once; stored in float32, because keypoints are sub-pixel."""
 
     kind = Kind.LOCAL
 

@@ -1,4 +1,4 @@
-"""Features kept on the disk by what they were made from, so that nothing is encoded twice.
+"""Features stored on the disk under a key of their inputs, so that nothing is encoded twice.
 
 One folder for each model, one ``.npy`` file for each frame or sound, its name the hash of all that the model saw.
 Behind the array stand four bytes, the CRC-32 of what is before them: a file that a power cut has spoiled counts as
@@ -33,13 +33,13 @@ _CRC_BYTES = 4
 
 @dataclass(frozen=True, slots=True)
 class CacheSettings:
-    """Whether features are kept, and how many.
+    """Whether features are stored, and the limit of the store.
 
     Attributes:
-        place: ``auto`` keeps those of models on torch in the user's cache folder; a folder keeps those of every model
-            there; ``off`` keeps none.
+        place: ``auto`` stores those of models on torch in the user's cache folder; a folder stores those of every model
+        there; ``off`` stores none.
         limit_gb: room on the disk; what was used longest ago goes first. Features of more than a hundredth of it for
-            one frame are not kept.
+            one frame are not stored.
     """
 
     place: Path | Literal["auto", "off"] = "auto"
@@ -56,14 +56,14 @@ DEFAULT_CACHE = CacheSettings()
 class FeatureStore:
     """The features on the disk; safe to use from several threads and processes.
 
-    A file that cannot be read or written is no error: its features are made again, or not kept.
+    A file that cannot be read or written is no error: its features are made again, or not stored.
 
     Attributes:
         found: how many features of each module came from here.
     """
 
     def __init__(self, folder: Path, limit_bytes: float = 20 * _GB) -> None:
-        """Use a folder, which is made when something is kept."""
+        """Use a folder, which is made when the first feature is stored."""
         self.folder, self.limit_bytes = folder, limit_bytes
         self.found: dict[Kind, int] = {}
         self._opened_s = time.time()
@@ -73,7 +73,7 @@ class FeatureStore:
         self._lock = threading.Lock()
 
     def get(self, kind: Kind, card: ModelCard, key: str) -> np.ndarray | None:
-        """Return kept features, None where there are none that can be read."""
+        """Return stored features, None where there are none that can be read."""
         path = self._path(kind, card, key)
         try:
             content = path.read_bytes()
@@ -130,7 +130,7 @@ class FeatureStore:
             if self._total + size > self.limit_bytes:
                 self._full = True
                 self._tell(
-                    f"The feature cache is full with what this build needs itself; further frames are not kept "
+                    f"The feature cache is full with what this build needs itself; further frames are not stored "
                     f"({self.limit_bytes / _GB:g} GB in {self.folder}; --feature-cache-gb)."
                 )
                 return False
@@ -154,7 +154,7 @@ class FeatureStore:
         return total
 
     def _entries(self) -> list[tuple[float, int, Path]]:
-        """Return (last use, bytes, file) of all that is kept; what broken-off writes left goes."""
+        """Return (last use, bytes, file) of all stored files; remove what broken-off writes left."""
         found: list[tuple[float, int, Path]] = []
         for path in self.folder.glob("*/*"):
             with suppress(OSError):  # another process may have removed it

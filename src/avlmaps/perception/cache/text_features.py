@@ -1,6 +1,6 @@
-"""Features of words kept on the disk: a list of rooms takes a text encoder of today half a minute on a CPU.
+"""Features of words stored on the disk: a list of rooms takes a text encoder of today half a minute on a CPU.
 
-A command that asks a map is a new process each time, and asks of the same names. They are kept in the user's cache
+A command that queries a map is a new process each time, and queries the same names. They are stored in the user's cache
 folder by model, its weights, sentences and precision, and by this release's code; the folder may be deleted any time.
 """
 
@@ -29,7 +29,7 @@ class KeptWords:
         self._store = FeatureStore(cache_folder() / "words", _LIMIT_BYTES)
 
     def get(self, phrase: str) -> Float32[np.ndarray, " d"] | None:
-        """Return the unit vector of a phrase, None where it is not kept."""
+        """Return the unit vector of a phrase, None where it is not stored."""
         row = self._store.get(Kind.WORDS, self._card, self._key(phrase))
         fits = row is not None and row.dtype == np.float32 and row.shape == (self._card.dim,)
         return row if fits else None

@@ -15,10 +15,10 @@ from avlmaps.perception.protocols import WordEncoder
 
 
 class NamedEncoder:
-    """An encoder that tells some names apart.
+    """An encoder that distinguishes a closed set of names.
 
     Args:
-        names: what it tells apart; ``categories`` or ``rooms`` of the network's notes.
+        names: the names that it distinguishes; ``categories`` or ``rooms`` of the network's notes.
         network: which; the one that ships if None.
         words: the word encoder whose space the features live in; the embedded one if None.
     """

@@ -44,7 +44,7 @@ _EXAMPLES = {
     "beige": "f0e0c0 e0d0a8 d8c098 e8d8b8 f5f5dc d2b48c e0c8a0 c8b490 d8c8b0 dcb884",
 }  # fmt: skip
 
-# Linear-light exposures at which a colour keeps its name. Dark orange is brown and dark yellow olive, so those
+# Linear-light exposures at which a colour has the same name. Dark orange is brown and dark yellow olive, so those
 # are not dimmed; a dim grey is a darker grey, which has examples of its own.
 _GAINS = {
     "red": (1.0, 0.5, 0.25, 0.1),
@@ -102,7 +102,7 @@ def _lab(linear: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
 def _coordinates(lab: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
     """Return where colours are compared: lightness at half weight, and chroma relative to lightness.
 
-    Exposure scales lightness and chroma together, so their ratio tells the colour; below a lightness of 15 chroma
+    Exposure scales lightness and chroma together, so their ratio identifies the colour; below a lightness of 15 chroma
     is mostly noise and counts less.
     """
     chroma = np.linalg.norm(lab[..., 1:], axis=-1, keepdims=True)

@@ -10,7 +10,7 @@ from jaxtyping import Float, Float32
 from avlmaps.core.camera import Pinhole
 
 CHANNELS = 8
-# Normals are taken over so many pixels to each side; over one where an edge is nearer.
+# Normals are taken over this many pixels to each side; over one where an edge is nearer.
 _REACH_PX = 3
 
 

@@ -1,10 +1,10 @@
 """The ear of the embedded sound encoder: mel spectra whose loudness and background are normalised away.
 
 A sound becomes mel power, is scaled to its own peak and gets a floor 60 dB below it, so that silence that is
-digital and silence that is not look the same. What the network hears is PCEN (per-channel energy normalisation;
+digital and silence that is not look the same. The network's input is PCEN (per-channel energy normalisation;
 Wang et al., "Trainable frontend for robust and far-field keyword spotting", ICASSP 2017, eq. 1-2): every band
 is divided by its own slow average, which removes steady background and the colour of the microphone. Beside it
-goes the plain logarithm, which keeps the colour of steady sounds such as rain.
+goes the plain logarithm, which preserves the colour of steady sounds such as rain.
 """
 
 from functools import cache
@@ -119,7 +119,7 @@ def pcen(power: T, background: T) -> T:
 def heard(
     windows_of_mels: Float32[np.ndarray, "windows frames bands"],
 ) -> Float32[np.ndarray, "windows 2 bands frames"]:
-    """Return what the network hears: PCEN, and the logarithm less its mean, both near unit variance."""
+    """Return the network's input: PCEN, and the logarithm less its mean, both near unit variance."""
     power = np.ascontiguousarray(windows_of_mels.transpose(0, 2, 1))
     power_over_background = pcen(power, power @ smoothing_matrix())
     log = np.log10(power + FLOOR)

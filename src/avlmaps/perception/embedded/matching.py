@@ -14,7 +14,7 @@ _ROUNDING = 1e-6
 
 
 class MutualRatio:
-    """Keeps pairs that are mutually nearest and pass Lowe's ratio test from the first picture to the second."""
+    """Selects pairs that are mutually nearest and pass Lowe's ratio test from the first picture to the second."""
 
     def __init__(self) -> None:
         self.card = ModelCard(

@@ -1,4 +1,4 @@
-"""Which of the names that an encoder tells apart a phrase means.
+"""The meaning of a phrase among the names of a closed-set encoder.
 
 The lexicon decides where it knows the noun: by name, synonym, compound or wider kind. The nearness of words chooses
 between several names that fit, and reads descriptions ("something to boil water in"). A noun that nobody knows means

@@ -16,7 +16,7 @@ SMALLEST_LOG_AREA, LARGEST_LOG_AREA = -4.0, 0.7
 
 
 class EmbeddedPixels(NamedEncoder):
-    """Tells some hundred things of homes and offices apart by their shape, helped a little by colour.
+    """Distinguishes some hundred things of homes and offices by their shape, helped a little by colour.
 
     Args:
         network: which; the one that ships if None.

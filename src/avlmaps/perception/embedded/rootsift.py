@@ -18,7 +18,7 @@ _PIXEL_CENTRE = 0.5
 class RootSift:
     """Finds the strongest SIFT keypoints of a picture (Lowe 2004) and describes them by RootSIFT (Arandjelović 2012).
 
-    A picture with a side of more than ``MAX_SIDE_PX`` is looked at in a smaller copy; the keypoints are told in the
+    A picture with a side of more than ``MAX_SIDE_PX`` is encoded in a smaller copy; the keypoints are returned in the
     pixels of the given picture all the same.
     """
 
@@ -45,7 +45,7 @@ class RootSift:
             return _no_features()
         xy = np.array([keypoint.pt for keypoint in found], np.float64)
         response = np.array([keypoint.response for keypoint in found])
-        # cv2 finds keypoints in threads and keeps ties beyond its limit: sort, so that every run gives the same.
+        # cv2 finds keypoints in threads and returns ties beyond its limit: sort, so that every run gives the same.
         order = np.lexsort((xy[:, 1], xy[:, 0], -response))[:MAX_KEYPOINTS]
         to_picture = np.array([rgb.shape[1] / gray.shape[1], rgb.shape[0] / gray.shape[0]])
         return LocalFeatures(

@@ -1,7 +1,7 @@
 """The network behind the embedded pixel and view encoders: what each pixel shows, and what kind of room it is.
 
 It looks at geometry in the frame of gravity, and at colour through a small late branch. It runs in onnxruntime at
-a small size (``Notes.width_px``), whatever the recording's; ``training/pixels`` makes its weights. Two sets ship: one
+a small size (``Notes.width_px``), for every recording; ``training/pixels`` makes its weights. Two sets ship: one
 that learnt from rendered worlds and real frames, and one that saw rendered worlds alone (the profile ``synthetic``).
 """
 
@@ -31,7 +31,7 @@ DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS = "scene_encoder", "scene_encoder_synthetic"
 
 
 class InstanceNotes(msgspec.Struct, frozen=True):
-    """How connected voxels are told from noise, fitted on maps of held-out homes (``training/pixels/instances.py``).
+    """How instances are distinguished from noise, fitted on maps of held-out homes (``training/pixels/instances.py``).
 
     The log-odds that they are a true instance are ``bias + slopes[0]·log-odds(p) + slopes[1]·log(area / usual area)``.
 
@@ -65,7 +65,7 @@ class Notes(msgspec.Struct, frozen=True):
         kinds: wider words and the categories that they take in.
         width_px: how wide the pictures are that the network looks at; their focal length is no longer than this
             either, since it was trained on none longer.
-        instances: how instances are told from noise.
+        instances: how instances are distinguished from noise.
         multiple: pictures are padded to a multiple of this.
     """
 
@@ -157,7 +157,7 @@ def load_network(weights: str = DEFAULT_WEIGHTS) -> SceneNetwork:
             f"The embedded pixel encoder's weights cannot be read ({fault}); install the package again, or make them "
             "with 'python -m training.pixels'."
         ) from fault
-    # What makes the features is in the checksum; how they are read may change, and old maps can still be asked.
+    # What makes the features is in the checksum; how they are read may change, and old maps can still be queried.
     made_by = msgspec.structs.replace(notes, called={}, kinds={}, instances=InstanceNotes(), note="")
     return SceneNetwork(arrays, notes, sha256(arrays + msgspec.json.encode(made_by)).hexdigest())
 

@@ -1,6 +1,6 @@
 """From features to probabilities: which kind a sound is, whether it is known at all, and what a phrase asks for.
 
-The constants were fitted on recordings that the networks had not heard (``training/sounds``), so that 0.5 is the
+The constants were fitted on recordings that were held out of training (``training/sounds``), so that 0.5 is the
 point where a yes is as often right as wrong.
 """
 
@@ -84,7 +84,7 @@ def kinds_of_windows(
 ) -> tuple[Float[np.ndarray, "windows kinds"], Float[np.ndarray, " windows"]]:
     """Return each window's posterior over the known kinds, and how likely it is of any of them.
 
-    The cosine to the nearest example tells strangers apart (a stranger lies between the kinds).
+    The cosine to the nearest example separates unknown sounds (such a sound lies between the kinds).
 
     Args:
         cosines: to the words of every kind.

@@ -157,7 +157,7 @@ class EmbeddedSounds:
     def score_sounds(
         self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
     ) -> Float32[np.ndarray, " sounds"]:
-        """Return how likely each sound is of the same kind as the asked one.
+        """Return how likely each sound is of the same kind as the queried one.
 
         Two things speak for it: that some windows of both are alike, and that both are taken for the same kind.
         """
@@ -220,7 +220,7 @@ class EmbeddedSounds:
             bias, slope = self.calibration.taught
             leads = np.stack([taught_lead(features, t.features, near) for t in taught], axis=1)
             own = sigmoid(bias + slope * leads)
-            # what the user taught goes before what the network believes of a sound it was not made for
+            # what the user taught goes before the network's scores for a sound that it was not trained on
             likely = np.hstack([likely * (1.0 - own.max(axis=1, keepdims=True)), own])
             known = np.maximum(known, own.max(axis=1))
         return Heard(likely.max(axis=0), float(known.max()))

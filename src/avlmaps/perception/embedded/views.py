@@ -13,7 +13,7 @@ from avlmaps.recordings.types import Frame
 
 
 class EmbeddedViews(NamedEncoder):
-    """Tells kinds of room apart by what stands in them.
+    """Distinguishes kinds of room by the things in them.
 
     Args:
         network: which; the one that ships if None.

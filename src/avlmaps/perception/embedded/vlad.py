@@ -18,7 +18,7 @@ class Vlad:
     """Sums, for each visual word, the residuals of the descriptors nearest to it (Jégou 2010).
 
     Each word's sum is normalised by itself (Arandjelović and Zisserman 2013), so that a repeated texture does not
-    drown the rest, and the whole is of unit length. Its dot product tells how alike two pictures are.
+    drown the rest, and the whole is of unit length. Its dot product measures how alike two pictures are.
     """
 
     def __init__(self) -> None:
@@ -28,7 +28,7 @@ class Vlad:
             dim=WORDS * DESCRIPTOR_DIM,
             licence="MIT",
             checksum=hashlib.sha256(constants.encode()).hexdigest(),
-            note="its visual words are learned on the map's own keyframes and kept in the map",
+            note="its visual words are learned on the map's own keyframes and stored in the map",
         )
 
     def fit(self, local: Sequence[LocalFeatures], rng: np.random.Generator) -> dict[str, np.ndarray]:

@@ -56,7 +56,7 @@ class ClapSounds(ContrastSounds):
         self._spectrogram = load_helper(ClapFeatureExtractor, folder, model)
         self._rate_hz = int(self._spectrogram.sampling_rate)
         self._window = int(self._spectrogram.nb_max_samples)
-        # a fused network expects four spectrograms of a window and another mel scale, whatever the settings say
+        # a fused network expects four spectrograms of a window and another mel scale, against the settings
         self._truncation = "fusion" if self._model.config.audio_config.enable_fusion else "rand_trunc"
         described = [f"{name} {getattr(self._spectrogram, name)}" for name in _SHAPING]
         card = ModelCard(

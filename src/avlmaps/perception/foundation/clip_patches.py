@@ -2,10 +2,10 @@
 
 CLIP (Radford et al., ICML 2021; MIT): ``openai/clip-vit-base-patch16`` and ``-base-patch32`` (512 numbers a feature),
 ``-large-patch14`` and ``-large-patch14-336`` (768), as transformers runs them (``CLIPModel``). CLIP compares a whole
-picture with a text; its last attention gathers the picture into one token. Left out, each patch keeps a feature of its
+picture with a text; its last attention gathers the picture into one token. Without it, each patch has a feature of its
 own in the same space (MaskCLIP: Zhou et al., ECCV 2022). A picture goes in with CLIP's own mean and deviation, its
-shorter side 448 pixels, its shape kept, with position embeddings interpolated to that grid (28x37 patches of 16 pixels
-for 640x480).
+shorter side 448 pixels, its shape the same, with position embeddings interpolated to that grid (28x37 patches of 16
+pixels for 640x480).
 
 What the last block does, chosen by ``model#way``; then follow the final layer norm and the visual projection:
 

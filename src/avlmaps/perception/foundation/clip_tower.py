@@ -32,7 +32,7 @@ class ClipTower:
         patch: edge of a patch, pixels.
         image_size: edge of the pictures that it was trained on, pixels.
         logit_scale: by what its training multiplied cosines.
-        licence: of the weights, as far as the name tells it.
+        licence: of the weights, where the name shows it.
         device: where it runs.
     """
 

@@ -3,7 +3,7 @@
 Oquab et al., "DINOv2: learning robust visual features without supervision", 2023; published code
 facebookresearch/dinov2 (Apache-2.0). Models that were trained from it (MegaLoc, SALAD) keep its names: ``cls_token``,
 ``pos_embed``, ``patch_embed.proj``, ``blocks.N.{norm1,attn.qkv,attn.proj,ls1.gamma,norm2,mlp.fc1,mlp.fc2,ls2.gamma}``,
-``norm``. All published sizes have heads 64 wide and an MLP that the checkpoint tells the width of.
+``norm``. All published sizes have heads 64 wide and an MLP whose width the checkpoint shows.
 """
 
 from collections.abc import Mapping

@@ -4,9 +4,9 @@ Oquab et al., "DINOv2: learning robust visual features without supervision", 202
 ``facebook/dinov2-small``, ``-base``, ``-large``, ``-giant`` of the hub, by transformers' ``Dinov2Model``; and
 ``facebook/dinov2-with-registers-*``.
 
-A picture keeps its shape: the shorter side is made about 224 pixels, both sides the nearest multiples of a patch (14),
+The shorter side of a picture becomes about 224 pixels, both sides the nearest multiples of a patch (14),
 by bicubic resizing without aliasing, ImageNet's mean and deviation. (The model's own preparation for classifying cuts
-the middle square out; a place may be told by what stands at the side.) The descriptor is, chosen by ``model#way``:
+the middle square out; things at the side may identify a place.) The descriptor is, chosen by ``model#way``:
 
 - ``both`` (default): the class token and the patches' mean, each of unit length, one behind the other: 768 numbers for
   ``-small``, 1536 for ``-base``;
@@ -41,7 +41,7 @@ class DinoPlaces:
     """Describes whole pictures by a DINOv2's tokens.
 
     Args:
-        model: the hub's id or a folder, behind ``#`` the way to make the descriptor.
+        model: the hub's id or a folder, behind ``#`` the kind of descriptor.
         short_side: of the picture that the model sees, pixels.
 
     Raises:
@@ -60,7 +60,7 @@ class DinoPlaces:
             dim=int(config.hidden_size) * (2 if self._way == "both" else 1),
             licence="Apache-2.0",
             checksum=checksum_of(weights_in(folder), f"{self._way} short side {short_side}", "bicubic", "ImageNet"),
-            note="was not trained to tell places apart; MegaLoc was",
+            note="was not trained to distinguish places; MegaLoc was",
         )
 
     def fit(self, local: Sequence[LocalFeatures], rng: np.random.Generator) -> dict[str, np.ndarray]:

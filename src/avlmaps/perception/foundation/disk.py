@@ -45,7 +45,7 @@ class DiskKeypoints:
         name = _file_name(model)
         get = f"hf download {_REPOSITORY} {name}"
         path = published_file(name, get, _REPOSITORY, [f"checkpoints/{Path(name).name}"])
-        # The published file keeps the network of its training's reward beside the extractor.
+        # The published file holds the network of its training's reward beside the extractor.
         state = read_tensors(path, get, part="extractor")
         network = DISK(desc_dim=DIM)
         load_strictly(network, state, path, get)

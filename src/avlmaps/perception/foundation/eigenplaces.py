@@ -1,4 +1,4 @@
-"""Places by EigenPlaces: a ResNet or VGG-16, trained so that a place is known from whatever side it is seen.
+"""Places by EigenPlaces: a ResNet or VGG-16, trained so that a place is known from every side.
 
 Berton, Trivigno, Caputo & Masone, "EigenPlaces: training viewpoint robust models for visual place recognition", 2023
 (MIT). Published code and weights: gmberton/EigenPlaces, release v1.0, files ``{network}_{dim}_eigenplaces.pth``:
@@ -7,9 +7,9 @@ Berton, Trivigno, Caputo & Masone, "EigenPlaces: training viewpoint robust model
 
 The network is torchvision's without its pooling and classifier, numbered from 0 under ``backbone``; what follows is
 ``aggregation``: unit length along the channels, a generalised mean over the picture (exponent ``aggregation.1.p``), a
-linear layer, unit length. Which network it is, is told by the weights.
+linear layer, unit length. The weights show which network it is.
 
-A picture keeps its shape, with ImageNet's mean and deviation. The published tests use it as large as it is; here one
+A picture retains its shape, with ImageNet's mean and deviation. The published tests use it as large as it is; here one
 whose shorter side is above 512 pixels (what the network was trained with) is made that small.
 """
 

@@ -2,7 +2,7 @@
 
 Published as ``disk_lightglue.pth`` and ``aliked_lightglue.pth`` (github.com/cvg/LightGlue, release v0.1_arxiv; copies
 in the hub's kornia/lightglue), Apache-2.0; 12 million weights, nine layers. It reads keypoints, relative to the
-pictures' sizes, and their descriptors of 128 numbers. It stops after fewer layers when it is sure, and drops keypoints
+pictures' sizes, and their descriptors of 128 numbers. It stops after fewer layers when it is confident, drops keypoints
 that match nothing, with the published thresholds; pairs are each other's best with a score above 0.1. The weights hold
 for the keypoints that they were learnt on, and for no others.
 """

@@ -8,7 +8,7 @@ training needs). Both are read; the computation is the same.
 
 A picture is squashed to 322 x 322 pixels (bilinear, ImageNet's mean and deviation), as the paper tests it. DINOv2
 ViT-B/14 makes 23 x 23 patches and a class token. Each patch gets a feature of 256 numbers and a score for each of 64
-clusters; a 65th, the dustbin, takes what tells nothing of a place. Three rounds of Sinkhorn's algorithm make shares of
+clusters; a 65th, the dustbin, takes patches that identify no place. Three rounds of Sinkhorn's algorithm make shares of
 the scores, the clusters' sums are put behind the class token's 256 numbers, and a linear layer makes 8448 numbers.
 """
 

@@ -6,7 +6,7 @@
 - MobileCLIP 2 (Faghri et al., 2025), ``timm/MobileCLIP2-{S0,S2,B,S3,S4,L-14}-OpenCLIP``: small and quick, but the
   weights are under Apple's own licence for research models (apple-amlr): research only. Apple's own folders
   (``apple/MobileCLIP2-S0``, a single ``.pt``) are read as well.
-- ``laion/CLIP-ViT-*``, ``timm/ViT-*-SigLIP2-*`` and whatever else has ``open_clip_config.json`` beside
+- ``laion/CLIP-ViT-*``, ``timm/ViT-*-SigLIP2-*`` and any other model that has ``open_clip_config.json`` beside
   ``open_clip_model.safetensors``.
 
 Sizes, preparation of pictures and tokens are open_clip's, from that file; weights are loaded strictly.

@@ -30,7 +30,7 @@ class OpenPixels(ABC):
 
     @property
     def vocabulary(self) -> tuple[str, ...]:
-        """Things of homes and offices that compete with an asked word, without ``other``."""
+        """Things of homes and offices that compete with a queried word, without ``other``."""
         return THINGS
 
     @property

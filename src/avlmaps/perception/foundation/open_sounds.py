@@ -27,7 +27,7 @@ class ContrastSounds(ABC):
     Args:
         card: of the model; its first prompt is put round a phrase.
         logit_scale: by how much its cosines count in a softmax.
-        others: what an asked phrase competes with.
+        others: phrases that compete with a queried phrase.
     """
 
     vocabulary: tuple[str, ...] = ()
@@ -49,14 +49,14 @@ class ContrastSounds(ABC):
     ) -> Float32[np.ndarray, "sounds words"]:
         """Return how likely each sound holds what each phrase names, at the model's own scale of the cosines.
 
-        Each phrase competes with a list of everyday sounds (``sound_scores.Contrast``), not with those asked beside it.
+        Each phrase competes with a list of everyday sounds (``sound_scores.Contrast``), not with the other phrases.
         """
         return self._contrast.words(sounds, self.encode_words(words))
 
     def score_sounds(
         self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
     ) -> Float32[np.ndarray, " sounds"]:
-        """Return how likely each sound is of the same kind as the asked one (``sound_scores.Contrast``)."""
+        """Return how likely each sound is of the same kind as the queried one (``sound_scores.Contrast``)."""
         return self._contrast.alike(sounds, asked)
 
     @cached_property

@@ -25,7 +25,7 @@ AREA_PROMPTS = ("a photo of a {}.", "a photo of the {} of a building.", "a view 
 
 UNKNOWN_LICENCE = "LicenseRef-unknown"
 APPLE_RESEARCH = "LicenseRef-apple-amlr"
-# By the beginning of the hub's id, or of the last part of it; the longest beginning tells.
+# By the beginning of the hub's id, or of the last part of it; the longest beginning decides.
 _LICENCES = {
     "google/": "Apache-2.0",
     "siglip": "Apache-2.0",
@@ -86,7 +86,7 @@ def views_card(model: str, dim: int, weights: Sequence[Path], folder: Path, *con
     """Return the card of such an encoder.
 
     Args:
-        model: as it was asked for: the hub's id, or a path.
+        model: the hub's id, or a path, as the user named it.
         dim: of its features.
         weights: the files of its weights.
         folder: where what else shapes the features lies beside them.

@@ -7,7 +7,7 @@ talking"), without a sentence around them.
 
 The model learnt to say for each frame whether a description holds: with frame a and text t, both as its heads give them
 and of any length, the probability is sigmoid(scale · a·t + bias). Features of unit length would lose that, so that they
-are kept in homogeneous coordinates, one number longer (1,025): (a, r) for a frame, (scale · t, bias / r) for a text,
+are stored in homogeneous coordinates, one number longer (1,025): (a, r) for a frame, (scale · t, bias / r) for a text,
 each scaled to unit length. Their product is positive just where the answer is yes, and what the model says is had back
 exactly. r, a quarter of the length that its head's weights make likely, only sees to it that the last number is small.
 
@@ -121,9 +121,9 @@ class FrameSounds:
     def score_sounds(
         self, sounds: Sequence[Float32[np.ndarray, "frames d"]], asked: Float32[np.ndarray, "frames d"]
     ) -> Float32[np.ndarray, " sounds"]:
-        """Return how likely each sound is of the same kind as the asked one.
+        """Return how likely each sound is of the same kind as the queried one.
 
-        Of the asked sound that second counts which speaks most clearly for some kind of sound (a clip may begin and
+        Of the queried sound that second counts which speaks most clearly for some kind of sound (a clip may begin and
         end in silence); it is compared with the second of each sound that is most like it.
         """
         moments, profiles = self._moments(asked)

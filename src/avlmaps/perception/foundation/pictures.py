@@ -16,7 +16,7 @@ _MOST_PATCHES = 4096
 
 
 def working_size(height: int, width: int, short_side: int, patch: int, most_patches: int = _MOST_PATCHES) -> Size:
-    """Return (height, width) to resize a picture to: whole patches, its shape kept as nearly as they allow.
+    """Return (height, width) to resize a picture to: whole patches, its shape preserved as nearly as they allow.
 
     Args:
         height: of the picture.
@@ -60,7 +60,7 @@ def in_batches(
     batch: int,
     encode: Callable[[list[UInt8[np.ndarray, "h w 3"]]], Iterable[Float32[np.ndarray, "hf wf d"]]],
 ) -> list[Float32[np.ndarray, "hf wf d"]]:
-    """Encode the frames' colour pictures, at most so many at once; those of one batch have the same shape."""
+    """Encode the frames' colour pictures, at most ``batch`` at once; those of one batch have the same shape."""
     out: list[Float32[np.ndarray, "hf wf d"]] = []
     start = 0
     while start < len(frames):
@@ -73,7 +73,7 @@ def in_batches(
 
 
 def chosen_way(choice: str, ways: Sequence[str]) -> tuple[str, str]:
-    """Split a choice into a model and the way in which its features are taken: ``model#way``, by default the first.
+    """Split a choice into a model and the kind of its features: ``model#way``, by default the first.
 
     Raises:
         BackendError: there is no such way.

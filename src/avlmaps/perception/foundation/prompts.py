@@ -53,7 +53,7 @@ class Prompted:
         encode_texts: returns a row for each sentence.
         dim: length of a row.
         prompts: sentences with ``{}`` for the word.
-        kept: where features of words outlive this process; None for none.
+        kept: a store of word features that outlives this process; None for none.
 
     Attributes:
         kept: the same; may be given later, once there is a card.

@@ -1,9 +1,9 @@
-"""Regions of a picture by SAM 2, asked at a grid of points for whatever lies there (Apache-2.0).
+"""Regions of a picture by SAM 2, prompted at a grid of points (Apache-2.0).
 
 Any of ``facebook/sam2.1-hiera-{tiny,small,base-plus,large}`` (and of ``sam2-hiera-*``), as transformers runs them
 (``Sam2Model``; the hub's files hold the video model, whose memory is left out). Thresholds are those of SAM 2's own
 automatic mask generator. The mask generation pipeline of transformers is not used: it places the grid as for a picture
-padded to a square, while SAM 2 stretches it to one, so that the lower part of a wide picture is never asked for.
+padded to a square, while SAM 2 stretches it to one, so that the lower part of a wide picture is never prompted.
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class ProposalSettings:
     """Which regions count.
 
     Attributes:
-        points_per_side: of the grid at which is asked; SAM 2's own generator takes 32, at four times the cost.
+        points_per_side: of the grid of prompts; SAM 2's own generator takes 32, at four times the cost.
         least_quality: the overlap with a true region that SAM 2 expects of its mask.
         least_stability: overlap of the masks that follow from a stricter and a laxer threshold.
         stability_offset: how much stricter and laxer, in logits.

@@ -9,7 +9,7 @@ region i and f of the whole, all of unit length,
     feature of region i = w_i f + (1 - w_i) f_i, scaled to unit length
 
 so that a region that is like the whole and like the others takes more of the whole. It is written to the region's
-cells, larger regions first, so that a cup keeps its own feature on its table. Cells of no region have none.
+cells, larger regions first, so that a cup has its own feature on its table. Cells of no region have none.
 
 CLIP is never retrained, so that rare things keep their names; but it is slow: one look of SAM 2 and one of CLIP for
 each of some fifty regions a frame. Another pair of models is chosen by ``CLIP+SAM``.

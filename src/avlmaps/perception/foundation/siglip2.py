@@ -13,7 +13,7 @@ mask and reads the feature off at the last place. So the published tokenizer.jso
 here; what other programs make of it has changed with their releases.
 
 The model holds a scale (about 112) and a bias (about -16.6) for its sigmoid. A query compares names of rooms with one
-another, where the bias cancels; it is kept as ``logit_bias`` for whoever asks how likely a caption is by itself (for a
+another, where the bias cancels; ``logit_bias`` stores it for callers that need the likelihood of one caption (for a
 bare name that is small even where it is right).
 """
 

@@ -1,6 +1,6 @@
 """From similarities to yes or no for sound models of an open vocabulary, with what the models learnt themselves.
 
-A contrastive model tells which of several texts fits a sound best, not whether one fits at all. So an asked phrase
+A contrastive model says which of several texts fits a sound best, not whether one fits at all. So a queried phrase
 competes with a list of everyday sounds, with silence and with noise (``OTHERS``): its score is its share of the softmax
 at the model's own temperature, at least 0.5 where it is likelier than all the others together. A phrase's own synonyms
 in the list must not compete with it. How near two texts are when they mean two things, the list itself shows: its
@@ -36,14 +36,14 @@ OTHERS = (
     "rain", "thunder", "sea waves", "a car engine", "a car horn", "a siren", "a train", "an airplane", "a helicopter",
     "church bells", "fireworks", "a gunshot", "a zipper", "paper rustling",
 )  # fmt: skip
-_ONE_MEANING = 0.995  # of the pairs of different sounds in the list, so many are less near than two names of one
+_ONE_MEANING = 0.995  # this share of the pairs of different sounds in the list is less near than two names of one
 _MOST_LEFT_OUT = 3
 _ALIKE = 0.5  # two sounds of one kind have a cosine above this
 
 
 @dataclass(frozen=True)
 class Contrast:
-    """What an asked phrase competes with.
+    """The competitors of a queried phrase.
 
     Attributes:
         others: a unit vector for each of some different kinds of sound.
@@ -58,7 +58,7 @@ class Contrast:
 
         Args:
             sounds: unit vectors, one for each window.
-            asked: unit vectors of the phrases.
+            asked: unit vectors of the queried phrases.
         """
         if not sounds or not len(asked):
             return np.zeros((len(sounds), len(asked)), np.float32)
@@ -74,7 +74,7 @@ class Contrast:
         return share / share.sum(axis=1, keepdims=True)
 
     def alike(self, sounds: Sequence[Windows], asked: Windows) -> Float32[np.ndarray, " sounds"]:
-        """Return how likely each sound is of the asked one's kind, by the two windows that are nearest.
+        """Return how likely each sound is of the queried one's kind, by the two windows that are nearest.
 
         Both must hold: the windows are alike, and the list's kinds speak to them alike.
         """

@@ -2,13 +2,13 @@
 
 Any of ``google/tipsv2-b14`` (768 numbers a feature), ``-l14`` (1024), ``-so400m14`` (1152) and ``-g14`` (1536), as
 transformers runs them (``Tipsv2Model``; published code: google-deepmind/tips). A picture goes in as RGB in [0, 1] with
-no mean or deviation taken out, its shorter side 448 pixels as its authors measure segmentation, its shape kept:
+no mean or deviation taken out, its shorter side 448 pixels as its authors measure segmentation, its shape preserved:
 640x480 gives 32x43 patches of 14 pixels, with position embeddings interpolated to that grid.
 
-Two ways to take a patch's feature, chosen by ``model#way``:
+Two kinds of patch features, chosen by ``model#way``:
 
-- ``values`` (default), with which the authors measure zero-shot segmentation: in the last block each patch keeps its
-  own value instead of attending to others (MaskCLIP's idea); the block's residuals and its MLP stay;
+- ``values`` (default), with which the authors measure zero-shot segmentation: in the last block each patch takes its
+own value instead of attending to others (MaskCLIP's idea); the block's residuals and its MLP stay;
 - ``last``, the final patch tokens as the model returns them.
 
 Both are compared with the text tower's mean over tokens. The two class tokens in front (the second is a register
@@ -46,7 +46,7 @@ class TipsPixels(OpenPixels):
     """A feature for every 14 x 14 pixels of the working size, in the space of TIPSv2's text encoder.
 
     Args:
-        model: hub id or folder, behind ``#`` the way to take features.
+        model: hub id or folder, behind ``#`` the kind of features.
         short_side: shorter side of the picture that the model sees, pixels.
     """
 

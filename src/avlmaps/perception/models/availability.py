@@ -1,4 +1,4 @@
-"""Which backends can run here, told without torch, without a network, and without opening a single weight.
+"""Which backends can run here, found without torch, without a network, and without opening a single weight.
 
 A model counts as here when its files lie where loading would look: in the folder of models, in the hub's cache, in
 torch's. Whether they are whole and the right ones is found out when they are loaded.
@@ -21,14 +21,14 @@ State = Literal["ready", "package missing", "weights missing", "broken"]
 
 @dataclass(frozen=True, slots=True)
 class Availability:
-    """What can be told of a backend.
+    """The state of a backend.
 
     Attributes:
         state: ``ready`` says that it can be loaded (a small one: that it was).
         model: which model it runs.
         licence: of the weights.
         note: what to do about it, or what to know of its limits.
-        dim: length of a feature; 0 where only loading would tell.
+        dim: length of a feature; 0 where only loading would show it.
     """
 
     state: State
@@ -39,7 +39,7 @@ class Availability:
 
 
 def availability(backend: Backend, model: str = "") -> Availability:
-    """Tell the state of a backend.
+    """Return the state of a backend.
 
     Args:
         backend: of the registry.
@@ -67,7 +67,7 @@ def _loaded(backend: Backend) -> Availability:
 
 
 def is_here(model: str) -> bool:
-    """Tell whether a model's files lie where they would be loaded from."""
+    """Return whether a model's files lie where they would be loaded from."""
     return any(place.exists() for place in _places(model))
 
 

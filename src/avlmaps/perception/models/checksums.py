@@ -15,7 +15,7 @@ _KEPT = "checksums.json"
 def checksum_of(files: Sequence[Path], *constants: str) -> str:
     """Return the hex SHA-256 of some files' contents and of constants that matter as much (sizes, prompts).
 
-    A file's own sum is kept in the user's folder with its size and time, and taken from there while they stay.
+    A file's own sum is stored in the user's folder with its size and time, and taken from there while they stay.
 
     Args:
         files: the weights; their order and names do not matter.

@@ -40,7 +40,7 @@ def chosen_device() -> torch.device:
 
 @cache
 def _use_cores() -> None:
-    """Let large models on the CPU use all cores, as torch would, though the command line keeps all else to one."""
+    """Let large models on the CPU use all cores, as torch would, though the command line limits all else to one."""
     threads = os.environ.get("AVLMAPS_TORCH_THREADS", "")
     if threads.isdecimal() and int(threads):
         torch.set_num_threads(int(threads))

@@ -22,7 +22,7 @@ def shrunk(rgb: UInt8[np.ndarray, "h w 3"], max_side_px: int) -> UInt8[np.ndarra
 
 
 def has_nothing(rgb: UInt8[np.ndarray, "h w 3"]) -> bool:
-    """Tell whether a picture is of one colour or too small, so that what a network finds in it are its own borders."""
+    """Return whether a picture is of one colour or too small, so that a network finds only its own borders in it."""
     return min(rgb.shape[:2]) < _SMALLEST_PX or bool((rgb == rgb[0, 0]).all())
 
 

@@ -43,7 +43,7 @@ def load_pretrained(
 ) -> T:
     """Return a model of transformers, ready for inference on a device, every weight from the checkpoint.
 
-    Nothing but tensors is read from a file, no code is run and no hub is asked.
+    Nothing but tensors is read from a file, no code is run and no hub is queried.
 
     Args:
         kind: its class, such as ``ClapModel``.
@@ -62,7 +62,7 @@ def load_pretrained(
             made, told = load.from_pretrained(
                 folder, output_loading_info=True, local_files_only=True, dtype=precision, weights_only=True
             )
-    except Exception as fault:  # what transformers, safetensors and torch raise for damaged files is not told apart
+    except Exception as fault:  # transformers, safetensors and torch raise many types for damaged files
         raise BackendError(
             f"{folder} cannot be loaded as {kind.__name__} ({type(fault).__name__}: {_short(fault)}); get it again "
             f"with: hf download {model}"
@@ -97,7 +97,7 @@ def load_helper(kind: Any, folder: Path, model: str) -> Any:
 
 @contextmanager
 def _quietly() -> Iterator[None]:
-    """Keep transformers' bars and reports of loading off the terminal: what matters of them is told here."""
+    """Hide transformers' bars and reports of loading: avlmaps reports what matters of them."""
     from transformers.utils import logging
 
     bars, level = logging.is_progress_bar_enabled(), logging.get_verbosity()

@@ -46,7 +46,7 @@ def published_file(name: str, how_to_get: str, repository: str = "", cached: Seq
 
 
 def _below_models(repository: str, name: str) -> Path | None:
-    """Return where ``hf download`` puts it when it is told the folder of models and the repository's name in it."""
+    """Return where ``hf download`` puts a file when it gets the folder of models and the repository's name in it."""
     folder = model_settings().folder
     return folder / repository / name if folder and repository else None
 

@@ -1,8 +1,8 @@
 """Reading checkpoints that hold more than tensors, without running anything that is in them.
 
-A PyTorch-Lightning checkpoint keeps hyper-parameters and callbacks beside the weights, as objects of classes of the
+A PyTorch-Lightning checkpoint holds hyper-parameters and callbacks beside the weights, as objects of classes of the
 program that trained it. torch's safe reader refuses any class that it does not know; here each such class is replaced
-by one that keeps nothing and does nothing, so that the weights can be read and nothing of the rest comes to life. A
+by one that stores nothing and does nothing, so that the weights can be read and nothing of the rest comes to life. A
 scripted archive (the ``.pt`` files of OpenAI's CLIP) holds code that loading may run; it is opened only where it is, by
 its checksum, one of those that OpenAI published.
 """
@@ -80,14 +80,14 @@ def _stand_in(module: str, name: str) -> type:
 
 
 class _InertMapping:
-    """Stands for a class of another program: whatever it is made of, it is a dictionary."""
+    """Stands for a class of another program: it is a dictionary, for any content."""
 
     def __new__(cls, *_args: Any) -> Any:
         return OrderedDict()
 
 
 class _Inert:
-    """Stands for a class of another program: whatever it is made of, it is nothing."""
+    """Stands for a class of another program: it is empty, for any content."""
 
     def __new__(cls, *_args: Any) -> Any:
         return object.__new__(cls)

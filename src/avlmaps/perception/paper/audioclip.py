@@ -3,7 +3,7 @@
 Expected is ``AudioCLIP-Partial-Training.pt`` (537 MB, MIT; the paper's) or ``AudioCLIP-Full-Training.pt``, from the
 release v0.1 of https://github.com/AndreyGuzhov/AudioCLIP, and CLIP's list of byte pairs (``clip_tokens``). Features
 have 1,024 numbers. A sound goes in as 44.1 kHz mono in units of 16-bit samples, five seconds at a time, a shorter one
-filled up with silence behind it: so the published system (AVLMaps) does it, which keeps the first five seconds of a
+filled up with silence behind it: so the published system (AVLMaps) does it, which uses the first five seconds of a
 sound and forgets the rest. Here a longer sound is encoded whole, one feature every five seconds, the last one at its
 end. Words go in bare, as there; each competes with a list of everyday sounds and with "other". The published system
 stretches the cosines over a map's sounds instead, so that one of them always fits; ``SoundSettings.normalise`` does
@@ -39,7 +39,7 @@ PROMPT = "{}"
 WINDOW_SAMPLES = 5 * RATE_HZ
 _FULL_SCALE = np.float32(32768.0)
 _RELEASE = "https://github.com/AndreyGuzhov/AudioCLIP/releases/download/v0.1"
-_NO_BIAS = "audio.fbsp.bias"  # the published class keeps an empty tensor for the bias that it does not have
+_NO_BIAS = "audio.fbsp.bias"  # the published class stores an empty tensor for the bias that it does not have
 _WINDOWS_ON_GPU = 16
 
 

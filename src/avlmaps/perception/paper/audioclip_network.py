@@ -3,7 +3,7 @@
 Guzhov et al., "AudioCLIP: Extending CLIP to image, text and audio", ICASSP 2022; published at
 https://github.com/AndreyGuzhov/AudioCLIP (MIT). Sizes are read off the checkpoint: published are 1,025 wavelets of
 2,048 samples behind a window of 1,654, ResNeXt-50 32x4d with attention between its stages, features of length 1,024.
-The checkpoints also hold CLIP RN50's picture tower, which hears nothing; ``NOT_NEEDED`` names it.
+The checkpoints also hold CLIP RN50's picture tower, which has no part in sounds; ``NOT_NEEDED`` names it.
 """
 
 from collections.abc import Mapping

@@ -2,7 +2,7 @@
 
 Guzhov et al., "ESResNe(X)t-fbsp: Learning robust time-frequency transformation of audio", IJCNN 2021, and its
 published code (https://github.com/AndreyGuzhov/AudioCLIP, MIT). Where that code depends on the order of float32
-operations, the same order is kept here: the phase of the highest wavelets reaches 3,200 radians, and silence is
+operations, the order here is the same: the phase of the highest wavelets reaches 3,200 radians, and silence is
 decibels of rounding errors.
 
 A sound is given as the published code wants it, in units of 16-bit samples at 44.1 kHz.
@@ -17,7 +17,7 @@ from torch.nn import functional
 
 RATE_HZ = 44_100
 HOP_SAMPLES = 561
-_LEAST_POWER = 1e-18  # stands for a power of zero; lesser ones are kept
+_LEAST_POWER = 1e-18  # stands for a power of zero; lesser ones stay
 _EPSILON = 1e-8
 
 
@@ -54,7 +54,7 @@ class Fbsp(nn.Module):
 
 @dataclass(frozen=True)
 class FrontEnd:
-    """Turns samples into the picture of three bands that the network looks at, in float32 whatever its precision.
+    """Turns samples into the picture of three bands that the network looks at, in float32 for every precision.
 
     Attributes:
         kernels: (2, bins, length) as ``Fbsp.kernels``.

@@ -9,7 +9,7 @@ what it has at every second pixel is returned: the network's own grid is no fine
 
 A word's feature is the mean over 63 sentences. The published code leaves that mean shorter than one, which favours
 words whose sentences agree; here every feature has unit length. Intrinsics are the map's affair: the grid covers the
-picture evenly, whatever the camera (the published code takes every camera for one of 90 degrees).
+picture evenly for every camera (the published code takes every camera for one of 90 degrees).
 """
 
 from collections.abc import Sequence
@@ -81,7 +81,7 @@ class LSegPixels(OpenPixels):
 
     @property
     def vocabulary(self) -> tuple[str, ...]:
-        """Matterport3D's classes, with which the paper's maps are asked, without ``other``."""
+        """Matterport3D's classes, with which the paper's maps are queried, without ``other``."""
         return VOCABULARY
 
     def _encode_pictures(self, pictures: list[UInt8[np.ndarray, "h w 3"]]) -> list[Float32[np.ndarray, "hf wf d"]]:

@@ -7,7 +7,7 @@ the residuals of each cluster to unit length, then all of them; whitening to 409
 pixels alone and learns nothing on a map.
 
 ``convert_netvlad`` writes the same weights as a ``.safetensors`` file, which opens faster; features are the same to
-the bit, and a map made with the one can be asked with the other.
+the bit, and a map made with the one can be queried with the other.
 """
 
 from itertools import pairwise

@@ -64,7 +64,7 @@ def _convolutions(layers: list[Any]) -> Weights:
 
 
 def _vlad(layers: list[Any]) -> Weights:
-    assignment, centres = _weights(layers[VLAD])  # both (512, clusters); the centres are kept with their sign turned
+    assignment, centres = _weights(layers[VLAD])  # both (512, clusters); the file stores the negative centres
     return {"assign.weight": _tensor(np.asarray(assignment).T[:, :, None]), "centres": _tensor(-np.asarray(centres))}
 
 

@@ -1,4 +1,4 @@
-"""The sentences that the published system puts a thing's name into, and the names that it tells apart.
+"""The sentences that the published system puts a thing's name into, and the names that it distinguishes.
 
 A name is encoded in each of 63 sentences and the mean is its feature, as the code of VLMaps and AVLMaps does it
 (``multiple_templates`` there). The sentences are the well-known ones that were published with CLIP and ViLD; they are
@@ -29,7 +29,7 @@ THING_PROMPTS = _published()
 """The 63 sentences for things."""
 
 AREA_PROMPTS = ("{}",)
-"""Areas are asked by their bare name in the published code."""
+"""The published code queries areas by their bare name."""
 
 THINGS = tuple(
     """wall floor chair door table picture cabinet cushion window sofa bed curtain chest_of_drawers plant sink stairs

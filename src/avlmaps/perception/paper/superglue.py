@@ -1,9 +1,9 @@
-"""SuperGlue (Sarlin, DeTone, Malisiewicz, Rabinovich 2020): the matcher of the paper, on keypoints that are kept.
+"""SuperGlue (Sarlin, DeTone, Malisiewicz, Rabinovich 2020): the matcher of the paper, on stored keypoints.
 
 Published as magic-leap-community/superglue_indoor (12 million weights; Magic Leap's licence: academic and
 non-commercial use only). transformers holds the network, but only for a pair of pictures of one size, whose keypoints
 it finds itself and fills up to one number, which changes the optimal transport a little. So its parts are run here one
-after the other on what the map has kept of each picture: keypoints relative to their picture's size, scores and
+after the other on what the map stores of each picture: keypoints relative to their picture's size, scores and
 descriptors of 256 numbers; keypoint encoder, attention within and across, projection, 100 Sinkhorn iterations. Pairs
 are each other's best with a probability above 0.2, as in the paper's code (the hub's configuration says 0). No
 coordinate is rounded.

@@ -4,7 +4,7 @@ Published as magic-leap-community/superpoint (1.3 million weights; Magic Leap's 
 use only), run by transformers. The network sees the picture's grey values in [0, 1] at their full size: the size to
 which transformers' own preprocessing would squeeze it is not used. Keypoints are whole pixels with a score above
 0.005 that are maxima within 4 pixels and at least 4 pixels from the border, as many as there are; descriptors have 256
-numbers. These are the settings that were in effect in the paper's code (its configuration asked for others, which were
+numbers. These are the settings that were in effect in the paper's code (its configuration named others, which were
 never read).
 """
 
@@ -65,7 +65,7 @@ class SuperPointKeypoints:
             found = self._network((grey.float() / 255.0)[None, None])
         height, width = grey.shape
         index = to_numpy(found.keypoints[0]).astype(np.float64) * (width, height)
-        # transformers keeps those at the right and lower border, which the published code removes as well.
+        # transformers returns those at the right and lower border, which the published code removes as well.
         last = np.array([width, height]) // _CELL_PX * _CELL_PX - BORDER_PX
         kept = (index < last - 0.5).all(axis=1)
         descriptors, score = unit_rows(found.descriptors[0]), to_numpy(found.scores[0])

@@ -15,14 +15,14 @@ from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, normalise
 from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.voxel_space import Space
 
-# What a place may be, if it is not what was asked for.
+# Names that compete with the queried area.
 AREA_NAMES = (
     "kitchen", "living room", "bedroom", "bathroom", "dining room", "office", "corridor", "staircase", "entrance hall",
     "laundry room", "storage room", "garage", "balcony", "garden", "gym", "library", "meeting room", "workshop",
     "laboratory", "classroom", "waiting area", "shop", "lounge", "children's room",
 )  # fmt: skip
 
-# For an encoder that does not tell by how much its cosines count.
+# For an encoder that has no scale for its cosines.
 _UNKNOWN_TEMPERATURE = 0.05
 
 
@@ -32,14 +32,14 @@ class AreaSettings:
 
     anchor: Literal["camera", "centre"] = "centre"
     """Where a keyframe's heat falls from: the camera (the paper), or the middle of what the camera saw (things are
-    found where they were asked for in 45 % of 191 tasks, with the camera's place in 35 %; docs/experiments.md)."""
+    found in the right place for 45 % of 191 tasks, with the camera's place for 35 %; docs/experiments.md)."""
     score: Literal["posterior", "min-max"] = "posterior"
     """``posterior`` asks how likely the name is among all area names; ``min-max`` stretches the cosines (the paper)."""
     temperature: float | None = None
     """Of the posterior: a cosine higher by this makes a name e times as likely. By default what the encoder learnt
-    (1 / ``logit_scale``), and 0.05 for one that tells nothing of the kind."""
+    (1 / ``logit_scale``), and 0.05 for one without such a scale."""
     same_word_cosine: float = 0.95
-    """Another name at least this close to the asked one names the same and does not compete with it. For an encoder
+    """Another name at least this close to the queried one names the same and does not compete with it. For an encoder
     with a scale it is measured from the middle of all names: its phrases lie in a cone, kitchen beside garage."""
     pool_m: float = 0.8
     """Views whose anchors are about so close speak together (``pooled``): one odd view is outvoted. 0 leaves each for
@@ -57,8 +57,8 @@ def area_scores(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return for each keyframe the posterior of the name among all area names, and its score in [0, 1].
 
-    An encoder that tells named kinds of room apart says itself how likely each is. For one of an open vocabulary it is
-    the softmax over the names that it was trained with; names that mean the asked place as well do not compete.
+    An encoder that distinguishes named kinds of room gives their probabilities. For one of an open vocabulary they
+    are the softmax over the names that it was trained with; names that mean the queried area as well do not compete.
 
     The scores are the posteriors, pooled over what looked at about the same place; they are stretched and each view
     speaks for itself where the settings ask for the paper's score.
@@ -124,7 +124,7 @@ def pooled(
     """Return what views say together with those that looked at about the same place.
 
     That is their mean, weighted by exp(−d² / 2·pool_m²), d the 3D distance: one odd view is outvoted. An average is
-    less sure than views that agree should be; so, where the weights add up to two views or more, it is squared and
+    less confident than views that agree should be; so, where the weights add up to two views or more, it is squared and
     rescaled, the product of two independent views that say the same. A lone view stays as it is.
 
     Args:

@@ -1,7 +1,7 @@
 """Which voxels are the object that a word asks for, and which of them belong together.
 
-As the paper does, the asked word competes with a vocabulary and with "other" for every voxel, and wins where it
-is the closest. The margin by which it wins is kept: instances are ranked and absence is told by it.
+As in the paper, the queried word competes with a vocabulary and with "other" for every voxel, and wins where it
+is the closest. The map stores the margin by which it wins: it ranks instances and decides absence.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.voxel_space import Space
 
 _CHUNK = 16_384
-# A name that a phrase means at least so much is the thing itself and does not compete with it.
+# A name that a phrase means by at least this much is the thing itself and does not compete with it.
 CLEARLY_MEANT = 0.25
 
 
@@ -32,20 +32,20 @@ class ObjectSettings:
     """From a word to instances."""
 
     same_word_cosine: float = 0.95
-    """A vocabulary word at least this close to the asked one names the same thing and does not compete with it."""
+    """A vocabulary word at least this close to the queried one names the same thing and does not compete with it."""
     least_score: float = 0.5
     """For an encoder that has no feature for "other": a voxel must score at least this."""
     margin_yes: float = 0.1
     """An instance that wins its voxels by this much on average is as likely right as wrong."""
     margin_yes_logits: float = 1.0
-    """The same for an encoder that tells by how much its cosines count: the margin times its ``logit_scale``."""
+    """The same for an encoder with a scale for its cosines: the margin times its ``logit_scale``."""
     area_yes_m2: float = 0.01
     """Surface below which an instance is probably noise; a mug shows about 0.02 m²."""
     least_confidence: float = 0.3
-    """Instances below this are noise (one or two voxels of 5 cm) and give no heat; 0 keeps all, as the paper does."""
+    """Instances below this are noise (one or two voxels of 5 cm) and give no heat; 0 admits all, as the paper does."""
     least_in_company: float = 0.02
-    """The same where the word is asked together with what it is near: then a weak instance there is likelier than a
-    sure one elsewhere (docs/experiments.md)."""
+    """The same where the query has context: then a weak instance there is likelier than a
+    confident one elsewhere (docs/experiments.md)."""
     score_in_company: float = 0.5
     """And there a voxel counts that scores at least this part of its best rival's score, for an encoder of names."""
     link_m: float = 0.1
@@ -60,7 +60,7 @@ class Asked:
 
     Attributes:
         rows: what a voxel's feature is compared with: its score is the length of their products with it. One unit
-            vector for most encoders; for one that tells names apart, the code of each name that is meant.
+            vector for most encoders; for one with a closed set of names, the code of each name that is meant.
         span: unit vectors of what is clearly meant; words that lie among them do not compete.
         understood: what of the word the encoder can act on.
         meant: for an encoder of names, how much each is meant; empty for others.
@@ -88,7 +88,7 @@ class Asked:
 class Rivals:
     """The two words of a vocabulary closest to each voxel, worked out once a map and vocabulary.
 
-    With two kept, a query is one pass over the features even when the asked word is in the vocabulary itself.
+    With the best two stored, a query is one pass over the features even if the queried word is in the vocabulary.
 
     Attributes:
         words: the vocabulary and, if the encoder has a feature for it, ``other`` as the last.
@@ -118,7 +118,7 @@ class Rivals:
         return cls(words, encoded[known], bool(known[-1]), *_two_closest(feature, encoded[known]))
 
     def silent_for(self, encoder: PixelEncoder, asked: "Asked", cosine: float) -> Bool[np.ndarray, " v"]:
-        """Return which words do not compete because they name what is asked for; ``other`` always competes."""
+        """Return which words do not compete because they name the queried thing; ``other`` always competes."""
         close = np.linalg.norm(self.word_feature @ asked.span.T, axis=1) >= cosine
         same = [bool(asked.understood) and encoder.understood(word) == asked.understood for word in self.words]
         silent = close | np.array(same, bool)
@@ -156,7 +156,7 @@ def object_margins(
     silent: Bool[np.ndarray, " v"],
     least_score: float,
 ) -> tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
-    """Return by how much the asked word beats its best rival at each voxel, and its score there.
+    """Return by how much the queried word beats its best rival at each voxel, and its score there.
 
     The margin is positive where the voxel is the object.
 
@@ -206,7 +206,7 @@ def instances_of(space: Space, mask: Bool[np.ndarray, " n"], link_m: float) -> I
 def instance_confidence(
     margin: Float[np.ndarray, " a"], instance: Int[np.ndarray, " a"], voxel_size_m: float, settings: ObjectSettings
 ) -> Float32[np.ndarray, " i"]:
-    """Return in [0, 1] how sure it is that each instance is the object: m / (m + m_yes) · (1 − exp(−area / area_yes)).
+    """Return the confidence of each instance, in [0, 1]: m / (m + m_yes) · (1 − exp(−area / area_yes)).
 
     m is the mean margin of its voxels, the area is a voxel's face for each of them.
     """
@@ -224,9 +224,9 @@ def named_confidence(
     instance: Int[np.ndarray, " a"],
     voxel_size_m: float,
 ) -> Float32[np.ndarray, " i"]:
-    """Return how sure it is that each instance is what was asked for, as the encoder was calibrated.
+    """Return the confidence that each instance matches the query, as the encoder was calibrated.
 
-    A phrase that means several names is as sure as the most meant of them would be with all their probability.
+    A phrase that means several names has the confidence that the most meant name would have with all their probability.
 
     Args:
         encoder: of names.
@@ -252,7 +252,7 @@ def object_factor(
     heat: HeatSettings,
     rgb: UInt8[np.ndarray, "n 3"] | None = None,
 ) -> NearThings:
-    """Return the heat of the object that a word asks for; if none is sure enough, of the best guesses, not ``found``.
+    """Return the heat of the object that a word names; if no confidence suffices, of the best guesses, not ``found``.
 
     With the voxels' colours, an encoder that knows things but no colours is helped out with those.
 
@@ -304,7 +304,7 @@ def colour_factor(
     settings: ObjectSettings,
     heat: HeatSettings,
 ) -> NearThings:
-    """Return the heat of whatever has a colour."""
+    """Return the heat of everything that has a colour."""
     mask = is_tinted(np.asarray(rgb), tint)
     instance = instances_of(space, mask, settings.link_m)
     confidence = instance_confidence(np.ones(len(instance)), instance, space.grid.voxel_size_m, settings)
@@ -317,13 +317,13 @@ def colour_factor(
 
 @dataclass(frozen=True, slots=True)
 class Pieces:
-    """The voxels that an asked word won, and the things that they make up.
+    """The voxels that a queried word won, and the things that they make up.
 
     Attributes:
         mask: which voxels they are.
         instance: which thing each of them belongs to.
         mean_probability: of each thing: the mean of its voxels' squared scores (for an encoder of names: p).
-        confidence: how sure it is that each is what was asked for.
+        confidence: the probability that each matches the query.
         won: how many voxels the word won before specks were left out.
         best: highest confidence before that.
     """

@@ -48,8 +48,8 @@ def sound_factor(
     Args:
         space: the map's voxels.
         sounds: what was heard.
-        scores: for each heard sound, in [0, 1]: how likely it is what was asked for.
-        part: what was asked.
+        scores: for each detected sound, in [0, 1]: the probability that it matches the query.
+        part: the part of the query.
         settings: whether to stretch the scores.
         heat: the falloff.
     """
