@@ -67,7 +67,7 @@ def with_rig(frames: list[Frame], rig: Rig) -> list[Frame]:
 class PointLoop:
     """The published way, written from its description: a hundredth of the pixels, a Python loop over them.
 
-    A dense grid of 1000 x 1000 x 30 holds the row of each voxel; the running mean is kept in arrays that double.
+    A dense grid of 1000 x 1000 x 30 holds the row of each voxel; the running mean is stored in arrays that double.
     """
 
     def __init__(self) -> None:

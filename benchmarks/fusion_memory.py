@@ -2,7 +2,7 @@
 
     python benchmarks/fusion_memory.py [--voxels 1000000] [--dim 512] [--rounds 1] [--file FILE.npy] [--json]
 
-A camera is carried along a line over rough ground until the map has so many voxels; `--rounds 3` walks the line three
+A camera is carried along a line over rough ground until the map has this many voxels; `--rounds 3` walks the line three
 times. Then the map is finished: means of unit length in float16, in memory or written to a file.
 """
 

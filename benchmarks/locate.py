@@ -1,4 +1,4 @@
-"""How long locating a photo takes, stage by stage, beside plain ways of doing the same in the same run.
+"""How long locating a photo takes, stage by stage, beside plain methods in the same run.
 
 python benchmarks/locate.py [--keyframes 100] [--photos 10] [--json]
 

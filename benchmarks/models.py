@@ -111,7 +111,7 @@ def measure(name: str, folder: Path, asked: Namespace) -> dict[str, object]:
         device = chosen_device()
         on_gpu = device.type != "cpu"
         batch, work = task(kind, encoder, on_gpu, asked)
-        # A GPU is waited for; on a busy CPU waiting must not count, which only one thread can tell.
+        # A GPU is waited for; on a busy CPU waiting must not count, which only one thread can separate.
         clock = time.perf_counter if on_gpu or torch.get_num_threads() > 1 else time.thread_time
         work()
         times = []

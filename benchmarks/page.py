@@ -55,7 +55,7 @@ ENTRIES = (
     Entry("frames", "Labelled frames of real rooms", "avlmaps bench frames --nyuv2 NYUV2 --out OUT", 0.2),
     Entry(
         "sounds", "Sounds", "avlmaps bench sounds --sounds SOUNDS --out OUT", 0.0,
-        "Tables called cross-validation were written with the weights, by networks that had not heard the fold.",
+        "Tables called cross-validation were written with the weights, by networks that were not trained on the fold.",
     ),
     Entry("segmentation", "Sounds in a track", "avlmaps bench segmentation --sounds SOUNDS --out OUT", 0.3),
     Entry("locate", "Position of a photo", "avlmaps bench locate --scenes RECORDING --out OUT", 0.2),
@@ -144,7 +144,7 @@ def read_figures(path: Path = FIGURES) -> dict[str, Any]:
 INTRODUCTION = """# Benchmarks
 
 `make bench` writes this page from [benchmarks.json](benchmarks.json), which holds what each command below printed.
-Nothing here is typed by hand; what was tried on the way is on [a page of its own](experiments.md).
+Nothing here is typed by hand; [a page of its own](experiments.md) holds what else was tried.
 
 Speed is a ratio against another way in the same run, since machines differ and are busy. Accuracy comes with counts and
 95 % intervals. Below a table stand the choices that were made on the same data. Each section names its command and the

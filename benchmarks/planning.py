@@ -1,4 +1,4 @@
-"""Planning over a grid of 1000 x 1000 cells: from raw states to a way, stage by stage, beside one exact search.
+"""Planning over a grid of 1000 x 1000 cells: from raw states to a path, stage by stage, beside one exact search.
 
     python benchmarks/planning.py [--cells 1000] [--repeats 5] [--json]
 

@@ -1,4 +1,4 @@
-"""Checkpoints of the published sizes with random weights, for timing: no hub is asked, and no answer means anything.
+"""Checkpoints of the published sizes with random weights, for timing: no hub is queried, and no answer means anything.
 
 The sizes are those of the published ``config.json`` (or of the published code, for files that bring none); the layouts
 are the tests' (``tests/foundation/tiny``). Vocabularies of the tokenizers are small, tables of tokens are not.
@@ -24,7 +24,7 @@ CLIPS = {
 
 
 def write_clip(folder: Path, model: str = CLIP_L14) -> None:
-    """CLIP as transformers keeps it."""
+    """CLIP as transformers stores it."""
     from tiny.clip import write_clip_tokens
     from transformers import CLIPConfig, CLIPImageProcessorPil, CLIPModel
 
@@ -129,7 +129,7 @@ def _tower(width: int, layers: int, heads: int) -> dict[str, Any]:
 
 
 def _tests_writer(module: str, function: str, **sizes: Any) -> Writer:
-    """Return a writer of the tests, asked for the published sizes."""
+    """Return a writer of the tests, with the published sizes."""
 
     def write(folder: Path) -> None:
         import importlib

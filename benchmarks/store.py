@@ -64,7 +64,7 @@ print(json.dumps({"parts": len(folders), "voxels": len(voxels), "merge_s": merge
 
 
 def content(voxels: int, dim: int, clips: Path) -> MapContent:
-    """Make up a map; features are drawn once and repeated, which no step of the store can tell."""
+    """Make up a map; features are drawn once and repeated, which no step of the store can detect."""
     rng = np.random.default_rng(0)
     side = int(np.ceil(voxels ** (1 / 3)))
     index = np.stack(np.unravel_index(np.arange(voxels), (side, side, side)), axis=1).astype(np.int32)
@@ -145,7 +145,7 @@ def in_a_process(script: str, path: Path, mode: str = "") -> dict:
 
 
 def write_parts(folder: Path, voxels: int, dim: int, parts: int = 4) -> None:
-    """Make up parts that overlap by half and cover so many voxels in all."""
+    """Make up parts that overlap by half and cover this many voxels in all."""
     size = 2 * voxels // (parts + 1)
     for number in range(parts):
         rows = np.arange(number * size // 2, number * size // 2 + size)

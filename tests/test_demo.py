@@ -138,7 +138,7 @@ def test_the_report_is_whole_and_loads_nothing_from_the_network(small: DemoRepor
         elif not source.startswith("data:image/"):
             assert (small.out / source).is_file(), source
     assert "http" not in text
-    assert "What it did when told" in text
+    assert "The drive: " in text
     for step in small.steps:
         assert (small.out / step.picture).is_file()
     assert len(text) < 6_000_000

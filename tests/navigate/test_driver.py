@@ -272,7 +272,7 @@ def test_forward_stops_where_the_known_floor_ends(drive, told_m, heading_rad, go
     body = Free(GroundPose(1.0, 1.0, heading_rad))
     arrival = MapDriver(of_plan(states), body, settings=drive).forward(told_m)
     assert not arrival.reached
-    assert arrival.note.startswith("what lies ahead is not known after ")
+    assert arrival.note.startswith("the floor ahead is not known after ")
     gone = hypot(arrival.pose.x_m - 1.0, arrival.pose.y_m - 1.0)
     assert gone_m - 0.15 <= gone <= gone_m + 0.01
 
@@ -323,7 +323,7 @@ def test_a_body_that_moves_otherwise_than_told_is_stopped_soon(drive, wrong):
     driver = MapDriver(FLOOR, Free(GroundPose(5.0, 2.5, 1.0), **wrong), settings=drive)
     arrival = driver.go_to(place(9.0, 2.5))
     assert not arrival.reached
-    assert "the body moves otherwise than it is told; check the frame of its pose" in arrival.note
+    assert "the body does not move as commanded; check the frame of its pose" in arrival.note
     assert hypot(arrival.pose.x_m - 5.0, arrival.pose.y_m - 2.5) < 2.5
 
 
@@ -331,7 +331,7 @@ def test_a_body_that_stands_dead_is_given_up_in_seconds():
     body = Free(GroundPose(2.0, 2.0, 2.0), ahead=0.0, turns=0.0)
     arrival = MapDriver(FLOOR, body, settings=VELOCITY).go_to(place(8.0, 2.5))
     assert not arrival.reached
-    assert "does not move though it is told to" in arrival.note
+    assert "does not move when commanded" in arrival.note
     assert body.time_s < 30.0
 
 

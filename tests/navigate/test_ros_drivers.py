@@ -205,7 +205,7 @@ def test_a_connection_lost_on_the_way_calls_the_goal_off_and_is_made_again_for_t
         arrival = driver.go_to(PLACE)
         assert not arrival.reached
         assert "connection to the robot was lost" in arrival.note
-        assert "told to stop" in arrival.note
+        assert "stopped" in arrival.note
         assert robot.soon(lambda: all(goal["status"] in (2, 5) for goal in robot.goals.values()))
         robot.does[""] = "succeed"
         assert driver.go_to(PLACE).reached
@@ -368,7 +368,7 @@ def test_a_robot_that_arrives_without_telling_where_has_not_arrived(robot):
         robot.does[""] = "arrive unseen"
         arrival = driver.go_to(PLACE)
         assert not arrival.reached
-        assert "says that it arrived, but where it is is not told any more: its transforms are" in arrival.note
+        assert "says that it arrived, but its pose is not reported any more: its transforms are" in arrival.note
 
 
 @pytest.mark.parametrize(

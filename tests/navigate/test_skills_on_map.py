@@ -116,7 +116,7 @@ def test_the_best_guess_is_gone_to_only_when_that_is_asked_for() -> None:
     robot = furnished_robot(settings=RobotSettings(guess=True), sounds=sounds)
     robot.move_to(robot.get_major_map(sound="dog"))
     assert robot.moves[-1].goal[:2] == pytest.approx((5.1, 3.1), abs=0.15)
-    assert any("not sure of 'dog'" in note for note in robot.seeker.notes)
+    assert any("confidence in 'dog' is" in note for note in robot.seeker.notes)
 
 
 def test_a_guess_leaves_out_what_is_nowhere_near() -> None:

@@ -1,4 +1,4 @@
-"""How well photos are located: some frames of a recording become the map, others are asked where they were taken."""
+"""How well photos are located: some frames of a recording become the map, others are located in it."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -83,13 +83,13 @@ def run(
     """Measure on one recording, once for each density of the map.
 
     Frames 0, s, 2s ... are all that the map's recording holds (of which keyframes are chosen as ever); the photos are
-    spread over the other frames, and their own poses are the truth. Photos of another place are asked, too.
+    spread over the other frames, and their own poses are the truth. Photos of another place are tried, too.
 
     Args:
         recording: frames with poses.
         seed: of visual words and RANSAC.
         steps: the densities s.
-        photos: at most so many are asked.
+        photos: limit of photos that are located.
         foreign: photos of another place, as large as the recording's; None takes the photos themselves, mirrored:
             a place that is not there, through the same camera.
         used: whose encoders; the embedded ones if None.

@@ -1,8 +1,8 @@
-"""The object benchmark: are the things of a building where the map says, are they things at all, is absence told.
+"""The object benchmark: are things where the map says, are its instances real things, does it report absence.
 
 Three figures for each scene. *First goal*: of the categories that stand there, how many have the first answer
-within half a metre of a true one. *Instances*: of the instances that the map is sure of (0.5 or more) how many are
-true, and of the true ones how many are found. *Found*: how well the best confidence tells categories that are there
+within half a metre of a true one. *Instances*: of the instances of confidence 0.5 or more how many are
+true, and of the true ones how many are found. *Found*: how well the best confidence separates categories that are there
 from those that are not (area under the ROC curve). Truth: boxes of things, of which the walk saw at least some.
 """
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
 
 STRUCTURE = ("wall", "floor", "ceiling", "column", "stairs", "railing")
-# A box is grown by so much: voxels and poses are that coarse.
+# A box is grown by this: voxels and poses are that coarse.
 GROWN_M = 0.1
 REACH_M = 0.5
 FEWEST_VOXELS = 15
@@ -40,7 +40,7 @@ class Instances:
     """What the map says of one category.
 
     Attributes:
-        category: what was asked.
+        category: the queried category.
         confidence: of each instance.
         is_true: whether most of its voxels lie in boxes of true ones.
     """
@@ -59,8 +59,8 @@ class ObjectFigures:
         reached: for each category that is there the distance of the first goal to a true one, metres; inf for none.
         said: the instances of every category of the vocabulary.
         true_count: how many true things of some size the walk saw.
-        found_count: how many of them the sure instances hold.
-        best: for every asked category the highest confidence, and whether it is there.
+        found_count: how many of them the confident instances hold.
+        best: for every queried category the highest confidence, and whether it is there.
     """
 
     scene: str
@@ -77,7 +77,7 @@ class ObjectFigures:
 
     @property
     def precise(self) -> tuple[int, int]:
-        """How many of the sure instances are true, of how many."""
+        """How many of the confident instances are true, of how many."""
         sure = [one.is_true[one.confidence >= 0.5] for one in self.said]
         return sum(int(a.sum()) for a in sure), sum(len(a) for a in sure)
 

@@ -1,7 +1,7 @@
 """How well sounds are found in a track: recorded clips put into silence and into noise, and looked for.
 
 The clips are those of ESC-10's folds 4 and 5 (the settings were chosen on folds 2 and 3 alone) and of other
-collections, named in an ``index.csv``. Truth is where a clip can be heard, cut as ``add_sounds`` cuts it.
+collections, named in an ``index.csv``. Truth is the audible part of a clip, cut as ``add_sounds`` cuts it.
 """
 
 import csv

@@ -2,7 +2,7 @@
 
 The folder holds clips and an ``index.csv`` (path, category ...). Clips cut from a recording that the weights were
 fitted to say nothing about them: they are left out and counted. Each group of clips, those of the ten kinds of ESC-10
-and those of all others, is asked for by name: ESC-10 by its ten names, the others by the names of all kinds in the
+and those of all others, is queried by name: ESC-10 by its ten names, the others by the names of all kinds in the
 folder and those ten.
 """
 

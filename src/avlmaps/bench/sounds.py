@@ -1,8 +1,8 @@
 """What the embedded sound encoder can do: figures of its cross-validation, and the shipped weights on other recordings.
 
-The shipped weights have heard every fold of ESC-10, so those clips say nothing about them. The tables whose names
-begin with "cross-validation" were written when the weights were made (``training/sounds``), by networks that had not
-heard the clips they were asked about; the others are measured when the suite runs, on clips that no network heard.
+The shipped weights were trained on every fold of ESC-10, so those clips say nothing about them. The tables whose names
+begin with "cross-validation" were written when the weights were made (``training/sounds``), by networks that were not
+trained on the clips of the tables; the others are measured when the suite runs, on clips that no network has seen.
 """
 
 import json

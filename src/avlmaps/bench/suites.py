@@ -23,7 +23,7 @@ class Asked:
 
     Attributes:
         sounds: folder of clips with an index.csv, for the suites of sound.
-        clips: the same, for ``sounds``: clips that are asked for by name, dry and in rooms.
+        clips: the same, for ``sounds``: clips that are queried by name, dry and in rooms.
         scenes: recordings with poses, for ``locate``.
         nyuv2: folder of labelled frames, for ``frames``.
         profile: the models that are measured.

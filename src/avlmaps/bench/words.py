@@ -15,7 +15,7 @@ from avlmaps.perception.embedded.words import EmbeddedWords
 
 _FIVE = 5
 # training/words/teacher_figures.json, of the day in it: all-MiniLM-L6-v2 in float32 on the same list, (first, among
-# five); the base install cannot run it, so the counts are kept here and a test holds them to the file.
+# five); the base install cannot run it, so the counts are stored here and a test holds them to the file.
 TEACHER = {"object": (116, 150), "room": (24, 37), "sound": (96, 124), "all": (236, 311)}
 
 

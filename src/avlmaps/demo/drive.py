@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from avlmaps.sim.scene import Scene
 
 PICTURE = "drive.png"
-# The robot is sent to what was asked for in these ways: together they need every sense, and nothing beside the command.
+# The robot is sent to the goals of these questions: together they need every modality, and nothing beside the command.
 _TOLD = ("sound", "area", "words")
 _MOST_LEGS = 2
 
@@ -29,7 +29,7 @@ class Drive:
     """A command, and what became of it.
 
     Attributes:
-        command: what the robot was told.
+        command: the command to the robot.
         asks: what each leg goes to, with its truth.
         start: where it stood; None where it could not be put anywhere.
         outcome: what it did; None where it could not begin.
@@ -85,7 +85,7 @@ def command_for(asks: Sequence[Ask]) -> tuple[str, tuple[Ask, ...]] | None:
 
 
 def drive(asks: Sequence[Ask], asked: "AVLMap", scene: "Scene", out: Path, tell: Callable[[str], None]) -> Drive | None:
-    """Tell a robot in the home where to go, and draw its way.
+    """Send a robot in the home to the goals with one command, and draw its path.
 
     Args:
         asks: the questions of the demonstration.
@@ -106,7 +106,7 @@ def drive(asks: Sequence[Ask], asked: "AVLMap", scene: "Scene", out: Path, tell:
     command, legs = chosen
     try:
         robot = robot_in(asked, scene)
-        # What it is sent to is truly there, so that it may go where it is not sure; whether that was right is told.
+        # The goals are truly there, so the robot may go to a best guess; the report says whether that was right.
         outcome = instruct(
             command, asked, robot.driver, RulesTranslator(), settings=RobotSettings(guess=True), tell=tell
         )
@@ -120,14 +120,14 @@ def drive_card(drive: Drive, sheet: Sheet, scene: str) -> str:
     """Return the report's part on the drive.
 
     Args:
-        drive: what was told and done.
+        drive: the commands and movements.
         sheet: the frame of the drawings; the ground is drawn in the page already.
         scene: the home's name, as `avlmaps go --scene` takes it.
     """
     right = sum(drive.right)
     head = (
-        f"<h2>What it did when told: {right} of {len(drive.asks)} places right</h2><p>The sentence became a program, "
-        "the program asked the map, and the robot drove there with nothing but the map to find its way: 10 cm ahead or "
+        f"<h2>The drive: {right} of {len(drive.asks)} places right</h2><p>The sentence became a program, "
+        "the program queried the map, and the robot drove there with nothing but the map to plan on: 10 cm ahead or "
         "5 degrees to a side at a time, in the home as it truly is. A stop is right when it lies within 1 m of the "
         "thing that was meant.</p>"
     )
@@ -141,7 +141,7 @@ def drive_card(drive: Drive, sheet: Sheet, scene: str) -> str:
             sheet.walk(way) if len(way) else "", sheet.dot((drive.start.x_m, drive.start.y_m), "robot"),
             sheet.goals([move.stop for move in drive.outcome.subgoals]),
         ],
-        "the robot's way, seen from above",
+        "the robot's path, top-down",
     )  # fmt: skip
     verdict = "right" if right == len(drive.asks) else "wrong"
     legs = "".join(f"<li>{escape(line)}</li>" for line in drive.lines()[1:])

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _LEVEL_DEG = 2.0
 # Where the camera was, the scene must have room; a map of another home of the same size has it at up to four of five.
 _LEAST_FREE, _CAMERA_M = 0.95, 0.05
-_MARGIN_M = 0.05  # a start that is chosen has so much more room than the body needs
+_MARGIN_M = 0.05  # a start that is chosen has this much more room than the body needs
 _NEAR_M = 0.5
 
 
@@ -75,7 +75,7 @@ def robot_in(asked: AVLMap, scene: Scene, shape: BodyShape = BASE, start: Ground
 
 
 def _floor(scene: Scene, cameras: Float[np.ndarray, "k 4 4"]) -> int | None:
-    """Return which floor of a scene a walk was on; None where there is no telling."""
+    """Return which floor of a scene a walk was on; None where it cannot be decided."""
     heights = np.array(floor_heights(scene))
     below = heights < np.median(cameras[:, 2, 3]) if len(cameras) else np.zeros(len(heights), bool)
     return int(np.flatnonzero(below)[-1]) if below.any() else None

@@ -13,7 +13,7 @@ from avlmaps.sim.mesh import Triple
 from avlmaps.sim.scene import Area, SceneObject
 from avlmaps.sim.truth import SEMANTIC, HeardEvent, read_truth
 
-# A thing was shown when it filled so much of the picture in so many frames.
+# A thing was shown when it filled at least this share of the picture in at least this many frames.
 LEAST_SHARE, LEAST_FRAMES = 0.006, 2
 
 
@@ -105,7 +105,7 @@ class Evidence:
 
 
 def _shown(folder: Path, count: int) -> Bool[np.ndarray, " objects"]:
-    """Tell which things filled enough of enough pictures; pictures hold the instance plus one."""
+    """Return which things filled enough of enough pictures; pictures hold the instance plus one."""
     import cv2
 
     frames: Int[np.ndarray, " objects"] = np.zeros(count, np.int64)

@@ -1,4 +1,4 @@
-"""Which home the demonstration walks through: the first, counted from a seed, that can be asked about."""
+"""Which home the demonstration walks through: the first, counted from a seed, that suits the questions."""
 
 import numpy as np
 from jaxtyping import Float
@@ -21,7 +21,7 @@ _EVERYWHERE = {"door", "folding door", "window", "picture"}
 
 
 def choose_home(seed: int) -> Scene:
-    """Return the first home from a seed on that fits; only what stands in it decides, never what a map answers.
+    """Return the first home from a seed on that fits; only its furniture decides, never an answer of a map.
 
     Raises:
         AvlmapsError: none of many fits.
@@ -34,7 +34,7 @@ def choose_home(seed: int) -> Scene:
 
 
 def fits(scene: Scene) -> bool:
-    """Tell whether a home is of one floor, neither small nor large, and holds what the questions ask for."""
+    """Return whether a home is of one floor, neither small nor large, and holds what the questions need."""
     if len({area.floor_m for area in scene.areas}) != 1 or not _ROOMS[0] <= len(scene.areas) <= _ROOMS[1]:
         return False
     if sum(_area_m2(area.polygon) for area in scene.areas) > _LARGEST_M2:

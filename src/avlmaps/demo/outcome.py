@@ -69,7 +69,7 @@ class DemoReport:
         built: what `avlmaps build --json` prints.
         located: the photo's pose error in cm and degrees, or None where it was not located.
         seconds: how long each stage took.
-        drive: what the robot did when it was told where to go; None where there was nothing to go to.
+        drive: the drive of the robot; None where there was nothing to go to.
     """
 
     out: Path

@@ -17,7 +17,7 @@ _OFF_THE_WALK_M = 0.4
 _LOOKED_FROM_M, _LOOKED_ALIKE_RAD = 2.0, np.deg2rad(45.0)
 _DEPTH_M = (1.0, 5.0)
 _STOREY_M = 1.5
-# A bare wall could be any: so many things, walls not counted, fill so much of a picture each.
+# A bare wall could be any: at least this many things, walls not counted, fill this share of a picture each.
 _FEWEST_THINGS, _LEAST_SHARE = 2, 0.01
 
 

@@ -16,7 +16,7 @@ from avlmaps.sim.scene import NOTHING, Scene
 Extent = tuple[float, float, float, float]
 
 _OVERHEAD = ("ceiling", "chandelier")
-_EYE_M, _ABOUT_M = 70.0, 0.6  # so far above, walls hide little; places at this height lie where they are drawn
+_EYE_M, _ABOUT_M = 70.0, 0.6  # from this height, walls hide little; places at this height lie where they are drawn
 _PIXELS = 1500
 _MARGIN_M = 0.3
 _DEEPEST_M = 5.0
@@ -137,7 +137,7 @@ def colour_of(name: str, number: int) -> tuple[int, int, int]:
 
 
 def envelope(samples: Float[np.ndarray, " n"], bins: int) -> Float[np.ndarray, " bins"]:
-    """Return the loudest sample of each of so many equal pieces, on a scale on which 1 is the loudest of all."""
+    """Return the loudest sample of each of ``bins`` equal pieces, on a scale on which 1 is the loudest of all."""
     edges = np.linspace(0, len(samples), bins + 1).astype(int)[:-1]
     loudest = np.maximum.reduceat(np.abs(samples), np.minimum(edges, max(len(samples) - 1, 0)))
     return loudest / max(float(loudest.max(initial=0.0)), 1e-9)

@@ -1,6 +1,6 @@
 """The demonstration's questions, chosen by rule from what is truly in a home and was shown, never from answers.
 
-Each needs more than a word: the same kind of thing stands in several places, and a sound, a photo or a room tells
+Each needs more than a word: the same kind of thing stands in several places, and a sound, a photo or a room says
 which one is meant; or the word was never a label; or there is no such thing.
 """
 
@@ -30,12 +30,12 @@ FURNITURE = (
 )  # fmt: skip
 # And what one asks for where there is nothing better.
 SMALL = ("trash can", "radiator", "mirror", "monitor", "loudspeaker", "basket", "picture")
-# What many homes lack; the first that this one lacks too is asked for in vain.
+# Things that many homes lack; the query for an absent thing uses the first that this one lacks too.
 RARE = ("piano", "pool table", "aquarium", "fireplace", "bicycle", "rocking horse", "guitar", "bathtub", "bunk bed")
 ROOMS = ("kitchen", "bedroom", "living room", "bathroom", "office", "dining room", "children's room", "hallway", "gym")
-# The right thing is at most so far from the place that is named, and every other at least so much farther.
+# The right thing is at most this far from the place that is named, and every other at least this much farther.
 NEAR_M, MARGIN_M = 2.5, 1.5
-# Which things are asked for, how near and how far the others: the first rule that something in the home keeps.
+# Which things are queried, how near and how far the others: the first rule that something in the home satisfies.
 _RULES = ((FURNITURE, NEAR_M, MARGIN_M), (FURNITURE, 3.5, 0.8), (SMALL, NEAR_M, MARGIN_M), (SMALL, 3.5, 0.8))
 APART_M = 1.0
 LEAST_PHOTO_SHARE = 0.02
@@ -53,7 +53,7 @@ class Ask:
         title: as a person would say it.
         why: why it is not easy, one sentence.
         command: what to type in the demonstration's folder.
-        question: what the map is asked.
+        question: the query.
         truth: places that would be right; empty where the right answer is that there is none.
         others: things of the same kind that would be wrong.
         about: the category, or the sound, that it is about.
@@ -125,8 +125,8 @@ def like_a_clip(evidence: Evidence, folder: Path, rng: np.random.Generator, used
     event = next((event for event in order if event.category not in used), order[0])
     truth = [box for e in evidence.events if e.category == event.category for box in evidence.heard_from(e)]
     part = Part(Modality.SOUND, str(folder / CLIP), is_file=True)
-    title = f"where was a sound like this one heard? (another recording: {event.category})"
-    why = "No word is given, only a clip that the robot never heard."
+    title = f"where was a sound like this one recorded? (another recording: {event.category})"
+    why = "No word is given, only a clip that is not in the recording."
     command = f"avlmaps query {MAP} --sound-clip {CLIP}"
     return Ask("clip", title, why, command, Question.of([part]), tuple(truth), (), event.category)
 
@@ -144,7 +144,7 @@ def in_a_room(evidence: Evidence, rng: np.random.Generator, used: Sequence[str] 
             if min(a.apart_m(b) for a in boxes for b in others) < APART_M:
                 continue
             places = len({evidence.objects[i].area for i in own})
-            why = f"Things of that kind stand in {places} rooms; which room is which, only pictures told the map."
+            why = f"Things of that kind stand in {places} rooms; only pictures say which room is which."
             return _sentence("area", f"the {category} in the {kind}", why, boxes, others, category)
     return None
 
@@ -175,7 +175,7 @@ def not_there(evidence: Evidence, rng: np.random.Generator) -> Ask | None:
     if not lacking:
         return None
     name = lacking[int(rng.integers(min(3, len(lacking))))]
-    return _sentence("absent", f"the {name}", "This home has none, and the map should say so.", (), (), name)
+    return _sentence("absent", f"the {name}", "This home has none, and the map should report so.", (), (), name)
 
 
 def choose_questions(
@@ -212,7 +212,7 @@ def alone_near(
 
 
 def _several(evidence: Evidence, wanted: Sequence[str], used: Sequence[str]) -> list[tuple[str, list[int]]]:
-    """Return those of the wanted things of which there are several, what was asked before last."""
+    """Return those of the wanted things of which there are several, those of earlier queries last."""
     ambiguous = evidence.ambiguous()
     names = sorted((name for name in wanted if name in ambiguous), key=lambda name: name in used)
     return [(name, ambiguous[name]) for name in names]

@@ -88,7 +88,7 @@ def write_report(
     page = (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>avlmaps: a home that can be asked</title><style>{style}</style></head>\n"
+        f"<title>avlmaps: a home as one map</title><style>{style}</style></head>\n"
         f"<body><main>\n{chr(10).join(body)}\n</main><script>{script}</script></body></html>\n"
     )
     path = report.out / "report.html"
@@ -99,11 +99,11 @@ def write_report(
 def _opening(report: "DemoReport", evidence: "Evidence") -> str:
     minutes = report.built["duration_s"] / 60
     return (
-        "<h1>A home that can be asked</h1>"
+        "<h1>A home as one map</h1>"
         f'<p class="lead">A robot drove through {_count(len(evidence.areas), "room")} in {minutes:.1f} minutes, with a '
-        "depth camera and a microphone. What it saw and heard became one map; the map was then asked by word, by "
-        "sound, by photo and by room. It never knew where things are. The truth was looked up afterwards, to say how "
-        "far each answer is off.</p>"
+        "depth camera and a microphone. Its recording became one map; the map was then queried by word, by "
+        "sound, by photo and by room. The map had no access to the truth, which serves only to measure "
+        "how far each answer is off.</p>"
     )
 
 
@@ -114,11 +114,11 @@ def _home(sheet: Sheet, home: Plan, evidence: "Evidence") -> str:
             sheet.picture(home), sheet.walk(evidence.walk), sheet.rooms(evidence.areas), sheet.heard(sounds),
             sheet.dot(evidence.walk[0], "robot", "robot"),
         ],
-        "the home from above, its rooms, the robot's way and the sounds",
+        "top-down view of the home: its rooms, the robot's path and the sounds",
     )  # fmt: skip
     return (
-        f'<div class="card">{drawing}<p class="note">The home as it truly is, its ceilings taken off. Blue: the '
-        "robot's way; yellow: the robot; numbers: where sounds came from.</p></div>"
+        f'<div class="card">{drawing}<p class="note">The true home without ceilings. Blue: the '
+        "robot's path; yellow: the robot; numbers: the sources of the sounds.</p></div>"
     )
 
 
@@ -144,8 +144,8 @@ def _strip(recording: "Recording", asked: "AVLMap", moments: int) -> Strip:
 
 def _film(recording: "Recording", evidence: "Evidence", strip: Strip, sheet: Sheet) -> str:
     camera = recording.rig.rgb
-    shown = ((strip.colour, "what the camera saw"), (strip.depth, "how far away it is"),
-             (strip.seen, "what the network takes it for"))  # fmt: skip
+    shown = ((strip.colour, "colour picture"), (strip.depth, "depth"),
+             (strip.seen, "names by the pixel encoder"))  # fmt: skip
     figures = "".join(
         f'<figure><div class="frame" role="img" aria-label="{name}" style="aspect-ratio:{camera.width}/{camera.height};'
         f'background-image:url({embedded(picture, quality=72)})"></div><figcaption>{name}</figcaption></figure>'
@@ -169,7 +169,7 @@ def _film(recording: "Recording", evidence: "Evidence", strip: Strip, sheet: She
         f'src="recording/{escape(recording.audio.path.name)}"></audio>'
     )
     return (
-        f'<h2>What it saw</h2><div class="card"><div class="film">{figures}</div><div class="scrub">'
+        f'<h2>Recorded frames</h2><div class="card"><div class="film">{figures}</div><div class="scrub">'
         f'<input id="moment" type="range" min="0" max="{data["duration"]}" step="0.5" '
         f'value="{_FIRST * data["duration"]:.1f}" aria-label="moment">'
         f'<output id="clock">0 s</output>{sound}</div><ul class="legend">{legend}</ul></div>'
@@ -188,8 +188,9 @@ def _track(recording: "Recording", evidence: "Evidence", report: "DemoReport") -
         for number, event in enumerate(evidence.events, 1)
     )
     return (
-        f'<h2>What it heard</h2><div class="card">{wave(loudness, duration_s, true, mapped)}<ul class="events">{events}'
-        f'</ul><p class="note">Shaded: what truly sounded ({len(true)}). Below: what the map heard by itself '
+        "<h2>Recorded sounds</h2>"
+        f'<div class="card">{wave(loudness, duration_s, true, mapped)}<ul class="events">{events}'
+        f'</ul><p class="note">Shaded: the true sounds ({len(true)}). Below: the sounds that the map detected '
         f"({len(mapped)}). Press one to listen.</p></div>"
     )
 
@@ -199,7 +200,7 @@ def _facts(report: "DemoReport") -> str:
     located = "–" if report.located is None else f"{report.located[0]:.1f} cm"
     facts = (
         (f"{built['frames']}", "frames"), (f"{built['voxels']:,}", f"voxels of {100 * built['voxel_size_m']:.0f} cm"),
-        (f"{built['keyframes']}", "keyframes"), (f"{len(built['sounds'])}", "sounds heard"),
+        (f"{built['keyframes']}", "keyframes"), (f"{len(built['sounds'])}", "sounds detected"),
         (f"{built['bytes'] / 1e6:.0f} MB", "on the disk"), (located, "error of the photo's place"),
     )  # fmt: skip
     told = "".join(f"<li><b>{escape(value)}</b>{escape(name)}</li>" for value, name in facts)
@@ -210,7 +211,7 @@ def _facts(report: "DemoReport") -> str:
         for name, label, colour in _STAGES
     )
     return (
-        f'<h2>What the map holds</h2><ul class="facts">{told}</ul><div class="stages">{stages}</div>'
+        f'<h2>The map</h2><ul class="facts">{told}</ul><div class="stages">{stages}</div>'
         f'<p class="note">{total:.0f} seconds on this computer, without a graphics card and without the network.</p>'
     )
 
@@ -218,10 +219,10 @@ def _facts(report: "DemoReport") -> str:
 def _verdict(report: "DemoReport") -> str:
     right = sum(step.right for step in report.steps)
     return (
-        f"<h2>What it answered: {right} of {len(report.steps)} right</h2><p>The questions were chosen by rule from "
-        "what stands in the home, before the map was asked. An answer is right when its first goal lies within 1 m of "
-        "a true place, seen from above, or when the map says truly that there is none; unsure when it says that there "
-        "is none, and its best guess is right.</p>"
+        f"<h2>Answers: {right} of {len(report.steps)} right</h2><p>The questions were chosen by rule from "
+        "the things in the home, before the map was queried. An answer is right when its first goal lies within 1 m of "
+        "a true place, horizontally, or when the map correctly reports that there is none. It is unsure when the map "
+        "reports that there is none, but its best guess is right.</p>"
         '<p class="key"><span><svg viewBox="0 0 40 40"><g class="goal"><circle cx="20" cy="20" r="17"/></g></svg>'
         'goals, best first</span><span><svg viewBox="0 0 40 40"><circle class="truth" cx="20" cy="20" r="15"/></svg>'
         'the truth</span><span><svg viewBox="0 0 40 40"><circle class="other" cx="20" cy="20" '

@@ -1,6 +1,6 @@
 """Make a home, drive through it, hear it, map it, ask it, send a robot through it.
 
-How far each answer and each stop is off, the truth tells afterwards.
+The truth measures afterwards how far each answer and each stop is off.
 """
 
 import shutil
@@ -35,9 +35,9 @@ class DemoSettings:
     """How large the demonstration is.
 
     Attributes:
-        frames: at most so many are recorded.
+        frames: limit of frames that are recorded.
         size: columns and rows of the pictures.
-        sounds: so many are placed, if the walk has room for them; None places one for every twelve seconds.
+        sounds: number of sounds, if the walk has room for them; None places one for every twelve seconds.
         workers: processes that draw; 0 takes as many as there are cores.
         moments: of the walk that the report shows.
     """
@@ -84,14 +84,14 @@ def run_demo(
         evidence = Evidence.of(recording)
         asks, photo = _choose(scene, recording, evidence, out, for_questions, for_photos)
         _write_clip(asks, out, for_clip)
-    with _stage("ask", seconds, "The map is asked."):
+    with _stage("ask", seconds, "The map is queried."):
         asked = AVLMap(stored)
         answered = [
             _answer(asked, ask, number, out) for number, ask in enumerate(progress(asks, "asking", unit="question"), 1)
         ]
         located = None if photo is None else _located(asked, photo, out)
     steps = tuple(step for step, _ in answered)
-    with _stage("drive", seconds, "A robot is told where to go."):
+    with _stage("drive", seconds, "A robot drives to goals by one command."):
         driven = drive(asks, asked, scene, out, say)
     report = DemoReport(out, scene.name, steps, describe(stored), located, seconds, driven)
     with _stage("report", seconds, "A page with pictures is written."):
@@ -103,7 +103,7 @@ def run_demo(
 
 @contextmanager
 def _stage(name: str, seconds: dict[str, float], sentence: str) -> Iterator[None]:
-    """Tell what begins, and keep how long it took."""
+    """Print what begins, and store how long it took."""
     say(sentence)
     begin = perf_counter()
     yield
@@ -166,7 +166,7 @@ def _choose(
 
 
 def _write_clip(asks: list[Ask], out: Path, rng: np.random.Generator) -> None:
-    """Make another recording of the sound that is asked for by a clip."""
+    """Make another recording of the sound that is queried by a clip."""
     import soundfile
 
     from avlmaps.sim.hearing import Synthesised

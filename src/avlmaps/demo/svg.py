@@ -66,7 +66,7 @@ class Sheet:
         return f'<g class="rooms">{"".join(_text(x, y + 9, name) for (x, y), name in places)}</g>'
 
     def walk(self, places: Float[np.ndarray, "n 3"]) -> str:
-        """Return a way."""
+        """Return a path."""
         points = " ".join("{},{}".format(*self.at(x, y)) for x, y in places[:, :2])
         return f'<polyline class="walk-under" points="{points}"/><polyline class="walk" points="{points}"/>'
 
@@ -98,7 +98,7 @@ class Sheet:
         return "".join(rings)
 
     def band(self, boxes: Sequence[Box]) -> str:
-        """Return a way of true places, where the robot was while it heard something."""
+        """Return a path of true places: the robot's path during a sound."""
         points = " ".join("{},{}".format(*self.at(*box.low[:2])) for box in boxes)
         style = 'stroke-linecap="round" stroke-linejoin="round"'
         return "".join(f'<polyline class="{kind}" {style} points="{points}"/>' for kind in ("truth-under", "truth"))
@@ -131,7 +131,7 @@ def wave(
         loudness: of equal pieces of it, in [0, 1].
         duration_s: of the whole.
         true: onset, offset and name of each sound that was put in.
-        mapped: onset and offset of each sound that the map heard by itself.
+        mapped: onset and offset of each sound that the map detected by itself.
     """
     middle, reach = 92.0, 58.0
     scale = WAVE_WIDTH / max(duration_s, 1e-9)

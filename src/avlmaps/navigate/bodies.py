@@ -13,7 +13,7 @@ from avlmaps.core.motion import Action, GroundPose, Moved
 class Body(Protocol):
     """A robot on the ground: a simulated one (`avlmaps.sim.body.SimulatedBody`), or one of a user's own.
 
-    A movement returns when it is over. Something in the way is no error: the body stops or slides, and says so.
+    A movement returns when it is over. An obstacle is no error: the body stops or slides, and reports a contact.
     """
 
     @property

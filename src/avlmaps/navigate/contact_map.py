@@ -1,6 +1,6 @@
 """What a driver found out while it drove: where its body has been, and what it ran into that the map does not know.
 
-Both are kept beside the map, never in it.
+Both are stored beside the map, never in it.
 """
 
 from math import atan2, cos, sin
@@ -10,7 +10,7 @@ import numpy as np
 from avlmaps.core.motion import GroundPose
 from avlmaps.maps.obstacles import CellState, Obstacles
 
-_LOST_M = 0.002  # by so much a movement must fall short to tell where it was stopped
+_LOST_M = 0.002  # a movement must fall short by this to show where it was stopped
 _WIDER_RAD = (0.0, 0.5, -0.5, 1.0, -1.0)  # how far beside the likeliest point it looks for one that can be
 
 
@@ -31,7 +31,7 @@ class Met:
         self._disc = np.mgrid[-reach : reach + 1, -reach : reach + 1].reshape(2, -1).T
 
     def stood_at(self, pose: GroundPose) -> None:
-        """Note that the body stood somewhere: whatever lies wholly under it is free."""
+        """Note that the body stood somewhere: every cell wholly under it is free."""
         cell_m = self._obstacles.cell_size_m
         at = (np.array([pose.x_m, pose.y_m]) - self._obstacles.origin_m) / cell_m
         cells = np.floor(at).astype(np.int64) + self._disc
@@ -41,7 +41,7 @@ class Met:
         self.cells[tuple(cells.T)] = False
 
     def touched(self, before: GroundPose, told: GroundPose, now: GroundPose) -> bool:
-        """Mark what stopped a movement, as far as that can be told.
+        """Mark the obstacle that stopped a movement, as far as the poses show it.
 
         A body that slides loses just the part of its way that leads into the thing, one that stops all of it. Where
         the likeliest point cannot be, since the map has something there or the body has been there, points beside

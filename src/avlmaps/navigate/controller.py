@@ -1,4 +1,4 @@
-"""Following a way: by the paper's actions, or by velocities. Both look at the pose anew each time, level frame."""
+"""Following a path: by the paper's actions, or by velocities. Both look at the pose anew each time, level frame."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ Safe = Callable[[GroundPose, GroundPose], bool]
 
 # Nearer than this no further step forward brings it, even with a heading that is half a turn of 5 degrees off.
 CLOSE_M = 0.5 * FORWARD_M / cos(0.5 * TURN_RAD) + 1e-6
-_ASTRAY_M = 1.1  # nothing but a body that moves otherwise than told gets so far off its way
-_FARTHER_M, _MOST_IN_VAIN = 0.01, 150  # as does one that comes no farther in so many movements
+_ASTRAY_M = 1.1  # only a body that does not follow its commands gets this far off its path
+_FARTHER_M, _MOST_IN_VAIN = 0.01, 150  # as does one that gains no distance in this many movements
 _LOOKAHEADS_M = (0.4, 0.25, 0.15)
 _SHORTER = (1.0, 0.6, 0.35, 0.15)  # parts of a lookahead
 _TURNS = round(pi / TURN_RAD)
@@ -28,7 +28,7 @@ def bearing(pose: GroundPose, x_m: float, y_m: float) -> float:
 
 
 class Route:
-    """A way and how far along it a body has come; that never goes back.
+    """A path and how far along it a body has come; that never goes back.
 
     Attributes:
         points: (n, 2) corners.
@@ -50,7 +50,7 @@ class Route:
         return float(self.points[-1, 0]), float(self.points[-1, 1])
 
     def at(self, along_m: float) -> tuple[float, float]:
-        """Return the place so far along it; its end beyond."""
+        """Return the place at this distance along it; its end beyond."""
         x, y = (float(np.interp(along_m, self._at, self.points[:, axis])) for axis in (0, 1))
         return x, y
 
@@ -68,7 +68,7 @@ class Route:
 
 
 class Watch:
-    """Sees when a body does not do what it is told, however long it is told to."""
+    """Detects a body that does not follow its commands, after any number of them."""
 
     def __init__(self, route: Route) -> None:
         """Watch a body that follows a route."""
@@ -84,27 +84,27 @@ class Watch:
             self._farthest_m, self._in_vain = self._route.along_m, 0
         if hypot(pose.x_m - x_m, pose.y_m - y_m) <= _ASTRAY_M and self._in_vain <= _MOST_IN_VAIN:
             return ""
-        return "the body moves otherwise than it is told; check the frame of its pose"
+        return "the body does not move as commanded; check the frame of its pose"
 
 
 def still(before: GroundPose, now: GroundPose) -> bool:
-    """Tell whether a body neither moved nor turned."""
+    """Return whether a body neither moved nor turned."""
     return before.distance_m(now) <= 1e-4 and abs(wrapped(now.heading_rad - before.heading_rad)) <= 1e-3
 
 
 def _farthest(
     route: Route, lookaheads_m: tuple[float, ...], pose: GroundPose, safe: Safe | None
 ) -> tuple[float, float]:
-    """Return the first place so far along a way to which a body can go straight; the last where there is none."""
+    """Return the first place at these distances along a path to which a body can go straight; else the last."""
     places = [route.at(route.along_m + lookahead_m) for lookahead_m in lookaheads_m]
     return next((place for place in places if safe is None or safe(pose, GroundPose(*place))), places[-1])
 
 
 class ActionController:
-    """Chooses the paper's actions: turns until it looks along the way as well as 5 degrees allow, then steps on."""
+    """Chooses the paper's actions: turns until it looks along the path as well as 5 degrees allow, then steps on."""
 
     def __init__(self, points: Float[np.ndarray, "n 2"], safe: Safe) -> None:
-        """Follow a way.
+        """Follow a path.
 
         Args:
             points: (n, 2) its corners.
@@ -142,7 +142,7 @@ class ActionController:
         ahead = round(wrapped(bearing(pose, x_m, y_m) - pose.heading_rad) / TURN_RAD)
         if self._safe(pose, pose.turned(ahead * TURN_RAD).ahead(FORWARD_M)):
             return ahead
-        # Not straight on: the safe step that leaves it nearest to the way ahead, if it comes nearer at all.
+        # Not straight on: the safe step that leaves it nearest to the path ahead, if it comes nearer at all.
         best, best_m = None, hypot(x_m - pose.x_m, y_m - pose.y_m) - 0.1 * FORWARD_M
         for turns in range(-_TURNS, _TURNS):
             step = pose.turned(turns * TURN_RAD).ahead(FORWARD_M)
@@ -152,7 +152,7 @@ class ActionController:
         return best
 
     def _target(self, pose: GroundPose) -> tuple[float, float]:
-        """Return the place to head for: as far along the way as it can go straight."""
+        """Return the place to head for: as far along the path as it can go straight."""
         return _farthest(self.route, _LOOKAHEADS_M, pose, self._safe)
 
 
@@ -164,7 +164,7 @@ def turns_for(angle_rad: float) -> list[Action]:
 
 @dataclass(frozen=True, slots=True)
 class VelocitySettings:
-    """Bounds of a body driven by velocities, and how it follows a way."""
+    """Bounds of a body driven by velocities, and how it follows a path."""
 
     speed_m_s: float = 0.5
     """Never faster ahead."""
@@ -177,9 +177,9 @@ class VelocitySettings:
     tick_s: float = 0.1
     """Time between two commands."""
     lookahead_m: float = 0.4
-    """How far along the way it heads."""
+    """Distance along the path to the place that it heads for, metres."""
     turn_first_rad: float = 0.8
-    """It turns on the spot where the way leads farther to a side than this."""
+    """It turns on the spot where the path leads farther to a side than this."""
     slow_room_m: float = 0.3
     """With less room than this beside it, it drives slower in proportion ..."""
     slowest: float = 0.25
@@ -194,10 +194,10 @@ class VelocitySettings:
 
 
 class VelocityController:
-    """Regulated pure pursuit: heads for a place on the way, slower in curves, near things and before the end.
+    """Regulated pure pursuit: heads for a place on the path, slower in curves, near things and before the end.
 
     Attributes:
-        route: the way.
+        route: the path.
         speed_m_s: of the last command.
         turn_rad_s: of the last command.
     """
@@ -205,12 +205,12 @@ class VelocityController:
     def __init__(
         self, points: Float[np.ndarray, "n 2"], settings: VelocitySettings | None = None, safe: Safe | None = None
     ) -> None:
-        """Follow a way.
+        """Follow a path.
 
         Args:
             points: (n, 2) its corners.
             settings: its bounds.
-            safe: it heads for a place to which it can go straight, where that can be told.
+            safe: it heads for a place to which it can go straight, where this is known.
         """
         self.route = Route(points)
         self._safe = safe

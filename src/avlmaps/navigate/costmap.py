@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
 
 _FAR_CELLS = 2.0**40  # farther off no grid reaches
-_HALF_DIAGONAL = np.sqrt(0.5)  # of a cell: what stands in one may stand in its nearest corner
+_HALF_DIAGONAL = np.sqrt(0.5)  # of a cell: an obstacle in one may stand in its nearest corner
 
 
 @dataclass(frozen=True, slots=True)
 class CostSettings:
-    """What counts as a way, and what it costs."""
+    """Which cells a path may cross, and their cost."""
 
     soft_m: float = 0.4
-    """Beyond its radius the body would like so much room; with more of it a metre costs no less."""
+    """Free room that the body prefers beyond its radius; with more of it a metre costs no less."""
     near_cost: float = 4.0
     """What a metre costs more where the body just fits; a metre in the open costs 1."""
     hole_m: float = 0.3
@@ -34,7 +34,7 @@ class CostSettings:
     hole_cost: float = 2.0
     """What a metre of such a gap costs more."""
     unknown_room_m: float = 0.0
-    """The body's middle keeps so far from larger unknown regions: for robots that could fall down stairs."""
+    """Distance of the body's middle from larger unknown regions: for robots that could fall down stairs."""
 
     def __post_init__(self) -> None:
         if not (self.soft_m > 0.0 and min(self.near_cost, self.hole_m, self.hole_cost, self.unknown_room_m) >= 0.0):
@@ -55,7 +55,7 @@ class Costmap:
         occupied: the obstacles themselves.
         opaque: what blocks the view over the floor.
         free: where the floor was seen and nothing stands.
-        known: where it is known what is there, small holes counted in, and so far from what is not as is asked for.
+        known: where the content is known, small holes counted in, and far enough from unknown regions.
     """
 
     origin_m: Float64[np.ndarray, "2"]
@@ -83,16 +83,16 @@ class Costmap:
         return self.origin_m + (np.asarray(cell) + 0.5) * self.cell_size_m
 
     def holds(self, xy: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
-        """Tell which places lie on the grid."""
+        """Return which places lie on the grid."""
         cell = self.cell_of(xy)
         return np.asarray(np.all((cell >= 0) & (cell < self.passable.shape), axis=-1))
 
     def is_passable(self, xy: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
-        """Tell at which places the body's middle may be; nowhere off the grid."""
+        """Return at which places the body's middle may be; nowhere off the grid."""
         return self._at(self.passable, xy)
 
     def is_known(self, xy: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
-        """Tell at which places it is known what is there; nowhere off the grid."""
+        """Return at which places the content is known; nowhere off the grid."""
         return self._at(self.known, xy)
 
     def known_ahead_m(
@@ -103,8 +103,8 @@ class Costmap:
         Args:
             xy: level x and y.
             heading_rad: which way is ahead.
-            distance_m: no farther than this is asked for.
-            escape_m: from where it is not known, so far leads out, if anything known comes then.
+            distance_m: limit of the search.
+            escape_m: from an unknown place, the search may cross this distance if known cells follow.
         """
         reach_m = float(np.hypot(*self.passable.shape)) * self.cell_size_m + escape_m  # no farther is anything known
         at_m = np.linspace(0.0, min(distance_m, reach_m), int(5 * min(distance_m, reach_m) / self.cell_size_m) + 2)
@@ -123,10 +123,10 @@ class Costmap:
 
 
 def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE) -> Obstacles:
-    """Find what stands in a body's way in a map, by its height and by the words that count as obstacles to it.
+    """Find the obstacles of a body in a map, by its height and by the words that count as obstacles to it.
 
     Args:
-        avlmap: the map; asked for the words of the shape.
+        avlmap: the map; queried for the words of the shape.
         shape: of the robot that is to move there.
 
     Raises:
@@ -210,7 +210,7 @@ def _distance(mask: Bool[np.ndarray, "nx ny"]) -> Float32[np.ndarray, "nx ny"]:
 
 
 def _small_holes(known: Bool[np.ndarray, "nx ny"], width: float) -> Bool[np.ndarray, "nx ny"]:
-    """Close gaps of up to so many cells: a cell is in one where every disc over it, so wide, meets a known cell."""
+    """Close gaps of up to ``width`` cells: in a gap, every disc of that width over a cell meets a known cell."""
     radius = int(width / 2.0 + 1e-6)
     if radius < 1 or known.all():
         return np.zeros(known.shape, bool)

@@ -29,8 +29,8 @@ _SAMPLE_M = 0.02  # places along a straight move that are looked at
 _STILL_M = 0.005  # a step that brings the body no farther was stopped
 _OPEN_M = 0.5  # beside a place in which it could stand, but to which no way leads, it stops no farther off
 _TURNED_RAD = 0.5 * TURN_RAD + 0.01  # a turn that is off by no more is done
-_EXTRA_TURNS = 36  # actions that a turn may take beyond what it was told
-_PATIENCE_S = 5.0  # so long a body may stand still though it is told to move
+_EXTRA_TURNS = 36  # actions that a turn may take beyond its angle
+_PATIENCE_S = 5.0  # time for which a body may stand still against its commands
 _MOST_M, _MOST_RAD = 1e6, 1e3
 
 
@@ -39,7 +39,7 @@ class Arrival:
     """What came of one movement. That a place was not reached is an ordinary result, and the note says why.
 
     Attributes:
-        reached: whether the robot stands where it was told to, within the driver's tolerance.
+        reached: whether the robot stands where it was sent, within the driver's tolerance.
         pose: where it stands now, level frame.
         actions: the discrete actions that were taken, in order; empty where a robot is driven in another way.
         path: (n, 2) the places that it passed, level x and y, metres; the first is where it began.
@@ -57,7 +57,7 @@ class Arrival:
 
 @runtime_checkable
 class Driver(Protocol):
-    """Drives one robot. None of its methods raises for what can happen on the way; `Arrival` tells of it."""
+    """Drives one robot. None of its methods raises for what can happen while driving; `Arrival` reports it."""
 
     @property
     def pose(self) -> GroundPose:
@@ -77,12 +77,12 @@ class Driver(Protocol):
         """Turn on the spot.
 
         Args:
-            angle_rad: to the left (counter-clockwise, seen from above); negative turns to the right.
+            angle_rad: to the left (counter-clockwise in the top-down view); negative turns to the right.
         """
         ...
 
     def forward(self, distance_m: float) -> Arrival:
-        """Drive straight ahead, as far as nothing is in the way; for a negative distance it turns round first."""
+        """Drive straight ahead until an obstacle; for a negative distance it turns round first."""
         ...
 
     def stop(self) -> Arrival:
@@ -99,20 +99,20 @@ class DriveSettings:
     tolerance_m: float = 0.15
     """It has arrived when it stands no farther from where it is to stop."""
     most_plans: int = 40
-    """It gives up a place after so many plans; each contact takes one."""
+    """It gives up a place after this many plans; each contact takes one."""
     most_movements: int = 5_000
-    """It gives up a place after so many actions, or ticks of a velocity."""
+    """It gives up a place after this many actions, or ticks of a velocity."""
     costs: CostSettings = field(default_factory=CostSettings)
-    """What a way costs."""
+    """Cost of a path."""
     planning: PlanSettings = field(default_factory=PlanSettings)
-    """How ways are found."""
+    """Search of a path."""
     velocities: VelocitySettings = field(default_factory=VelocitySettings)
     """Bounds of the velocities."""
 
 
 @dataclass(slots=True)
 class _Trip:
-    """What happened since a movement was told."""
+    """Events since a command was given."""
 
     path: list[tuple[float, float]]
     actions: list[Action] = field(default_factory=list)
@@ -122,9 +122,9 @@ class _Trip:
 
 
 class MapDriver:
-    """Plans on a map, follows the way with its eyes on the body's pose, and plans anew when it meets something.
+    """Plans on a map, follows the path with its eyes on the body's pose, and plans again after a contact.
 
-    What it meets is kept for later drives, beside the map. No movement is made of which the map foretells a contact.
+    Contacts are stored for later drives, beside the map. No movement is made of which the map foretells a contact.
 
     Attributes:
         obstacles: what the map knows.
@@ -149,7 +149,7 @@ class MapDriver:
 
     @cached_property
     def planner(self) -> Planner:
-        """Finds ways round what is known by now."""
+        """Finds paths round all obstacles that are known by now."""
         settings = self.settings
         costmap = costmap_of(self.obstacles, self.shape.radius_m, settings.costs, self.met.cells)
         return Planner(costmap, settings.planning)
@@ -191,7 +191,7 @@ class MapDriver:
         return self._arrival(trip, True, "it turns by 5° at a time, so that it did not turn" if small else "")
 
     def forward(self, distance_m: float) -> Arrival:
-        """Drive straight ahead, as far as nothing is in the way; for a negative distance it turns round first."""
+        """Drive straight ahead until an obstacle; for a negative distance it turns round first."""
         trip = self._trip()
         if not abs(distance_m) <= _MOST_M:
             return self._arrival(trip, False, f"{distance_m} m is no distance to drive")
@@ -208,7 +208,7 @@ class MapDriver:
         gone_m = start.distance_m(self.pose)
         if not arrived:
             known = self._known_m(1.5 * FORWARD_M) >= 1.5 * FORWARD_M
-            why = trip.fault or ("something is in the way" if known else "what lies ahead is not known")
+            why = trip.fault or ("an obstacle is ahead" if known else "the floor ahead is not known")
             return self._arrival(trip, False, f"{why} after {gone_m:.2f} m")
         small = self.settings.mode == "actions" and not trip.actions and distance_m > 0.01
         return self._arrival(trip, True, "it drives 0.1 m at a time, so that it did not move" if small else "")
@@ -234,7 +234,7 @@ class MapDriver:
         return Arrival(reached, self.pose, tuple(trip.actions), np.array(trip.path), note, trip.contacts)
 
     def _at_stop(self, trip: _Trip, stop: Stop | None, goal: Float[np.ndarray, "2"], note: str) -> Arrival:
-        """Tell how a drive ended that had a way, and stop there."""
+        """Report how a drive ended that had a path, and stop there."""
         self._take(Action.STOP, trip)
         if stop is None:
             return self._arrival(trip, False, note)
@@ -264,7 +264,7 @@ class MapDriver:
         return "no way leads there that is wide enough for the robot"
 
     def _safe(self, start: GroundPose, end: GroundPose) -> bool:
-        """Tell whether a straight move touches nothing that is known; out of a tight place it may, if that helps."""
+        """Return whether a straight move touches nothing that is known; out of a tight place it may, if that helps."""
         costmap = self.planner.costmap
         count = int(start.distance_m(end) / _SAMPLE_M) + 2
         part = np.linspace(0.0, 1.0, count)[:, None]
@@ -278,7 +278,7 @@ class MapDriver:
         return bool(room_m[0] < costmap.radius_m and room_m.min() >= room_m[0] - 1e-6 and room_m[-1] > room_m[0])
 
     def _follow(self, points: Float[np.ndarray, "n 2"], trip: _Trip) -> bool:
-        """Follow a way until its end; return False where something stopped it, which it then knows of."""
+        """Follow a path until its end; return False where an obstacle stopped it, which it then knows of."""
         if self.settings.mode == "velocity":
             return self._follow_smoothly(points, trip)
         controller = ActionController(points, self._safe)
@@ -321,7 +321,7 @@ class MapDriver:
                 return False
             idle = idle + 1 if still(before, self.pose) else 0
             if idle * settings.tick_s >= _PATIENCE_S and max(command[0], abs(command[1])) > 0.01:
-                trip.fault = "the body does not move though it is told to"
+                trip.fault = "the body does not move when commanded"
         return controller.route.to_end_m(self.pose) <= self.settings.tolerance_m
 
     def _stepped(self, steps: int, trip: _Trip) -> bool:

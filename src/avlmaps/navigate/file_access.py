@@ -74,7 +74,7 @@ def offered_by(command: str, roots: Sequence[Path] | None = None) -> Readable:
 
 
 def _is_within(path: Path, root: Path) -> bool:
-    """Tell whether a path, with every link followed, lies in a folder."""
+    """Return whether a path, with every link followed, lies in a folder."""
     try:
         return path.resolve().is_relative_to(root.resolve())
     except (OSError, ValueError, RuntimeError):  # a name too long or that no file can have, a loop of links

@@ -1,4 +1,4 @@
-"""What a thing covers of the ground: its outline seen from above, and the places beside, before and between outlines.
+"""The ground that a thing covers: its top-down outline, and the places beside, before and between outlines.
 
 Level frame, metres. Nothing here prefers an axis: a world that is turned gives turned answers, a mirrored one mirrored.
 """
@@ -65,7 +65,7 @@ class Outline:
         return first + ((a + b) * cross[:, None]).sum(axis=0) / (6.0 * area)
 
     def contains(self, xy: Float[np.ndarray, "2"]) -> bool:
-        """Tell whether a place lies inside."""
+        """Return whether a place lies inside."""
         x, y = xy
         a, b = self.corners, np.roll(self.corners, -1, axis=0)
         spans = (a[:, 1] > y) != (b[:, 1] > y)
@@ -82,7 +82,7 @@ class Outline:
         return 0.0 if self.contains(xy) else float(np.linalg.norm(self.nearest_to(xy) - xy))
 
     def beside(self, direction: Float[np.ndarray, "2"], distance_m: float) -> Float[np.ndarray, "2"]:
-        """Return the place in a direction from its middle that lies so far beyond its outermost corner that way.
+        """Return the place in a direction from its middle, at this distance beyond its outermost corner there.
 
         Args:
             direction: unit vector.

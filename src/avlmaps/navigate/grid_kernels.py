@@ -7,13 +7,13 @@ import numpy as np
 from numba import njit
 
 BLOCK = 4  # cells a side of a block, of the coarse graph
-# Half of the sixteen neighbours; the others are the ways back.
+# Half of the sixteen neighbours; the others are the reverse steps.
 STEPS = np.array([(1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2)])
 
 
 @njit(cache=True)
 def _open_step(number, i, j, di, dj):  # pragma: no cover - compiled
-    """Tell whether a step from a cell leads over nothing but cells of the graph, those whose corner it touches too."""
+    """Return whether a step leads over nothing but cells of the graph, including those whose corner it touches."""
     nx, ny = number.shape
     if i + di >= nx or j + dj < 0 or j + dj >= ny or number[i + di, j + dj] < 0:
         return False
@@ -144,7 +144,7 @@ def block_parts(passable, cost):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def _meets(node, i, j, di, dj):  # pragma: no cover - compiled
-    """Tell whether a step leads into another block's part, and is not just the next one along the same border."""
+    """Return whether a step leads into another block's part, and is not just the next one along the same border."""
     crosses_i = di == 1 and i % BLOCK == BLOCK - 1
     crosses_j = (dj == 1 and j % BLOCK == BLOCK - 1) or (dj == -1 and j % BLOCK == 0)
     if (di != 0 and not crosses_i) or (dj != 0 and not crosses_j) or not _open_step(node, i, j, di, dj):
@@ -264,7 +264,7 @@ def shortcuts(points, passable, cost, window):  # pragma: no cover - compiled
         points: (n, 2) in cells; neighbours are joined by free straight lines.
         passable: cells that a line may touch.
         cost: of a cell's length within a cell.
-        window: a line leaps over at most so many points.
+        window: limit of the points that a line leaps over.
     """
     count = points.shape[0]
     best = np.full(count, np.inf)
@@ -319,14 +319,14 @@ def room_along(points, occupied, reach):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def seen_from(x, y, cells, opaque, own):  # pragma: no cover - compiled
-    """Tell for each cell whether a thing at a place is seen from its middle.
+    """Return for each cell whether a thing at a place is seen from its middle.
 
     Args:
         x: of the thing, in cells.
         y: of the thing.
         cells: (n, 2) the cells to look from.
         opaque: what blocks the view.
-        own: what is opaque within so many cells of the thing is the thing itself.
+        own: an opaque cell within this many cells of the thing is the thing itself.
     """
     seen = np.zeros(cells.shape[0], np.bool_)
     nx, ny = opaque.shape

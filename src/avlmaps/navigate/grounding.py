@@ -1,4 +1,4 @@
-"""Which things a program's words, heatmaps and places mean, asked of a map."""
+"""The things that a program's words, heatmaps and places mean, found by queries to a map."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -22,13 +22,13 @@ class Seeker:
 
     Attributes:
         asked: the map.
-        guess: whether to take the best guess where the map is not sure.
+        guess: whether to take the best guess where the map's confidence is below 0.5.
         readable: which files a program may load.
         notes: what a person should know: words half understood, guesses.
     """
 
     def __init__(self, asked: AVLMap, guess: bool, readable: Readable, tell: Callable[[str], None]) -> None:
-        """Take a map, and what is to be told of things as they are found."""
+        """Take a map, and a function that is called with each note on things as they are found."""
         self.asked = asked
         self.guess = guess
         self.readable = readable
@@ -51,7 +51,7 @@ class Seeker:
 
         Raises:
             ProgramError: not exactly one is given, or it is of the wrong kind.
-            QueryError: it cannot be asked.
+            QueryError: the map cannot answer the query.
         """
         given = {"obj": obj, "sound": sound, "img": img, "area": area}
         named = [name for name, value in given.items() if value is not None]
@@ -130,11 +130,12 @@ class Seeker:
         if isinstance(target, str):
             self._note(heat)
         if not heat.found:
-            self.note(f"the map is not sure of {things[0].name}; this is its best guess, {things[0].sure:.2f} sure")
+            sure = f"{things[0].sure:.2f}, below {SURE:.2f}"
+            self.note(f"the map's confidence in {things[0].name} is {sure}; this is its best guess")
         return things, tells_one(heat)
 
     def place_of(self, target: Target) -> Place:
-        """Return the place of the best thing that a target may mean; told where to go, a robot knows it again.
+        """Return the place of the best thing that a target may mean; a later skill finds the thing again at that place.
 
         Raises:
             GoalNotFoundError: there is none.
@@ -168,7 +169,7 @@ class Seeker:
         return place
 
     def note(self, note: str) -> None:
-        """Keep a note, once, and tell it."""
+        """Store a note, once, and report it."""
         if note and note not in self.notes:
             self.notes.append(note)
             self._tell(f"note: {note}")

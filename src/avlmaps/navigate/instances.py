@@ -12,7 +12,7 @@ from avlmaps.query.factors import Factor, NearThings
 from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
 
-# From this on an instance is more likely what was asked for than not.
+# From this confidence on an instance more likely matches the query than not.
 SURE = 0.5
 _MOST_GOALS = 30
 
@@ -25,7 +25,7 @@ class Thing:
         name: what it was called; ``""`` for a place that a program gives.
         outline: what it covers of the ground, level frame; a single point where it is no thing.
         place: where the goal is, level frame, metres.
-        sure: in [0, 1]: how sure the map is; 1 for a place that a program gives.
+        sure: in [0, 1]: the map's confidence; 1 for a place that a program gives.
         solid: whether it is a thing with an extent, rather than a place.
     """
 
@@ -53,7 +53,7 @@ def things_in(heat: Heatmap, guess: bool = False) -> list[Thing]:
 
     Args:
         heat: what is sought, and what it is near.
-        guess: take the best guess where the map is not sure that there is such a thing, however unsure that is; where
+        guess: take the best guess where the map's confidence is below 0.5, however low it is; where
             nothing comes together with what it is near, the thing alone.
 
     Raises:
@@ -78,18 +78,18 @@ def _guesses(heat: Heatmap) -> Iterator[Heatmap]:
 
 
 def nearest(things: Sequence[Thing], xy: Float[np.ndarray, "2"]) -> Thing:
-    """Return the thing nearest to a place, of those that the map is sure of; the best where it is of none."""
+    """Return the thing nearest to a place, of those with a confidence of 0.5 or more; the best where there is none."""
     sure = [thing for thing in things if thing.sure >= SURE]
     return min(sure, key=lambda thing: thing.outline.distance_m(xy)) if sure else things[0]
 
 
 def likely(things: Sequence[Thing], one: bool) -> Sequence[Thing]:
-    """Return the things that may be meant: the best where it is said which one, else those that the map is sure of."""
+    """Return the things that may be meant: the best where one is meant, else those of confidence 0.5 or more."""
     return things[:1] if one else [thing for thing in things if thing.sure >= SURE] or things[:1]
 
 
 def same_thing(a: Thing, b: Thing) -> bool:
-    """Tell whether two are one and the same thing."""
+    """Return whether two are one and the same thing."""
     return a.solid and b.solid and np.allclose(a.outline.centre, b.outline.centre, atol=1e-6)
 
 
@@ -107,7 +107,7 @@ def _thing(heat: Heatmap, lead: Factor, goal: Goal) -> Thing:
 
 
 def why_not(heat: Heatmap, guess: bool = False) -> str:
-    """Return one sentence on why there is no goal: which phrase, how sure the map is, and what to do."""
+    """Return one sentence on why there is no goal: which phrase, the map's confidence, and what to do."""
     missing = [factor for factor in heat.factors if not factor.found]
     if not missing:
         return (
@@ -122,5 +122,5 @@ def why_not(heat: Heatmap, guess: bool = False) -> str:
 def _absence(factor: Factor) -> str:
     what = f"{factor.part.modality} {factor.part.query!r}"
     best = float(np.max(factor.confidence, initial=0.0)) if isinstance(factor, NearThings) else 0.0
-    note = factor.note or f"it is at best {best:.2f} sure of it, below {SURE:.2f}"
+    note = factor.note or f"its confidence is at best {best:.2f}, below {SURE:.2f}"
     return f"{what}: {note}".rstrip(".")

@@ -23,7 +23,7 @@ from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
 
 _MOST_PROGRAMS = 6
-_NEAR_M = 1.0  # within so much of it a goal counts as reached where the paper judges
+_NEAR_M = 1.0  # within this distance a goal counts as reached where the paper judges
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class Outcome:
     Attributes:
         command: what was said.
         programs: what ran, in order; more than one where the translator had to try again.
-        notes: what a person should know: how something was taken, what the map is not sure of.
+        notes: what a person should know: how a part was understood, where the map's confidence is low.
         done: every step, a failed one too.
         moves: every movement.
         error: why it was not obeyed to its end, one sentence; None where it was.
@@ -120,7 +120,7 @@ class Outcome:
 
 
 def _silent(_: str) -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 def instruct(
@@ -146,11 +146,11 @@ def instruct(
         settings: how the robot takes its skills.
         readable: which files the program may load; by default those in the working directory, and those that the
             command names.
-        translation: what the translator made of the command, where it was asked before.
-        tell: is given lines as it goes: the program, what is found, each step.
+        translation: the translator's answer to the command, if it exists already.
+        tell: called with each line: the program, what is found, each step.
 
     Raises:
-        LanguageError: the command was not understood. Whatever happens later is in the outcome.
+        LanguageError: the command was not understood. All later faults are in the outcome.
     """
     begin = perf_counter()
     translation = translation or translator.program_for(command)
@@ -210,7 +210,7 @@ class _Run:
             self.tell(str(self.done[-1]))
 
     def repaired(self, program: str, trace: Trace) -> Translation | None:
-        """Return the program that the translator writes instead; what was done is told to those who ask."""
+        """Return the program that the translator writes instead; the request lists what was done."""
         done = [one.step.text for one in self.done if one.step.error is None]
         try:
             return self.translator.repair(self.command, program, trace.error or "", done)

@@ -24,7 +24,7 @@ class Move:
         stop: where it ended, world, on the floor.
         distance_m: from the goal to where it ended, over the ground (the world need not be level); None for a turn.
         heading_rad: where it looks then, level frame, counter-clockwise from +x.
-        reached: whether the driver reached what it was told to.
+        reached: whether the driver reached its goal.
         actions: the discrete actions taken.
         path: (n, 2) places passed, level x and y.
         note: what the driver had to say.

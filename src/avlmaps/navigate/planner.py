@@ -1,8 +1,8 @@
-"""Ways over a cost map: SciPy's Dijkstra over cells with sixteen neighbours, pulled straight where that costs no more.
+"""Paths over a cost map: SciPy's Dijkstra over cells with sixteen neighbours, pulled straight where that costs no more.
 
 A large floor is searched twice: first over blocks of cells, split into their connected parts, so that what is
-connected stays so; then over the cells along the way that was found, and wider round it where that does not lead there.
-So a way is found wherever there is one; its cost was never above 1.1 times the least in the tests on random floors.
+connected stays so; then over the cells along that path, and wider round it where that does not lead there.
+So a path is found wherever there is one; its cost was never above 1.1 times the least in the tests on random floors.
 """
 
 from collections.abc import Iterator
@@ -24,27 +24,27 @@ _AROUND = (2, 1, 0)  # blocks around the coarse way that are searched: fewer whe
 
 @dataclass(frozen=True, slots=True)
 class PlanSettings:
-    """How ways are found."""
+    """How paths are found."""
 
     exact_cells: int = 100_000
     """Floors with no more cells that can be passed are searched at once; larger ones coarse to fine."""
     direct: float = 1.05
-    """On a larger floor a straight line is taken unsearched where it costs at most so many times the least that any
+    """On a larger floor a straight line is taken unsearched where it costs at most this many times the least that any
     way of its length can."""
     escape_m: float = 1.0
     """How far a body that stands where the map lets none stand may go straight to get out."""
     beside_m: float = 2.0
     """How far from a place that cannot be stood on the body may stop instead."""
     roomy_m: float = 0.03
-    """A stop beside a place may be farther from it by so much for each unit of cost that it saves."""
+    """A stop beside a place may be farther from it by this distance for each unit of cost that it saves, metres."""
     own_m: tuple[float, ...] = (0.075, 0.2, 0.35, 0.5, 0.7)
-    """What blocks the view within so far of a place is the thing there itself: the least that lets it be seen, so
+    """Obstacles within this distance of a place are the thing there itself: the least that lets it be seen, so
     that a wardrobe is seen through its front and not through its back and the wall. For free floor just the first."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Way:
-    """A way for a body's middle.
+    """A path for a body's middle.
 
     Attributes:
         points: (n, 2) level x and y of its corners, from start to goal, metres.
@@ -75,7 +75,7 @@ class Stop:
 
 
 class Planner:
-    """Finds ways over one cost map; what several ways share is worked out once.
+    """Finds paths over one cost map; what several paths share is worked out once.
 
     Attributes:
         costmap: what it plans on.
@@ -109,7 +109,7 @@ class Planner:
         """Return the cheapest way between two places, None where there is none.
 
         Args:
-            start: level x and y; from where no body could stand the way leads straight to the nearest place that can.
+            start: level x and y; from where no body could stand the path leads straight to the nearest place that can.
             goal: level x and y, where the body can stand.
         """
         if not self.costmap.is_passable(goal):

@@ -1,4 +1,4 @@
-"""The robot: every skill of the vocabulary over a map that can be asked and a driver that moves a body.
+"""The robot: every skill of the vocabulary over a map that is queried and a driver that moves a body.
 
 Places in programs are in the world, as in the map's answers; what is left, north or straight ahead is worked out in
 the level frame, where the robot moves. Headings are counter-clockwise from +x; a program's turns are clockwise and its
@@ -37,28 +37,28 @@ class RobotSettings:
     """How a robot takes its skills."""
 
     guess: bool = False
-    """Go to the best guess where the map is not sure that there is such a thing."""
+    """Go to the best guess where the map's confidence is below 0.5."""
     persist: bool = False
     """Go on with a program where a place is not reached, as the paper's evaluation does, instead of stopping."""
 
 
 def _silent(_: str) -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 class Robot:
     """A robot that knows a map and can drive; it implements `avlmaps.language.vocabulary.Vocabulary`.
 
     Where a phrase alone says what is meant, skills that stand in relation to the robot (`face`, `move_to_left`,
-    `move_to_object` ...) take the nearest thing of that name that the map is sure of; `move_to`, `get_pos` and
+    `move_to_object` ...) take the nearest thing of that name with a confidence of 0.5 or more; `move_to`, `get_pos` and
     `get_contour` take the best. A heatmap of several parts always means its best place.
 
     Attributes:
         asked: the map.
         driver: what moves the body.
         settings: how skills are taken.
-        seeker: asks the map what a program means.
-        moves: what it did so far.
+        seeker: finds in the map what a program means.
+        moves: the movements that it made.
     """
 
     def __init__(
@@ -234,12 +234,12 @@ class Robot:
 
     @property
     def actions(self) -> list[Action]:
-        """All discrete actions so far."""
+        """All discrete actions that were taken."""
         return [action for move in self.moves for action in move.actions]
 
     @property
     def path(self) -> Float[np.ndarray, "n 2"]:
-        """The places passed so far, level x and y."""
+        """The places that were passed, level x and y."""
         return np.concatenate([np.zeros((0, 2)), *(move.path for move in self.moves)])
 
     @cached_property

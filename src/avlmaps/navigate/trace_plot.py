@@ -1,4 +1,4 @@
-"""The way that a robot drove, over the map seen from above: obstacles faint, start, goals, stops, what it met."""
+"""The path that a robot drove, over the top-down map: obstacles faint, start, goals, stops, contacts."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -58,7 +58,7 @@ def draw_way(
         space: the map's voxels, with its colours.
         start: where the robot stood at first.
         moves: what it did; those to a place are numbered.
-        obstacles: what the map knows to stand in the way.
+        obstacles: the obstacles that the map knows.
         met: (m, 2) places where it met something that the map did not know, level x and y.
         title: such as the command.
     """
@@ -72,7 +72,7 @@ def draw_way(
         ax.plot(*move.path.T, color=_WAY, linewidth=1.8, zorder=5)
     _draw_pose(ax, start, "start")
     if met is not None and len(met):
-        ax.plot(*met.T, linestyle="none", marker="x", markersize=5, color=_MET, zorder=6, label="met on the way")
+        ax.plot(*met.T, linestyle="none", marker="x", markersize=5, color=_MET, zorder=6, label="contacts")
     for number, move in enumerate((one for one in moves if one.goal is not None), 1):
         _draw_subgoal(ax, space, number, move)
     ax.set_title(plot_text(title), fontsize=10, color=INK, loc="left", fontweight="bold", wrap=True)

@@ -43,7 +43,7 @@ def _halvings(picture: UInt8[np.ndarray, "h w 3"]) -> list[UInt8[np.ndarray, "..
 
 
 def atlas_of(materials: tuple[Material, ...]) -> Atlas:
-    """Gather the pictures of materials; a picture that several share is kept once."""
+    """Gather the pictures of materials; a picture that several share is stored once."""
     table = np.zeros((max(len(materials), 1), _MOST_LEVELS, 4), np.int64)
     kept: dict[int, tuple[np.ndarray, np.ndarray]] = {}
     texels: list[np.ndarray] = []
@@ -92,7 +92,7 @@ def picture_maps(
 
 
 def _dual(edge: Float[np.ndarray, "t 2 3"]) -> Float[np.ndarray, "t 2 3"]:
-    """Return the vectors that tell how far along each of two edges a step goes; zero where they are parallel."""
+    """Return the vectors that measure how far along each of two edges a step goes; zero where they are parallel."""
     a, b = edge[:, 0], edge[:, 1]
     aa, bb, ab = (np.einsum("ti,ti->t", p, q)[:, None] for p, q in ((a, a), (b, b), (a, b)))
     area = aa * bb - ab * ab

@@ -1,7 +1,7 @@
 """A simulated robot in the true geometry of a scene: a disc that nothing gets into, and that stops or slides.
 
 The world's z is up here, so its level frame is the world. The part of the building at the body's heights is cut out
-of the triangles as lines, and distances to those are exact; a grid of distances only tells where nothing is near.
+of the triangles as lines, and distances to those are exact; a grid of distances only says where nothing is near.
 """
 
 from dataclasses import dataclass
@@ -27,10 +27,10 @@ _CHORD_RAD = 0.1  # ... and turn
 
 @dataclass(frozen=True, slots=True)
 class MotionNoise:
-    """How inexactly a body does what it is told; its odometry tells the truth all the same. Standard deviations.
+    """How inexactly a body follows its commands; its odometry is true all the same. Standard deviations.
 
     Attributes:
-        forward: of the way, as a part of it.
+        forward: of the distance, as a part of it.
         turn: of the turn, as a part of it.
         drift_rad_per_m: of the turn that creeps in while it drives, for one metre.
     """
@@ -41,12 +41,12 @@ class MotionNoise:
 
 
 class Building:
-    """What of a scene is in the way of a body of some height; bodies of any radius can share one.
+    """The obstacles of a scene for a body of some height; bodies of any radius can share one.
 
     Attributes:
         scene: which scene.
         floor_m: height of the floor.
-        segments: (s, 4) outlines between the body's heights, seen from above, as x y x y.
+        segments: (s, 4) outlines between the body's heights, top-down, as x y x y.
     """
 
     def __init__(
@@ -56,8 +56,8 @@ class Building:
 
         Args:
             scene: the building.
-            low_m: what is lower over the floor than this is not in the way.
-            high_m: what is higher neither.
+            low_m: lower parts over the floor are no obstacles.
+            high_m: higher parts are none either.
             floor: which floor, counted from the lowest; the one with most to stand on where it is not said.
             flies: whether the body needs no floor.
         """
@@ -90,7 +90,7 @@ class Building:
         return (*self._sorted, room_m, self._ground, _FINE_M)
 
     def clearance_m(self, x_m: float, y_m: float) -> float:
-        """Return the distance from a place to the nearest thing in the way; by looking at everything."""
+        """Return the distance from a place to the nearest obstacle; by looking at everything."""
         return float(body_kernels.nearest_point(x_m, y_m, self.segments)[0])
 
 
@@ -108,8 +108,8 @@ class SimulatedBody:
     Attributes:
         building: what is in its way.
         radius_m: of the body.
-        contacts: how many of its movements touched something so far.
-        travelled_m: how far it has moved so far.
+        contacts: how many of its movements touched something.
+        travelled_m: how far it has moved.
     """
 
     def __init__(
@@ -141,7 +141,7 @@ class SimulatedBody:
             rng: draws the noise.
 
         Raises:
-            NavigationError: something is in the way where it is to start, or there is no floor.
+            NavigationError: the start is not free, or there is no floor.
             ValueError: noise without a generator.
         """
         if noise is not None and rng is None:
@@ -164,14 +164,14 @@ class SimulatedBody:
         return self._pose
 
     def fits(self, xy: Float[np.ndarray, "2"]) -> bool:
-        """Tell whether the body can stand at a place, level x and y."""
+        """Return whether the body can stand at a place, level x and y."""
         return bool(body_kernels.fits(float(xy[0]), float(xy[1]), self.radius_m, self._arrays))
 
     def place_at(self, pose: GroundPose) -> None:
         """Put it somewhere else.
 
         Raises:
-            NavigationError: something is in the way there, or there is no floor.
+            NavigationError: the place is not free, or there is no floor.
         """
         if not self.fits(np.array([pose.x_m, pose.y_m])):
             clear_m = self.building.clearance_m(pose.x_m, pose.y_m)
@@ -195,7 +195,7 @@ class SimulatedBody:
         return self._moved(0.0, TURN_RAD if action is Action.LEFT else -TURN_RAD)
 
     def drive(self, speed_m_s: float, turn_rad_s: float, duration_s: float) -> Moved:
-        """Move at a velocity for a while, along an arc; a touch ends the way, not the turn."""
+        """Move at a velocity for a while, along an arc; a touch ends the movement, not the turn."""
         return self._moved(speed_m_s * duration_s, turn_rad_s * duration_s)
 
     def _moved(self, ahead_m: float, turn_rad: float) -> Moved:

@@ -5,7 +5,7 @@ from numba import njit
 
 from avlmaps.sim.grid_kernels import _clip
 
-SUBSTEP_M = 0.005  # near something the disc moves by so much at once
+SUBSTEP_M = 0.005  # near something the disc moves by this at once
 _TOUCH_M = 1e-6
 _HALVINGS = 8
 _PUSHES = 4  # a disc that slides is pushed out of what it touches so often before it stops
@@ -13,7 +13,7 @@ _PUSHES = 4  # a disc that slides is pushed out of what it touches so often befo
 
 @njit(cache=True)
 def cut_segments(corners, low_m, high_m):  # pragma: no cover - compiled
-    """Return the outlines (s, 4), as x y x y, of all triangles' parts between two heights, seen from above."""
+    """Return the outlines (s, 4), as x y x y, of all triangles' parts between two heights, top-down."""
     first = np.empty((8, 3))
     second = np.empty((8, 3))
     segments = np.empty((8 * corners.shape[0], 4))
@@ -101,14 +101,14 @@ def _nearest(x, y, reach_m, segments, starts, members, origin, cell_m, nx, ny): 
 
 @njit(cache=True)
 def _supported(x, y, ground, origin, cell_m):  # pragma: no cover - compiled
-    """Tell whether there is floor below a place."""
+    """Return whether there is floor below a place."""
     i, j = int(np.floor((x - origin[0]) / cell_m)), int(np.floor((y - origin[1]) / cell_m))
     return 0 <= i < ground.shape[0] and 0 <= j < ground.shape[1] and ground[i, j]
 
 
 @njit(cache=True)
 def _fits(x, y, radius_m, building):  # pragma: no cover - compiled
-    """Tell whether a disc touches nothing, and where the nearest point lies that it touches."""
+    """Return whether a disc touches nothing, and where the nearest point lies that it touches."""
     segments, starts, members, origin, cell_m, nx, ny, _, ground, fine_m = building
     apart, px, py = _nearest(x, y, radius_m + 0.01, segments, starts, members, origin, cell_m, nx, ny)
     return apart >= radius_m - _TOUCH_M and _supported(x, y, ground, origin, fine_m), apart, px, py
@@ -183,5 +183,5 @@ def moved(x, y, dx, dy, radius_m, slides, building):  # pragma: no cover - compi
 
 @njit(cache=True)
 def fits(x, y, radius_m, building):  # pragma: no cover - compiled
-    """Tell whether a disc touches nothing at a place and has floor below its middle."""
+    """Return whether a disc touches nothing at a place and has floor below its middle."""
     return _fits(x, y, radius_m, building)[0]

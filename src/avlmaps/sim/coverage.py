@@ -25,7 +25,7 @@ class FloorCoverage:
     """How much of a floor was recorded.
 
     Attributes:
-        footprint_m2: area of the box round the building, seen from above.
+        footprint_m2: area of the box round the building, top-down.
         walkable_m2: floor on which the robot's middle can stand.
         reached_share: how much of that is connected with the drive.
         driven_share: how much of it lies within 0.5 m of the drive.

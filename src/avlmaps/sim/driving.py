@@ -1,4 +1,4 @@
-"""Driving a robot along a way with stops, tick by tick: speeds, turns and where it looks. Metres, radians, seconds."""
+"""Driving a robot along a path with stops, tick by tick: speeds, turns and where it looks. Metres, radians, seconds."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 _HALF_FIELD_RAD = np.deg2rad(32.0)  # what lies this far beside the middle of the picture is shown well
-_LOOK_S = 0.5  # what was in the picture for so long has been seen
+_LOOK_S = 0.5  # a thing that was in the picture for this long has been seen
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,14 +18,14 @@ class WalkSettings:
         speed_m_s: when nothing slows it.
         turn_rad_s: fastest turn.
         turn_rad_s2: how fast a turn begins and ends.
-        camera_height_m: lowest and highest height of the camera above the floor; a walk keeps one.
+        camera_height_m: lowest and highest height of the camera above the floor; fixed during a walk.
         pitch_down_rad: how far the camera looks down, on average.
         pitch_sway_rad: how far that slowly varies to either side.
         glance_rad: how far it looks to the sides of its way while driving.
         reach_m: from how far a thing counts as seen.
         radius_m: of the robot.
-        look_around: whether it stops and turns to what did not come into the picture on the way.
-        max_frames: thins a longer walk evenly to so many poses.
+        look_around: whether it stops and turns to what did not come into the picture while driving.
+        max_frames: thins a longer walk evenly to this number of poses.
         floor: which floor, counted from the lowest; the one with most room where it is not said.
     """
 
@@ -46,7 +46,7 @@ class WalkSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tour:
-    """A way over the floor with stops, and what is seen along it.
+    """A path over the floor with stops, and what is seen along it.
 
     Attributes:
         path: (n, 2) points a few centimetres apart.
@@ -77,7 +77,7 @@ class _Robot:
         self.note()
 
     def at(self, metres: float) -> Float[np.ndarray, "2"]:
-        """Return the place so many metres along the way."""
+        """Return the place at this distance along the path, metres."""
         path = self.tour.path
         return np.array([np.interp(metres, self.along, path[:, 0]), np.interp(metres, self.along, path[:, 1])])
 
@@ -109,7 +109,7 @@ class _Robot:
         return abs(goal_rad - self.heading_rad)
 
     def drive_to(self, metres: float, period_s: float, phase: float) -> None:
-        """Drive on to a place along the way, looking ahead and now and then to the sides."""
+        """Drive on to a place along the path, looking ahead and now and then to the sides."""
         rate_hz = self.settings.rate_hz
         while self.along_m < metres - 1e-6:
             way = self.way_rad()

@@ -71,7 +71,7 @@ class FreeSpace:
         return self.middle_of(np.argwhere(self.free))
 
     def is_free(self, xy: Float[np.ndarray, "*n 2"]) -> np.ndarray:
-        """Tell at which places the robot can stand."""
+        """Return at which places the robot can stand."""
         cell = self.cell_of(xy)
         inside = np.all((cell >= 0) & (cell < self.free.shape), axis=-1)
         i, j = np.moveaxis(np.where(inside[..., None], cell, 0), -1, 0)
@@ -112,7 +112,7 @@ class FreeSpace:
         return grid
 
     def paths(self, places: Float[np.ndarray, "k 2"]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the cost (k, k) of driving between places, and for each the way back to it, for `path`.
+        """Return the cost (k, k) of driving between places, and for each the route back to it, for `path`.
 
         The cost of a metre rises near obstacles, up to twice, so that paths keep to the middle of doors.
         """
@@ -145,7 +145,7 @@ class FreeSpace:
 def floor_heights(scene: Scene) -> tuple[float, ...]:
     """Return the height of every floor of a building, lowest first.
 
-    Where it has areas, they tell the floors; else every level surface does that is called floor, or where nothing
+    Where it has areas, they give the floors; else every level surface does that is called floor, or where nothing
     is, that is at least a third as large as the largest and a storey above the one below. The height is that of the
     highest large surface there: the top of a slab, not its underside.
     """
@@ -181,7 +181,7 @@ def free_space(
     """Return where a robot can stand: on a floor, with nothing of the scene within its radius and its height.
 
     Args:
-        scene: what stands in the way.
+        scene: the obstacles.
         radius_m: of the robot.
         height_m: of the robot; what is lower than 0.1 m it drives over.
         cell_m: side of a cell of the grid.

@@ -24,7 +24,7 @@ def _clip(polygon, count, axis, limit, sign, clipped):  # pragma: no cover - com
 
 @njit(cache=True)
 def mark_slab(corners, low_m, high_m, origin, cell_m, grid):  # pragma: no cover - compiled
-    """Mark every cell over which a triangle has a point between two heights; whatever lies off the grid is left out."""
+    """Mark every cell over which a triangle has a point between two heights; cells off the grid are left out."""
     first = np.empty((8, 3))
     second = np.empty((8, 3))
     nx, ny = grid.shape
@@ -72,7 +72,7 @@ def _mark_column(polygon, count, i, origin, cell_m, grid, ny):  # pragma: no cov
 
 @njit(cache=True)
 def _in_sight(ex, ey, low, high, opaque, origin, cell_m):  # pragma: no cover - compiled
-    """Tell whether nothing opaque lies between a place and a box (xy corners), along the line to its middle."""
+    """Return whether nothing opaque lies between a place and a box (xy corners), along the line to its middle."""
     tx, ty = (low[0] + high[0]) / 2, (low[1] + high[1]) / 2
     steps = int(np.hypot(tx - ex, ty - ey) / (0.5 * cell_m)) + 1
     for s in range(1, steps):
@@ -87,7 +87,7 @@ def _in_sight(ex, ey, low, high, opaque, origin, cell_m):  # pragma: no cover - 
 
 @njit(cache=True)
 def sees(eyes, low, high, reach_m, opaque, origin, cell_m):  # pragma: no cover - compiled
-    """Tell which eyes (e, 2) are within reach and in sight of which boxes (b, 2)-(b, 2)."""
+    """Return which eyes (e, 2) are within reach and in sight of which boxes (b, 2)-(b, 2)."""
     seen = np.zeros((eyes.shape[0], low.shape[0]), np.bool_)
     for e in range(eyes.shape[0]):
         for b in range(low.shape[0]):
@@ -101,7 +101,7 @@ def sees(eyes, low, high, reach_m, opaque, origin, cell_m):  # pragma: no cover 
 
 @njit(cache=True)
 def sees_pairs(eyes, low, high, opaque, origin, cell_m):  # pragma: no cover - compiled
-    """Tell which eyes (n, 2) have each its own box (n, 2)-(n, 2) in sight."""
+    """Return which eyes (n, 2) have each its own box (n, 2)-(n, 2) in sight."""
     seen = np.zeros(eyes.shape[0], np.bool_)
     for k in range(eyes.shape[0]):
         seen[k] = _in_sight(eyes[k, 0], eyes[k, 1], low[k], high[k], opaque, origin, cell_m)

@@ -29,7 +29,7 @@ _NEARBY_M = 0.3  # crevices take their light from as far away
 _CREVICE = 0.4  # the share of it that they take
 _GLOW = 2.5  # linear radiance of a surface of emission 1
 _SKY = (1.15, 1.25, 1.4)  # linear, what shines in where there is no wall
-_DEFAULT_LAMP_M = 3.0  # lamps put by default stand so far apart
+_DEFAULT_LAMP_M = 3.0  # distance between lamps put by default
 _STRUCTURE = frozenset({"wall", "floor", "ceiling", "column", "stairs", "railing"})
 
 

@@ -4,14 +4,14 @@ import numpy as np
 from numba import njit
 
 RAYS_LEFT = -2.0  # the ray left the grid
-RAYS_CLEAR = -1.0  # nothing on the way
+RAYS_CLEAR = -1.0  # nothing between
 _STEPS_A_CELL = 2.2  # points laid on a triangle per side of a cell, so that no cell on it is missed
 _OCCLUSION_M = 0.5  # how far away something still darkens a corner
-_CLOSED = 0.85  # share of the bounced light that the closest corner keeps away
+_CLOSED = 0.85  # share of the bounced light that the closest corner blocks
 _UNSEEN = 0.1  # share of the light of probes behind something that still arrives
 _LEAST = 0.01  # light weaker than this is not looked for
 _ASIDE = 1.1  # cells that a sample may be moved along its surface to be free; less than any wall is thick
-_STRIDE = 0.75  # cells walked where something solid is next to the way
+_STRIDE = 0.75  # cells walked where something solid is next to the ray
 
 
 @njit(cache=True)
@@ -55,7 +55,7 @@ def spread_along_columns(room):  # pragma: no cover - compiled
 def march(empty, px, py, pz, dx, dy, dz, farthest):  # pragma: no cover - compiled
     """Walk from a place along a unit direction, in cells; return the distance to the first solid cell, or why none.
 
-    ``empty`` tells for each cell how many cells away, along any axis, the nearest solid one is: 0 in it.
+    ``empty`` says for each cell how many cells away, along any axis, the nearest solid one is: 0 in it.
     """
     nx, ny, nz = empty.shape
     along = 1.0 / max(abs(dx), abs(dy), abs(dz))
@@ -73,7 +73,7 @@ def march(empty, px, py, pz, dx, dy, dz, farthest):  # pragma: no cover - compil
 
 @njit(cache=True)
 def _start(empty, place, nx, ny, nz, low, cell_m, out):  # pragma: no cover - compiled
-    """Lift a place off its surface to where there is room, sidewards too if need be; tell whether there is any."""
+    """Lift a place off its surface to where there is room, sidewards too if need be; return whether there is any."""
     # two directions along the surface (Duff et al. 2017)
     sign = 1.0 if nz >= 0 else -1.0
     a = -1.0 / (sign + nz)
@@ -175,7 +175,7 @@ def splat(place, normal, albedo, glow, area, light, free, low, cell_m, sent):  #
 
 @njit(cache=True)
 def _received(sent, x, y, z, dx, dy, dz, out):  # pragma: no cover - compiled
-    """Average what a coarse cell sends against a direction; tell whether it has any surface that does."""
+    """Average what a coarse cell sends against a direction; return whether it has any surface that does."""
     if x < 0 or y < 0 or z < 0 or x >= sent.shape[0] or y >= sent.shape[1] or z >= sent.shape[2]:
         return False
     total = 0.0
@@ -272,7 +272,7 @@ def _openness(empty, p, nx, ny, nz, ring, cell_m):  # pragma: no cover - compile
 def _from_probes(p, n, empty, step, cube, probe_free, count, see, total):  # pragma: no cover - compiled
     """Sum in ``total`` the light from the probes round a place, in cells, on a surface; return their weight.
 
-    ``step`` is the way between probes, in cells; ``see`` counts only those with nothing between.
+    ``step`` is the distance between probes, in cells; ``see`` counts only those with nothing between.
     """
     weight = 0.0
     total[:] = 0.0
@@ -308,7 +308,7 @@ def ambient(normal, ring, empty, cell_m, probes, bounce, light, start, free):  #
         empty: cells, as in `march`.
         cell_m: their size.
         probes: (p, 6, 3) light from the six sides at each probe; (p,) which of them count; how many there are along
-            x, y and z; the way between them in metres. The first lies half a step from the corner of the cells.
+            x, y and z; the distance between them in metres. The first lies half a step from the corner of the cells.
         bounce: factor for the bounces that are not followed.
         light: (s, 2, 3), changed.
         start: (s, 2, 3), as `direct` found it.

@@ -1,6 +1,6 @@
 """Materials by kind, with variety: `material("wood", rng)`.
 
-A kind has a pool of textures that are made when they are first drawn and then kept, so that the hundreds of
+A kind has a pool of textures that are made when they are first drawn and then stored, so that the hundreds of
 materials of a home cost little. What is drawn depends on the generator alone, never on what is already in the pool:
 texture number i of a kind is made by a generator of its own.
 """
@@ -27,8 +27,8 @@ class _Kind:
         gloss: middle of the gloss.
         grey: maker of textures to be tinted, or None.
         pictured: maker of textures in colours of their own, or None.
-        share: how often the pictured ones are taken where both are there and no colour is asked for.
-        pool: textures of each sort that are kept.
+        share: how often the pictured ones are taken where both are there and no colour is requested.
+        pool: textures of each sort that are stored.
         drift: how far each channel of a drawn tint may stray.
         opacity: 1 for solid.
     """

@@ -134,7 +134,7 @@ class Mesh:
 
 
 def joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Return all the meshes as one; materials that are the same object are kept once."""
+    """Return all the meshes as one; materials that are the same object are stored once."""
     meshes = [mesh for mesh in meshes if len(mesh.triangle)]
     if not meshes:
         return Mesh.empty()

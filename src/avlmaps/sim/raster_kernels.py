@@ -10,14 +10,14 @@ from numba import njit
 
 NEAR_M = 0.02  # what lies nearer than this in front of the camera is cut away
 _STEP = 256  # snapped units in a pixel
-_FARTHEST_UNIT = float(1 << 29)  # keeps products of snapped coordinates within 64 bits
+_FARTHEST_UNIT = float(1 << 29)  # holds products of snapped coordinates within 64 bits
 _TILE = 8  # pixels along a side of a tile of the coarse depth
 _REFRESH = 48  # groups drawn between two looks at the coarse depth
 
 
 @njit(cache=True)
 def _outside(box, rotation, shift, lens, width, height):  # pragma: no cover - compiled
-    """Tell where a box appears: (hidden, first column, last column, first row, last row, greatest inverse depth)."""
+    """Return where a box appears: (hidden, first column, last column, first row, last row, greatest inverse depth)."""
     u0, u1, v0, v1, nearest = 1e30, -1e30, 1e30, -1e30, 1e30
     behind = 0
     for k in range(8):
@@ -204,7 +204,7 @@ def draw(
         lens: fx, fy, cx, cy.
         width: columns.
         height: rows.
-        inverse: (height * width,) float32, inverse z-depth of what is drawn so far; 0 where nothing is. Changed.
+        inverse: (height * width,) float32, inverse z-depth of what is drawn already; 0 where nothing is. Changed.
         shown: (height * width,) int32, the triangle; -1 where nothing is. Changed.
     """
     coarse = np.zeros(((height + _TILE - 1) // _TILE, (width + _TILE - 1) // _TILE), np.float32)

@@ -50,12 +50,12 @@ class RecordSettings:
         sounds: folder of clips, as ``avlmaps add-sounds`` reads it; None makes them by rule.
         categories: only these kinds of sound; all that homes make if empty.
         sources: how many sounds; one for every twelve seconds of the walk if None.
-        ambiguous: how many kinds of sound are heard in two places.
+        ambiguous: how many kinds of sound play in two places.
         rate_hz: samples a second of the track.
         snr_db: how far the room's noise lies below a sound at 1 m.
         overlap_s: how much two sounds may overlap.
         drift: how the poses stray, as odometry does; None gives true poses.
-        max_frames: thins a longer walk evenly to so many frames.
+        max_frames: thins a longer walk evenly to this number of frames.
         semantic: whether instance images are written as well.
         colour: file type of the colour pictures.
         workers: processes that draw; 1 draws in this one, 0 takes as many as there are cores.
@@ -145,7 +145,7 @@ def record_scene(
     Args:
         scene: the building.
         out: the folder to make; it must be empty.
-        settings: the camera, its faults, and how sounds are heard.
+        settings: the camera, its faults, and how sounds reach the microphone.
         seed: of the walk, the sounds and the faults.
 
     Raises:
@@ -153,7 +153,7 @@ def record_scene(
         AudioError: the folder of clips cannot be used.
     """
     settings, out = settings or RecordSettings(), Path(out)
-    if (out / DESCRIPTION).exists():  # told before the work is done, not after
+    if (out / DESCRIPTION).exists():  # reported before the work is done, not after
         raise RecordingError(f"{out} holds a recording already; choose another folder or remove it.")
     space = require_floor(scene, settings.walk)
     for_walk, for_sounds, for_track, for_frames = np.random.default_rng(seed).spawn(4)
@@ -193,18 +193,18 @@ def _trip(scene: Scene, settings: RecordSettings, rng: np.random.Generator) -> _
 
 
 def _soundings(scene: Scene, settings: RecordSettings, trip: _Trip, rng: np.random.Generator) -> list[Sounding]:
-    """Place sounds and let each be heard as the robot comes by."""
+    """Place sounds and let each play as the robot comes by."""
     if settings.hearing == "none":
         return []
     bank = Synthesised() if settings.sounds is None else Recorded(settings.sounds, settings.rate_hz)
     count = max(1, round(trip.duration_s / _SECONDS_A_SOUND)) if settings.sources is None else settings.sources
     robot = trip.world_from_camera[:, :3, 3]
-    pairs = settings.ambiguous  # more kinds are drawn than are heard: not every place has its moment in the walk
+    pairs = settings.ambiguous  # more kinds are drawn than play: not every place has its moment in the walk
     drawn = candidates(scene, rng, 2 * (count + pairs), settings.categories, bank=bank, walk=robot)
     rule = ScheduleRule(pause_s=-settings.overlap_s if settings.overlap_s > 0.0 else ScheduleRule().pause_s)
     soundings = schedule(scene, drawn, trip.stamps_s, robot, rule, most=count, pairs=pairs)
     if len(soundings) < count and settings.sources is not None:
-        say(f"note: {len(soundings)} of {count} sounds are heard: the walk has no room for more.")
+        say(f"note: {len(soundings)} of {count} sounds play: the walk has no room for more.")
     return soundings
 
 
@@ -257,7 +257,7 @@ _Job = tuple[int, str, Float[np.ndarray, "4 4"], Shift]
 
 
 class _Artist:
-    """Draws frames into files; every frame has its own random numbers, whoever draws it."""
+    """Draws frames into files; every frame has its own random numbers, in every process."""
 
     def __init__(self, renderer: Renderer, settings: RecordSettings, folder: Path, seed: int) -> None:
         self._renderer, self._settings, self._folder, self._seed = renderer, settings, folder, seed

@@ -52,7 +52,7 @@ class View:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Groups:
-    """Triangles in the order they are kept in, and the groups they form."""
+    """Triangles in their stored order, and the groups they form."""
 
     order: Int[np.ndarray, " t"]
     first: Int[np.ndarray, " g1"]
@@ -84,7 +84,7 @@ class _Layer:
 
     @classmethod
     def empty(cls, pixels: int) -> "_Layer":
-        """Return memory for a picture of so many pixels."""
+        """Return memory for a picture of this number of pixels."""
         return cls(np.zeros(pixels, np.float32), np.zeros(pixels, np.int32), np.zeros((pixels, 3), np.float32),
                    np.zeros(pixels, np.float32), np.zeros((pixels, 3), np.float32))  # fmt: skip
 
@@ -110,7 +110,7 @@ def _grouped(mesh: Mesh) -> _Groups:
 
 
 def _curve(shoulder: bool) -> UInt8[np.ndarray, " n"]:
-    """Return the 8-bit value by the root of linear light, from 0 to 2; a shoulder keeps bright places from white."""
+    """Return the 8-bit value by the root of linear light, from 0 to 2; a shoulder protects bright places from white."""
     linear = np.square(2 * np.arange(shade_kernels.LEVELS) / shade_kernels.LEVELS)
     if shoulder:
         linear = np.where(linear < 0.5, linear, 0.5 + 0.5 * np.tanh(0.9 * (linear - 0.5) / 0.5))
@@ -126,7 +126,7 @@ def _returns(mesh: Mesh, atlas: Atlas) -> Float32[np.ndarray, " m"]:
 
 
 class Renderer:
-    """Draws views of one scene; not from two threads at once, since it keeps its working memory between views."""
+    """Draws views of one scene; not from two threads at once, since it reuses its working memory between views."""
 
     def __init__(self, scene: Scene, lit: bool = True) -> None:
         """Prepare a scene.
@@ -175,7 +175,7 @@ class Renderer:
         return self._finished(front, gain, camera.height, camera.width)
 
     def _layers_for(self, pixels: int) -> tuple[_Layer, _Layer]:
-        """Return the working memory for pictures of a size, kept from the view before."""
+        """Return the working memory for pictures of a size, reused from the view before."""
         if self._layers is None or len(self._layers[0].shown) != pixels:
             front, behind = _Layer.empty(pixels), _Layer.empty(pixels)
             self._layers = (front, behind)

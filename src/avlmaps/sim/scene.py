@@ -55,7 +55,7 @@ class Area:
 
     Attributes:
         kind: ``kitchen``, ``bedroom`` ...
-        polygon: (k, 2) corners seen from above, counter-clockwise.
+        polygon: (k, 2) top-down corners, counter-clockwise.
         floor_m: height of its floor.
         ceiling_m: height of its ceiling.
         name: kind and number.
@@ -68,7 +68,7 @@ class Area:
     name: str = ""
 
     def contains(self, xy: Float[np.ndarray, "*n 2"]) -> np.ndarray:
-        """Tell which points lie inside it, seen from above."""
+        """Return which points lie inside it, top-down."""
         x, y = np.asarray(xy)[..., 0], np.asarray(xy)[..., 1]
         a, b = self.polygon, np.roll(self.polygon, -1, axis=0)
         inside = np.zeros(x.shape, bool)

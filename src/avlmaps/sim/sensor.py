@@ -130,7 +130,7 @@ class Sensor:
         if shift != Shift() or faults.noise > 0 or faults.vignetting > 0:
             value = np.arange(256, dtype=np.float64)
             gain = 2.0**shift.stops * np.array([shift.red, 1.0, shift.blue])
-            # values are about the root of the light; a shoulder keeps what was not white from becoming so at once
+            # values are about the root of the light; a shoulder stops what was not white from becoming so at once
             curve = value[:, None] * np.sqrt(gain)
             curve = np.where(curve > 200, 200 + 55 * np.tanh((curve - 200) / 70), curve)
             spread = faults.noise * (0.4 + 0.6 * np.sqrt(value / 128))

@@ -29,7 +29,7 @@ def lose_depth(
     above = np.zeros(width, np.float32)
     for y in range(height):
         row[:] = depth[y]
-        seen_to = -1e9  # how far in the other view the pixels so far reach: what falls short of it is hidden there
+        seen_to = -1e9  # how far in the other view the pixels until now reach: nearer ones are hidden there
         for k in range(width):
             x = k if shift_px >= 0 else width - 1 - k
             z = row[x]

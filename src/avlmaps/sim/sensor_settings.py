@@ -9,7 +9,7 @@ from avlmaps.core.errors import AvlmapsError
 
 
 class SensorError(AvlmapsError):
-    """A simulated sensor is asked for faults that none can have."""
+    """The settings give a simulated sensor faults that none can have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,13 +90,13 @@ class OdometryFaults:
     """How a pose that is summed from wheels or from picture to picture strays; all in the plane of the floor."""
 
     along: float = 0.01
-    """Standard deviation of the error of the way, metres after one metre; it grows with the root of the way."""
+    """Standard deviation of the error of a distance, metres after one metre; it grows with the distance's root."""
     heading_per_m: float = 0.01
     """Standard deviation of the error of the heading, radians after one metre, growing likewise."""
     heading_per_rad: float = 0.01
     """Standard deviation of the error of the heading, radians after one radian turned, growing likewise."""
     scale: float = 0.005
-    """Standard deviation of an error of scale that a whole drive keeps."""
+    """Standard deviation of an error of scale that is constant during a drive."""
 
 
 @dataclass(frozen=True, slots=True)

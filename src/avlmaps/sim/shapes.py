@@ -1,4 +1,4 @@
-"""Simple solids to build furniture from. Each stands where it is told to, z up, metres."""
+"""Simple solids to build furniture from. Each stands at its given place, z up, metres."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -169,7 +169,7 @@ def rounded_box(
 ) -> Mesh:
     """Return a box with round upright edges and bevelled top and bottom: cushions, appliances.
 
-    ``soft_top`` lifts the middle of the top by so many metres.
+    ``soft_top`` lifts the middle of the top by this many metres.
     """
     (a, b, c), (d, e, f) = low, high
     radius = min(radius, (d - a) * 0.49, (e - b) * 0.49, (f - c) * 0.49)

@@ -16,7 +16,7 @@ _BOX_GROWN_M = 0.05  # a ray that comes this near to a thing's box shows it
 _TWICE_M = 1.2  # a thing is seen from two places at least this far apart, where that can be
 _LOWEST_RAD = np.deg2rad(30.0)  # how far below the horizon the camera sees
 _NEAREST_M = 0.5  # from nearer than this nothing is seen as a whole
-_MIDST_M = 0.5  # so much farther than the free place nearest to its middle one is still in the midst of an area
+_MIDST_M = 0.5  # this much farther than the free place nearest to its middle one is still in the midst of an area
 _AREA, _OBJECT, _FLOOR = 3.0, 1.0, 0.25  # what entering an area, an object and a piece of floor are worth
 _AGAIN = 0.3  # what seeing a thing from a second place is worth, of the first
 _LEAST_GAIN = 0.9  # a place that adds less is not gone to
@@ -48,7 +48,7 @@ class Targets:
     def in_sight(
         self, places: Float[np.ndarray, "e 2"], reach_m: float, opaque: np.ndarray, space: FreeSpace
     ) -> Bool[np.ndarray, "e t"]:
-        """Tell which targets are within reach of which places with nothing opaque between."""
+        """Return which targets are within reach of which places with nothing opaque between."""
         seen = sees(np.ascontiguousarray(places), self.low, self.high, reach_m, opaque, space.origin, space.cell_m)
         far = np.linalg.norm(places[:, None] - self.middle, axis=2) > self.nearest_m
         # What can only be seen from nearby, in a narrow room, is seen from there.
@@ -117,7 +117,7 @@ def areas_at(scene: Scene, space: FreeSpace, xy: Float[np.ndarray, "n 2"]) -> In
 
 
 def _entered(scene: Scene, space: FreeSpace, candidates: Float[np.ndarray, "c 2"]) -> list[np.ndarray]:
-    """Tell for each area that can be entered which candidates are in the midst of its free floor."""
+    """Return for each area that can be entered which candidates are in the midst of its free floor."""
     free = space.middles()
     owner, of_candidate = areas_at(scene, space, free), areas_at(scene, space, candidates)
     entered = []

@@ -14,7 +14,7 @@ from avlmaps.sim.views import camera_poses, random_views
 
 __all__ = ["WalkSettings", "random_views", "walk_through"]
 
-_SMOOTHING = 150  # rounds of pulling the way straight
+_SMOOTHING = 150  # rounds of pulling the path straight
 
 
 def walk_through(
@@ -44,7 +44,7 @@ def walk_through(
 
 
 def _tour(scene: Scene, space: FreeSpace, settings: WalkSettings, eye_m: float, rng: np.random.Generator) -> Tour:
-    """Order the viewpoints, join them and pull the way smooth; all its points stay free."""
+    """Order the viewpoints, join them and pull the path smooth; all its points stay free."""
     targets = targets_of(scene, space, eye_m)
     opaque = occupied(scene, space, eye_m - 0.15, eye_m + 0.15)
     views = viewpoints(scene, space, targets, opaque, settings.reach_m)

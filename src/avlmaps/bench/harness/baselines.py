@@ -15,7 +15,7 @@ from avlmaps.recordings.audio import AudioTrack, Sound
 
 
 class WeakHearing:
-    """The sounds of a map, as a weaker ear tells them.
+    """The sounds of a map, as a weaker sound encoder scores them.
 
     Args:
         asked: the map.

@@ -35,7 +35,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A sound that can be asked for.
+    """A sound that can be queried.
 
     Attributes:
         category: its name.
@@ -63,7 +63,7 @@ class Evidence:
         seen: for each thing how many voxels of the map it fills.
         areas: its rooms.
         events: its sounds.
-        storey_m: heights between which lies the storey that was recorded; things of others are neither asked for nor
+        storey_m: heights between which lies the storey that was recorded; things of others are neither queried nor
             rivals, since distances are horizontal.
     """
 
@@ -84,7 +84,7 @@ class Evidence:
         return {name: own for name, own in found.items() if sum(map(self.shows, own)) >= 2}
 
     def shows(self, instance: int) -> bool:
-        """Tell whether the recording shows enough of a thing to ask for it."""
+        """Return whether the recording shows enough of a thing to query it."""
         return bool(self.seen[instance] >= LEAST_SEEN)
 
     def box(self, instance: int) -> Box:
@@ -95,7 +95,7 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Photo:
-    """A picture that may be asked with.
+    """A picture that a query may use.
 
     Attributes:
         world_from_camera: where it was taken.

@@ -1,4 +1,4 @@
-"""Heat that comes from truth, or that no map of ours keeps: for ceilings and baselines, in memory alone."""
+"""Heat that comes from truth, or that no map of ours stores: for ceilings and baselines, in memory alone."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,8 +11,8 @@ from avlmaps.query.factors import Factor, NearAnchors, NearThings
 from avlmaps.query.voxel_space import Space
 from avlmaps.sim.scene import Area
 
-_STOREY_M = 0.5  # an area reaches so far below its floor and above its ceiling
-_WALL_M = 0.1  # and so far into its walls: a voxel of what stands at a wall may lie in it
+_STOREY_M = 0.5  # an area reaches this far below its floor and above its ceiling
+_WALL_M = 0.1  # and this far into its walls: a voxel of a thing at a wall may lie in it
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +59,10 @@ def true_things(space: Space, part: Part, falloff_per_m: float, label: Int[np.nd
 
     Args:
         space: the map's voxels.
-        part: what was asked.
+        part: the part of the query.
         falloff_per_m: how fast heat falls.
         label: the thing that each voxel is.
-        own: the things that are what was asked for.
+        own: the things that match the query.
     """
     mask: Bool[np.ndarray, " n"] = np.isin(label, np.array(own, np.int64))
     instance = np.unique(label[mask], return_inverse=True)[1].reshape(-1)
@@ -75,7 +75,7 @@ def true_places(space: Space, part: Part, falloff_per_m: float, places: Sequence
 
     Args:
         space: the map's voxels.
-        part: what was asked.
+        part: the part of the query.
         falloff_per_m: how fast heat falls.
         places: for each thing that was heard or seen the places along its track.
     """
@@ -85,7 +85,7 @@ def true_places(space: Space, part: Part, falloff_per_m: float, places: Sequence
 
 
 def true_regions(space: Space, part: Part, areas: Sequence[Area]) -> VoxelHeat:
-    """Return 1 in the rooms of the kind that was asked for and 0 outside, the map of rooms being truly known."""
+    """Return 1 in the rooms of the queried kind and 0 outside, the map of rooms being truly known."""
     inside = np.zeros(len(space), bool)
     for area in areas:
         if area.kind != part.query:
@@ -97,7 +97,7 @@ def true_regions(space: Space, part: Part, areas: Sequence[Area]) -> VoxelHeat:
 
 
 def near_polygon(area: Area, xy: Float[np.ndarray, "n 2"], margin_m: float) -> Bool[np.ndarray, " n"]:
-    """Tell which points lie inside a room, or no farther from its outline than the margin."""
+    """Return which points lie inside a room, or no farther from its outline than the margin."""
     near = np.asarray(area.contains(xy))
     a, b = area.polygon, np.roll(area.polygon, -1, axis=0)
     for start, end in zip(a, b, strict=True):

@@ -15,7 +15,7 @@ Clips = Literal["unheard", "all"]
 
 
 class TaskError(AvlmapsError):
-    """Tasks cannot be read, or do not fit what is asked for."""
+    """Tasks cannot be read, or do not fit the suite."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,9 +24,9 @@ class Recorded:
 
     Attributes:
         hearing: ``overlay`` or ``acoustic``.
-        frames: at most so many in a scene.
-        sources: at most so many sounds in a scene.
-        ambiguous: how many kinds of sound are heard in two places.
+        frames: limit of frames in a scene.
+        sources: limit of sounds in a scene.
+        ambiguous: how many kinds of sound play in two places.
         sensor: whose faults colour and depth have.
         sounds: name of the folder of clips; ``""`` for sounds made by rule.
         seed: of walks, sounds and tasks.
@@ -56,13 +56,13 @@ class SceneSettings:
         sounds: folder of clips; made by rule if None.
         clips: ``unheard``: those of the folder that the shipped sound encoder was not trained on; ``all``.
         sensor: whose faults colour and depth have.
-        frames: at most so many a scene.
-        sources: at most so many sounds a scene.
-        ambiguous: how many kinds of sound are heard in two places.
+        frames: limit of frames a scene.
+        sources: limit of sounds a scene.
+        ambiguous: how many kinds of sound play in two places.
         jobs: scenes side by side; 0 takes as many as there are cores.
-        seed: of walks, sounds and all that is asked.
-        load: what to ask instead of making it; how the scenes were recorded comes from the file.
-        save: where to write what is asked.
+        seed: of walks, sounds and all queries.
+        load: tasks to use instead of making new ones; how the scenes were recorded comes from the file.
+        save: where to write the tasks.
     """
 
     scenes: tuple[str, ...]

@@ -49,7 +49,7 @@ class SceneJob:
         recorded: how it is recorded.
         sounds: the folder of clips; None for sounds made by rule.
         profile: the models that map it.
-        work: where all scenes' work is kept.
+        work: folder of all scenes' work.
         models: other backends than the profile's, ``module=backend[@model]``.
         rules: how it is mapped and queried.
     """
@@ -107,7 +107,7 @@ def scene_jobs(settings: SceneSettings, recorded: Recorded, names: Sequence[str]
         settings: the folder of clips, the models and the rules.
         recorded: how scenes are recorded, which saved tasks may decide.
         names: of scenes.
-        work: where all scenes' work is kept.
+        work: folder of all scenes' work.
     """
     return [
         SceneJob(name, recorded, settings.sounds, settings.profile, work, settings.models, settings.rules)
@@ -176,7 +176,7 @@ class Workplace:
 
     @cached_property
     def truth(self) -> Truth:
-        """What is truly there; sounds by the names that people call them, whatever a collection calls its clips."""
+        """The truth of the scene; sounds by the names that people use, for any names of a collection."""
         truth = read_truth(self.recording.path) if self.own is None else self.own.truth
         named = tuple(replace(event, category=called(event.category)) for event in truth.events)
         return replace(truth, events=named)
@@ -279,7 +279,7 @@ class Workplace:
 
 
 def _same_things(made: Sequence[SceneObject], recorded: Sequence[SceneObject]) -> bool:
-    """Tell whether things are the same, to the rounding of the files."""
+    """Return whether things are the same, to the rounding of the files."""
     if [thing.category for thing in made] != [thing.category for thing in recorded]:
         return False
     corners = (np.array([(*thing.low, *thing.high) for thing in things]) for things in (made, recorded))

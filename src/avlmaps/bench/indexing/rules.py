@@ -1,7 +1,7 @@
 """The rules by which tasks are made of a scene, so that each is truly ambiguous and has one right answer.
 
-What is sought never tells alone: the recording shows at least two things of the category, or holds the sound at two
-places. The context does: the right one is near it, and every other is clearly farther.
+The name of the goal alone never identifies it: the recording shows at least two things of the category, or holds the
+sound at two places. The context does: the right one is near it, and every other is clearly farther.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from avlmaps.sim.mesh import Triple
 APART_M = 1.0  # things in other areas are at least this far from the right things
 LEAST_PIXELS = 0.01  # of a photo that show the thing
 _A_CATEGORY = 3  # tasks of one category in a scene and table, at most
-_A_SOUND = 10  # the same for a sound that is sought: few sounds are heard at two places
+_A_SOUND = 10  # the same for a sound that is sought: few sounds play at two places
 
 
 def sound_tasks(evidence: Evidence, rng: np.random.Generator, most: int) -> list[Task]:

@@ -30,7 +30,7 @@ PAPER_SIZES: Mapping[TaskKind, int] = {
     TaskKind.NEAR_SOUND: 119,
 }
 _PHOTOS_A_TASK = 12  # tried for each that is wanted
-_RECIPE = 2  # raised when tasks are made, or asked, in another way
+_RECIPE = 2  # raised when tasks are made, or queried, by other rules
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +61,7 @@ class SceneOutcome:
 
     Attributes:
         scene: its name.
-        tasks: what was asked.
+        tasks: the tasks of the scene.
         answers: of every configuration that the profile has the models for.
         frames: frames of the map.
         voxels: voxels of the map.
@@ -86,7 +86,7 @@ class Outcome:
 
     Attributes:
         settings: what the benchmark was run on.
-        tasks: all that was asked.
+        tasks: all tasks.
         scenes: one outcome each.
         weights: the checksum of every model, by module.
     """

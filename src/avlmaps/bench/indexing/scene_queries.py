@@ -1,4 +1,4 @@
-"""One scene as it is asked: its map, its truth, and every source of heat that a configuration may join."""
+"""One scene under query: its map, its truth, and every source of heat that a configuration may join."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -69,12 +69,12 @@ class AskedScene:
     # What the map itself says.
 
     def map_object(self, task: Task, role: Role) -> Heatmap | None:
-        """The category, as the map's pixel features tell it; raises ``QueryError`` where they know no such word."""
+        """The category, by the map's pixel features; raises ``QueryError`` where they know no such word."""
         primary = role is Role.PRIMARY
         return self._once(("object", task.object_name, role), lambda: self.asked.object(task.object_name, primary))
 
     def map_sound(self, task: Task, role: Role) -> Heatmap | None:
-        """The sound, as the map's sound features tell it."""
+        """The sound, by the map's sound features."""
         primary = role is Role.PRIMARY
         return self._once(("sound", task.sound_name, role), lambda: self.asked.sound(task.sound_name, primary))
 
@@ -85,7 +85,7 @@ class AskedScene:
         )
 
     def map_area(self, task: Task, role: Role) -> Heatmap | None:
-        """The area, as the keyframes' view features tell it, by the rules of the map."""
+        """The area, by the keyframes' view features and the rules of the map."""
         return self._once(("area", task.context, role), lambda: self.asked.area(task.context, role is Role.PRIMARY))
 
     def paper_area(self, task: Task, role: Role) -> Heatmap | None:
@@ -102,7 +102,7 @@ class AskedScene:
     # What the paper's baselines make of the same recording.
 
     def weak_sound(self, task: Task, role: Role) -> Heatmap | None:
-        """The sound, as a weaker ear tells it."""
+        """The sound, by a weaker sound encoder."""
         return self._once(("weak", task.sound_name, role), lambda: self._weak_hearing.heat(task.sound_name, role))
 
     @cached_property
@@ -116,7 +116,7 @@ class AskedScene:
         )
 
     def area_as_object(self, task: Task, role: Role) -> Heatmap | None:
-        """The area's name, asked of the pixel features as if it were a thing; None where they know nothing of it."""
+        """The area's name, queried from the pixel features as if it were a thing; None where they do not know it."""
 
         def make() -> Heatmap | None:
             try:

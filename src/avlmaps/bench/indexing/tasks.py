@@ -33,7 +33,7 @@ class Task:
         kind: which table it belongs to.
         scene: the scene's name, such as ``house:1000000:held-out``.
         category: what is sought: an object, or a sound (``object-sound``).
-        context: what tells which one: an area, an object, a sound; for a photo the name in the answer lists.
+        context: the part that says which one: an area, an object, a sound; for a photo the name in the answer lists.
         targets: the boxes that are right; for an area all things of the category in it, for a sound the places of the
             robot while it was heard.
         rivals: the number of other things of the category that the recording shows, or of other places of the sound.

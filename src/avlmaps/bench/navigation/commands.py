@@ -19,7 +19,7 @@ from avlmaps.bench.navigation.phrases import an_image, heat_of
 from avlmaps.bench.navigation.rules import APART_M, mission, rows_of
 
 BESIDE_M = 0.5  # the skills' own distance from an edge
-_ROOM_M = 0.5  # a spot is asked for only where a robot can stand as near as this
+_ROOM_M = 0.5  # a spot is a goal only where a robot can stand as near as this
 _TRIES = 30
 
 # Parts that a form is filled with.
@@ -35,7 +35,7 @@ class Form:
         command: the sentence; ``{0}`` is what the first part is called.
         parts: what it is filled with.
         relation: what becomes of the parts: ``""``: each is a goal; ``between``, ``left``, ``right``, ``north`` ...:
-            one spot; ``face``: the first is a goal, then the second is to be faced; ``turn``: only a way to look.
+            one spot; ``face``: the first is a goal, then the second is to be faced; ``turn``: only a heading.
         distance_m: from the edge, for a side.
     """
 

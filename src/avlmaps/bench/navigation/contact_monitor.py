@@ -1,4 +1,4 @@
-"""A body under watch: what it touched, and whether the map had told before that it would."""
+"""A body under watch: what it touched, and whether the map had foretold it."""
 
 from dataclasses import dataclass
 
@@ -37,7 +37,7 @@ class Foreknowledge:
         return float(np.linalg.norm(apart, axis=1).min())
 
     def foretells(self, xy: tuple[float, float]) -> bool:
-        """Tell whether the map shows an obstacle within the robot's radius of a place (level x and y)."""
+        """Return whether the map shows an obstacle within the robot's radius of a place (level x and y)."""
         return self.room_m(xy) < self.radius_m - _EXACT_M
 
 

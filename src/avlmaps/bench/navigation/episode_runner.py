@@ -25,13 +25,13 @@ from avlmaps.navigate.skills import Robot, RobotSettings
 
 # No limit by the clock: how busy a machine is must not decide what a robot reaches.
 _BUDGET = Budget(seconds=1e6)
-_MOST_HEATS = 100  # kept in memory
+_MOST_HEATS = 100  # in memory
 Launch = Callable[[GroundPose], tuple[Driver, WatchedBody]]
 
 
 @dataclass(slots=True)
 class _Log:
-    """What was told and done on a mission so far."""
+    """The commands and movements of a mission until now."""
 
     commands: list[str] = field(default_factory=list)
     programs: list[str] = field(default_factory=list)
@@ -50,7 +50,7 @@ class Pilot:
         translator: from sentences to programs; None runs the missions' own programs.
         photos: folder of the photos.
         photo_names: the files of a mission's photos, as it names them.
-        guess: whether robots go to the best guess where the map is not sure.
+        guess: whether robots go to the best guess where the map's confidence is below 0.5.
         seed: of the benchmark.
     """
 
@@ -66,7 +66,7 @@ class Pilot:
     def run(self, mission: Mission, configuration: Configuration, key: str = "") -> Episode:
         """Send a robot on a mission.
 
-        Where a program breaks off, because the map does not know a goal, the robot is told those that it has not been
+        Where a program breaks off, because the map does not know a goal, the robot goes to those that it has not been
         to one by one, from where it stands, so that each counts by itself.
 
         Args:
@@ -86,7 +86,7 @@ class Pilot:
         )  # fmt: skip
 
     def _driven(self, mission: Mission, robot: Robot, driver: Driver) -> _Log:
-        """Tell the whole command; where its program breaks off, tell what is left one by one."""
+        """Give the whole command; where its program breaks off, give the remaining goals one by one."""
         files, goals, log = self.photo_names(mission), mission.goals, _Log()
         error = self._told(mission.sentence(files), mission.program(files), goals, robot, log)
         broke_off = error is not None and log.understood and len(goals) > 1
@@ -101,7 +101,7 @@ class Pilot:
         return log
 
     def _told(self, command: str, program: str, goals: Sequence[Goal], robot: Robot, log: _Log) -> str | None:
-        """Tell a robot something and judge its stops; return why it broke off, None where it did not."""
+        """Give the robot a command and judge its stops; return why it broke off, None where it did not."""
         log.commands.append(command)
         try:
             if self.translator is not None:
@@ -117,7 +117,7 @@ class Pilot:
         return trace.error
 
     def _judged(self, goals: Sequence[Goal], begin: GroundPose, moves: Sequence[Move]) -> list[Leg]:
-        """Return a leg for each movement that was for a goal: a place for a place, a turn for a way to look."""
+        """Return a leg for each movement that was for a goal: a place for a place, a turn for a heading."""
         legs: list[Leg] = []
         for move in moves:
             pose = GroundPose(move.stop[0], move.stop[1], move.heading_rad)

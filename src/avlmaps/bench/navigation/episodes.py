@@ -1,4 +1,4 @@
-"""What became of a mission: a record for each stop, kept as JSON lines, so that a run that was broken off goes on."""
+"""The outcome of a mission: a record for each stop, stored as JSON lines, so that a run that was broken off resumes."""
 
 import os
 from collections.abc import Iterator
@@ -60,11 +60,11 @@ class Episode:
         scene: the scene's name.
         configuration: whose senses.
         seed: of the benchmark.
-        commands: what the robot was told; more than once where a program broke off and it was told the rest.
+        commands: the commands to the robot; more than one where a program broke off and the rest was commanded again.
         programs: what was run.
         legs: one for each goal.
         contacts: how often the body touched something, turns included.
-        foretold: how many of these touches the map could have told before.
+        foretold: how many of these touches the map had foretold.
         understood: whether every command became a program.
         key: of everything that it depends on.
     """

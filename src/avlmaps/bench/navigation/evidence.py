@@ -25,7 +25,7 @@ from avlmaps.bench.navigation.phrases import (
 from avlmaps.sim.mesh import Triple
 
 _SHOWN = 0.02  # of a photo's pixels that a thing fills, to count
-_THINGS_IN_PHOTO = 2  # a photo of bare walls is asked of nobody
+_THINGS_IN_PHOTO = 2  # a photo of bare walls is in no query
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +35,8 @@ class Ground:
     Attributes:
         evidence: what was recorded, and the truth.
         floor: where a robot can drive.
-        photos: pictures that may be asked with.
-        tasks: tasks of the indexing benchmark: things that only a sound, a photo or an area tells apart.
+        photos: pictures that a query may use.
+        tasks: tasks of the indexing benchmark: things that only a sound, a photo or an area identifies.
     """
 
     evidence: Evidence
@@ -98,7 +98,7 @@ class Ground:
         ]
 
     def ambiguous_things(self, kind: TaskKind) -> list[tuple[Goal, Task]]:
-        """Return goals for things that their name alone does not tell; a photo is called ``{photo 0}``."""
+        """Return goals for things that their name alone does not identify; a photo is called ``{photo 0}``."""
         made: list[tuple[Goal, Task]] = []
         for task in self.tasks:
             if task.kind is not kind:
@@ -114,7 +114,7 @@ class Ground:
         return made
 
     def ambiguous_sounds(self) -> list[tuple[Goal, Photo | None]]:
-        """Return goals for sounds that were heard in two places or more, told apart by a thing or a photo near one."""
+        """Return goals for sounds that played in two places or more, identified by a thing or a photo near one."""
         made: list[tuple[Goal, Photo | None]] = []
         for sound, places in self.heard.items():
             if len(places) < 2:

@@ -10,8 +10,8 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.sim.free_space import FreeSpace, floor_heights, free_space
 from avlmaps.sim.scene import Scene
 
-_AS_NEAR_M = 0.1  # places that are as near to a thing as a robot comes, to so much
-_ROOM_M = 0.1  # so much more than its radius is free round a robot at the start
+_AS_NEAR_M = 0.1  # places that are as near to a thing as a robot comes, within this
+_ROOM_M = 0.1  # this much more than its radius is free round a robot at the start
 _TRIES = 60
 
 
@@ -50,7 +50,7 @@ class Floor:
         return cls(max(parts, key=lambda part: part.area_m2), radius_m, number)
 
     def reachable(self, goal: Goal) -> bool:
-        """Tell whether some place from which the goal counts as reached can be driven to."""
+        """Return whether some place from which the goal counts as reached can be driven to."""
         if not goal.moves:
             return True
         middles = self.space.middles()

@@ -36,11 +36,11 @@ class Goal:
         kind: how it is named.
         said: how a command names it; ``{photo 0}`` stands for the file of the mission's first photo.
         program: the line of a program that goes there.
-        boxes: right things; the distance is to the nearest point of a box, seen from above.
+        boxes: right things; the distance is horizontal, to the nearest point of a box.
         places: right places: where a sound was heard or came from, where a photo was taken, a spot; metres, world.
-        rooms: corners of right rooms, seen from above; 0 m away inside.
+        rooms: corners of right rooms, top-down; 0 m away inside.
         heading_rad: where the robot is to look, counter-clockwise from +x; None where that does not matter.
-        context: what tells which one is meant, for an ambiguous goal: ``object``, ``sound``, ``image``, ``area``.
+        context: the part that says which one is meant, if ambiguous: ``object``, ``sound``, ``image``, ``area``.
     """
 
     kind: GoalKind
@@ -58,7 +58,7 @@ class Goal:
 
     @property
     def moves(self) -> bool:
-        """Whether it is a place to go to, rather than a way to look."""
+        """Whether it is a place to go to, rather than a heading."""
         return self.kind is not GoalKind.LOOK
 
     def off_m(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
@@ -86,7 +86,7 @@ class Goal:
         return min(_off_box_rad(box, pose) for box in self.boxes)
 
     def reached(self, pose: GroundPose) -> bool:
-        """Tell whether a stop is right: within a metre for a place, within 15 degrees for a way to look."""
+        """Return whether a stop is right: within a metre for a place, within 15 degrees for a heading."""
         off_rad = self.off_rad(pose)
         near = not self.moves or float(self.off_m(np.array([[pose.x_m, pose.y_m]]))[0]) < SUCCESS_M
         return near and (off_rad is None or off_rad <= SUCCESS_RAD)
@@ -123,7 +123,7 @@ def room_distance_m(corners: Float[np.ndarray, "k 2"], xy: Float[np.ndarray, "n 
 
 
 def between(a: Box, b: Box) -> Triple:
-    """Return the middle between the nearest points of two boxes, seen from above; of many such the middle one."""
+    """Return the middle between the nearest points of two boxes, top-down; of many such the middle one."""
     x, y = (_middle(a.low[axis], a.high[axis], b.low[axis], b.high[axis]) for axis in (0, 1))
     return (x, y, 0.0)
 
@@ -134,7 +134,7 @@ def _middle(low_a: float, high_a: float, low_b: float, high_b: float) -> float:
 
 
 def beside(box: Box, direction: Float[np.ndarray, "2"], distance_m: float) -> Triple:
-    """Return the place in a direction (unit vector) from a box's middle, so far beyond its outermost corner."""
+    """Return the place in a direction (unit vector) from a box's middle, this far beyond its outermost corner."""
     middle = (np.array(box.low[:2]) + np.array(box.high[:2])) / 2
     reach = float(np.abs(direction) @ (np.array(box.high[:2]) - middle))
     x, y = middle + direction * (reach + distance_m)

@@ -62,7 +62,7 @@ class KnownScene:
 
 
 class Perceived(AVLMap):
-    """The same map, asked through other senses; a robot does not notice.
+    """The same map, queried through other encoders; a robot does not notice.
 
     A sense that is none knows nothing of what is sought, and takes every place as equally near to a mark.
     """

@@ -15,14 +15,14 @@ def in_a_row(reached: Sequence[Sequence[bool]], length: int) -> list[int]:
 
 
 def independent(reached: Sequence[Sequence[bool]]) -> tuple[int, int]:
-    """Return how many subgoals were reached, and of how many, whatever became of those before."""
+    """Return how many subgoals were reached, and of how many, regardless of those before."""
     return sum(sum(own) for own in reached), sum(len(own) for own in reached)
 
 
 def path_weight(reached: bool, shortest_m: float, path_m: float) -> float:
     """Return a subgoal's success weighted by path length, S·l / max(p, l), after Anderson et al. (2018).
 
-    Ways shorter than one step count as one step, so that standing at the goal already is neither 0 nor undefined.
+    Paths shorter than one step count as one step, so that standing at the goal already is neither 0 nor undefined.
 
     Args:
         reached: whether the stop was right.

@@ -1,4 +1,4 @@
-"""A mission: what a robot is told in a scene, where it starts, and what is right; saved so that others run the same."""
+"""A mission: the command to a robot in a scene, its start, and the right goals; saved so that others run the same."""
 
 import json
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ class Series(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Mission:
-    """One or several subgoals, told in one command.
+    """One or several subgoals in one command.
 
     Attributes:
         name: unique: scene, series and number.
@@ -74,7 +74,7 @@ class Mission:
 
         Args:
             files: the photos' files.
-            only: name just this goal (a robot whose program broke off is told what is left one by one).
+            only: name just this goal (a robot whose program broke off gets the remaining goals one by one).
         """
         said = [_named(goal.said, files) for goal in self.goals]
         if only is not None:
@@ -144,7 +144,7 @@ def load_missions(path: Path) -> MissionSet:
 
 
 def allocated(made: list[list[Mission]], total: int) -> list[Mission]:
-    """Take so many missions from scenes in turn: the first of each, then the second of each, and so on."""
+    """Take ``total`` missions from scenes in turn: the first of each, then the second of each, and so on."""
     longest = max(map(len, made), default=0)
     turns = [own[number] for number in range(longest) for own in made if number < len(own)]
     kept = {mission.name for mission in turns[:total]}

@@ -31,7 +31,7 @@ from avlmaps.sim.scene import Scene
 
 _PHOTOS = 120  # drawn in a scene; those that show too little are left
 _TASKS = 20  # ambiguous things of each kind in a scene
-_MORE = 2.0  # so many times its share a scene offers, since others may have fewer
+_MORE = 2.0  # a scene offers this many times its share, since others may have fewer
 _STREAM = 20  # of random numbers: those below are the indexing suite's
 
 
@@ -61,7 +61,7 @@ class NavigationPlace:
 
     @cached_property
     def obstacles(self) -> Obstacles:
-        """What the map shows to be in the way."""
+        """The obstacles that the map shows."""
         return obstacles_for(self.work.asked, BASE)
 
     @cached_property

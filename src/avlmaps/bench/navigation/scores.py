@@ -49,7 +49,7 @@ class Score:
         path_m: mean length driven for a subgoal.
         actions: mean number of actions for a subgoal.
         contacts: touches in all.
-        foretold: touches that the map could have told.
+        foretold: touches that the map had foretold.
     """
 
     sequences: int
@@ -97,12 +97,12 @@ def share_of(episodes: Sequence[Episode], which: Callable[[Leg], bool], seed: in
 
 
 def of_kind(*kinds: GoalKind) -> Callable[[Leg], bool]:
-    """Return what tells subgoals of some kinds."""
+    """Return a function that selects subgoals of some kinds."""
     return lambda leg: leg.kind in kinds
 
 
 def is_reachable(leg: Leg) -> bool:
-    """Tell whether any robot of this size could have reached a subgoal."""
+    """Return whether any robot of this size could have reached a subgoal."""
     return leg.reachable
 
 

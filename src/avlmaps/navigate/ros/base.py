@@ -56,7 +56,7 @@ class RosDriver(ABC):
         token: str | None = None,
         clock: Callable[[], float] = monotonic,
     ) -> None:
-        """Connect, and wait until the robot tells its pose.
+        """Connect, and wait until the robot reports its pose.
 
         Args:
             url: of rosbridge, ``ws://host:9090``.
@@ -99,7 +99,7 @@ class RosDriver(ABC):
 
     @abstractmethod
     def _cancel_all(self, link: Link, wait_s: float) -> bool:
-        """Ask that whatever the robot is at be cancelled; tell whether it agreed within that time."""
+        """Request that the robot's task, if any, be cancelled; return whether it agreed within that time."""
 
     @abstractmethod
     def _pose_task(self, pose: GroundPose) -> Task:
@@ -126,7 +126,7 @@ class RosDriver(ABC):
 
     @property
     def pose(self) -> GroundPose:
-        """Where the robot is, level frame; where it was last known to be, when its pose is not told any more."""
+        """Where the robot is, level frame; where it was last known to be, when its pose is not reported any more."""
         return self._contact.pose
 
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
@@ -150,14 +150,14 @@ class RosDriver(ABC):
         return replace(driven, path=np.concatenate([turned.path, driven.path]))
 
     def stop(self) -> Arrival:
-        """Cancel whatever the robot is at, whoever sent it there, and tell whether it stands still."""
+        """Cancel the robot's task, from this client or another, and report whether it stands still."""
         self._halted.set()
         track, contact = Track(self.pose), self._contact
         if contact.link.lost is not None:
             return self._arrival(False, track, f"{contact.loss()}; use the robot's own stop")
         self._cancel_all(contact.link, 0.0)
         still = contact.stands_still(self.settings.cancel_timeout_s)
-        return self._arrival(still, track, "" if still else "The robot was told to stop and is not seen to stand")
+        return self._arrival(still, track, "" if still else "The robot was stopped, but its pose changes or is lost")
 
     def halt(self) -> Halt:
         """Return whether the robot stands after an interrupt, which has cancelled the goal that was active.
@@ -229,7 +229,7 @@ class RosDriver(ABC):
             return self._arrival(False, track, note or f"{self.called} did not do it")
         now = self._contact.pose_from_now(self.settings.pose_max_age_s)
         if now is None:
-            why = f"{self.called} says that it arrived, but where it is is not told any more: {self._contact.unseen()}"
+            why = f"{self.called} says that it arrived, but its pose is not reported any more: {self._contact.unseen()}"
             return self._arrival(False, track, why)
         track.passed(now)
         off = plan.off(now)
@@ -239,7 +239,7 @@ class RosDriver(ABC):
         return self._arrival(True, track, plan.note)
 
     def _pursue(self, task: Task, track: Track) -> Goal:
-        """Send one goal and see it to its end, whatever it is."""
+        """Send one goal and see it to its end, good or bad."""
         goal = self._goal = Goal(task)
         try:
             self._beat(goal)
@@ -274,7 +274,7 @@ class RosDriver(ABC):
             if self._contact.link.lost is not None:
                 return self._contact.loss(), False
             if self._halted.is_set():
-                return "The robot was told to stop", False
+                return "The robot was stopped", False
             if not goal.answered and watch.took_s > settings.answer_timeout_s:
                 within = f"within {settings.answer_timeout_s:g} s; is {self.called} running?"
                 return f"Nothing answers at {goal.task.action} {within}", True
@@ -289,9 +289,9 @@ class RosDriver(ABC):
         """Call a goal off, by every way there is, and say how it went."""
         link = self._contact.link
         if link.lost is not None:
-            goal.over(End.FAILED)  # before what is heard over the next connection ends it otherwise
+            goal.over(End.FAILED)  # before a message over the next connection ends it otherwise
             agreed = self._call_off_anew()
-            told = "it was reached again and told to stop" if agreed else "it may still be driving: use its own stop"
+            told = "it was reached again and stopped" if agreed else "it may still be driving: use its own stop"
             goal.note = f"{why}; {told}"
             return
         wait_s = self.settings.cancel_timeout_s

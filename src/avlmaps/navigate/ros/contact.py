@@ -34,7 +34,7 @@ class Contact:
         greet: Callable[[Link], None],
         clock: Callable[[], float] = monotonic,
     ) -> None:
-        """Connect, and wait until the robot tells its pose.
+        """Connect, and wait until the robot reports its pose.
 
         Args:
             url: of rosbridge.
@@ -93,7 +93,7 @@ class Contact:
 
     @property
     def pose(self) -> GroundPose:
-        """Where the robot is, level frame; where it was last, when that is not told any more."""
+        """Where the robot is, level frame; where it was last, when that is not reported any more."""
         self._fresh()
         assert self._last is not None, "the constructor waits for it"
         return self._last
@@ -108,7 +108,7 @@ class Contact:
         return self._last
 
     def pose_from_now(self, wait_s: float) -> GroundPose | None:
-        """Return a pose that was told after this call; None where none is within that time."""
+        """Return a pose that was reported after this call; None where none is within that time."""
         now_s, until_s = self._clock(), monotonic() + wait_s
         while monotonic() < until_s and self.link.lost is None:
             seen = self.sighting()
@@ -119,10 +119,10 @@ class Contact:
         return None
 
     def stands_still(self, wait_s: float) -> bool:
-        """Tell whether the robot comes to stand within that time.
+        """Return whether the robot comes to stand within that time.
 
-        Only what it tells from now on counts: two poses some time apart, and no other place between them. A robot that
-        tells nothing is not seen to stand.
+        Only poses from now on count: two poses some time apart, and no other place between them. A robot that
+        reports nothing is not seen to stand.
         """
         begun_s, until_s = self._clock(), monotonic() + wait_s
         since_s, at = begun_s, None
@@ -157,7 +157,7 @@ class Contact:
         return f"The connection to the robot was lost ({(self.link.lost or '').rstrip('.')})"
 
     def sighting(self) -> Sighting | None:
-        """Return what the transforms tell now, in the robot's frame."""
+        """Return the pose by the transforms now, in the robot's frame."""
         return self._tree.seen(self.frames.map_frame, self.frames.base_frame)
 
     def _fresh(self) -> bool:

@@ -23,7 +23,7 @@ _FAR_M = 1e6
 
 @dataclass(frozen=True, slots=True)
 class GroundTransform:
-    """A rigid movement over the ground, named ``b_from_a``: it takes what is told in frame a to frame b.
+    """A rigid movement over the ground, named ``b_from_a``: it maps places of frame a to frame b.
 
     Attributes:
         x_m: where a's origin lies in b.
@@ -83,14 +83,14 @@ class GroundTransform:
             The transform, and how far off a place is left, metres (root mean square).
 
         Raises:
-            NavigationError: there are too few places, or they tell no direction.
+            NavigationError: there are too few places, or they define no direction.
         """
         a, b = np.asarray(in_a, np.float64), np.asarray(in_b, np.float64)
         if a.shape != b.shape or a.ndim != 2 or a.shape[1:] != (2,):
             raise ValueError(f"places of shape {a.shape} and {b.shape}; both must be (n, 2)")
         if len(a) < 2 or not (np.isfinite(a).all() and np.isfinite(b).all()) or np.ptp(a, axis=0).max() < 0.1:
             raise NavigationError(
-                f"{len(a)} places do not tell how two frames lie to each other; give two or more, metres apart."
+                f"{len(a)} places do not define how two frames lie to each other; give two or more, metres apart."
             )
         from_a, from_b = a - a.mean(axis=0), b - b.mean(axis=0)
         sine = float((from_a[:, 0] * from_b[:, 1] - from_a[:, 1] * from_b[:, 0]).sum())

@@ -1,4 +1,4 @@
-"""What a ROS robot is told to do, and how it stands with it."""
+"""The task of a ROS robot, and its state."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -48,9 +48,9 @@ class Goal:
     """A task that was sent. The network's thread writes what comes of it; the first end stands.
 
     Attributes:
-        task: what was asked for.
+        task: the requested task.
         id: its name on the bridge, unlike any other client's.
-        answered: whether anything was heard of it.
+        answered: whether any message about it arrived.
         end: how it ended; None while it has not.
         note: why, where the robot says.
     """
@@ -69,7 +69,7 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What to send for a movement, and how to tell whether it was made.
+    """The message to send for a movement, and the test whether it was made.
 
     Attributes:
         tasks: the first whose server is there is done.
@@ -103,7 +103,7 @@ class Track:
 
 
 class Watch:
-    """Tells how long something takes."""
+    """Measures how long something takes."""
 
     def __init__(self) -> None:
         self._begun_s = monotonic()

@@ -35,7 +35,7 @@ class Orders(msgspec.Struct):
 
 
 class Guard:
-    """The driver's end of the pipe; whatever happens to the guard does not stop the driver."""
+    """The driver's end of the pipe; no fault of the guard stops the driver."""
 
     def __init__(self, orders: Orders) -> None:
         """Start a guard."""
@@ -45,7 +45,7 @@ class Guard:
     def _start(self) -> None:
         command = [sys.executable, "-m", "avlmaps.navigate.ros.guard"]
         silent = subprocess.DEVNULL
-        # PYTHONPATH stays as it is; the session of its own keeps the terminal's signals away from it.
+        # PYTHONPATH stays as it is; a session of its own shields it from the terminal's signals.
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=silent, stderr=silent, start_new_session=True, bufsize=0
         )

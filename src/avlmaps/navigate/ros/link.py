@@ -91,7 +91,7 @@ class Link:
         self._topic(topic, kind).subscribe(hand_on)
 
     def advertise(self, topic: str, kind: str) -> None:
-        """Tell that something will be published."""
+        """Announce that something will be published."""
         self._topic(topic, kind).advertise()
 
     def publish(self, topic: str, message: dict[str, Any]) -> None:

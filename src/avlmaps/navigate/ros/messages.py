@@ -1,4 +1,4 @@
-"""What goes over rosbridge, both ways. Everything that comes from the robot is data: checked here, or left out.
+"""The messages to and from rosbridge. Everything that comes from the robot is data: checked here, or left out.
 
 Sources: the rosbridge v2 protocol; the definitions of nav2_msgs, action_msgs, actionlib_msgs, move_base_msgs and
 tf2_msgs. rosbridge writes NaN as null, which no number here takes.
@@ -33,7 +33,7 @@ class Incoming(msgspec.Struct):
         msg: a published message, not yet read; the text of a status message.
         values: the result of a goal or a call, not yet read; a sentence where it failed.
         status: the end of a goal, by number; absent from old bridges, which put it into ``values``.
-        result: whether the bridge could do what it was asked.
+        result: whether the bridge could do what was requested.
         level: of a status message: error, warning, info or none.
     """
 
@@ -92,7 +92,7 @@ class GoalState(msgspec.Struct):
 
 
 class GoalStates(msgspec.Struct):
-    """What move_base tells five times a second."""
+    """The states that move_base reports five times a second."""
 
     status_list: list[GoalState]
 
@@ -104,7 +104,7 @@ class GoalUpdate(msgspec.Struct):
 
 
 class ActionEnd(msgspec.Struct):
-    """The result of a goal of Nav2; old bridges nest it in ``result`` and tell the status here."""
+    """The result of a goal of Nav2; old bridges nest it in ``result`` and put the status here."""
 
     status: int | None = None
     error_code: int = 0

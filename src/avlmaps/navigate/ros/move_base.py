@@ -1,6 +1,6 @@
 """Driving with move_base (ROS 1): one actionlib server, spoken to over its five topics.
 
-roslibpy's own client of actionlib is not used: it tells an action's result without its status, so that success and
+roslibpy's own client of actionlib is not used: it reports an action's result without its status, so that success and
 failure look alike until the next status message.
 """
 
@@ -24,7 +24,7 @@ _SEND_AGAIN_S = 1.0
 class MoveBaseDriver(RosDriver):
     """Sends goals to move_base. It has no turns and straight drives of its own, so they are goals as well.
 
-    A movement smaller than move_base's tolerances is then no movement, and told as one that was not made.
+    A movement smaller than move_base's tolerances is then no movement, and reported as one that was not made.
     """
 
     called: ClassVar[str] = "move_base"
@@ -82,7 +82,7 @@ class MoveBaseDriver(RosDriver):
                     return self._under_way is False
 
     def _remind(self, goal: Goal) -> None:
-        """Send a goal again of which nothing is heard: a topic that was just advertised may lose its first message.
+        """Send a goal again that got no answer: a topic that was just advertised may lose its first message.
 
         The server knows a goal by its id, and takes it only once.
         """

@@ -24,9 +24,9 @@ _WHY = {
     207: "planning took too long",
     208: "no way leads there on its own map",
     701: "turning took too long",
-    703: "something is in the way of turning",
+    703: "an obstacle blocks the turn",
     721: "driving straight took too long",
-    723: "something is in the way ahead",
+    723: "an obstacle is ahead",
 }
 
 
@@ -123,7 +123,7 @@ class Nav2Driver(RosDriver):
 
 
 def _end_of(message: Incoming) -> tuple[End, str]:
-    """Read a result. Bridges have written it in three ways; what cannot be read is a failure."""
+    """Read a result. Bridges have written it in three forms; what cannot be read is a failure."""
     if not message.result:
         why = text_in(message.values)
         if "no action server" in why.lower():

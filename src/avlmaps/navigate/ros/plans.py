@@ -1,4 +1,4 @@
-"""What to ask of a robot for each movement, from where it stands, and how to tell afterwards whether it was made."""
+"""The request to a robot for each movement, from where it stands, and the test whether the movement was made."""
 
 from collections.abc import Callable
 from math import atan2, degrees, hypot
@@ -32,7 +32,7 @@ def place_to_stand(
     Args:
         start: where the robot is, level frame.
         wanted: the place, level x and y.
-        looked_at: what to look at once there; else it looks the way it came.
+        looked_at: what to look at once there; else it looks in the direction of its arrival.
         standing: moves the place to where a body can stand.
         settings: tolerances.
         task: returns the task of standing at a pose.

@@ -35,11 +35,11 @@ class RosSettings:
     tf_namespace: str = ""
     """Of its transforms, where they are not on /tf and /tf_static."""
     radius_m: float = 0.25
-    """Of the body, to find where it can stand on our map; the robot keeps its own distance on the way."""
+    """Of the body, to find where it can stand on our map; the robot plans with its own distances."""
     goal_timeout_s: float = 300.0
     """A goal that is not over by then is cancelled."""
     answer_timeout_s: float = 10.0
-    """A goal of which nothing is heard by then has nobody to take it."""
+    """A goal that has no answer by then has nobody to take it, seconds."""
     cancel_timeout_s: float = 3.0
     """How long to wait until a cancelled goal is over."""
     connect_timeout_s: float = 10.0
@@ -47,7 +47,7 @@ class RosSettings:
     pose_timeout_s: float = 10.0
     """How long to wait for the first pose."""
     pose_max_age_s: float = 3.0
-    """Transforms that are older tell no pose; the robot is not driven without one."""
+    """Transforms that are older give no pose; the robot is not driven without one."""
     heartbeat_s: float = 0.5
     """While a goal is active, a heartbeat is published on ``avlmaps/heartbeat`` once in this time."""
     stall_s: float = 3.0
@@ -55,9 +55,9 @@ class RosSettings:
     reached_m: float = 0.5
     """A robot that says it has arrived must stand this near; Nav2's own tolerance is 0.25 m by default."""
     reached_rad: float = 0.35
-    """And look so nearly where it was told to."""
+    """And look in the goal's direction within this angle, radians."""
     speed_m_s: float = 0.15
-    """For Nav2's straight drives, which need one told; what limits the robot has still hold."""
+    """For Nav2's straight drives, which need a speed; the robot's own limits still hold."""
 
     def __post_init__(self) -> None:
         for name in ("namespace", "tf_namespace"):

@@ -1,4 +1,4 @@
-"""The robot's tree of frames as /tf and /tf_static tell it now, and the pose of its body in it."""
+"""The robot's tree of frames by the current /tf and /tf_static, and the pose of its body in it."""
 
 import threading
 from collections.abc import Callable
@@ -27,12 +27,12 @@ class _Edge:
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
-    """A pose that the tree tells.
+    """A pose by the tree.
 
     Attributes:
         pose: of the body on the ground, in the fixed frame.
         heard_s: when the oldest of the moving transforms that it is made of was heard, by the tree's clock.
-        age_s: since then, at the moment of looking. To tell what came before what, compare ``heard_s``: a process may
+        age_s: since then, at the moment of looking. To order events, compare ``heard_s``: a process may
             stand still between two looks at a clock.
     """
 
@@ -42,7 +42,7 @@ class Sighting:
 
 
 class LiveTree:
-    """Keeps the newest transform of each frame, by this machine's clock: the robot's may be set otherwise.
+    """Stores the newest transform of each frame, by this machine's clock: the robot's may be set otherwise.
 
     Attributes:
         refused: how many transforms were left out, being NaN or no rotation.

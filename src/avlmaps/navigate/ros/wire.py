@@ -1,6 +1,6 @@
 """roslibpy's own connection, made safe: sizes capped, messages read strictly, certificates checked, no silent retries.
 
-Importing this module imports twisted; only `link` does, and only when a robot is asked for.
+Importing this module imports twisted; only `link` does, and only when a robot is needed.
 
 roslibpy tries again for ever when a connection is lost, and then sends what was meant for then; a goal that comes
 minutes late is a danger. Here a connection that is lost stays lost, and the driver makes a new one for the next goal.
@@ -29,13 +29,13 @@ _starting = threading.Lock()
 
 @dataclass(frozen=True, slots=True)
 class Listener:
-    """Who is told what happens on a connection; all are called in the network's thread.
+    """The receiver of a connection's events; all are called in the network's thread.
 
     Attributes:
         incoming: a message came.
         fault: what came is no message.
         opened: messages can go.
-        over: the connection is lost, or nobody answered; it is told why.
+        over: the connection is lost, or nobody answered; called with the reason.
     """
 
     incoming: Callable[[Incoming], None]

@@ -19,7 +19,7 @@ _GLTF = (".glb", ".gltf")
 
 
 def load_scene(path: Path | str, up_axis: Axis = "auto") -> Scene:
-    """Read a building from a file or a folder; what lies beside it tells which layout it has.
+    """Read a building from a file or a folder; the files beside it show which layout it has.
 
     Args:
         path: a ``.glb`` or ``.gltf``; a Matterport3D, HM3D or Replica folder or a file of one; a

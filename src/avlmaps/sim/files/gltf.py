@@ -59,11 +59,11 @@ class Part:
 
 
 def load_gltf(path: Path, up_axis: Axis = "auto") -> Scene:
-    """Read a building from a glTF file; ``NAME.objects.json`` beside it may tell its areas and which way is up.
+    """Read a building from a glTF file; ``NAME.objects.json`` beside it may give its areas and the up axis.
 
     Args:
         path: ``.glb`` or ``.gltf``.
-        up_axis: which of the file's axes is up. ``auto`` believes the side-car, then ``extras`` of the asset, then
+        up_axis: which of the file's axes is up. ``auto`` takes the side-car, then ``extras`` of the asset, then
             what is called floor (it lies flat), then glTF's own rule, y.
 
     Raises:
@@ -88,7 +88,7 @@ def read_parts(path: Path) -> list[Part]:
     """Read every mesh of a glTF file as often as it is placed.
 
     Raises:
-        SceneError: a file is missing, truncated, not glTF or packed in a way that is not read here.
+        SceneError: a file is missing, truncated, not glTF or packed in a form that is not read here.
     """
     header = header_of(path)
     packed = sorted(set(header.get("extensionsRequired", ())) & set(_UNREADABLE))
@@ -275,7 +275,7 @@ def _up(wanted: Axis, notes: dict[str, Any], header: dict[str, Any], parts: Sequ
 
 
 def up_of(floors: Sequence[Mesh]) -> str:
-    """Return the axis along which floors face, ``y`` (as glTF has it) where there is no floor to tell."""
+    """Return the axis along which floors face, ``y`` (as glTF has it) where there is no floor to decide."""
     facing = np.zeros(3)
     for mesh in floors:
         facing += (np.abs(mesh.normals()) * mesh.areas_m2()[:, None]).sum(axis=0)

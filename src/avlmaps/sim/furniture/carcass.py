@@ -179,7 +179,7 @@ def door(
 
 
 def drawer(rng: np.random.Generator, style: FrontStyle, room: Room, pulled: float = 0.0) -> Mesh:
-    """Return a drawer's front with its handles, and its box where it stands open so many metres."""
+    """Return a drawer's front with its handles, and its box where it stands open by ``pulled`` metres."""
     (a, b, c), (d, e, f) = room.low, room.high
     panel: Panel = style.panel if style.panel in ("flat", "framed", "raised") else "flat"
     parts = [_panel(style, room, panel, style.look)]

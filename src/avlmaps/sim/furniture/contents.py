@@ -87,7 +87,7 @@ def ornament(rng: np.random.Generator, x: float, y: float, z: float, tall: float
 
 
 def shelf_things(rng: np.random.Generator, room: Room, looks: list[Material], full: float) -> list[Mesh]:
-    """Return what stands in one bay of a shelf: books, things or nothing.
+    """Return the contents of one bay of a shelf: books, things or nothing.
 
     Args:
         rng: draws it.

@@ -28,7 +28,7 @@ def _drape(
         top: height of its top.
         look: its cloth.
         x: depth of its middle.
-        pinch: share of its width that it keeps, from the hem up; None for all of it.
+        pinch: share of its width that stays, from the hem up; None for all of it.
         towards: the y to which pinching gathers it.
         hem: height of its lower edge.
     """

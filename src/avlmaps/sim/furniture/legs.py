@@ -9,7 +9,7 @@ from avlmaps.sim.materials import material
 from avlmaps.sim.mesh import Material, Mesh, Triple, joined
 from avlmaps.sim.shapes import box, circle, cylinder, lathe, loft, slab, tube
 
-# Share of the way up the leg, and thickness there against the style's own.
+# Share of the leg's height, and thickness there against the style's own.
 _PROFILES: dict[str, tuple[tuple[float, float], ...]] = {
     "straight": ((0.0, 1.0), (1.0, 1.0)),
     "tapered": ((0.0, 0.5), (1.0, 1.0)),
@@ -26,7 +26,7 @@ class LegStyle:
     """How a leg is shaped.
 
     Attributes:
-        profile: rows of (share of the way up, thickness against ``thickness_m``).
+        profile: rows of (share of the leg's height, thickness against ``thickness_m``).
         sides: of its section: 4 for square, more for round.
         thickness_m: of a straight leg, metres.
     """

@@ -32,7 +32,7 @@ def _metal(rng: np.random.Generator) -> Material:
 
 def shade(middle: Triple, low_radius: float, top_radius: float, height: float, look: Material,
           sides: int = 20, pleat: float = 0.0) -> Mesh:  # fmt: skip
-    """Return an open shade from ``middle``'s z upwards, round or with few sides; ``pleat`` folds it by so much."""
+    """Return an open shade from ``middle``'s z upwards, round or with few sides; ``pleat`` is the depth of folds."""
     x, y, z = middle
     fold = 1.0 - pleat * (np.arange(sides) % 2)
     rings = [

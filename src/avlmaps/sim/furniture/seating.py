@@ -1,4 +1,4 @@
-"""Chairs with a wooden frame, by the way their backs are made."""
+"""Chairs with a wooden frame, by the make of their backs."""
 
 from dataclasses import replace
 

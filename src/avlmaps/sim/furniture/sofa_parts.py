@@ -49,7 +49,7 @@ class SofaPlan:
 
 
 def sofa_plan(rng: np.random.Generator, seats: int, arm: tuple[float, float] = (0.08, 0.26)) -> SofaPlan:
-    """Draw the measures of a sofa for so many people, or of an armchair for one."""
+    """Draw the measures of a sofa for this number of people, or of an armchair for one."""
     each = draw(rng, 0.5, 0.62) if seats in (1, 4) else draw(rng, 0.52, 0.76)
     seat = draw(rng, 0.37, 0.48)
     clear = pick(rng, (0.0, draw(rng, 0.02, 0.06), draw(rng, 0.08, 0.17)))

@@ -1,4 +1,4 @@
-"""What a robot hears in a scene: which things sound, when, and how it reaches the microphone."""
+"""The sounds of a scene: which things sound, when, and how it reaches the microphone."""
 
 from avlmaps.sim.hearing.acoustic import AcousticSettings, acoustic
 from avlmaps.sim.hearing.kinds import KINDS, SoundKind, kind_of

@@ -78,7 +78,7 @@ def _moving(
     rng: np.random.Generator,
     settings: AcousticSettings,
 ) -> Float[np.ndarray, " m"]:
-    """Return a clip as the moving robot hears it: triangular windows, each by the response at its middle."""
+    """Return a clip at the moving microphone: triangular windows, each by the response at its middle."""
     from scipy.signal import oaconvolve
 
     hop = max(1, round(settings.step_s * settings.rate_hz))

@@ -7,8 +7,8 @@ What is modelled, in units of the direct sound at 1 m:
 - early reflections in the source's own room, where the microphone is in it too: image sources of the room's polygon, by
   pyroomacoustics, with the room's mean absorption;
 - the late field in every room: noise that decays as the coupled rooms do (``rooms``), band by band.
-Doors that stand closed stop sound as walls do. What is not modelled: furniture in the way of sound, reflections that
-reach the next room, scattering, moving doors, Doppler shift, stairwells (another floor is heard through its slab
+Doors that stand closed stop sound as walls do. Not modelled: furniture between source and microphone, reflections
+that reach the next room, scattering, moving doors, Doppler shift, stairwells (another floor is audible through its slab
 alone), the directivity of sources and microphone.
 """
 
@@ -151,7 +151,7 @@ class Acoustics:
         return found
 
     def _through_slab(self, source: Float[np.ndarray, "3"], ear: Float[np.ndarray, "3"]) -> Float[np.ndarray, " t"]:
-        """Return what is heard on another floor: only what comes straight through the slab between."""
+        """Return the sound on another floor: only what comes straight through the slab between."""
         distance_m = max(float(np.linalg.norm(ear - source)), _NEAREST_M)
         out = np.zeros(round(_LONGEST_S * self.rate_hz))
         gain = 10.0 ** (-_SLAB_DB / 20.0) / distance_m

@@ -17,7 +17,7 @@ class SoundKind:
         floor: kinds of rooms in which it is also heard where nothing that makes it stands; ``("*",)``: in any.
         height_m: height over the floor there.
         level_db: loudness at 1 m against other kinds.
-        indoors: whether homes make it; sounds from outdoors come in by the windows and only when asked for.
+        indoors: whether homes make it; sounds from outdoors come in by the windows and only on request.
     """
 
     names: tuple[str, ...]

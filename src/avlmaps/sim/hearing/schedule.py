@@ -11,7 +11,7 @@ from avlmaps.sim.hearing.sources import Source
 from avlmaps.sim.mesh import Triple
 from avlmaps.sim.scene import Scene
 
-_OTHER_ROOM_M = 4.0  # a source in another room counts as so much farther away
+_OTHER_ROOM_M = 4.0  # a source in another room counts as this much farther away
 _STEP_S = 0.1
 
 
@@ -21,10 +21,10 @@ class ScheduleRule:
 
     Attributes:
         pause_s: least silence between two; negative lets them overlap by as much.
-        distance_m: least distance between any two places at which the robot hears different sounds, as in the paper,
+        distance_m: least distance between any two places at which the robot records different sounds, as in the paper,
             and between any two sources.
         twins_m: least distance between two sources of one kind.
-        reach_m: a source that the robot passes at no less than this (mean over the sound) is not heard at all.
+        reach_m: a source that the robot passes at no less than this (mean over the sound) does not play at all.
     """
 
     pause_s: float = 1.0
@@ -61,7 +61,7 @@ def schedule(
 ) -> list[Sounding]:
     """Let sources sound when the robot is nearest to them, as far as the rule allows; what finds no room is left out.
 
-    Each kind is heard once, from the first of its sources for which there is room; ``pairs`` of the kinds are heard
+    Each kind plays once, from the first of its sources for which there is room; ``pairs`` of the kinds play
     twice, from sources that are far apart, and these come first.
 
     Args:
@@ -69,9 +69,9 @@ def schedule(
         sources: what may sound, the most wanted first.
         stamps_s: when the robot was where.
         robot: its places.
-        rule: what keeps sounds apart.
-        most: how many are heard at most.
-        pairs: how many kinds are heard twice, as far as there is room.
+        rule: the distances between sounds.
+        most: limit of the sounds.
+        pairs: how many kinds play twice, if there is room.
 
     Returns:
         In the order of their onsets.
@@ -102,7 +102,7 @@ class _Planner:
     _areas: np.ndarray | None = None
 
     def take_two_of(self, sources: Sequence[Source]) -> bool:
-        """Let two of these be heard that are far apart, or none."""
+        """Let two of these play that are far apart, or none."""
         for i, one in enumerate(sources):
             far = [other for other in sources[i + 1 :] if _distance_m(one, other) >= self.rule.twins_m]
             if not far or not self.take_one_of([one]):
@@ -113,7 +113,7 @@ class _Planner:
         return False
 
     def take_one_of(self, sources: Sequence[Source]) -> bool:
-        """Let the first of these be heard for which there is room."""
+        """Let the first of these play for which there is room."""
         for source in sources:
             if any(_distance_m(source, other.source) < self.rule.distance_m for other in self.found):
                 continue
@@ -153,7 +153,7 @@ def _steps(source: Source) -> int:
 
 
 def _free_onsets(walk: Walk, found: Sequence[Sounding], steps: int, rule: ScheduleRule) -> Bool[np.ndarray, " onsets"]:
-    """Tell at which onsets a sound of so many steps would keep the rule."""
+    """Return at which onsets a sound of ``steps`` steps would satisfy the rule."""
     if steps > len(walk.stamps_s):
         return np.zeros(0, bool)
     taken = np.zeros(len(walk.stamps_s), bool)

@@ -40,7 +40,7 @@ class Synthesised:
         return tuple(sorted(MAKERS))
 
     def draw(self, category: str, rng: np.random.Generator) -> tuple[str, Sound]:
-        """Make one; its name tells the seed it was made with."""
+        """Make one; its name holds the seed it was made with."""
         from avlmaps.sim.synthesis import RATE_HZ, synthesise
 
         seed = int(rng.integers(1 << 31))
@@ -87,10 +87,10 @@ class Recorded:
 
 
 def chosen_categories(bank: Bank, asked: tuple[str, ...] | None) -> tuple[str, ...]:
-    """Return the asked categories, or those of the bank that homes make, sorted.
+    """Return the requested categories, or those of the bank that homes make, sorted.
 
     Raises:
-        AudioError: the bank lacks one that is asked for, or has none of a home.
+        AudioError: the bank lacks a requested one, or has none of a home.
     """
     if not asked:
         of_homes = tuple(name for name in bank.categories if kind_of(name).indoors)

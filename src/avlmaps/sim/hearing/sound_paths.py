@@ -184,7 +184,7 @@ def _filled(solid: Bool[np.ndarray, "nx ny"], indoors: Bool[np.ndarray, "nx ny"]
 
 
 def _walls(scene: Scene) -> Bool[np.ndarray, " t"]:
-    """Tell which triangles stop sound: those of walls, or of anything tall where a file names no walls."""
+    """Return which triangles stop sound: those of walls, or of anything tall where a file names no walls."""
     solid = np.array([thing.category in SOLID for thing in scene.objects], bool)
     if not any(thing.category == "wall" for thing in scene.objects):
         solid |= np.array([thing.high[2] - thing.low[2] > _TALL_M for thing in scene.objects], bool)

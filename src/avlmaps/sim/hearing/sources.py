@@ -1,4 +1,4 @@
-"""Placing sounds in a scene: at the things that make them, or on the floor of the rooms where they are heard."""
+"""Placing sounds in a scene: at the things that make them, or on the floor of the rooms where they occur."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -58,15 +58,15 @@ def place_sources(
     apart_m: float = 2.0,
     twins_apart_m: float = 4.0,
 ) -> list[Source]:
-    """Draw sounds and put each at a thing that makes it, or where such a sound is heard.
+    """Draw sounds and put each at a thing that makes it, or where such a sound occurs.
 
     Args:
         scene: the building.
         rng: draws kinds, places and clips.
         count: how many sources; fewer where the scene has no room for more.
         categories: only these kinds; all that homes make if None.
-        ambiguous: how many of the kinds are to be heard in two places (of different clips), so that the kind alone
-            does not tell the place.
+        ambiguous: how many of the kinds are to play in two places (of different clips), so that the kind alone
+        does not identify the place.
         bank: where the clips come from; made by rule if None.
         walk: where the robot will be: only places that it comes near to are taken.
         apart_m: least distance between any two sources.

@@ -102,7 +102,7 @@ def _set(
     heading: np.ndarray,
     over_m: float = 0.0,
 ) -> bool:
-    """Stand a thing at the first of several places on a top where it meets nothing, jutting out no more than told."""
+    """Stand a thing at the first of several places on a top where it meets nothing, within the given overhang."""
     taken = f.laid.setdefault((id(anchor), round(100 * top.z)), [])
     foot = footprint(piece.mesh)
     corner = corners_of(centre, np.broadcast_to(foot.half, centre.shape), heading)

@@ -40,7 +40,7 @@ def joined_up(
         rooms: of one floor.
         walls: between them, without holes.
         open_plan: the probability that rooms of an open plan have no wall between them.
-        patience: how dear the way to a room may be (see `_price`).
+        patience: how dear the path to a room may be (see `_price`).
     """
     start = min(range(len(rooms)), key=lambda i: (rooms[i].kind not in ("entrance hall", *HUBS), i))
     wanted = _tree(rooms, walls, start, patience)
@@ -69,7 +69,7 @@ def joined_up(
 
 
 def _tree(rooms: list[Room], walls: list[Wall], start: int, patience: float) -> set[int] | None:
-    """Return the walls that need a door so that the way from the start to each room costs least."""
+    """Return the walls that need a door so that the path from the start to each room costs least."""
     best = {start: 0.0}
     through: dict[int, int] = {}
     queue = [(0.0, start)]
@@ -173,7 +173,7 @@ def _leaf_places(wall: Wall, hole: Hole) -> np.ndarray:
 def _leaf_is_free(
     rooms: list[Room], walls: list[Wall], index: int, hole: Hole, leaves: dict[int, list[np.ndarray]]
 ) -> bool:
-    """Tell whether an open door leaves room to pass by it, between it and walls, other doorways and their leaves."""
+    """Return whether an open door leaves room to pass by it, between it and walls, other doorways and their leaves."""
     wall = walls[index]
     room = wall.left if hole.to_left else wall.right
     polygon, places = rooms[room].polygon, _leaf_places(wall, hole)
@@ -181,7 +181,7 @@ def _leaf_is_free(
         return False
     for end in range(3, len(places), 4):
         tip, way = places[end], (places[end] - places[end - 1]) / np.linalg.norm(places[end] - places[end - 1])
-        halfway = places[end - 2]  # so far from its own wall that another wall is near it or none
+        halfway = places[end - 2]  # this is far enough from its own wall that another wall is near it or none
         beside_wall = not inside(polygon, halfway, -0.35) and not inside(polygon, tip, -0.35)
         if not beside_wall and not inside(polygon, tip + 0.5 * way, -0.45):
             return False

@@ -14,7 +14,7 @@ from avlmaps.sim.mesh import Mesh
 from avlmaps.sim.scene import Light, SceneBuilder
 
 _UNDER_LAMPS = ("dining table", "kitchen island", "coffee table", "bed")
-_TOUCH_M = 0.006  # pieces stand so far from the wall behind them
+_TOUCH_M = 0.006  # distance of pieces from the wall behind them
 
 
 # How high the lowest edge of what hangs on a wall is, metres.
@@ -25,21 +25,21 @@ HANGING_M = {"picture": (1.1, 1.6), "mirror": (0.9, 1.3), "clock": (1.5, 2.0), "
              "microwave": (1.4, 1.5), "plant": (1.4, 1.9), "telephone": (1.1, 1.4)}  # fmt: skip
 
 
-Among = Callable[[str], bool]  # tells of the name of a family whether it will do
+Among = Callable[[str], bool]  # says of the name of a family whether it will do
 
 
 def floor_standing(family: str) -> bool:
-    """Tell whether a family stands on the floor: not on a worktop, not on a wall."""
+    """Return whether a family stands on the floor: not on a worktop, not on a wall."""
     return not family.startswith(("wall", "counter", "table top"))
 
 
 def wall_hung(family: str) -> bool:
-    """Tell whether a family is made to hang on a wall."""
+    """Return whether a family is made to hang on a wall."""
     return family.startswith("wall")
 
 
 def on_floor_or_wall(family: str) -> bool:
-    """Tell whether a family needs no worktop under it."""
+    """Return whether a family needs no worktop under it."""
     return not family.startswith(("counter", "table top"))
 
 
@@ -57,7 +57,7 @@ def _fit_to_stand(category: str) -> Among:
 
 
 def hangs(piece: Piece) -> bool:
-    """Tell whether a piece is made to hang on a wall."""
+    """Return whether a piece is made to hang on a wall."""
     return wall_hung(piece.family)
 
 
@@ -81,7 +81,7 @@ class Stood:
 
     @property
     def centre(self) -> Float[np.ndarray, "2"]:
-        """Middle of its box, seen from above."""
+        """Middle of its box, top-down."""
         return self.to_world(self.foot.middle)
 
     def to_world(self, xy: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
@@ -112,7 +112,7 @@ class Furnisher:
         has_ceiling: there is one to hang lamps from.
         fill: how much stands in it, 1 for a room that has what it needs.
         mess: how much lies about, from 0 to 1.
-        stood: what stands in it so far.
+        stood: the pieces that stand in it already.
         laid: rectangles taken on tops, by the piece's identity and the top's height in centimetres.
     """
 
@@ -159,7 +159,7 @@ class Furnisher:
         self, piece: Piece, centre: Float[np.ndarray, "n 2"], heading_rad: Float[np.ndarray, " n"], z: float = 0.0,
         front_m: float = 0.0, solid: bool = True, zones: bool = True, except_for: int = -1,
     ) -> Stood | None:  # fmt: skip
-        """Put a piece at the first of several places that is free and leaves the ways free."""
+        """Put a piece at the first of several places that is free and leaves the passages free."""
         foot = footprint(piece.mesh)
         if z + foot.high_m > self.height_m - 0.02 and piece.category not in ("wall", "column"):
             return None
@@ -273,7 +273,7 @@ class Furnisher:
         return self.along(piece, sides, front_m=0.0, gap_m=-_TOUCH_M + 0.001, z=z, near=near, tries=tries, corner=0.0)
 
     def from_ceiling(self, piece: Piece, centre: Float[np.ndarray, "2"]) -> Stood | None:
-        """Hang a lamp from the ceiling over a place, where a head passes under it or a table keeps heads away."""
+        """Hang a lamp from the ceiling over a place, where a head passes under it or a table stands below."""
         foot = footprint(piece.mesh)
         z = self.height_m - foot.high_m - 0.001
         over_table = any(

@@ -29,7 +29,7 @@ def cut(polygon: Polygon, share: float, direction: Float[np.ndarray, "2"]) -> tu
     for low, high in pairwise(levels):
         if high - low < 1e-9:
             continue
-        # Between two corners the width changes evenly: widths a little inside both ends tell it all.
+        # Between two corners the width changes evenly: widths a little inside both ends determine it.
         near, far = (_width_at(sides, low + f * (high - low)) for f in (0.001, 0.999))
         slab = 0.5 * (near + far) * (high - low)
         if done + slab >= goal:
@@ -161,7 +161,7 @@ def _without_corner(rng: np.random.Generator, polygon: Polygon) -> Polygon:
 
 
 def sound(rooms: list[tuple[str, Polygon]]) -> bool:
-    """Tell whether every room is wide enough for its kind and none is a strip."""
+    """Return whether every room is wide enough for its kind and none is a strip."""
     for kind, polygon in rooms:
         if len(polygon) < 3 or np.min(np.hypot(*(polygon - polygon[[*range(1, len(polygon)), 0]]).T)) < 0.5:
             return False

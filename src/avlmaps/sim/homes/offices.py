@@ -1,4 +1,4 @@
-"""What stands in the rooms of an office."""
+"""The furniture of the rooms of an office."""
 
 import numpy as np
 

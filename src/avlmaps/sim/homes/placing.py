@@ -1,4 +1,4 @@
-"""Where a thing can stand in a room: oriented boxes that must not meet, and ways that must stay free. Metres."""
+"""Where a thing can stand in a room: oriented boxes that must not meet, and passages that must stay free. Metres."""
 
 from dataclasses import dataclass, field
 
@@ -11,7 +11,7 @@ from avlmaps.sim.homes.polygons import corners_of, inside, overlapping, shrunk
 
 _WAY_M = 0.38  # a robot of 0.25 m and the coarseness of the grids that look for its way
 _CELL_M = 0.1
-_OVERHEAD_M = 1.75  # what hangs higher leaves the way free
+_OVERHEAD_M = 1.75  # higher things leave the passage free
 _UNDERFOOT_M = 0.08
 
 
@@ -43,7 +43,7 @@ class Side:
         return float(np.arctan2(self.inward[1], self.inward[0]))
 
     def is_free(self, start: np.ndarray, end: np.ndarray, low: float, high: float) -> np.ndarray:
-        """Tell which stretches of it cross no opening between two heights."""
+        """Return which stretches of it cross no opening between two heights."""
         free = (start >= 0.0) & (end <= self.length_m)
         for a, b, lower, upper in self.closed:
             if low < upper and high > lower:
@@ -117,14 +117,14 @@ class Ground:
         self, foot: Footprint, centre: Float[np.ndarray, "n 2"], heading_rad: Float[np.ndarray, " n"], z: float = 0.0,
         zones: bool = True, except_for: int = -1,
     ) -> Bool[np.ndarray, " n"]:  # fmt: skip
-        """Tell where a piece can stand: within the walls, meeting nothing, and out of the zones kept clear.
+        """Return where a piece can stand: within the walls, meeting nothing, and out of the clear zones.
 
         Args:
             foot: its box.
             centre: where the middle of its box would be.
             heading_rad: where its front would look.
             z: height of its origin.
-            zones: heed the zones kept clear before furniture; those before doors are heeded always.
+            zones: respect the clear zones before furniture; those before doors are respected always.
             except_for: number of a piece that it may meet (a chair its table).
         """
         corner = corners_of(centre, np.broadcast_to(foot.half, centre.shape), heading_rad)
@@ -142,7 +142,7 @@ class Ground:
         return good
 
     def keeps_ways(self, foot: Footprint, centre: np.ndarray, heading_rad: float, z: float, front_m: float) -> bool:
-        """Tell whether the doors stay connected, and the place before the piece with them, when it stands there."""
+        """Return whether the doors stay connected, and the place before the piece with them, when it stands there."""
         if z + foot.low_m > _OVERHEAD_M or z + foot.high_m < _UNDERFOOT_M:
             return True
         free = self._free & ~self._near(foot, centre, heading_rad, _WAY_M)
@@ -205,7 +205,7 @@ class Ground:
 
 
 def ground_of(plan: Plan, room: int) -> Ground:
-    """Return the bare floor of a room, with the zones before its doors kept clear."""
+    """Return the bare floor of a room, with clear zones before its doors."""
     inner = shrunk(plan.rooms[room].polygon, plan.wall_m / 2)
     sides = []
     for a, b in zip(inner, np.roll(inner, -1, axis=0), strict=True):

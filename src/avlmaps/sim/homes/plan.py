@@ -1,4 +1,4 @@
-"""What a floor plan is: rooms, the walls between them, and the holes in the walls. Metres, seen from above."""
+"""What a floor plan is: rooms, the walls between them, and the holes in the walls. Metres, top-down."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -75,7 +75,7 @@ class Wall:
         return np.array([-y, x])
 
     def at(self, along_m: float) -> Float[np.ndarray, "2"]:
-        """Return the place on its middle line so far from a."""
+        """Return the place on its middle line at this distance from a."""
         return self.a + along_m * self.along
 
     def with_hole(self, hole: Hole) -> "Wall":

@@ -1,4 +1,4 @@
-"""Plane geometry of floor plans: convex polygons that are cut, shrunk and compared. Metres, seen from above.
+"""Plane geometry of floor plans: convex polygons that are cut, shrunk and compared. Metres, top-down.
 
 Polygons are (k, 2), counter-clockwise.
 """
@@ -11,7 +11,7 @@ _SAME_M = 1e-6
 
 def area_m2(polygon: Float[np.ndarray, "k 2"]) -> float:
     """Return the area of a polygon, positive where it runs counter-clockwise."""
-    corners: list[list[float]] = polygon.tolist()  # so few that plain numbers are faster
+    corners: list[list[float]] = polygon.tolist()  # few enough that plain numbers are faster
     return 0.5 * sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(corners, corners[1:] + corners[:1], strict=True))
 
 
@@ -57,7 +57,7 @@ def shrunk(polygon: Float[np.ndarray, "k 2"], by_m: float) -> Float[np.ndarray, 
 
 
 def inside(polygon: Float[np.ndarray, "k 2"], xy: Float[np.ndarray, "*n 2"], slack_m: float = 0.0) -> np.ndarray:
-    """Tell which places lie in a convex polygon, or out of it by no more than a slack."""
+    """Return which places lie in a convex polygon, or out of it by no more than a slack."""
     a = polygon
     along = np.roll(polygon, -1, axis=0) - a
     along = along / np.linalg.norm(along, axis=1, keepdims=True)
@@ -89,7 +89,7 @@ def corners_of(
 def overlapping(
     a: Float[np.ndarray, "n 4 2"], b: Float[np.ndarray, "m 4 2"], slack_m: float = 0.0
 ) -> Bool[np.ndarray, "n m"]:
-    """Tell which rectangles of one set overlap which of another by more than a slack (separating axes)."""
+    """Return which rectangles of one set overlap which of another by more than a slack (separating axes)."""
     apart = np.zeros((len(a), len(b)), bool)
     for own, other, turned in ((a, b, False), (b, a, True)):
         for k in (0, 1):

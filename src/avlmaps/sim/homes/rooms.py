@@ -1,4 +1,4 @@
-"""What stands in the rooms people live in: living and dining rooms, bedrooms, studies."""
+"""The furniture of the rooms people live in: living and dining rooms, bedrooms, studies."""
 
 import numpy as np
 

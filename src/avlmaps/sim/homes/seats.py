@@ -20,7 +20,7 @@ def push_in_m(chair: Mesh, table: Mesh) -> float:
 
 
 def meets_legs(table: Stood, foot: Footprint, centre: np.ndarray, heading_rad: float) -> bool:
-    """Tell whether a leg of the table would stand within the box of a chair."""
+    """Return whether a leg of the table would stand within the box of a chair."""
     mesh = table.piece.mesh
     legs = table.to_world(mesh.vertex[mesh.vertex[:, 2] < _LEGS_BELOW_M][:, :2].astype(np.float64))
     c, s = np.cos(heading_rad), np.sin(heading_rad)

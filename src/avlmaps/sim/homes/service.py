@@ -1,4 +1,4 @@
-"""What stands in the rooms that serve: kitchens, bathrooms, laundries, halls, storage rooms, gyms."""
+"""The furniture of the rooms that serve: kitchens, bathrooms, laundries, halls, storage rooms, gyms."""
 
 import numpy as np
 
@@ -154,7 +154,7 @@ def storage(f: Furnisher) -> None:
 
 
 def hallway(f: Furnisher) -> None:
-    """Furnish a hall: coats, shoes, a runner, keeping the way free."""
+    """Furnish a hall: coats, shoes, a runner, with a free passage."""
     rng = f.rng
     entrance = 1.6 if f.kind == "entrance hall" else 0.8
     several(f, {"coat rack": 0.45 * entrance, "shoe rack": 0.45 * entrance, "console table": 0.35, "plant": 0.3,

@@ -55,7 +55,7 @@ def _pale(rng: np.random.Generator) -> Triple:
 
 
 def looks_of(rng: np.random.Generator, room: Room, home: Looks | None) -> Looks:
-    """Draw what a room looks like; what the home has in common is kept in most rooms."""
+    """Draw what a room looks like; most rooms share the home's own looks."""
     entry = lexicon().find(room.kind, Kind.ROOM)
     wet = entry is not None and entry.wet
     floor_kind = pick(rng, ("tile", "tile", "stone", "marble") if wet else
@@ -186,7 +186,7 @@ def hole_filling(rng: np.random.Generator, hole: Hole, wall_m: float, which: Fam
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leaf:
-    """What a door puts into a room: an oriented box round its leaf, seen from above.
+    """What a door puts into a room: an oriented box round its leaf, top-down.
 
     Attributes:
         centre: its middle.

@@ -1,4 +1,4 @@
-"""Sounds made by rule: for rooms that must be heard, and for kinds of which no free recording is at hand."""
+"""Sounds made by rule: for rooms that need a sound, and for kinds of which no free recording is at hand."""
 
 import numpy as np
 from jaxtyping import Float32

@@ -1,4 +1,4 @@
-"""The value a maker returns, and the two ways to finish one: grey to be tinted, or in colours of its own."""
+"""The value a maker returns, and its two finishes: grey to be tinted, or in colours of its own."""
 
 from dataclasses import dataclass
 
