@@ -23,7 +23,7 @@ GLOSSARY = ROOT / "docs" / "glossary.md"
 HEADING = "## Words to avoid"
 LEAST_WORDS = 4
 # Folders and files whose prose is still to be rewritten. The aim is an empty list.
-NOT_YET: tuple[str, ...] = ("src/avlmaps", "benchmarks", "training")
+NOT_YET: tuple[str, ...] = ("src/avlmaps/language",)
 # The glossary quotes the words, the change log is history, and benchmarks/ (checked) writes the page of results.
 EXEMPT = ("docs/glossary.md", "docs/benchmarks.md", "CHANGELOG.md")
 _QUOTED = re.compile(r"(?m:^[ \t]*\w+:(?=\s))|``.*?``|`[^`]*`|\"[^\"\n]{1,120}\"|“[^”]*”", re.DOTALL)
@@ -86,7 +86,14 @@ def hits_in(file: str, text: str, words: dict[str, str]) -> list[Hit]:
 
 def files() -> Iterator[Path]:
     """Yields every file whose prose is checked."""
-    for pattern in ("*.md", "docs/**/*.md", "training/**/*.md", "src/avlmaps/**/*.py", "benchmarks/**/*.py"):
+    for pattern in (
+        "*.md",
+        "docs/**/*.md",
+        "training/**/*.md",
+        "training/**/*.py",
+        "src/avlmaps/**/*.py",
+        "benchmarks/**/*.py",
+    ):
         for path in sorted(ROOT.glob(pattern)):
             name = path.relative_to(ROOT).as_posix()
             if not name.startswith((*EXEMPT, *NOT_YET)):

@@ -38,7 +38,7 @@ class Options:
     resume: bool = False
     """Go on from the checkpoint in the folder ``work``."""
     start: Path | None = Path("training/pixels/start.npz")
-    """Weights to begin with; those that ship unless told otherwise."""
+    """Weights to begin with; by default those that ship."""
     batch: int = 16
     """Pictures in a step; a GPU takes 128."""
     threads: int = 2
@@ -46,7 +46,7 @@ class Options:
     renderers: int = 1
     """Processes that render beside the training."""
     readers: int = 1
-    """What draws batches: one thread, or so many processes."""
+    """Number of processes that draw batches; 1 is one thread."""
     shards: int = 12
     """Shards of about 500 frames (240 MB) that are stored; the oldest is replaced."""
     first_seed: int = 10_000

@@ -12,7 +12,7 @@ from training.pixels.network import MULTIPLE
 from avlmaps.core.camera import Pinhole
 from avlmaps.perception.embedded.geometry import channels
 
-# A frame shows a category with at least so many of its 320x240 pixels.
+# A frame shows a category with at least this many of its 320x240 pixels.
 FEWEST_PIXELS = 160
 # How evenly categories are drawn: 0 each as often as any other, 1 as often as frames show it.
 EVENNESS = 0.45
@@ -73,7 +73,7 @@ class Batch:
 
 
 class Shards:
-    """Draws frames from the shards in a folder; looks for new ones when told to."""
+    """Draws frames from the shards in a folder; looks for new ones on request."""
 
     def __init__(self, folder: Path) -> None:
         """Open the shards that are there."""
@@ -154,7 +154,7 @@ class View:
 
 
 def draw_batch(sources: list[tuple[Shards, int]], view: View, rng: np.random.Generator) -> Batch:
-    """Draw a batch with so many frames of each source."""
+    """Draw a batch with the given number of frames of each source."""
     items = [_sample(*shards.draw_category(rng), view, rng) for shards, size in sources for _ in range(size)]
     return Batch(*(np.stack([item[i] for item in items]) for i in range(6)))
 

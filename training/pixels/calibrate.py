@@ -21,7 +21,7 @@ from avlmaps.bench.nyu import SCORED
 from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, Notes
 
 PIXELS_PER_FRAME = 400
-# Of the biases that make single pixels likeliest only so much is applied: they favour walls, which fill most of a
+# Of the biases that make single pixels likeliest only this share is applied: they favour walls, which fill most of a
 # view, and a thing whose pixels all lean to the wall is never seen. Instances are calibrated afterwards.
 PRIOR_SHARE = 0.25
 NOTES = {
@@ -100,7 +100,7 @@ def likelihood_loss(scores: Scores, bias: Tensor, temperature: Tensor) -> Tensor
 def fit_scores(parts: list[Scores]) -> tuple[np.ndarray, float]:
     """Return the bias of each category and the temperature that make the held-out truth likeliest.
 
-    Every part counts alike. Biases are held near zero, so that a category that hardly occurs keeps its own.
+    Every part counts alike. Biases are held near zero, so that a category that hardly occurs retains its own.
     """
     bias = torch.zeros(len(CATEGORIES), requires_grad=True)
     log_t = torch.zeros(1, requires_grad=True)

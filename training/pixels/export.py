@@ -25,7 +25,7 @@ def write_start(network: RoomNetwork, path: Path) -> None:
 
 
 def read_start(path: Path) -> dict[str, torch.Tensor]:
-    """Return the weights that ``write_start`` kept."""
+    """Return the weights that ``write_start`` stored."""
     with np.load(path, allow_pickle=False) as arrays:
         return {n: torch.from_numpy(a.astype(np.float32) if a.dtype == np.float16 else a) for n, a in arrays.items()}
 

@@ -81,7 +81,7 @@ def with_holes(depth_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def mistaken(up: np.ndarray, height_is_known: bool, rng: np.random.Generator) -> tuple[np.ndarray, float]:
-    """Return up as it might be believed, and by how much the camera's height over the floor is believed larger.
+    """Return up as a map might assume it, and by how much the camera's height over the floor is assumed larger.
 
     Gravity is off by up to about three degrees, the floor by some centimetres, sometimes by ten, and at times a table
     is taken for it.

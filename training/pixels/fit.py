@@ -43,7 +43,7 @@ class Options:
     minutes: float = 80.0
     """How long in all; 600 on two cores is a night."""
     sitting: float = 1e9
-    """Stop after so many minutes of this run; ``--resume`` takes up the schedule where it was left."""
+    """Stop this run after this time, minutes; ``--resume`` takes up the schedule where it was left."""
     batch: int = 16
     """Pictures in a step."""
     real_share: float = 0.5
@@ -55,7 +55,7 @@ class Options:
     threads: int = 2
     """CPU threads."""
     readers: int = 1
-    """What draws batches: one thread, or so many processes; a GPU takes a dozen."""
+    """Number of processes that draw batches; 1 is one thread; a GPU takes a dozen."""
     view: View = field(default_factory=View)
     """Size of the pictures."""
     seed: int = 0

@@ -1,4 +1,4 @@
-"""Calibration of instances: maps of held-out homes, and how far connected voxels of a name can be believed."""
+"""Calibration of instances: maps of held-out homes, and the confidence of connected voxels of a name."""
 
 import sys
 from collections.abc import Iterator

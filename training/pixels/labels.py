@@ -1,4 +1,4 @@
-"""What the network tells apart. The order is that of its outputs, so new names go to the end."""
+"""The names that the network distinguishes. The order is that of its outputs, so new names go to the end."""
 
 from avlmaps.core.lexicon import Kind, lexicon
 

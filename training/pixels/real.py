@@ -21,7 +21,7 @@ from training.pixels.labels import CATEGORIES, FIRST_COARSE, ROOMS, UNLABELLED
 from avlmaps.bench.nyu import CAMERA, CLASSES, NyuFolder
 
 WIDTH, HEIGHT = 320, 240
-# The frames in their order are cut into blocks of about so many, at gaps in their numbers; each sixth is held out.
+# The frames in their order are cut into blocks of about this size, at gaps in their numbers; each sixth is held out.
 BLOCK = 22
 EACH = 6
 FIRST_HELD_OUT = 2

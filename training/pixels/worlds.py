@@ -36,7 +36,7 @@ class Options:
     out: Path = Path("build/pixels/training")
     """Folder of the shards."""
     shards: int = 60
-    """How many shards are kept; then the oldest is replaced."""
+    """How many shards stay; then the oldest is replaced."""
     homes_per_shard: int = 8
     """Homes in a shard."""
     frames_per_home: int = 64
@@ -109,7 +109,7 @@ def camera_of(rng: np.random.Generator) -> Pinhole:
 
 @dataclass
 class Shard:
-    """Frames collected so far."""
+    """Frames collected already."""
 
     depth: list[np.ndarray]
     label: list[np.ndarray]

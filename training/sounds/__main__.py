@@ -36,7 +36,7 @@ def main() -> None:
     """Run the stages in order; networks that are in the work folder are not fitted again."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sounds", type=Path, default=ROOT.parent / "shared" / "data" / "sounds")
-    parser.add_argument("--work", type=Path, default=ROOT / "build" / "sounds", help="where networks are kept")
+    parser.add_argument("--work", type=Path, default=ROOT / "build" / "sounds", help="folder of the networks")
     parser.add_argument("--out", type=Path, default=ROOT, help="the checkout to write weights and figures into")
     parser.add_argument("--start", type=Path, default=ROOT / WEIGHTS / "sounds.onnx", help="weights to go on from")
     parser.add_argument("--steps", type=int, default=ONWARDS.steps)

@@ -30,7 +30,7 @@ class Augmentation:
         narrow: share of sounds that lose everything above some band, as codecs and cheap microphones do.
         noisy: share of sounds that get background noise, at snr_db.
         snr_db: range of signal-to-noise ratios.
-        trimmed: share of sounds of which only a loud piece is kept.
+        trimmed: share of sounds that are cut to a loud piece.
         mixed: share of sounds to which another of the batch is added, at most as loud.
         masks: widths of the masks over bands and frames (SpecAugment; Park et al. 2019).
     """
@@ -192,7 +192,7 @@ def mixed(power: Tensor, how: Augmentation, generator: torch.Generator) -> tuple
 def augmented(
     power: Tensor, noise: Tensor, how: Augmentation, generator: torch.Generator
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Return what the network hears of a batch, each sound in new circumstances, and what ``mixed`` added."""
+    """Return the network's input for a batch, each sound in new circumstances, and what ``mixed`` added."""
     power = trimmed(moved(power, how, generator), how, generator)
     power, other, share = mixed(coloured(power, how, generator), how, generator)
     power = in_rooms(power, how, generator)

@@ -1,4 +1,4 @@
-"""Fit the constants that turn cosines into probabilities, on clips that the networks had not heard."""
+"""Fit the constants that turn cosines into probabilities, on clips that the networks were not trained on."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -175,12 +175,12 @@ def fit_word(
     """Fit the last step of a question in words, as if UNKNOWN_SHARE of a building's sounds were of no known kind.
 
     Args:
-        heard: held-out clips of recorded kinds; each is asked for by the names of all recorded kinds.
+        heard: held-out clips of recorded kinds; each is queried by the names of all recorded kinds.
         kinds: which kind each is.
         unknown: clips of kinds that a network was fitted without, and the recorded kinds that it was fitted with, by
-            whose names each is asked for.
+            whose names each is queried.
         encode_words: the word encoder.
-        c: the constants so far.
+        c: the constants until now.
     """
     odds = matching_odds(heard, [KINDS[name][0] for name in RECORDED], encode_words, c)
     right = kinds[:, None] == np.arange(len(RECORDED))[None, :]
@@ -205,7 +205,7 @@ def pair_features(heard: Evidence, c: Calibration) -> np.ndarray:
 
 
 def fit_pairs(heard: Evidence, kinds: np.ndarray, folds: np.ndarray, c: Calibration) -> Calibration:
-    """Fit the question by a clip on pairs of held-out clips of one fold, which one network has heard."""
+    """Fit the question by a clip on pairs of held-out clips of one fold, which one network was trained on."""
     pairs = pair_features(heard, c)
     first, second = np.triu_indices(len(kinds), 1)
     together = folds[first] == folds[second]
@@ -216,11 +216,11 @@ def fit_pairs(heard: Evidence, kinds: np.ndarray, folds: np.ndarray, c: Calibrat
 
 @dataclass(frozen=True, slots=True)
 class Lesson:
-    """A kind that the networks were fitted without, taught from a few clips, and clips from other sources to tell.
+    """A kind that the networks were fitted without, taught from a few clips, and clips from other sources as a test.
 
     Attributes:
         kind: which.
-        lead: of every clip to tell, by ``taught_lead``.
+        lead: of every test clip, by ``taught_lead``.
         right: which of them are of the kind.
     """
 
@@ -235,9 +235,9 @@ def lessons(heard: Evidence, kinds: np.ndarray, sources: np.ndarray, taught: Seq
     Args:
         heard: one-window clips, by networks that know nothing of the taught kinds.
         kinds: their kinds.
-        sources: of which recording each was cut; those that taught and their siblings are not asked about.
+        sources: of which recording each was cut; those that taught and their siblings are not tested.
         taught: the kinds to teach.
-        clips: how many to teach from, where there are so many sources.
+        clips: how many to teach from, where there are enough sources.
     """
     rng = np.random.default_rng(0)
     found = []

@@ -163,7 +163,7 @@ class Corpus:
 
 
 def read_corpus(folder: Path, cache: Path, each: int = 16, seed: int = 0) -> Corpus:
-    """Read the recorded clips with folds and make the synthetic ones; both are kept in the cache."""
+    """Read the recorded clips with folds and make the synthetic ones; the cache stores both."""
     clips = tuple(clip for clip in read_index(folder) if clip.fold)
     file = cache / f"recorded-{len(clips)}.npy"
     if not file.exists():

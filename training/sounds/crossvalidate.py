@@ -37,8 +37,8 @@ class Networks:
         encode_words: the word encoder.
         settings: of networks that go on from ``start``.
         scratch: of the network that starts anew.
-        start: weights that were shipped before, which heard ESC-10 (every fold) and synthetic sounds alone.
-        work: where networks are kept.
+        start: weights that were shipped before, trained on ESC-10 (every fold) and synthetic sounds alone.
+        work: folder of the networks.
     """
 
     corpus: Corpus
@@ -49,11 +49,11 @@ class Networks:
     work: Path
 
     def of_fold(self, fold: int) -> SoundNet:
-        """Return the network that never heard the household clips of a fold (0: one that heard all)."""
+        """Return the network that was not trained on the household clips of a fold (0: one that was trained on all)."""
         return self._network(f"fold{fold}" if fold else "all", fold, self.settings, self._opened())
 
     def stranger(self) -> SoundNet:
-        """Return the network that starts anew and never heard one fold of anything, nor some kinds at all."""
+        """Return the network that starts anew, without one fold of anything and without some kinds at all."""
         return self._network("stranger", LEFT_OUT_FOLD, self.scratch, None, tuple(map(NAMES.index, LEFT_OUT)))
 
     def _opened(self) -> SoundNet:
@@ -83,13 +83,13 @@ class Networks:
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """Clips that a network had not heard.
+    """Clips that a network was not trained on.
 
     Attributes:
         dry: evidence of the clips as they are.
         wet: of the same clips 4 m away in a simulated room of RT60 ``ROOM_S``.
         kinds: the right kind of each.
-        nets: a number for the network that heard it.
+        nets: a number for the network that encoded it.
         sources: the recording that each was cut from.
     """
 
@@ -108,7 +108,7 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What the cross-validation heard.
+    """The results of the cross-validation.
 
     Attributes:
         household: every clip of ESC-50, by the network of its fold.
@@ -156,7 +156,7 @@ def example_bank(net: SoundNet, examples: Examples) -> tuple[np.ndarray, np.ndar
 
 
 def hear_held_out(corpus: Corpus, networks: Networks, aims: np.ndarray) -> Answers:
-    """Let every clip be heard by a network that never heard its recording."""
+    """Encode every clip by a network that was not trained on its recording."""
     household = corpus.kinds >= len(ESC10)
     wet = wet_mels(corpus, household | (corpus.folds == LEFT_OUT_FOLD), networks.work)
     sources = np.array([clip.source for clip in corpus.clips])

@@ -1,4 +1,4 @@
-"""The tables of the cross-validation, from features of clips that the networks had not heard."""
+"""The tables of the cross-validation, from features of clips that the networks were not trained on."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -91,7 +91,7 @@ def area_under_curve(known: np.ndarray, unknown: np.ndarray) -> tuple[float, flo
 
 
 def refusal_table(answers: Answers, c: Calibration) -> Table:
-    """Return how well strangers are told from known clips, by the score of the most likely recorded kind.
+    """Return how well unknown clips are separated from known ones, by the score of the most likely recorded kind.
 
     Strangers are clips of ten household kinds that one network was fitted without.
     """

@@ -32,7 +32,7 @@ class Settings:
         smoothing: share of the target that is spread over all kinds.
         rate: highest learning rate; it rises for a tenth of the steps and then falls.
         decay: weight decay.
-        averaging: half-life-like constant of the moving average of weights, which is what is kept.
+        averaging: half-life-like constant of the moving average of weights, which is the result.
         seed: of everything.
     """
 
@@ -149,7 +149,7 @@ def turned(net: SoundNet, old: Tensor, new: Tensor) -> SoundNet:
     """Turn the network's features from the space of one word encoder into that of another.
 
     The rotation is the one that brings what all kinds are called in the old space nearest to the new (orthogonal
-    Procrustes; Schönemann 1966). It keeps every angle between sounds, so the word encoder may be improved without
+    Procrustes; Schönemann 1966). It preserves every angle between sounds, so the word encoder may be improved without
     hearing everything again.
 
     Args:

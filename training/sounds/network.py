@@ -1,4 +1,4 @@
-"""The network: a small residual convolution net from what is heard to the space of words."""
+"""The network: a small residual convolution net from spectra to the space of words."""
 
 import torch
 import torch.nn.functional as functional

@@ -64,9 +64,9 @@ def principal_axes(vectors: np.ndarray, dim: int) -> np.ndarray:
 
 
 def like_the_kept(axes: np.ndarray, kept: Path) -> np.ndarray:
-    """Return the axes in the order and with the signs of those kept of the last training, where there are any.
+    """Return the axes in the order and with the signs of those of the last training, where there are any.
 
-    An axis may as well point the other way; kept as it was, what other encoders learnt of the space stays nearly true.
+    An axis may as well point in the opposite direction; unchanged, the space that other encoders learnt stays valid.
     """
     if not kept.is_file():
         return axes
@@ -79,7 +79,7 @@ def like_the_kept(axes: np.ndarray, kept: Path) -> np.ndarray:
 def first_table(teacher: Teacher, projection: np.ndarray, guard: KeptOut) -> tuple[list[str], np.ndarray]:
     """Return the word pieces and their first vectors: what the teacher says of each piece alone.
 
-    A piece that is a kept-out query, or continues a word, gets what a ridge regression from the teacher's input
+    A piece that is a held-out query, or continues a word, gets what a ridge regression from the teacher's input
     embeddings says, so that no query is ever shown to the teacher on the student's behalf. Rare pieces weigh more.
     """
     inputs = teacher.weights["embeddings.word_embeddings.weight"].float().numpy()
@@ -133,7 +133,7 @@ def make_lessons(
 def taught_phrases(
     teacher: Teacher, domain: int, mixed: int, aliases: dict[str, str], guard: KeptOut, rng: np.random.Generator
 ) -> list[str]:
-    """Return the phrases as the encoder reads them (cleaned, aliases replaced), none of them kept out."""
+    """Return the phrases as the encoder reads them (cleaned, aliases replaced), none of them held out."""
     made = make_phrases(teacher.pieces, domain, mixed, guard, rng)
     read = (" ".join(replace_aliases(clean_phrase(phrase).split(), aliases)) for phrase in made)
     return [phrase for phrase in dict.fromkeys(read) if phrase and guard.allows(phrase)]

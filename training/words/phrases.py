@@ -28,7 +28,7 @@ _EMPTY_WORDS = frozenset(_EMPTY.split())
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """One row of a list of queries: what is asked, the label that is right, and ``object``, ``room`` or ``sound``."""
+    """One row of a list of queries: the query, the label that is right, and ``object``, ``room`` or ``sound``."""
 
     query: str
     label: str
@@ -69,16 +69,16 @@ class KeptOut:
 
     @classmethod
     def of(cls, queries: Iterable[str]) -> "KeptOut":
-        """Return what has to be kept out for these queries."""
+        """Return what has to be held out for these queries."""
         queries = list(queries)
         return cls(frozenset(map(literal_key, queries)), frozenset(map(content_key, queries)))
 
     def allows(self, phrase: str) -> bool:
-        """Tell whether the phrase is no copy of a query."""
+        """Return whether the phrase is no copy of a query."""
         return literal_key(phrase) not in self.literal
 
     def allows_label(self, phrase: str) -> bool:
-        """Tell whether the phrase, with a label, is neither a copy nor a near copy of a query."""
+        """Return whether the phrase, with a label, is neither a copy nor a near copy of a query."""
         return self.allows(phrase) and content_key(phrase) not in self.content
 
 
