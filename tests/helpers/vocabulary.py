@@ -124,15 +124,14 @@ def _python_prose(text: str) -> list[tuple[int, str]]:
     blocks: list[_Block] = []
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
         kind = _kind(token)
-        if kind is None:
-            continue
-        last = blocks[-1] if blocks else None
-        if last is None or last.kind != kind or last.closed or token.start[0] > last.line + 1:
-            last = _Block(kind, token.start[0])
-            blocks.append(last)
         if kind == "other":
-            last.closed = True
-        else:
+            if blocks:
+                blocks[-1].closed = True
+        elif kind is not None:
+            last = blocks[-1] if blocks else None
+            if last is None or last.kind != kind or last.closed or token.start[0] > last.line + 1:
+                last = _Block(kind, token.start[0])
+                blocks.append(last)
             last.add(token)
     return [(block.first, block.text) for block in blocks if block.is_prose()]
 
@@ -158,7 +157,7 @@ class _Block:
         self.line = token.end[0]
 
     def is_prose(self) -> bool:
-        if self.kind == "other" or self._raw:
+        if self._raw:
             return False
         return self.kind == "comment" or self._long or len(re.findall(r"[^\W\d_]{2,}", self.text)) >= LEAST_WORDS
 
