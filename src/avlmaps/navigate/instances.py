@@ -44,7 +44,7 @@ def named(heat: Heatmap) -> str:
 
 
 def tells_one(heat: Heatmap) -> bool:
-    """Tell whether a heatmap says which one is meant, rather than only what it is called."""
+    """Return whether a heatmap says which instance is meant, rather than only its name."""
     return len(heat.factors) > 1 or not isinstance(heat.lead, NearThings)
 
 
@@ -68,7 +68,7 @@ def things_in(heat: Heatmap, guess: bool = False) -> list[Thing]:
 
 
 def _guesses(heat: Heatmap) -> Iterator[Heatmap]:
-    """Yield what may be meant by a heatmap, the surest first."""
+    """Yield what may be meant by a heatmap, the highest confidence first."""
     lead = Heatmap.of(heat.lead)
     yield heat
     yield heat.with_unsure()

@@ -37,19 +37,19 @@ class HeatSettings:
 
 
 class Factor(ABC):
-    """The heat of one thing that was asked for.
+    """The heat of one part of the query.
 
     Attributes:
         space: the map's voxels.
-        part: what was asked.
+        part: the part of the query.
         falloff_per_m: ε.
         anchors: (a, 3) places that the heat falls from, metres, world.
         instance: (a,) number of the distinct thing that each anchor belongs to.
-        confidence: (instances,) in [0, 1]: how sure it is that each is what was asked for; 0.5 and more is yes.
-        found: whether the map holds what was asked for.
+        confidence: (instances,) in [0, 1]: the probability that each matches the part; 0.5 and more is yes.
+        found: whether the map holds the part.
         understood: what the encoder could act on.
         note: one sentence on why it was not found, or ``""``.
-        flat: whether the heat is the same all the way up and down.
+        flat: whether the heat is the same at every height.
     """
 
     space: Space
@@ -104,8 +104,8 @@ class NearThings(Factor):
 
     Attributes:
         mask: which voxels are the object; the anchors are their middles, in the same order.
-        with_unsure: makes the same with the instances, too, that are too unsure to count where nothing else is asked:
-            what they are near tells whether one of them is meant. None where there are no others.
+        with_unsure: makes the same with the instances whose confidence is too low to count in a query for the
+        thing alone: the context may select one of them. None where there are no others.
     """
 
     space: Space
@@ -121,7 +121,7 @@ class NearThings(Factor):
     flat: bool = field(default=False, init=False)
 
     def in_company(self) -> "NearThings":
-        """Return what is sought with its unsure instances; what it is near stays what is sure."""
+        """Return the primary part with its uncertain instances; context stays with the confident ones."""
         return self._with_unsure if self.part.role is Role.PRIMARY else self
 
     def at_any_rate(self) -> "NearThings":

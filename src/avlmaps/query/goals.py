@@ -26,8 +26,8 @@ class Goal:
     """One distinct place that answers a question.
 
     Attributes:
-        position: metres, world: on the object where one is asked for, else where the sound was heard or the camera was.
-        score: in [0, 1]: the heat there times the confidence that the primary thing is what was asked for.
+        position: metres, world: on the object if the primary part is one, else the sound position or the camera's.
+        score: in [0, 1]: the heat there times the confidence that the primary thing matches the query.
         size: extent of the instance along the axes of the level frame (x and y horizontal, z up), metres. For an
             object its voxels' box; for a sound or an area the box of the places it was heard or seen from.
         parts: heat of each modality there; a second part of a modality is called ``object_2`` and so on.

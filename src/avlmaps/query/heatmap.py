@@ -81,7 +81,7 @@ class Heatmap:
 
     @property
     def found(self) -> bool:
-        """Whether all that was asked for is in the map and comes together somewhere."""
+        """Whether all parts of the query are in the map and come together somewhere."""
         return is_found(self.factors, self.values)
 
     def goals(self, top: int = 3) -> list[Goal]:

@@ -405,7 +405,7 @@ def _absence(word: str, voxels: int, won: int, best: float) -> str:
 
 
 def fitting(settings: ObjectSettings, encoder: PixelEncoder) -> ObjectSettings:
-    """Return the settings with the margin that an encoder is sure at, in its own cosines."""
+    """Return the settings with the margin at which an encoder is confident, in its own cosines."""
     if isinstance(encoder, ScaledEncoder) and is_open(encoder):
         return replace(settings, margin_yes=settings.margin_yes_logits / encoder.logit_scale)
     return settings
