@@ -7,7 +7,7 @@ from query_fakes import UP, furnished_map, keyframes_at, sounds_of
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap, QuerySettings
-from avlmaps.query.factors import NearAnchors
+from avlmaps.query.factors import NearAnchors, NearThings
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.area import AreaSettings, modes
 from avlmaps.query.voxel_space import Space
@@ -44,12 +44,46 @@ def test_a_sound_decides_between_two_chairs() -> None:
         assert heat.found
 
 
-def test_the_best_goal_of_sure_instances_is_the_highest_place() -> None:
+def test_the_best_goal_of_certain_instances_is_nearly_the_hottest_place() -> None:
     m = AVLMap(furnished_map(sounds=sounds_of([track(1.0, 2.0), track(4.0, 1.0)], [0.9, 0.7])))
     heat = m.object("chair", primary=True) * m.sound("dog")
-    highest = m.space.centres[int(np.argmax(heat.values))]
-    assert heat.goals()[0].position == pytest.approx(tuple(highest), abs=0.3)
-    assert heat.goals()[0].parts["object"] * heat.goals()[0].parts["sound"] == pytest.approx(heat.peak, abs=1e-6)
+    goal = heat.goals()[0]
+    assert 0.8 * heat.peak - 1e-6 <= goal.parts["object"] * goal.parts["sound"] <= heat.peak + 1e-6
+    assert goal.score == pytest.approx(heat.peak * heat.lead.confidence.max(), abs=0.001)
+
+
+def test_a_stray_voxel_at_the_edge_of_a_thing_is_not_the_goal() -> None:
+    block = np.stack(np.meshgrid(range(10), range(10), range(8), indexing="ij"), axis=-1).reshape(-1, 3)
+    stray = np.array([[10 + k, 0, 0] for k in range(6)])  # a trail along the floor, towards the sound
+    voxels = np.concatenate([block, stray]).astype(np.int32)
+    space = Space(GridSpec(0.05), voxels, np.array([0.0, 0.0, 1.0]))
+    chair = NearThings(
+        space, Part(Modality.OBJECT, "chair", Role.PRIMARY), 2.0, np.ones(len(voxels), bool),
+        np.zeros(len(voxels), int), np.ones(1), True,
+    )  # fmt: skip
+    dog = NearAnchors(
+        space, Part(Modality.SOUND, "dog"), 0.2, np.array([[1.5, 0.0, 0.2]]), np.ones(1), np.zeros(1, int), True
+    )
+    goal = (Heatmap.of(chair) * Heatmap.of(dog)).goals()[0]
+    assert goal.position[0] < 0.5 and goal.position[2] > 0.1
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_goal_on_a_thing_is_one_of_its_own_voxels(seed) -> None:
+    rng = np.random.default_rng(seed)
+    voxels = np.unique(rng.integers(0, 30, (200, 3)), axis=0).astype(np.int32)
+    space = Space(GridSpec(0.05), voxels, np.array([0.0, 0.0, 1.0]))
+    mask = rng.random(len(voxels)) < 0.3
+    mask[0] = True
+    instance = rng.integers(0, 3, mask.sum())
+    instance[:1] = 2
+    thing = NearThings(space, Part(Modality.OBJECT, "x", Role.PRIMARY), 2.0, mask, instance, np.full(3, 0.7), True)
+    sound = NearAnchors(
+        space, Part(Modality.SOUND, "y"), 0.2, rng.uniform(0, 1.5, (2, 3)), np.ones(2), np.arange(2), True
+    )
+    for goal in (Heatmap.of(thing) * Heatmap.of(sound)).goals(top=5):
+        assert np.linalg.norm(thing.anchors - goal.position, axis=1).min() < 1e-9
+        assert goal.parts["object"] == pytest.approx(1.0)
 
 
 def test_a_sound_alone_is_put_where_it_was_heard_not_at_any_height() -> None:
