@@ -38,7 +38,7 @@ from random_models import LEFT_OUT, WRITERS  # noqa: E402
 
 CAMERA = Pinhole(525.0, 525.0, 320.0, 240.0, 640, 480)
 SOUND_S, RATE_HZ = 10, 48_000
-VIEWS_AT_ONCE = 16  # as a build hands them to a large model; a CPU takes them one by one all the same
+VIEWS_AT_ONCE = 16  # as a build hands them to a large model; a CPU takes them one by one nevertheless
 
 
 def large_models() -> dict[str, Backend]:

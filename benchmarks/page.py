@@ -157,7 +157,7 @@ checksums of the weights; where those are not the weights that ship, it says so.
 
 SOUNDS is a folder of clips with an `index.csv`, RECORDING a recording with poses (the red kitchen of 7-Scenes here),
 NYUV2 labelled frames in the layout of NYU Depth V2,
-HOUSE a scene file (the house of aws-robomaker-small-house-world here). A run that was stopped goes on where it ended.
+HOUSE a scene file (the house of aws-robomaker-small-house-world here). A run that was stopped resumes where it stopped.
 """
 
 

@@ -3,8 +3,8 @@
     python benchmarks/planning.py [--cells 1000] [--repeats 5] [--json]
 
 The floors are drawn at random (walls with doors, boxes) or made to be hard: an open hall, where everything can be
-reached, and a serpent, whose way leads through nearly all of it. `exact` is the same search over all cells at once,
-its graph made anew as well.
+reached, and a serpent, whose path leads through nearly all of it. `exact` is the same search over all cells at once,
+its graph made again as well.
 """
 
 from timing import parser, seconds, show, use_one_thread

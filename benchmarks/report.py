@@ -6,7 +6,7 @@
     python benchmarks/report.py --page           # measure nothing, write the page again
     python benchmarks/report.py --check          # exit 1 unless page and README agree with docs/benchmarks.json
 
-Each result is stored as soon as its command ends; the suites go on from their own work in --out. Commands
+Each result is stored as soon as its command ends; the suites continue from their own work in --out. Commands
 whose data is not there are skipped with a note.
 """
 

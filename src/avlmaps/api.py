@@ -22,7 +22,7 @@ def build_map(
 ) -> "AVLMap":
     """Build a map of a recording and open it.
 
-    A build that is stopped at any time goes on where it ended when it is called again. A map that is finished already,
+    A build that was stopped resumes where it stopped when it is called again. A map that is finished already,
     from the same recording with the same settings, is opened without work.
 
     Args:
@@ -30,7 +30,7 @@ def build_map(
         path: folder of the map, by custom ``NAME.avlmap``.
         profile: which models perceive: ``embedded``, ``foundation``, ``paper`` or one of your own.
         settings: everything else about the build; the defaults if None.
-        resume: go on with what a stopped build had finished; otherwise begin anew.
+        resume: continue with what a stopped build had finished; otherwise begin again.
         overwrite: replace a finished map there that came from another recording, or with other settings.
         progress: show progress bars on standard error.
 

@@ -115,11 +115,11 @@ def test_a_closed_room_is_not_reached_and_it_says_so():
     driver = driver_in(BUILDING, obstacles=closed)
     far = driver.go_to(place(5.5, 3.5))
     assert not far.reached
-    assert far.note == "no way leads there that is wide enough for the robot"
+    assert far.note == "no path leads there that is wide enough for the robot"
     assert far.pose == START
     near = driver.go_to(place(3.5, 3.5))
     assert not near.reached
-    assert near.note.startswith("no way leads to where the place can be seen; it stands 0.")
+    assert near.note.startswith("no path leads to where the place can be seen; it stands 0.")
 
 
 def test_a_place_off_the_map_is_not_reached():
@@ -371,4 +371,4 @@ def test_just_beside_a_place_with_no_way_in_it_says_why():
     states[61:69, 26:34] = CellState.FREE  # too narrow a pit for the body
     driver = MapDriver(of_plan(states), Free(GroundPose(1.0, 1.5)), BodyShape(radius_m=0.1))
     arrival = driver.go_to(place(3.25, 1.5))
-    assert "no way leads" in arrival.note
+    assert "no path leads" in arrival.note

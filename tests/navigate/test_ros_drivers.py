@@ -130,7 +130,7 @@ def test_failure_is_an_ordinary_result_that_says_why(robot, does, says):
 
 def test_the_reason_that_nav2_gives_is_told_in_words():
     with FakeRobot(2, "abort") as robot, opened(robot) as driver:
-        assert "no way leads there on its own map" in driver.go_to(PLACE).note
+        assert "no path leads there on its own map" in driver.go_to(PLACE).note
 
 
 @pytest.mark.parametrize("does", ["succeed", "abort"])
@@ -594,7 +594,7 @@ def test_a_goal_that_no_way_leads_to_is_not_sent(robot):
     with opened(robot, obstacles=floor_with_a_table()) as driver:
         beyond = driver.go_to(np.array([20.0, 0.0, 0.0]))
         assert not beyond.reached
-        assert "No way leads near (20.00, 0.00)" in beyond.note
+        assert "No path leads near (20.00, 0.00)" in beyond.note
         robot.pose = GroundPose(40.0, 0.0)
         robot.soon(lambda: driver.pose.x_m > 30.0)
         astray = driver.go_to(np.array([-1.0, 0.0, 0.0]))

@@ -1,7 +1,7 @@
 """The whole making: ``python -m training.pixels`` renders, trains, calibrates and writes weights that ship.
 
 With ``--nyuv2`` the weights learn from real frames as well and are those of the profile ``embedded``; without, from
-rendered worlds alone, and are those of ``synthetic``. Rendering goes on beside the training, so that it never runs out
+rendered worlds alone, and are those of ``synthetic``. Rendering runs beside the training, so that it never runs out
 of new homes.
 """
 
@@ -36,7 +36,7 @@ class Options:
     sitting: float = 1e9
     """How long to train now."""
     resume: bool = False
-    """Go on from the checkpoint in the folder ``work``."""
+    """Continue from the checkpoint in the folder ``work``."""
     start: Path | None = Path("training/pixels/start.npz")
     """Weights to begin with; by default those that ship."""
     batch: int = 16

@@ -47,7 +47,7 @@ class Options:
     name: str = DEFAULT_WEIGHTS
     """Their name without an ending."""
     start: Path | None = Path("training/pixels/start.npz")
-    """Where the weights are stored for a training that goes on from them."""
+    """Where the weights are stored for a training that continues from them."""
     count: int = 500
     """Rendered frames to look at."""
     seed: int = 0

@@ -18,7 +18,7 @@ def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
 
 
 def write_start(network: RoomNetwork, path: Path) -> None:
-    """Keep the weights, in half precision, so that another training can go on from them."""
+    """Keep the weights, in half precision, so that another training can continue from them."""
     arrays = {name: value.numpy() for name, value in network.state_dict().items()}
     path.write_bytes(b"")
     np.savez_compressed(path, **{n: a.astype(np.float16) if a.dtype == np.float32 else a for n, a in arrays.items()})

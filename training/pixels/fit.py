@@ -2,7 +2,7 @@
 
 Runs on a GPU where there is one, else on the CPU, in bfloat16 where the processor multiplies that (where it does not,
 bfloat16 is three times slower than float32). The learning rate follows the clock, so that a run of any length ends
-well. A checkpoint of less than 20 MB is written every few minutes; ``--resume`` goes on from it and along the same
+well. A checkpoint of less than 20 MB is written every few minutes; ``--resume`` continues from it and along the same
 schedule, so that one training may take several sittings (``--sitting 9`` stops after nine minutes).
 """
 
@@ -61,7 +61,7 @@ class Options:
     seed: int = 0
     """Of pictures and of the first weights."""
     resume: bool = False
-    """Go on from the checkpoint, with its last weights."""
+    """Continue from the checkpoint, with its last weights."""
     start: Path | None = None
     """Begin with these weights: ``training/pixels/start.npz``, those that ship, or a checkpoint, its mean."""
     widths: tuple[int, int, int, int, int] = WIDTHS

@@ -37,7 +37,7 @@ class Options:
     work: Path = Path("build/pixels/homes")
     """Folder of the recordings and maps."""
     out: Path = Path("src/avlmaps/perception/embedded/weights")
-    """Folder of the notes, which are written anew."""
+    """Folder of the notes, which are written again."""
     profile: Literal["embedded", "synthetic"] = "embedded"
     """Whose weights."""
     homes: int = 6
@@ -121,7 +121,7 @@ def fit_instances(found: list[Pieces]) -> InstanceNotes:
 
 
 def calibrate_instances(options: Options) -> None:
-    """Map held-out homes, fit, and write the notes anew."""
+    """Map held-out homes, fit, and write the notes again."""
     found = [
         piece
         for number in range(options.homes)

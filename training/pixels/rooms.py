@@ -1,4 +1,4 @@
-"""The room head, fitted anew on whole pictures: ``python -m training.pixels.rooms``.
+"""The room head, fitted again on whole pictures: ``python -m training.pixels.rooms``.
 
 While the rest is trained it sees windows of pictures, but the room needs the whole view. The rest is held
 as it is, so that one look at each picture is enough.

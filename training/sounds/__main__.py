@@ -38,7 +38,7 @@ def main() -> None:
     parser.add_argument("--sounds", type=Path, default=ROOT.parent / "shared" / "data" / "sounds")
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "sounds", help="folder of the networks")
     parser.add_argument("--out", type=Path, default=ROOT, help="the checkout to write weights and figures into")
-    parser.add_argument("--start", type=Path, default=ROOT / WEIGHTS / "sounds.onnx", help="weights to go on from")
+    parser.add_argument("--start", type=Path, default=ROOT / WEIGHTS / "sounds.onnx", help="weights to continue from")
     parser.add_argument("--steps", type=int, default=ONWARDS.steps)
     parser.add_argument("--each", type=int, default=16, help="synthetic sounds of a kind")
     arguments = parser.parse_args()

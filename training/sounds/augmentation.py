@@ -105,7 +105,7 @@ def _draws() -> Tensor:
 
 
 def fluctuations(count: int, generator: torch.Generator) -> Tensor:
-    """Return how the power of noise fluctuates about one (count, frames, bands), from a bank: drawing anew is slow."""
+    """Return how the power of noise fluctuates about one (count, frames, bands), from a bank: drawing again is slow."""
     bank = _draws()
     shift = int(torch.randint(FRAMES, (1,), generator=generator))
     return bank.roll(shift, dims=1)[torch.randint(len(bank), (count,), generator=generator)]

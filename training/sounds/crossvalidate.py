@@ -35,8 +35,8 @@ class Networks:
     Attributes:
         corpus: what they learn from.
         encode_words: the word encoder.
-        settings: of networks that go on from ``start``.
-        scratch: of the network that starts anew.
+        settings: of networks that continue from ``start``.
+        scratch: of the network that starts from scratch.
         start: weights that were shipped before, trained on ESC-10 (every fold) and synthetic sounds alone.
         work: folder of the networks.
     """
@@ -53,7 +53,7 @@ class Networks:
         return self._network(f"fold{fold}" if fold else "all", fold, self.settings, self._opened())
 
     def stranger(self) -> SoundNet:
-        """Return the network that starts anew, without one fold of anything and without some kinds at all."""
+        """Return the network that starts from scratch, without one fold of anything and without some kinds at all."""
         return self._network("stranger", LEFT_OUT_FOLD, self.scratch, None, tuple(map(NAMES.index, LEFT_OUT)))
 
     def _opened(self) -> SoundNet:
@@ -112,7 +112,7 @@ class Answers:
 
     Attributes:
         household: every clip of ESC-50, by the network of its fold.
-        peers: every clip of one fold of kinds that the network which started anew without it was fitted to.
+        peers: every clip of one fold of kinds that the network which started from scratch without it was fitted to.
         strangers: every clip of the kinds that this network was fitted without.
         without: those kinds.
     """

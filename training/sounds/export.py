@@ -98,7 +98,7 @@ def write_onnx(nets: Sequence[SoundNet], path: Path) -> None:
 
 
 def read_onnx(path: Path) -> SoundNet:
-    """Return the network of a file that ``write_onnx`` wrote from one network, to go on from it.
+    """Return the network of a file that ``write_onnx`` wrote from one network, to continue from it.
 
     Its batch norms are folded; ``opened_norms`` sets them so that it can be fitted again.
     """
@@ -123,7 +123,7 @@ def read_onnx(path: Path) -> SoundNet:
 def opened_norms(net: SoundNet, x: torch.Tensor) -> SoundNet:
     """Give folded batch norms the statistics of a batch (n, 2, bands, frames), without changing what the net answers.
 
-    Without that, fitting would begin with every channel scaled anew.
+    Without that, fitting would begin with every channel scaled again.
     """
 
     def open_up(norm: nn.Module, inputs: tuple[torch.Tensor, ...]) -> None:

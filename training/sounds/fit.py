@@ -92,7 +92,7 @@ def fit(
         words: targets (templates, kinds, dim).
         settings: how.
         label: for the lines of progress.
-        start: the network to go on from; a new one if None.
+        start: the network to continue from; a new one if None.
     """
     torch.manual_seed(settings.seed)
     generator = torch.Generator().manual_seed(settings.seed)

@@ -82,7 +82,7 @@ def run(
 ) -> dict[str, Any]:
     """Measure on one recording, once for each density of the map.
 
-    Frames 0, s, 2s ... are all that the map's recording holds (of which keyframes are chosen as ever); the photos are
+    Frames 0, s, 2s ... are all that the map's recording holds (of which keyframes are chosen as usual); the photos are
     spread over the other frames, and their own poses are the truth. Photos of another place are tried, too.
 
     Args:

@@ -90,7 +90,7 @@ def build(verb: "Build") -> dict[str, Any]:
 
     begin = perf_counter()
     if verb.resume and verb.fresh:
-        raise UsageError("--resume goes on with a stopped build and --fresh begins anew; choose one of them.")
+        raise UsageError("--resume continues with a stopped build and --fresh begins again; choose one of them.")
     if verb.rules == "paper" and verb.sensor not in ("auto", "none"):
         raise UsageError(
             f"The paper's rules use every depth as it is; leave out --sensor {verb.sensor} or --rules paper."

@@ -136,7 +136,7 @@ def _run(verb: Verb) -> int:
     except KeyboardInterrupt as stop:
         if (status := getattr(stop, "status", None)) is not None:  # of a robot that was driving; its answer is printed
             return _complain(stop, status)
-        return _fail(verb, stop, "stopped; the same command goes on where this one ended, where it can", 130)
+        return _fail(verb, stop, "stopped; the same command continues where this one ended, where it can", 130)
     except Exception as fault:
         if verb.json:
             _emit_error(fault, f"{type(fault).__name__}: {fault}; this is a fault of avlmaps, please report it.")

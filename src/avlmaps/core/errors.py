@@ -52,7 +52,7 @@ class ProgramError(AvlmapsError):
 
 
 class NavigationError(AvlmapsError):
-    """A robot cannot be driven: no way leads there, it is stuck, or its connection failed."""
+    """A robot cannot be driven: no path leads there, it is stuck, or its connection failed."""
 
 
 class GoalNotFoundError(AvlmapsError):

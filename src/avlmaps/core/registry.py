@@ -178,7 +178,7 @@ def load(kind: Kind, name: str) -> Any:
 
 
 def forget_loaded() -> None:
-    """Let go of all backends that were made; the next ``load`` makes them anew (other files, another device)."""
+    """Let go of all backends that were made; the next ``load`` makes them again (other files, another device)."""
     _load.cache_clear()
 
 

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int
 
 from avlmaps.core import poses
 
-# Messages of one stream may arrive a little out of order; a step back by more is a clock that was set anew.
+# Messages of one stream may arrive a little out of order; a step back by more is a clock that was reset.
 MAX_DISORDER_S = 1.0
 # A pause is worth a report when it lasts this long and this many times the usual interval.
 MIN_GAP_S = 1.0
@@ -37,7 +37,7 @@ def in_order(stamps_s: Float[np.ndarray, " n"], what: str) -> InOrder:
     """Put a stream in the order of time, for any clock.
 
     Stamps that are no number are left out. Where the clock steps back by at most ``MAX_DISORDER_S`` the samples
-    are sorted; where it steps back further it was set anew, and only the longest stretch before, between or after
+    are sorted; where it steps back further it was reset, and only the longest stretch before, between or after
     such jumps remains, since one time line cannot hold two of them. Of equal stamps the first remains.
 
     Args:

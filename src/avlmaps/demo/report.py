@@ -333,7 +333,7 @@ def _honest(report: "DemoReport", recording: "Recording") -> str:
         "with echo. The map is made by the very code that maps real recordings, with the small networks that ship with "
         "the package; they know about a hundred kinds of things and sixteen kinds of rooms. Six questions are a look, "
         "not a measurement: <code>avlmaps bench</code> measures, over many homes and with intervals.</p>"
-        "<h2>Go on from here</h2>"
+        "<h2>Continue from here</h2>"
         f"<p>The map is <code>{MAP}</code> beside this page. In its folder:</p>"
         f'<pre><code>avlmaps query {MAP} "the lamp near the sofa" --plot heat.png\n'
         f'avlmaps query {MAP} "the chair in the kitchen" --json\n'

@@ -34,7 +34,7 @@ def build_map(
 ) -> StoredMap:
     """Build a map of a recording, or finish one that was begun.
 
-    A build that is killed at any instant goes on from its last finished part when it is started again, and ends with
+    A build that is killed at any instant continues from its last finished part when it is started again, and ends with
     the same map, bit by bit. A finished map in the folder stays whole and readable until the new one replaces it.
 
     Args:
@@ -44,7 +44,7 @@ def build_map(
         settings: all that can be chosen.
         cache: whether features are stored, so that another build of the same frames encodes nothing again.
         parts: folders of ``build_part`` from other machines; their frames are not fused again.
-        resume: go on with what a stopped build had finished; otherwise begin anew.
+        resume: continue with what a stopped build had finished; otherwise begin again.
         overwrite: replace a finished map there that came from another recording, or with other settings.
         progress: show how far it is on standard error.
 

@@ -8,7 +8,7 @@ from avlmaps.maps.fusion.voxel_kernels import OPTIONS, find_row
 
 @njit(**OPTIONS)
 def count_through(index, voxel_size, clear, size, camera, pose, through):
-    """Add 1 to each voxel that a view sees through: all rays that may meet it go on for a voxel's edge behind it.
+    """Add 1 to each voxel that a view sees through: all rays that may meet it continue for a voxel's edge behind it.
 
     Args:
         index: (n, 3) int32.

@@ -27,7 +27,7 @@ def perceived(
 
     Args:
         recording: where the frames are.
-        stretches: numbers of frames; no batch reaches from one stretch into the next, so that a build that goes on
+        stretches: numbers of frames; no batch reaches from one stretch into the next, so that a build that continues
             from a stretch encodes the same batches as one that was never stopped.
         encoder: None yields frames alone.
     """

@@ -3,7 +3,7 @@
 Large files are memory-mapped, and comparing them with their checksums takes a second for 1.5 GB. A thread does it when
 a map is opened for the first time, and code that reads the arrays waits for its outcome. ``.checked.json`` in the map's
 folder then stores each file's size, inode and times of change; files whose entries are the same at the next opening are
-not read again. A copied map is checked anew. ``avlmaps info MAP --verify`` heeds no such note.
+not read again. A copied map is checked again. ``avlmaps info MAP --verify`` heeds no such note.
 """
 
 import hashlib
@@ -95,7 +95,7 @@ class Guard:
         return tuple(self._faults)
 
     def require_whole(self) -> None:
-        """Refuse to go on with files that are damaged, or that were changed or cut off since the map was opened.
+        """Refuse to continue with files that are damaged, or that were changed or cut off since the map was opened.
 
         Files that were replaced or removed are another matter: their old content stays readable.
 

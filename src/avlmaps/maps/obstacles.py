@@ -136,7 +136,7 @@ def find_obstacles(
     Args:
         voxels: the map's.
         grid: their size.
-        up_in_world: which way is up.
+        up_in_world: the up direction.
         body: of the robot that is to move there.
         cell_size_m: edge of a cell; that of a voxel by default, and not smaller (the floor would have holes).
         ignored: voxels of what this body passes through or over; where only such stand, a cell is free.

@@ -1,6 +1,6 @@
 """Parts of a map: sums over some frames, stored on disk, that add up to the whole in any order.
 
-A stopped build goes on from the parts that it had finished, and machines that share the work bring theirs:
+A stopped build continues from the parts that it had finished, and machines that share the work bring theirs:
 ``build_part`` on each of them, then ``build_map(..., parts=[...])`` on one.
 """
 
@@ -73,7 +73,7 @@ class Part:
     key: str
 
     def sums(self) -> VoxelSums:
-        """Return the sums over its frames, memory-mapped anew, so that memory is let go with them."""
+        """Return the sums over its frames, memory-mapped again, so that memory is let go with them."""
         return VoxelSums(**self._arrays(VoxelSums))
 
     def views(self) -> FreeViews:

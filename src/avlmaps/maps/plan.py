@@ -105,7 +105,7 @@ def claim(plan: Plan, resume: bool, overwrite: bool) -> MapInfo | None:
 
 
 def require_unchanged(plan: Plan, stamp: str) -> None:
-    """Refuse to go on with a recording whose files were written since the build began.
+    """Refuse to continue with a recording whose files were written since the build began.
 
     What was made of it is removed, since nobody knows which frames are old and which are new.
 

@@ -20,7 +20,7 @@ class FrameSettings:
     on_bad: Literal["skip", "stop"] = "skip"
     """What to do with a frame that cannot be read: leave it out and note it in the map, or stop."""
     max_bad_share: float = 0.05
-    """Stop all the same when more than this share of the frames cannot be read."""
+    """Stop nevertheless when more than this share of the frames cannot be read."""
 
     def __post_init__(self) -> None:
         _require(self.step >= 1, f"frames.step is {self.step}", "1 or more")
@@ -30,7 +30,7 @@ class FrameSettings:
 
 @dataclass(frozen=True, slots=True)
 class GravitySettings:
-    """Finding which way is up, where the recording does not say, and where the floor is."""
+    """Finding the up direction, where the recording does not say, and where the floor is."""
 
     frames: int = 60
     """Number of frames to look at, spread evenly."""
@@ -58,7 +58,7 @@ class BuildSettings:
     fusion: FusionSettings = field(default_factory=FusionSettings)
     """From frames to voxels."""
     gravity: GravitySettings = field(default_factory=GravitySettings)
-    """Finding which way is up."""
+    """Finding the up direction."""
     keyframes: KeyframeSettings = field(default_factory=KeyframeSettings)
     """Which frames stand for the walk."""
     hearing: HearingSettings = field(default_factory=HearingSettings)

@@ -82,7 +82,7 @@ class KeptSounds:
 
 
 def find_up(plan: Plan) -> tuple[UpInfo, float]:
-    """Return which way is up, from the recording or from the planes in view, and the seconds that it took."""
+    """Return the up direction, from the recording or from the planes in view, and the seconds that it took."""
     if plan.recording.up_in_world is not None:
         return UpInfo.of(plan.recording.up_in_world, "recording", 1.0), 0.0
     key = key_of("up", BUILD_VERSION, plan.recording.fingerprint, plan.settings.gravity, plan.settings.seed)
@@ -294,9 +294,9 @@ def _box(voxels: Voxels, voxel_size_m: float) -> Box:
 
 def _notices(plan: Plan, up: UpInfo, ground: GroundInfo, bad: int) -> Iterator[str]:
     if up.known_from == "camera":
-        yield "Which way is up is a guess from how the camera was held: too little smooth surface is in view."
+        yield "The up direction is a guess from how the camera was held: too little smooth surface is in view."
     elif up.support < _GUESS:
-        yield f"Which way is up is a guess: only {up.support:.0%} of the surface in view agrees with it."
+        yield f"The up direction is a guess: only {up.support:.0%} of the surface in view agrees with it."
     yield from ground_notices(ground)
     if bad:
         yield f"{bad} of {len(plan.recording)} frames could not be read and were left out (bad_frames in map.json)."

@@ -1,4 +1,4 @@
-"""Following a path: by the paper's actions, or by velocities. Both look at the pose anew each time, level frame."""
+"""Following a path: by the paper's actions, or by velocities. Both look at the pose again each time, level frame."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

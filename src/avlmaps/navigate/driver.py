@@ -27,7 +27,7 @@ from avlmaps.navigate.planner import Planner, PlanSettings, Stop
 
 _SAMPLE_M = 0.02  # places along a straight move that are looked at
 _STILL_M = 0.005  # a step that brings the body no farther was stopped
-_OPEN_M = 0.5  # beside a place in which it could stand, but to which no way leads, it stops no farther off
+_OPEN_M = 0.5  # beside a place in which it could stand, but to which no path leads, it stops no farther off
 _TURNED_RAD = 0.5 * TURN_RAD + 0.01  # a turn that is off by no more is done
 _EXTRA_TURNS = 36  # actions that a turn may take beyond its angle
 _PATIENCE_S = 5.0  # time for which a body may stand still against its commands
@@ -118,7 +118,7 @@ class _Trip:
     actions: list[Action] = field(default_factory=list)
     contacts: int = 0
     movements: int = 0
-    fault: str = ""  # what is wrong with the body, so that there is no use in going on
+    fault: str = ""  # what is wrong with the body, so that there is no use in continuing
 
 
 class MapDriver:
@@ -244,7 +244,7 @@ class MapDriver:
             return self._arrival(trip, False, f"{note or 'it got no nearer'}, {away_m:.2f} m from the place")
         if not stop.seen:
             return self._arrival(
-                trip, False, f"no way leads to where the place can be seen; it stands {away_m:.2f} m away from it"
+                trip, False, f"no path leads to where the place can be seen; it stands {away_m:.2f} m away from it"
             )
         if not stop.beside_m:
             return self._arrival(trip, True)
@@ -253,7 +253,7 @@ class MapDriver:
                 trip, True, f"the robot cannot stand in the place itself; it stands {away_m:.2f} m beside it"
             )
         return self._arrival(
-            trip, away_m <= _OPEN_M, f"no way leads to the place itself; it stands {away_m:.2f} m beside it"
+            trip, away_m <= _OPEN_M, f"no path leads to the place itself; it stands {away_m:.2f} m beside it"
         )
 
     def _no_way(self, goal: Float[np.ndarray, "2"]) -> str:
@@ -261,7 +261,7 @@ class MapDriver:
             return f"the place ({goal[0]:.2f}, {goal[1]:.2f}) m is off the map"
         if self.planner.entry(self._xy) is None:
             return "nothing round the robot is known to be free, so that it cannot set out"
-        return "no way leads there that is wide enough for the robot"
+        return "no path leads there that is wide enough for the robot"
 
     def _safe(self, start: GroundPose, end: GroundPose) -> bool:
         """Return whether a straight move touches nothing that is known; out of a tight place it may, if that helps."""

@@ -1,6 +1,6 @@
 """From a command to what the robot did: translate, parse, run, and try again where the translator can.
 
-The whole way in one function; a program is data all along, and nothing but the table of skills ever runs.
+The whole path in one function; a program is data all along, and nothing but the table of skills ever runs.
 """
 
 from collections.abc import Callable

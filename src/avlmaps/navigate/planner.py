@@ -19,7 +19,7 @@ from avlmaps.navigate.costmap import Costmap
 
 _EVERY = 8  # cells of a straight run of a path from which shortcuts may begin
 _WINDOW = 24  # such points that a shortcut may leap
-_AROUND = (2, 1, 0)  # blocks around the coarse way that are searched: fewer where they hold too many cells
+_AROUND = (2, 1, 0)  # blocks around the coarse path that are searched: fewer where they hold too many cells
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ class Stop:
         xy: level x and y; that of the place itself where a body can stand there.
         beside_m: how far from the place that is; 0 for the place itself.
         seen: whether the place can be seen from there.
-        open: whether the body could stand in the place itself; then it stops beside it since no way leads there.
+        open: whether the body could stand in the place itself; then it stops beside it since no path leads there.
     """
 
     xy: Float64[np.ndarray, "2"]
@@ -75,7 +75,7 @@ class Stop:
 
 
 class Planner:
-    """Finds paths over one cost map; what several paths share is worked out once.
+    """Finds paths over one cost map; what several paths share is computed once.
 
     Attributes:
         costmap: what it plans on.
@@ -106,7 +106,7 @@ class Planner:
         return _BlockGraph.of(self.costmap)
 
     def way(self, start: Float[np.ndarray, "2"], goal: Float[np.ndarray, "2"]) -> Way | None:
-        """Return the cheapest way between two places, None where there is none.
+        """Return the cheapest path between two places, None where there is none.
 
         Args:
             start: level x and y; from where no body could stand the path leads straight to the nearest place that can.
@@ -193,7 +193,7 @@ class Planner:
         return bool(grid_kernels.line_cost(ax, ay, bx, by, passable, cost, most) <= most)
 
     def _search(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "n 2"]:
-        """Return the cells of the cheapest way between two cells of one connected part."""
+        """Return the cells of the cheapest path between two cells of one connected part."""
         for corridor in () if self._is_small else self._corridors(first, last):
             cells = _CellGraph.of(corridor, self.costmap).path(first, last)
             if cells is not None:  # parts of blocks also touch where the cells beside the corner lie in other blocks
@@ -206,7 +206,7 @@ class Planner:
     def _corridors(
         self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]
     ) -> Iterator[Bool[np.ndarray, "nx ny"]]:
-        """Yield the cells around the cheapest way over blocks: as wide as is cheap to search, then wider."""
+        """Yield the cells around the cheapest path over blocks: as wide as is cheap to search, then wider."""
         passable, size = self.costmap.passable, grid_kernels.BLOCK
         blocks = self._blocks.path(first, last)
         nx, ny = passable.shape
@@ -273,7 +273,7 @@ class _BlockGraph:
         return cls(node, middle, _sparse(*grid_kernels.block_graph(node, middle, mean)))
 
     def path(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "k 2"]:
-        """Return the blocks of the cheapest way; those of its ends alone where there is none."""
+        """Return the blocks of the cheapest path; those of its ends alone where there is none."""
         ends = int(self.node[tuple(first)]), int(self.node[tuple(last)])
         parts = _path(self.weights, *ends)
         return (self.middle[list(ends) if parts is None else parts] / grid_kernels.BLOCK).astype(np.int64)

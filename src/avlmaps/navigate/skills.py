@@ -1,6 +1,6 @@
 """The robot: every skill of the vocabulary over a map that is queried and a driver that moves a body.
 
-Places in programs are in the world, as in the map's answers; what is left, north or straight ahead is worked out in
+Places in programs are in the world, as in the map's answers; what is left, north or straight ahead is computed in
 the level frame, where the robot moves. Headings are counter-clockwise from +x; a program's turns are clockwise and its
 compass has 0 in the north, as people say it, and only this module translates.
 """
@@ -39,7 +39,7 @@ class RobotSettings:
     guess: bool = False
     """Go to the best guess where the map's confidence is below 0.5."""
     persist: bool = False
-    """Go on with a program where a place is not reached, as the paper's evaluation does, instead of stopping."""
+    """Continue with a program where a place is not reached, as the paper's evaluation does, instead of stopping."""
 
 
 def _silent(_: str) -> None:

@@ -36,7 +36,7 @@ def plot_way(
     met: Float[np.ndarray, "m 2"] | None = None,
     title: str = "",
 ) -> Path:
-    """Write a picture of a robot's way; see ``draw_way``.
+    """Write a picture of a robot's path; see ``draw_way``.
 
     Raises:
         QueryError: the picture cannot be written there.
@@ -52,7 +52,7 @@ def draw_way(
     met: Float[np.ndarray, "m 2"] | None = None,
     title: str = "",
 ) -> "Figure":
-    """Draw a robot's way, for a notebook.
+    """Draw a robot's path, for a notebook.
 
     Args:
         space: the map's voxels, with its colours.

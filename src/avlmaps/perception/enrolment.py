@@ -137,7 +137,7 @@ def _audible(clip: Path | str | Sound) -> tuple[str, Sound]:
             )
         sound = track.read()
     peak = float(np.abs(sound.samples).max(initial=0.0))
-    if peak < SILENT_PEAK:  # NaN goes on to the encoder, which refuses it
+    if peak < SILENT_PEAK:  # NaN continues to the encoder, which refuses it
         raise AudioError(
             f"There is nothing to hear in {label} (peak {peak:.6f} of 1); give a clip that holds the sound."
         )

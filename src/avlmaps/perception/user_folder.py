@@ -24,7 +24,7 @@ def user_folder() -> Path:
 
 
 def cache_folder() -> Path:
-    """Return the folder for what can be worked out again and may be deleted at any time; it need not exist yet.
+    """Return the folder for what can be computed again and may be deleted at any time; it need not exist yet.
 
     ``cache`` in ``AVLMAPS_HOME`` where that is set; else ``%LOCALAPPDATA%`` on Windows, ``~/Library/Caches`` on macOS
     and ``$XDG_CACHE_HOME`` (``~/.cache``) elsewhere, and ``avlmaps`` in it.

@@ -106,7 +106,7 @@ class Located:
         score: the confidence, in [0, 1]; at least 0.5 exactly where a pose is given.
         elapsed_ms: how long it took.
         camera: the camera that the pose holds for; another than the given one where its focal length was refined.
-        guess: where it was not located, the likeliest pose all the same, if requested: not to be relied on.
+        guess: where it was not located, the likeliest pose nevertheless, if requested: not to be relied on.
         guess_inliers: keypoints that agree with the guess; 0 where it is only the place of a keyframe.
     """
 

@@ -1,6 +1,6 @@
 """The space that heatmaps live in: the map's voxels, their places, and what is horizontal.
 
-The recording's world need not be level, so the map knows which way is up. "Level frame" means the world turned
+The recording's world need not be level, so the map knows the up direction. "Level frame" means the world turned
 by the smallest rotation that makes up its z axis; it shares the world's origin.
 """
 
@@ -78,7 +78,7 @@ class Blocks:
 
 
 class Space:
-    """Where a map's voxels are. All heatmaps of one map share one; what costs time is worked out once.
+    """Where a map's voxels are. All heatmaps of one map share one; what costs time is computed once.
 
     Attributes:
         grid: turns metres into voxels.

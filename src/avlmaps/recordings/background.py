@@ -71,7 +71,7 @@ def _rms_of_filtered_noise(b: Float[np.ndarray, " zeros"], a: Float[np.ndarray, 
 
 
 def _hum(second: int, rate_hz: int, phases: Float[np.ndarray, " 5"]) -> Float[np.ndarray, " second"]:
-    """Return mains hum of RMS 1: 50 Hz and two harmonics, whose phase goes on from second to second."""
+    """Return mains hum of RMS 1: 50 Hz and two harmonics, whose phase continues from second to second."""
     time_s = second + np.arange(rate_hz) / rate_hz
     tones = [
         level * np.sin(2.0 * np.pi * hz * time_s + phase)

@@ -31,7 +31,7 @@ Report = Callable[[Fault], None]
 
 
 def stop_at_first(fault: Fault) -> None:
-    """Refuse to go on where a fault is fatal; pass over any other.
+    """Refuse to continue where a fault is fatal; pass over any other.
 
     Raises:
         RecordingError: the fault is fatal.

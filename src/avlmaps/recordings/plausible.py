@@ -199,7 +199,7 @@ def _reachable(
                 if away_m > MAX_SHIFT_M:
                     fault = fault or f"{told}; mend those poses, or cut the recording there."
                 else:
-                    shifts.append(f"{told}; if tracking began anew there, the map shows the place twice.")
+                    shifts.append(f"{told}; if tracking began again there, the map shows the place twice.")
             kept.append(stretch)
             last = int(stretch[end])
     return np.sort(np.concatenate(kept)), shifts[:_SHOWN], fault

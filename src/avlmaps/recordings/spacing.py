@@ -17,7 +17,7 @@ Measure = Literal["straight", "walked"]
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """A robot's way on a fine time grid.
+    """A robot's path on a fine time grid.
 
     Attributes:
         stamps_s: the grid, seconds.

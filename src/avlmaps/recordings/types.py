@@ -16,7 +16,7 @@ from avlmaps.recordings.audio import AudioTrack
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """Which way is up, and where the floor is under a camera.
+    """The up direction, and where the floor is under a camera.
 
     Attributes:
         up_in_world: unit vector.
@@ -60,7 +60,7 @@ class Frame:
         depth_m: z-depth in metres; 0 where there is none (never NaN).
         world_from_camera: 4x4 pose of the depth camera.
         rig: the two cameras.
-        ground: which way is up and where the floor is, once that is known (a build finds it out first).
+        ground: the up direction and where the floor is, once that is known (a build finds it out first).
     """
 
     index: int
@@ -104,7 +104,7 @@ class Recording(ABC):
         rig: the cameras (of every frame).
         stamps_s: (n,) float64, strictly rising, seconds from the start of the recording.
         world_from_camera: (n, 4, 4) float64, orthonormal. The world's z axis need not be up: see ``up_in_world``.
-        up_in_world: unit vector, or None where the recording does not know which way is up.
+        up_in_world: unit vector, or None where the recording does not know the up direction.
         audio: the sound track on the frames' clock, or None.
         notices: one sentence for each thing worth knowing (gaps, clock jumps, frames left out).
         topics: of a bag, which topic was chosen for what (rgb, depth, pose, audio); empty for others.

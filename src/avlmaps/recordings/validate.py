@@ -57,7 +57,7 @@ def _check_audio(recording: Recording, report: Report) -> None:
     lack_s = float(recording.stamps_s[-1]) - recording.audio.end_s
     if lack_s > _MAX_AUDIO_LACK_S:
         sentence = (
-            f"{recording.audio.path} ends at {recording.audio.end_s:.2f} s, but the frames go on to "
+            f"{recording.audio.path} ends at {recording.audio.end_s:.2f} s, but the frames continue to "
             f"{recording.stamps_s[-1]:.2f} s; the sound of the last {lack_s:.2f} s is missing."
         )
         report(Fault(sentence, recording.audio.path, fatal=False))

@@ -42,7 +42,7 @@ class VideoFrames:
         return len(self.stamps_s)
 
     def picture(self, index: int) -> UInt8[np.ndarray, "h w 3"]:
-        """Decode one frame; going on in order is fast, a jump costs a seek to the key frame before it.
+        """Decode one frame; continuing in order is fast, a jump costs a seek to the key frame before it.
 
         Raises:
             RecordingError: the frame cannot be decoded.

@@ -27,7 +27,7 @@ _CHORD_RAD = 0.1  # ... and turn
 
 @dataclass(frozen=True, slots=True)
 class MotionNoise:
-    """How inexactly a body follows its commands; its odometry is true all the same. Standard deviations.
+    """How inexactly a body follows its commands; its odometry is true nevertheless. Standard deviations.
 
     Attributes:
         forward: of the distance, as a part of it.

@@ -1,4 +1,4 @@
-"""Light in a scene, worked out once: lamps with shadows, and what comes back from walls, windows and screens.
+"""Light in a scene, computed once: lamps with shadows, and what comes back from walls, windows and screens.
 
 Large flat surfaces carry patches of texels on a lattice of the world; small and round ones carry light at their
 corners. Every sample is lit on both sides, since triangles are seen from both. What is solid is a grid of small
@@ -60,7 +60,7 @@ class LightMap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Samples:
-    """Where light is worked out, and for which triangle each place stands."""
+    """Where light is computed, and for which triangle each place stands."""
 
     place: Float[np.ndarray, "s 3"]
     normal: Float[np.ndarray, "s 3"]

@@ -1,4 +1,4 @@
-"""Compiled: the places on the surfaces of a scene at which light is worked out."""
+"""Compiled: the places on the surfaces of a scene at which light is computed."""
 
 import numpy as np
 from numba import njit

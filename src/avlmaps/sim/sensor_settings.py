@@ -64,7 +64,7 @@ class ColourFaults:
     """Standard deviation of the gain of red and of blue against green."""
     drift_frames: float = 0.0
     """Frames after which exposure and white balance have changed by about as much as they ever do, in a sequence
-    of `shifts`; 0 draws them anew for each frame."""
+    of `shifts`; 0 draws them again for each frame."""
     noise: float = 0.0
     """Standard deviation of the noise in mid grey, 8-bit values; it grows with the root of the light."""
     blur_px: float = 0.0

@@ -112,7 +112,7 @@ def read_truth(recording: Path) -> Truth:
             tuple(_read_area(entry) for entry in areas),
         )
     except (KeyError, ValueError, TypeError) as error:
-        raise RecordingError(f"The truth beside {recording} is damaged ({error!r}); record it anew.") from None
+        raise RecordingError(f"The truth beside {recording} is damaged ({error!r}); record it again.") from None
 
 
 def _event(row: dict[str, str]) -> HeardEvent:

@@ -75,7 +75,7 @@ def _on_floor(scene: Scene, space: FreeSpace, rng: np.random.Generator, n: int, 
     pitch = rng.normal(np.deg2rad(-10.0), np.deg2rad(11.0), n)
     towards = np.arctan2(target_m[:, 1] - height[aimed], target_m[:, 0])
     pitch[aimed] = towards + rng.uniform(-0.6, 0.6, len(towards)) * half_field[1]
-    # Past an end a pitch is drawn anew, so that the ends themselves are not favoured.
+    # Past an end a pitch is drawn again, so that the ends themselves are not favoured.
     outside = (pitch < _PITCH_RAD[0]) | (pitch > _PITCH_RAD[1])
     pitch[outside] = rng.uniform(*_PITCH_RAD, int(outside.sum()))
     position = np.column_stack([place + rng.uniform(-0.5, 0.5, (n, 2)) * space.cell_m, space.floor_m + height])

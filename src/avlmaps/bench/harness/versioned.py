@@ -32,5 +32,5 @@ def load_versioned(path: Path, kind: type[T], schema_version: int) -> T:
         if version == schema_version:
             return msgspec.json.decode(content, type=kind)
     except (msgspec.DecodeError, msgspec.ValidationError, AttributeError) as fault:
-        raise TaskError(f"The tasks {path} are damaged ({fault}); save them anew with --save-tasks.") from fault
-    raise TaskError(f"The tasks {path} are of schema {version}, this avlmaps reads {schema_version}; save them anew.")
+        raise TaskError(f"The tasks {path} are damaged ({fault}); save them again with --save-tasks.") from fault
+    raise TaskError(f"The tasks {path} are of schema {version}, this avlmaps reads {schema_version}; save them again.")

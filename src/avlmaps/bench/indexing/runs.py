@@ -122,7 +122,7 @@ def run(settings: IndexingSettings, work: Path, open_spec: Callable[[str], Scene
 
     Args:
         settings: what.
-        work: folder of recordings, maps, tasks and answers; a run that was stopped goes on from there.
+        work: folder of recordings, maps, tasks and answers; a run that was stopped resumes from there.
         open_spec: makes a scene of its name (tests give small ones).
 
     Raises:

@@ -24,7 +24,7 @@ from avlmaps.sim.truth import Truth
 
 @dataclass(eq=False)
 class AskedScene:
-    """A map and the truth of its scene; each source of heat is worked out once.
+    """A map and the truth of its scene; each source of heat is computed once.
 
     Attributes:
         asked: the map.
@@ -110,7 +110,7 @@ class AskedScene:
         return WeakHearing(self.asked, self.seed)
 
     def alike_keyframe(self, task: Task, role: Role) -> Heatmap | None:
-        """The photo, put where the most alike keyframe was taken; its pose is not worked out."""
+        """The photo, put where the most alike keyframe was taken; its pose is not computed."""
         return self._once(
             ("alike", task.name, role), lambda: alike_keyframe(self.asked, self.photo_of(task), task.context, role)
         )

@@ -24,7 +24,7 @@ class Leg:
         off_m: how far the stop is from the nearest right thing, horizontally.
         reached: whether that is right.
         reachable: whether any robot of this size could have.
-        shortest_m: the shortest way from where it stood before, in truth; None where there is none.
+        shortest_m: the shortest path from where it stood before, in truth; None where there is none.
         path_m: what it drove.
         actions: how many actions it took.
         contacts: how often it touched something.

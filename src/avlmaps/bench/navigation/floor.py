@@ -1,4 +1,4 @@
-"""The ground of a scene as it truly is: where a robot can stand, what it can reach, how long the shortest way is."""
+"""The ground of a scene as it truly is: where a robot can stand, what it can reach, how long the shortest path is."""
 
 from dataclasses import dataclass, field
 
@@ -62,7 +62,7 @@ class Floor:
         return float(goal.off_m(middles).min()) if len(middles) else np.inf
 
     def shortest_m(self, goal: Goal, xy: Float[np.ndarray, "2"]) -> float:
-        """Return the length of the shortest way from a place to a goal: to where a robot comes nearest to it.
+        """Return the length of the shortest path from a place to a goal: to where a robot comes nearest to it.
 
         0 for a goal that is only looked at; inf where there is no way.
         """

@@ -26,7 +26,7 @@ def path_weight(reached: bool, shortest_m: float, path_m: float) -> float:
 
     Args:
         reached: whether the stop was right.
-        shortest_m: l, the shortest way in truth; infinite where there is none.
+        shortest_m: l, the shortest path in truth; infinite where there is none.
         path_m: p, what the robot drove.
     """
     if not reached:

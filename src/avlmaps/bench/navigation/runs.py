@@ -85,7 +85,7 @@ def run(settings: NavigationSettings, out: Path, open_spec: OpenSpec = open_scen
     Args:
         settings: what.
         out: folder for ``work`` (recordings and maps, shared with the indexing suite), ``navigation_missions.json``
-            and ``episodes``; a run that was broken off goes on from there.
+            and ``episodes``; a run that was broken off resumes from there.
         open_spec: makes a scene of its name (tests give small ones).
 
     Raises:
@@ -138,7 +138,7 @@ def _count(todo: Sequence[_Todo]) -> int:
 
 
 def _missions(settings: NavigationSettings, out: Path, open_spec: OpenSpec) -> MissionSet:
-    """Return the missions of a file, of a run that was broken off, or made anew."""
+    """Return the missions of a file, of a run that was broken off, or made again."""
     if settings.load is not None:
         given = load_missions(settings.load)
         if given.recorded.sounds != settings.recorded.sounds:

@@ -56,7 +56,7 @@ class NavigationPlace:
 
     @cached_property
     def building(self) -> Building:
-        """What is truly in a robot's way."""
+        """What is truly in a robot's path."""
         return Building(self.work.scene, BASE.step_m, BASE.height_m, self.floor.number)
 
     @cached_property

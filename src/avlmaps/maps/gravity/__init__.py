@@ -1,1 +1,1 @@
-"""Up and the floor: which way is up in a recording, and how high the floor lies under the camera."""
+"""Up and the floor: the up direction in a recording, and how high the floor lies under the camera."""

@@ -154,7 +154,7 @@ def _joined(
 
 
 class GroundedRecording(Subset):
-    """A whole recording whose frames know which way is up and where the floor is."""
+    """A whole recording whose frames know the up direction and where the floor is."""
 
     def __init__(self, whole: Recording, ground: Ground) -> None:
         """Put a recording on its ground."""

@@ -20,7 +20,7 @@ _RANDOMNESS = 1  # number of the stage as a source of randomness (keyframes have
 
 
 def look_for_up(recording: Recording, settings: BuildSettings) -> UpInfo:
-    """Return which way is up: as the recording says, else as the planes in view do, else as the camera was held."""
+    """Return the up direction: as the recording says, else as the planes in view do, else as the camera was held."""
     from avlmaps.maps.gravity.up import find_up
 
     if recording.up_in_world is not None:

@@ -1,4 +1,4 @@
-"""Finding which way is up from what a depth camera saw, for recordings that do not say.
+"""Finding the up direction from what a depth camera saw, for recordings that do not say.
 
 Floors, table tops and ceilings share one normal. A direction that many surfaces share is found by RANSAC over
 surface normals; the camera decides which of a room's three directions is up: people and robots hold it nearly
@@ -26,7 +26,7 @@ FEWEST_NORMALS = 200
 
 @dataclass(frozen=True, slots=True)
 class Up:
-    """Which way is up.
+    """The up direction.
 
     Attributes:
         direction: unit vector in the world.
@@ -103,7 +103,7 @@ def _most_shared(
 def _refined(direction: Float[np.ndarray, "3"], normals: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3"]:
     """Return the direction that the normals near it run along and those across it, of walls, run across most exactly.
 
-    It is the first eigenvector of the difference of both groups' scatter, taken anew with a narrowing cone.
+    It is the first eigenvector of the difference of both groups' scatter, taken again with a narrowing cone.
     """
     for cone_rad in (NEAR_RAD, NEAR_RAD, REFINED_RAD, REFINED_RAD, REFINED_RAD):
         along = np.abs(normals @ direction)

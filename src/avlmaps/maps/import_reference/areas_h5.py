@@ -40,7 +40,7 @@ def read_areas(path: Path) -> ReferenceAreas:
     if bad.any():
         raise MapError(
             f"{path}: {int(bad.sum())} of {len(view)} features in clip_sparse_map hold NaN or infinity (the first is "
-            f"{int(bad.argmax())}); let the reference code write the file anew."
+            f"{int(bad.argmax())}); let the reference code write the file again."
         )
     try:
         pose = poses.orthonormalized_all(pose, [f"{path}, robot_pose_list {row}" for row in range(len(pose))])

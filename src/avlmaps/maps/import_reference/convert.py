@@ -187,7 +187,7 @@ def _converted(source: ReferenceVoxels, walk: Walk, settings: ImportSettings, gr
         raise MapError(
             f"{source.path}: {left_out} of {len(source)} voxels hold NaN, infinity or a colour or weight that is none "
             f"(the first is {first_bad}), more than {settings.max_bad_share:.0%}; let the reference code write the "
-            "file anew, or leave them out with a larger --max-bad-share."
+            "file again, or leave them out with a larger --max-bad-share."
         )
     return table.voxels(), left_out
 

@@ -75,7 +75,7 @@ class Source:
     def _of_sounds_and_pictures(self) -> Iterator[str]:
         if self.ears.walks:
             yield (
-                f"The sounds were heard anew in {len(self.ears.walks)} walks of their own; their times go on from the "
+                f"The sounds come from {len(self.ears.walks)} walks of their own; their times continue from the "
                 "end of the scene's walk."
             )
         elif self.scene.has_sound_map:

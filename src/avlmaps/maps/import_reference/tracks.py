@@ -1,9 +1,9 @@
-"""Hearing the sounds of a scene of the data set anew, from the walks below ``audio_video/``.
+"""Encoding the sounds of a scene of the data set again, from the walks below ``audio_video/``.
 
 The reference stores its sound map as a pickle, which nobody should read who does not know who wrote it, and which holds
 neither the time of a sound nor the sound itself. The tracks that it was made from lie beside it; they are encoded
 here as in a build. They were recorded on walks of their own, in the world of the scene's poses: their times are made to
-go on from the end of the scene's walk, one walk after the other.
+continue from the end of the scene's walk, one walk after the other.
 """
 
 import glob
@@ -78,7 +78,7 @@ class Ears:
         """Find and encode the sounds of all walks.
 
         Args:
-            clips_folder: where each sound is written as FLAC; made anew if there are walks.
+            clips_folder: where each sound is written as FLAC; made again if there are walks.
 
         Returns:
             The sounds in the order of their onset, in the map's time.

@@ -1,4 +1,4 @@
-"""What a keyframe saw, worked out from the map's voxels where the depth pictures are not at hand."""
+"""What a keyframe saw, computed from the map's voxels where the depth pictures are not at hand."""
 
 from collections.abc import Iterable
 

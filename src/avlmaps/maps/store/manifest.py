@@ -110,7 +110,7 @@ class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class UpInfo(msgspec.Struct, frozen=True, kw_only=True):
-    """Which way is up in the recording's world, and how that is known.
+    """The up direction in the recording's world, and how that is known.
 
     Attributes:
         direction: unit vector.
@@ -266,7 +266,7 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
         avlmaps_version: which release built it.
         build_key: hash of everything that went in (recording, settings, models); another build has another one.
         voxel_size_m: the grid.
-        up: which way is up.
+        up: the up direction.
         ground: where the floors are; None in maps of older releases and in imported ones.
         rig: the recording's cameras.
         profile: which models perceived.

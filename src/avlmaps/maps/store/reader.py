@@ -139,7 +139,7 @@ def _manifest_content(path: Path) -> bytes:
     if has_unfinished_build(path):
         raise MapError(
             f"{path} is a half-built map (its build was stopped); run the same `avlmaps build` again with --resume, "
-            "and it goes on from there."
+            "and it resumes from there."
         )
     if path.is_dir():
         raise MapError(f"{path} is a folder without a map in it (no {MANIFEST}); make one with `avlmaps build`.")

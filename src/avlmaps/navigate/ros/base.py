@@ -303,7 +303,7 @@ class RosDriver(ABC):
             goal.note += f" ({link.told[-1]})"
 
     def _beat(self, goal: Goal) -> None:
-        """Publish that this loop runs and wants the goal to go on."""
+        """Publish that this loop runs and wants the goal to continue."""
         if self.guard is not None:
             self.guard.beat()
         if self._contact.link.lost is None:

@@ -76,7 +76,7 @@ class GroundTransform:
         """Return the ``b_from_a`` that brings places known in both frames together best, by least squares.
 
         Args:
-            in_a: the places in frame a, metres; two or more, not all the same.
+            in_a: the places in frame a, metres; two or more different ones.
             in_b: the same places in frame b.
 
         Returns:

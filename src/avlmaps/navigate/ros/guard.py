@@ -57,7 +57,7 @@ class Guard:
         return self._process.poll() is None
 
     def beat(self) -> None:
-        """Say that a goal is active and watched; a guard that has done its work, or died, is started anew."""
+        """Say that a goal is active and watched; a guard that has done its work, or died, is started again."""
         if not self.stands:
             self._start()
         self._write(_ACTIVE)
@@ -76,7 +76,7 @@ class Guard:
             self._process.wait(1.0)
 
     def _write(self, content: bytes) -> None:
-        with suppress(OSError):  # a guard that died: the driver goes on, and ``stands`` says so
+        with suppress(OSError):  # a guard that died: the driver continues, and ``stands`` says so
             assert self._process.stdin is not None
             self._process.stdin.write(content)
 

@@ -90,6 +90,6 @@ class _Standing:
             )
         stop = self._planner.stop_for(start, wanted)
         if stop is None:
-            return f"No way leads near ({wanted[0]:.2f}, {wanted[1]:.2f}) on the map for a body of that radius"
+            return f"No path leads near ({wanted[0]:.2f}, {wanted[1]:.2f}) on the map for a body of that radius"
         note = f"The place is not free on the map; it was sent {stop.beside_m:.2f} m beside it" if stop.beside_m else ""
         return stop.xy, note

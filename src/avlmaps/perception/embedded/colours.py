@@ -4,7 +4,7 @@ It knows thirteen basic colour terms, and dark and light; it knows nothing of th
 colour (``red`` of ``red cabinet``), the rest goes unread, and the answer says so.
 
 A colour is compared with named examples in CIELAB, with chroma taken relative to lightness so that a red front in
-the shade is still red. All 32,768 colours of five bits a channel are worked out once; a picture costs a look-up.
+the shade is still red. All 32,768 colours of five bits a channel are computed once; a picture costs a look-up.
 """
 
 import hashlib

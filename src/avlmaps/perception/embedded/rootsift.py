@@ -19,7 +19,7 @@ class RootSift:
     """Finds the strongest SIFT keypoints of a picture (Lowe 2004) and describes them by RootSIFT (Arandjelović 2012).
 
     A picture with a side of more than ``MAX_SIDE_PX`` is encoded in a smaller copy; the keypoints are returned in the
-    pixels of the given picture all the same.
+    pixels of the given picture nevertheless.
     """
 
     def __init__(self) -> None:

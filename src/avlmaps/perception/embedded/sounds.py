@@ -110,7 +110,7 @@ class EmbeddedSounds:
 
     @property
     def taught(self) -> tuple[TaughtSound, ...]:
-        """The user's own sounds, read anew so that one taught a moment ago is known; without those of other weights."""
+        """The user's own sounds, read at each call so that new ones are known; without those of other weights."""
         own = taught_sounds(self._folder) if sounds_folder(self._folder).is_dir() else []
         return tuple(taught for taught in own if taught.checksum == self.card.checksum)
 

@@ -47,7 +47,7 @@ def clean(word: str) -> str:
 
 
 class Prompted:
-    """Features of words by a text encoder; each word's is worked out alone, and once.
+    """Features of words by a text encoder; each word's is computed alone, and once.
 
     Args:
         encode_texts: returns a row for each sentence.

@@ -1,1 +1,1 @@
-"""Backends of the ``paper`` profile: the published system's models on torch, written anew where no library has them."""
+"""Backends of the ``paper`` profile: the published system's models on torch, written here where no library has them."""

@@ -2,7 +2,7 @@
 
 Li et al., "Language-driven semantic segmentation", ICLR 2022; published at https://github.com/isl-org/lang-seg (MIT),
 in the form that VLMaps and AVLMaps use (backbone ``clip_vitl16_384``, ``arch_option`` 0, batch normalisation). Written
-anew from the paper and from the checkpoint's layout. Four blocks of the transformer are tapped; each map of tokens is
+here from the paper and from the checkpoint's layout. Four blocks of the transformer are tapped; each map of tokens is
 joined with the class token, brought to its own scale (4, 2, 1 and 1/2 times the patches), and fused from the coarsest
 to the finest; a 1x1 convolution makes CLIP's dimensions of it. The features are half the picture's size.
 """

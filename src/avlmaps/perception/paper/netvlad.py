@@ -1,7 +1,7 @@
 """NetVLAD (Arandjelović and others 2016): the descriptor of places that the paper retrieves by.
 
 Published as ``VGG16-NetVLAD-Pitts30K.mat`` (and ``...-TokyoTM.mat``): MatConvNet's network as a plain struct, as hloc
-reads it; research use. Written anew after the published layers: the picture at its full size, 0 to 255, less the mean
+reads it; research use. Written here after the published layers: the picture at its full size, 0 to 255, less the mean
 colour; VGG16 up to conv5_3 without its ReLU; each place's 512 numbers to unit length; soft assignment to 64 clusters;
 the residuals of each cluster to unit length, then all of them; whitening to 4096 numbers; unit length. It looks at the
 pixels alone and learns nothing on a map.

@@ -86,7 +86,7 @@ class Asked:
 
 @dataclass(frozen=True, slots=True)
 class Rivals:
-    """The two words of a vocabulary closest to each voxel, worked out once a map and vocabulary.
+    """The two words of a vocabulary closest to each voxel, computed once a map and vocabulary.
 
     With the best two stored, a query is one pass over the features even if the queried word is in the vocabulary.
 

@@ -103,7 +103,7 @@ def settle(
 
 
 def _orthonormal(shots: Shots, report: Report, pose_files: Sequence[Path]) -> Shots:
-    """Make the rotations orthonormal at once; where one is none, report that one and go on with the others."""
+    """Make the rotations orthonormal at once; where one is none, report that one and continue with the others."""
     labels = [f"frame {name}" for name in shots.names]
     try:
         mended = poses.orthonormalized_all(shots.world_from_camera, labels)

@@ -135,7 +135,7 @@ def _read_poses(folder: Path, report: Report) -> _Poses:
         line = int(table.lines[row])
         sentence = (
             f"{path}, line {line}: stamp {stamps_s[row]:.6f} s is not after that of the line before "
-            f"({stamps_s[row - 1]:.6f} s); frames are sorted, or cut where the clock was set anew."
+            f"({stamps_s[row - 1]:.6f} s); frames are sorted, or cut where the clock was reset."
         )
         report(Fault(sentence, path, line, fatal=False))
     usable = finite & rigid

@@ -1,8 +1,8 @@
 """7-Scenes and 3DMatch: ``frame-000000.color.jpg|png``, ``.depth.png`` (mm), ``.pose.txt`` (camera to world).
 
 Facts of the data: depth 0 and 65535 say nothing was measured; the full sequences run at 30 frames/s and the number
-in a frame's name counts them, so that data with every second frame only has right stamps all the same; poses hold
-NaN or infinity where tracking was lost (3DMatch); rotations are off orthonormal by some 1e-4. Which way is up is
+in a frame's name counts them, so that data with every second frame only has right stamps nevertheless; poses hold
+NaN or infinity where tracking was lost (3DMatch); rotations are off orthonormal by some 1e-4. The up direction is
 not known. The raw Kinect data of 7-Scenes has depth that was never registered to colour: the intrinsics that it
 comes with (585) are the depth camera's, and the colour camera fits a focal length of 525 (measured on red kitchen).
 """

@@ -24,7 +24,7 @@ def load_scene(path: Path | str, up_axis: Axis = "auto") -> Scene:
     Args:
         path: a ``.glb`` or ``.gltf``; a Matterport3D, HM3D or Replica folder or a file of one; a
             ``.scene_instance.json`` of ReplicaCAD or HSSD.
-        up_axis: which axis of a plain glTF file is up; worked out where it is not said.
+        up_axis: which axis of a plain glTF file is up; computed where it is not said.
 
     Raises:
         SceneError: a file is missing, truncated, or of no layout that is known.

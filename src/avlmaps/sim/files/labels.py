@@ -86,7 +86,7 @@ def coloured(
 ) -> Mesh:
     """Return a mesh with a colour at every vertex as a mesh with a picture.
 
-    Every triangle has its own 2x2 texels, which blend over it as its three colours do (the fourth goes on evenly,
+    Every triangle has its own 2x2 texels, which blend over it as its three colours do (the fourth continues evenly,
     as far as colours go); in a mesh of very many small triangles it has one texel, of their mean.
     """
     count = len(triangle)

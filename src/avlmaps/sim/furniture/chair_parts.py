@@ -105,7 +105,7 @@ def bent_rail(
 
 
 def rear_posts(frame: ChairFrame, style: LegStyle, look: Material, finial: float = 0.0) -> Mesh:
-    """Return the two rear legs that go on upwards as the posts of the back."""
+    """Return the two rear legs that continue upwards as the posts of the back."""
     parts = []
     for s in (1, -1):
         y = s * (frame.rear / 2 - style.thickness_m / 2)

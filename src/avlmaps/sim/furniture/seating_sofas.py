@@ -81,7 +81,7 @@ def corner_sofa(rng: np.random.Generator) -> Piece:
     look = covering(rng)
     thick = draw(rng, 0.12, 0.2)
     half, deep = plan.width / 2, plan.depth
-    run = draw(rng, 0.7, 1.5)  # the side run goes on by this in front of the main seat
+    run = draw(rng, 0.7, 1.5)  # the side run continues by this in front of the main seat
     edge = half + plan.back
     parts = [
         rounded_box((-plan.back, -half, plan.clear), (deep, edge, plan.seat - thick), 0.015, look, 2),

@@ -25,7 +25,7 @@ class AcousticSettings:
         rate_hz: samples a second.
         loudness_db: of a sound of middling kind at 1 m in the open, RMS of its loud frames against full scale.
         snr_db: how far the room's noise lies below that.
-        step_s: how often the robot's place counts anew; between two the responses are cross-faded.
+        step_s: how often the robot's place counts again; between two the responses are cross-faded.
     """
 
     rate_hz: int = 22_050

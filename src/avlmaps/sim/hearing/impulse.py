@@ -2,7 +2,7 @@
 
 What is modelled, in units of the direct sound at 1 m:
 - the direct sound, 1/r, where no wall lies between; else what bends round through the doorways (1/length of the
-  shortest way, held back as a thin screen would by Kurze and Anderson's formula, at most 24 dB) and what comes through
+  shortest path, held back as a thin screen would by Kurze and Anderson's formula, at most 24 dB) and what comes through
   the walls (1/r, each wall by a light partition's loss);
 - early reflections in the source's own room, where the microphone is in it too: image sources of the room's polygon, by
   pyroomacoustics, with the room's mean absorption;

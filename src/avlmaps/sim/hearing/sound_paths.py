@@ -29,7 +29,7 @@ class Way:
         straight_m: distance as the crow flies.
         clear: whether no wall lies between.
         walls: how many do.
-        round_m: length of the shortest way through the air; inf where there is none.
+        round_m: length of the shortest path through the air; inf where there is none.
     """
 
     straight_m: float
@@ -139,7 +139,7 @@ class Air:
         return int(len(hit) > 0) + int(np.count_nonzero(np.diff(hit) > thick))
 
     def _length_round(self, before: np.ndarray, a: Float[np.ndarray, "2"], b: Float[np.ndarray, "2"]) -> float:
-        """Return the length of the shortest way round the walls: that of the grid, pulled tight."""
+        """Return the length of the shortest path round the walls: that of the grid, pulled tight."""
         way = self._space.path(before, b)
         start, goal = (self._space.nearest(end) for end in (a, b))
         if np.linalg.norm(way[0] - start) > 2 * self.cell_m:

@@ -48,7 +48,7 @@ def _width_at(sides: list[tuple[float, float, float, float]], level: float) -> f
 
 
 class _Unsound(Exception):  # noqa: N818
-    """A room came out too narrow: the layout is drawn anew. Never leaves this module."""
+    """A room came out too narrow: the layout is drawn again. Never leaves this module."""
 
 
 def divided(

@@ -18,7 +18,7 @@ def dress_windows(f: Furnisher, cloth: float, style: str | None) -> None:
     Args:
         f: furnishes the room.
         cloth: the probability that a window has curtains or blinds.
-        style: the curtains' style, drawn anew for each where not said.
+        style: the curtains' style, drawn again for each where not said.
     """
     for side in f.ground.sides:
         for start, end, sill, head in side.windows:
