@@ -1,4 +1,4 @@
-"""What docs/benchmarks.md and the README's table show, made from docs/benchmarks.json alone."""
+"""The text of docs/benchmarks.md and the README's table, made from docs/benchmarks.json alone."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""What the benchmarks share: one thread, the best of repeats, a table and JSON."""
+"""Parts that the benchmarks share: one thread, the best of repeats, a table and JSON."""
 
 import argparse
 import json

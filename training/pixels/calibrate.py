@@ -34,7 +34,7 @@ NOTES = {
 
 @dataclass(frozen=True)
 class Options:
-    """What to calibrate on."""
+    """Options of the calibration."""
 
     network: Path = Path("build/pixels/network.pt")
     """Checkpoint of the training."""
@@ -60,7 +60,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Scores:
-    """What the network says of some pixels and frames, and the truth."""
+    """The network's outputs for some pixels and frames, and the truth."""
 
     category: Tensor
     label: Tensor

@@ -1,4 +1,4 @@
-"""What sensors and maps get wrong, for frames that are learnt from: depth, the direction of up, the floor's height."""
+"""Faults of sensors and maps, for frames that are learnt from: depth, the direction of up, the floor's height."""
 
 import cv2
 import numpy as np
@@ -95,6 +95,6 @@ def mistaken(up: np.ndarray, height_is_known: bool, rng: np.random.Generator) ->
     else:
         off = -rng.uniform(0.2, 0.9)
     if not height_is_known and rng.random() < 0.5:
-        # What is known is the lowest large level surface in view, a bed's or a table's.
+        # The known height is that of the lowest large level surface in view, a bed's or a table's.
         off += rng.uniform(0.3, 0.9)
     return up / np.linalg.norm(up), float(off)

@@ -32,7 +32,7 @@ SPREAD = 0.4
 
 @dataclass(frozen=True)
 class Options:
-    """What to calibrate on."""
+    """Options of the calibration."""
 
     work: Path = Path("build/pixels/homes")
     """Folder of the recordings and maps."""

@@ -1,4 +1,4 @@
-"""What the network is taught by: fine labels of rendered frames, coarse ones of real frames, rooms and floors."""
+"""The losses of the network: fine labels of rendered frames, coarse ones of real frames, rooms and floors."""
 
 import numpy as np
 import torch
@@ -10,7 +10,7 @@ from training.pixels.network import has_bfloat16
 from avlmaps.bench.nyu import CLASSES, SCORED, class_of_kinds
 
 SMOOTHING = 0.03
-# What has no class of its own is labelled loosely ("other prop" also where nobody labelled): it counts less.
+# Labels without a class of their own are loose ("other prop" also where nobody labelled): they count less.
 WEIGHT_OF_OTHERS = 0.25
 ROOM_SHARE, FLOOR_SHARE = 0.15, 0.2
 

@@ -74,7 +74,7 @@ def probabilities(network: nn.Module, geometry: np.ndarray, colour: np.ndarray, 
 
 @dataclass(frozen=True)
 class Options:
-    """What to measure."""
+    """Options of the measurement."""
 
     network: Path = Path("build/pixels/network.pt")
     """Checkpoint."""

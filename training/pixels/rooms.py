@@ -20,7 +20,7 @@ from training.pixels.whole import whole_frame
 
 @dataclass(frozen=True)
 class Options:
-    """What to fit on."""
+    """Options of the fit."""
 
     network: Path = Path("build/pixels/network.pt")
     """Checkpoint; its room head is replaced."""

@@ -31,7 +31,7 @@ _ROOM = {name: number for number, name in enumerate(ROOMS)}
 
 @dataclass(frozen=True)
 class Options:
-    """What to render."""
+    """Options of the rendering."""
 
     out: Path = Path("build/pixels/training")
     """Folder of the shards."""

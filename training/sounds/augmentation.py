@@ -1,4 +1,4 @@
-"""What is done to mel power while training: other places, microphones, distances and noises, new in every step.
+"""Changes of mel power while training: other places, microphones, distances and noises, new in every step.
 
 Everything works on batches of normalised mel power (n, frames, bands), since sounds add up in power and rooms,
 microphones and pitch are simple there; it costs a few milliseconds a batch and needs no audio.

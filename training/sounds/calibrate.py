@@ -68,7 +68,7 @@ def prototypes(encode_words: EncodeWords) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What speaks for every kind in sounds of one window.
+    """The evidence for every kind in sounds of one window.
 
     Attributes:
         features: (n, dim).

@@ -119,7 +119,7 @@ def synthetic_mels(each: int, seed: int, cache: Path) -> tuple[Float32[np.ndarra
 
 @dataclass(frozen=True, slots=True)
 class Examples:
-    """What is learnt from: mel power (n, frames, bands) and the index of each one's kind in ``NAMES``."""
+    """Training data: mel power (n, frames, bands) and the index of each one's kind in ``NAMES``."""
 
     recorded: np.ndarray
     recorded_kinds: np.ndarray

@@ -93,7 +93,7 @@ class Schedule:
 
 @dataclass(frozen=True, slots=True)
 class Lessons:
-    """What the student learns from: phrases with targets (unit, d), and paraphrases with the index of a concept."""
+    """The student's data: phrases with targets (unit, d), and paraphrases with the index of a concept."""
 
     phrases: Cut
     targets: Float32[np.ndarray, "n d"]

@@ -25,7 +25,7 @@ Table = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class FrameFigures:
-    """What all frames gave.
+    """Results over all frames.
 
     Attributes:
         confusion: pixels of each true class (rows) that were taken for each class.

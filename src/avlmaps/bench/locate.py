@@ -57,7 +57,7 @@ class MapOfPictures:
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """What came of some photos.
+    """Results of some photos.
 
     Attributes:
         cm: distance to the true place; infinite where a photo was not located.

@@ -37,7 +37,7 @@ _MOSTLY, _A_QUARTER = 0.5, 0.25
 
 @dataclass(frozen=True, slots=True)
 class Instances:
-    """What the map says of one category.
+    """The map's answer for one category.
 
     Attributes:
         category: the queried category.
@@ -52,7 +52,7 @@ class Instances:
 
 @dataclass(frozen=True, slots=True)
 class ObjectFigures:
-    """What one scene gave.
+    """The results of one scene.
 
     Attributes:
         scene: its name.

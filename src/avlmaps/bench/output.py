@@ -1,4 +1,4 @@
-"""What a suite writes: its tables as JSON, Markdown, CSV and a picture, with all that one must know to judge them."""
+"""The output of a suite: its tables as JSON, Markdown, CSV and a picture, with everything needed to judge them."""
 
 import csv
 import io

@@ -52,7 +52,7 @@ _CONDITIONS: tuple[tuple[str, float | None], ...] = (
 
 @dataclass(slots=True)
 class Tally:
-    """What was found and what not, over many tracks.
+    """The sounds that were found and missed, over many tracks.
 
     Attributes:
         sounds: how many there were.

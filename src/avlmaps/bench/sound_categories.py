@@ -1,4 +1,4 @@
-"""What collections of clips call their categories, and the kind of the embedded sound encoder that each one is.
+"""The categories of clip collections, and the kind of the embedded sound encoder for each one.
 
 A category that is no key here is looked up among the kinds' own names; one that is neither is unknown to the encoder.
 """
@@ -46,7 +46,7 @@ ESC50 = {
     "water drops": "water drops",
     "wind": "wind",
 }
-# What other collections call theirs.
+# The categories of other collections.
 CATEGORIES = ESC50 | {
     "applause": "clapping",
     "car engine": "car engine",

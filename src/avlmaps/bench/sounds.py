@@ -1,4 +1,4 @@
-"""What the embedded sound encoder can do: figures of its cross-validation, and the shipped weights on other recordings.
+"""Accuracy of the embedded sound encoder: its cross-validation, and the shipped weights on other recordings.
 
 The shipped weights were trained on every fold of ESC-10, so those clips say nothing about them. The tables whose names
 begin with "cross-validation" were written when the weights were made (``training/sounds``), by networks that were not

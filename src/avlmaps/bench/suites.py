@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What a suite measures on.
+    """The inputs of a suite.
 
     Attributes:
         sounds: folder of clips with an index.csv, for the suites of sound.

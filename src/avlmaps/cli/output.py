@@ -1,4 +1,4 @@
-"""What a verb prints: one JSON object, or lines for a person."""
+"""The output of a verb: one JSON object, or lines for a person."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""What every verb takes, and what every verb takes that runs models."""
+"""The options of every verb, and of every verb that runs models."""
 
 import os
 from collections.abc import Iterator

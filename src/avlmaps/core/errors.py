@@ -56,4 +56,4 @@ class NavigationError(AvlmapsError):
 
 
 class GoalNotFoundError(AvlmapsError):
-    """What a command names is not in the map; skills raise it, and the trace records it."""
+    """The map does not hold the thing that a command names; skills raise it, and the trace records it."""

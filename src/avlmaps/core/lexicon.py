@@ -29,7 +29,7 @@ _LINKS = frozenset({
 
 
 class Kind(StrEnum):
-    """What an entry names."""
+    """The kind of an entry."""
 
     THING = "thing"
     ROOM = "room"

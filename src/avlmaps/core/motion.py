@@ -56,7 +56,7 @@ class GroundPose:
 
 @dataclass(frozen=True, slots=True)
 class Moved:
-    """What came of one movement of a body.
+    """The result of one movement of a body.
 
     Attributes:
         pose: where the body is now, as its odometry says.

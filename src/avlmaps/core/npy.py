@@ -26,7 +26,7 @@ _UNREADABLE = (
 
 @dataclass(frozen=True, slots=True)
 class NpyHeader:
-    """What the header of an NPY file says.
+    """The header of an NPY file.
 
     Attributes:
         shape: of the array.

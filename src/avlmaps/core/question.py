@@ -23,7 +23,7 @@ class Modality(StrEnum):
 
 
 class Role(StrEnum):
-    """What a part is for: the primary part is the thing that is sought, the context says where it is."""
+    """The role of a part: the primary part is the thing that is sought, the context says where it is."""
 
     PRIMARY = "primary"
     CONTEXT = "context"

@@ -1,4 +1,4 @@
-"""What is truly there and what the walk showed of it: what questions are chosen from and answers are judged by."""
+"""The truth of the home and the part of it that the walk showed; questions and verdicts come from it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

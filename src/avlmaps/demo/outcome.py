@@ -1,4 +1,4 @@
-"""What the demonstration found out: each question with its answer, and how far it is from the truth."""
+"""The outcome of the demonstration: each question with its answer, and its distance from the truth."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -60,7 +60,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class DemoReport:
-    """What the demonstration made.
+    """The products of the demonstration.
 
     Attributes:
         out: its folder.

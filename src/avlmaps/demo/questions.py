@@ -17,7 +17,7 @@ from avlmaps.core.question import Modality, Part, Question
 from avlmaps.demo.evidence import Box, Evidence
 from avlmaps.language.questions import parse_sentence
 
-# What a label of training is also called in speech; none of these words was ever a label. The largest come first.
+# Spoken names of labels of training; none of these words was ever a label. The largest come first.
 SPOKEN = {
     name: lexicon().named(name, Kind.THING).spoken
     for name in ("sofa", "refrigerator", "wardrobe", "bookshelf", "stove", "tv", "chest of drawers", "sink",

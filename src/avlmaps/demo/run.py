@@ -78,7 +78,7 @@ def run_demo(
         scene = scene or choose_home(seed)
     with _stage("record", seconds, f"A robot with a depth camera and a microphone drives through {_rooms(scene)}."):
         recording = _record(scene, out, settings, seed)
-    with _stage("build", seconds, "What it saw and heard becomes a map."):
+    with _stage("build", seconds, "The recording becomes a map."):
         stored = build_map(recording, out / MAP)
     with _stage("choose", seconds, "Questions are chosen by what is truly there."):
         evidence = Evidence.of(recording)

@@ -88,7 +88,7 @@ class Guard:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What is wrong with the files, one sentence each; waits until all are checked."""
+        """The faults of the files, one sentence each; waits until all are checked."""
         if self._thread is not None:
             self._thread.join()
             self._thread = None

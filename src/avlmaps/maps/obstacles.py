@@ -26,7 +26,7 @@ SIGHT_M = (1.2, 1.7)  # heights over the floor of a robot's and of a person's ey
 
 
 class CellState(IntEnum):
-    """What is known of a cell; the number is what the grid holds."""
+    """The state of a cell; the number is what the grid holds."""
 
     UNKNOWN = 0
     FREE = 1
@@ -42,7 +42,7 @@ class Body:
     height_m: float = 1.5
     """Height over the floor that it needs free."""
     step_m: float = 0.1
-    """What is lower than this is floor to it: it can drive over, and depth is no more exact."""
+    """Lower voxels are floor to it: it can drive over them, and depth is no more exact."""
     min_hits: int = 3
     """Voxels with fewer pixels count for nothing: a depth camera's lone speckles."""
     flies_m: float | None = None

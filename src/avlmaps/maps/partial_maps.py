@@ -41,7 +41,7 @@ Span = tuple[int, int, int]
 
 
 class PartInfo(msgspec.Struct, frozen=True, kw_only=True):
-    """What is known of a part beside its sums.
+    """The description of a part beside its sums.
 
     Attributes:
         recording: the recording's name, for people.

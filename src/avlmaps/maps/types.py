@@ -1,4 +1,4 @@
-"""What a map holds, in memory or memory-mapped: voxels, keyframes, heard sounds; all in the recording's world."""
+"""The content of a map, in memory or memory-mapped: voxels, keyframes, sounds; all in the recording's world."""
 
 from dataclasses import dataclass, field
 

@@ -49,7 +49,7 @@ class BodyShape:
     height_m: float = 1.5
     """Height of its top over the floor."""
     step_m: float = 0.1
-    """What is lower than this it drives over."""
+    """It drives over lower obstacles."""
     flies_m: float | None = None
     """Height of its lowest part over the floor, for a body that flies: lower things are not in its way."""
     ignores: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""What a driver found out while it drove: where its body has been, and what it ran into that the map does not know.
+"""The findings of a driver: where its body has been, and obstacles that it ran into and the map does not know.
 
 Both are stored beside the map, never in it.
 """

@@ -1,4 +1,4 @@
-"""What a metre costs: where a body's middle may be, how much room it has there, and what it is worth to keep away.
+"""The cost of a metre: where a body's middle may be, how much room it has there, and the price of less room.
 
 Everything is in the level frame. A grid's cell (i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · cell_size_m``.
 """
@@ -28,11 +28,11 @@ class CostSettings:
     soft_m: float = 0.4
     """Free room that the body prefers beyond its radius; with more of it a metre costs no less."""
     near_cost: float = 4.0
-    """What a metre costs more where the body just fits; a metre in the open costs 1."""
+    """Extra cost of a metre where the body just fits; a metre in the open costs 1."""
     hole_m: float = 0.3
     """Gaps in the seen floor up to so wide are crossed; no larger unknown region ever is. 0 crosses none."""
     hole_cost: float = 2.0
-    """What a metre of such a gap costs more."""
+    """Extra cost of a metre of such a gap."""
     unknown_room_m: float = 0.0
     """Distance of the body's middle from larger unknown regions: for robots that could fall down stairs."""
 

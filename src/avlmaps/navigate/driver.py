@@ -36,7 +36,7 @@ _MOST_M, _MOST_RAD = 1e6, 1e3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrival:
-    """What came of one movement. That a place was not reached is an ordinary result, and the note says why.
+    """The result of one movement. That a place was not reached is an ordinary result, and the note says why.
 
     Attributes:
         reached: whether the robot stands where it was sent, within the driver's tolerance.
@@ -118,7 +118,7 @@ class _Trip:
     actions: list[Action] = field(default_factory=list)
     contacts: int = 0
     movements: int = 0
-    fault: str = ""  # what is wrong with the body, so that there is no use in continuing
+    fault: str = ""  # a fault of the body, so that there is no use in continuing
 
 
 class MapDriver:
@@ -224,7 +224,7 @@ class MapDriver:
         return np.array([self.pose.x_m, self.pose.y_m])
 
     def _level(self, place: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"]:
-        with np.errstate(invalid="ignore"):  # what is no number lies off the map
+        with np.errstate(invalid="ignore"):  # NaN lies off the map
             return np.asarray(place, np.float64) @ self.obstacles.level_from_world[:2].T
 
     def _trip(self) -> _Trip:

@@ -1,4 +1,4 @@
-"""What a robot did while a program ran: each movement, where it was to end and where it ended."""
+"""The movements of a robot while a program ran: where each was to end and where it ended."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

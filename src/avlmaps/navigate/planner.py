@@ -138,7 +138,7 @@ class Planner:
         mask = costmap.passable if part is None else self._part == part
         cells, _ = self._near(mask, start, self.settings.escape_m)
         x, y = costmap.in_cells(start)
-        # What the map has under its middle does not hold it back, a wall beside it does.
+        # An obstacle of the map under its middle does not hold it back, a wall beside it does.
         within = bool(costmap.holds(start)) and bool(costmap.occupied[tuple(costmap.cell_of(start))])
         own = costmap.radius_m / costmap.cell_size_m if within else 1.0
         ways_out = cells[grid_kernels.seen_from(x, y, cells, costmap.occupied, own)]

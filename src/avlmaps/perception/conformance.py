@@ -1,4 +1,4 @@
-"""What every backend must hold to, ours and others': call ``check(kind, backend)`` in a test of your own.
+"""The promises of every backend, ours and others': call ``check(kind, backend)`` in a test of your own.
 
 Each check builds small inputs itself, needs no data and no network, and raises ``NonConformanceError`` with one
 sentence that says which promise of ``avlmaps.perception.protocols`` is broken.

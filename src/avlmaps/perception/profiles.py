@@ -126,7 +126,7 @@ class Profile:
         return cast(ModelCard, self._require(kind).card)  # pyright: ignore[reportAttributeAccessIssue]
 
 
-# What a matcher has learnt holds for the keypoints that it learnt on.
+# A matcher's training holds for the keypoints that it was trained on.
 _MATCHER_OF = {"disk": "lightglue-disk", "aliked": "lightglue-aliked", "superpoint": "superglue"}
 _PROFILES: dict[str, Profile] = {}
 

@@ -1,4 +1,4 @@
-"""What a backend must be able to do. Arrays are numpy at every boundary; features have unit length.
+"""The protocols of backends. Arrays are numpy at every boundary; features have unit length.
 
 One conformance suite (``avlmaps.perception.conformance``) holds for every backend of a protocol, ours or others'.
 """

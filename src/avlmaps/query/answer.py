@@ -1,4 +1,4 @@
-"""What a query returns: goals, and the outcome of each part; with their JSON (a contract of the command line)."""
+"""The answer of a query: goals, and the outcome of each part; with their JSON (a contract of the command line)."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,7 +11,7 @@ from avlmaps.query.heatmap import Heatmap
 
 @dataclass(frozen=True, slots=True)
 class PartAnswer:
-    """What became of one part of a question.
+    """The outcome of one part of a question.
 
     Attributes:
         part: the part.

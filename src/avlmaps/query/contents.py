@@ -1,4 +1,4 @@
-"""What a map holds without a question: its things, its sounds and its rooms, each named with a confidence.
+"""The content of a map without a question: its things, sounds and rooms, each named with a confidence.
 
 A thing is a connected group of voxels that a word of the vocabulary wins (``modalities.object``). Several words may
 claim the same voxels ("chair", "office chair"); the most confident claim stands, and what overlaps it is left out.

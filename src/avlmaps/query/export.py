@@ -36,7 +36,7 @@ _PALETTE_SEED = 5
 
 
 class ColorBy(StrEnum):
-    """What colours an export; the value is the word on the command line."""
+    """The source of an export's colours; the value is the word on the command line."""
 
     PICTURE = "picture"
     THING = "thing"

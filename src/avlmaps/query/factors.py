@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, Float32, Int
 from avlmaps.core.question import Part, Role
 from avlmaps.query.voxel_space import Space
 
-# What has this confidence or more is found: an instance, a sound, a view, the place of a photo.
+# From this confidence on a part is found: an instance, a sound, a view, the place of a photo.
 FOUND_AT = 0.5
 # Scores are products of float32 vectors of unit length. Their last digits depend on the order of summation, which
 # depends on the processor and on how many vectors are multiplied at once; a difference below this means nothing.

@@ -21,7 +21,7 @@ _SAME_SIDE = 0.25  # cosine: no descriptor bears a change of view by more than 7
 
 @runtime_checkable
 class LocatableMap(Protocol):
-    """What ``locate`` needs of a stored map."""
+    """The parts of a stored map that ``locate`` needs."""
 
     @property
     def keyframes(self) -> Keyframes:
@@ -30,7 +30,7 @@ class LocatableMap(Protocol):
 
     @property
     def place_state(self) -> dict[str, np.ndarray]:
-        """What the place encoder learned."""
+        """The state that the place encoder learned."""
         ...
 
     @property

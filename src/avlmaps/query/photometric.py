@@ -49,7 +49,7 @@ class PhotometricSettings:
     heights_m: tuple[float, ...] = (-0.65, -0.15, 0.3)
     """From the height of the camera of the nearest keyframe."""
     far_m: float = 8.0
-    """What is farther from an eye is not drawn."""
+    """Limit of the distance of drawn voxels from an eye."""
     pitches_rad: tuple[float, ...] = tuple(np.deg2rad(np.arange(-32.0, 17.0, 8.0)))
     """Above the horizon, of the pictures that are looked for first."""
     candidates: int = 40
@@ -61,7 +61,7 @@ class PhotometricSettings:
     colour_weight: float = 2.0
     """Of the two channels of colour, against brightness."""
     inlier_worth: float = 0.015
-    """What a keypoint that agrees with a given pose adds to its likeness..."""
+    """A keypoint that agrees with a given pose adds this to its likeness..."""
     most_inliers: int = 12
     """...up to this many of them."""
 

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 UNSEEN = np.float32(1e9)
-_LEAST_M = 0.15  # what is nearer to the eye is not drawn: the eye stands in it
+_LEAST_M = 0.15  # a voxel nearer to the eye is not drawn: the eye stands in it
 
 
 @njit(cache=True, nogil=True, fastmath=True)

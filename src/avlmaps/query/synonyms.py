@@ -1,4 +1,4 @@
-"""What an encoder of an open vocabulary needs of a query: by how much its cosines count, and which words are rivals.
+"""Settings of a query for an encoder of an open vocabulary: the scale of its cosines, and which words are rivals.
 
 Such an encoder gives every word a vector, and words of one sense lie close but not at one place: queried for a couch,
 a sofa would win half of its voxels. Words which name the wanted thing, or a kind of it, do not compete; the lexicon

@@ -1,4 +1,4 @@
-"""What to say of a name that an encoder of a closed set does not know."""
+"""The note on a name that an encoder of a closed set does not know."""
 
 from avlmaps.core.lexicon import Kind, lexicon, noun_of
 

@@ -1,4 +1,4 @@
-"""What `recording.json` of our own folder format holds, and the names of the files beside it.
+"""The content of `recording.json` of our own folder format, and the names of the files beside it.
 
 recording.json    this file's Description; written last, so that a folder without it is unfinished
 rgb/              colour pictures, PNG or JPEG; or one video instead, rgb.mp4 (.mkv, .mov, .webm, .avi)

@@ -19,7 +19,7 @@ from avlmaps.recordings.faults import Report, stop_at_first
 from avlmaps.recordings.types import Recording
 
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
-# What a map's folder holds and no recording's does.
+# Files that a map's folder holds and no recording's does.
 _MAP = "map.json"
 # A folder of a million files must not be listed to be recognised.
 _LOOKED_AT = 2000

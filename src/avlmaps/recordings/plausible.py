@@ -100,7 +100,7 @@ def pace_fault(stamps_s: Float[np.ndarray, " n"], what: str, expected_s: float |
 
 @dataclass(frozen=True, slots=True)
 class Plausible:
-    """What was found about the poses of a walk.
+    """The findings about the poses of a walk.
 
     Attributes:
         index: frames that are used, rising.

@@ -1,4 +1,4 @@
-"""What a recording is: frames with poses, an audio track, and how to get at them without reading it whole."""
+"""A recording: frames with poses, an audio track, and how to get at them without reading it whole."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping

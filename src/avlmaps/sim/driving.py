@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-_HALF_FIELD_RAD = np.deg2rad(32.0)  # what lies this far beside the middle of the picture is shown well
+_HALF_FIELD_RAD = np.deg2rad(32.0)  # a thing this far beside the middle of the picture is shown well
 _LOOK_S = 0.5  # a thing that was in the picture for this long has been seen
 
 

@@ -14,7 +14,7 @@ from avlmaps.sim.scene import Scene
 
 FLOOR_CATEGORIES = frozenset({"floor", "carpet", "rug", "mat"})
 STRUCTURE = frozenset({"wall", "floor", "ceiling", "column", "stairs", "railing"})
-_STEP_M = 0.1  # what is lower than this can be driven over
+_STEP_M = 0.1  # lower obstacles can be driven over
 _THRESHOLD_M = 0.3  # gaps in the floor up to this wide (door sills, seams of a scan) count as floor
 _FLAT = 0.8  # the upward part of the normal of what can be stood on
 _LARGE = 0.34  # a floor without a name has at least this share of the largest level surface

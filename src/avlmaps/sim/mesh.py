@@ -15,7 +15,7 @@ _CORNER = np.arange(3)[None, :, None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Material:
-    """What a surface looks like.
+    """The look of a surface.
 
     Attributes:
         colour: sRGB in [0, 1]; multiplied with the texture where there is one.

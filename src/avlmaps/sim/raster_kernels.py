@@ -8,7 +8,7 @@ the triangle's plane: along the ray of a pixel (x, y, 1) the inverse z-depth of 
 import numpy as np
 from numba import njit
 
-NEAR_M = 0.02  # what lies nearer than this in front of the camera is cut away
+NEAR_M = 0.02  # parts nearer than this in front of the camera are cut away
 _STEP = 256  # snapped units in a pixel
 _FARTHEST_UNIT = float(1 << 29)  # holds products of snapped coordinates within 64 bits
 _TILE = 8  # pixels along a side of a tile of the coarse depth

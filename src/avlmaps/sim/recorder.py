@@ -109,7 +109,7 @@ class RecordSettings:
 
 @dataclass(frozen=True, slots=True)
 class SceneRecording:
-    """What was recorded.
+    """The content of a finished recording.
 
     Attributes:
         path: the folder.

@@ -1,4 +1,4 @@
-"""What a camera sees in a scene: colour, depth, instance and category images, drawn on one core.
+"""Views of a camera in a scene: colour, depth, instance and category images, drawn on one core.
 
     view = Renderer(scene).render(camera, world_from_camera)
 
@@ -32,7 +32,7 @@ _METER_STEP = 61  # every so manieth pixel decides on the exposure
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """What one camera saw.
+    """The view of one camera.
 
     Attributes:
         rgb: sRGB.

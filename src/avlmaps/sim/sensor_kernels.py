@@ -84,7 +84,7 @@ def measure_depth(true, gauss, at, jitter, shift_px, noise, step, out):  # pragm
             if z <= 0 or shift == 0:
                 out[y, x] = z
                 continue
-            # what is coarse is alike over three rows and three columns, as matching over windows makes it
+            # coarse noise is alike over three rows and three columns, as matching over windows makes it
             near = shift / z + fine * gauss[at[y, 2] + x] + coarse * gauss[at[y - y % 3, 3] + x // 3]
             if step > 0:
                 near = step * np.rint(near * per_step)

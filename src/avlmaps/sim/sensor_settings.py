@@ -1,4 +1,4 @@
-"""What a simulated RGB-D camera gets wrong; apart from the kernels, so that help texts need no compiler."""
+"""The faults of a simulated RGB-D camera; apart from the kernels, so that help texts need no compiler."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -101,7 +101,7 @@ class OdometryFaults:
 
 @dataclass(frozen=True, slots=True)
 class SensorSettings:
-    """What a simulated RGB-D camera gets wrong."""
+    """The faults of a simulated RGB-D camera."""
 
     depth: DepthFaults = DepthFaults()
     """Depth."""

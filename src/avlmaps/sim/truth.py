@@ -1,4 +1,4 @@
-"""What a simulated recording truly holds, written beside it for evaluation; mapping never reads it."""
+"""The truth of a simulated recording, written beside it for evaluation; mapping never reads it."""
 
 import csv
 import io
@@ -52,7 +52,7 @@ class HeardEvent:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What is truly there: sounds, things, rooms.
+    """The truth of a scene: sounds, things, rooms.
 
     Attributes:
         simulation: the scene's name, the seed and the settings that made the recording.

@@ -17,14 +17,14 @@ _TWICE_M = 1.2  # a thing is seen from two places at least this far apart, where
 _LOWEST_RAD = np.deg2rad(30.0)  # how far below the horizon the camera sees
 _NEAREST_M = 0.5  # from nearer than this nothing is seen as a whole
 _MIDST_M = 0.5  # this much farther than the free place nearest to its middle one is still in the midst of an area
-_AREA, _OBJECT, _FLOOR = 3.0, 1.0, 0.25  # what entering an area, an object and a piece of floor are worth
-_AGAIN = 0.3  # what seeing a thing from a second place is worth, of the first
+_AREA, _OBJECT, _FLOOR = 3.0, 1.0, 0.25  # value of entering an area, an object and a piece of floor
+_AGAIN = 0.3  # value of seeing a thing from a second place, as a share of the first
 _LEAST_GAIN = 0.9  # a place that adds less is not gone to
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:
-    """What is to be seen on a floor: things, and pieces of the floor.
+    """The targets on a floor: things, and pieces of the floor.
 
     Attributes:
         low: (t, 2) lowest xy of the box round each.
@@ -51,7 +51,7 @@ class Targets:
         """Return which targets are within reach of which places with nothing opaque between."""
         seen = sees(np.ascontiguousarray(places), self.low, self.high, reach_m, opaque, space.origin, space.cell_m)
         far = np.linalg.norm(places[:, None] - self.middle, axis=2) > self.nearest_m
-        # What can only be seen from nearby, in a narrow room, is seen from there.
+        # A target that can only be seen from nearby, in a narrow room, is seen from there.
         return seen & (far | ~np.any(seen & far, axis=0))
 
 
@@ -182,6 +182,6 @@ def _greedy(
         chosen.append(best)
         news.append(new)
         left[new] -= 1
-        # What is seen from here adds nothing from close by.
+        # A target seen from here adds nothing from close by.
         close = np.linalg.norm(places - places[best], axis=1) < _TWICE_M
         covers[np.ix_(close, new)] = False

@@ -1,1 +1,1 @@
-"""What the suites share: scenes made ready, work in several processes, files, intervals and output."""
+"""Parts that the suites share: scenes made ready, work in several processes, files, intervals and output."""

@@ -1,4 +1,4 @@
-"""What the paper's baselines make of a map that they share with us: a weaker ear, and retrieval without a pose."""
+"""The paper's baselines on a map that they share with us: a weaker sound encoder, and retrieval without a pose."""
 
 from functools import cached_property
 

@@ -1,4 +1,4 @@
-"""What is truly in a recorded scene, and the rule that makes a goal unambiguous: one near, all others farther."""
+"""The truth of a recorded scene, and the rule that makes a goal unambiguous: one near, all others farther."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,7 +55,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """What is truly in a scene and was recorded.
+    """The things and sounds that are truly in a scene and were recorded.
 
     Attributes:
         scene: its name.

@@ -1,4 +1,4 @@
-"""What one must know to judge a table: scenes, seed, profile, weights, rules; as JSON and in words."""
+"""The origin of a table: scenes, seed, profile, weights, rules; as JSON and in words."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePath

@@ -42,7 +42,7 @@ _RECIPE = 1  # raised when what a folder of work holds is made in another way
 
 @dataclass(frozen=True, slots=True)
 class SceneJob:
-    """What one process makes ready.
+    """The settings of the scenes that one process makes ready.
 
     Attributes:
         spec: the scene's name.
@@ -245,7 +245,7 @@ class Workplace:
 
     @property
     def evidence(self) -> Evidence:
-        """What tasks are made of."""
+        """The map and the truth from which tasks are made."""
         label, truth = self.label, self.truth
         seen = np.bincount(label[label != NOTHING], minlength=len(truth.objects))
         eye_m = float(np.median(self.recording.world_from_camera[:, 2, 3]))

@@ -64,7 +64,7 @@ _AREA_ROWS = (
     ("true objects + sparse view map", (_true_object, _area), (Kind.VIEWS,), "variant"),
     (CEILING, (_true_object, AskedScene.true_area), (), "ceiling"),
 )
-# What is sought stands first: here the sound.
+# The primary part stands first: here the sound.
 _SOUND_ROWS = (
     ("sound only, weaker encoder", (_weak,), (), "baseline"),
     ("sound only", (_sound,), (Kind.SOUNDS,), "baseline"),

@@ -1,4 +1,4 @@
-"""What the tables say of answers: recall within distances, mean distance, and their intervals."""
+"""The figures of the tables: recall within distances, mean distance, and their intervals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ _RESAMPLES = 2000
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """What a configuration said to a task.
+    """A configuration's answer to a task.
 
     Attributes:
         task: the task's name.

@@ -35,7 +35,7 @@ _RECIPE = 2  # raised when tasks are made, or queried, by other rules
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IndexingSettings(SceneSettings):
-    """What the benchmark is run on.
+    """The settings of the benchmark.
 
     Attributes:
         scenes: held-out homes by default, or recordings with ``objects.json``.
@@ -57,7 +57,7 @@ class IndexingSettings(SceneSettings):
 
 @dataclass(frozen=True, slots=True)
 class SceneOutcome:
-    """What became of one scene.
+    """The outcome of one scene.
 
     Attributes:
         scene: its name.
@@ -82,7 +82,7 @@ class SceneOutcome:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of all scenes.
+    """The outcome of all scenes.
 
     Attributes:
         settings: what the benchmark was run on.
@@ -109,7 +109,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class _Todo:
-    """What one process does: make a scene's tasks, or ask some."""
+    """The work of one process: make a scene's tasks, or answer some."""
 
     job: SceneJob
     open_spec: Callable[[str], Scene]

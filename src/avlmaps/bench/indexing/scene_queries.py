@@ -66,7 +66,7 @@ class AskedScene:
         is_file = modality is Modality.IMAGE
         return Part(modality, query, role, is_file), self.asked.settings.heat.falloff_per_m(role)
 
-    # What the map itself says.
+    # The map's own answers.
 
     def map_object(self, task: Task, role: Role) -> Heatmap | None:
         """The category, by the map's pixel features; raises ``QueryError`` where they know no such word."""
@@ -99,7 +99,7 @@ class AskedScene:
 
         return self._once(("paper area", task.context, role), make)
 
-    # What the paper's baselines make of the same recording.
+    # The paper's baselines on the same recording.
 
     def weak_sound(self, task: Task, role: Role) -> Heatmap | None:
         """The sound, by a weaker sound encoder."""
@@ -155,7 +155,7 @@ class AskedScene:
     def _region_views(self) -> Float32[np.ndarray, "n d"]:
         return region_features(self.asked, self.recording)
 
-    # What is truly there.
+    # The truth.
 
     def true_object(self, task: Task, role: Role) -> Heatmap | None:
         """The things of the category, their voxels truly known."""

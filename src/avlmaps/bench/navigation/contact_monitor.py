@@ -13,7 +13,7 @@ _EXACT_M = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Foreknowledge:
-    """What a map knows of obstacles before a robot drives.
+    """The obstacles that a map knows before a robot drives.
 
     Attributes:
         obstacles: the map's own grid.

@@ -41,7 +41,7 @@ class _Log:
 
 @dataclass(frozen=True, eq=False)
 class Pilot:
-    """What is needed to send robots on missions in one scene.
+    """Everything that a mission in one scene needs.
 
     Attributes:
         scene: its map and its truth.

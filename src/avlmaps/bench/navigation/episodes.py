@@ -15,7 +15,7 @@ from avlmaps.bench.navigation.missions import Series
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """What became of one subgoal.
+    """The outcome of one subgoal.
 
     Attributes:
         said: how it was named.
@@ -52,7 +52,7 @@ class Leg:
 
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """What became of one mission with the senses of one configuration.
+    """The outcome of one mission with the encoders of one configuration.
 
     Attributes:
         mission: its name.

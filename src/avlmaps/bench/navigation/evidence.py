@@ -1,4 +1,4 @@
-"""What missions of one scene are made of: things, sounds and photos that a robot can drive to."""
+"""The evidence for missions of one scene: things, sounds and photos that a robot can drive to."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

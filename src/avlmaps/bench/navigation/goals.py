@@ -1,4 +1,4 @@
-"""What a robot is sent to, what the truth says of it, and whether a stop is right."""
+"""The goals of a robot, their truth, and whether a stop is right."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -41,7 +41,7 @@ class Senses:
 
 @dataclass(frozen=True, eq=False)
 class KnownScene:
-    """What is truly in a scene, beside its map.
+    """The truth of a scene, beside its map.
 
     Attributes:
         asked: the map.
@@ -143,7 +143,7 @@ class Perceived(AVLMap):
 
     def _true_area(self, word: str, primary: bool) -> Heatmap:
         own = [area for area in self._scene.truth.areas if area.kind == _plain(word)]
-        if primary:  # what is sought has places; those of a room are its middle
+        if primary:  # a primary part has places; those of a room are its middle
             middles = [np.append(area.polygon.mean(axis=0), area.floor_m)[None] for area in own]
             return self._places(Modality.AREA, word, primary, middles)
         return Heatmap.of(true_regions(self.space, Part(Modality.AREA, _plain(word)), own))

@@ -1,4 +1,4 @@
-"""What the tables say of runs: subgoals in a row, independent ones, success weighted by path length. Pure functions."""
+"""The figures of runs: subgoals in a row, independent ones, success weighted by path length. Pure functions."""
 
 from collections.abc import Sequence
 

@@ -2,7 +2,7 @@
 
 from avlmaps.sim.hearing.kinds import kind_of
 
-# What people do and animals do, by the names of our rules and of ESC-50. All else is of the house itself.
+# Sounds of people and of animals, by the names of our rules and of ESC-50. All others are of the house itself.
 HUMAN = frozenset({
     "breathing", "brushing teeth", "children playing", "clapping", "coughing", "crowd cheering", "crying baby",
     "drinking or sipping", "footsteps", "laughing", "sneezing", "snoring", "talking", "whistling",

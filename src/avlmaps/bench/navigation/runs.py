@@ -34,7 +34,7 @@ OpenSpec = Callable[[str], Scene]
 
 @dataclass(frozen=True, slots=True)
 class SceneFacts:
-    """What one scene was.
+    """The properties of one scene.
 
     Attributes:
         scene: its name.
@@ -55,7 +55,7 @@ class SceneFacts:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of all scenes."""
+    """The outcome of all scenes."""
 
     settings: NavigationSettings
     missions: MissionSet
@@ -70,7 +70,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class _Todo:
-    """What one process does: make a scene's missions, or send robots on some."""
+    """The work of one process: make a scene's missions, or send robots on some."""
 
     job: SceneJob
     settings: NavigationSettings

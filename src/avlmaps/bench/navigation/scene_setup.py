@@ -56,7 +56,7 @@ class NavigationPlace:
 
     @cached_property
     def building(self) -> Building:
-        """What is truly in a robot's path."""
+        """The true obstacles of a robot."""
         return Building(self.work.scene, BASE.step_m, BASE.height_m, self.floor.number)
 
     @cached_property
@@ -70,7 +70,7 @@ class NavigationPlace:
 
     @cached_property
     def ground(self) -> Ground:
-        """What missions are made of."""
+        """The evidence from which missions are made."""
         evidence, rng = self.work.evidence, self._rng(0)
         photos = tuple(self.work.photos(_PHOTOS))
         tasks = (

@@ -1,4 +1,4 @@
-"""What the navigation benchmark is run on."""
+"""The settings of the navigation benchmark."""
 
 from dataclasses import dataclass
 from math import ceil
@@ -14,7 +14,7 @@ _PAIRS_OF_200 = 119
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NavigationSettings(SceneSettings):
-    """What the benchmark is run on.
+    """The settings of the benchmark.
 
     Attributes:
         scenes: held-out homes by default.

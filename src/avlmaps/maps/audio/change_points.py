@@ -30,7 +30,7 @@ class ChangeSettings:
     """Cutting a track where what sounds changes."""
 
     change_s: float = 0.2
-    """What lasts this long and is wholly unlike its surroundings is a stretch of its own; what is more alike must last
+    """A stretch this long that is wholly unlike its surroundings is one of its own; a more alike stretch must last
     longer. No stretch is shorter."""
     max_length_s: float = 5.0
     """A stretch that lasts longer is cut where that costs least: the robot moves on, and its places with it."""

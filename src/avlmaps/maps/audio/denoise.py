@@ -83,7 +83,7 @@ def denoised_blocks(blocks: Iterable[Sound], profile: NoiseProfile, reduction_db
     """
     size, hop = _sizes(profile.rate_hz)
     reach = _SMOOTH_FRAMES // 2  # frames of context that smoothing needs on either side
-    late = size - hop  # what comes out first lies before the track
+    late = size - hop  # the first output lies before the track
     waiting, tail = np.zeros(late + reach * hop, np.float32), np.zeros(late, np.float32)
     owed = 0
     for samples, is_end in _with_end(blocks, profile.rate_hz, np.zeros(2 * size + reach * hop, np.float32)):

@@ -34,7 +34,7 @@ _EXPONENTIALS = np.exp(-np.arange(STEPS * (int(GREATEST_EXPONENT) + 1) + 1) / ST
 
 
 class Scratch(NamedTuple):
-    """What the kernels keep between their steps, for pictures of one size; only the touched part costs memory.
+    """Working memory of the kernels between their steps, for pictures of one size; only the touched part costs memory.
 
     Of each pixel of a row: ``key`` (of its voxel), ``weight``, ``sharp`` (how exact its depth is), ``picture``
     (its colour pixel), ``cell`` (its cell of the feature map), the latter two linear indices, -1 outside. Of the

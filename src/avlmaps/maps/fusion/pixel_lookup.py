@@ -10,7 +10,7 @@ from avlmaps.core.camera import Pinhole, Rig
 
 @dataclass(frozen=True, slots=True)
 class PixelLookup:
-    """What fusion needs to know of a rig and a feature map's size, computed once for all frames.
+    """Tables of a rig and a feature map's size that fusion needs, computed once for all frames.
 
     Where the two cameras share their centre and axes, the colour pixel depends on the depth pixel's column and row
     alone, and tables hold it; else each point is projected.

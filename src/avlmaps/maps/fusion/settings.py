@@ -1,4 +1,4 @@
-"""What of fusion can be chosen; apart from the kernels, so that the command line's help need not load a compiler."""
+"""The settings of fusion; apart from the kernels, so that the command line's help need not load a compiler."""
 
 from dataclasses import dataclass
 

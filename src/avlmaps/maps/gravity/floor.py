@@ -17,7 +17,7 @@ from avlmaps.recordings.subset import Subset
 from avlmaps.recordings.types import Frame, Ground, Recording
 
 _BAND_M = 0.12  # cameras of one group differ in height by no more than this
-_STOREY_M = 0.6  # what cameras saw counts for others whose height differs by no more than this
+_STOREY_M = 0.6  # a camera's view counts for others whose height differs by no more than this
 
 
 @dataclass(frozen=True, slots=True)

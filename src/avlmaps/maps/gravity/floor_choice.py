@@ -43,7 +43,7 @@ _AT_BOTTOM = 0.65  # the bottom of what is in view is taken for a floor out of v
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What is known round a camera height.
+    """The surfaces round a camera height.
 
     Attributes:
         camera_m: height of the cameras, along up.
@@ -60,7 +60,7 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What someone said about the floor.
+    """A user's or a robot's hint about the floor.
 
     Attributes:
         floor_m: its height along up.
@@ -75,7 +75,7 @@ class Expected:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What speaks for and against a floor at one height.
+    """The evidence for and against a floor at one height.
 
     Attributes:
         height_m: of the floor, along up.

@@ -90,7 +90,7 @@ def _gathered(
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """What one frame shows, in level axes: x and y horizontal, the third along up; metres.
+    """The surfaces of one frame, in level axes: x and y horizontal, the third along up; metres.
 
     Attributes:
         camera_m: (3,) where the camera was.

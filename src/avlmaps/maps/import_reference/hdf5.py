@@ -14,7 +14,7 @@ import numpy as np
 from avlmaps.core.errors import BackendError, MapError
 
 _MEND = "copy it again, or let the code that wrote it write it again"
-# What h5py raises where the bytes are not as they should be.
+# The errors that h5py raises where the bytes are not as they should be.
 _FAULTS = (OSError, RuntimeError, LookupError, TypeError, ValueError, ArithmeticError, MemoryError)
 Shape = tuple[int | None, ...]
 

@@ -13,7 +13,7 @@ TOP_DOWN = "map/grid_lseg_1.npy"
 
 @dataclass(frozen=True, slots=True)
 class SceneFiles:
-    """What there is of a map of the reference code.
+    """The files of a map of the reference code.
 
     Attributes:
         folder: of the scene.

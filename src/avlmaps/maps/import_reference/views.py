@@ -1,4 +1,4 @@
-"""What a keyframe saw, computed from the map's voxels where the depth pictures are not at hand."""
+"""The part of the map that a keyframe saw, computed from the map's voxels where there are no depth pictures."""
 
 from collections.abc import Iterable
 

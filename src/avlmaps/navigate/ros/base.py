@@ -1,4 +1,4 @@
-"""What driving Nav2 and move_base share: seeing a goal to its end, calling it off, and reporting what came of it."""
+"""Parts that driving Nav2 and move_base share: seeing a goal to its end, calling it off, and the report."""
 
 import threading
 from abc import ABC, abstractmethod
@@ -39,7 +39,7 @@ class RosDriver(ABC):
     """
 
     called: ClassVar[str]
-    """What drives the robot, as notes name it."""
+    """The program that drives the robot, as notes name it."""
     tf_kind: ClassVar[str]
     """The type of /tf."""
     heartbeat_kind: ClassVar[str]
@@ -83,7 +83,7 @@ class RosDriver(ABC):
         self._absent: set[str] = set()
         self._contact = Contact(url, token, self.frames, self.settings, self.tf_kind, self._greeted, clock)
 
-    # What differs between the two.
+    # The differences between the two.
 
     @abstractmethod
     def _greet(self, link: Link) -> None:
@@ -190,7 +190,7 @@ class RosDriver(ABC):
     # One movement.
 
     def _level(self, place: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"]:
-        known = np.isfinite(place).all()  # what is no number stays none, without a warning
+        known = np.isfinite(place).all()  # NaN stays NaN, without a warning
         return (self._level_from_world @ np.asarray(place, np.float64))[:2] if known else np.full(2, np.nan)
 
     def _plan_to(

@@ -158,7 +158,7 @@ class _Shift(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class RobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """What a robot's file may hold; `Frames.read` and `RosSettings.read` check it further."""
+    """The content of a robot's file; `Frames.read` and `RosSettings.read` check it further."""
 
     map_frame: str = "map"
     base_frame: str = "base_link"

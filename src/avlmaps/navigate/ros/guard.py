@@ -24,7 +24,7 @@ _BETWEEN_TRIES_S = 1.0
 
 
 class Orders(msgspec.Struct):
-    """What a guard needs to know, in one line of JSON."""
+    """The settings of a guard, in one line of JSON."""
 
     kind: Literal["nav2", "move_base"]
     url: str

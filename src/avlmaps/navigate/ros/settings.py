@@ -28,7 +28,7 @@ _RANGES: Mapping[str, tuple[float, float]] = {
 
 @dataclass(frozen=True, slots=True)
 class RosSettings:
-    """What may differ from robot to robot."""
+    """The settings that differ from robot to robot."""
 
     namespace: str = ""
     """Of the robot's actions (``/robot1`` for ``/robot1/navigate_to_pose``)."""

@@ -1,4 +1,4 @@
-"""What the embedded pixel and view encoders share: names, their codes, and which of them a phrase means."""
+"""Parts that the embedded pixel and view encoders share: names, their codes, and which of them a phrase means."""
 
 from functools import cached_property
 from typing import cast

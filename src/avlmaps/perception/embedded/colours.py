@@ -55,7 +55,7 @@ _GAINS = {
     "brown": (1.0, 0.5),
 }
 
-# What a word stands for, where it is no basic term itself.
+# The meaning of words that are no basic term themselves.
 _SYNONYMS = {
     "gray": "grey", "silver": "light grey", "charcoal": "dark grey", "steel-grey": "grey", "ebony": "black",
     "ivory": "white", "cream": "beige", "off-white": "white",

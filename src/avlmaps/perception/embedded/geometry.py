@@ -1,4 +1,4 @@
-"""What a depth picture says of shape, in the frame of gravity: the channels that the embedded encoders look at.
+"""The shape in a depth picture, in the frame of gravity: the channels that the embedded encoders look at.
 
 Shape carries from rendered rooms to real ones where colour does not, and it does so best where "up" is up and
 heights are heights, however the camera was held.

@@ -51,7 +51,7 @@ class InstanceNotes(msgspec.Struct, frozen=True):
 
 
 class Notes(msgspec.Struct, frozen=True):
-    """What is known of the weights beside them.
+    """The description of the weights beside them.
 
     Attributes:
         id: the model's name and version.
@@ -85,7 +85,7 @@ class Notes(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What the network makes of a frame.
+    """The network's outputs for a frame.
 
     Attributes:
         category: probability of each category on a grid that covers the colour picture evenly.
@@ -157,7 +157,7 @@ def load_network(weights: str = DEFAULT_WEIGHTS) -> SceneNetwork:
             f"The embedded pixel encoder's weights cannot be read ({fault}); install the package again, or make them "
             "with 'python -m training.pixels'."
         ) from fault
-    # What makes the features is in the checksum; how they are read may change, and old maps can still be queried.
+    # The checksum covers everything that makes the features; how they are read may change, and old maps stay usable.
     made_by = msgspec.structs.replace(notes, called={}, kinds={}, instances=InstanceNotes(), note="")
     return SceneNetwork(arrays, notes, sha256(arrays + msgspec.json.encode(made_by)).hexdigest())
 

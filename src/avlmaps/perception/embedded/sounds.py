@@ -60,7 +60,7 @@ class KnownKind:
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """What is made of one sound.
+    """The features of one sound.
 
     Attributes:
         kinds: how likely the sound holds each kind, the known ones and then the taught ones; they need not sum to one,
@@ -182,7 +182,7 @@ class EmbeddedSounds:
 
     @cached_property
     def _prototypes(self) -> Float32[np.ndarray, "kinds d"]:
-        """What the network aims at for each kind: the mean over the templates of what it is called first."""
+        """The network's target for each kind: the mean over the templates of its first name."""
         firsts = [kind.called[0] for kind in self.kinds]
         total = np.sum(
             [self._words.encode([prompt.format(word) for word in firsts]) for prompt in self.card.prompts], axis=0
@@ -220,7 +220,7 @@ class EmbeddedSounds:
             bias, slope = self.calibration.taught
             leads = np.stack([taught_lead(features, t.features, near) for t in taught], axis=1)
             own = sigmoid(bias + slope * leads)
-            # what the user taught goes before the network's scores for a sound that it was not trained on
+            # the user's own sounds go before the network's scores for a sound that it was not trained on
             likely = np.hstack([likely * (1.0 - own.max(axis=1, keepdims=True)), own])
             known = np.maximum(known, own.max(axis=1))
         return Heard(likely.max(axis=0), float(known.max()))

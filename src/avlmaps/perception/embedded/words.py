@@ -27,7 +27,7 @@ _REMEMBERED = 4096
 
 @dataclass(frozen=True, slots=True)
 class WordWeights:
-    """What the training command writes.
+    """The files that the training command writes.
 
     Attributes:
         entries: names of the table's rows: word pieces, words, runs of words.

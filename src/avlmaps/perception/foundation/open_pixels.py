@@ -1,4 +1,4 @@
-"""What the pixel encoders of an open vocabulary share: batches of frames, any word, the learnt scale."""
+"""Parts that the pixel encoders of an open vocabulary share: batches of frames, any word, the learnt scale."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence

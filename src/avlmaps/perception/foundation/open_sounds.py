@@ -1,4 +1,4 @@
-"""What the sound encoders of an open vocabulary share: samples that can be used, windows, phrases, and yes or no."""
+"""Parts that the sound encoders of an open vocabulary share: usable samples, windows, phrases, and yes or no."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""What the view encoders of an open vocabulary share: batches of frames, words in sentences, the learnt scale."""
+"""Parts that the view encoders of an open vocabulary share: batches of frames, words in sentences, the learnt scale."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.types import Frame
 
 AREA_PROMPTS = ("a photo of a {}.", "a photo of the {} of a building.", "a view inside a {}.")
-"""What a caption of a picture taken there may say; the mean over a few sentences is steadier than one of them."""
+"""Captions of a picture taken there; the mean over a few sentences is steadier than one of them."""
 
 UNKNOWN_LICENCE = "LicenseRef-unknown"
 APPLE_RESEARCH = "LicenseRef-apple-amlr"

@@ -58,7 +58,7 @@ class RegionPixels(OpenPixels):
             licence=self._clip.licence if same else f"{self._clip.licence} AND Apache-2.0",
             checksum=self._clip.checksum(self._proposer.checksum, f"regions {short_side}", *CLIP_PROMPTS),
             prompts=CLIP_PROMPTS,
-            note="what lies in no region (some walls and floors) has no feature; slow: a GPU is needed in practice",
+            note="a pixel in no region (some walls and floors) has no feature; slow: a GPU is needed in practice",
         )
         super().__init__(card, self._clip.words, self._clip.logit_scale)
 

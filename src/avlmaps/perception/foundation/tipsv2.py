@@ -70,7 +70,7 @@ class TipsPixels(OpenPixels):
             licence="Apache-2.0",
             checksum=checksum_of(weights_in(folder), f"tipsv2 {way} short side {short_side}", *TIPS_PROMPTS),
             prompts=TIPS_PROMPTS,
-            note="what is smaller than a patch (1/32 of the picture's height) is mixed with what is round it",
+            note="a thing smaller than a patch (1/32 of the picture's height) is mixed with its surroundings",
         )
         words = Prompted(self._encode_texts, dim, TIPS_PROMPTS)
         super().__init__(card, words, 1.0 / float(self._model.temperature.detach()), _BATCH_ON_GPU)

@@ -6,7 +6,7 @@ from pathlib import Path
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.models.settings import model_settings
 
-# What a model's folder must hold for transformers or open_clip to load it; code and other formats stay where they are.
+# The files of a model's folder that transformers or open_clip need; code and other formats stay where they are.
 _WANTED = ("*.json", "*.safetensors", "*.txt", "*.model", "*.jinja")
 
 

@@ -1,4 +1,4 @@
-"""What learned matchers read: keypoints as their networks count pixels, descriptors, scores, the picture's size."""
+"""The input of learned matchers: keypoints as their networks count pixels, descriptors, scores, the picture's size."""
 
 from dataclasses import dataclass
 

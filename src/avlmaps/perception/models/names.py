@@ -1,4 +1,4 @@
-"""What a model is called in a map, which may travel: a hub's id or a file's name, never a path of this machine."""
+"""The name of a model in a map, which may travel: a hub's id or a file's name, never a path of this machine."""
 
 import ntpath
 import posixpath

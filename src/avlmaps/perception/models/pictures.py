@@ -1,4 +1,4 @@
-"""What finders of keypoints have in common: smaller copies of pictures, blank ones, and where the first pixel lies."""
+"""Parts that finders of keypoints share: smaller copies of pictures, blank ones, and where the first pixel lies."""
 
 import cv2
 import numpy as np

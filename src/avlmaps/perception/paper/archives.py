@@ -74,7 +74,7 @@ def _stand_ins(path: Path) -> list[Any]:
 
 
 def _stand_in(module: str, name: str) -> type:
-    # What numpy pickles is set up by tuples, all else by dictionaries, and the reader fills only true dictionaries.
+    # Objects of numpy are set up by tuples, all else by dictionaries, and the reader fills only true dictionaries.
     base = _Inert if module.startswith("numpy") else _InertMapping
     return type(name or "unnamed", (base,), {"__module__": module, "__qualname__": name})
 

@@ -86,7 +86,7 @@ class _Block(nn.Module):
 
 
 class _Attention(nn.Module):
-    """What went into a stage says how much each place and channel that comes out of it counts, in (0, 1)."""
+    """The input of a stage says how much each place and channel of its output counts, in (0, 1)."""
 
     def __init__(self, channels: int, out_channels: int, kernel: tuple[int, int]) -> None:
         super().__init__()
@@ -189,4 +189,4 @@ def _picture_tower() -> list[str]:
 
 
 NOT_NEEDED = frozenset(("logit_scale", "logit_scale_ai", *_picture_tower()))
-"""What a published checkpoint holds for comparing pictures with texts and with sounds."""
+"""The parts of a published checkpoint that compare pictures with texts and with sounds."""

@@ -36,7 +36,7 @@ THINGS = tuple(
     ceiling toilet stool towel mirror tv_monitor shower column bathtub counter fireplace lighting beam railing shelving
     blinds gym_equipment seating board_panel furniture appliances clothes""".replace("\n", " ").split()
 )
-"""What competes for a voxel in the published maps: Matterport3D's classes, without ``void`` and ``objects``."""
+"""The competitors for a voxel in the published maps: Matterport3D's classes, without ``void`` and ``objects``."""
 
 VOCABULARY = tuple(name.replace("_", " ") for name in THINGS)
 """The same as people write them; the published code encodes the underscores of five of them, too."""

@@ -193,7 +193,7 @@ class Wav2ClipSounds(ContrastSounds):
             AudioError: the sound has no samples, or some that are no finite numbers.
         """
         samples = usable_samples(sound, RATE_HZ)
-        # what is too short to be mirrored around half a frame; the published code fails there
+        # a sound too short to be mirrored around half a frame; the published code fails there
         samples = np.pad(samples, (0, max(0, self._network.frame // 2 + 1 - len(samples))))
         return np.concatenate(
             [self._encode_window(part) for part in windows(samples, _LONGEST_SAMPLES, _LONGEST_SAMPLES)]

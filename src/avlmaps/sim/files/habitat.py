@@ -35,7 +35,7 @@ _PREFIXES = ("frl_apartment_", "frl_")
 
 @dataclass(frozen=True, slots=True)
 class _Template:
-    """What an object is made from: its model file, and its config, empty where it has none."""
+    """The files of an object: its model file, and its config, empty where it has none."""
 
     model: Path
     config: dict[str, Any]

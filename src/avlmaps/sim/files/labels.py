@@ -20,7 +20,7 @@ _FINE = 200_000  # meshes of more triangles than this get one colour for each
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """What an annotation says of one thing.
+    """The annotation of one thing.
 
     Attributes:
         category: what it is.

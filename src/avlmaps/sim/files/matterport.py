@@ -32,7 +32,7 @@ _HEADER = "ASCII 1.1"
 
 @dataclass(slots=True)
 class House:
-    """What a ``.house`` file says.
+    """The content of a ``.house`` file.
 
     Attributes:
         region: by index: letter, lowest corner, highest corner.

@@ -19,7 +19,7 @@ _LONGEST_HEADER = 1 << 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlyMesh:
-    """What a PLY file holds.
+    """The content of a PLY file.
 
     Attributes:
         vertex: (v, 3) places.

@@ -277,7 +277,7 @@ def drawer_bed(rng: np.random.Generator) -> Piece:
     for side in (1, -1):
         for x0, x1 in split(0.05, plan.length - 0.05, [1.0] * count(rng, 2, 3)):
             front = drawers(rng, style, Room((-0.3, x0, 0.06), (0.0, x1, plan.base - 0.02)), [1.0])
-            # What was made to look along +x is laid along the bed's side, mirrored at its right.
+            # A piece made to look along +x is laid along the bed's side, mirrored at its right.
             along = np.array([[0.0, 1.0, 0.0], [side, 0.0, 0.0], [0.0, 0.0, 1.0]])
             parts += [mesh.mapped(along).moved(y=side * y) for mesh in front]
     head = plan.top + draw(rng, 0.2, 0.6)

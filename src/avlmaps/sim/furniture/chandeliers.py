@@ -36,7 +36,7 @@ def _cap(rng: np.random.Generator, kind: str, at: Triple, radius: float, look: M
     if kind == "globe":
         return ellipsoid((x, y, z - radius), (radius, radius, radius), look, 14, 9)
     profile = [(r * radius, z + h * radius) for r, h in rows[kind]]
-    closed = kind == "drop" or look.emission > 0.1  # what shines is shut by a diffuser
+    closed = kind == "drop" or look.emission > 0.1  # a lamp that shines is shut by a diffuser
     return lathe(profile, look, x, y, 16) if closed else turned_ring(profile, look, x, y, 16)
 
 

@@ -1,4 +1,4 @@
-"""What stands on shelves and hangs in wardrobes: books, boxes, vases, folded and hanging clothes."""
+"""The contents of shelves and wardrobes: books, boxes, vases, folded and hanging clothes."""
 
 import numpy as np
 

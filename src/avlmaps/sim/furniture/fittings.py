@@ -1,4 +1,4 @@
-"""What kitchens, bathrooms and appliances share: fronts with handles, taps, dials, basins and round bodies.
+"""Parts that kitchens, bathrooms and appliances share: fronts with handles, taps, dials, basins and round bodies.
 
 Everything here is built with its back at low x and its front towards +x.
 """

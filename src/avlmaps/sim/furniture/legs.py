@@ -1,4 +1,4 @@
-"""What furniture stands on: legs of many styles, bars between them, plinths, runners and feet."""
+"""The legs of furniture: many styles, bars between them, plinths, runners and feet."""
 
 from dataclasses import dataclass
 

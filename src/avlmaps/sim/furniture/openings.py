@@ -157,7 +157,7 @@ def window(rng: np.random.Generator, width_m: float, height_m: float, wall_m: fl
     inner_w, inner_h = width_m - 2 * jamb, height_m - 2 * jamb
     parts += [part.moved(z=jamb) for part in _sashes(rng, inner_w, inner_h, x, style, look)]
     pane = (0.0, inner_w, 0.0), (0.0, 0.0, inner_h)
-    # What is outside is a picture behind the bars, since nothing is built there; a few panes are plain.
+    # The outside is a picture behind the bars, since nothing is built there; a few panes are plain.
     view = material("outdoors" if chance(rng, 0.88) else "glass", rng)
     parts.append(sheet((x, -inner_w / 2, jamb), *pane, view, fill=True))
     trim, proud = draw(rng, 0.04, 0.1), draw(rng, 0.006, 0.02)

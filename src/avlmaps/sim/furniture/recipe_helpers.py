@@ -1,4 +1,4 @@
-"""What many recipes share: drawing measures, frames, bars between two points, cloth, and finishing a piece."""
+"""Parts that many recipes share: drawing measures, frames, bars between two points, cloth, and finishing a piece."""
 
 from collections.abc import Sequence
 from typing import TypeVar

@@ -20,7 +20,7 @@ class Bank(Protocol):
 
     @property
     def categories(self) -> tuple[str, ...]:
-        """What it has, sorted."""
+        """The categories that it has, sorted."""
         ...
 
     def draw(self, category: str, rng: np.random.Generator) -> tuple[str, Sound]:
@@ -34,7 +34,7 @@ class Synthesised:
 
     @property
     def categories(self) -> tuple[str, ...]:
-        """What there is a rule for, sorted."""
+        """The categories with a rule, sorted."""
         from avlmaps.sim.synthesis import MAKERS
 
         return tuple(sorted(MAKERS))
@@ -67,7 +67,7 @@ class Recorded:
 
     @property
     def categories(self) -> tuple[str, ...]:
-        """What the folder has, sorted."""
+        """The categories of the folder, sorted."""
         return tuple(sorted(self._clips))
 
     def draw(self, category: str, rng: np.random.Generator) -> tuple[str, Sound]:

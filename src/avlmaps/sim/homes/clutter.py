@@ -9,7 +9,7 @@ from avlmaps.sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps.sim.homes.furnish import Among, Furnisher, Stood, floor_standing, footprint
 from avlmaps.sim.homes.polygons import corners_of, overlapping
 
-# What is found on the tops of what.
+# Things found on the tops of furniture.
 ON_TOP: dict[str, tuple[str, ...]] = {
     "kitchen counter": ("kettle", "toaster", "coffee machine", "microwave", "bottle", "bowl", "pot", "cup", "tableware",
                         "basket", "bottle", "plant"),

@@ -1,4 +1,4 @@
-"""What is built into rooms: columns, piers and niches, low and free-standing walls, beams under the ceiling."""
+"""Fixtures of rooms: columns, piers and niches, low and free-standing walls, beams under the ceiling."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What belongs to walls and ceilings: curtains and blinds, radiators, pictures, clocks, lamps."""
+"""Things on walls and ceilings: curtains and blinds, radiators, pictures, clocks, lamps."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What a floor plan is: rooms, the walls between them, and the holes in the walls. Metres, top-down."""
+"""A floor plan: rooms, the walls between them, and the holes in the walls. Metres, top-down."""
 
 from dataclasses import dataclass, replace
 from typing import Literal

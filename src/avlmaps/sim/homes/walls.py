@@ -24,7 +24,7 @@ _FALLBACK = {"plaster": "painted", "tile": "ceramic", "parquet": "wood", "wallpa
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Looks:
-    """What a room's surfaces look like.
+    """The looks of a room's surfaces.
 
     Attributes:
         wall: its walls.
@@ -66,7 +66,7 @@ def looks_of(rng: np.random.Generator, room: Room, home: Looks | None) -> Looks:
     elif chance(rng, 0.6):
         wall_kind = "plaster"
     if home is None:
-        wall_kind = pick(rng, ("plaster", "plaster", "painted", "wallpaper"))  # what most rooms have
+        wall_kind = pick(rng, ("plaster", "plaster", "painted", "wallpaper"))  # the wall of most rooms
     plain = wall_kind in ("plaster", "painted")
     wall = surface(wall_kind, rng, _pale(rng) if plain else None)
     floor = surface(floor_kind, rng)
@@ -186,7 +186,7 @@ def hole_filling(rng: np.random.Generator, hole: Hole, wall_m: float, which: Fam
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leaf:
-    """What a door puts into a room: an oriented box round its leaf, top-down.
+    """The space that a door needs in a room: an oriented box round its leaf, top-down.
 
     Attributes:
         centre: its middle.

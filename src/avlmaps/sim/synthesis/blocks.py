@@ -1,4 +1,4 @@
-"""What synthetic sounds are made of: coloured noise, bands, ringing bodies, voices, and placing them in time."""
+"""Building blocks of synthetic sounds: coloured noise, bands, ringing bodies, voices, and placing them in time."""
 
 from collections.abc import Callable, Iterable, Sequence
 

@@ -1,4 +1,4 @@
-"""What hangs on walls: paintings and posters, composed by rule."""
+"""Pictures on walls: paintings and posters, composed by rule."""
 
 import colorsys
 
