@@ -124,9 +124,9 @@ def test_every_command_of_the_page_is_one_that_the_command_line_reads(entry):
     import tyro
 
     from avlmaps.cli.bench import Bench
-    from avlmaps.cli.main import _CONFIG
+    from avlmaps.cli.usage import CONFIG
 
-    bench = tyro.cli(Bench, args=shlex.split(entry.command)[2:], config=_CONFIG)
+    bench = tyro.cli(Bench, args=shlex.split(entry.command)[2:], config=CONFIG)
     if bench.suite == "indexing":
         assert bench.indexing_settings().sizes is not None
     if bench.suite == "navigation":

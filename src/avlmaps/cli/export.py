@@ -45,12 +45,22 @@ class Export(ModelVerb):
 
     def run(self) -> None:
         """Write the file."""
-        answer = _export(self)
-        files = ", ".join(f"{name} ({size_of(Path(name).stat().st_size)})" for name in answer["files"])
-        emit(answer, [f"wrote {files}"], self.json)
+        answer = export(self)
+        emit(answer, export_lines(answer), self.json)
 
 
-def _export(verb: Export) -> dict[str, Any]:
+def export_lines(answer: dict[str, Any]) -> list[str]:
+    """Lay out what `export` wrote."""
+    return ["wrote " + ", ".join(f"{name} ({size_of(Path(name).stat().st_size)})" for name in answer["files"])]
+
+
+def export(verb: Export, opened: "AVLMap | None" = None) -> dict[str, Any]:
+    """Write a map for other programs.
+
+    Args:
+        verb: what to write, and where.
+        opened: the map, where it is open already.
+    """
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.export import write_table
 
@@ -65,7 +75,7 @@ def _export(verb: Export) -> dict[str, Any]:
     there = [str(path) for path in written if path.exists()]
     if there and not verb.overwrite:
         raise UsageError(f"{' and '.join(there)} exists; give another --out, or replace it with --overwrite.")
-    opened = AVLMap.open(verb.map)
+    opened = AVLMap.open(verb.map) if opened is None else opened
     if kind == ".pgm":
         _write_grid(verb, opened)
     elif kind == ".csv":

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from jaxtyping import Float
 
     from avlmaps.core.motion import GroundPose
-    from avlmaps.language.translator import Translator
+    from avlmaps.language.translator import Translation, Translator
     from avlmaps.maps.obstacles import Obstacles
     from avlmaps.navigate.driver import Driver
     from avlmaps.navigate.interrupts import Halt
@@ -92,14 +92,14 @@ class Go(ModelVerb):
             if self.json:
                 emit({**stop.to_json(), "error": error_answer("interrupted", str(stop))}, (), as_json=True)
             raise
-        failed = _failure(answer)
+        failed = failure(answer)
         emit({**answer, "error": failed}, go_lines(answer), self.json)
         if failed is not None:
             raise AnsweredError(failed["message"])
 
 
 @dataclass(frozen=True, slots=True)
-class _Ready:
+class Ready:
     """A robot that is ready for a program.
 
     Attributes:
@@ -121,40 +121,41 @@ class _Ready:
 
 def go(verb: "Go") -> dict[str, Any]:
     """Do what the sentence says, and return the report."""
-    start = _start(verb.start)
+    start = read_start(verb.start)
     if verb.robot == "simulated" and verb.scene is None and not verb.dry_run:
         raise UsageError(
             "go needs --scene, in which the simulated robot drives, or --robot nav2|move_base, or --dry-run."
         )
     if verb.robot != "simulated" and (verb.scene or start):
         raise UsageError(f"--scene and --start belong to a simulated robot; --robot {verb.robot} is where it is.")
-    translator = _translator(verb)
+    translator = translator_for(verb)
     if verb.explain and verb.dry_run:
         from avlmaps.language.rules import explanation
 
         for line in explanation(translator, verb.sentence):
             say(line)
     if verb.dry_run:
-        translation = translator.program_for(verb.sentence)
-        return {
-            "plan": translation.plan,
-            "program": translation.program, "steps": [], "actions": [], "subgoals": [], "ok": True, "error": None,
-            "notes": list(translation.notes), "path_m": 0.0, "elapsed_s": 0.0, "frame": "recording",
-        }  # fmt: skip
+        return plan_answer(translator.program_for(verb.sentence))
     from avlmaps.navigate.interrupts import raised_signals
 
     with raised_signals():
         return _driven(verb, start)
 
 
+def plan_answer(translation: "Translation") -> dict[str, Any]:
+    """Return the answer for a command that is read and not obeyed."""
+    return {
+        "plan": translation.plan,
+        "program": translation.program, "steps": [], "actions": [], "subgoals": [], "ok": True, "error": None,
+        "notes": list(translation.notes), "path_m": 0.0, "elapsed_s": 0.0, "frame": "recording",
+    }  # fmt: skip
+
+
 def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
-    from avlmaps.navigate.instruct import instruct
-    from avlmaps.navigate.interrupts import Interrupted
-    from avlmaps.navigate.skills import RobotSettings
     from avlmaps.query.avlmap import AVLMap
 
     asked = AVLMap.open(verb.map)
-    translator = _translator(verb, asked)
+    translator = translator_for(verb, asked)
     if verb.explain:
         from avlmaps.language.rules import explanation
 
@@ -162,7 +163,29 @@ def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
             say(line)
     # A sentence that is not understood fails here, before a scene is made.
     translation = translator.program_for(verb.sentence)
-    robot = _in_scene(verb, asked, start) if verb.robot == "simulated" else _real(verb, asked)
+    robot = simulated_robot(verb, asked, start) if verb.robot == "simulated" else _real(verb, asked)
+    return drive(verb, asked, robot, translator, translation)
+
+
+def drive(
+    verb: "Go", asked: "AVLMap", robot: Ready, translator: "Translator", translation: "Translation"
+) -> dict[str, Any]:
+    """Run the program of a command on a robot, and close the robot's connection after it.
+
+    Args:
+        verb: the command, with what belongs to it.
+        asked: the map.
+        robot: what drives.
+        translator: made the program, and repairs it where it can.
+        translation: the program.
+
+    Raises:
+        Interrupted: a signal came; its ``halt`` says how the robot stands.
+    """
+    from avlmaps.navigate.instruct import instruct
+    from avlmaps.navigate.interrupts import Interrupted
+    from avlmaps.navigate.skills import RobotSettings
+
     settings = RobotSettings(guess=verb.guess)
     try:
         outcome = instruct(
@@ -182,7 +205,13 @@ def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
     return outcome.to_json()
 
 
-def _translator(verb: "Go", asked: "AVLMap | None" = None) -> "Translator":
+def translator_for(verb: "Go", asked: "AVLMap | None" = None) -> "Translator":
+    """Return what turns the command into a program.
+
+    Args:
+        verb: the command; it names the translator.
+        asked: the map, whose encoder may know words that the lexicon does not.
+    """
     from avlmaps.language.commands import Given
 
     came = Given(
@@ -200,7 +229,7 @@ def _translator(verb: "Go", asked: "AVLMap | None" = None) -> "Translator":
     return ChatTranslator(given)
 
 
-def _start(words: str | None) -> "GroundPose | None":
+def read_start(words: str | None) -> "GroundPose | None":
     """Read ``x,y,heading``, the heading in degrees; None stays None."""
     from avlmaps.core.motion import GroundPose
 
@@ -215,7 +244,8 @@ def _start(words: str | None) -> "GroundPose | None":
         raise UsageError(f"--start takes x,y,heading in metres and degrees, such as 1.5,2,90; not {words!r}.") from None
 
 
-def _in_scene(verb: "Go", asked: "AVLMap", start: "GroundPose | None") -> _Ready:
+def simulated_robot(verb: "Go", asked: "AVLMap", start: "GroundPose | None") -> Ready:
+    """Put a simulated robot into the scene that was mapped."""
     from avlmaps.demo.driving import robot_in
     from avlmaps.navigate.bodies import SHAPES
     from avlmaps.navigate.interrupts import Halt
@@ -223,10 +253,10 @@ def _in_scene(verb: "Go", asked: "AVLMap", start: "GroundPose | None") -> _Ready
 
     robot = robot_in(asked, open_scene(verb.scene or ""), SHAPES[verb.body], start)
     halt = Halt(True, "the simulated robot moves only while the command runs")
-    return _Ready(robot.driver, robot.start, robot.obstacles, lambda: robot.met, lambda: halt, lambda: None)
+    return Ready(robot.driver, robot.start, robot.obstacles, lambda: robot.met, lambda: halt, lambda: None)
 
 
-def _real(verb: "Go", asked: "AVLMap") -> _Ready:
+def _real(verb: "Go", asked: "AVLMap") -> Ready:
     from avlmaps.navigate.bodies import SHAPES
     from avlmaps.navigate.costmap import obstacles_for
     from avlmaps.navigate.ros import Frames, RosSettings, open_ros_driver
@@ -237,10 +267,10 @@ def _real(verb: "Go", asked: "AVLMap") -> _Ready:
     obstacles = obstacles_for(asked, SHAPES[verb.body])
     kind = "nav2" if verb.robot == "nav2" else "move_base"
     driver = open_ros_driver(kind, verb.ros, frames, obstacles, settings=settings, guarded=True)
-    return _Ready(driver, driver.pose, obstacles, lambda: None, driver.halt, driver.close)
+    return Ready(driver, driver.pose, obstacles, lambda: None, driver.halt, driver.close)
 
 
-def _failure(answer: dict[str, Any]) -> dict[str, Any] | None:
+def failure(answer: dict[str, Any]) -> dict[str, Any] | None:
     """Return why a command was not obeyed to its end, as ``error`` in JSON has it; None where it was."""
     if answer["ok"]:
         return None

@@ -98,11 +98,11 @@ def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]
     stored = open_stored(path, verify=verify)
     told = described(stored)
     if plot is not None:
-        told["plot"] = str(_plotted(stored, plot))
+        told["plot"] = str(plot_named(stored, plot))
     return told
 
 
-def _plotted(stored: "StoredMap", plot: Path) -> Path:
+def plot_named(stored: "StoredMap", plot: Path) -> Path:
     """Draw a map with the names of its things and rooms, as far as its models are here."""
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.plots import plot_map

@@ -12,6 +12,7 @@ from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
     from avlmaps.core.camera import Pinhole
+    from avlmaps.query.avlmap import AVLMap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,15 +37,24 @@ class Locate(ModelVerb):
         emit(answer, locate_lines(answer), self.json)
 
 
-def locate_photo(map_path: Path, picture: Path, intrinsics: str | None) -> dict[str, Any]:
-    """Locate a photo."""
+def locate_photo(
+    map_path: Path, picture: Path, intrinsics: str | None, opened: "AVLMap | None" = None
+) -> dict[str, Any]:
+    """Locate a photo.
+
+    Args:
+        map_path: folder of the map.
+        picture: the photo.
+        intrinsics: ``fx,fy,cx,cy`` of its camera; None for those of the map's own.
+        opened: the map, where it is open already.
+    """
     from avlmaps.core.poses import FRAME
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.modalities.image import read_picture
 
     rgb = read_picture(picture)
     given = None if intrinsics is None else camera_of(intrinsics, rgb.shape[1], rgb.shape[0])
-    found = AVLMap.open(map_path).locate(rgb, given)
+    found = (AVLMap.open(map_path) if opened is None else opened).locate(rgb, given)
     pose, camera = found.world_from_camera, found.camera
     if pose is not None and given is not None and camera != given:
         say(f"note: the focal length {given.fx:g} does not fit the photo; {camera.fx:.1f} was used.")

@@ -2,7 +2,6 @@
 
 import io
 import os
-import re
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stderr, suppress
@@ -19,12 +18,14 @@ from avlmaps.cli.go import Go
 from avlmaps.cli.import_map import ImportMap
 from avlmaps.cli.info import Info
 from avlmaps.cli.locate import Locate
-from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_of
+from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_of, system_sentence
 from avlmaps.cli.profiles import Profiles
 from avlmaps.cli.query import Query
 from avlmaps.cli.record import Record
+from avlmaps.cli.shell import Shell
 from avlmaps.cli.teach_sound import TeachSound
 from avlmaps.cli.things import Things
+from avlmaps.cli.usage import CONFIG, usage_sentence
 from avlmaps.cli.verb import Verb, models_in_force
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.printable import printable
@@ -45,6 +46,7 @@ VERBS: dict[str, type[Verb]] = {
     "info": Info,
     "query": Query,
     "things": Things,
+    "shell": Shell,
     "export": Export,
     "locate": Locate,
     "go": Go,
@@ -52,8 +54,6 @@ VERBS: dict[str, type[Verb]] = {
     "profiles": Profiles,
     "bench": Bench,
 }
-_CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff)
-_SHOWN = 200
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -82,7 +82,7 @@ def _main(words: list[str]) -> None:
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # avlmaps reports a truncated picture in its own words
     shortly = not words or words[0].startswith("-")
     with _usage_in_json() if _wants_json(words) else nullcontext():
-        verb = tyro.cli(_any_verb(shortly), prog="avlmaps", description=_DESCRIPTION, args=words, config=_CONFIG)
+        verb = tyro.cli(_any_verb(shortly), prog="avlmaps", description=_DESCRIPTION, args=words, config=CONFIG)
     sys.exit(_run(verb))
 
 
@@ -101,10 +101,7 @@ def _usage_in_json() -> Iterator[None]:
     except SystemExit as stop:
         sys.stderr.write(told.getvalue())
         if stop.code not in (0, None):
-            # a title, a rule, what is wrong, a rule, and help
-            parts = re.split(r"\n *[-─]{3,} *\n", re.sub("[╭╮╰╯│]", " ", told.getvalue()))
-            message = " ".join(parts[min(1, len(parts) - 1)].split())
-            emit({"error": error_answer("usage", message)}, (), as_json=True)
+            emit({"error": error_answer("usage", usage_sentence(told.getvalue()))}, (), as_json=True)
         raise
 
 
@@ -132,7 +129,7 @@ def _run(verb: Verb) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except (OSError, MemoryError) as error:
-        return _fail(verb, error, _sentence(error), 1)
+        return _fail(verb, error, system_sentence(error), 1)
     except KeyboardInterrupt as stop:
         if (status := getattr(stop, "status", None)) is not None:  # of a robot that was driving; its answer is printed
             return _complain(stop, status)
@@ -163,17 +160,6 @@ def _emit_error(error: BaseException, message: str) -> None:
     """Print an error as JSON, unless standard output is what failed."""
     with suppress(OSError):
         emit({"error": error_answer(kind_of(error), message)}, (), as_json=True)
-
-
-def _sentence(error: OSError | MemoryError) -> str:
-    """Return what the system refused, without its numbers for it."""
-    if isinstance(error, MemoryError):
-        return "there is not enough memory for this; check the sizes in the input, or free some"
-    if error.filename is None or error.strerror is None:
-        return f"{error.strerror or error}; check the files and the space on the disk."
-    name = str(error.filename)
-    shown = name if len(name) <= _SHOWN else f"{name[: _SHOWN // 2]}...{name[-_SHOWN // 2 :]}"
-    return f"{shown}: {error.strerror}; check the path, its permissions and the space on the disk."
 
 
 def _complain(what: object, status: int) -> int:

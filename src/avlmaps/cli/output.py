@@ -17,6 +17,20 @@ class AnsweredError(Exception):
     """A verb failed and its answer, which is printed already, says why; exit status 1."""
 
 
+_SHOWN = 200
+
+
+def system_sentence(error: OSError | MemoryError) -> str:
+    """Return what the system refused, without its numbers for it."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory for this; check the sizes in the input, or free some"
+    if error.filename is None or error.strerror is None:
+        return f"{error.strerror or error}; check the files and the space on the disk."
+    name = str(error.filename)
+    shown = name if len(name) <= _SHOWN else f"{name[: _SHOWN // 2]}...{name[-_SHOWN // 2 :]}"
+    return f"{shown}: {error.strerror}; check the path, its permissions and the space on the disk."
+
+
 def error_answer(kind: str, message: str) -> dict[str, Any]:
     """Return an error as it stands in an answer, under the key ``error``."""
     return {"kind": kind, "message": message}

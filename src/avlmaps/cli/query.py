@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from avlmaps.core.camera import Pinhole
     from avlmaps.core.question import Part
     from avlmaps.query.answer import Answer
-    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.avlmap import AVLMap, QuerySettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,8 +61,13 @@ class Query(ModelVerb):
         emit(answer, query_lines(answer), self.json)
 
 
-def ask(verb: "Query") -> dict[str, Any]:
-    """Query a map with a sentence or with parts."""
+def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
+    """Query a map with a sentence or with parts.
+
+    Args:
+        verb: the query.
+        opened: the map, where it is open already.
+    """
     from avlmaps.core.question import Modality, Question
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.rules import query_settings
@@ -76,12 +81,20 @@ def ask(verb: "Query") -> dict[str, Any]:
         )
     if verb.top < 1:
         raise UsageError(f"--top is {verb.top}; it must be 1 or more.")
-    asked = AVLMap.open(verb.map, query_settings(verb.rules))
+    settings = query_settings(verb.rules)
+    asked = AVLMap.open(verb.map, settings) if opened is None else _by_rules(opened, settings)
     if verb.sentence.strip():
         return _asked_in_words(verb, asked)
     question = Question.of(parts, Modality(verb.primary) if verb.primary else None)
     camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
     return _plotted(verb, asked.ask(question, top=verb.top, intrinsics=camera))
+
+
+def _by_rules(opened: "AVLMap", settings: "QuerySettings") -> "AVLMap":
+    """Return an opened map under other settings; the map itself where they are the same."""
+    from avlmaps.query.avlmap import AVLMap
+
+    return opened if opened.settings == settings else AVLMap(opened.stored, settings)
 
 
 _MOST_COUNTED, _AS_LIKELY = 200, 0.5  # instances count that score at least half of the best one

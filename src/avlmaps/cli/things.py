@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, emit, place, table_lines
 from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.progress import say
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,17 +36,23 @@ class Things(ModelVerb):
 
     def run(self) -> None:
         """List the map's contents."""
-        answer = _contents(self)
-        emit(answer, _lines(answer), self.json)
+        answer = contents(self)
+        emit(answer, contents_lines(answer), self.json)
 
 
-def _contents(verb: Things) -> dict[str, Any]:
+def contents(verb: Things, opened: "AVLMap | None" = None) -> dict[str, Any]:
+    """List the things, sounds and rooms of a map.
+
+    Args:
+        verb: what to list.
+        opened: the map, where it is open already.
+    """
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.export import write_table
 
     if not 0.0 <= verb.least <= 1.0:
         raise UsageError(f"--least takes a confidence from 0 to 1, not {verb.least:g}.")
-    opened = AVLMap.open(verb.map)
+    opened = AVLMap.open(verb.map) if opened is None else opened
     models = opened.stored.info.models
     things = opened.things(verb.name or None, verb.least, verb.structure) if "pixels" in models else []
     sounds, rooms = opened.sounds(), opened.rooms() if "views" in models else []
@@ -58,24 +67,39 @@ def _contents(verb: Things) -> dict[str, Any]:
     }
 
 
-def _lines(answer: dict[str, Any]) -> list[str]:
-    lines: list[str] = []
-    if answer["things"]:
-        rows = [
-            (t["name"], f"{t['confidence']:.2f}", place(t["position"]), " x ".join(f"{side:.2f}" for side in t["size"]))
-            for t in answer["things"]
-        ]
-        lines += table_lines(("thing", "confidence", "position", "size in m"), rows)
-    else:
-        lines.append("no things with this confidence; lower --least to list less certain ones")
-    if answer["sounds"]:
-        rows = [
-            (", ".join(f"{n} {c:.2f}" for n, c in zip(s["names"], s["confidences"], strict=True)) or "unnamed",
-             f"{s['onset_s']:.1f} - {s['offset_s']:.1f} s", place(s["position"]))
-            for s in answer["sounds"]
-        ]  # fmt: skip
-        lines += ["", *table_lines(("sound", "time", "position of the robot"), rows)]
-    if answer["rooms"]:
-        rows = [(r["name"], f"{r['confidence']:.2f}", place(r["position"]), str(r["views"])) for r in answer["rooms"]]
-        lines += ["", *table_lines(("room", "confidence", "position", "views"), rows)]
-    return lines
+def contents_lines(answer: dict[str, Any]) -> list[str]:
+    """Lay out what `things` reports: three tables with an empty line between them."""
+    lines = thing_lines(answer["things"])
+    lines += ["", *sound_lines(answer["sounds"])] if answer["sounds"] else []
+    return [*lines, "", *room_lines(answer["rooms"])] if answer["rooms"] else lines
+
+
+def thing_lines(things: list[dict[str, Any]]) -> list[str]:
+    """Lay out things as a table."""
+    if not things:
+        return ["no things with this confidence; lower --least to list less certain ones"]
+    rows = [
+        (t["name"], f"{t['confidence']:.2f}", place(t["position"]), " x ".join(f"{side:.2f}" for side in t["size"]))
+        for t in things
+    ]
+    return table_lines(("thing", "confidence", "position", "size in m"), rows)
+
+
+def sound_lines(sounds: list[dict[str, Any]]) -> list[str]:
+    """Lay out sounds as a table, in the order of their onset."""
+    if not sounds:
+        return ["no sounds"]
+    rows = [
+        (", ".join(f"{n} {c:.2f}" for n, c in zip(s["names"], s["confidences"], strict=True)) or "unnamed",
+         f"{s['onset_s']:.1f} - {s['offset_s']:.1f} s", place(s["position"]))
+        for s in sounds
+    ]  # fmt: skip
+    return table_lines(("sound", "time", "position of the robot"), rows)
+
+
+def room_lines(rooms: list[dict[str, Any]]) -> list[str]:
+    """Lay out rooms as a table, those with most views first."""
+    if not rooms:
+        return ["no rooms"]
+    rows = [(r["name"], f"{r['confidence']:.2f}", place(r["position"]), str(r["views"])) for r in rooms]
+    return table_lines(("room", "confidence", "position", "views"), rows)

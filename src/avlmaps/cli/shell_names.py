@@ -1,0 +1,107 @@
+"""What the prompt of `avlmaps shell` completes: verbs, names of things, sounds and rooms, and file names."""
+
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from prompt_toolkit.completion import CompleteEvent, Completer, Completion
+from prompt_toolkit.document import Document
+
+from avlmaps.core.lexicon import lexicon
+from avlmaps.core.printable import UNSAFE
+
+_MOST_WORDS = 4  # of a name that is being typed
+_MOST_SHOWN = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Completed:
+    """One way to go on.
+
+    Attributes:
+        text: what stands there then.
+        start: how many characters before the cursor it replaces.
+        note: shown beside it.
+    """
+
+    text: str
+    start: int
+    note: str = ""
+
+
+def completions(line: str, verbs: Sequence[str], file_verbs: Sequence[str], here: Iterable[str]) -> list[Completed]:
+    """Return what a line may go on with, at most 40.
+
+    Args:
+        line: what stands before the cursor.
+        verbs: the words that a line may begin with.
+        file_verbs: those of them that take a file.
+        here: names of what this map holds; these come first.
+    """
+    first, blank, rest = line.lstrip().partition(" ")
+    if blank and first in file_verbs:
+        return list(_files(rest.lstrip()))[:_MOST_SHOWN]
+    found = [] if blank else [Completed(verb, len(first), "verb") for verb in verbs if verb.startswith(first.lower())]
+    words = line.split(" ")
+    for count in range(min(_MOST_WORDS, len(words)), 0, -1):
+        named = list(_named(" ".join(words[-count:]), here))
+        if named:
+            found += named
+            break
+    return found[:_MOST_SHOWN] if line.strip() else []
+
+
+def _named(typed: str, here: Iterable[str]) -> Iterator[Completed]:
+    """Yield the names that begin so; those of this map first."""
+    if not typed.strip() or typed[0] == " ":
+        return
+    names = dict.fromkeys(_lexicon_names(), "") | dict.fromkeys(here, "in this map")
+    for name in sorted(names, key=lambda one: (not names[one], one)):
+        if name.startswith(typed.lower()) and not UNSAFE.search(name):
+            yield Completed(name, len(typed), names[name])
+
+
+@cache
+def _lexicon_names() -> tuple[str, ...]:
+    words = lexicon()
+    names = {name for entry in words.entries() for name in (entry.name, *entry.synonyms)}
+    return tuple(sorted(names | {*words.colours, *words.materials}))
+
+
+def _files(typed: str) -> Iterator[Completed]:
+    """Yield the files and folders whose names begin so, written as the shell reads them back."""
+    plain = typed.replace("\\ ", " ").strip("'\"")
+    folder, _, begin = plain.rpartition("/")
+    base = Path(f"{folder}/" if plain.startswith("/") else folder or ".").expanduser()
+    try:
+        entries = sorted(base.iterdir())
+    except OSError:
+        return
+    for entry in entries:
+        name = entry.name
+        if not name.startswith(begin) or UNSAFE.search(name) or (name.startswith(".") and not begin):
+            continue
+        whole = f"{folder}/{name}" if "/" in plain else name
+        yield Completed(shlex.quote(whole) + ("/" if entry.is_dir() else ""), len(typed))
+
+
+class NameCompleter(Completer):
+    """Completes at the prompt."""
+
+    def __init__(self, verbs: Sequence[str], file_verbs: Sequence[str], here: Callable[[], Iterable[str]]) -> None:
+        """Take what completes.
+
+        Args:
+            verbs: the words that a line may begin with.
+            file_verbs: those of them that take a file.
+            here: returns the names of what the map holds.
+        """
+        self._verbs, self._file_verbs, self._here = verbs, file_verbs, here
+
+    def get_completions(self, document: Document, complete_event: CompleteEvent) -> Iterator[Completion]:
+        """Yield the completions of what stands before the cursor."""
+        found = completions(document.text_before_cursor, self._verbs, self._file_verbs, tuple(self._here()))
+        for one in found:
+            yield Completion(one.text, -one.start, display_meta=one.note)
