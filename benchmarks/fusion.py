@@ -37,7 +37,7 @@ def kitchen_frames(count: int) -> list[Frame]:
         depth = cv2.imread(str(path), cv2.IMREAD_UNCHANGED).astype(np.float32) / 1000.0
         depth[depth > 60.0] = 0.0
         rgb = np.ascontiguousarray(cv2.imread(str(path).replace("depth.png", "color.jpg"))[..., ::-1])
-        pose = poses.orthonormalized(np.loadtxt(str(path).replace("depth.png", "pose.txt")), path.name)
+        pose = poses.orthonormalize(np.loadtxt(str(path).replace("depth.png", "pose.txt")), path.name)
         frames.append(Frame(len(frames), path.name, len(frames) / 15, rgb, depth, pose, rig))
     return frames
 

@@ -14,8 +14,8 @@ import numpy as np  # noqa: E402
 
 from avlmaps.bench.locate import MapOfPictures  # noqa: E402
 from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
-from avlmaps.maps.keyframes import SeenKeyframe, assembled  # noqa: E402
-from avlmaps.perception.embedded.matching import RATIO, matched  # noqa: E402
+from avlmaps.maps.keyframes import SeenKeyframe, stack_keyframes  # noqa: E402
+from avlmaps.perception.embedded.matching import RATIO, match_mutual  # noqa: E402
 from avlmaps.perception.pose import estimate_pose  # noqa: E402
 from avlmaps.perception.profiles import profile  # noqa: E402
 from avlmaps.query.locate import alike, locate  # noqa: E402
@@ -56,7 +56,7 @@ def made_map(walls: list[np.ndarray], rng: np.random.Generator) -> MapOfPictures
         place = used.place_encoder().encode(rgb, one, state)
         none = np.zeros(0, np.float32)
         seen.append(SeenKeyframe(float(number), pose, points.mean(axis=0), none, place, one, points, b""))
-    return MapOfPictures(assembled(seen), state, used, Rig(CAMERA, CAMERA))
+    return MapOfPictures(stack_keyframes(seen), state, used, Rig(CAMERA, CAMERA))
 
 
 def by_opencv(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -102,7 +102,7 @@ def measure(stored: MapOfPictures, photos: list[np.ndarray]) -> dict[str, float]
         best = int(timed("retrieval", alike, keyframes, place, 5)[0])
         rows = slice(keyframes.offsets[best], keyframes.offsets[best + 1])
         other = keyframes.descriptors[rows].astype(np.float32)
-        pairs = timed("matching, ours", matched, local.descriptors, other)
+        pairs = timed("matching, ours", match_mutual, local.descriptors, other)
         timed("matching, cv2 brute force", by_opencv, local.descriptors, other)
         timed("matching, cv2 FLANN", by_flann, local.descriptors, other)
         xy, points = local.xy[pairs[:, 0]], keyframes.points_world[rows][pairs[:, 1]]

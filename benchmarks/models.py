@@ -106,9 +106,9 @@ def measure(name: str, folder: Path, asked: Namespace) -> dict[str, object]:
         encoder: Any = load(kind, name)
         import torch
 
-        from avlmaps.perception.models.device import chosen_device
+        from avlmaps.perception.models.device import select_device
 
-        device = chosen_device()
+        device = select_device()
         on_gpu = device.type != "cpu"
         batch, work = task(kind, encoder, on_gpu, asked)
         # A GPU is waited for; on a busy CPU waiting must not count, which only one thread can separate.

@@ -51,11 +51,11 @@ print(json.dumps({"open_s": opened - before, "features": mapped, "then_5000_rows
 MERGE = """
 from pathlib import Path
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.partial_maps import add_up, load_part
+from avlmaps.maps.partial_maps import sum_parts, load_part
 from avlmaps.maps.store.array_files import write_array
 before = time.perf_counter()
 folders = sorted(Path(sys.argv[1]).glob("part*"))
-voxels = add_up([load_part(folder, verify=False) for folder in folders], GridSpec()).voxels()
+voxels = sum_parts([load_part(folder, verify=False) for folder in folders], GridSpec()).voxels()
 merged = time.perf_counter()
 write_array(Path(sys.argv[1]), "feature", voxels.feature)
 print(json.dumps({"parts": len(folders), "voxels": len(voxels), "merge_s": merged - before,

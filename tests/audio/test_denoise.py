@@ -7,10 +7,10 @@ from audio_fakes import RATE_HZ, quiet, tone
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.maps.audio.denoise import NoiseProfile, denoised, denoised_blocks, noise_profile
+from avlmaps.maps.audio.denoise import NoiseProfile, denoise, denoise_blocks, noise_profile
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.background import background
-from avlmaps.recordings.clips import amplified, audible_part, find_clips, loudness_db
+from avlmaps.recordings.clips import amplify, audible_part, find_clips, loudness_db
 
 
 def noise(seconds: int, kind: str, seed: int = 0) -> np.ndarray:
@@ -31,7 +31,7 @@ def snr_db(clean: np.ndarray, heard: np.ndarray) -> float:
 def test_noise_gets_quieter_and_a_tone_stays(kind: str) -> None:
     clean = np.concatenate([quiet(1.0), tone(2.0, level=0.05), quiet(1.0)])
     noisy = clean + noise(4, kind, seed=1)
-    heard = denoised(Sound(noisy, RATE_HZ), profile(kind)).samples
+    heard = denoise(Sound(noisy, RATE_HZ), profile(kind)).samples
     assert snr_db(clean, heard) > snr_db(clean, noisy) + 6.0
     inner = slice(int(1.2 * RATE_HZ), int(2.8 * RATE_HZ))
     assert np.dot(heard[inner], clean[inner]) / np.dot(clean[inner], clean[inner]) == pytest.approx(1.0, abs=0.05)
@@ -41,15 +41,15 @@ def test_a_clean_sound_comes_out_as_it_went_in() -> None:
     silent = noise_profile([Sound(quiet(1.0), RATE_HZ)])
     assert silent is not None
     sound = Sound(tone(1.0) + noise(1, "white"), RATE_HZ)
-    np.testing.assert_allclose(denoised(sound, silent).samples, sound.samples, atol=1e-6)
+    np.testing.assert_allclose(denoise(sound, silent).samples, sound.samples, atol=1e-6)
 
 
 @given(count=st.integers(1, 20_000), cuts=st.lists(st.integers(0, 20_000), max_size=6))
 def test_how_it_is_cut_into_blocks_changes_nothing(count: int, cuts: list[int]) -> None:
     samples = noise(2, "white")[:count]
-    at_once = denoised(Sound(samples, RATE_HZ), profile()).samples
+    at_once = denoise(Sound(samples, RATE_HZ), profile()).samples
     pieces = [Sound(piece, RATE_HZ) for piece in np.split(samples, sorted(min(cut, count) for cut in cuts))]
-    joined = np.concatenate([block.samples for block in denoised_blocks(pieces, profile())])
+    joined = np.concatenate([block.samples for block in denoise_blocks(pieces, profile())])
     assert len(at_once) == len(joined) == count
     np.testing.assert_allclose(joined, at_once, atol=1e-6)
 
@@ -69,7 +69,7 @@ def test_a_click_in_the_quiet_does_not_count() -> None:
 
 def test_another_rate_than_the_profiles_is_refused() -> None:
     with pytest.raises(ValueError, match="a block has 8000 samples a second, the profile is for 16000"):
-        denoised(Sound(quiet(1.0), 8_000), profile())
+        denoise(Sound(quiet(1.0), 8_000), profile())
 
 
 @pytest.mark.shared
@@ -78,8 +78,8 @@ def test_real_sounds_in_noise_come_out_clearer(shared_data: Path) -> None:
     gained = []
     for i, clip in enumerate(clips):
         sound = audible_part(clip, RATE_HZ)
-        clean = amplified(sound, -30.0 - loudness_db(sound)).samples
+        clean = amplify(sound, -30.0 - loudness_db(sound)).samples
         noisy = clean + noise(7, "pink", seed=i + 1)[: len(clean)]
-        gained.append(snr_db(clean, denoised(Sound(noisy, RATE_HZ), profile()).samples) - snr_db(clean, noisy))
+        gained.append(snr_db(clean, denoise(Sound(noisy, RATE_HZ), profile()).samples) - snr_db(clean, noisy))
     assert min(gained) > -1.0
     assert np.mean(gained) > 2.5

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError, BackendError
-from avlmaps.maps.audio.events import HearingSettings, hear
+from avlmaps.maps.audio.events import HearingSettings, detect_events
 from avlmaps.maps.audio.events import track_of as places_of
 from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings, segment
 from avlmaps.recordings.audio import AudioTrack
@@ -18,7 +18,7 @@ PLAIN = HearingSettings()
 def test_every_sound_has_its_time_its_places_its_feature_and_its_clip(tmp_path: Path) -> None:
     track = track_of(tmp_path / "a.flac", quiet(2.0), tone(1.0), quiet(3.0), tone(7.0, hz=400.0), quiet(3.0))
     walk = straight_walk(16.0, 0.5, track)
-    heard = hear(walk, FakeEncoder(), PLAIN, tmp_path / "clips")
+    heard = detect_events(walk, FakeEncoder(), PLAIN, tmp_path / "clips")
     assert len(heard) == 2
     np.testing.assert_allclose(heard.onset_s, [2.0, 6.0], atol=0.05)
     np.testing.assert_allclose(heard.offset_s, [3.0, 13.0], atol=0.05)
@@ -34,7 +34,7 @@ def test_every_sound_has_its_time_its_places_its_feature_and_its_clip(tmp_path: 
 
 def test_a_long_sound_is_encoded_whole(tmp_path: Path) -> None:
     encoder = FakeEncoder()
-    hear(
+    detect_events(
         straight_walk(20.0, 0.5, track_of(tmp_path / "a.flac", quiet(2.0), tone(12.0), quiet(2.0))),
         encoder,
         PLAIN,
@@ -46,7 +46,7 @@ def test_a_long_sound_is_encoded_whole(tmp_path: Path) -> None:
 @pytest.mark.parametrize("audio", ["none", "silent"])
 def test_without_anything_to_hear_the_shapes_are_right(tmp_path: Path, audio: str) -> None:
     track = None if audio == "none" else track_of(tmp_path / "a.flac", quiet(3.0))
-    heard = hear(straight_walk(3.0, 0.5, track), FakeEncoder(), PLAIN, tmp_path / "clips")
+    heard = detect_events(straight_walk(3.0, 0.5, track), FakeEncoder(), PLAIN, tmp_path / "clips")
     assert len(heard) == 0
     assert (heard.track.shape, heard.feature.shape, heard.clips) == ((0, 3), (0, 4), ())
     assert (heard.track_offsets.tolist(), heard.feature_offsets.tolist()) == ([0], [0])
@@ -57,7 +57,7 @@ def test_sounds_outside_the_frames_get_the_nearest_place_and_a_notice(
 ) -> None:
     track = track_of(tmp_path / "a.flac", tone(0.5), quiet(4.0), tone(0.5), start_s=-3.0)
     walk = FakeWalk(np.array([0.0, 0.5, 1.0]), np.array([[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]), track)
-    heard = hear(walk, FakeEncoder(), PLAIN, tmp_path / "clips")
+    heard = detect_events(walk, FakeEncoder(), PLAIN, tmp_path / "clips")
     np.testing.assert_array_equal(heard.track, [[1.0, 0.0, 0.0], [3.0, 0.0, 0.0]])
     assert (
         "note: 2 of 2 sounds lie outside the frames, 0.00 to 1.00 s, the first at -3.00 s;" in capsys.readouterr().err
@@ -82,8 +82,8 @@ def test_noise_is_reduced_before_the_encoder_but_not_in_the_clip(tmp_path: Path)
     noise = np.random.default_rng(0).normal(0.0, 0.02, 9 * RATE_HZ).astype(np.float32)
     track = track_of(tmp_path / "a.flac", np.concatenate([quiet(4.0), tone(1.0), quiet(4.0)]) + noise)
     walk, raw, clean = straight_walk(9.0, 0.5, track), FakeEncoder(), FakeEncoder()
-    heard = hear(walk, raw, HearingSettings(noise_reduction_db=0.0), tmp_path / "clips")
-    hear(walk, clean, PLAIN, tmp_path / "clips")
+    heard = detect_events(walk, raw, HearingSettings(noise_reduction_db=0.0), tmp_path / "clips")
+    detect_events(walk, clean, PLAIN, tmp_path / "clips")
     ideal = tone(9.0)[: len(raw.heard[0].samples)]
 
     def background(samples: np.ndarray) -> float:
@@ -103,7 +103,7 @@ def test_an_encoder_that_breaks_its_promise_is_named(tmp_path: Path) -> None:
 
     track = track_of(tmp_path / "a.flac", quiet(1.0), tone(0.5), quiet(1.0))
     with pytest.raises(BackendError, match=r"The sound model test/loudness returned features of \(0, 4\) for 0.5"):
-        hear(straight_walk(3.0, 0.5, track), Broken(), PLAIN, tmp_path / "clips")
+        detect_events(straight_walk(3.0, 0.5, track), Broken(), PLAIN, tmp_path / "clips")
 
 
 def test_settings_that_make_no_sense_are_told() -> None:
@@ -114,6 +114,6 @@ def test_settings_that_make_no_sense_are_told() -> None:
 def test_the_same_segments_are_heard_as_segmented(tmp_path: Path) -> None:
     track = track_of(tmp_path / "a.flac", quiet(1.0), tone(0.3), quiet(2.0), tone(0.3), quiet(1.0))
     chosen = HearingSettings(SegmentationSettings(padding_s=0.1))
-    heard = hear(straight_walk(4.0, 0.5, track), FakeEncoder(), chosen, tmp_path / "clips")
+    heard = detect_events(straight_walk(4.0, 0.5, track), FakeEncoder(), chosen, tmp_path / "clips")
     expected = segment(track, chosen.segmentation)
     np.testing.assert_array_equal(heard.onset_s, [one.onset_s for one in expected])

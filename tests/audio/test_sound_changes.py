@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError, BackendError
-from avlmaps.maps.audio.change_points import ChangeSettings, cut_at_changes, frames_of_track
-from avlmaps.maps.audio.events import HearingSettings, hear
+from avlmaps.maps.audio.change_points import ChangeSettings, frames_of_track, split_at_changes
+from avlmaps.maps.audio.events import HearingSettings, detect_events
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.perception.protocols import FrameSoundEncoder, ModelCard
 from avlmaps.recordings.audio import Sound
@@ -71,7 +71,7 @@ def test_no_division_is_better_than_the_one_that_is_found(
     kind = np.sort(rng.integers(0, changes + 1, count))
     rows = unit(rng.standard_normal((changes + 1, 3))[kind] + 0.2 * rng.standard_normal((count, 3)))
     chosen = ChangeSettings(change_s=shortest * HOP_S, max_length_s=longest * HOP_S + 1e-9)
-    edges = cut_at_changes(rows, HOP_S, chosen).tolist()
+    edges = split_at_changes(rows, HOP_S, chosen).tolist()
     assert edges[0] == 0
     assert edges[-1] == count
     costs = [spread(rows, one) + shortest * (len(one) - 1) for one in every_division(count, shortest, longest)]
@@ -84,7 +84,7 @@ def test_edges_are_where_the_features_change_whatever_the_noise_on_them(lengths:
     rng = np.random.default_rng(seed)
     kinds = np.arange(len(lengths)) % 4
     rows = unit(np.eye(64)[np.repeat(kinds, lengths)] + 0.05 * rng.standard_normal((sum(lengths), 64)))
-    edges = cut_at_changes(rows, HOP_S, ChangeSettings(max_length_s=60 * HOP_S))
+    edges = split_at_changes(rows, HOP_S, ChangeSettings(max_length_s=60 * HOP_S))
     np.testing.assert_array_equal(edges, np.cumsum([0, *lengths]))
 
 
@@ -92,7 +92,7 @@ def test_edges_are_where_the_features_change_whatever_the_noise_on_them(lengths:
 @given(seed=st.integers(0, 1000), count=st.integers(0, 700))
 def test_stretches_are_disjoint_whole_and_of_the_asked_lengths(seed: int, count: int) -> None:
     rows = unit(np.random.default_rng(seed).standard_normal((count, 6)))
-    edges = cut_at_changes(rows, HOP_S, ChangeSettings(change_s=0.2, max_length_s=2.0))
+    edges = split_at_changes(rows, HOP_S, ChangeSettings(change_s=0.2, max_length_s=2.0))
     assert edges[0] == 0
     assert edges[-1] == count
     if count > 5:
@@ -102,14 +102,14 @@ def test_stretches_are_disjoint_whole_and_of_the_asked_lengths(seed: int, count:
 
 def test_what_does_not_change_is_cut_only_because_it_is_long() -> None:
     rows = np.tile(np.eye(4, dtype=np.float32)[0], (250, 1))
-    assert len(cut_at_changes(rows, HOP_S, ChangeSettings(max_length_s=20.0))) == 2
-    assert len(cut_at_changes(rows, HOP_S, ChangeSettings(max_length_s=5.0))) == 3
+    assert len(split_at_changes(rows, HOP_S, ChangeSettings(max_length_s=20.0))) == 2
+    assert len(split_at_changes(rows, HOP_S, ChangeSettings(max_length_s=5.0))) == 3
 
 
 def test_a_track_is_divided_by_its_sounds_loud_or_hardly_audible(tmp_path: Path) -> None:
     pieces = [tone(2.0, 300.0), tone(1.2, 1000.0, level=0.001), tone(1.6, 3000.0), tone(1.2, 300.0, level=0.002)]
     track = track_of(tmp_path / "a.flac", *pieces)
-    heard = hear(straight_walk(6.0, 0.5, track), FakeFrames(), HearingSettings(), tmp_path / "clips")
+    heard = detect_events(straight_walk(6.0, 0.5, track), FakeFrames(), HearingSettings(), tmp_path / "clips")
     np.testing.assert_allclose(heard.onset_s, [0.0, 2.0, 3.2, 4.8], atol=1e-6)
     np.testing.assert_allclose(heard.offset_s, [2.0, 3.2, 4.8, 6.0], atol=1e-6)
     np.testing.assert_array_equal(np.diff(heard.feature_offsets), [50, 30, 40, 30])
@@ -124,23 +124,23 @@ def test_a_track_is_divided_by_its_sounds_loud_or_hardly_audible(tmp_path: Path)
 def test_other_encoders_and_the_choice_of_energy_cut_as_before(tmp_path: Path) -> None:
     track = track_of(tmp_path / "a.flac", quiet(2.0), tone(1.0), quiet(3.0))
     walk = straight_walk(6.0, 0.5, track)
-    plain = hear(walk, FakeEncoder(), HearingSettings(), tmp_path / "1")
-    by_energy = hear(walk, FakeFrames(), HearingSettings(cut="energy"), tmp_path / "2")
+    plain = detect_events(walk, FakeEncoder(), HearingSettings(), tmp_path / "1")
+    by_energy = detect_events(walk, FakeFrames(), HearingSettings(cut="energy"), tmp_path / "2")
     np.testing.assert_array_equal(plain.onset_s, by_energy.onset_s)
     np.testing.assert_allclose(plain.onset_s, [1.97], atol=0.03)
     assert isinstance(FakeFrames(), FrameSoundEncoder)
     assert not isinstance(FakeEncoder(), FrameSoundEncoder)
     with pytest.raises(BackendError, match=r"test/loudness gives no feature for each step of time .* hearing.cut auto"):
-        hear(walk, FakeEncoder(), HearingSettings(cut="changes"), tmp_path / "3")
+        detect_events(walk, FakeEncoder(), HearingSettings(cut="changes"), tmp_path / "3")
 
 
 def test_only_digital_silence_is_no_sound(tmp_path: Path) -> None:
     track = track_of(tmp_path / "a.flac", quiet(2.0), tone(1.0, level=0.0005), quiet(2.0))
-    heard = hear(straight_walk(5.0, 0.5, track), FakeFrames(), HearingSettings(), tmp_path / "clips")
+    heard = detect_events(straight_walk(5.0, 0.5, track), FakeFrames(), HearingSettings(), tmp_path / "clips")
     np.testing.assert_allclose([heard.onset_s[0], heard.offset_s[0]], [2.0, 3.0], atol=1e-6)
     assert len(heard) == 1
     silent = track_of(tmp_path / "b.flac", quiet(3.0))
-    assert len(hear(straight_walk(3.0, 0.5, silent), FakeFrames(), HearingSettings(), tmp_path / "none")) == 0
+    assert len(detect_events(straight_walk(3.0, 0.5, silent), FakeFrames(), HearingSettings(), tmp_path / "none")) == 0
 
 
 @pytest.mark.parametrize("seconds", [0.01, 0.5, 25.99, 26.0, 61.3])
@@ -168,7 +168,7 @@ def test_an_encoder_that_breaks_its_promise_is_named(tmp_path: Path) -> None:
 
     track = track_of(tmp_path / "a.flac", tone(2.0))
     with pytest.raises(BackendError, match=r"test/pitches returned features of \(25, 4\) for 2.00 s; .* of \(50, 4\)"):
-        hear(straight_walk(2.0, 0.5, track), Broken(), HearingSettings(), tmp_path / "clips")
+        detect_events(straight_walk(2.0, 0.5, track), Broken(), HearingSettings(), tmp_path / "clips")
 
 
 def test_settings_that_make_no_sense_are_told_and_old_maps_lack_them() -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps.core.files import replaced_atomically, sha256_of_file, sync_folder, write_bytes_atomically
+from avlmaps.core.files import replace_atomically, sha256_of_file, sync_folder, write_bytes_atomically
 
 
 def test_a_file_is_replaced_whole_and_nothing_is_left_beside_it(tmp_path: Path):
@@ -19,7 +19,7 @@ def test_a_file_is_replaced_whole_and_nothing_is_left_beside_it(tmp_path: Path):
 def test_an_error_while_writing_leaves_the_old_file(tmp_path: Path):
     target = tmp_path / "map.json"
     target.write_bytes(b"old")
-    with pytest.raises(RuntimeError, match="half way"), replaced_atomically(target) as stream:
+    with pytest.raises(RuntimeError, match="half way"), replace_atomically(target) as stream:
         stream.write(b"ne")
         raise RuntimeError("half way")
     assert target.read_bytes() == b"old"
@@ -29,7 +29,7 @@ def test_an_error_while_writing_leaves_the_old_file(tmp_path: Path):
 def test_until_the_end_readers_see_the_old_file(tmp_path: Path):
     target = tmp_path / "map.json"
     target.write_bytes(b"old")
-    with replaced_atomically(target) as stream:
+    with replace_atomically(target) as stream:
         stream.write(b"new")
         stream.flush()
         assert target.read_bytes() == b"old"

@@ -84,11 +84,11 @@ def test_the_angle_between_rotations_is_symmetric_and_at_most_half_a_turn(a: np.
 def test_a_rotation_with_rounding_is_made_orthonormal_and_hardly_moved(a: np.ndarray, noise: np.ndarray):
     written = a.copy()
     written[:3, :3] += noise
-    mended = poses.orthonormalized(written, "frame 7")
+    mended = poses.orthonormalize(written, "frame 7")
     assert np.allclose(mended[:3, :3].T @ mended[:3, :3], np.eye(3), atol=1e-12)
     assert np.abs(mended - a).max() < 5e-3
     assert np.array_equal(mended[:3, 3], a[:3, 3])
-    assert np.allclose(poses.orthonormalized_all(written[None], ["frame 7"])[0], mended, atol=1e-12)
+    assert np.allclose(poses.orthonormalize_all(written[None], ["frame 7"])[0], mended, atol=1e-12)
 
 
 def _scaled() -> np.ndarray:
@@ -122,14 +122,14 @@ def _nan() -> np.ndarray:
 )
 def test_what_is_no_pose_is_refused_with_the_frames_name(pose: np.ndarray, sentence: str):
     with pytest.raises(RecordingError, match=re.escape(sentence)):
-        poses.orthonormalized(pose, "frame 000012")
+        poses.orthonormalize(pose, "frame 000012")
     with pytest.raises(RecordingError, match=re.escape(sentence)):
-        poses.orthonormalized_all(np.stack([np.eye(4), pose]), ["frame 000011", "frame 000012"])
+        poses.orthonormalize_all(np.stack([np.eye(4), pose]), ["frame 000011", "frame 000012"])
 
 
 def test_a_pose_of_another_shape_is_refused():
     with pytest.raises(RecordingError, match=r"The pose of x has shape \(3, 4\); it must be 4x4."):
-        poses.orthonormalized(np.eye(4)[:3], "x")
+        poses.orthonormalize(np.eye(4)[:3], "x")
 
 
 @given(arrays(float, 3, elements=st.floats(-1, 1)).filter(lambda up: np.linalg.norm(up) > 0.1))

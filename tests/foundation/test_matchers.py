@@ -31,7 +31,7 @@ from avlmaps.perception.foundation import aliked, disk
 from avlmaps.perception.foundation.lightglue import LightGlue
 from avlmaps.perception.models.settings import ModelSettings, using_models
 from avlmaps.perception.paper import superglue
-from avlmaps.perception.paper.superglue import SuperGlue, mutual_best, transported
+from avlmaps.perception.paper.superglue import SuperGlue, mutual_best, sinkhorn
 from avlmaps.perception.profiles import Profile
 from avlmaps.perception.protocols import LearnedMatcher, LocalFeatures
 from avlmaps.query.locate import locate
@@ -232,7 +232,7 @@ def test_superglue_is_its_formula_for_pictures_of_two_sizes_and_any_numbers_of_k
     put("superglue", random=True)
     state = {name: value.double().numpy() for name, value in load_file(models / FOLDER / "model.safetensors").items()}
     seen = []
-    monkeypatch.setattr(superglue, "transported", lambda likeness, *rest: seen.append(likeness) or likeness.double())
+    monkeypatch.setattr(superglue, "sinkhorn", lambda likeness, *rest: seen.append(likeness) or likeness.double())
     own = load(Kind.MATCHER, "superglue")
     for n, m, size in ((30, 45, (640, 400)), (1, 7, (100, 900)), (9, 1, (320, 240))):
         a, b = features(n, 256, n), features(m, 256, m, size)
@@ -274,7 +274,7 @@ def test_transport_is_that_of_the_published_logarithms(n: int, m: int, scale: fl
     torch.manual_seed(seed)
     likeness, idle = scale * torch.randn(n, m), torch.tensor(1.0)
     expected = log_optimal_transport(likeness[None].double(), idle.double(), 100)[0, :-1, :-1].exp()
-    torch.testing.assert_close(transported(likeness, idle, 100), expected, atol=1e-6, rtol=1e-6)
+    torch.testing.assert_close(sinkhorn(likeness, idle, 100), expected, atol=1e-6, rtol=1e-6)
 
 
 @given(n=st.integers(1, 9), m=st.integers(1, 9), seed=st.integers(0, 999))

@@ -15,7 +15,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.conformance import check, example_frame
 from avlmaps.perception.foundation.proposals import Proposals, ProposalSettings, Sam2Proposals, apart
-from avlmaps.perception.foundation.regions import RegionPixels, cut_out, mixed
+from avlmaps.perception.foundation.regions import RegionPixels, blend_with_whole, crop
 from avlmaps.perception.protocols import BatchPixelEncoder, ScaledEncoder
 
 CLIP = "openai/clip-vit-base-patch16"
@@ -50,7 +50,9 @@ def test_the_mixture_is_the_papers(count: int, seed: int) -> None:
         alike.append(float(regions[i] @ whole) + others / count)
     weight = np.exp(alike) / np.exp(alike).sum()
     expected = unit(weight[:, None] * whole + (1.0 - weight[:, None]) * regions)
-    np.testing.assert_allclose(mixed(torch.tensor(whole), torch.tensor(regions)).numpy(), expected, atol=1e-9)
+    np.testing.assert_allclose(
+        blend_with_whole(torch.tensor(whole), torch.tensor(regions)).numpy(), expected, atol=1e-9
+    )
 
 
 @given(st.integers(0, 12), st.integers(0, 1000), st.sampled_from([0.0, 0.3, 0.7, 1.0]))
@@ -77,10 +79,10 @@ def test_what_stays_is_apart_and_what_goes_overlaps_something_better(count: int,
 
 def test_a_cut_out_is_never_empty() -> None:
     rgb = np.arange(5 * 7 * 3, dtype=np.uint8).reshape(5, 7, 3)
-    np.testing.assert_array_equal(cut_out(rgb, np.array([0, 0, 1, 1], np.float32)), rgb)
+    np.testing.assert_array_equal(crop(rgb, np.array([0, 0, 1, 1], np.float32)), rgb)
     for box in ([1, 1, 1, 1], [0.5, 0.5, 0.5, 0.5], [0, 0.99, 0.01, 1.0]):
-        assert cut_out(rgb, np.array(box, np.float32)).size > 0
-    np.testing.assert_array_equal(cut_out(rgb, np.array([3 / 7, 0.4, 5 / 7, 0.8], np.float32)), rgb[2:4, 3:5])
+        assert crop(rgb, np.array(box, np.float32)).size > 0
+    np.testing.assert_array_equal(crop(rgb, np.array([3 / 7, 0.4, 5 / 7, 0.8], np.float32)), rgb[2:4, 3:5])
 
 
 def test_masks_are_those_of_sam2_at_every_point_of_the_picture(models: Path) -> None:
@@ -129,7 +131,7 @@ def test_features_lie_in_their_regions_small_ones_on_large_ones(models: Path) ->
             clip.get_image_features(processor(c, return_tensors="pt")["pixel_values"]).pooler_output for c in cut_outs
         ]
     rows = [row / row.norm() for row in rows]
-    expected = mixed(rows[0][0], torch.cat(rows[1:])).numpy()
+    expected = blend_with_whole(rows[0][0], torch.cat(rows[1:])).numpy()
     assert not found[4:].any()
     assert (found[2:4, 2:4] @ expected[1]).min() > 0.999
     assert (found[:2].reshape(-1, DIM) @ expected[0]).min() > 0.999

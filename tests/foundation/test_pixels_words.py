@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.foundation.pictures import chosen_way, working_size
+from avlmaps.perception.foundation.pictures import split_model_way, working_size
 from avlmaps.perception.foundation.prompts import CLIP_PROMPTS, THINGS, TIPS_PROMPTS, Prompted, mean_direction
 
 
@@ -83,7 +83,7 @@ def test_a_picture_that_is_fit_already_keeps_its_size() -> None:
 
 
 def test_ways_are_chosen_by_name() -> None:
-    assert chosen_way("openai/clip#b", ("a", "b")) == ("openai/clip", "b")
-    assert chosen_way("openai/clip", ("a", "b")) == ("openai/clip", "a")
+    assert split_model_way("openai/clip#b", ("a", "b")) == ("openai/clip", "b")
+    assert split_model_way("openai/clip", ("a", "b")) == ("openai/clip", "a")
     with pytest.raises(BackendError, match="a, b"):
-        chosen_way("openai/clip#c", ("a", "b"))
+        split_model_way("openai/clip#c", ("a", "b"))

@@ -303,7 +303,7 @@ def test_large_models_have_all_cores_unless_threads_are_named(run, monkeypatch: 
     monkeypatch.setenv("AVLMAPS_TORCH_THREADS", "2")
     device._use_cores.cache_clear()
     try:
-        device.chosen_device()
+        device.select_device()
         assert torch.get_num_threads() == 2
     finally:
         torch.set_num_threads(1)

@@ -14,7 +14,7 @@ from transformers import PeAudioFrameLevelModel, PeAudioProcessor
 
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.registry import Kind
-from avlmaps.maps.audio.change_points import cut_at_changes, frames_of_track
+from avlmaps.maps.audio.change_points import frames_of_track, split_at_changes
 from avlmaps.perception.conformance import check
 from avlmaps.perception.foundation.pe_a_frame import FrameSounds, _chunks, _Space
 from avlmaps.perception.protocols import FrameSoundEncoder
@@ -102,7 +102,7 @@ def test_a_track_is_mapped_whole_and_asked_by_its_stretches(framed: FrameSounds,
     write_flac(tmp_path / "a.flac", sound)
     features = frames_of_track(AudioTrack.open(tmp_path / "a.flac"), framed)
     assert features.shape == (201, framed.card.dim)
-    edges = cut_at_changes(features, framed.hop_s)
+    edges = split_at_changes(features, framed.hop_s)
     scores = framed.score_words([features[a:b] for a, b in pairwise(edges)], ["dog bark"])
     assert scores.shape == (len(edges) - 1, 1)
     assert len(edges) > 2

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.maps.cleaning import clean, seen_through, smear_reach
-from avlmaps.maps.free_space import FreeViewCollector, block_size, count_through, joined
+from avlmaps.maps.free_space import FreeViewCollector, block_size, concat_views, count_through
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.voxel_sums import Evidence
 from avlmaps.maps.grid import GridSpec
@@ -107,7 +107,7 @@ def test_the_order_and_the_parts_of_the_frames_do_not_matter(seed):
     whole = clean(evidence, [views_of(frames)], CAMERA, GRID, PERFECT)
     order = [frames[n] for n in rng.permutation(5)]
     parts = [views_of(order[:2]), views_of([]), views_of(order[2:])]
-    for views in (parts, [joined(parts)]):
+    for views in (parts, [concat_views(parts)]):
         kept, removed = clean(evidence, views, CAMERA, GRID, PERFECT)
         np.testing.assert_array_equal(kept, whole[0])
         assert removed == whole[1]

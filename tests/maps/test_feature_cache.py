@@ -19,11 +19,11 @@ from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.build import build_map, build_part
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.perception.cache.cached_encoders import (
-    RememberingFrameSounds,
-    RememberingKeypoints,
-    RememberingPixels,
-    came_from_store,
-    remembering,
+    CachedFrameSounds,
+    CachedKeypoints,
+    CachedPixels,
+    cache_note,
+    with_cache,
 )
 from avlmaps.perception.cache.feature_store import CacheSettings, FeatureStore, key_of
 from avlmaps.perception.conformance import check
@@ -240,7 +240,7 @@ def test_keys_tell_types_shapes_and_order_apart() -> None:
 
 
 def test_all_that_an_encoder_may_look_at_is_in_the_key_and_nothing_else(tmp_path: Path) -> None:
-    encoder = RememberingPixels(CountedPixels(), FeatureStore(tmp_path), half=False)
+    encoder = CachedPixels(CountedPixels(), FeatureStore(tmp_path), half=False)
 
     def encodes(frame: Frame) -> bool:
         before = COUNTS.get("pixels", 0)
@@ -292,7 +292,7 @@ def test_keypoints_come_back_as_they_were(tmp_path: Path, size: tuple[int, int],
             _count("local")
             return local
 
-    encoder, rgb = RememberingKeypoints(Real(), FeatureStore(tmp_path)), np.zeros((24, 32, 3), np.uint8)
+    encoder, rgb = CachedKeypoints(Real(), FeatureStore(tmp_path)), np.zeros((24, 32, 3), np.uint8)
     first, second = encoder.encode(rgb), encoder.encode(rgb)
     assert COUNTS["local"] == 1
     for told in (first, second):
@@ -303,7 +303,7 @@ def test_keypoints_come_back_as_they_were(tmp_path: Path, size: tuple[int, int],
 
 
 def test_encoders_keep_their_protocols_whatever_way_they_are_asked(tmp_path: Path) -> None:
-    used = remembering(profile("embedded"), CacheSettings(tmp_path))
+    used = with_cache(profile("embedded"), CacheSettings(tmp_path))
     encoders = {
         BatchPixelEncoder: used.pixel_encoder(),
         ViewEncoder: used.view_encoder(),
@@ -327,7 +327,7 @@ def test_an_encoder_of_steps_stays_one(tmp_path: Path) -> None:
         card, vocabulary, hop_s = CARD, (), 0.04
         encode = encode_words = score_words = score_sounds = None
 
-    assert isinstance(RememberingFrameSounds(Steps(), FeatureStore(tmp_path)), FrameSoundEncoder)
+    assert isinstance(CachedFrameSounds(Steps(), FeatureStore(tmp_path)), FrameSoundEncoder)
 
 
 # Whole builds
@@ -391,8 +391,8 @@ def test_the_bar_says_how_many_came_from_the_cache(
 
 
 def test_the_embedded_profile_is_left_as_it_is() -> None:
-    assert remembering(profile("embedded"), CacheSettings()) is profile("embedded")
-    assert came_from_store(profile("embedded"), Kind.PIXELS) == ""
+    assert with_cache(profile("embedded"), CacheSettings()) is profile("embedded")
+    assert cache_note(profile("embedded"), Kind.PIXELS) == ""
 
 
 def test_a_stopped_build_goes_on_from_the_cache(torch_like: Profile, tmp_path: Path) -> None:

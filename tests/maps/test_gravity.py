@@ -127,7 +127,7 @@ def test_table_and_floor_of_the_real_kitchen_are_level(shared_data):
     for path in sorted((shared_data / "data" / "redkitchen").glob("*.depth.png"))[::25]:
         depth = cv2.imread(str(path), cv2.IMREAD_UNCHANGED).astype(np.float32) / 1000.0
         depth[depth > 60.0] = 0.0
-        pose = poses.orthonormalized(np.loadtxt(str(path).replace("depth.png", "pose.txt")), path.name)
+        pose = poses.orthonormalize(np.loadtxt(str(path).replace("depth.png", "pose.txt")), path.name)
         blank = np.zeros((480, 640, 3), np.uint8)
         frames.append(Frame(len(frames), path.name, float(len(frames)), blank, depth, pose, Rig(camera, camera)))
     up = find_up(frames, np.random.default_rng(0))

@@ -207,12 +207,12 @@ def test_the_floor_is_never_above_a_level_that_is_seen_through(
 @pytest.fixture(scope="module")
 def kitchen(shared_data: Path) -> tuple[list[Sight], np.ndarray]:
     """Every fourth frame of the red kitchen as evidence, and up."""
-    from avlmaps.maps.gravity.stage import look_for_up
+    from avlmaps.maps.gravity.stage import estimate_up
     from avlmaps.maps.settings import DEFAULTS
     from avlmaps.recordings.open import open_recording
 
     recording = open_recording(shared_data / "data" / "redkitchen")
-    up = look_for_up(recording, DEFAULTS).vector()
+    up = estimate_up(recording, DEFAULTS).vector()
     return [sight_of(recording.frame(index), up) for index in range(0, len(recording), 4)], up
 
 

@@ -11,7 +11,7 @@ from build_fakes import SETTINGS, Walk, register_fakes
 from avlmaps.cli.output import ground_lines
 from avlmaps.core.errors import MapError
 from avlmaps.maps.build import build_map, describe
-from avlmaps.maps.gravity.stage import ground_notices, look_for_ground
+from avlmaps.maps.gravity.stage import estimate_ground, ground_notices
 from avlmaps.maps.settings import DEFAULTS, BuildSettings, GravitySettings
 from avlmaps.maps.store.manifest import FloorGuess, FloorInfo, GroundInfo, UpInfo
 from avlmaps.maps.store.reader import StoredMap, open_stored
@@ -64,7 +64,7 @@ def ground_of(best: FloorGuess, second: FloorGuess | None, cameras: float = 1.0)
 
 
 def test_a_film_without_floor_gets_a_notice_that_says_what_to_do() -> None:
-    ground, info = look_for_ground(desk_only(), DEFAULTS, UP_INFO)
+    ground, info = estimate_ground(desk_only(), DEFAULTS, UP_INFO)
     assert info.main().best.confidence < 0.7 and info.known_from == "surfaces"
     (notice,) = ground_notices(info)
     assert "--camera-height-m" in notice
@@ -72,7 +72,7 @@ def test_a_film_without_floor_gets_a_notice_that_says_what_to_do() -> None:
 
 
 def test_the_height_that_a_user_gives_is_taken_without_a_notice() -> None:
-    ground, info = look_for_ground(desk_only(), given(1.15), UP_INFO)
+    ground, info = estimate_ground(desk_only(), given(1.15), UP_INFO)
     assert ground.camera_height_m(desk_only().world_from_camera[0]) == pytest.approx(1.15, abs=0.05)
     assert info.known_from == "user" and info.main().best.confidence > 0.9
     assert list(ground_notices(info)) == []
@@ -80,15 +80,15 @@ def test_the_height_that_a_user_gives_is_taken_without_a_notice() -> None:
 
 def test_a_given_height_that_most_surfaces_lie_below_gets_a_notice() -> None:
     looks = [(1.0 + 0.1 * i, 1.0, 1.35, 60.0 + 5 * i, 25.0) for i in range(12)]
-    _, info = look_for_ground(Filmed(film(office(), looks)), given(0.61), UP_INFO)
+    _, info = estimate_ground(Filmed(film(office(), looks)), given(0.61), UP_INFO)
     assert [notice for notice in ground_notices(info) if "below the floor that was given" in notice]
 
 
 def test_the_base_of_a_robot_is_a_hint() -> None:
-    ground, info = look_for_ground(desk_only(BaseHeight(1.15, on_floor=True)), DEFAULTS, UP_INFO)
+    ground, info = estimate_ground(desk_only(BaseHeight(1.15, on_floor=True)), DEFAULTS, UP_INFO)
     assert ground.camera_height_m(desk_only().world_from_camera[0]) == pytest.approx(1.15, abs=0.05)
     assert info.known_from == "recording"
-    above, _ = look_for_ground(desk_only(BaseHeight(1.0, on_floor=False)), DEFAULTS, UP_INFO)
+    above, _ = estimate_ground(desk_only(BaseHeight(1.0, on_floor=False)), DEFAULTS, UP_INFO)
     assert above.camera_height_m(desk_only().world_from_camera[0]) > 1.0
 
 

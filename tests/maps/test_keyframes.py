@@ -12,13 +12,13 @@ from avlmaps.core.poses import apply, from_quaternion, inverse, rotation_angle_r
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.keyframes import (
     KeyframeSettings,
-    assembled,
+    describe_keyframe,
     keyframes_by_motion,
     perceive_keyframes,
-    see_keyframe,
     select_keyframes,
+    stack_keyframes,
 )
-from avlmaps.maps.keypoint_depth import lifted, middle_of_view
+from avlmaps.maps.keypoint_depth import lift_keypoints, middle_of_view
 from avlmaps.perception.profiles import Profile, profile
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.registration import depth_in_colour
@@ -107,7 +107,7 @@ def test_limits_must_be_positive(name: str) -> None:
 def test_lifted_points_lie_on_the_surface_that_the_pixel_shows(rig: Rig) -> None:
     frame = RoomWalk(rig=rig).frame(0)
     xy = np.random.default_rng(0).uniform((0, 0), (320, 240), (800, 2)).astype(np.float32)
-    points = lifted(xy, frame, 6.0)
+    points = lift_keypoints(xy, frame, 6.0)
     good = np.isfinite(points[:, 0])
     assert good.mean() > 0.6
     distance = distance_to_surface_m(points[good])
@@ -129,7 +129,7 @@ def test_depth_of_another_size_is_looked_up_at_the_same_place() -> None:
     rig = Rig(CAMERA, CAMERA.resized(160, 120))
     frame = RoomWalk(rig=rig).frame(2)
     xy = np.random.default_rng(0).uniform((0, 0), (320, 240), (400, 2)).astype(np.float32)
-    points = lifted(xy, frame, 6.0)
+    points = lift_keypoints(xy, frame, 6.0)
     good = np.isfinite(points[:, 0])
     assert np.percentile(distance_to_surface_m(points[good]), 95) < 0.02
 
@@ -141,7 +141,7 @@ def flat_frame(depth_m: np.ndarray) -> Frame:
 def test_a_point_beside_a_step_in_depth_is_not_lifted() -> None:
     depth = np.full((240, 320), 1.0, np.float32)
     depth[:, 160:] = 2.0
-    points = lifted(np.array([[160.5, 100], [150.5, 100], [170.5, 100]], np.float32), flat_frame(depth), 6.0)
+    points = lift_keypoints(np.array([[160.5, 100], [150.5, 100], [170.5, 100]], np.float32), flat_frame(depth), 6.0)
     assert np.isnan(points[0]).all()
     np.testing.assert_allclose(points[1:, 2], [1.0, 2.0])
 
@@ -151,7 +151,7 @@ def test_holes_and_far_depths_are_not_lifted_and_a_few_lost_pixels_do_no_harm() 
     depth[:, :50] = 0.0
     depth[:, 200:] = 7.0
     depth[::3, 50:200:3] = 0.0
-    points = lifted(
+    points = lift_keypoints(
         np.array([[20, 100], [100, 100], [300, 100], [0, 0], [320, 240]], np.float32), flat_frame(depth), 6.0
     )
     np.testing.assert_array_equal(np.isfinite(points[:, 0]), [False, True, False, False, False])
@@ -159,7 +159,7 @@ def test_holes_and_far_depths_are_not_lifted_and_a_few_lost_pixels_do_no_harm() 
 
 
 def test_no_keypoints_give_no_points() -> None:
-    assert lifted(np.zeros((0, 2), np.float32), RoomWalk().frame(0), 6.0).shape == (0, 3)
+    assert lift_keypoints(np.zeros((0, 2), np.float32), RoomWalk().frame(0), 6.0).shape == (0, 3)
 
 
 def test_the_nearer_of_two_surfaces_hides_the_other_in_the_colour_camera() -> None:
@@ -225,8 +225,8 @@ def test_what_is_kept_of_a_keyframe_fits_together() -> None:
 def test_a_profile_with_views_gives_area_features_and_one_without_keypoints_none() -> None:
     register(Backend(Kind.VIEWS, "brightness", f"{__name__}:Brightness"))
     frame = RoomWalk().frame(0)
-    seen = see_keyframe(frame, Profile("bare", views="brightness"), {})
-    keyframes = assembled([seen, seen])
+    seen = describe_keyframe(frame, Profile("bare", views="brightness"), {})
+    keyframes = stack_keyframes([seen, seen])
     np.testing.assert_allclose(keyframes.view, [[frame.rgb.mean(), 1.0]] * 2, rtol=1e-5)
     assert keyframes.place.shape == (2, 0)
     np.testing.assert_array_equal(keyframes.offsets, [0, 0, 0])
@@ -244,8 +244,8 @@ def test_keypoints_that_are_known_already_are_not_looked_for_again() -> None:
     recording, used = RoomWalk(), profile("colours")
     frame = recording.frame(0)
     state = used.place_encoder().fit([used.local_encoder().encode(frame.rgb)], np.random.default_rng(0))
-    fresh = see_keyframe(frame, used, state)
-    given_them = see_keyframe(frame, used, state, local=used.local_encoder().encode(frame.rgb))
+    fresh = describe_keyframe(frame, used, state)
+    given_them = describe_keyframe(frame, used, state, local=used.local_encoder().encode(frame.rgb))
     np.testing.assert_array_equal(fresh.local.descriptors, given_them.local.descriptors)
     np.testing.assert_array_equal(fresh.place, given_them.place)
     np.testing.assert_array_equal(fresh.points_world, given_them.points_world)

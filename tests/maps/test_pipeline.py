@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.build import build_map
-from avlmaps.maps.encoding import perceived
+from avlmaps.maps.encoding import encode_frames
 from avlmaps.maps.prefetch import run_ahead
 from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.perception.profiles import Profile, profile
@@ -51,7 +51,7 @@ def test_each_frame_comes_in_its_place_with_its_own_features(bad: set[int], cuts
     walk, encoder = Walk(12, bad=tuple(bad)), InBatches(size)
     edges = [0, *sorted(cuts), 12]
     stretches = [range(a, b) for a, b in pairwise(edges)]
-    seen = list(perceived(walk, stretches, encoder))
+    seen = list(encode_frames(walk, stretches, encoder))
     assert [frame.index for frame, _ in seen] == list(range(12))
     for frame, features in seen:
         assert isinstance(frame, BadFrame) == (frame.index in bad)
@@ -68,7 +68,7 @@ def test_each_frame_comes_in_its_place_with_its_own_features(bad: set[int], cuts
 
 
 def test_without_an_encoder_frames_come_alone() -> None:
-    seen = list(perceived(Walk(4, bad=(2,)), [range(4)], None))
+    seen = list(encode_frames(Walk(4, bad=(2,)), [range(4)], None))
     assert [features for _, features in seen] == [None] * 4
     assert isinstance(seen[2][0], BadFrame)
 
@@ -99,7 +99,7 @@ class SlowPixels(Pixels):
 def test_the_slowest_of_three_stages_sets_the_pace() -> None:
     def elapsed_s(count: int) -> float:
         begin = perf_counter()
-        for _ in perceived(SlowWalk(count), [range(count)], SlowPixels()):
+        for _ in encode_frames(SlowWalk(count), [range(count)], SlowPixels()):
             sleep(EVERY_S)  # fusion
         return perf_counter() - begin
 
@@ -163,7 +163,7 @@ def test_what_an_encoder_raises_ends_the_build_with_its_sentence(tmp_path: Path)
             raise BackendError("The model is out of memory; take a smaller --batch.")
 
     with pytest.raises(BackendError, match="smaller --batch"):
-        list(perceived(Walk(6), [range(6)], Broken()))
+        list(encode_frames(Walk(6), [range(6)], Broken()))
 
 
 def test_a_profile_of_ones_own_is_known_after_a_build() -> None:

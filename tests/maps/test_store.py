@@ -21,8 +21,8 @@ from avlmaps.maps import integrity
 from avlmaps.maps.build import build_map
 from avlmaps.maps.repair import damaged_files, repair_map
 from avlmaps.maps.store.array_files import SMALL_BYTES, read_array, write_array
-from avlmaps.maps.store.array_validation import array_fields, assembled, check_order
-from avlmaps.maps.store.lock import is_locked, locked
+from avlmaps.maps.store.array_validation import array_fields, check_order, validate_arrays
+from avlmaps.maps.store.lock import is_locked, lock_folder
 from avlmaps.maps.store.reader import has_unfinished_build, open_stored, verify_stored
 from avlmaps.maps.types import HeardSounds, Voxels
 
@@ -153,14 +153,14 @@ def test_a_half_built_map(tmp_path: Path) -> None:
 
 
 def test_a_map_that_is_being_built(tmp_path: Path) -> None:
-    with locked(tmp_path):
+    with lock_folder(tmp_path):
         assert is_locked(tmp_path)
         assert refused(tmp_path) == f"{tmp_path} is being built at this moment; wait until the build has finished."
     assert not is_locked(tmp_path)
 
 
 def test_two_builds_into_one_folder_are_refused(tmp_path: Path) -> None:
-    with locked(tmp_path), pytest.raises(MapError) as fault:
+    with lock_folder(tmp_path), pytest.raises(MapError) as fault:
         build_map(Walk(4), tmp_path, PROFILE, SETTINGS, progress=False)
     assert str(fault.value) == (
         f"{tmp_path} is being built by another process ({os.getpid()}) at this moment; wait for it, or build into "
@@ -374,7 +374,7 @@ def test_sounds_without_any_are_whole() -> None:
         "feature": np.zeros((0, 7), np.float32),
         "clips": (),
     }
-    assert len(assembled(HeardSounds, empty, "here")) == 0
+    assert len(validate_arrays(HeardSounds, empty, "here")) == 0
     assert array_fields(HeardSounds) == [name for name in empty if name != "clips"]
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import NavigationError
-from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, wrapped
+from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, wrap_angle
 from avlmaps.navigate.controller import (
     CLOSE_M,
     ActionController,
@@ -63,7 +63,7 @@ def test_a_turn_ends_within_half_a_step_of_the_heading(pose, turn):
     end = pose
     for action in turns_for(turn):
         end = acted(end, action)
-    assert abs(wrapped(end.heading_rad - pose.heading_rad - turn)) <= TURN_RAD / 2 + 1e-9
+    assert abs(wrap_angle(end.heading_rad - pose.heading_rad - turn)) <= TURN_RAD / 2 + 1e-9
 
 
 @given(pose=POSES, count=st.integers(0, 80))
@@ -71,7 +71,7 @@ def test_turning_left_and_as_often_right_changes_nothing(pose, count):
     end = pose
     for action in [*turns_for(count * TURN_RAD), *turns_for(-count * TURN_RAD)]:
         end = acted(end, action)
-    assert abs(wrapped(end.heading_rad - pose.heading_rad)) < 1e-9
+    assert abs(wrap_angle(end.heading_rad - pose.heading_rad)) < 1e-9
     assert (end.x_m, end.y_m) == (pose.x_m, pose.y_m)
 
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core import poses
-from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, wrapped
+from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, wrap_angle
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.navigate.bodies import BodyShape
 from avlmaps.navigate.controller import bearing
@@ -68,7 +68,7 @@ def test_by_a_true_map_it_touches_nothing_and_arrival_means_being_there(goals, s
 def test_it_faces_what_it_is_told_to_once_there(drive):
     driver = driver_in(BUILDING, drive)
     arrival = driver.go_to(place(3.0, 3.2), face=place(3.4, 2.3))
-    off = wrapped(bearing(arrival.pose, 3.4, 2.3) - arrival.pose.heading_rad)
+    off = wrap_angle(bearing(arrival.pose, 3.4, 2.3) - arrival.pose.heading_rad)
     assert arrival.reached
     assert abs(off) <= TURN_RAD / 2 + 0.01
 
@@ -147,7 +147,7 @@ def test_a_turn_is_to_the_left_and_as_far_as_told(angle, smooth):
     driver = driver_in(BUILDING, VELOCITY if smooth else None, start=GroundPose(0.8, 0.6, 1.0))
     arrival = driver.turn(angle)
     assert arrival.reached
-    assert abs(wrapped(arrival.pose.heading_rad - 1.0 - angle)) <= TURN_RAD / 2 + 0.01
+    assert abs(wrap_angle(arrival.pose.heading_rad - 1.0 - angle)) <= TURN_RAD / 2 + 0.01
     assert len(arrival.actions) == (0 if smooth else abs(round(angle / TURN_RAD)))
 
 
@@ -188,7 +188,7 @@ def test_a_tilted_world_is_driven_in_its_level_frame():
     arrival = driver.go_to(level_from_world.T @ np.array([3.0, 3.2, 0.7]), face=level_from_world.T @ place(0.0, 3.2))
     assert arrival.reached
     assert hypot(arrival.pose.x_m - 3.0, arrival.pose.y_m - 3.2) < 0.15
-    assert abs(wrapped(arrival.pose.heading_rad - pi)) < 0.1
+    assert abs(wrap_angle(arrival.pose.heading_rad - pi)) < 0.1
 
 
 def test_a_body_that_never_moves_is_given_up():

@@ -13,7 +13,7 @@ from avlmaps.language.rules import RulesTranslator
 from avlmaps.language.translator import Translation
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.instruct import Outcome, instruct
-from avlmaps.navigate.trace_plot import draw_way, plot_way
+from avlmaps.navigate.trace_plot import draw_path, plot_path
 from avlmaps.query.avlmap import AVLMap
 from helpers.kinematic import KinematicDriver
 from query.query_fakes import furnished_map, sounds_of
@@ -144,13 +144,13 @@ def test_a_budget_holds_for_the_robot_too() -> None:
 def test_the_way_is_drawn_with_start_goals_and_stops(tmp_path) -> None:
     outcome, _ = told("go to the table, then go to the chair")
     asked = AVLMap(furnished_map())
-    figure = draw_way(asked.space, GroundPose(3.0, 2.0), outcome.moves, met=np.array([[1.0, 1.0]]), title="there")
+    figure = draw_path(asked.space, GroundPose(3.0, 2.0), outcome.moves, met=np.array([[1.0, 1.0]]), title="there")
     labels = figure.axes[0].get_legend_handles_labels()[1]
     assert labels[0] == "start"
     assert any(label.startswith("2: 'chair'") for label in labels)
     lines = [line.get_xydata() for line in figure.axes[0].get_lines()]
     assert any(len(line) and np.allclose(np.asarray(line)[-1], outcome.subgoals[0].stop[:2]) for line in lines)
-    assert plot_way(tmp_path / "way.png", asked.space, GroundPose(3.0, 2.0), outcome.moves).stat().st_size > 5000
+    assert plot_path(tmp_path / "way.png", asked.space, GroundPose(3.0, 2.0), outcome.moves).stat().st_size > 5000
 
 
 def test_a_program_that_moves_nothing_says_so() -> None:

@@ -13,7 +13,7 @@ pytest.importorskip("roslibpy")
 from ros_bridge import FakeRobot, in_thread
 
 from avlmaps.core.errors import NavigationError
-from avlmaps.core.motion import GroundPose, wrapped
+from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.navigate.driver import Driver
@@ -101,10 +101,10 @@ def test_goals_and_poses_pass_through_the_frames_and_the_tilted_world(robot, see
     assert arrival.reached, arrival.note
     looked = np.arctan2(*(faced - level)[1::-1])
     assert arrival.pose.distance_m(GroundPose(*level[:2])) < 1e-6
-    assert abs(wrapped(arrival.pose.heading_rad - looked)) < 1e-6
+    assert abs(wrap_angle(arrival.pose.heading_rad - looked)) < 1e-6
     expected = lie.pose(GroundPose(level[0], level[1], looked))  # what the robot itself was told
     assert robot.pose.distance_m(expected) < 1e-6
-    assert abs(wrapped(robot.pose.heading_rad - expected.heading_rad)) < 1e-6
+    assert abs(wrap_angle(robot.pose.heading_rad - expected.heading_rad)) < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -391,7 +391,7 @@ def test_a_turn_is_to_the_left_by_a_positive_angle(robot, angle):
     with opened(robot) as driver:
         arrival = driver.turn(angle)
     assert arrival.reached, arrival.note
-    assert abs(wrapped(arrival.pose.heading_rad - 0.7 - angle)) < 1e-6
+    assert abs(wrap_angle(arrival.pose.heading_rad - 0.7 - angle)) < 1e-6
     assert arrival.pose.distance_m(GroundPose(1.0, 2.0)) < 1e-6
 
 
@@ -412,7 +412,7 @@ def test_a_drive_back_turns_round_first(robot):
         arrival = driver.forward(-0.4)
         assert arrival.reached, arrival.note
         assert arrival.pose.distance_m(GroundPose(1.0, 2.0, 0.7).ahead(-0.4)) < 1e-6
-        assert abs(wrapped(arrival.pose.heading_rad - 0.7 - pi)) < 1e-6
+        assert abs(wrap_angle(arrival.pose.heading_rad - 0.7 - pi)) < 1e-6
         robot.does[""] = "abort"
         count = len(goals(robot))
         assert not driver.forward(-0.4).reached
@@ -584,7 +584,7 @@ def test_a_goal_in_an_obstacle_becomes_a_place_beside_it(robot):
         x_m, y_m = arrival.pose.x_m, arrival.pose.y_m
         outside_m = np.hypot(max(abs(x_m - 2.0) - 0.5, 0.0), max(abs(y_m) - 0.5, 0.0))
         assert 0.2 <= outside_m < 0.5
-        assert abs(wrapped(arrival.pose.heading_rad - np.arctan2(-y_m, 2.0 - x_m))) < 1e-6
+        assert abs(wrap_angle(arrival.pose.heading_rad - np.arctan2(-y_m, 2.0 - x_m))) < 1e-6
         free = driver.go_to(np.array([-1.0, -1.0, 0.0]))
         assert free.note == ""
         assert free.pose.distance_m(GroundPose(-1.0, -1.0)) < 1e-6

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import NavigationError
-from avlmaps.core.motion import GroundPose, wrapped
+from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps.navigate.ros import Frames, GroundTransform, RosSettings
 
 metres = st.floats(-100.0, 100.0)
@@ -19,7 +19,9 @@ poses = st.builds(GroundPose, metres, metres, angles)
 
 
 def same(a: GroundPose, b: GroundPose) -> bool:
-    return a.distance_m(b) < 1e-9 * (1 + abs(a.x_m) + abs(a.y_m)) and abs(wrapped(a.heading_rad - b.heading_rad)) < 1e-9
+    return (
+        a.distance_m(b) < 1e-9 * (1 + abs(a.x_m) + abs(a.y_m)) and abs(wrap_angle(a.heading_rad - b.heading_rad)) < 1e-9
+    )
 
 
 def matrix(transform: GroundTransform) -> np.ndarray:
@@ -63,7 +65,7 @@ def test_places_known_in_both_frames_tell_the_transform(transform, seed, count):
     rng = np.random.default_rng(seed)
     places = rng.uniform(-5, 5, (count, 2))
     places[1] += 12.0
-    told, off_m = GroundTransform.fitted(places, transform.points(places))
+    told, off_m = GroundTransform.fit(places, transform.points(places))
     np.testing.assert_allclose(matrix(told), matrix(transform), atol=1e-6)
     assert off_m < 1e-6
 
@@ -73,7 +75,7 @@ def test_no_other_transform_brings_noisy_places_nearer(transform, seed):
     rng = np.random.default_rng(seed)
     places = rng.uniform(-5, 5, (6, 2))
     noisy = transform.points(places) + rng.normal(0, 0.1, (6, 2))
-    told, off_m = GroundTransform.fitted(places, noisy)
+    told, off_m = GroundTransform.fit(places, noisy)
     for shift in rng.normal(0, 0.05, (20, 3)):
         other = GroundTransform(told.x_m + shift[0], told.y_m + shift[1], told.yaw_rad + shift[2] / 10)
         assert np.sqrt(((other.points(places) - noisy) ** 2).sum(axis=1).mean()) >= off_m - 1e-12
@@ -81,7 +83,7 @@ def test_no_other_transform_brings_noisy_places_nearer(transform, seed):
 
 def test_a_mirrored_pair_of_places_is_never_matched_by_mirroring():
     places = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 1.0]])
-    told, off_m = GroundTransform.fitted(places, places * [1.0, -1.0])
+    told, off_m = GroundTransform.fit(places, places * [1.0, -1.0])
     assert np.linalg.det(matrix(told)) == pytest.approx(1.0)
     assert off_m > 0.1
 
@@ -89,7 +91,7 @@ def test_a_mirrored_pair_of_places_is_never_matched_by_mirroring():
 @pytest.mark.parametrize("places", [np.zeros((1, 2)), np.zeros((3, 2)), np.full((2, 2), np.nan)])
 def test_places_that_tell_no_direction_are_refused(places):
     with pytest.raises(NavigationError, match="two or more"):
-        GroundTransform.fitted(places, places)
+        GroundTransform.fit(places, places)
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), 1e9])

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from avlmaps.core.motion import GroundPose
-from avlmaps.navigate.ros.messages import Incoming, shown, stamped_pose, transforms_in
+from avlmaps.navigate.ros.messages import Incoming, sanitize_line, stamped_pose, transforms_in
 from avlmaps.navigate.ros.tree import LiveTree
 
 
@@ -184,6 +184,6 @@ def test_no_json_raises_anything_but_value_errors(value):
 
 @given(st.text())
 def test_text_from_outside_is_one_clean_line(text):
-    line = shown(text, 50)
+    line = sanitize_line(text, 50)
     assert len(line) <= 50
     assert not any(ord(c) < 32 or 127 <= ord(c) < 160 for c in line)

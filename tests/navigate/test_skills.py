@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import NavigationError, ProgramError
-from avlmaps.core.motion import Action, GroundPose, wrapped
+from avlmaps.core.motion import Action, GroundPose, wrap_angle
 from avlmaps.language.program import SKILLS
 from avlmaps.language.vocabulary import Vocabulary
 from avlmaps.navigate.skills import Robot, RobotSettings
@@ -102,7 +102,7 @@ def test_a_positive_turn_goes_to_the_right() -> None:
 def test_the_compass_has_north_up_and_east_to_its_right(compass: float, ccw: float, start_deg: float) -> None:
     robot = robot_among(GroundPose(0.0, 0.0, radians(start_deg)))
     robot.turn_absolute(compass)
-    assert abs(wrapped(robot.driver.pose.heading_rad - radians(ccw))) < 1e-9
+    assert abs(wrap_angle(robot.driver.pose.heading_rad - radians(ccw))) < 1e-9
 
 
 def test_left_and_right_are_as_seen_from_the_robot() -> None:
@@ -146,7 +146,7 @@ def test_a_thing_on_the_left_is_a_quarter_counter_clockwise_from_ahead(pose: Gro
         robot = robot_among(pose, lamp=box(x, y, 0.4, 0.4))
         getattr(robot, skill)("lamp")
         bearing = atan2(y - pose.y_m, x - pose.x_m)
-        assert abs(wrapped(bearing - robot.driver.pose.heading_rad - at)) < 1e-6
+        assert abs(wrap_angle(bearing - robot.driver.pose.heading_rad - at)) < 1e-6
         assert (robot.driver.pose.x_m, robot.driver.pose.y_m) == (pose.x_m, pose.y_m)
 
 
@@ -199,7 +199,7 @@ def test_a_mirror_swaps_left_and_right(pose: GroundPose, x: float, y: float, wid
 def same(here: Robot, there: Robot, moved, headed) -> None:
     ours, theirs = here.driver.pose, there.driver.pose
     np.testing.assert_allclose(moved(np.array([[ours.x_m, ours.y_m]]))[0], [theirs.x_m, theirs.y_m], atol=1e-6)
-    assert abs(wrapped(headed(ours.heading_rad) - theirs.heading_rad)) < 1e-5
+    assert abs(wrap_angle(headed(ours.heading_rad) - theirs.heading_rad)) < 1e-5
     if here.moves[-1].goal is not None:
         np.testing.assert_allclose(moved(np.array([here.moves[-1].goal[:2]]))[0], there.moves[-1].goal[:2], atol=1e-6)
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.poses import apply, from_quaternion, inverse, rotation_angle_rad
-from avlmaps.perception.pose import PoseSettings, agreement, estimate_pose, refined_focal
+from avlmaps.perception.pose import PoseSettings, agreement, estimate_pose, refine_focal
 
 CAMERA = Pinhole(520.0, 530.0, 318.0, 243.0, 640, 480)
 
@@ -96,7 +96,7 @@ def test_a_wrong_focal_length_is_found_out(seed: int, factor: float) -> None:
     given_camera = Pinhole(CAMERA.fx * factor, CAMERA.fy * factor, CAMERA.cx, CAMERA.cy, 640, 480)
     answer = estimate_pose(xy, points, given_camera, np.random.default_rng(0), PoseSettings(max_error_rad=0.03))
     assert answer is not None
-    refined = refined_focal(xy, points, given_camera, answer[0].world_from_camera)
+    refined = refine_focal(xy, points, given_camera, answer[0].world_from_camera)
     assert refined.fx == pytest.approx(CAMERA.fx, rel=0.01)
     assert refined.fy / refined.fx == pytest.approx(CAMERA.fy / CAMERA.fx)
 

@@ -8,7 +8,7 @@ import soundfile
 
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.perception.embedded.sounds import EmbeddedSounds
-from avlmaps.perception.enrolment import forget_sound, sounds_folder, taught_sounds, teach_sound
+from avlmaps.perception.enrolment import enrolled_sounds, forget_sound, sounds_folder, teach_sound
 from avlmaps.perception.user_folder import user_folder
 from avlmaps.recordings.audio import AudioTrack, Sound
 
@@ -59,7 +59,7 @@ def test_a_taught_sound_is_known_by_its_name_and_a_paraphrase(knowing: EmbeddedS
 def test_a_forgotten_sound_is_known_no_more(knowing: EmbeddedSounds, tmp_path: Path) -> None:
     teach_sound("toy robot", [sparkle(0)], tmp_path, knowing)
     forget_sound("Toy  robot", tmp_path)
-    assert taught_sounds(tmp_path) == []
+    assert enrolled_sounds(tmp_path) == []
     assert "toy robot" not in knowing.vocabulary
     with pytest.raises(BackendError) as refused:
         forget_sound("toy robot", tmp_path)
@@ -70,7 +70,7 @@ def test_what_is_kept_is_what_was_taught(knowing: EmbeddedSounds, tmp_path: Path
     file = tmp_path / "clip.wav"
     soundfile.write(file, sparkle(0).samples, RATE_HZ)
     taught = teach_sound("  our   kettle's whistle ", [file, sparkle(1)], tmp_path, knowing)
-    (kept,) = taught_sounds(tmp_path)
+    (kept,) = enrolled_sounds(tmp_path)
     assert kept.name == taught.name == "our kettle's whistle"
     assert kept.clips == ("clip.wav", "the clip")
     assert kept.checksum == knowing.card.checksum
@@ -80,14 +80,14 @@ def test_what_is_kept_is_what_was_taught(knowing: EmbeddedSounds, tmp_path: Path
 def test_names_that_look_alike_as_files_stay_apart(knowing: EmbeddedSounds, tmp_path: Path) -> None:
     for name in ("Tür", "Tur", "门铃", "../../etc"):
         teach_sound(name, [sparkle(0)], tmp_path, knowing)
-    assert {taught.name for taught in taught_sounds(tmp_path)} == {"Tür", "Tur", "门铃", "../../etc"}
+    assert {taught.name for taught in enrolled_sounds(tmp_path)} == {"Tür", "Tur", "门铃", "../../etc"}
     assert all(path.parent == sounds_folder(tmp_path) for path in sounds_folder(tmp_path).iterdir())
 
 
 def test_teaching_again_replaces(knowing: EmbeddedSounds, tmp_path: Path) -> None:
     teach_sound("toy", [sparkle(0)], tmp_path, knowing)
     teach_sound("Toy", [sparkle(1), sparkle(2)], tmp_path, knowing)
-    (kept,) = taught_sounds(tmp_path)
+    (kept,) = enrolled_sounds(tmp_path)
     assert kept.name == "Toy"
     assert len(kept.clips) == 2
 
@@ -97,7 +97,7 @@ def test_sounds_taught_to_other_weights_are_left_out(knowing: EmbeddedSounds, tm
     (notes,) = sounds_folder(tmp_path).glob("*/sound.json")
     notes.write_text(notes.read_text().replace(knowing.card.checksum, "0" * 64))
     assert knowing.taught == ()
-    assert [taught.name for taught in taught_sounds(tmp_path)] == ["toy"]
+    assert [taught.name for taught in enrolled_sounds(tmp_path)] == ["toy"]
 
 
 def test_silence_teaches_nothing(knowing: EmbeddedSounds, tmp_path: Path) -> None:
@@ -108,7 +108,7 @@ def test_silence_teaches_nothing(knowing: EmbeddedSounds, tmp_path: Path) -> Non
     assert str(refused.value) == (
         "There is nothing to hear in silence.wav (peak 0.000000 of 1); give a clip that holds the sound."
     )
-    assert taught_sounds(tmp_path) == []
+    assert enrolled_sounds(tmp_path) == []
 
 
 def test_what_cannot_be_read_is_refused(knowing: EmbeddedSounds, tmp_path: Path) -> None:
@@ -131,7 +131,7 @@ def test_damaged_notes_are_named(knowing: EmbeddedSounds, tmp_path: Path) -> Non
     (notes,) = sounds_folder(tmp_path).glob("*/sound.json")
     notes.write_text("{")
     with pytest.raises(BackendError) as refused:
-        taught_sounds(tmp_path)
+        enrolled_sounds(tmp_path)
     assert str(refused.value).startswith(f"The taught sound in {notes.parent} is damaged")
     assert str(refused.value).endswith("; delete it and teach it again.")
 

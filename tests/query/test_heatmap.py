@@ -6,8 +6,8 @@ from hypothesis.extra import numpy as hnp
 
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
-from avlmaps.query.factors import HeatSettings, NearAnchors, anchor_heat, normalised, object_heat
-from avlmaps.query.heatmap import Heatmap, fused
+from avlmaps.query.factors import HeatSettings, NearAnchors, anchor_heat, object_heat, stretch_scores
+from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.voxel_space import Space
 
 SIZE_M = 0.05
@@ -116,7 +116,7 @@ def test_a_product_is_element_wise_and_keeps_its_factors(index, first, second) -
     np.testing.assert_array_equal((a * b).values, a.values * b.values)
     np.testing.assert_array_equal((a * b).values, (b * a).values)
     assert (a * b).factors == (*a.factors, *b.factors)
-    assert fused([a, b]).peak <= min(a.peak, b.peak) + 1e-6
+    assert product([a, b]).peak <= min(a.peak, b.peak) + 1e-6
     assert np.all((a.values >= 0.0) & (a.values <= 1.0))
 
 
@@ -144,7 +144,7 @@ def test_an_empty_map_has_no_heat_and_no_goals() -> None:
 
 @given(hnp.arrays(np.float64, st.integers(0, 8), elements=st.floats(-5, 5)))
 def test_normalised_scores_lie_in_0_1_and_keep_their_order(scores) -> None:
-    stretched = normalised(scores)
+    stretched = stretch_scores(scores)
     assert stretched.shape == scores.shape
     assert np.isfinite(stretched).all()
     assert np.all((stretched >= 0.0) & (stretched <= 1.0))
@@ -153,10 +153,10 @@ def test_normalised_scores_lie_in_0_1_and_keep_their_order(scores) -> None:
 
 
 def test_one_score_and_equal_scores_become_one() -> None:
-    np.testing.assert_array_equal(normalised(np.array([0.3])), [1.0])
-    np.testing.assert_array_equal(normalised(np.array([-2.0, -2.0])), [1.0, 1.0])
-    np.testing.assert_array_equal(normalised(np.array([0.0, 5.0])), [0.0, 1.0])
-    assert len(normalised(np.zeros(0))) == 0
+    np.testing.assert_array_equal(stretch_scores(np.array([0.3])), [1.0])
+    np.testing.assert_array_equal(stretch_scores(np.array([-2.0, -2.0])), [1.0, 1.0])
+    np.testing.assert_array_equal(stretch_scores(np.array([0.0, 5.0])), [0.0, 1.0])
+    assert len(stretch_scores(np.zeros(0))) == 0
 
 
 @given(
@@ -165,15 +165,15 @@ def test_one_score_and_equal_scores_become_one() -> None:
 )
 def test_scores_that_differ_by_rounding_alone_are_equal(noise, score) -> None:
     rounding = 2.0 * np.finfo(np.float32).eps * max(1.0, abs(score))
-    np.testing.assert_array_equal(normalised(score + rounding * noise), np.ones(len(noise)))
-    apart = normalised(np.append(score + rounding * noise, score + 1e-3 * max(1.0, abs(score))))
+    np.testing.assert_array_equal(stretch_scores(score + rounding * noise), np.ones(len(noise)))
+    apart = stretch_scores(np.append(score + rounding * noise, score + 1e-3 * max(1.0, abs(score))))
     assert apart[-1] == 1.0
     assert np.all(apart[:-1] < 1e-3)
 
 
 def test_scores_that_are_no_numbers_are_refused() -> None:
     with pytest.raises(ValueError, match="a score is NaN or infinite"):
-        normalised(np.array([0.1, np.nan]))
+        stretch_scores(np.array([0.1, np.nan]))
     space = Space(GridSpec(SIZE_M), np.zeros((0, 3), np.int32), np.array([0.0, 0.0, 1.0]))
     with pytest.raises(ValueError, match="an anchor's score is outside"):
         factor(space, np.zeros((1, 3)), np.array([np.nan]))

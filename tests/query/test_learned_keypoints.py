@@ -9,8 +9,8 @@ import pytest
 
 from avlmaps.bench.locate import MapOfPictures, map_of
 from avlmaps.core.poses import inverse, rotation_angle_rad
-from avlmaps.maps.keyframe_stage import joined
-from avlmaps.maps.keyframes import KeyframeSettings, assembled, see_keyframe
+from avlmaps.maps.keyframe_stage import concat_keyframes
+from avlmaps.maps.keyframes import KeyframeSettings, describe_keyframe, stack_keyframes
 from avlmaps.perception.embedded.rootsift import RootSift
 from avlmaps.perception.profiles import profile
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
@@ -94,24 +94,26 @@ def test_keypoints_without_scores_reach_a_matcher_without_any_and_with_the_size_
 
 def test_a_map_of_pictures_with_and_without_scores_has_none() -> None:
     seen = [
-        see_keyframe(WALK.frame(i), profile_of(Scored(told=i > 0), None), {"centres": np.zeros((64, 128), np.float32)})
+        describe_keyframe(
+            WALK.frame(i), profile_of(Scored(told=i > 0), None), {"centres": np.zeros((64, 128), np.float32)}
+        )
         for i in range(3)
     ]
-    assert assembled(seen).score.shape == (0,)
-    pieces = [assembled(seen[:1]), assembled(seen[1:])]
+    assert stack_keyframes(seen).score.shape == (0,)
+    pieces = [stack_keyframes(seen[:1]), stack_keyframes(seen[1:])]
     assert len(pieces[1].score) == len(pieces[1].xy) > 0
-    whole = joined(pieces)
+    whole = concat_keyframes(pieces)
     assert whole.score.shape == (0,) and len(whole.xy) == sum(len(piece.xy) for piece in pieces)
 
 
 def test_scores_stay_with_their_keypoints_when_lots_are_joined() -> None:
     seen = [
-        see_keyframe(WALK.frame(i), profile_of(Scored(), None), {"centres": np.zeros((64, 128), np.float32)})
+        describe_keyframe(WALK.frame(i), profile_of(Scored(), None), {"centres": np.zeros((64, 128), np.float32)})
         for i in range(3)
     ]
     blank = replace(seen[0], local=LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32)))
     blank = replace(blank, points_world=np.zeros((0, 3), np.float32))
-    whole = joined([assembled([seen[0]]), assembled([blank]), assembled(seen[1:])])
+    whole = concat_keyframes([stack_keyframes([seen[0]]), stack_keyframes([blank]), stack_keyframes(seen[1:])])
     np.testing.assert_array_equal(whole.score, score_of(whole.xy).astype(np.float16))
 
 
@@ -135,7 +137,7 @@ def test_planted_matches_of_few_or_many_keypoints_are_believed_by_the_same_rules
     kept = LocalFeatures(xy, np.zeros((len(xy), 4), np.float32))
     profile_ = profile_of(SimpleNamespace(encode=lambda rgb: kept), Planted())
     profile_.place = ""
-    seen = see_keyframe(frame, profile_, {}, KeyframeSettings(max_depth_m=20.0))
+    seen = describe_keyframe(frame, profile_, {}, KeyframeSettings(max_depth_m=20.0))
     good = np.flatnonzero(np.isfinite(seen.points_world[:, 0]))[:count]
     seen = replace(
         seen,
@@ -143,7 +145,7 @@ def test_planted_matches_of_few_or_many_keypoints_are_believed_by_the_same_rules
         points_world=seen.points_world[good],
         place=np.ones(1, np.float32),
     )
-    stored = MapOfPictures(assembled([seen]), {}, profile_, WALK.rig)
+    stored = MapOfPictures(stack_keyframes([seen]), {}, profile_, WALK.rig)
     whole_pixels = np.floor(xy[good]) + 0.5  # as DISK and SuperPoint tell them
     found = locate_features(
         stored,

@@ -8,7 +8,7 @@ from avlmaps.bench.locate import MapOfPictures, map_of
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import inverse, rotation_angle_rad
-from avlmaps.maps.keyframes import assembled
+from avlmaps.maps.keyframes import stack_keyframes
 from avlmaps.perception.profiles import profile
 from avlmaps.query.locate import Located, LocateSettings, alike, locate, nearest
 from helpers.picture_room import CAMERA, Room, RoomWalk, looking, painting
@@ -153,7 +153,7 @@ def test_a_blank_picture_is_not_located(stored: MapOfPictures, value: int) -> No
 
 
 def test_a_map_without_keyframes_locates_nothing(stored: MapOfPictures, photo: np.ndarray) -> None:
-    empty = replace(stored, keyframes=assembled([]))
+    empty = replace(stored, keyframes=stack_keyframes([]))
     assert locate(empty, photo, None, rng()).world_from_camera is None
 
 

@@ -12,7 +12,7 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedViewEncoder
 from avlmaps.query.factors import HeatSettings
-from avlmaps.query.modalities.area import AreaSettings, area_factor, area_scores, pooled
+from avlmaps.query.modalities.area import AreaSettings, area_factor, area_scores, pool_posteriors
 from avlmaps.query.voxel_space import Space
 
 ROOMS = ("kitchen", "bedroom", "office", "open-plan office")
@@ -77,31 +77,31 @@ def views(seed: int, count: int = 12) -> tuple[np.ndarray, np.ndarray]:
 @given(seed=st.integers(0, 10_000))
 def test_pooling_keeps_distributions_and_knows_no_order(seed: int) -> None:
     share, places = views(seed)
-    together = pooled(share, places, 0.8)
+    together = pool_posteriors(share, places, 0.8)
     np.testing.assert_allclose(together.sum(axis=1), 1.0)
     assert together.min() >= 0.0
     order = np.random.default_rng(seed + 1).permutation(len(share))
-    np.testing.assert_allclose(pooled(share[order], places[order], 0.8), together[order], atol=1e-12)
+    np.testing.assert_allclose(pool_posteriors(share[order], places[order], 0.8), together[order], atol=1e-12)
 
 
 @given(seed=st.integers(0, 10_000))
 def test_a_view_that_nothing_else_looked_near_stays_as_it_is(seed: int) -> None:
     share, places = views(seed)
     places[0] += 100.0
-    np.testing.assert_allclose(pooled(share, places, 0.8)[0], share[0])
+    np.testing.assert_allclose(pool_posteriors(share, places, 0.8)[0], share[0])
 
 
 def test_one_odd_view_is_outvoted_and_views_that_agree_are_surer_than_each() -> None:
     odd, usual = [0.9, 0.1], [0.2, 0.8]
-    together = pooled(np.array([odd, usual, usual, usual]), np.zeros((4, 3)), 0.8)
+    together = pool_posteriors(np.array([odd, usual, usual, usual]), np.zeros((4, 3)), 0.8)
     mean = np.array([0.375, 0.625]) ** 2
     np.testing.assert_allclose(together, np.tile(mean / mean.sum(), (4, 1)))
-    assert pooled(np.array([usual, usual]), np.zeros((2, 3)), 0.8)[0, 1] > 0.8
+    assert pool_posteriors(np.array([usual, usual]), np.zeros((2, 3)), 0.8)[0, 1] > 0.8
 
 
 def test_the_storey_above_has_no_say() -> None:
     share, places = np.array([[1.0, 0.0], [0.0, 1.0]]), np.array([[0.0, 0, 1], [0, 0, 4]])
-    np.testing.assert_allclose(pooled(share, places, 0.8), share)
+    np.testing.assert_allclose(pool_posteriors(share, places, 0.8), share)
 
 
 def test_the_papers_way_lets_every_view_speak_for_itself() -> None:

@@ -105,7 +105,7 @@ def test_each_thing_is_drawn_by_its_own_confidence_and_a_product_by_that_of_what
     assert isinstance(factor, NearThings)
     along_x = m.stored.voxels.index[factor.mask][:, 0]
     split = (along_x > np.median(along_x)).astype(int)
-    factor = replace(factor, instance=split, confidence=np.array([1.0, 0.25]), with_unsure=None)
+    factor = replace(factor, instance=split, confidence=np.array([1.0, 0.25]), with_uncertain=None)
     shown = factor.shown[factor.mask]
     np.testing.assert_allclose(shown, np.where(split == 1, 0.25, 1.0), atol=1e-6)
     both = Heatmap.of(factor) * m.sound("dog")

@@ -31,7 +31,7 @@ def test_a_png_bomb_is_refused_by_its_header(
     tmp_path: Path, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = write_folder(tmp_path / "walk")
-    monkeypatch.setattr(images, "decoded", None)
+    monkeypatch.setattr(images, "decode_picture", None)
     for file, read in (
         (path / "rgb/000002.png", lambda file: images.read_colour(file, CAMERA)),
         (path / "depth/000002.png", lambda file: images.read_depth(file, CAMERA, 1000.0)),

@@ -14,7 +14,7 @@ from training.sounds.kinds import MADE, NAMES, kind_of
 from avlmaps.core.progress import progress
 from avlmaps.perception.embedded import logmel
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resampled
+from avlmaps.recordings.resample import resample
 from avlmaps.sim.synthesis import MAKERS
 
 SHIPPABLE = ("CC0", "CC-BY ")  # the start of a licence with which a clip may teach weights that ship
@@ -80,7 +80,7 @@ def read_samples(path: Path) -> Float32[np.ndarray, " n"]:
     import soundfile
 
     samples, rate_hz = soundfile.read(path, dtype="float32", always_2d=True)
-    return resampled(Sound(samples.mean(axis=1), rate_hz), logmel.RATE_HZ).samples
+    return resample(Sound(samples.mean(axis=1), rate_hz), logmel.RATE_HZ).samples
 
 
 def mels_of(samples: Float32[np.ndarray, " n"]) -> Float32[np.ndarray, "frames bands"]:

@@ -20,7 +20,7 @@ from avlmaps.core.progress import progress
 from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings, segment
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.background import background
-from avlmaps.recordings.clips import Clip, amplified, audible_part, find_clips, gain_for
+from avlmaps.recordings.clips import Clip, amplify, audible_part, find_clips, gain_for
 
 COLUMNS = (
     "clips",
@@ -165,7 +165,7 @@ def measure(
 
 def _prepared(clip: Clip) -> Sound:
     sound = audible_part(clip, _RATE_HZ)
-    return amplified(sound, gain_for(sound, _LOUDNESS_DB))
+    return amplify(sound, gain_for(sound, _LOUDNESS_DB))
 
 
 def _track(sounds: Sequence[Sound], rng: np.random.Generator) -> tuple[Float32[np.ndarray, " n"], list[Segment]]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from avlmaps.cli.info import described, info_lines
+from avlmaps.cli.info import describe_map, info_lines
 from avlmaps.cli.output import UsageError, emit
 from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.progress import say
@@ -118,7 +118,7 @@ def build(verb: "Build") -> dict[str, Any]:
         resume=not verb.fresh,
         overwrite=verb.overwrite,
     )
-    return {**described(stored), "elapsed_s": round(perf_counter() - begin, 3)}
+    return {**describe_map(stored), "elapsed_s": round(perf_counter() - begin, 3)}
 
 
 def _chosen_profile(name: str, words: "Sequence[str]") -> "Profile":

@@ -197,10 +197,10 @@ def drive(
     finally:
         robot.close()
     if verb.plot is not None:
-        from avlmaps.navigate.trace_plot import plot_way
+        from avlmaps.navigate.trace_plot import plot_path
 
         title = f"“{verb.sentence}”"
-        plot_way(verb.plot, asked.space, robot.start, outcome.moves, robot.obstacles, robot.met(), title)
+        plot_path(verb.plot, asked.space, robot.start, outcome.moves, robot.obstacles, robot.met(), title)
         return {**outcome.to_json(), "plot": str(verb.plot)}
     return outcome.to_json()
 

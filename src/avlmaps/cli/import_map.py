@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 
-from avlmaps.cli.info import described, info_lines
+from avlmaps.cli.info import describe_map, info_lines
 from avlmaps.cli.output import emit
 from avlmaps.cli.verb import ModelVerb
 
@@ -53,4 +53,4 @@ def _imported(verb: ImportMap) -> dict[str, Any]:
     stored = import_reference_map(
         verb.source, verb.out, settings, areas=verb.areas, poses=verb.poses, overwrite=verb.overwrite
     )
-    return described(stored)
+    return describe_map(stored)

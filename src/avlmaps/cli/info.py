@@ -96,7 +96,7 @@ def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]
     from avlmaps.maps.store.reader import open_stored
 
     stored = open_stored(path, verify=verify)
-    told = described(stored)
+    told = describe_map(stored)
     if plot is not None:
         told["plot"] = str(plot_named(stored, plot))
     return told
@@ -117,7 +117,7 @@ def plot_named(stored: "StoredMap", plot: Path) -> Path:
     return plot_map(stored, plot, things, rooms)
 
 
-def described(stored: "StoredMap") -> dict[str, Any]:
+def describe_map(stored: "StoredMap") -> dict[str, Any]:
     """Describe a map, the names of its sounds, and the rules that it was built by."""
     from avlmaps.maps.store.reader import describe
     from avlmaps.query.rules import rules_of

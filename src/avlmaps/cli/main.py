@@ -144,9 +144,9 @@ def _run(verb: Verb) -> int:
 def _compiling(verb: Verb) -> AbstractContextManager[None]:
     if not verb.compiles:
         return nullcontext()
-    from avlmaps.core.compiling import announced
+    from avlmaps.core.compiling import announce_compiling
 
-    return announced()
+    return announce_compiling()
 
 
 def _fail(verb: Verb, error: BaseException, message: str, status: int) -> int:

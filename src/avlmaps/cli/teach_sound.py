@@ -37,10 +37,10 @@ class TeachSound(Verb):
 
 def teach(name: str, clips: tuple[Path, ...]) -> dict[str, Any]:
     """Teach a kind of sound from clips, or forget it where there are none."""
-    from avlmaps.perception.enrolment import forget_sound, taught_sounds, teach_sound
+    from avlmaps.perception.enrolment import enrolled_sounds, forget_sound, teach_sound
 
     if clips:
         teach_sound(name, list(clips))
     else:
         forget_sound(name)
-    return {"name": name, "clips": len(clips), "taught": [sound.name for sound in taught_sounds()]}
+    return {"name": name, "clips": len(clips), "taught": [sound.name for sound in enrolled_sounds()]}

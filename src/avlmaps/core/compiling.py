@@ -9,7 +9,7 @@ NOTICE = "compiling once (up to a minute or two; later runs skip this)"
 
 
 @contextmanager
-def announced() -> Iterator[None]:
+def announce_compiling() -> Iterator[None]:
     """Print one line on standard error when a loop is not in the cache and is compiled, in this process or a fork."""
     from numba.core import event
 

@@ -138,7 +138,7 @@ def sampled_digest(path: Path | str, budget_bytes: int) -> bytes:
 
 
 @contextmanager
-def replaced_atomically(path: Path) -> Iterator[BinaryIO]:
+def replace_atomically(path: Path) -> Iterator[BinaryIO]:
     """Open a temporary file beside ``path``; on success sync it and rename it over ``path``.
 
     The folder is synced as well, so that the new name survives a power cut.
@@ -157,7 +157,7 @@ def replaced_atomically(path: Path) -> Iterator[BinaryIO]:
 
 def write_bytes_atomically(path: Path, content: bytes) -> None:
     """Write a whole small file so that readers see the old or the new content, never a mixture."""
-    with replaced_atomically(path) as stream:
+    with replace_atomically(path) as stream:
         stream.write(content)
 
 

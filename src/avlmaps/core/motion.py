@@ -38,7 +38,7 @@ class GroundPose:
     def __post_init__(self) -> None:
         if not all(abs(value) < 1e9 for value in (self.x_m, self.y_m, self.heading_rad)):  # NaN fails as well
             raise ValueError(f"({self.x_m}, {self.y_m}) m, {self.heading_rad} rad is no pose")
-        object.__setattr__(self, "heading_rad", wrapped(self.heading_rad))
+        object.__setattr__(self, "heading_rad", wrap_angle(self.heading_rad))
 
     def turned(self, angle_rad: float) -> "GroundPose":
         """Return the pose turned to the left by an angle."""
@@ -67,7 +67,7 @@ class Moved:
     contact: bool = False
 
 
-def wrapped(angle_rad: float) -> float:
+def wrap_angle(angle_rad: float) -> float:
     """Return the angle in (−π, π]."""
     turned = (angle_rad + pi) % (2 * pi) - pi
     return pi if turned == -pi else turned

@@ -19,7 +19,7 @@ FRAME = "recording"
 """The frame of every position that is printed, written or drawn: the world of the recording's poses."""
 
 
-def orthonormalized(
+def orthonormalize(
     world_from_camera: Float[np.ndarray, "*shape"], name: str, max_fault: float = MAX_ROTATION_FAULT
 ) -> Float[np.ndarray, "4 4"]:
     """Return the pose with its rotation replaced by the nearest one (in the Frobenius norm).
@@ -51,10 +51,10 @@ def orthonormalized(
     return pose
 
 
-def orthonormalized_all(
+def orthonormalize_all(
     world_from_camera: Float[np.ndarray, "n 4 4"], names: Sequence[str], max_fault: float = MAX_ROTATION_FAULT
 ) -> Float[np.ndarray, "n 4 4"]:
-    """Do what ``orthonormalized`` does for many poses at once; the first pose that is none is named in the error."""
+    """Do what ``orthonormalize`` does for many poses at once; the first pose that is none is named in the error."""
     with np.errstate(invalid="ignore", over="ignore"):
         rotation = world_from_camera[:, :3, :3]
         fault = np.abs(np.swapaxes(rotation, 1, 2) @ rotation - np.eye(3)).max(axis=(1, 2), initial=0.0)
@@ -63,7 +63,7 @@ def orthonormalized_all(
         determinant = np.linalg.det(np.where(wild[:, None, None], np.eye(3), rotation))
     wild |= determinant < 0.0
     for index in np.flatnonzero(wild).tolist():
-        orthonormalized(world_from_camera[index], names[index], max_fault)
+        orthonormalize(world_from_camera[index], names[index], max_fault)
     u, _, vt = np.linalg.svd(rotation)
     pose = world_from_camera.copy()
     pose[:, :3, :3] = u @ vt

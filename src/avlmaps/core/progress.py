@@ -22,7 +22,7 @@ def silence(quiet: bool = True) -> None:
 
 
 @contextmanager
-def silenced(quiet: bool = True) -> Iterator[None]:
+def silence_progress(quiet: bool = True) -> Iterator[None]:
     """Keep progress off for a while, and put it back as it was; with ``quiet=False`` change nothing."""
     before = _quiet
     silence(before or quiet)

@@ -98,7 +98,7 @@ def drive(asks: Sequence[Ask], asked: "AVLMap", scene: "Scene", out: Path, tell:
     from avlmaps.language.rules import RulesTranslator
     from avlmaps.navigate.instruct import instruct
     from avlmaps.navigate.skills import RobotSettings
-    from avlmaps.navigate.trace_plot import plot_way
+    from avlmaps.navigate.trace_plot import plot_path
 
     chosen = command_for(asks)
     if chosen is None:
@@ -112,7 +112,7 @@ def drive(asks: Sequence[Ask], asked: "AVLMap", scene: "Scene", out: Path, tell:
         )
     except AvlmapsError as fault:
         return Drive(command, legs, None, None, str(fault))
-    plot_way(out / PICTURE, asked.space, robot.start, outcome.moves, robot.obstacles, robot.met, f"“{command}”")
+    plot_path(out / PICTURE, asked.space, robot.start, outcome.moves, robot.obstacles, robot.met, f"“{command}”")
     return Drive(command, legs, robot.start, outcome, outcome.error)
 
 

@@ -125,12 +125,12 @@ def _home(sheet: Sheet, home: Plan, evidence: "Evidence") -> str:
 def _strip(recording: "Recording", asked: "AVLMap", moments: int) -> Strip:
     """Look again at some moments of the walk, as the map's own pixel encoder does."""
     from avlmaps.core.progress import progress
-    from avlmaps.maps.gravity.stage import grounded
+    from avlmaps.maps.gravity.stage import attach_estimated_ground
     from avlmaps.maps.settings import DEFAULTS
     from avlmaps.perception.embedded.pixels import EmbeddedPixels
 
     encoder = EmbeddedPixels()
-    whole = grounded(recording, DEFAULTS)
+    whole = attach_estimated_ground(recording, DEFAULTS)
     index = np.unique(np.linspace(0, len(recording) - 1, moments).round().astype(int))
     frames = []
     for number in progress(index, "looking again"):

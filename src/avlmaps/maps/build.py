@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from avlmaps.core.progress import silenced
-from avlmaps.maps.keyframe_stage import keep_keyframes
+from avlmaps.core.progress import silence_progress
+from avlmaps.maps.keyframe_stage import describe_keyframes
 from avlmaps.maps.partial_maps import build_part, merge_parts
 from avlmaps.maps.plan import claim, make_plan, require_unchanged
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
-from avlmaps.maps.stages import attach_ground, commit, find_up, fuse, hear_sounds, merge, sense
-from avlmaps.maps.store.lock import locked
+from avlmaps.maps.stages import attach_ground, commit, detect_sounds, find_up, fuse, identify_sensor, merge
+from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.reader import StoredMap, describe, open_stored
-from avlmaps.perception.cache.cached_encoders import remembering
+from avlmaps.perception.cache.cached_encoders import with_cache
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.profiles import Profile
 from avlmaps.perception.profiles import profile as profile_of
@@ -54,15 +54,15 @@ def build_map(
         BackendError: the profile is not known, or a package for it is missing.
     """
     stamp = recording.change_stamp()
-    plan = make_plan(recording, Path(path), remembering(profile_of(profile), cache), settings)
-    with silenced(not progress), locked(plan.path):
+    plan = make_plan(recording, Path(path), with_cache(profile_of(profile), cache), settings)
+    with silence_progress(not progress), lock_folder(plan.path):
         if claim(plan, resume, overwrite) is None:
             up = find_up(plan)
             plan, ground, grounding_s = attach_ground(plan, up[0])
-            sensor = sense(plan)
+            sensor = identify_sensor(plan)
             fused = fuse(plan, parts, sensor)
-            pictures = keep_keyframes(plan, fused)
-            heard = hear_sounds(plan)
+            pictures = describe_keyframes(plan, fused)
+            heard = detect_sounds(plan)
             merged = merge(plan, fused, sensor)  # late, because it fills the memory
             require_unchanged(plan, stamp)
             commit(plan, up, (ground, grounding_s), fused, pictures, heard, merged)

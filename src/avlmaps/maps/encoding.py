@@ -13,16 +13,16 @@ from jaxtyping import Float32
 from avlmaps.core.errors import RecordingError
 from avlmaps.maps.prefetch import run_ahead
 from avlmaps.maps.store.manifest import BadFrame
-from avlmaps.perception.cache.cached_encoders import encoded_together
+from avlmaps.perception.cache.cached_encoders import encode_batch
 from avlmaps.perception.protocols import BatchPixelEncoder, PixelEncoder
 from avlmaps.recordings.types import Frame, Recording
 
-Perceived = tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]
+EncodedFrame = tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]
 
 
-def perceived(
+def encode_frames(
     recording: Recording, stretches: Sequence[Sequence[int]], encoder: PixelEncoder | None
-) -> Generator[Perceived]:
+) -> Generator[EncodedFrame]:
     """Yield the frames with their features, in order; one that cannot be read yields its fault in its place.
 
     Args:
@@ -33,33 +33,33 @@ def perceived(
     """
     every = [index for stretch in stretches for index in stretch]
     size = 1 if encoder is None else batch_of(encoder)
-    with closing(run_ahead(decoded(recording, every), max(2, size))) as frames:
+    with closing(run_ahead(decode_frames(recording, every), max(2, size))) as frames:
         if encoder is None:
             yield from ((frame, None) for frame in frames)
             return
         lengths = [len(stretch) for stretch in stretches]
-        with closing(run_ahead(encoded(frames, lengths, encoder, size))) as seen:
+        with closing(run_ahead(encode_batches(frames, lengths, encoder, size))) as seen:
             yield from seen
 
 
-def decoded(recording: Recording, indices: Iterable[int]) -> Generator[Frame | BadFrame]:
+def decode_frames(recording: Recording, indices: Iterable[int]) -> Generator[Frame | BadFrame]:
     """Read frames; for one that cannot be read, yield the sentence that says why."""
     for index in indices:
         try:
             yield recording.frame(index)
         except RecordingError as fault:
-            yield BadFrame(index=index, why=without_place(str(fault), recording))
+            yield BadFrame(index=index, why=strip_folder(str(fault), recording))
 
 
-def encoded(
+def encode_batches(
     frames: Iterator[Frame | BadFrame], lengths: Sequence[int], encoder: PixelEncoder, size: int
-) -> Generator[Perceived]:
+) -> Generator[EncodedFrame]:
     """Add features to frames, at most ``size`` frames at once, stretch by stretch."""
     for length in lengths:
         stretch = islice(frames, length)
         while group := _next_group(stretch, size):
             good = [frame for frame in group if isinstance(frame, Frame)]
-            features = iter(encoded_together(encoder, good))
+            features = iter(encode_batch(encoder, good))
             for frame in group:
                 yield frame, (next(features) if isinstance(frame, Frame) else None)
 
@@ -81,6 +81,6 @@ def batch_of(encoder: PixelEncoder) -> int:
     return max(1, encoder.batch) if isinstance(encoder, BatchPixelEncoder) else 1
 
 
-def without_place(sentence: str, recording: Recording) -> str:
+def strip_folder(sentence: str, recording: Recording) -> str:
     """Return a sentence about a recording without the folders that it lies in: a map may travel."""
     return sentence.replace(str(recording.path), recording.path.name)

@@ -74,7 +74,7 @@ class FreeViewCollector:
         return FreeViews(clear, np.stack(self._pose) if self._pose else np.zeros((0, 4, 4)))
 
 
-def joined(parts: Sequence[FreeViews]) -> FreeViews:
+def concat_views(parts: Sequence[FreeViews]) -> FreeViews:
     """Put the views of parts one after the other."""
     clear, pose = [part.clear_mm for part in parts], [part.clear_pose for part in parts]
     return FreeViews(np.concatenate(clear), np.concatenate(pose))

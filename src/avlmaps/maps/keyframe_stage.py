@@ -13,15 +13,14 @@ from jaxtyping import Float32, Int
 
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
-from avlmaps.maps.keyframes import assembled as put_together
-from avlmaps.maps.keyframes import learn_places, see_keyframe, select_keyframes
+from avlmaps.maps.keyframes import describe_keyframe, learn_places, select_keyframes, stack_keyframes
 from avlmaps.maps.partial_maps import BUILD_VERSION, Part
 from avlmaps.maps.plan import Plan
 from avlmaps.maps.prefetch import run_ahead
-from avlmaps.maps.store.array_validation import RAGGED, ROWS_OR_NONE, array_fields, assembled
+from avlmaps.maps.store.array_validation import RAGGED, ROWS_OR_NONE, array_fields, validate_arrays
 from avlmaps.maps.store.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
 from avlmaps.maps.types import Keyframes
-from avlmaps.perception.cache.cached_encoders import came_from_store
+from avlmaps.perception.cache.cached_encoders import cache_note
 from avlmaps.perception.protocols import LocalFeatures, ViewEncoder
 from avlmaps.recordings.subset import Subset
 from avlmaps.recordings.types import Frame, Recording
@@ -36,7 +35,7 @@ class _Facts(msgspec.Struct):
 
 
 @dataclass(frozen=True, slots=True)
-class KeptKeyframes:
+class KeyframeResult:
     """Outcome of the stage: the pictures, what the place encoder learned, and the seconds it took."""
 
     keyframes: Keyframes
@@ -44,7 +43,7 @@ class KeptKeyframes:
     elapsed_s: float
 
 
-def keep_keyframes(plan: Plan, parts: Sequence[Part]) -> KeptKeyframes:
+def describe_keyframes(plan: Plan, parts: Sequence[Part]) -> KeyframeResult:
     """Choose keyframes among the frames that were fused, and look at them."""
     fused = fused_frames(parts)
     good = Subset(plan.recording, fused)
@@ -59,8 +58,8 @@ def keep_keyframes(plan: Plan, parts: Sequence[Part]) -> KeptKeyframes:
     missing = {folder: lot for folder, lot in lots.items() if find_checkpoint(folder, _Facts, key) is None}
     _look(plan, good, missing, len(chosen), place_state, local, key)
     kept = [load_checkpoint(folder, _Facts, key) for folder in lots]
-    pieces = [assembled(Keyframes, lot.arrays, str(lot.folder)) for lot in kept]
-    return KeptKeyframes(joined(pieces), place_state, learning_s + sum(lot.facts.elapsed_s for lot in kept))
+    pieces = [validate_arrays(Keyframes, lot.arrays, str(lot.folder)) for lot in kept]
+    return KeyframeResult(concat_keyframes(pieces), place_state, learning_s + sum(lot.facts.elapsed_s for lot in kept))
 
 
 def _learn(
@@ -96,10 +95,12 @@ def _look(
         for folder, lot in lots.items():
             begin = perf_counter()
             seen = [
-                replace(see_keyframe(frame, blind, place_state, plan.settings.keyframes, local.get(index)), view=view)
+                replace(
+                    describe_keyframe(frame, blind, place_state, plan.settings.keyframes, local.get(index)), view=view
+                )
                 for index, frame, view in islice(ahead, len(lot))
             ]
-            pieces = put_together(seen)
+            pieces = stack_keyframes(seen)
             arrays = {name: getattr(pieces, name) for name in array_fields(Keyframes)}
             save_checkpoint(folder, key, _Facts(perf_counter() - begin), arrays)
         for _ in ahead:  # nothing is left; this completes the bar
@@ -129,7 +130,7 @@ def _encoded(
 def _from_store(plan: Plan) -> str:
     """Return how many keyframes the store holds whole: the lowest count of their kinds of features."""
     kinds = (Kind.VIEWS, Kind.LOCAL, Kind.PLACE)
-    told = [came_from_store(plan.used, kind) for kind in kinds if plan.used.backend_name(kind)]
+    told = [cache_note(plan.used, kind) for kind in kinds if plan.used.backend_name(kind)]
     return min((words for words in told if words), key=lambda words: int(words.split()[0]), default="")
 
 
@@ -140,10 +141,10 @@ def fused_frames(parts: Sequence[Part]) -> Int[np.ndarray, " n"]:
     return np.setdiff1d(np.concatenate(covered), np.array(bad, np.int64))
 
 
-def joined(pieces: Sequence[Keyframes]) -> Keyframes:
+def concat_keyframes(pieces: Sequence[Keyframes]) -> Keyframes:
     """Put keyframes one after the other; the offsets of ragged arrays run on."""
     if not pieces:
-        return put_together([])
+        return stack_keyframes([])
     arrays = {name: [getattr(piece, name) for piece in pieces] for name in array_fields(Keyframes)}
     for offsets, _ in RAGGED[Keyframes]:
         lengths = np.concatenate([np.diff(piece) for piece in arrays[offsets]])

@@ -8,7 +8,7 @@ from jaxtyping import Float, Float16, Float32, Int, Int64, UInt8
 
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.progress import progress
-from avlmaps.maps.keypoint_depth import lifted, middle_of_view
+from avlmaps.maps.keypoint_depth import lift_keypoints, middle_of_view
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.profiles import Profile
 from avlmaps.perception.protocols import LocalFeatures
@@ -136,10 +136,10 @@ def perceive_keyframes(
     """
     place_state, known = learn_places(recording, indices, profile, rng)
     seen = [
-        see_keyframe(recording.frame(int(index)), profile, place_state, settings, known.get(int(index)))
+        describe_keyframe(recording.frame(int(index)), profile, place_state, settings, known.get(int(index)))
         for index in progress(indices, "seeing", total=len(indices), unit="keyframe")
     ]
-    return assembled(seen), place_state
+    return stack_keyframes(seen), place_state
 
 
 def learn_places(
@@ -186,7 +186,7 @@ class SeenKeyframe:
     thumbnail: bytes
 
 
-def see_keyframe(
+def describe_keyframe(
     frame: Frame,
     profile: Profile,
     place_state: dict[str, np.ndarray],
@@ -214,12 +214,12 @@ def see_keyframe(
         view=profile.view_encoder().encode([frame])[0] if profile.views else np.zeros(0, np.float32),
         place=place,
         local=local,
-        points_world=lifted(local.xy, frame, settings.max_depth_m),
+        points_world=lift_keypoints(local.xy, frame, settings.max_depth_m),
         thumbnail=_thumbnail(frame.rgb, settings.thumbnail_width_px),
     )
 
 
-def assembled(seen: Sequence[SeenKeyframe]) -> Keyframes:
+def stack_keyframes(seen: Sequence[SeenKeyframe]) -> Keyframes:
     """Put keyframes, in the order of time, into the map's arrays."""
     return Keyframes(
         stamp_s=np.array([one.stamp_s for one in seen], np.float64),

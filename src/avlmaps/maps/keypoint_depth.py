@@ -13,7 +13,7 @@ MAX_SPREAD = 0.03
 """Depths in a keypoint's patch may differ by this part of the depth; at an edge it is unknown which side it is on."""
 
 
-def lifted(
+def lift_keypoints(
     xy: Float32[np.ndarray, "n 2"], frame: Frame, max_depth_m: float, max_spread: float = MAX_SPREAD
 ) -> Float32[np.ndarray, "n 3"]:
     """Return the world points that keypoints of the colour picture show.

@@ -18,17 +18,17 @@ import numpy as np
 from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
-from avlmaps.maps.encoding import Perceived, perceived
-from avlmaps.maps.free_space import FreeViewCollector, FreeViews, joined
+from avlmaps.maps.encoding import EncodedFrame, encode_frames
+from avlmaps.maps.free_space import FreeViewCollector, FreeViews, concat_views
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator, VoxelSums
-from avlmaps.maps.gravity.stage import grounded
+from avlmaps.maps.gravity.stage import attach_estimated_ground
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.sensor import SensorModel
 from avlmaps.maps.sensor_stage import find_sensor
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.store.checkpoints import Checkpoint, find_checkpoint, key_of, load_checkpoint, save_checkpoint
 from avlmaps.maps.store.manifest import BadFrame
-from avlmaps.perception.cache.cached_encoders import came_from_store, remembering
+from avlmaps.perception.cache.cached_encoders import cache_note, with_cache
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.profiles import Profile
 from avlmaps.perception.profiles import profile as profile_of
@@ -144,7 +144,7 @@ def build_part(
     Raises:
         MapError: there are no such frames, or too many of them cannot be read.
     """
-    out, used = Path(out), remembering(profile_of(profile), cache)
+    out, used = Path(out), with_cache(profile_of(profile), cache)
     settings = settings.for_profile(used.weight_variance_m2)
     if not 0 <= start < stop <= len(recording):
         raise MapError(f"There are no frames {start} to {stop}; {recording.path} has frames 0 to {len(recording)}.")
@@ -154,7 +154,7 @@ def build_part(
         if part.info.spans != (span,):
             raise MapError(f"{out} holds a part of other frames; give another folder, or remove it first.")
         return part
-    known = grounded(recording, settings) if used.pixels else recording
+    known = attach_estimated_ground(recording, settings) if used.pixels else recording
     fuse_spans(known, [(span, out)], used, settings, find_sensor(recording, settings).model)
     return load_part(out, key)
 
@@ -182,12 +182,12 @@ def merge_parts(folders: Sequence[Path | str], out: Path | str) -> Part:
         elapsed_s=sum(part.info.elapsed_s for part in parts),
     )
     # The grid only turns metres into voxels, and merging meets none.
-    views = joined([part.views() for part in parts])
-    save_checkpoint(Path(out), key, info, _arrays(add_up(parts, GridSpec()).sums(), views))
+    views = concat_views([part.views() for part in parts])
+    save_checkpoint(Path(out), key, info, _arrays(sum_parts(parts, GridSpec()).sums(), views))
     return load_part(Path(out), key)
 
 
-def add_up(parts: Sequence[Part], grid: GridSpec) -> VoxelAccumulator:
+def sum_parts(parts: Sequence[Part], grid: GridSpec) -> VoxelAccumulator:
     """Add the sums of parts, in the order given; in memory is only the total."""
     total = VoxelAccumulator(grid, parts[0].sums().feature_sum.shape[1])
     for part in parts:
@@ -277,8 +277,8 @@ def fuse_spans(
     tolerance = Tolerance(recording, settings, known_bad)
     stretches = [range(*span) for span, _ in jobs]
     total_frames = done + sum(map(len, stretches))
-    with closing(perceived(recording, stretches, encoder)) as ahead:
-        seen = progress(ahead, "fusing", total=total_frames, done=done, note=lambda: came_from_store(used, Kind.PIXELS))
+    with closing(encode_frames(recording, stretches, encoder)) as ahead:
+        seen = progress(ahead, "fusing", total=total_frames, done=done, note=lambda: cache_note(used, Kind.PIXELS))
         for span, folder in jobs:
             begin = perf_counter()
             dim = encoder.card.dim if encoder else 0
@@ -298,7 +298,7 @@ def fuse_spans(
 
 
 def _fuse(
-    seen: Iterable[Perceived], total: VoxelAccumulator, free: FreeViewCollector, tolerance: Tolerance
+    seen: Iterable[EncodedFrame], total: VoxelAccumulator, free: FreeViewCollector, tolerance: Tolerance
 ) -> list[BadFrame]:
     """Add frames up; return those that could not be read."""
     bad: list[BadFrame] = []

@@ -9,8 +9,8 @@ from avlmaps.core.progress import say
 from avlmaps.maps.build import build_map
 from avlmaps.maps.integrity import Guard, remember_checked
 from avlmaps.maps.plan import make_plan
-from avlmaps.maps.store.array_files import FileInfo, checked_path, sync_names, writing_into
-from avlmaps.maps.store.lock import locked
+from avlmaps.maps.store.array_files import FileInfo, explain_write_errors, sync_names, verify_file
+from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import MANIFEST, MapInfo, parse_manifest, read_manifest, write_manifest
 from avlmaps.maps.store.reader import open_stored, profile_of_map
 from avlmaps.maps.store.writer import sweep
@@ -43,7 +43,7 @@ def damaged_files(path: Path) -> dict[str, str]:
     found: dict[str, str] = {}
     for name, file in sorted(info.files.items()):
         try:
-            checked_path(path, file, verify=True)
+            verify_file(path, file, verify=True)
             Guard(path, {name: file}, trusting=False).require_whole()
         except MapError as fault:
             found[name] = str(fault)
@@ -91,7 +91,7 @@ def repair_map(path: Path | str, recording: Recording | None) -> Repaired:
             f"({info.avlmaps_version}); build it again with --overwrite."
         )
     made = build_map(recording, workshop, used, info.settings).info
-    with locked(path):
+    with lock_folder(path):
         return _put_back(path, info, made, damaged)
 
 
@@ -100,7 +100,7 @@ def _put_back(path: Path, info: MapInfo, made: MapInfo, damaged: dict[str, str])
     wanted = {
         name: info.files[name] if same else file for name, file in made.files.items() if not same or name in damaged
     }
-    with writing_into(path):
+    with explain_write_errors(path):
         for name, file in wanted.items():
             _replace(path / _WORKSHOP, made.files[name], path, file)
         sync_names(path, wanted.values())

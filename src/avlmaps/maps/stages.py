@@ -14,24 +14,24 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.maps.cleaning import clean
-from avlmaps.maps.encoding import without_place
+from avlmaps.maps.encoding import strip_folder
 from avlmaps.maps.gravity.floor import GroundedRecording
-from avlmaps.maps.gravity.stage import ground_notices, look_for_ground, look_for_up, spread
+from avlmaps.maps.gravity.stage import estimate_ground, estimate_up, ground_notices, spread
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.keyframe_stage import KeptKeyframes
+from avlmaps.maps.keyframe_stage import KeyframeResult
 from avlmaps.maps.partial_maps import (
     BUILD_VERSION,
     Part,
-    add_up,
     check_disjoint,
     find_part,
     fuse_spans,
     load_part,
     plan_spans,
+    sum_parts,
 )
 from avlmaps.maps.plan import Plan, audio_key
 from avlmaps.maps.sensor_stage import find_sensor
-from avlmaps.maps.store.array_validation import array_fields, assembled
+from avlmaps.maps.store.array_validation import array_fields, validate_arrays
 from avlmaps.maps.store.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
 from avlmaps.maps.store.manifest import (
     Box,
@@ -73,7 +73,7 @@ class _Facts(msgspec.Struct):
 
 
 @dataclass(frozen=True, slots=True)
-class KeptSounds:
+class SoundResult:
     """Outcome of the sound stage: what was heard, where the clips lie, and the seconds it took."""
 
     sounds: HeardSounds
@@ -90,7 +90,7 @@ def find_up(plan: Plan) -> tuple[UpInfo, float]:
     found = find_checkpoint(folder, _UpFacts, key)
     if found is None:
         begin = perf_counter()
-        save_checkpoint(folder, key, _UpFacts(look_for_up(plan.recording, plan.settings), perf_counter() - begin), {})
+        save_checkpoint(folder, key, _UpFacts(estimate_up(plan.recording, plan.settings), perf_counter() - begin), {})
         found = load_checkpoint(folder, _UpFacts, key)
     return found.facts.up, found.facts.elapsed_s
 
@@ -103,7 +103,7 @@ def attach_ground(plan: Plan, up: UpInfo) -> tuple[Plan, GroundInfo, float]:
     found = find_checkpoint(folder, _GroundFacts, key)
     if found is None or not found.facts.whole:  # a frame that could not be read then may be readable now
         begin = perf_counter()
-        ground, info = look_for_ground(plan.recording, plan.settings, up)
+        ground, info = estimate_ground(plan.recording, plan.settings, up)
         arrays = {name: getattr(ground, name) for name in ("up_in_world", "camera_m", "floor_m")}
         whole = len(ground.camera_m) == len(spread(recording, plan.settings.gravity.frames))
         save_checkpoint(folder, key, _GroundFacts(info, whole, perf_counter() - begin), arrays)
@@ -112,7 +112,7 @@ def attach_ground(plan: Plan, up: UpInfo) -> tuple[Plan, GroundInfo, float]:
     return on_ground, found.facts.ground, found.facts.elapsed_s
 
 
-def sense(plan: Plan) -> SensorInfo:
+def identify_sensor(plan: Plan) -> SensorInfo:
     """Return the depth camera, as the settings name it or as the frames show it."""
     if plan.settings.fusion.sensor != "auto":
         return find_sensor(plan.recording, plan.settings)
@@ -158,7 +158,7 @@ class Merged:
 def merge(plan: Plan, parts: Sequence[Part], sensor: SensorInfo) -> Merged:
     """Add the parts up to the voxels of the map, and remove those that are no surface."""
     begin, grid = perf_counter(), GridSpec(plan.settings.voxel_size_m)
-    total = add_up(parts, grid)
+    total = sum_parts(parts, grid)
     if len(total) == 0:
         farthest = min(plan.settings.fusion.max_depth_m, sensor.model.farthest_m(grid.voxel_size_m))
         raise MapError(
@@ -175,30 +175,30 @@ def merge(plan: Plan, parts: Sequence[Part], sensor: SensorInfo) -> Merged:
     return Merged(total.voxels(kept=kept), sensor, removed, perf_counter() - begin)
 
 
-def hear_sounds(plan: Plan) -> KeptSounds:
+def detect_sounds(plan: Plan) -> SoundResult:
     """Find the sounds in the track; none where there is no track, or no model for them."""
     if plan.recording.audio is None or not plan.used.sounds:
-        return KeptSounds(_silence(plan), plan.path, 0.0)
+        return SoundResult(_silence(plan), plan.path, 0.0)
     settings, model = plan.settings.hearing, plan.models[Kind.SOUNDS.value]
     key = key_of("sounds", BUILD_VERSION, plan.recording.fingerprint, audio_key(plan.recording), settings, model)
     folder = plan.folder("sounds", key)
     found = find_checkpoint(folder, _Facts, key)
     if found is None:
-        from avlmaps.maps.audio.events import hear
+        from avlmaps.maps.audio.events import detect_events
 
         begin = perf_counter()
         scratch = folder.with_name("clips.unfinished")
         shutil.rmtree(scratch, ignore_errors=True)
         scratch.mkdir(parents=True)
-        heard = hear(plan.recording, plan.used.sound_encoder(), settings, scratch)
+        heard = detect_events(plan.recording, plan.used.sound_encoder(), settings, scratch)
         arrays = {name: getattr(heard, name) for name in array_fields(HeardSounds)}
         clips = {f"clips/{number:06d}": scratch / Path(clip).name for number, clip in enumerate(heard.clips)}
         save_checkpoint(folder, key, _Facts(perf_counter() - begin), arrays, clips)
         shutil.rmtree(scratch)
         found = load_checkpoint(folder, _Facts, key)
     names = tuple(path.name for path in found.files.values())
-    sounds = assembled(HeardSounds, {**found.arrays, "clips": names}, str(folder))
-    return KeptSounds(sounds, folder / "clips", found.facts.elapsed_s)
+    sounds = validate_arrays(HeardSounds, {**found.arrays, "clips": names}, str(folder))
+    return SoundResult(sounds, folder / "clips", found.facts.elapsed_s)
 
 
 def _silence(plan: Plan) -> HeardSounds:
@@ -219,8 +219,8 @@ def commit(
     up: tuple[UpInfo, float],
     ground: tuple[GroundInfo, float],
     parts: Sequence[Part],
-    pictures: KeptKeyframes,
-    heard: KeptSounds,
+    pictures: KeyframeResult,
+    heard: SoundResult,
     merged: Merged,
 ) -> MapInfo:
     """Write the map and, last of all, its manifest; then the parts go."""
@@ -282,7 +282,7 @@ def _recording_info(recording: Recording) -> RecordingInfo:
         fingerprint=recording.fingerprint,
         frames=len(recording),
         duration_s=recording.duration_s,
-        notices=tuple(without_place(notice, recording) for notice in recording.notices),
+        notices=tuple(strip_folder(notice, recording) for notice in recording.notices),
     )
 
 

@@ -14,7 +14,7 @@ _LOST_M = 0.002  # a movement must fall short by this to show where it was stopp
 _WIDER_RAD = (0.0, 0.5, -0.5, 1.0, -1.0)  # how far beside the likeliest point it looks for one that can be
 
 
-class Met:
+class ContactMap:
     """Cells that the body found occupied, and cells that it stood on.
 
     Attributes:
@@ -30,7 +30,7 @@ class Met:
         reach = int(radius_m / obstacles.cell_size_m) + 1
         self._disc = np.mgrid[-reach : reach + 1, -reach : reach + 1].reshape(2, -1).T
 
-    def stood_at(self, pose: GroundPose) -> None:
+    def mark_free(self, pose: GroundPose) -> None:
         """Note that the body stood somewhere: every cell wholly under it is free."""
         cell_m = self._obstacles.cell_size_m
         at = (np.array([pose.x_m, pose.y_m]) - self._obstacles.origin_m) / cell_m
@@ -40,7 +40,7 @@ class Met:
         self._been[tuple(cells.T)] = True
         self.cells[tuple(cells.T)] = False
 
-    def touched(self, before: GroundPose, told: GroundPose, now: GroundPose) -> bool:
+    def mark_contact(self, before: GroundPose, told: GroundPose, now: GroundPose) -> bool:
         """Mark the obstacle that stopped a movement, as far as the poses show it.
 
         A body that slides loses just the part of its way that leads into the thing, one that stops all of it. Where

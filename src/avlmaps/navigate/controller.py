@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import NavigationError
-from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, wrapped
+from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, wrap_angle
 
 # Whether a body can move straight from one pose to another, as far as is known.
 Safe = Callable[[GroundPose, GroundPose], bool]
@@ -89,7 +89,7 @@ class Watch:
 
 def still(before: GroundPose, now: GroundPose) -> bool:
     """Return whether a body neither moved nor turned."""
-    return before.distance_m(now) <= 1e-4 and abs(wrapped(now.heading_rad - before.heading_rad)) <= 1e-3
+    return before.distance_m(now) <= 1e-4 and abs(wrap_angle(now.heading_rad - before.heading_rad)) <= 1e-3
 
 
 def _farthest(
@@ -139,7 +139,7 @@ class ActionController:
     def _turns_to_step(self, pose: GroundPose) -> int | None:
         """Return by how many turns to the left the best safe step begins."""
         x_m, y_m = self._target(pose)
-        ahead = round(wrapped(bearing(pose, x_m, y_m) - pose.heading_rad) / TURN_RAD)
+        ahead = round(wrap_angle(bearing(pose, x_m, y_m) - pose.heading_rad) / TURN_RAD)
         if self._safe(pose, pose.turned(ahead * TURN_RAD).ahead(FORWARD_M)):
             return ahead
         # Not straight on: the safe step that leaves it nearest to the path ahead, if it comes nearer at all.
@@ -233,7 +233,7 @@ class VelocityController:
         if left_m <= settings.close_m and passed:
             return None if self._stands() else self._limited(0.0, 0.0)
         x_m, y_m = self._target(pose)
-        off_rad = wrapped(bearing(pose, x_m, y_m) - pose.heading_rad)
+        off_rad = wrap_angle(bearing(pose, x_m, y_m) - pose.heading_rad)
         apart_m = max(hypot(x_m - pose.x_m, y_m - pose.y_m), 1e-6)
         self._turning = abs(off_rad) > (0.1 if self._turning else settings.turn_first_rad)
         if self._turning or blocked:

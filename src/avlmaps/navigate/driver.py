@@ -8,11 +8,11 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, wrapped
+from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, wrap_angle
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate import grid_kernels
 from avlmaps.navigate.bodies import BASE, Body, BodyShape
-from avlmaps.navigate.contact_map import Met
+from avlmaps.navigate.contact_map import ContactMap
 from avlmaps.navigate.controller import (
     ActionController,
     VelocityController,
@@ -139,8 +139,8 @@ class MapDriver:
     ) -> None:
         self.obstacles, self.body, self.shape = obstacles, body, shape
         self.settings = settings or DriveSettings()
-        self.met = Met(obstacles, shape.radius_m)
-        self.met.stood_at(body.pose)
+        self.met = ContactMap(obstacles, shape.radius_m)
+        self.met.mark_free(body.pose)
 
     @property
     def pose(self) -> GroundPose:
@@ -176,7 +176,7 @@ class MapDriver:
                 note = trip.fault or f"it gave up after {trip.movements} movements"
                 break
         if face is not None and np.isfinite(x_y := self._level(face)).all():
-            self._turned(wrapped(bearing(self.pose, *map(float, x_y)) - self.pose.heading_rad), trip)
+            self._turned(wrap_angle(bearing(self.pose, *map(float, x_y)) - self.pose.heading_rad), trip)
         return self._at_stop(trip, stop, goal, note)
 
     def turn(self, angle_rad: float) -> Arrival:
@@ -357,7 +357,7 @@ class MapDriver:
                 if command is None:
                     break
                 self._drive(*command, trip)
-            left_rad -= wrapped(self.pose.heading_rad - heading_rad)
+            left_rad -= wrap_angle(self.pose.heading_rad - heading_rad)
             heading_rad = self.pose.heading_rad
             idle = idle + 1 if still(before, self.pose) else 0
         return left_rad
@@ -390,11 +390,11 @@ class MapDriver:
         meant_m = before.distance_m(told)
         stopped = moved.contact or (meant_m > 2 * _STILL_M and before.distance_m(moved.pose) < _STILL_M)
         if meant_m:
-            self.met.stood_at(moved.pose)
+            self.met.mark_free(moved.pose)
         if not stopped:
             return True
         trip.contacts += moved.contact
         # A turn has no direction in which it was stopped.
-        if meant_m and self.met.touched(before, told, moved.pose):
+        if meant_m and self.met.mark_contact(before, told, moved.pose):
             self.__dict__.pop("planner", None)
         return False

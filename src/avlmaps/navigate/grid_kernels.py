@@ -40,7 +40,7 @@ def _mean_cost(cost, i, j, di, dj):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def numbered(mask):  # pragma: no cover - compiled
+def number_cells(mask):  # pragma: no cover - compiled
     """Return the number of each true cell, −1 elsewhere, and the rows and columns of the true cells."""
     nx, ny = mask.shape
     number = np.full((nx, ny), -1, np.int32)
@@ -318,7 +318,7 @@ def room_along(points, occupied, reach):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def seen_from(x, y, cells, opaque, own):  # pragma: no cover - compiled
+def mark_visible(x, y, cells, opaque, own):  # pragma: no cover - compiled
     """Return for each cell whether a thing at a place is seen from its middle.
 
     Args:

@@ -12,7 +12,7 @@ from avlmaps.language.vocabulary import Clip, Picture, Place, Target
 from avlmaps.navigate.arguments import kind_of, text_of
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
-from avlmaps.navigate.instances import Thing, likely, nearest, same_thing, tells_one, things_in
+from avlmaps.navigate.instances import SURE, Thing, likely, nearest, same_thing, tells_one, things_in
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 

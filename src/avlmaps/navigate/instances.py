@@ -36,7 +36,7 @@ class Thing:
     solid: bool = False
 
 
-def named(heat: Heatmap) -> str:
+def describe_query(heat: Heatmap) -> str:
     """Return what a heatmap asks for in words: ``'chair' near 'glass breaking'``."""
     lead = heat.lead
     others = [f"{factor.part.query!r}" for factor in heat.factors if factor is not lead]
@@ -64,17 +64,17 @@ def things_in(heat: Heatmap, guess: bool = False) -> list[Thing]:
         goals = tried.goals(_MOST_GOALS)
         if goals:
             return [_thing(tried, tried.lead, goal) for goal in goals]
-    raise GoalNotFoundError(why_not(heat, guess))
+    raise GoalNotFoundError(explain_absence(heat, guess))
 
 
 def _guesses(heat: Heatmap) -> Iterator[Heatmap]:
     """Yield what may be meant by a heatmap, the highest confidence first."""
     lead = Heatmap.of(heat.lead)
     yield heat
-    yield heat.with_unsure()
+    yield heat.include_uncertain()
     if len(heat.factors) > 1:
         yield lead
-        yield lead.with_unsure()
+        yield lead.include_uncertain()
 
 
 def nearest(things: Sequence[Thing], xy: Float[np.ndarray, "2"]) -> Thing:
@@ -98,25 +98,25 @@ def _thing(heat: Heatmap, lead: Factor, goal: Goal) -> Thing:
     instance = int(lead.instance[np.argmin(np.linalg.norm(lead.anchors - position, axis=1))])
     place, sure = heat.space.level(position), goal.score
     if not isinstance(lead, NearThings):
-        return Thing(named(heat), Outline.at(place[:2]), place, sure)
+        return Thing(describe_query(heat), Outline.at(place[:2]), place, sure)
     own = heat.space.level(lead.anchors[lead.instance == instance])
     outline = Outline.round(own[:, :2], heat.space.grid.voxel_size_m)
     if len(heat.factors) == 1:
         sure = float(lead.confidence[instance])
-    return Thing(named(heat), outline, place, sure, solid=True)
+    return Thing(describe_query(heat), outline, place, sure, solid=True)
 
 
-def why_not(heat: Heatmap, guess: bool = False) -> str:
+def explain_absence(heat: Heatmap, guess: bool = False) -> str:
     """Return one sentence on why there is no goal: which phrase, the map's confidence, and what to do."""
     missing = [factor for factor in heat.factors if not factor.found]
     if not missing:
         return (
-            f"{named(heat)} is nowhere in the map: each is there, but they do not come together anywhere; name it by "
-            "something that is nearer to it."
+            f"{describe_query(heat)} is nowhere in the map: each is there, but they do not come together anywhere; "
+            "name it by something that is nearer to it."
         )
     told = "; ".join(_absence(factor) for factor in missing)
     advice = "say it in other words" if guess else "say it in other words, or let the robot go to the best guess"
-    return f"{named(heat)} is not found in the map: {told}; {advice}."
+    return f"{describe_query(heat)} is not found in the map: {told}; {advice}."
 
 
 def _absence(factor: Factor) -> str:

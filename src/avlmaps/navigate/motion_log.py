@@ -63,7 +63,7 @@ class Move:
         return where + away + (f" ({self.note.rstrip('.')})" if self.note else "")
 
 
-def joined(arrivals: Sequence[Arrival]) -> Arrival:
+def concat_motions(arrivals: Sequence[Arrival]) -> Arrival:
     """Return several movements as one."""
     last = arrivals[-1]
     notes = dict.fromkeys(arrival.note for arrival in arrivals if arrival.note)

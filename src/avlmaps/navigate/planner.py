@@ -141,7 +141,7 @@ class Planner:
         # An obstacle of the map under its middle does not hold it back, a wall beside it does.
         within = bool(costmap.holds(start)) and bool(costmap.occupied[tuple(costmap.cell_of(start))])
         own = costmap.radius_m / costmap.cell_size_m if within else 1.0
-        ways_out = cells[grid_kernels.seen_from(x, y, cells, costmap.occupied, own)]
+        ways_out = cells[grid_kernels.mark_visible(x, y, cells, costmap.occupied, own)]
         return costmap.middle_of(ways_out[0]) if len(ways_out) else None
 
     def stop_for(self, start: Float[np.ndarray, "2"], place: Float[np.ndarray, "2"]) -> Stop | None:
@@ -166,7 +166,7 @@ class Planner:
         stands = bool(costmap.is_passable(place))
         things = 1 if costmap.free[tuple(costmap.cell_of(place))] else None  # on free floor there is no thing
         for own_m in self.settings.own_m[:things]:
-            seen = grid_kernels.seen_from(x, y, cells, costmap.opaque, own_m / costmap.cell_size_m)
+            seen = grid_kernels.mark_visible(x, y, cells, costmap.opaque, own_m / costmap.cell_size_m)
             if seen.any():
                 best = int(np.argmax(seen))
                 return Stop(costmap.middle_of(cells[best]), float(distance_m[best]), open=stands)
@@ -251,7 +251,7 @@ class _CellGraph:
 
     @classmethod
     def of(cls, mask: Bool[np.ndarray, "nx ny"], costmap: Costmap) -> "_CellGraph":
-        number, cells = grid_kernels.numbered(mask)
+        number, cells = grid_kernels.number_cells(mask)
         return cls(number, cells, _sparse(*grid_kernels.cell_graph(number, cells, costmap.cost)))
 
     def path(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "k 2"] | None:

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import NavigationError, ProgramError
-from avlmaps.core.motion import Action, wrapped
+from avlmaps.core.motion import Action, wrap_angle
 from avlmaps.language.vocabulary import Clip, Heat, Picture, Place, Target
 from avlmaps.navigate.arguments import kind_of, number_of, text_of
 from avlmaps.navigate.driver import Arrival, Driver
@@ -24,7 +24,7 @@ from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline, bearing_rad, middle_between, to_the_left
 from avlmaps.navigate.grounding import Seeker
 from avlmaps.navigate.instances import Thing
-from avlmaps.navigate.motion_log import Move, Triple, joined
+from avlmaps.navigate.motion_log import Move, Triple, concat_motions
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 
@@ -293,14 +293,14 @@ class Robot:
         self._turn_towards(skill, thing.name, heading)
 
     def _turn_towards(self, skill: str, name: str, heading_rad: float) -> None:
-        angle = wrapped(heading_rad - self.driver.pose.heading_rad)
+        angle = wrap_angle(heading_rad - self.driver.pose.heading_rad)
         self._done(skill, name, None, [self.driver.turn(angle)])
 
     def _done(self, skill: str, name: str, goal: Float[np.ndarray, "3"] | None, arrivals: Sequence[Arrival]) -> None:
         """Keep what came of a movement, and stop where it was to a place: there the paper's tasks are judged."""
         if goal is not None and arrivals[-1].actions[-1:] != (Action.STOP,):
             arrivals = [*arrivals, self.driver.stop()]
-        arrival = joined(arrivals)
+        arrival = concat_motions(arrivals)
         world = self.asked.space.world
         pose = arrival.pose
         here = np.array([pose.x_m, pose.y_m])

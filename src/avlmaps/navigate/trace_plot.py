@@ -27,7 +27,7 @@ _OBSTACLE_RGBA = (0.15, 0.16, 0.18, 0.30)
 _LONGEST_NAME = 60
 
 
-def plot_way(
+def plot_path(
     path: Path,
     space: Space,
     start: GroundPose,
@@ -36,15 +36,15 @@ def plot_way(
     met: Float[np.ndarray, "m 2"] | None = None,
     title: str = "",
 ) -> Path:
-    """Write a picture of a robot's path; see ``draw_way``.
+    """Write a picture of a robot's path; see ``draw_path``.
 
     Raises:
         QueryError: the picture cannot be written there.
     """
-    return save(draw_way(space, start, moves, obstacles, met, title), path)
+    return save(draw_path(space, start, moves, obstacles, met, title), path)
 
 
-def draw_way(
+def draw_path(
     space: Space,
     start: GroundPose,
     moves: Sequence[Move],

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from avlmaps.core.errors import AudioError, BackendError
-from avlmaps.core.files import replaced_atomically, write_bytes_atomically
+from avlmaps.core.files import replace_atomically, write_bytes_atomically
 from avlmaps.perception.protocols import SoundEncoder
 from avlmaps.perception.user_folder import user_folder
 from avlmaps.recordings.audio import AudioTrack, Sound
@@ -86,7 +86,7 @@ def teach_sound(
     return taught
 
 
-def taught_sounds(folder: Path | None = None) -> list[TaughtSound]:
+def enrolled_sounds(folder: Path | None = None) -> list[TaughtSound]:
     """Return every sound that was taught, by name.
 
     Raises:
@@ -105,7 +105,7 @@ def forget_sound(name: str, folder: Path | None = None) -> None:
     """
     place = sounds_folder(folder) / _slug(name)
     if not (place / "sound.json").is_file():
-        known = ", ".join(taught.name for taught in taught_sounds(folder)) or "none"
+        known = ", ".join(taught.name for taught in enrolled_sounds(folder)) or "none"
         raise BackendError(f"No sound called {name!r} was taught; taught are: {known}.")
     (place / "sound.json").unlink()  # first: a folder without notes is no sound, even with other files left in it
     shutil.rmtree(place)
@@ -148,7 +148,7 @@ def _keep(taught: TaughtSound, root: Path) -> None:
     place = root / _slug(taught.name)
     place.mkdir(parents=True, exist_ok=True)
     (place / "sound.json").unlink(missing_ok=True)
-    with replaced_atomically(place / "features.npy") as stream:
+    with replace_atomically(place / "features.npy") as stream:
         np.save(stream, taught.features, allow_pickle=False)
     notes = {
         "schema": SCHEMA,

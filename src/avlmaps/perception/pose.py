@@ -80,7 +80,7 @@ def agreement(
     return float(np.maximum(0.0, 1.0 - (error_px / max_error_px) ** 2).sum())
 
 
-def refined_focal(
+def refine_focal(
     xy: Float[np.ndarray, "n 2"],
     points_world: Float[np.ndarray, "n 3"],
     camera: Pinhole,

@@ -16,7 +16,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.query.answer import Answer, PartAnswer
 from avlmaps.query.factors import Factor, HeatSettings, NearAnchors
-from avlmaps.query.heatmap import Heatmap, fused
+from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.modalities.area import AreaSettings, area_factor
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
 from avlmaps.query.modalities.object import Asked, ObjectSettings, Pieces, Rivals, object_factor, object_pieces
@@ -314,7 +314,7 @@ class AVLMap:
             from avlmaps.language.questions import parse_sentence
 
             question = parse_sentence(question)
-        heat = fused([self.heat(part, intrinsics) for part in question.parts])
+        heat = product([self.heat(part, intrinsics) for part in question.parts])
         goals, found = heat.goals(top), heat.found
         elapsed_ms = 1e3 * (time.perf_counter() - begin)
         parts = [

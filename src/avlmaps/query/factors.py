@@ -72,11 +72,11 @@ class Factor(ABC):
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat at any points."""
 
-    def in_company(self) -> "Factor":
+    def for_product(self) -> "Factor":
         """Return this factor as it counts in a product with others."""
         return self
 
-    def at_any_rate(self) -> "Factor":
+    def include_uncertain(self) -> "Factor":
         """Return this factor with all that may be meant, however unsure."""
         return self
 
@@ -104,7 +104,7 @@ class NearThings(Factor):
 
     Attributes:
         mask: which voxels are the object; the anchors are their middles, in the same order.
-        with_unsure: makes the same with the instances whose confidence is too low to count in a query for the
+        with_uncertain: makes the same with the instances whose confidence is too low to count in a query for the
         thing alone: the context may select one of them. None where there are no others.
     """
 
@@ -117,20 +117,20 @@ class NearThings(Factor):
     found: bool
     understood: str = ""
     note: str = ""
-    with_unsure: "Callable[[], NearThings] | None" = None
+    with_uncertain: "Callable[[], NearThings] | None" = None
     flat: bool = field(default=False, init=False)
 
-    def in_company(self) -> "NearThings":
+    def for_product(self) -> "NearThings":
         """Return the primary part with its uncertain instances; context stays with the confident ones."""
-        return self._with_unsure if self.part.role is Role.PRIMARY else self
+        return self._with_uncertain if self.part.role is Role.PRIMARY else self
 
-    def at_any_rate(self) -> "NearThings":
+    def include_uncertain(self) -> "NearThings":
         """Return the same with its unsure instances."""
-        return self._with_unsure
+        return self._with_uncertain
 
     @cached_property
-    def _with_unsure(self) -> "NearThings":
-        return self.with_unsure() if self.with_unsure is not None else self
+    def _with_uncertain(self) -> "NearThings":
+        return self.with_uncertain() if self.with_uncertain is not None else self
 
     @cached_property
     def anchors(self) -> Float[np.ndarray, "a 3"]:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -227,7 +227,7 @@ def lead_of(factors: Sequence[Factor]) -> Factor:
     return primary or next((factor for factor in factors if isinstance(factor, NearThings)), factors[0])
 
 
-def normalised(scores: Float[np.ndarray, " a"]) -> Float[np.ndarray, " a"]:
+def stretch_scores(scores: Float[np.ndarray, " a"]) -> Float[np.ndarray, " a"]:
     """Stretch scores to [0, 1] as the paper does, lowest to 0 and highest to 1.
 
     Where all are equal within rounding (or there is one only) no anchor is better than another, and all become 1;

@@ -48,13 +48,13 @@ class Heatmap:
         one, two = self._in_company(), other._in_company()
         return Heatmap(self.space, one.factors + two.factors, one.values * two.values)
 
-    def with_unsure(self) -> "Heatmap":
+    def include_uncertain(self) -> "Heatmap":
         """Return the heatmap that includes instances of low confidence: for a caller that must guess."""
-        return fused([Heatmap.of(factor.at_any_rate()) for factor in self.factors])
+        return product([Heatmap.of(factor.include_uncertain()) for factor in self.factors])
 
     def _in_company(self) -> "Heatmap":
         """Return the heatmap as it counts in a product; that of several things is one already."""
-        return Heatmap.of(self.factors[0].in_company()) if len(self.factors) == 1 else self
+        return Heatmap.of(self.factors[0].for_product()) if len(self.factors) == 1 else self
 
     def __len__(self) -> int:
         return len(self.values)
@@ -108,7 +108,7 @@ class Heatmap:
         return figure if path is None else save(figure, Path(path))
 
 
-def fused(heatmaps: Sequence[Heatmap]) -> Heatmap:
+def product(heatmaps: Sequence[Heatmap]) -> Heatmap:
     """Return the product of one or more heatmaps."""
     product = heatmaps[0]
     for heat in heatmaps[1:]:

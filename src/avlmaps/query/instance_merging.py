@@ -54,4 +54,4 @@ def likeliest(things: NearThings) -> NearThings:
     solid = np.where(surface_m2 >= _SPECK_M2, things.confidence, 0.0).astype(np.float32)
     least = max(float(np.max(solid, initial=0.0)) / 2, float(np.finfo(np.float32).tiny))
     mask, instance, confidence = without_specks(things.mask, things.instance, solid, least)
-    return replace(things, mask=mask, instance=instance, confidence=confidence, with_unsure=lambda: things)
+    return replace(things, mask=mask, instance=instance, confidence=confidence, with_uncertain=lambda: things)

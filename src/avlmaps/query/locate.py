@@ -11,7 +11,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.maps.types import Keyframes
-from avlmaps.perception.pose import PoseSettings, agreement, estimate_pose, refined_focal
+from avlmaps.perception.pose import PoseSettings, agreement, estimate_pose, refine_focal
 from avlmaps.perception.profiles import Profile
 from avlmaps.perception.protocols import LocalFeatures, Pose
 
@@ -290,7 +290,7 @@ def _with_better_focal(
     settings: LocateSettings,
 ) -> tuple[Pinhole, _Estimate]:
     """Return the camera with a better focal length, and its estimate, where points agree clearly better."""
-    refined = refined_focal(xy, points_world, camera, estimate[0].world_from_camera, settings.pose)
+    refined = refine_focal(xy, points_world, camera, estimate[0].world_from_camera, settings.pose)
     if abs(refined.fx / camera.fx - 1.0) > settings.max_focal_change:
         return camera, estimate
     again = estimate_pose(xy, points_world, refined, rng, settings.pose)

@@ -13,7 +13,7 @@ from avlmaps.core.printable import plot_text
 from avlmaps.core.question import Modality
 from avlmaps.query.factors import FOUND_AT, Factor, NearAnchors
 from avlmaps.query.goals import Goal
-from avlmaps.query.topdown import TopDown, walked
+from avlmaps.query.topdown import TopDown, camera_path
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ def draw_ground(ax: "Axes", view: TopDown, space: Space, with_walk: bool = True)
     ax.tick_params(labelsize=7, colors=INK, length=2)
     for spine in ax.spines.values():
         spine.set_color("#c9c7c0")
-    walk = walked(space)
+    walk = camera_path(space)
     if with_walk and len(walk) > 1:
         ax.plot(*walk[:, :2].T, color="white", linewidth=2.6, alpha=0.8)
         ax.plot(*walk[:, :2].T, color=_PATH, linewidth=1.2, label="path of the camera")

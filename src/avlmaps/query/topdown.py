@@ -42,7 +42,7 @@ class TopDown:
             half = _MARGIN_CELLS * voxel_size_m
             extent = (-half, half, -half, half)
             return cls(np.zeros((*empty.shape, 3), np.uint8), empty, np.zeros((0, 2), np.int64), extent)
-        places = np.concatenate([level[:, :2], walked(space)[:, :2]])
+        places = np.concatenate([level[:, :2], camera_path(space)[:, :2]])
         sides = float(np.ptp(places, axis=0).max()) / voxel_size_m
         cell_m = voxel_size_m * max(1, int(np.ceil(sides / _MOST_CELLS)))
         shown = np.floor(places / cell_m).astype(np.int64)
@@ -63,7 +63,7 @@ class TopDown:
         return raster
 
 
-def walked(space: Space) -> Float[np.ndarray, "k 3"]:
+def camera_path(space: Space) -> Float[np.ndarray, "k 3"]:
     """Return where the keyframes' cameras were, level frame, in the order of time."""
     if space.stored is None:
         return np.zeros((0, 3))
@@ -72,7 +72,7 @@ def walked(space: Space) -> Float[np.ndarray, "k 3"]:
 
 def _ceiling_m(space: Space, level: Float[np.ndarray, "n 3"]) -> float:
     """Return the height above which voxels are left out: a little over the camera, or none where it is not known."""
-    cameras = walked(space)
+    cameras = camera_path(space)
     return float(cameras[:, 2].max()) + _HEADROOM_M if len(cameras) else float(level[:, 2].max())
 
 

@@ -14,11 +14,11 @@ from jaxtyping import Float32
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.progress import progress as shown
-from avlmaps.core.progress import say, silenced
+from avlmaps.core.progress import say, silence_progress
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.background import background as noise_of
 from avlmaps.recordings.background import seconds_of
-from avlmaps.recordings.clips import Clip, amplified, audible_part, find_clips, gain_for, loudness_db
+from avlmaps.recordings.clips import Clip, amplify, audible_part, find_clips, gain_for, loudness_db
 from avlmaps.recordings.layout import DESCRIPTION
 from avlmaps.recordings.spacing import Placer, Spacing, Walk, capacity, chosen_spacing
 from avlmaps.recordings.types import Recording
@@ -147,7 +147,7 @@ def add_sounds(
         noise = noise_of(background, placed[0].loudness_db - (_SNR_DB if snr_db is None else snr_db), rate_hz, rng)
     events = [_event(sound, walk, rate_hz) for sound in placed]
     seconds = _mixed(recording, placed, noise, rate_hz)
-    with silenced(not progress):
+    with silence_progress(not progress):
         _write(recording, out, shown(seconds, "mixing", unit="second"), events)
         for notice in notices:
             say(f"note: {notice}")
@@ -284,7 +284,7 @@ def _mixed(
         while waiting and waiting[0].begin < begin + rate_hz:
             sound = waiting.pop(0)
             part = audible_part(sound.clip, rate_hz, sound.length / rate_hz)
-            sounding.append((sound.begin, amplified(part, sound.gain_db).samples))
+            sounding.append((sound.begin, amplify(part, sound.gain_db).samples))
         for at, samples in sounding:
             first, last = max(at, begin), min(at + len(samples), begin + rate_hz)
             if first < last:

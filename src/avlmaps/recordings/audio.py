@@ -136,7 +136,7 @@ class AudioTrack:
             yield Sound(_checked(block, self.path, self.rate_hz, at), self.rate_hz)
             at += len(block)
         if at < count:
-            raise containers.truncated(self.path, at / self.rate_hz, count / self.rate_hz)
+            raise containers.truncation_error(self.path, at / self.rate_hz, count / self.rate_hz)
 
 
 def write_flac(path: Path, sound: Sound | Iterable[Sound]) -> None:
@@ -151,14 +151,14 @@ def write_flac(path: Path, sound: Sound | Iterable[Sound]) -> None:
     """
     import soundfile
 
-    from avlmaps.core.files import replaced_atomically
+    from avlmaps.core.files import replace_atomically
 
     blocks = iter([sound] if isinstance(sound, Sound) else sound)
     first = next(blocks, None)
     if first is None:
         raise AudioError(f"There is no sound to write to {path}; give at least one block.")
     # Written by name: through a stream of ours, libsndfile would report a full disk on standard error by itself.
-    with replaced_atomically(path) as stream:
+    with replace_atomically(path) as stream:
         try:
             with soundfile.SoundFile(stream.name, "w", first.rate_hz, 1, "PCM_16", format="FLAC") as file:
                 for block in chain([first], blocks):

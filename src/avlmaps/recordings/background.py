@@ -8,7 +8,7 @@ from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import AudioError
 from avlmaps.recordings.audio import AudioTrack, Sound
-from avlmaps.recordings.resample import resampled
+from avlmaps.recordings.resample import resample
 
 KINDS = ("white", "pink", "room")
 _LONGEST_S = 120.0  # of a recorded background; more of it is not read
@@ -88,7 +88,7 @@ def _swell(second: int, rate_hz: int, phases: Float[np.ndarray, " 5"]) -> Float[
 
 def _recorded(path: Path, level_db: float, rate_hz: int) -> Iterator[Float32[np.ndarray, " second"]]:
     track = AudioTrack.open(path)
-    loop = resampled(track.read(0.0, min(track.duration_s, _LONGEST_S)), rate_hz).samples
+    loop = resample(track.read(0.0, min(track.duration_s, _LONGEST_S)), rate_hz).samples
     rms = float(np.sqrt(np.mean(loop.astype(np.float64) ** 2)))
     if rms < 1e-6:
         raise AudioError(f"The background {path} is silent; give another file, or {', '.join(KINDS)}.")

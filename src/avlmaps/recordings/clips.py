@@ -10,7 +10,7 @@ from jaxtyping import Float32
 
 from avlmaps.core.errors import AudioError
 from avlmaps.recordings.audio import AudioTrack, Sound
-from avlmaps.recordings.resample import resampled
+from avlmaps.recordings.resample import resample
 
 SUFFIXES = {".wav", ".flac", ".ogg", ".oga", ".opus", ".mp3", ".m4a"}
 AUDIBLE_DB = -40.0  # below a clip's loudest 10 ms; what is quieter at its ends is cut off
@@ -101,7 +101,7 @@ def audible_part(clip: Clip, rate_hz: int, longest_s: float | None = None) -> So
     Raises:
         AudioError: the clip cannot be read or is silent.
     """
-    sound = audible(resampled(AudioTrack.open(clip.path).read(), rate_hz), str(clip.path))
+    sound = audible(resample(AudioTrack.open(clip.path).read(), rate_hz), str(clip.path))
     if longest_s is not None:
         sound = Sound(sound.samples[: round(longest_s * rate_hz)], rate_hz)
     return Sound(sound.samples * _edges(sound), rate_hz)
@@ -113,7 +113,7 @@ def gain_for(sound: Sound, wanted_db: float) -> float:
     return float(min(wanted_db - loudness_db(sound), _HIGHEST_PEAK_DB - peak_db))
 
 
-def amplified(sound: Sound, gain_db: float) -> Sound:
+def amplify(sound: Sound, gain_db: float) -> Sound:
     """Return the sound with a gain in dB."""
     return Sound(sound.samples * np.float32(10.0 ** (gain_db / 20.0)), sound.rate_hz)
 

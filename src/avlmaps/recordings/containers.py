@@ -24,7 +24,7 @@ _AUDIBLE_POWER = 1e-8
 _SLACK_S = 0.5  # containers round their durations, encoders drop or pad a few hundred samples
 
 
-def truncated(path: Path, found_s: float, promised_s: float) -> AudioError:
+def truncation_error(path: Path, found_s: float, promised_s: float) -> AudioError:
     """Return the error for a file that ends before it should."""
     return AudioError(
         f"{path} is truncated: it should last {promised_s:.2f} s and breaks off at {found_s:.2f} s; copy or convert it "
@@ -162,11 +162,11 @@ def _examine_plain(path: Path) -> tuple[int, int]:
         rate_hz, count = int(file.samplerate), int(file.frames)
         promised = _promised_wav_samples(path, file.channels)
         if promised is not None and count < promised:
-            raise truncated(path, count / rate_hz, promised / rate_hz)
+            raise truncation_error(path, count / rate_hz, promised / rate_hz)
         if file.format == "FLAC" and not _ends_at(file, count):
             found = sum(len(piece) for piece in _readable(path))
             if 0 < count < _UNKNOWN and found < count:
-                raise truncated(path, found / rate_hz, count / rate_hz)
+                raise truncation_error(path, found / rate_hz, count / rate_hz)
             count = found
     return rate_hz, count
 

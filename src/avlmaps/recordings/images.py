@@ -153,14 +153,14 @@ def read_colour(path: Path, camera: Pinhole) -> UInt8[np.ndarray, "h w 3"]:
 
     content = read_bytes(path)
     _check_outside(path, content, camera)
-    bgr = decoded(content, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    bgr = decode_picture(content, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if bgr is None:
         raise RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
     _check_size(path, bgr.shape, camera)
     return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
 
 
-def decoded(content: bytes, flags: int) -> np.ndarray | None:
+def decode_picture(content: bytes, flags: int) -> np.ndarray | None:
     """Decode a PNG or JPEG whose header was compared before; None where that fails."""
     import cv2
 
@@ -207,7 +207,7 @@ def decode_depth_png(path: Path, content: bytes) -> np.ndarray:
 
     check_whole(path, content)
     picture_size(path, content)
-    raw = decoded(content, cv2.IMREAD_UNCHANGED)
+    raw = decode_picture(content, cv2.IMREAD_UNCHANGED)
     if raw is None:
         raise RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
     if raw.dtype != np.uint16 or raw.ndim != 2:

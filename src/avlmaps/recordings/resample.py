@@ -9,7 +9,7 @@ from avlmaps.recordings.audio import Sound
 _QUALITY = "HQ"
 
 
-def resampled(sound: Sound, rate_hz: int) -> Sound:
+def resample(sound: Sound, rate_hz: int) -> Sound:
     """Return the sound at another rate, low-passed so that nothing folds; the same sound where the rate is right.
 
     Gives what ``librosa.resample`` gives by default: no delay, and a length rounded up to a whole sample. It works

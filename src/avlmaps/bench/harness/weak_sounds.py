@@ -9,7 +9,7 @@ from jaxtyping import Float, Float32
 
 from avlmaps.perception.embedded import logmel
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resampled
+from avlmaps.recordings.resample import resample
 from avlmaps.sim.hearing import Synthesised
 
 _EXAMPLES = 4
@@ -57,6 +57,6 @@ def weak_ear(seed: int) -> WeakSounds:
 
 
 def _feature(sound: Sound) -> Float32[np.ndarray, " d"]:
-    mels = logmel.normalised(logmel.mel_power(resampled(sound, logmel.RATE_HZ).samples))
+    mels = logmel.normalised(logmel.mel_power(resample(sound, logmel.RATE_HZ).samples))
     log = np.log10(mels)
     return np.concatenate([log.mean(axis=0), log.std(axis=0)])

@@ -8,7 +8,7 @@ from avlmaps.bench.indexing.tasks import Task, TaskKind
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Role
 from avlmaps.core.registry import Kind
-from avlmaps.query.heatmap import Heatmap, fused
+from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.sim.mesh import Triple
 
 Source = Callable[[AskedScene, Task, Role], Heatmap | None]
@@ -43,7 +43,7 @@ class Configuration:
             ]
         except QueryError:
             return None
-        goals = fused([one for one in heat if one is not None]).goals(1)
+        goals = product([one for one in heat if one is not None]).goals(1)
         return goals[0].position if goals else None
 
 

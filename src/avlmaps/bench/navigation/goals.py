@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.bench.harness.evidence import Box
-from avlmaps.core.motion import GroundPose, wrapped
+from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps.sim.mesh import Triple
 
 SUCCESS_M = 1.0  # the paper's
@@ -80,7 +80,7 @@ class Goal:
         At a thing that is to be faced (a goal ``look`` with boxes) any part of it may be ahead.
         """
         if self.heading_rad is not None:
-            return abs(wrapped(pose.heading_rad - self.heading_rad))
+            return abs(wrap_angle(pose.heading_rad - self.heading_rad))
         if self.moves:
             return None
         return min(_off_box_rad(box, pose) for box in self.boxes)
@@ -97,7 +97,7 @@ def _off_box_rad(box: Box, pose: GroundPose) -> float:
     if box.distance_m((pose.x_m, pose.y_m, 0.0)) == 0.0:
         return 0.0
     corners = [(x, y) for x in (box.low[0], box.high[0]) for y in (box.low[1], box.high[1])]
-    angles = [wrapped(atan2(y - pose.y_m, x - pose.x_m) - pose.heading_rad) for x, y in corners]
+    angles = [wrap_angle(atan2(y - pose.y_m, x - pose.x_m) - pose.heading_rad) for x, y in corners]
     if max(angles) - min(angles) > pi:  # seen over the shoulder: the span goes the other way round
         return min(abs(angle) for angle in angles)
     return max(0.0, min(angles), -max(angles))

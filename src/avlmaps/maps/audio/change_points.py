@@ -78,7 +78,7 @@ def _check(rows: Float32[np.ndarray, "..."], wanted: int, encoder: FrameSoundEnc
         )
 
 
-def cut_at_changes(
+def split_at_changes(
     features: Float32[np.ndarray, "frames d"], hop_s: float, settings: ChangeSettings = ChangeSettings()
 ) -> Int[np.ndarray, " edges"]:
     """Return where a sequence of unit vectors is divided: 0, the first frame of each further stretch, their number.

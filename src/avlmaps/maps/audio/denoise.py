@@ -58,7 +58,7 @@ def noise_profile(quiet: Iterable[Sound]) -> NoiseProfile | None:
     return NoiseProfile((np.median(np.concatenate(powers), axis=0) / np.log(2.0)).astype(np.float32), rate_hz)
 
 
-def denoised(sound: Sound, profile: NoiseProfile, reduction_db: float = 12.0) -> Sound:
+def denoise(sound: Sound, profile: NoiseProfile, reduction_db: float = 12.0) -> Sound:
     """Return the sound with the background made quieter, of the same length.
 
     Args:
@@ -66,11 +66,11 @@ def denoised(sound: Sound, profile: NoiseProfile, reduction_db: float = 12.0) ->
         profile: the background.
         reduction_db: limit of the reduction, dB.
     """
-    samples = [block.samples for block in denoised_blocks([sound], profile, reduction_db)]
+    samples = [block.samples for block in denoise_blocks([sound], profile, reduction_db)]
     return Sound(np.concatenate(samples) if samples else sound.samples, sound.rate_hz)
 
 
-def denoised_blocks(blocks: Iterable[Sound], profile: NoiseProfile, reduction_db: float = 12.0) -> Iterator[Sound]:
+def denoise_blocks(blocks: Iterable[Sound], profile: NoiseProfile, reduction_db: float = 12.0) -> Iterator[Sound]:
     """Take the background out of a long track block by block; how it is cut into blocks changes nothing.
 
     Args:

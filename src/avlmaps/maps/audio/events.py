@@ -11,8 +11,8 @@ from jaxtyping import Float32
 
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.progress import progress, say
-from avlmaps.maps.audio.change_points import ChangeSettings, cut_at_changes, frames_of_track
-from avlmaps.maps.audio.denoise import denoised, noise_profile
+from avlmaps.maps.audio.change_points import ChangeSettings, frames_of_track, split_at_changes
+from avlmaps.maps.audio.denoise import denoise, noise_profile
 from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings, segment
 from avlmaps.maps.types import HeardSounds
 from avlmaps.perception.protocols import FrameSoundEncoder, SoundEncoder
@@ -46,7 +46,9 @@ class HearingSettings:
                 raise AudioError(f"hearing.{name} is {value}; choose 0 or more.")
 
 
-def hear(recording: Recording, encoder: SoundEncoder, settings: HearingSettings, clips_folder: Path) -> HeardSounds:
+def detect_events(
+    recording: Recording, encoder: SoundEncoder, settings: HearingSettings, clips_folder: Path
+) -> HeardSounds:
     """Find the sounds of a recording, encode each whole, and return the robot's path during each.
 
     An encoder with a feature for each short step of time encodes the whole track, which is then divided where the
@@ -102,7 +104,7 @@ def _by_energy(track: AudioTrack, encoder: SoundEncoder, settings: HearingSettin
 def _by_changes(track: AudioTrack, encoder: FrameSoundEncoder, settings: ChangeSettings) -> Iterator[_Piece]:
     """Yield the stretches of the track between changes, and the features of their steps."""
     features = frames_of_track(track, encoder)
-    edges = cut_at_changes(features, encoder.hop_s, settings)
+    edges = split_at_changes(features, encoder.hop_s, settings)
     for begin, end in pairwise(edges.tolist()):
         offset_s = min(track.start_s + end * encoder.hop_s, track.end_s)
         stretch = Segment(track.start_s + begin * encoder.hop_s, offset_s)
@@ -138,7 +140,7 @@ def _cleaned(sound: Sound, track: AudioTrack, found: Sequence[Segment], index: i
     if settings.noise_reduction_db == 0.0 or settings.quiet_s == 0.0:
         return sound
     profile = noise_profile(_quiet_around(track, found, index, settings.quiet_s))
-    return sound if profile is None else denoised(sound, profile, settings.noise_reduction_db)
+    return sound if profile is None else denoise(sound, profile, settings.noise_reduction_db)
 
 
 def _quiet_around(track: AudioTrack, found: Sequence[Segment], index: int, quiet_s: float) -> Iterator[Sound]:

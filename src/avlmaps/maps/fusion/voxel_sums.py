@@ -141,7 +141,7 @@ class VoxelTable:
             self.reserve(len(block[0]))
             self.count = kernels.add_rows(block, self.slots, self.geometry, self.feature_sum, self.weight, self.count)
 
-    def sorted_rows(self) -> Int64[np.ndarray, " n"]:
+    def sort_rows(self) -> Int64[np.ndarray, " n"]:
         """Return the rows in the order of their index (x, then y, then z)."""
         index = self.index[: self.count].astype(np.int64)
         if not len(index):
@@ -155,7 +155,7 @@ class VoxelTable:
 
     def sums(self, feature_out: np.ndarray | None = None) -> VoxelSums:
         """Return the sums, sorted; see `VoxelAccumulator.sums`."""
-        rows = self.sorted_rows()
+        rows = self.sort_rows()
         feature_sum = feature_array(feature_out, (self.count, self.dim), np.float32)
         for block in blocks(self.count, self.dim):
             feature_sum[block] = self.feature_sum[rows[block]]
@@ -173,12 +173,12 @@ class VoxelTable:
 
     def evidence(self) -> Evidence:
         """Return what is known of each voxel's surface, sorted."""
-        rows = self.sorted_rows()
+        rows = self.sort_rows()
         return Evidence(self.index[rows], self.hits[rows], self.views[rows], self.sharp[rows])
 
     def voxels(self, feature_out: np.ndarray | None = None, kept: Bool[np.ndarray, " n"] | None = None) -> Voxels:
         """Return the means, sorted; see `VoxelAccumulator.voxels`."""
-        rows = self.sorted_rows()
+        rows = self.sort_rows()
         rows = rows if kept is None else rows[kept]
         feature = feature_array(feature_out, (len(rows), self.dim), np.float16)
         parts = blocks(len(rows), self.dim)

@@ -19,7 +19,7 @@ _MUCH_BELOW = 0.1  # a floor that the user gave gets one when more surface than 
 _RANDOMNESS = 1  # number of the stage as a source of randomness (keyframes have 2)
 
 
-def look_for_up(recording: Recording, settings: BuildSettings) -> UpInfo:
+def estimate_up(recording: Recording, settings: BuildSettings) -> UpInfo:
     """Return the up direction: as the recording says, else as the planes in view do, else as the camera was held."""
     from avlmaps.maps.gravity.up import find_up
 
@@ -46,7 +46,7 @@ def spread_frames(recording: Recording, count: int) -> Iterator[Frame]:
             yield recording.frame(int(index))
 
 
-def look_for_ground(recording: Recording, settings: BuildSettings, up: UpInfo) -> tuple[Ground, GroundInfo]:
+def estimate_ground(recording: Recording, settings: BuildSettings, up: UpInfo) -> tuple[Ground, GroundInfo]:
     """Return the floor under each camera height, and what is known of it for the manifest."""
     expected, known_from = _expected(recording, settings, up)
     found = find_ground(spread_frames(recording, settings.gravity.frames), up.vector(), expected)
@@ -127,6 +127,6 @@ def ground_notices(ground: GroundInfo) -> Iterator[str]:
         )
 
 
-def grounded(recording: Recording, settings: BuildSettings) -> Recording:
+def attach_estimated_ground(recording: Recording, settings: BuildSettings) -> Recording:
     """Return the recording with up and the floor in its frames; the same on every machine."""
-    return GroundedRecording(recording, look_for_ground(recording, settings, look_for_up(recording, settings))[0])
+    return GroundedRecording(recording, estimate_ground(recording, settings, estimate_up(recording, settings))[0])

@@ -8,7 +8,7 @@ from jaxtyping import Float32, Float64
 
 from avlmaps.core import poses
 from avlmaps.core.errors import MapError, RecordingError
-from avlmaps.maps.import_reference.hdf5 import opened
+from avlmaps.maps.import_reference.hdf5 import open_hdf5
 
 DIM = 768  # CLIP ViT-L/14's
 
@@ -33,7 +33,7 @@ def read_areas(path: Path) -> ReferenceAreas:
         BackendError: h5py is not installed.
         MapError: the file is damaged, of another kind, or holds what is no feature or no pose.
     """
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         pose = file.numbers("robot_pose_list", (None, 4, 4), kinds="f").whole(np.float64)
         view = file.numbers("clip_sparse_map", (len(pose), DIM), kinds="f").whole(np.float64)
     bad = ~np.isfinite(view).all(axis=1)
@@ -43,7 +43,7 @@ def read_areas(path: Path) -> ReferenceAreas:
             f"{int(bad.argmax())}); let the reference code write the file again."
         )
     try:
-        pose = poses.orthonormalized_all(pose, [f"{path}, robot_pose_list {row}" for row in range(len(pose))])
+        pose = poses.orthonormalize_all(pose, [f"{path}, robot_pose_list {row}" for row in range(len(pose))])
     except RecordingError as fault:
         raise MapError(str(fault)) from None
     norm = np.linalg.norm(view, axis=1, keepdims=True)

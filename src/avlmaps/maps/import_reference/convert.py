@@ -15,13 +15,13 @@ from jaxtyping import Int, Int32
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.progress import progress as shown
-from avlmaps.core.progress import say, silenced
+from avlmaps.core.progress import say, silence_progress
 from avlmaps.core.version import __version__
 from avlmaps.maps.fusion.measure_kernels import SHARP_UNITS
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.import_reference.frames import Walk, read_walk
-from avlmaps.maps.import_reference.hdf5 import opened
+from avlmaps.maps.import_reference.hdf5 import open_hdf5
 from avlmaps.maps.import_reference.places import voxels_filled
 from avlmaps.maps.import_reference.scene import find_scene
 from avlmaps.maps.import_reference.source import PROFILE, Source
@@ -29,7 +29,7 @@ from avlmaps.maps.import_reference.tracks import HEARING, Ears
 from avlmaps.maps.import_reference.voxels_h5 import DIM, ReferenceVoxels, VoxelRows
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import key_of
-from avlmaps.maps.store.lock import locked
+from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import (
     MANIFEST,
     Box,
@@ -102,7 +102,7 @@ def import_reference_map(
     if not is_map_or_free(path):
         raise MapError(f"{path} is there already and is no map; give another --out, nothing in it was touched.")
     scene = find_scene(Path(source), areas, poses)
-    with silenced(not progress), opened(scene.voxels) as file:
+    with silence_progress(not progress), open_hdf5(scene.voxels) as file:
         voxels = ReferenceVoxels(file)
         settings = _with_own_cell_size(settings, voxels)
         walk = read_walk(scene, needs_first_pose=voxels.corner is None)
@@ -111,7 +111,7 @@ def import_reference_map(
         key = key_of("import", IMPORT_VERSION, source_key, settings.cell_size_m)
         if _finished(path, key, overwrite):
             return open_stored(path)
-        with locked(path):
+        with lock_folder(path):
             _write(path, Source(scene, voxels, walk, ears), settings, key, begin)
     return open_stored(path)
 
@@ -141,7 +141,7 @@ def _write(path: Path, source: Source, settings: ImportSettings, key: str, begin
     grid, walk = GridSpec(settings.cell_size_m), source.walk
     voxels, left_out = _converted(source.voxels, walk, settings, grid)
     clips = path / PARTS / "clips"
-    heard = source.ears.hear(clips)
+    heard = source.ears.detect_events(clips)
     content = MapContent(voxels, walk.keyframes(grid.centre_of(voxels.index)), {}, heard, clips)
     elapsed_s = perf_counter() - begin
     finished = datetime.now(UTC).isoformat(timespec="seconds")

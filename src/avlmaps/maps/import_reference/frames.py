@@ -127,7 +127,7 @@ def _listed(scene: SceneFiles) -> tuple[CameraFile, Float64[np.ndarray, "n 4 4"]
         if scene.poses is not None:
             listed = read_habitat_poses(scene.poses)
             names = [f"{scene.poses}, pose {number}" for number in range(len(listed))]
-            listed = poses.orthonormalized_all(listed, names)
+            listed = poses.orthonormalize_all(listed, names)
         return given, listed, _camera(given, scene.camera.parent)
     except (RecordingError, ValueError) as fault:
         raise MapError(str(fault)) from None

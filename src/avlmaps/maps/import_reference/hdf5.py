@@ -36,7 +36,7 @@ def _told(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator["Hdf5"]:
+def open_hdf5(path: Path) -> Iterator["Hdf5"]:
     """Open a file for reading.
 
     Raises:

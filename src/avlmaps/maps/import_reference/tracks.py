@@ -18,7 +18,7 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind, find, load
-from avlmaps.maps.audio.events import HearingSettings, hear
+from avlmaps.maps.audio.events import HearingSettings, detect_events
 from avlmaps.maps.import_reference.scene import SceneFiles
 from avlmaps.maps.store.array_validation import array_fields
 from avlmaps.maps.store.manifest import ModelInfo
@@ -74,7 +74,7 @@ class Ears:
         """Return what identifies these sounds."""
         return [[walk.fingerprint for walk in self.walks], self.start_s.tolist(), self.model]
 
-    def hear(self, clips_folder: Path) -> HeardSounds:
+    def detect_events(self, clips_folder: Path) -> HeardSounds:
         """Find and encode the sounds of all walks.
 
         Args:
@@ -89,7 +89,7 @@ class Ears:
         heard: list[HeardSounds] = []
         for walk, start_s in zip(self.walks, self.start_s.tolist(), strict=True):
             here = clips_folder / walk.path.name
-            found = hear(walk, load(Kind.SOUNDS, self.backend), HEARING, here)
+            found = detect_events(walk, load(Kind.SOUNDS, self.backend), HEARING, here)
             heard.append(_moved(found, here, clips_folder, start_s))
         return _joined(heard)
 

@@ -46,7 +46,7 @@ class FileInfo(msgspec.Struct, frozen=True, kw_only=True):
 
 
 @contextmanager
-def writing_into(folder: Path) -> Iterator[None]:
+def explain_write_errors(folder: Path) -> Iterator[None]:
     """Turn a full disk, a missing permission and their like into one sentence."""
     try:
         yield
@@ -85,7 +85,7 @@ def write_copy(folder: Path, name: str, source: Path) -> FileInfo:
 
 def _write(folder: Path, name: str, suffix: str, chunks: Iterable[bytes | memoryview]) -> tuple[str, int, str]:
     stem = folder / name
-    with writing_into(folder):
+    with explain_write_errors(folder):
         stem.parent.mkdir(parents=True, exist_ok=True)
         partial = stem.with_name(f".{stem.name}.{os.getpid()}.partial")
         try:
@@ -126,7 +126,7 @@ def read_array(folder: Path, info: FileInfo, *, verify: bool = False) -> np.ndar
     Raises:
         MapError: the file is missing, truncated, changed, or not the array that the manifest describes.
     """
-    path = checked_path(folder, info, verify=verify)
+    path = verify_file(folder, info, verify=verify)
     try:
         array = load_npy(path, info.bytes, mapped=info.bytes > SMALL_BYTES)
     except PermissionError as fault:
@@ -151,7 +151,7 @@ def _type_name(said: str) -> str:
         return said[:_QUOTED]
 
 
-def checked_path(folder: Path, info: FileInfo, *, verify: bool = False) -> Path:
+def verify_file(folder: Path, info: FileInfo, *, verify: bool = False) -> Path:
     """Return where a file is, its size checked, and its checksum if it is small or ``verify`` is set.
 
     Raises:

@@ -30,7 +30,7 @@ def array_fields(kind: type) -> list[str]:
     return [field.name for field in dataclasses.fields(kind) if hasattr(field.type, "dim_str")]
 
 
-def assembled(kind: type[T], values: Mapping[str, Any], where: str) -> T:
+def validate_arrays(kind: type[T], values: Mapping[str, Any], where: str) -> T:
     """Return the dataclass of these fields, each array of the type and shape of its annotation.
 
     Args:

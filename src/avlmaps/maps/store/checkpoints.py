@@ -18,12 +18,12 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.files import MANIFEST_BYTES, decode_json, read_regular, write_bytes_atomically
 from avlmaps.maps.store.array_files import (
     FileInfo,
-    checked_path,
+    explain_write_errors,
     read_array,
     sync_names,
+    verify_file,
     write_array,
     write_copy,
-    writing_into,
 )
 
 DONE = "done.json"
@@ -80,7 +80,7 @@ def save_checkpoint(
     written = {name: write_array(folder, name, array) for name, array in arrays.items()}
     written |= {name: write_copy(folder, name, source) for name, source in (files or {}).items()}
     done = _Done(key=key, facts=msgspec.Raw(msgspec.json.encode(facts)), files=written)
-    with writing_into(folder):
+    with explain_write_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
         sync_names(folder, written.values())
         write_bytes_atomically(folder / DONE, msgspec.json.encode(done))
@@ -109,7 +109,7 @@ def load_checkpoint(folder: Path, facts: type[F], key: str | None = None, *, ver
     if key is not None and done.key != key:
         raise MapError(f"{folder} was made from another recording, with other settings or with other models.")
     arrays = {name: read_array(folder, file, verify=verify) for name, file in done.files.items() if file.dtype}
-    others = {n: checked_path(folder, file, verify=verify) for n, file in sorted(done.files.items()) if not file.dtype}
+    others = {n: verify_file(folder, file, verify=verify) for n, file in sorted(done.files.items()) if not file.dtype}
     return Checkpoint(folder, done.key, said, arrays, others)
 
 

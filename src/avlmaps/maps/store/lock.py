@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from avlmaps.core.errors import MapError
-from avlmaps.maps.store.array_files import writing_into
+from avlmaps.maps.store.array_files import explain_write_errors
 
 LOCK = ".lock"
 
@@ -37,13 +37,13 @@ def _grab_patiently(descriptor: int) -> None:
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def lock_folder(folder: Path) -> Iterator[None]:
     """Hold the folder's lock; the folder is made if it is not there.
 
     Raises:
         MapError: another build holds it, or the folder cannot be written.
     """
-    with writing_into(folder):
+    with explain_write_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
     try:

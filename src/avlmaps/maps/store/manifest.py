@@ -12,7 +12,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.files import MANIFEST_BYTES, decode_json, read_regular, write_bytes_atomically
 from avlmaps.maps.sensor import SensorModel
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.array_files import FileInfo, writing_into
+from avlmaps.maps.store.array_files import FileInfo, explain_write_errors
 from avlmaps.perception.models.names import public_choice, public_name
 from avlmaps.perception.protocols import ModelCard
 
@@ -317,7 +317,7 @@ class _Ident(msgspec.Struct):
 def write_manifest(folder: Path, info: MapInfo) -> None:
     """Write ``map.json``; with it the folder becomes this map, and not before."""
     content = msgspec.json.format(msgspec.json.encode(info), indent=2)
-    with writing_into(folder):
+    with explain_write_errors(folder):
         write_bytes_atomically(folder / MANIFEST, content + b"\n")
 
 

@@ -15,8 +15,8 @@ from avlmaps.core.poses import FRAME, rotation_to_level
 from avlmaps.core.registry import Kind
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.integrity import Guard
-from avlmaps.maps.store.array_files import MEND, FileInfo, checked_path, read_array
-from avlmaps.maps.store.array_validation import array_fields, assembled, check_extent, check_order, content_fault
+from avlmaps.maps.store.array_files import MEND, FileInfo, read_array, verify_file
+from avlmaps.maps.store.array_validation import array_fields, check_extent, check_order, content_fault, validate_arrays
 from avlmaps.maps.store.lock import is_locked
 from avlmaps.maps.store.manifest import MANIFEST, GroundInfo, MapInfo, parse_manifest, read_manifest
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
@@ -171,11 +171,11 @@ def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
     for name, array in arrays.items():
         if not isinstance(array, np.memmap) and (fault := content_fault(name, array)):
             raise MapError(f"{path / names[name].path} is damaged: {fault}; {MEND}.")
-    voxels = assembled(Voxels, _of(arrays, Voxels, "voxels/"), f"{path}/voxels")
-    keyframes = assembled(Keyframes, _of(arrays, Keyframes, "keyframes/"), f"{path}/keyframes")
+    voxels = validate_arrays(Voxels, _of(arrays, Voxels, "voxels/"), f"{path}/voxels")
+    keyframes = validate_arrays(Keyframes, _of(arrays, Keyframes, "keyframes/"), f"{path}/keyframes")
     clips = tuple(_clip(path, names[name], verify) for name in sorted(names) if name.startswith(CLIPS))
     heard = {**_of(arrays, HeardSounds, "sounds/"), "clips": clips}
-    sounds = assembled(HeardSounds, heard, f"{path}/sounds")
+    sounds = validate_arrays(HeardSounds, heard, f"{path}/sounds")
     counts = info.counts
     if (len(voxels), len(keyframes), len(sounds), len(clips)) != (
         counts.voxels,
@@ -198,7 +198,7 @@ def _of(arrays: Mapping[str, np.ndarray], kind: type, prefix: str) -> dict[str, 
 
 
 def _clip(path: Path, file: FileInfo, verify: bool) -> str:
-    checked_path(path, file, verify=verify)
+    verify_file(path, file, verify=verify)
     return file.path
 
 

@@ -21,7 +21,7 @@ from avlmaps.navigate.ros.frames import Frames
 from avlmaps.navigate.ros.goals import End, Goal, Plan, Task, Track, Watch
 from avlmaps.navigate.ros.guard import Guard
 from avlmaps.navigate.ros.link import Link
-from avlmaps.navigate.ros.plans import LEAST_M, LONGEST_M, Standing, ahead_of, place_to_stand, turned_from
+from avlmaps.navigate.ros.plans import LEAST_M, LONGEST_M, Standing, ahead_of, place_to_stand, plan_turn
 from avlmaps.navigate.ros.settings import RosSettings
 
 _LOOK_EVERY_S = 0.1
@@ -137,7 +137,7 @@ class RosDriver(ABC):
 
     def turn(self, angle_rad: float) -> Arrival:
         """Turn on the spot, to the left by a positive angle."""
-        return self._move(lambda start: turned_from(start, angle_rad, self.settings, self._turn_tasks))
+        return self._move(lambda start: plan_turn(start, angle_rad, self.settings, self._turn_tasks))
 
     def forward(self, distance_m: float) -> Arrival:
         """Drive straight ahead; for a negative distance it turns round first, so that it sees where it goes."""

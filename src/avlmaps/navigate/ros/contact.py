@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from time import monotonic, sleep
 
 from avlmaps.core.errors import NavigationError
-from avlmaps.core.motion import GroundPose, wrapped
+from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps.navigate.ros.frames import Frames
 from avlmaps.navigate.ros.link import Link
 from avlmaps.navigate.ros.settings import RosSettings
@@ -169,5 +169,5 @@ class Contact:
 
 
 def _is_elsewhere(before: GroundPose, now: GroundPose) -> bool:
-    turned_rad = abs(wrapped(now.heading_rad - before.heading_rad))
+    turned_rad = abs(wrap_angle(now.heading_rad - before.heading_rad))
     return now.distance_m(before) > _STILL_M or turned_rad > _STILL_RAD

@@ -15,7 +15,7 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.files import write_bytes_atomically
-from avlmaps.core.motion import GroundPose, wrapped
+from avlmaps.core.motion import GroundPose, wrap_angle
 
 _MOST_BYTES = 10_000
 _FAR_M = 1e6
@@ -38,7 +38,7 @@ class GroundTransform:
     def __post_init__(self) -> None:
         if not (isfinite(self.yaw_rad) and abs(self.x_m) < _FAR_M and abs(self.y_m) < _FAR_M):
             raise ValueError(f"({self.x_m}, {self.y_m}) m, {self.yaw_rad} rad is no transform between two floors")
-        object.__setattr__(self, "yaw_rad", wrapped(self.yaw_rad))
+        object.__setattr__(self, "yaw_rad", wrap_angle(self.yaw_rad))
 
     def __matmul__(self, other: "GroundTransform") -> "GroundTransform":
         """Return ``c_from_a`` of this ``c_from_b`` and another ``b_from_a``."""
@@ -72,7 +72,7 @@ class GroundTransform:
         return cls(in_b.x_m - x_m, in_b.y_m - y_m, turned.yaw_rad)
 
     @classmethod
-    def fitted(cls, in_a: Float[np.ndarray, "n 2"], in_b: Float[np.ndarray, "n 2"]) -> tuple["GroundTransform", float]:
+    def fit(cls, in_a: Float[np.ndarray, "n 2"], in_b: Float[np.ndarray, "n 2"]) -> tuple["GroundTransform", float]:
         """Return the ``b_from_a`` that brings places known in both frames together best, by least squares.
 
         Args:

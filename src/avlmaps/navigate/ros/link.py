@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 import msgspec
 
 from avlmaps.core.errors import BackendError, NavigationError
-from avlmaps.navigate.ros.messages import Incoming, shown, text_in
+from avlmaps.navigate.ros.messages import Incoming, sanitize_line, text_in
 
 if TYPE_CHECKING:
     from avlmaps.navigate.ros.wire import Bridge
@@ -71,8 +71,8 @@ class Link:
             bridge = Bridge(self.url, headers, listener, timeout_s)
         except RuntimeError as fault:
             raise NavigationError(
-                f"No connection to {self.url} can be made from this process ({shown(str(fault), 300)}); start a new "
-                "one, without the environment variable ROSLIBPY_TRANSPORT."
+                f"No connection to {self.url} can be made from this process ({sanitize_line(str(fault), 300)}); "
+                "start a new one, without the environment variable ROSLIBPY_TRANSPORT."
             ) from None
         with self.heard:
             self.heard.wait_for(lambda: self.lost is not None or self._open, timeout_s)
@@ -167,7 +167,9 @@ def address(url: str) -> str:
     except ValueError:
         host, port, parts = None, None, urlsplit("")
     if parts.scheme not in ("ws", "wss") or not host or parts.username or any(c <= " " or c > "~" for c in url):
-        raise NavigationError(f"{shown(url)!r} is no address of a rosbridge; write it as ws://HOST:{DEFAULT_PORT}.")
+        raise NavigationError(
+            f"{sanitize_line(url)!r} is no address of a rosbridge; write it as ws://HOST:{DEFAULT_PORT}."
+        )
     port = port or (DEFAULT_PORT if parts.scheme == "ws" else 443)
     name = f"[{host}]" if ":" in host else host
     return f"{parts.scheme}://{name}:{port}{parts.path or '/'}" + (f"?{parts.query}" if parts.query else "")

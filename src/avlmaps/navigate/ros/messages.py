@@ -173,9 +173,9 @@ def text_in(raw: msgspec.Raw, most: int = 200) -> str:
         told = msgspec.json.decode(raw, type=str)
     except ValueError:
         return ""
-    return shown(told, most)
+    return sanitize_line(told, most)
 
 
-def shown(text: str, most: int = 200) -> str:
+def sanitize_line(text: str, most: int = 200) -> str:
     """Return a text from outside on one line, nothing in it but what is seen, and not too long."""
     return printable(" ".join(UNSAFE.sub(" ", text).split()), most)

@@ -13,7 +13,7 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.ros.base import RosDriver
 from avlmaps.navigate.ros.goals import End, Goal, Task
 from avlmaps.navigate.ros.link import Link
-from avlmaps.navigate.ros.messages import GoalState, GoalStates, GoalUpdate, shown, stamped_pose
+from avlmaps.navigate.ros.messages import GoalState, GoalStates, GoalUpdate, sanitize_line, stamped_pose
 
 # actionlib_msgs/GoalStatus
 _PENDING, _ACTIVE, _PREEMPTED, _SUCCEEDED, _ABORTED, _REJECTED, _PREEMPTING, _RECALLING, _RECALLED, _LOST = range(10)
@@ -109,7 +109,7 @@ class MoveBaseDriver(RosDriver):
 
 
 def _end_of(state: GoalState) -> tuple[End, str]:
-    why = f" ({shown(state.text)})" if shown(state.text) else ""
+    why = f" ({sanitize_line(state.text)})" if sanitize_line(state.text) else ""
     match state.status:
         case 3:
             return End.SUCCEEDED, ""

@@ -9,7 +9,7 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.ros.base import RosDriver
 from avlmaps.navigate.ros.goals import End, Goal, Task
 from avlmaps.navigate.ros.link import Link
-from avlmaps.navigate.ros.messages import ActionEnd, Incoming, duration, shown, stamped_pose, text_in
+from avlmaps.navigate.ros.messages import ActionEnd, Incoming, duration, sanitize_line, stamped_pose, text_in
 
 _SUCCEEDED, _CANCELLED = 4, 5  # action_msgs/GoalStatus
 # nav2_msgs' error codes, by the action that sets them: ComputePathToPose 2xx, FollowPath 1xx, behaviours 7xx.
@@ -141,5 +141,5 @@ def _end_of(message: Incoming) -> tuple[End, str]:
         return End.CANCELLED, "The goal was cancelled, by the robot or another of its users"
     code = told.error_code or inner.error_code
     known = _WHY.get(code, "" if code == 0 else f"error {code}")
-    why = shown(told.error_msg or inner.error_msg) or known or "it does not say why"
+    why = sanitize_line(told.error_msg or inner.error_msg) or known or "it does not say why"
     return End.FAILED, f"Nav2 gave up ({why})"

@@ -54,7 +54,7 @@ def open_ros_driver(
     token = token or os.environ.get("AVLMAPS_ROS_TOKEN") or None
     if level_from_world is None and obstacles is not None:
         level_from_world = obstacles.level_from_world
-    standing = None if obstacles is None else standing_on(obstacles, settings.radius_m)
+    standing = None if obstacles is None else standable_goal(obstacles, settings.radius_m)
     driver = {"nav2": Nav2Driver, "move_base": MoveBaseDriver}[kind]
     opened = driver(url, frames, settings, standing=standing, level_from_world=level_from_world, token=token)
     if guarded:
@@ -63,7 +63,7 @@ def open_ros_driver(
     return opened
 
 
-def standing_on(obstacles: "Obstacles", radius_m: float) -> Standing:
+def standable_goal(obstacles: "Obstacles", radius_m: float) -> Standing:
     """Return what moves goals to where a body can stand and get to, by a map's obstacles.
 
     Args:

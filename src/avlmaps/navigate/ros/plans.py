@@ -6,7 +6,7 @@ from math import atan2, degrees, hypot
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.motion import GroundPose, wrapped
+from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps.navigate.ros.goals import Plan, Task
 from avlmaps.navigate.ros.settings import RosSettings
 
@@ -51,7 +51,7 @@ def place_to_stand(
     target = GroundPose(x_m, y_m, next((angle for angle in (asked, travel) if angle is not None), start.heading_rad))
 
     def off(now: GroundPose) -> str:
-        away_m, turned = now.distance_m(target), abs(wrapped(now.heading_rad - target.heading_rad))
+        away_m, turned = now.distance_m(target), abs(wrap_angle(now.heading_rad - target.heading_rad))
         if away_m > settings.reached_m:
             return f"it stands {away_m:.2f} m from where it was sent"
         if asked is not None and turned > settings.reached_rad:
@@ -61,13 +61,13 @@ def place_to_stand(
     return Plan((task(target),), off, note)
 
 
-def turned_from(start: GroundPose, angle_rad: float, settings: RosSettings, tasks: Tasks) -> Plan | str:
+def plan_turn(start: GroundPose, angle_rad: float, settings: RosSettings, tasks: Tasks) -> Plan | str:
     """Plan a turn on the spot, or return why that cannot be."""
     if not abs(angle_rad) < 100.0:
         return f"{angle_rad} rad is no angle to turn by"
 
     def off(now: GroundPose) -> str:
-        wrong = abs(wrapped(now.heading_rad - start.heading_rad - angle_rad))
+        wrong = abs(wrap_angle(now.heading_rad - start.heading_rad - angle_rad))
         allowed = min(settings.reached_rad, max(0.05, abs(angle_rad) / 2))
         return f"it is {degrees(wrong):.0f} degrees from where it was to turn" if wrong > allowed else ""
 

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose
-from avlmaps.navigate.ros.messages import shown, transforms_in
+from avlmaps.navigate.ros.messages import sanitize_line, transforms_in
 
 _MOST_FRAMES = 5000
 _FAR_M = 1e6
@@ -118,6 +118,6 @@ class LiveTree:
 
 
 def _listed(names: list[str], most: int = 8) -> str:
-    return ", ".join(shown(name, 40) for name in names[:most]) + (
+    return ", ".join(sanitize_line(name, 40) for name in names[:most]) + (
         f" and {len(names) - most} more" if len(names) > most else ""
     )

@@ -20,7 +20,7 @@ from twisted.internet import reactor as _reactor
 from twisted.internet.error import ReactorNotRestartable
 from twisted.internet.ssl import optionsForClientTLS
 
-from avlmaps.navigate.ros.messages import MOST_BYTES, Incoming, shown
+from avlmaps.navigate.ros.messages import MOST_BYTES, Incoming, sanitize_line
 
 reactor: Any = _reactor  # its methods are put on it at run time
 _PING_EVERY_S, _PING_WAIT_S = 5.0, 10.0
@@ -57,11 +57,11 @@ class _Protocol(AutobahnRosBridgeProtocol):
             message = msgspec.json.decode(payload, type=Incoming)
             self.factory.listener.incoming(message)
         except (ValueError, TypeError, RecursionError) as fault:
-            self.factory.listener.fault(shown(str(fault)))
+            self.factory.listener.fault(sanitize_line(str(fault)))
 
     def onClose(self, wasClean: bool, code: int | None, reason: str | None) -> None:  # noqa: N802, N803
         """Keep why the connection ended."""
-        self.factory.told = shown(str(reason or ""))
+        self.factory.told = sanitize_line(str(reason or ""))
 
     def send_message(self, payload: bytes) -> None:
         """Send one message, if the connection still stands by then."""
@@ -110,11 +110,11 @@ class _Factory(AutobahnRosBridgeClientFactory):
     def clientConnectionLost(self, connector: Any, reason: Any) -> None:  # noqa: N802 - twisted's name
         """Take note that it is over."""
         self._proto = None
-        self.listener.over(self.told or shown(reason.getErrorMessage()))
+        self.listener.over(self.told or sanitize_line(reason.getErrorMessage()))
 
     def clientConnectionFailed(self, connector: Any, reason: Any) -> None:  # noqa: N802 - twisted's name
         """Take note that nobody answered."""
-        self.listener.over(shown(reason.getErrorMessage()))
+        self.listener.over(sanitize_line(reason.getErrorMessage()))
 
     def drop(self) -> None:
         """End the connection in any state; from any thread."""

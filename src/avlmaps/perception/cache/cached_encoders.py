@@ -32,7 +32,7 @@ from avlmaps.recordings.types import Frame
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RememberingProfile(Profile):
+class CachedProfile(Profile):
     """A profile with a store of features behind some of its encoders.
 
     Attributes:
@@ -47,36 +47,36 @@ class RememberingProfile(Profile):
         """Return the pixel encoder, or raise ``BackendError``."""
         store, half = self._store_of(Kind.PIXELS), self.on_torch(Kind.PIXELS)
         encoder = Profile.pixel_encoder(self)
-        return encoder if store is None and not half else RememberingPixels(encoder, store, half)
+        return encoder if store is None and not half else CachedPixels(encoder, store, half)
 
     def view_encoder(self) -> ViewEncoder:
         """Return the view encoder, or raise ``BackendError``."""
         store, encoder = self._store_of(Kind.VIEWS), Profile.view_encoder(self)
-        return encoder if store is None else RememberingViews(encoder, store)
+        return encoder if store is None else CachedViews(encoder, store)
 
     def sound_encoder(self) -> SoundEncoder:
         """Return the sound encoder, or raise ``BackendError``."""
         store, encoder = self._store_of(Kind.SOUNDS), Profile.sound_encoder(self)
         if store is None:
             return encoder
-        made = RememberingFrameSounds if isinstance(encoder, FrameSoundEncoder) else RememberingSounds
+        made = CachedFrameSounds if isinstance(encoder, FrameSoundEncoder) else CachedSounds
         return made(encoder, store)
 
     def local_encoder(self) -> LocalEncoder:
         """Return the keypoint encoder, or raise ``BackendError``."""
         store, encoder = self._store_of(Kind.LOCAL), Profile.local_encoder(self)
-        return encoder if store is None else RememberingKeypoints(encoder, store)
+        return encoder if store is None else CachedKeypoints(encoder, store)
 
     def place_encoder(self) -> PlaceEncoder:
         """Return the place encoder, or raise ``BackendError``."""
         store, encoder = self._store_of(Kind.PLACE), Profile.place_encoder(self)
-        return encoder if store is None else RememberingPlaces(encoder, store)
+        return encoder if store is None else CachedPlaces(encoder, store)
 
     def _store_of(self, kind: Kind) -> FeatureStore | None:
         return self.store if kind in self.remembered_kinds else None
 
 
-def remembering(used: Profile, settings: CacheSettings) -> Profile:
+def with_cache(used: Profile, settings: CacheSettings) -> Profile:
     """Return the profile with a store behind its encoders, as the settings say."""
     kinds = [kind for kind in Kind if kind is not Kind.WORDS and used.backend_name(kind)]
     on_torch = frozenset(kind for kind in kinds if used.on_torch(kind))
@@ -90,12 +90,12 @@ def remembering(used: Profile, settings: CacheSettings) -> Profile:
         return used
     store = FeatureStore(folder, 1e9 * settings.limit_gb) if folder is not None and kinds_kept else None
     same = {field.name: getattr(used, field.name) for field in fields(Profile)}
-    return RememberingProfile(**same, store=store, remembered_kinds=kinds_kept)
+    return CachedProfile(**same, store=store, remembered_kinds=kinds_kept)
 
 
-def came_from_store(used: Profile, kind: Kind) -> str:
+def cache_note(used: Profile, kind: Kind) -> str:
     """Return how many features of a module came from the store, for a progress bar; ``""`` where none can."""
-    if not isinstance(used, RememberingProfile) or used.store is None or kind not in used.remembered_kinds:
+    if not isinstance(used, CachedProfile) or used.store is None or kind not in used.remembered_kinds:
         return ""
     return f"{used.store.found.get(kind, 0)} from the cache"
 
@@ -124,7 +124,7 @@ class _Remembering:
             self._store.put(self.kind, self.card, key, array)
 
 
-class RememberingPixels(_Remembering):
+class CachedPixels(_Remembering):
     """A ``BatchPixelEncoder`` that encodes each frame once; features on torch are rounded to float16."""
 
     kind = Kind.PIXELS
@@ -167,7 +167,7 @@ class RememberingPixels(_Remembering):
         keys = ["" if self._store is None else self._key(*_seen_in(frame)) for frame in frames]
         kept = [self._known(key) for key in keys]
         missing = [i for i, features in enumerate(kept) if features is None]
-        fresh = encoded_together(self._encoder, [frames[i] for i in missing])
+        fresh = encode_batch(self._encoder, [frames[i] for i in missing])
         for i in reversed(missing):  # a frame's features can take 150 MB: none is held twice for long
             rounded = fresh.pop().astype(self._kept_as)
             self._put(keys[i], rounded)
@@ -181,7 +181,7 @@ class RememberingPixels(_Remembering):
         return found.astype(np.float32, copy=False)
 
 
-class RememberingViews(_Remembering):
+class CachedViews(_Remembering):
     """A view encoder that encodes each frame once."""
 
     kind = Kind.VIEWS
@@ -203,7 +203,7 @@ class RememberingViews(_Remembering):
         return self._encoder.encode_words(words)
 
 
-class RememberingSounds(_Remembering):
+class CachedSounds(_Remembering):
     """A sound encoder that encodes each sound once."""
 
     kind = Kind.SOUNDS
@@ -239,7 +239,7 @@ class RememberingSounds(_Remembering):
         return self._encoder.score_sounds(sounds, asked)
 
 
-class RememberingFrameSounds(RememberingSounds):
+class CachedFrameSounds(CachedSounds):
     """The same for an encoder that gives a vector for each step of time."""
 
     @property
@@ -248,7 +248,7 @@ class RememberingFrameSounds(RememberingSounds):
         return self._encoder.hop_s
 
 
-class RememberingPlaces(_Remembering):
+class CachedPlaces(_Remembering):
     """A place encoder that encodes each picture once (with the same keypoints, after the same learning)."""
 
     kind = Kind.PLACE
@@ -271,7 +271,7 @@ class RememberingPlaces(_Remembering):
         return kept
 
 
-class RememberingKeypoints(_Remembering):
+class CachedKeypoints(_Remembering):
     """A keypoint encoder that encodes each picture once; stored in float32, because keypoints are sub-pixel."""
 
     kind = Kind.LOCAL
@@ -288,7 +288,7 @@ class RememberingKeypoints(_Remembering):
         return local
 
 
-def encoded_together(encoder: PixelEncoder, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
+def encode_batch(encoder: PixelEncoder, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
     """Return the features of each frame, made in one go where the encoder can."""
     if len(frames) > 1 and isinstance(encoder, BatchPixelEncoder):
         return encoder.encode_batch(frames)

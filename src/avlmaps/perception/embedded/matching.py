@@ -26,10 +26,10 @@ class MutualRatio:
 
     def match(self, a: LocalFeatures, b: LocalFeatures) -> Int[np.ndarray, "m 2"]:
         """Return rows (index in a, index in b), rising in a; each index at most once."""
-        return matched(a.descriptors, b.descriptors)
+        return match_mutual(a.descriptors, b.descriptors)
 
 
-def matched(
+def match_mutual(
     a: Float32[np.ndarray, "n d"], b: Float32[np.ndarray, "m d"], ratio: float = RATIO
 ) -> Int[np.ndarray, "k 2"]:
     """Return the pairs of unit vectors that are mutually nearest and pass the ratio test.

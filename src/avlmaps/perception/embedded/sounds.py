@@ -33,10 +33,10 @@ from avlmaps.perception.embedded.sound_calibration import (
     taught_lead,
     typical_examples,
 )
-from avlmaps.perception.enrolment import TaughtSound, sounds_folder, taught_sounds
+from avlmaps.perception.enrolment import TaughtSound, enrolled_sounds, sounds_folder
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resampled
+from avlmaps.recordings.resample import resample
 
 _BATCH = 16
 
@@ -111,7 +111,7 @@ class EmbeddedSounds:
     @property
     def taught(self) -> tuple[TaughtSound, ...]:
         """The user's own sounds, read at each call so that new ones are known; without those of other weights."""
-        own = taught_sounds(self._folder) if sounds_folder(self._folder).is_dir() else []
+        own = enrolled_sounds(self._folder) if sounds_folder(self._folder).is_dir() else []
         return tuple(taught for taught in own if taught.checksum == self.card.checksum)
 
     def encode(self, sound: Sound) -> Float32[np.ndarray, "windows d"]:
@@ -121,7 +121,7 @@ class EmbeddedSounds:
             AudioError: the sound has no samples, or some that are no finite numbers.
         """
         logmel.check_audible(sound.samples)
-        mels = logmel.normalised(logmel.mel_power(resampled(sound, logmel.RATE_HZ).samples))
+        mels = logmel.normalised(logmel.mel_power(resample(sound, logmel.RATE_HZ).samples))
         windows = logmel.windows(mels)
         parts = [
             cast(np.ndarray, self._session.run(None, {"heard": logmel.heard(windows[at : at + _BATCH])})[0])

@@ -17,7 +17,7 @@ from kornia.feature import ALIKED
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.models.checksums import checksum_of
-from avlmaps.perception.models.device import chosen_device, inference, to_numpy, unit_rows
+from avlmaps.perception.models.device import inference, select_device, to_numpy, unit_rows
 from avlmaps.perception.models.pictures import has_nothing, local_features, no_features, shrunk
 from avlmaps.perception.models.published import load_strictly, published_file, read_tensors
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
@@ -48,7 +48,7 @@ class AlikedKeypoints:
         path = published_file(name, get, _REPOSITORY, [f"checkpoints/{Path(name).name}"])
         network = ALIKED(variant, max_num_keypoints=MAX_KEYPOINTS, detection_threshold=THRESHOLD)
         load_strictly(network, read_tensors(path, get), path, get, computed=_COMPUTED)
-        self._device = chosen_device()
+        self._device = select_device()
         self._network = network.eval().to(self._device)
         self.card = ModelCard(
             id=f"aliked/{Path(name).name}",

@@ -21,7 +21,7 @@ from jaxtyping import Float32
 
 from avlmaps.perception.foundation.open_sounds import ContrastSounds, by_portions, usable_samples, windows
 from avlmaps.perception.models.checksums import checksum_of, weights_in
-from avlmaps.perception.models.device import chosen_batch, chosen_device, unit_rows
+from avlmaps.perception.models.device import select_batch, select_device, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
@@ -51,7 +51,7 @@ class ClapSounds(ContrastSounds):
         from transformers import AutoTokenizer, ClapFeatureExtractor, ClapModel
 
         folder = pretrained_folder(model)
-        self._model: Any = load_pretrained(ClapModel, folder, model, chosen_device(), torch.float32)
+        self._model: Any = load_pretrained(ClapModel, folder, model, select_device(), torch.float32)
         self._tokenizer = load_helper(AutoTokenizer, folder, model)
         self._spectrogram = load_helper(ClapFeatureExtractor, folder, model)
         self._rate_hz = int(self._spectrogram.sampling_rate)
@@ -79,7 +79,7 @@ class ClapSounds(ContrastSounds):
             AudioError: the sound has no samples, or some that are no finite numbers.
         """
         pieces = windows(usable_samples(sound, self._rate_hz), self._window, round(self._window * (1.0 - _SHARED)))
-        return by_portions(pieces, max(1, chosen_batch(_WINDOWS_ON_GPU)), self.card.dim, self._encode_windows)
+        return by_portions(pieces, max(1, select_batch(_WINDOWS_ON_GPU)), self.card.dim, self._encode_windows)
 
     def _read(self, texts: Sequence[str]) -> torch.Tensor:
         return text_features(self._model, self._tokenizer, texts, _MOST_TOKENS)

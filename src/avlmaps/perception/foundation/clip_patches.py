@@ -24,7 +24,7 @@ from jaxtyping import Float32, UInt8
 
 from avlmaps.perception.foundation.clip_tower import ClipTower
 from avlmaps.perception.foundation.open_pixels import OpenPixels
-from avlmaps.perception.foundation.pictures import chosen_way, working_size
+from avlmaps.perception.foundation.pictures import split_model_way, working_size
 from avlmaps.perception.foundation.prompts import CLIP_PROMPTS
 from avlmaps.perception.models.device import inference, unit_rows
 from avlmaps.perception.protocols import ModelCard
@@ -44,7 +44,7 @@ class ClipPatches(OpenPixels):
     """
 
     def __init__(self, model: str = "openai/clip-vit-base-patch16", short_side: int = 448) -> None:
-        name, way = chosen_way(model, _WAYS)
+        name, way = split_model_way(model, _WAYS)
         self._clip = ClipTower(name)
         self._way, self._short_side = way, short_side
         card = ModelCard(

@@ -8,10 +8,10 @@ import torch
 from jaxtyping import Float, UInt8
 
 from avlmaps.perception.foundation.open_views import licence_of
-from avlmaps.perception.foundation.pictures import Size, stacked
+from avlmaps.perception.foundation.pictures import Size, stack_pictures
 from avlmaps.perception.foundation.prompts import CLIP_PROMPTS, Prompted
 from avlmaps.perception.models.checksums import checksum_of, weights_in
-from avlmaps.perception.models.device import chosen_device, chosen_type, inference, to_numpy
+from avlmaps.perception.models.device import inference, select_device, select_dtype, to_numpy
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
 from avlmaps.perception.models.texts import text_features
@@ -48,8 +48,8 @@ class ClipTower:
         from transformers import CLIPModel, CLIPTokenizer
 
         self._folder = pretrained_folder(model)
-        self.device = chosen_device()
-        self._type = chosen_type(self.device)
+        self.device = select_device()
+        self._type = select_dtype(self.device)
         self._model: Any = load_pretrained(CLIPModel, self._folder, model, self.device, self._type)
         self._tokenizer: Any = load_helper(CLIPTokenizer, self._folder, model)
         self.vision: Any = self._model.vision_model
@@ -69,7 +69,7 @@ class ClipTower:
 
     def pixels(self, pictures: Sequence[UInt8[np.ndarray, "h w 3"]], size: Size) -> torch.Tensor:
         """Return pictures of one shape as (b, 3, height, width), resized to ``size``, normalised as CLIP wants them."""
-        picture = stacked(pictures, size, self.device, torch.float32)
+        picture = stack_pictures(pictures, size, self.device, torch.float32)
         return ((picture - self._mean) / self._deviation).to(self._type)
 
     def whole(self, rgb: UInt8[np.ndarray, "h w 3"]) -> torch.Tensor:

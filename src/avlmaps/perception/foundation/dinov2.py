@@ -23,10 +23,10 @@ import torch
 from jaxtyping import Float32, UInt8
 
 from avlmaps.perception.foundation.open_views import hub_model
-from avlmaps.perception.foundation.pictures import chosen_way
+from avlmaps.perception.foundation.pictures import split_model_way
 from avlmaps.perception.foundation.whole_pictures import imagenet_picture, size_with_short_side
 from avlmaps.perception.models.checksums import checksum_of, weights_in
-from avlmaps.perception.models.device import chosen_device, unit_rows
+from avlmaps.perception.models.device import select_device, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
@@ -49,12 +49,12 @@ class DinoPlaces:
     """
 
     def __init__(self, model: str = "facebook/dinov2-small", short_side: int = _SHORT_SIDE) -> None:
-        name, self._way = chosen_way(model, _WAYS)
+        name, self._way = split_model_way(model, _WAYS)
         self._network, folder = hub_model(name, _CLASSES)
         config: Any = self._network.config
         self._patch, self._short_side = int(config.patch_size), short_side
         self._front = 1 + int(getattr(config, "num_register_tokens", 0))
-        self._device = chosen_device()
+        self._device = select_device()
         self.card = ModelCard(
             id=public_name(name) + ("" if self._way == _WAYS[0] else f"#{self._way}"),
             dim=int(config.hidden_size) * (2 if self._way == "both" else 1),

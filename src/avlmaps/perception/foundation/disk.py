@@ -17,7 +17,7 @@ from kornia.feature import DISK
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.models.checksums import checksum_of
-from avlmaps.perception.models.device import chosen_device, inference, to_numpy, unit_rows
+from avlmaps.perception.models.device import inference, select_device, to_numpy, unit_rows
 from avlmaps.perception.models.pictures import has_nothing, local_features, no_features, shrunk
 from avlmaps.perception.models.published import load_strictly, published_file, read_tensors
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
@@ -49,7 +49,7 @@ class DiskKeypoints:
         state = read_tensors(path, get, part="extractor")
         network = DISK(desc_dim=DIM)
         load_strictly(network, state, path, get)
-        self._device = chosen_device()
+        self._device = select_device()
         self._network = network.eval().to(self._device)
         self.card = ModelCard(
             id=f"disk/{Path(name).name}",

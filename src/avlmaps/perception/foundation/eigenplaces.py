@@ -25,7 +25,7 @@ from torch.nn import functional
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.foundation.whole_pictures import imagenet_picture, size_with_short_side
 from avlmaps.perception.models.checksums import checksum_of
-from avlmaps.perception.models.device import chosen_device, unit_rows
+from avlmaps.perception.models.device import select_device, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.operators import declare_missing_operators
 from avlmaps.perception.models.precision import mixed_precision
@@ -54,7 +54,7 @@ class EigenPlaces:
         state = read_tensors(path, get)
         network = EigenPlacesNetwork(backbone_of(state, path, get), *_linear_sizes(state, path, get))
         load_strictly(network, state, path, get)
-        self._device = chosen_device()
+        self._device = select_device()
         self._network = network.eval().requires_grad_(False).to(self._device)
         self.card = ModelCard(
             id=public_name(model),

@@ -15,7 +15,7 @@ from kornia.feature import LightGlue as KorniaLightGlue
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.models.checksums import checksum_of
-from avlmaps.perception.models.device import chosen_device
+from avlmaps.perception.models.device import select_device
 from avlmaps.perception.models.matches import network_input, no_matches
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.published import load_strictly, published_file, read_tensors
@@ -50,7 +50,7 @@ class LightGlue:
         network = KorniaLightGlue(features=None, input_dim=DIM, filter_threshold=SCORE, n_layers=LAYERS)  # pyright: ignore[reportArgumentType]
         state = {_present_name(key): value for key, value in read_tensors(path, get).items()}
         load_strictly(network, state, path, get, computed=_COMPUTED)
-        self._device = chosen_device()
+        self._device = select_device()
         self._network = network.eval().to(self._device)
         self.card = ModelCard(
             id=f"lightglue/{Path(name).name}",

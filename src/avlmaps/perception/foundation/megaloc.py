@@ -27,7 +27,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.perception.foundation.dino_network import DinoNetwork, DinoSizes
 from avlmaps.perception.foundation.whole_pictures import imagenet_picture
 from avlmaps.perception.models.checksums import checksum_of, weights_in
-from avlmaps.perception.models.device import chosen_device, unit_rows
+from avlmaps.perception.models.device import select_device, unit_rows
 from avlmaps.perception.models.files import model_folder
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
@@ -60,7 +60,7 @@ class MegaLoc:
         state = _current_names(read_tensors(path, _GET))
         network = MegaLocNetwork(_sizes_of(state, path), _aggregation_of(state, path))
         load_strictly(network, state, path, _GET)
-        self._device, self._side = chosen_device(), side
+        self._device, self._side = select_device(), side
         self._network = network.eval().requires_grad_(False).to(self._device)
         self.card = ModelCard(
             id=public_name(model),

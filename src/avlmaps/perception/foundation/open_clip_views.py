@@ -22,7 +22,7 @@ from jaxtyping import UInt8
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.foundation.open_views import OpenViews, views_card
 from avlmaps.perception.models.checksums import weights_in
-from avlmaps.perception.models.device import chosen_device
+from avlmaps.perception.models.device import select_device
 from avlmaps.perception.models.files import model_folder
 
 _CONFIG = "open_clip_config.json"
@@ -47,7 +47,7 @@ class OpenClipViews(OpenViews):
     """
 
     def __init__(self, model: str = "timm/PE-Core-B-16") -> None:
-        device = chosen_device()
+        device = select_device()
         folder = model_folder(model, _WANTED)
         if not weights_in(folder):  # older repositories have no safetensors
             folder = model_folder(model, (*_WANTED, "open_clip_pytorch_model.bin"))

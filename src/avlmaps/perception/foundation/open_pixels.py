@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-from avlmaps.perception.foundation.pictures import in_batches
+from avlmaps.perception.foundation.pictures import encode_in_batches
 from avlmaps.perception.foundation.prompts import THINGS, Prompted, clean
-from avlmaps.perception.models.device import chosen_batch
+from avlmaps.perception.models.device import select_batch
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.types import Frame
 
@@ -36,7 +36,7 @@ class OpenPixels(ABC):
     @property
     def batch(self) -> int:
         """How many frames it likes to be given at once."""
-        return chosen_batch(self._on_gpu)
+        return select_batch(self._on_gpu)
 
     def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
         """Return a feature for each cell of the grid, of unit length or all zero."""
@@ -44,7 +44,7 @@ class OpenPixels(ABC):
 
     def encode_batch(self, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
         """Return what ``encode`` returns for each frame (to rounding)."""
-        return in_batches(frames, max(self.batch, 1), self._encode_pictures)
+        return encode_in_batches(frames, max(self.batch, 1), self._encode_pictures)
 
     def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
         """Return a unit vector for each phrase, the mean over the card's sentences; all zero for a blank one."""

@@ -11,11 +11,11 @@ from jaxtyping import Float32
 
 from avlmaps.core.errors import AudioError
 from avlmaps.perception.foundation.sound_scores import OTHERS, Contrast
-from avlmaps.perception.models.device import chosen_device, unit_rows
+from avlmaps.perception.models.device import select_device, unit_rows
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resampled
+from avlmaps.recordings.resample import resample
 
 T = TypeVar("T")
 WORDS_AT_ONCE = 64
@@ -36,7 +36,7 @@ class ContrastSounds(ABC):
         self.card = card
         self.logit_scale = logit_scale
         self._others = tuple(others)
-        self._device = chosen_device()
+        self._device = select_device()
 
     def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
         """Return a unit vector for each phrase, as the name of a sound."""
@@ -90,7 +90,7 @@ def usable_samples(sound: Sound, rate_hz: int) -> Float32[np.ndarray, " n"]:
             f"The sound has {bad} samples of {len(sound.samples)} that are no finite numbers; convert it again from "
             "its source."
         )
-    return resampled(sound, rate_hz).samples
+    return resample(sound, rate_hz).samples
 
 
 def windows(samples: Float32[np.ndarray, " n"], length: int, step: int) -> list[Float32[np.ndarray, " m"]]:

@@ -13,7 +13,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.perception.cache.text_features import KeptWords
 from avlmaps.perception.foundation.prompts import Prompted
 from avlmaps.perception.models.checksums import checksum_of
-from avlmaps.perception.models.device import chosen_batch, chosen_device, unit_rows
+from avlmaps.perception.models.device import select_batch, select_device, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
@@ -54,12 +54,12 @@ class OpenViews(ABC):
     def __init__(self, card: ModelCard, logit_scale: float) -> None:
         self.card = card
         self.logit_scale = logit_scale
-        self._device = chosen_device()
+        self._device = select_device()
         self._words = Prompted(self._text_rows, card.dim, card.prompts, KeptWords(card))
 
     def encode(self, frames: Sequence[Frame]) -> Float32[np.ndarray, "n d"]:
         """Return a unit vector for each frame."""
-        batch, found = chosen_batch(_ON_GPU), [np.zeros((0, self.card.dim), np.float32)]
+        batch, found = select_batch(_ON_GPU), [np.zeros((0, self.card.dim), np.float32)]
         for start in range(0, len(frames), batch):
             with mixed_precision(self._device):
                 found.append(unit_rows(self._see([frame.rgb for frame in frames[start : start + batch]])))
@@ -140,7 +140,7 @@ def hub_model(model: str, classes: Mapping[str, str]) -> tuple[Any, Path]:
             f"{folder} holds a model of the type {kind!r}, expected is {' or '.join(map(repr, classes))}; choose "
             "another model, or another backend for this one (avlmaps profiles)."
         )
-    made = load_pretrained(getattr(transformers, classes[kind]), folder, model, chosen_device(), torch.float32)
+    made = load_pretrained(getattr(transformers, classes[kind]), folder, model, select_device(), torch.float32)
     return made.requires_grad_(False), folder
 
 

@@ -28,7 +28,7 @@ from jaxtyping import Float, Float32
 from avlmaps.perception.foundation.open_sounds import WORDS_AT_ONCE, by_portions, usable_samples
 from avlmaps.perception.foundation.sound_scores import OTHERS, QUIET, joined, one_kind, sigmoid
 from avlmaps.perception.models.checksums import checksum_of, weights_in
-from avlmaps.perception.models.device import chosen_device, to_numpy
+from avlmaps.perception.models.device import select_device, to_numpy
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
@@ -58,7 +58,7 @@ class FrameSounds:
         from transformers import AutoTokenizer, PeAudioFeatureExtractor, PeAudioFrameLevelModel
 
         folder = pretrained_folder(model)
-        self._device = chosen_device()
+        self._device = select_device()
         self._model: Any = load_pretrained(PeAudioFrameLevelModel, folder, model, self._device, torch.float32)
         self._model.text_model.config.tie_last_hidden_states = False  # hidden_states[-1] as the last layer gives it
         self._tokenizer = load_helper(AutoTokenizer, folder, model)

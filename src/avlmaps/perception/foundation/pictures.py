@@ -32,7 +32,7 @@ def working_size(height: int, width: int, short_side: int, patch: int, most_patc
     return patch * min(rows, most_patches), patch * min(columns, most_patches // min(rows, most_patches))
 
 
-def stacked(
+def stack_pictures(
     pictures: Sequence[UInt8[np.ndarray, "h w 3"]],
     size: Size,
     device: torch.device,
@@ -55,7 +55,7 @@ def stacked(
     return picture.clamp(0.0, 1.0).to(precision)
 
 
-def in_batches(
+def encode_in_batches(
     frames: Sequence[Frame],
     batch: int,
     encode: Callable[[list[UInt8[np.ndarray, "h w 3"]]], Iterable[Float32[np.ndarray, "hf wf d"]]],
@@ -72,7 +72,7 @@ def in_batches(
     return out
 
 
-def chosen_way(choice: str, ways: Sequence[str]) -> tuple[str, str]:
+def split_model_way(choice: str, ways: Sequence[str]) -> tuple[str, str]:
     """Split a choice into a model and the kind of its features: ``model#way``, by default the first.
 
     Raises:

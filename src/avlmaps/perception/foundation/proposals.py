@@ -13,9 +13,9 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, Float32, Int, UInt8
 
-from avlmaps.perception.foundation.pictures import Size, stacked
+from avlmaps.perception.foundation.pictures import Size, stack_pictures
 from avlmaps.perception.models.checksums import checksum_of, weights_in
-from avlmaps.perception.models.device import chosen_device, to_numpy
+from avlmaps.perception.models.device import select_device, to_numpy
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_pretrained, pretrained_folder
@@ -76,7 +76,7 @@ class Sam2Proposals:
 
         self._settings = settings or ProposalSettings()
         folder = pretrained_folder(model)
-        self._device = chosen_device()
+        self._device = select_device()
         self._model: Any = load_pretrained(Sam2Model, folder, model, self._device, torch.float32)
         self._side = int(self._model.config.prompt_encoder_config.image_size)
         self.name = public_name(model)
@@ -92,7 +92,7 @@ class Sam2Proposals:
             grid: rows and columns of the masks.
         """
         with mixed_precision(self._device):
-            picture = stacked([rgb], (self._side, self._side), self._device, torch.float32, "bilinear")
+            picture = stack_pictures([rgb], (self._side, self._side), self._device, torch.float32, "bilinear")
             seen = self._model.get_image_embeddings((picture - self._mean) / self._deviation)
             points = _grid_of_points(self._settings.points_per_side, self._device) * self._side
             found = [self._at(seen, some) for some in points.split(_POINTS_AT_ONCE)]

@@ -24,7 +24,7 @@ from avlmaps.perception.foundation.open_pixels import OpenPixels
 from avlmaps.perception.foundation.pictures import working_size
 from avlmaps.perception.foundation.prompts import CLIP_PROMPTS
 from avlmaps.perception.foundation.proposals import Proposals, ProposalSettings, Sam2Proposals
-from avlmaps.perception.models.device import chosen_batch, inference, to_numpy, unit_rows
+from avlmaps.perception.models.device import inference, select_batch, to_numpy, unit_rows
 from avlmaps.perception.protocols import ModelCard
 
 _PROPOSER = "facebook/sam2.1-hiera-tiny"
@@ -81,18 +81,18 @@ class RegionPixels(OpenPixels):
 
     def _features(self, rgb: UInt8[np.ndarray, "h w 3"], found: Proposals) -> Float32[np.ndarray, "n d"]:
         """Return the mixed feature of each region."""
-        cutouts = [rgb, *(cut_out(rgb, box) for box in found.box)]
-        at_once = chosen_batch(_CUTOUTS_ON_GPU) if self._clip.device.type != "cpu" else _CUTOUTS_ON_CPU
+        cutouts = [rgb, *(crop(rgb, box) for box in found.box)]
+        at_once = select_batch(_CUTOUTS_ON_GPU) if self._clip.device.type != "cpu" else _CUTOUTS_ON_CPU
         rows: list[torch.Tensor] = []
         with inference():
             for start in range(0, len(cutouts), at_once):
                 some = [self._clip.whole(picture) for picture in cutouts[start : start + at_once]]
                 rows.append(self._clip.picture_features(torch.cat(some)))
             unit = torch.from_numpy(unit_rows(torch.cat(rows)))
-            return to_numpy(mixed(unit[0], unit[1:]))
+            return to_numpy(blend_with_whole(unit[0], unit[1:]))
 
 
-def mixed(whole: torch.Tensor, regions: torch.Tensor) -> torch.Tensor:
+def blend_with_whole(whole: torch.Tensor, regions: torch.Tensor) -> torch.Tensor:
     """Return the unit features (r, d) of regions with some of the whole picture in each.
 
     Args:
@@ -106,7 +106,7 @@ def mixed(whole: torch.Tensor, regions: torch.Tensor) -> torch.Tensor:
     return both / both.norm(dim=1, keepdim=True).clamp_min(1e-12)
 
 
-def cut_out(rgb: UInt8[np.ndarray, "h w 3"], box: Float32[np.ndarray, "4"]) -> UInt8[np.ndarray, "h2 w2 3"]:
+def crop(rgb: UInt8[np.ndarray, "h w 3"], box: Float32[np.ndarray, "4"]) -> UInt8[np.ndarray, "h2 w2 3"]:
     """Return the part of a picture in a box (x0, y0, x1, y1 in [0, 1]), at least one pixel of it."""
     height, width = rgb.shape[:2]
     x0, y0 = min(int(box[0] * width), width - 1), min(int(box[1] * height), height - 1)

@@ -22,13 +22,13 @@ import torch
 from jaxtyping import Float32, UInt8
 
 from avlmaps.perception.foundation.open_pixels import OpenPixels
-from avlmaps.perception.foundation.pictures import chosen_way, stacked, working_size
+from avlmaps.perception.foundation.pictures import split_model_way, stack_pictures, working_size
 from avlmaps.perception.foundation.prompts import TIPS_PROMPTS, Prompted
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import (
-    chosen_device,
-    chosen_type,
     inference,
+    select_device,
+    select_dtype,
     to_numpy,
     unit_rows,
 )
@@ -53,10 +53,10 @@ class TipsPixels(OpenPixels):
     def __init__(self, model: str = "google/tipsv2-b14", short_side: int = 448) -> None:
         from transformers import Tipsv2Model, Tipsv2Tokenizer
 
-        name, way = chosen_way(model, _WAYS)
+        name, way = split_model_way(model, _WAYS)
         folder = pretrained_folder(name)
-        self._device = chosen_device()
-        self._type = chosen_type(self._device)
+        self._device = select_device()
+        self._type = select_dtype(self._device)
         self._model: Any = load_pretrained(Tipsv2Model, folder, name, self._device, self._type)
         self._tokenizer = load_helper(Tipsv2Tokenizer, folder, name)
         self._way, self._short_side = cast(Way, way), short_side
@@ -79,7 +79,7 @@ class TipsPixels(OpenPixels):
         height, width = pictures[0].shape[:2]
         size = working_size(height, width, self._short_side, self._patch)
         with inference():
-            pixels = stacked(pictures, size, self._device, self._type)
+            pixels = stack_pictures(pictures, size, self._device, self._type)
             vision = self._model.vision_model
             tokens = _of_values(vision, pixels) if self._way == "values" else vision(pixels).last_hidden_state
             patches = unit_rows(tokens[:, self._front :])

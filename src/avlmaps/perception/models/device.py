@@ -17,7 +17,7 @@ declare_missing_operators()
 _TYPES = {"float32": torch.float32, "float16": torch.float16, "bfloat16": torch.bfloat16}
 
 
-def chosen_device() -> torch.device:
+def select_device() -> torch.device:
     """Return the device of the settings.
 
     Raises:
@@ -46,7 +46,7 @@ def _use_cores() -> None:
         torch.set_num_threads(int(threads))
 
 
-def chosen_type(device: torch.device) -> torch.dtype:
+def select_dtype(device: torch.device) -> torch.dtype:
     """Return the precision of the settings: by default float16 on CUDA, float32 elsewhere."""
     asked = model_settings().precision
     if asked == "auto":
@@ -54,9 +54,9 @@ def chosen_type(device: torch.device) -> torch.dtype:
     return _TYPES[asked]
 
 
-def chosen_batch(on_gpu: int) -> int:
+def select_batch(on_gpu: int) -> int:
     """Return how many pictures go through at once: the settings' number, else ``on_gpu`` on a GPU and 1 elsewhere."""
-    return model_settings().batch or (1 if chosen_device().type == "cpu" else on_gpu)
+    return model_settings().batch or (1 if select_device().type == "cpu" else on_gpu)
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import torch
 
-from avlmaps.perception.models.device import chosen_type, inference
+from avlmaps.perception.models.device import inference, select_dtype
 
 
 @contextmanager
@@ -15,7 +15,7 @@ def mixed_precision(device: torch.device) -> Iterator[None]:
     For networks that read places in a picture: a float16 holds no fraction of a pixel above 1024. On a CPU half
     precision is slower, so that everything stays float32 there.
     """
-    kind = chosen_type(device)
+    kind = select_dtype(device)
     half = device.type != "cpu" and kind is not torch.float32
     with inference(), torch.autocast(device.type, dtype=kind if half else None, enabled=half):
         yield

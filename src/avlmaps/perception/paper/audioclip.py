@@ -24,7 +24,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.perception.foundation.open_sounds import ContrastSounds, by_portions, usable_samples, windows
 from avlmaps.perception.foundation.sound_scores import OTHERS
 from avlmaps.perception.models.checksums import checksum_of
-from avlmaps.perception.models.device import chosen_batch, chosen_device, inference, unit_rows
+from avlmaps.perception.models.device import inference, select_batch, select_device, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.published import load_strictly, published_file, read_tensors
@@ -64,7 +64,7 @@ class AudioClipSounds(ContrastSounds):
                 f"{path} was made with {network.sizes.tokens} tokens, CLIP's list of byte pairs has "
                 f"{len(self._tokens)}; get the published file with: {how_to_get}"
             )
-        device = chosen_device()
+        device = select_device()
         self._network = network.eval().to(device)
         self._front_end = FrontEnd.of(network.audio.fbsp, network.audio.window, device)
         card = ModelCard(
@@ -89,7 +89,7 @@ class AudioClipSounds(ContrastSounds):
         samples = usable_samples(sound, RATE_HZ)
         samples = np.pad(samples, (0, max(0, WINDOW_SAMPLES - len(samples))))
         heard = windows(samples, WINDOW_SAMPLES, WINDOW_SAMPLES)
-        return by_portions(heard, chosen_batch(_WINDOWS_ON_GPU), self.card.dim, self._encode_windows)
+        return by_portions(heard, select_batch(_WINDOWS_ON_GPU), self.card.dim, self._encode_windows)
 
     def _read(self, texts: Sequence[str]) -> torch.Tensor:
         return self._network(padded(self._tokens.encode(texts, self._network.sizes.context)).to(self._device))

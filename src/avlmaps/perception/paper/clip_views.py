@@ -18,7 +18,7 @@ from jaxtyping import UInt8
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.foundation.open_views import OpenViews, hub_model, licence_of
 from avlmaps.perception.models.checksums import checksum_of, weights_in
-from avlmaps.perception.models.device import chosen_device
+from avlmaps.perception.models.device import select_device
 from avlmaps.perception.models.files import model_file
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.pretrained import load_helper
@@ -116,7 +116,7 @@ class _HubTowers(_Towers):
 class _OpenAiTowers(_Towers):
     def __init__(self, model: str) -> None:
         path = model_file(model, _GET)
-        self._network, self._device = _network_of(path), chosen_device()
+        self._network, self._device = _network_of(path), select_device()
         self._network.to(self._device)
         self._tokens = clip_tokens()
         text = self._network.sizes

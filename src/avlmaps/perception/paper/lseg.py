@@ -24,7 +24,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.perception.foundation.open_pixels import OpenPixels
 from avlmaps.perception.foundation.prompts import Prompted
 from avlmaps.perception.models.checksums import checksum_of
-from avlmaps.perception.models.device import chosen_device, inference, to_numpy, unit_rows
+from avlmaps.perception.models.device import inference, select_device, to_numpy, unit_rows
 from avlmaps.perception.models.files import model_file
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
@@ -59,7 +59,7 @@ class LSegPixels(OpenPixels):
 
     def __init__(self, model: str = PUBLISHED, every: int = 2) -> None:
         path = model_file(model, HOW_TO_GET)
-        self._device = chosen_device()
+        self._device = select_device()
         self._network = read_network(path).to(self._device)
         self._tokens = clip_tokens()
         sizes = self._network.sizes

@@ -22,7 +22,7 @@ from torch import nn
 from torch.nn import functional
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.device import chosen_device, inference, unit_rows
+from avlmaps.perception.models.device import inference, select_device, unit_rows
 from avlmaps.perception.models.published import load_strictly, published_file, read_tensors
 from avlmaps.perception.paper.netvlad_file import CONVOLUTIONS, Weights, checksum_of_weights, read_mat
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
@@ -47,7 +47,7 @@ class NetVlad:
         path, get = _found(model)
         weights = read_mat(path, get) if path.suffix == ".mat" else cast(Weights, read_tensors(path, get))
         network = _network(weights, path, get)
-        self._device = chosen_device()
+        self._device = select_device()
         self._network = network.eval().to(self._device)
         self.card = ModelCard(
             id=f"netvlad/{path.stem}",

@@ -17,7 +17,7 @@ from jaxtyping import Float, Int
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.models.checksums import checksum_of, weights_in
-from avlmaps.perception.models.device import chosen_device
+from avlmaps.perception.models.device import select_device
 from avlmaps.perception.models.matches import NetworkInput, network_input, no_matches
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.operators import declare_missing_operators
@@ -47,7 +47,7 @@ class SuperGlue:
         from transformers import SuperGlueForKeypointMatching
 
         folder = pretrained_folder(model)
-        self._device = chosen_device()
+        self._device = select_device()
         network = load_pretrained(SuperGlueForKeypointMatching, folder, model, self._device, torch.float32)
         del network.keypoint_detector  # the SuperPoint that came with it; the map's keypoints are found already
         self._network: Any = network
@@ -79,7 +79,7 @@ class SuperGlue:
             likeness = first.float() @ second.float().T / self.card.dim**0.5
             if self._device.type == "mps":  # has no float64
                 likeness = likeness.cpu()
-            likely = transported(likeness, self._network.bin_score, ITERATIONS)
+            likely = sinkhorn(likeness, self._network.bin_score, ITERATIONS)
         return mutual_best(likely.cpu().numpy(), PROBABILITY)
 
     def _described(self, a: NetworkInput, b: NetworkInput) -> tuple[torch.Tensor, torch.Tensor]:
@@ -100,7 +100,7 @@ class SuperGlue:
         return picture.descriptors[None] + self._network.keypoint_encoder(places[None], picture.score[None])[0]
 
 
-def transported(likeness: torch.Tensor, idle: torch.Tensor, iterations: int) -> torch.Tensor:
+def sinkhorn(likeness: torch.Tensor, idle: torch.Tensor, iterations: int) -> torch.Tensor:
     """Return how likely each pair is by optimal transport with a bin for those that match nothing (Sinkhorn).
 
     The published code does the same with logarithms in float32. Products in float64 need no logarithm in each round,

@@ -14,7 +14,7 @@ import torch
 from jaxtyping import UInt8
 
 from avlmaps.perception.models.checksums import checksum_of, weights_in
-from avlmaps.perception.models.device import chosen_device, inference, to_numpy, unit_rows
+from avlmaps.perception.models.device import inference, select_device, to_numpy, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.operators import declare_missing_operators
 from avlmaps.perception.models.pictures import has_nothing, local_features, no_features
@@ -42,7 +42,7 @@ class SuperPointKeypoints:
         from transformers import SuperPointForKeypointDetection
 
         folder = pretrained_folder(model)
-        self._device = chosen_device()
+        self._device = select_device()
         network = load_pretrained(SuperPointForKeypointDetection, folder, model, self._device, torch.float32)
         finder = network.keypoint_decoder
         finder.keypoint_threshold, finder.nms_radius = THRESHOLD, RADIUS_PX

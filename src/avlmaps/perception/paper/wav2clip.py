@@ -24,7 +24,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.perception.foundation.open_sounds import ContrastSounds, usable_samples, windows
 from avlmaps.perception.foundation.sound_scores import OTHERS
 from avlmaps.perception.models.checksums import checksum_of, weights_in
-from avlmaps.perception.models.device import chosen_device, inference, unit_rows
+from avlmaps.perception.models.device import inference, select_device, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
@@ -169,7 +169,7 @@ class Wav2ClipSounds(ContrastSounds):
     def __init__(self, model: str = "Wav2CLIP.pt") -> None:
         name = public_name(model)
         path = published_file(model, _HOW_TO_GET, cached=(f"checkpoints/{name}",))
-        device = chosen_device()
+        device = select_device()
         self._network = _loaded(path).eval().to(device)
         dim = self._network.dim
         folder = self._load_words(dim, device)

@@ -11,7 +11,7 @@ from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Part
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.protocols import NamedViewEncoder, ScaledEncoder, ViewEncoder
-from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, normalised
+from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, stretch_scores
 from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.voxel_space import Space
 
@@ -42,8 +42,8 @@ class AreaSettings:
     """Another name at least this close to the queried one names the same and does not compete with it. For an encoder
     with a scale it is measured from the middle of all names: its phrases lie in a cone, kitchen beside garage."""
     pool_m: float = 0.8
-    """Views whose anchors are about so close speak together (``pooled``): one odd view is outvoted. 0 leaves each for
-    itself, as the paper does."""
+    """Views whose anchors are within this distance vote together (``pool_posteriors``): an odd one is outvoted. 0 takes
+    each by itself, as the paper does."""
     link_m: float = 1.0
     """Keyframes closer than this to a better one belong to its area."""
 
@@ -85,10 +85,10 @@ def area_scores(
         share, meant, raw = weight / weight.sum(axis=1, keepdims=True), np.eye(1, weight.shape[1])[0], cosine[:, 0]
     posterior = np.clip(share @ meant, 0.0, 1.0)
     if settings.score == "min-max":
-        return posterior, normalised(raw)
+        return posterior, stretch_scores(raw)
     if places is None or not settings.pool_m > 0.0 or not len(share):
         return posterior, posterior
-    return posterior, np.clip(pooled(share, places, settings.pool_m) @ meant, 0.0, 1.0)
+    return posterior, np.clip(pool_posteriors(share, places, settings.pool_m) @ meant, 0.0, 1.0)
 
 
 def area_distribution(
@@ -115,10 +115,10 @@ def area_distribution(
         logits = view.reshape(-1, words.shape[1]) @ words.T / _temperature(encoder, settings)
         share = np.exp(logits - logits.max(axis=1, keepdims=True, initial=-np.inf))
     share = share / np.maximum(share.sum(axis=1, keepdims=True), 1e-12)
-    return pooled(share, places, settings.pool_m) if settings.pool_m > 0.0 and len(share) else share
+    return pool_posteriors(share, places, settings.pool_m) if settings.pool_m > 0.0 and len(share) else share
 
 
-def pooled(
+def pool_posteriors(
     share: Float[np.ndarray, "k n"], places: Float[np.ndarray, "k 3"], pool_m: float
 ) -> Float[np.ndarray, "k n"]:
     """Return what views say together with those that looked at about the same place.

@@ -277,8 +277,8 @@ def object_factor(
         )
     scored = object_scores(feature, encoder, rivals, asked, settings)
 
-    def things(in_company: bool) -> NearThings:
-        pieces = pieces_of(space, encoder, asked, scored, settings, in_company)
+    def things(with_uncertain: bool) -> NearThings:
+        pieces = pieces_of(space, encoder, asked, scored, settings, with_uncertain)
         if tint is not None and rgb is not None:
             share = tinted_share(rgb, pieces.mask, pieces.instance, tint)
             pieces = replace(pieces, confidence=pieces.confidence * share)
@@ -286,7 +286,7 @@ def object_factor(
         note = "" if best >= FOUND_AT else _absence(part.query, len(pieces.mask), pieces.won, best)
         if understood and squeezed(understood) != squeezed(part.query):
             note = f"understood only {understood!r} of {part.query!r}" + ("; " + note if note else "")
-        falloff, alone = heat.falloff_per_m(part.role), None if in_company else lambda: things(True)
+        falloff, alone = heat.falloff_per_m(part.role), None if with_uncertain else lambda: things(True)
         found = best >= FOUND_AT
         return NearThings(
             space, part, falloff, pieces.mask, pieces.instance, pieces.confidence, found, understood, note, alone
@@ -366,11 +366,11 @@ def pieces_of(
     asked: Asked,
     scored: tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]],
     settings: ObjectSettings,
-    in_company: bool = False,
+    with_uncertain: bool = False,
 ) -> Pieces:
-    """Return the things that voxels with these margins and scores make up; with ``in_company``, unsure ones as well."""
+    """Return the things that voxels with these margins and scores make up, uncertain ones too if ``with_uncertain``."""
     margin, score = scored
-    least = settings.least_in_company if in_company else settings.least_confidence
+    least = settings.least_in_company if with_uncertain else settings.least_confidence
 
     def confidence_of(mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"]) -> Float32[np.ndarray, " i"]:
         if isinstance(encoder, NamedPixelEncoder):
@@ -379,7 +379,7 @@ def pieces_of(
 
     mask = margin > 0.0
     won = int(mask.sum())
-    if in_company and isinstance(encoder, NamedPixelEncoder):
+    if with_uncertain and isinstance(encoder, NamedPixelEncoder):
         mask |= score > np.maximum(settings.score_in_company * (score - margin), 0.0)
     instance = instances_of(space, mask, settings.link_m)
     confidence = confidence_of(mask, instance)

@@ -11,7 +11,7 @@ from jaxtyping import Float, Float32
 from avlmaps.core.errors import AudioError, QueryError
 from avlmaps.core.question import Part
 from avlmaps.maps.types import HeardSounds
-from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, normalised
+from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, stretch_scores
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import Sound
 
@@ -62,7 +62,9 @@ def sound_factor(
             f"none of the {len(sounds)} heard sounds is like {part.query!r}; the best score is {best:.2f}, "
             f"below {FOUND_AT:.2f}"
         )
-    used = normalised(np.asarray(scores, np.float64)) if settings.normalise == "min-max" else np.clip(scores, 0.0, 1.0)
+    used = (
+        stretch_scores(np.asarray(scores, np.float64)) if settings.normalise == "min-max" else np.clip(scores, 0.0, 1.0)
+    )
     which = np.repeat(np.arange(len(sounds)), np.diff(sounds.track_offsets))
     anchors = np.asarray(sounds.track, np.float64).reshape(-1, 3)
     return NearAnchors(

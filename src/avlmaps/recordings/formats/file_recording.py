@@ -106,12 +106,12 @@ def _orthonormal(shots: Shots, report: Report, pose_files: Sequence[Path]) -> Sh
     """Make the rotations orthonormal at once; where one is none, report that one and continue with the others."""
     labels = [f"frame {name}" for name in shots.names]
     try:
-        mended = poses.orthonormalized_all(shots.world_from_camera, labels)
+        mended = poses.orthonormalize_all(shots.world_from_camera, labels)
     except RecordingError:
         good, kept = [], []
         for i, label in enumerate(labels):
             try:
-                good.append(poses.orthonormalized(shots.world_from_camera[i], f"{label} ({pose_files[i]})"))
+                good.append(poses.orthonormalize(shots.world_from_camera[i], f"{label} ({pose_files[i]})"))
                 kept.append(i)
             except RecordingError as error:
                 report(Fault(str(error), pose_files[i]))

@@ -41,7 +41,7 @@ class Pcm:
     channels: int
 
     @classmethod
-    def parsed(cls, words: str) -> "Pcm":
+    def parse_rate(cls, words: str) -> "Pcm":
         """Read ``16000`` or ``16000,2`` (samples a second, channels).
 
         Raises:
@@ -50,10 +50,10 @@ class Pcm:
         rate, _, channels = words.partition(",")
         if not (rate.strip().isdecimal() and (not channels or channels.strip().isdecimal())):
             raise RecordingError(f"audio_pcm takes samples a second and channels, such as 16000,1; not {words!r}.")
-        return cls.checked(int(rate), int(channels or 1), "audio_pcm")
+        return cls.check_rate(int(rate), int(channels or 1), "audio_pcm")
 
     @classmethod
-    def checked(cls, rate_hz: int, channels: int, what: str) -> "Pcm":
+    def check_rate(cls, rate_hz: int, channels: int, what: str) -> "Pcm":
         """Return the numbers, or raise ``RecordingError`` where no sound has them."""
         if not (LOWEST_RATE_HZ <= rate_hz <= _HIGHEST_RATE_HZ and 1 <= channels <= _MOST_CHANNELS):
             raise RecordingError(
@@ -97,7 +97,7 @@ def extract_audio(
         sample_format = getattr(info, "sample_format", "") or "S16LE"
         if sample_format.upper() != "S16LE":
             return None, (f"The sound on {topic} is {sample_format}; of plain samples only S16LE is read.",)
-        pcm = Pcm.checked(int(info.sample_rate), int(info.channels), f"The AudioInfo of {topic}")
+        pcm = Pcm.check_rate(int(info.sample_rate), int(info.channels), f"The AudioInfo of {topic}")
     if pcm is not None:
         _write_pcm(every, target, pcm)
         return AudioTrack.open(target, start_s=start_s), ()
@@ -171,7 +171,7 @@ def _pieces(messages: Iterable[tuple[int, Any]], topic: str) -> Iterator[tuple[P
                 f"{', '.join(map(str, _SAMPLES))} are read (8 is 16-bit). Give a file instead (--audio FILE)."
             )
         name, dtype, scale = _SAMPLES[int(info.format)]
-        pcm = Pcm.checked(int(info.rate), int(info.channels), f"The AudioInfo of {topic}")
+        pcm = Pcm.check_rate(int(info.rate), int(info.channels), f"The AudioInfo of {topic}")
         samples = np.asarray(getattr(audio, name)).astype(dtype).astype(np.float64)
         whole = samples[: len(samples) // pcm.channels * pcm.channels].reshape(-1, pcm.channels)[:, :_FLAC_CHANNELS]
         middle = 128.0 if dtype == "u1" else 0.0

@@ -12,7 +12,7 @@ from jaxtyping import Float, Float32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import MAX_ROTATION_FAULT, from_quaternion
-from avlmaps.recordings.images import MOST_PIXELS, decoded, encoded_size
+from avlmaps.recordings.images import MOST_PIXELS, decode_picture, encoded_size
 
 _COLOUR_ENCODINGS = {
     "rgb8": (3, (0, 1, 2)),
@@ -96,7 +96,7 @@ def _decoded(content: Any, name: str, camera: Pinhole | None, colour: bool) -> n
             f"The compressed picture {name} says that it is {size[0]}x{size[1]}; its calibration says "
             f"{'another size' if camera is None else f'{camera.width}x{camera.height}'}."
         )
-    picture = decoded(raw, flag) if size is not None else None
+    picture = decode_picture(raw, flag) if size is not None else None
     if picture is None:
         raise RecordingError(
             f"The compressed picture {name} ({len(raw)} bytes) cannot be decoded; it is cut short or damaged."

@@ -246,7 +246,7 @@ class RosbagRecording(Recording):
         return sorted(file for file in self.path.rglob("*") if file.is_file()) if self.path.is_dir() else [self.path]
 
     def _read_audio(self, topics: RosTopics) -> tuple[AudioTrack | None, tuple[str, ...]]:
-        pcm = Pcm.parsed(topics.audio_pcm) if topics.audio_pcm else None
+        pcm = Pcm.parse_rate(topics.audio_pcm) if topics.audio_pcm else None
         known = self._bag.topics_of(_AUDIO_TYPES)
         found = [topics.audio] if topics.audio else known
         if not found or topics.audio == "none":

@@ -80,4 +80,4 @@ def _camera(file: Path, size: tuple[int, int]) -> Pinhole:
 
 def _extrinsic(file: Path) -> np.ndarray:
     """Return a camera's place on the body; the identity where there is no such file (as in most exports)."""
-    return poses.orthonormalized(read_matrix(file, 4, 4), str(file)) if file.is_file() else np.eye(4)
+    return poses.orthonormalize(read_matrix(file, 4, 4), str(file)) if file.is_file() else np.eye(4)

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.clips import loudness_db
-from avlmaps.recordings.resample import resampled
+from avlmaps.recordings.resample import resample
 from avlmaps.sim.hearing.impulse import Acoustics
 from avlmaps.sim.hearing.overlay import add_at, room_noise
 from avlmaps.sim.hearing.schedule import Sounding
@@ -60,7 +60,7 @@ def acoustic(
     building = Acoustics(scene, settings.rate_hz)
     samples = np.zeros(round(duration_s * settings.rate_hz), np.float32)
     for sounding in soundings:
-        clip = resampled(sounding.source.sound, settings.rate_hz)
+        clip = resample(sounding.source.sound, settings.rate_hz)
         wanted_db = settings.loudness_db + sounding.source.level_db
         dry = clip.samples * 10.0 ** ((wanted_db - loudness_db(clip)) / 20.0)
         heard = _moving(building, sounding, dry, (stamps_s, robot), rng, settings)

@@ -7,8 +7,8 @@ from jaxtyping import Float32
 
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.background import background
-from avlmaps.recordings.clips import amplified, gain_for
-from avlmaps.recordings.resample import resampled
+from avlmaps.recordings.clips import amplify, gain_for
+from avlmaps.recordings.resample import resample
 from avlmaps.sim.hearing.schedule import Sounding
 
 NEAREST_M = 1.0  # nearer than this a sound grows no louder
@@ -37,9 +37,9 @@ def overlay(
     samples = room_noise(duration_s, loudness_db - snr_db, rate_hz, rng)
     for sounding in soundings:
         distance_m = float(np.linalg.norm(np.subtract(sounding.robot, sounding.source.position)))
-        clip = resampled(sounding.source.sound, rate_hz)
+        clip = resample(sounding.source.sound, rate_hz)
         wanted_db = loudness_db - 20.0 * np.log10(max(distance_m, NEAREST_M))
-        add_at(samples, amplified(clip, gain_for(clip, wanted_db)).samples, round(sounding.onset_s * rate_hz))
+        add_at(samples, amplify(clip, gain_for(clip, wanted_db)).samples, round(sounding.onset_s * rate_hz))
     return Sound(np.clip(samples, -1.0, 1.0).astype(np.float32), rate_hz)
 
 
