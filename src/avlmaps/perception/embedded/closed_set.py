@@ -10,6 +10,7 @@ from avlmaps.core import lexicon as words_known
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.embedded.codes import word_codes
 from avlmaps.perception.embedded.meanings import Meanings
+from avlmaps.perception.embedded.paired_networks import PairedNetworks
 from avlmaps.perception.embedded.scene_network import SceneNetwork, load_network
 from avlmaps.perception.protocols import WordEncoder
 
@@ -23,7 +24,7 @@ class NamedEncoder:
         words: the word encoder whose space the features live in; the embedded one if None.
     """
 
-    def __init__(self, names: str, network: SceneNetwork | None, words: WordEncoder | None) -> None:
+    def __init__(self, names: str, network: SceneNetwork | PairedNetworks | None, words: WordEncoder | None) -> None:
         self._network = load_network() if network is None else network
         self._words = cast(WordEncoder, load(Kind.WORDS, "embedded")) if words is None else words
         self.names: tuple[str, ...] = getattr(self._network.notes, names)

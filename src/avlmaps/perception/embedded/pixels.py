@@ -7,6 +7,7 @@ from jaxtyping import Float, Float32
 
 from avlmaps.perception.embedded.closed_set import NamedEncoder
 from avlmaps.perception.embedded.codes import features_of
+from avlmaps.perception.embedded.paired_networks import PairedNetworks, load_pair
 from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, SceneNetwork, Seen, load_network
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.types import Frame
@@ -19,12 +20,12 @@ class EmbeddedPixels(NamedEncoder):
     """Distinguishes some hundred things of homes and offices by their shape, helped a little by colour.
 
     Args:
-        network: which; the one that ships if None.
+        network: which; the two that ship, together, if None.
         words: the word encoder whose space the features live in; the embedded one if None.
     """
 
-    def __init__(self, network: SceneNetwork | None = None, words: WordEncoder | None = None) -> None:
-        super().__init__("categories", network, words)
+    def __init__(self, network: SceneNetwork | PairedNetworks | None = None, words: WordEncoder | None = None) -> None:
+        super().__init__("categories", load_pair() if network is None else network, words)
         notes = self._network.notes
         self.card = ModelCard(
             id=notes.id, dim=self.codes.shape[1], licence="MIT", checksum=self._network.checksum, note=notes.note
