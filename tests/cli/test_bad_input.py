@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from .conftest import RATE_HZ, beeps
+from helpers.walked_room import RATE_HZ, beeps
 
 
 def test_an_error_in_the_middle_of_a_loop_stands_on_its_own_last_line(walk: Path, run, tmp_path: Path) -> None:

@@ -13,8 +13,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.poses import rotation_angle_rad
 from helpers.raycast import render
 from helpers.room import Room
-
-from .conftest import CAMERA, RATE_HZ, beeps
+from helpers.walked_room import CAMERA, RATE_HZ, beeps
 
 
 def test_build_and_info_tell_the_contracts_keys(built: Path, answer) -> None:

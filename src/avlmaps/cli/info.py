@@ -118,29 +118,11 @@ def plot_named(stored: "StoredMap", plot: Path) -> Path:
 
 
 def describe_map(stored: "StoredMap") -> dict[str, Any]:
-    """Describe a map, the names of its sounds, and the rules that it was built by."""
-    from avlmaps.maps.store.reader import describe
-    from avlmaps.query.rules import rules_of
-
-    return {**with_sound_names(describe(stored), stored), "rules": rules_of(stored.info.settings)}
-
-
-def with_sound_names(told: dict[str, Any], stored: "StoredMap") -> dict[str, Any]:
-    """Return the report on a map, each sound with the names that fit it best, where its sound model is here."""
+    """Describe a map: its counts and models, its sounds with names, the rules that it was built by."""
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.schema import map_answer
 
-    if not told["sounds"]:
-        return told
-    try:
-        heard = AVLMap(stored).sounds()
-    except AvlmapsError as error:
-        say(f"note: the sounds have no names here. {error}")
-        return told
-    sounds = [
-        {**sound, "names": list(event.names), "confidences": list(event.confidences)}
-        for sound, event in zip(told["sounds"], heard, strict=True)
-    ]
-    return {**told, "sounds": sounds}
+    return map_answer(AVLMap(stored), note=lambda error: say(f"note: the sounds have no names here. {error}"))
 
 
 def _describe_recording(recording: "Recording") -> dict[str, Any]:

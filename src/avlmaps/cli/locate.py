@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional, arg
 
@@ -13,6 +13,7 @@ from avlmaps.core.progress import say
 if TYPE_CHECKING:
     from avlmaps.core.camera import Pinhole
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.schema import LocateAnswer
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +40,7 @@ class Locate(ModelVerb):
 
 def locate_photo(
     map_path: Path, picture: Path, intrinsics: str | None, opened: "AVLMap | None" = None
-) -> dict[str, Any]:
+) -> "LocateAnswer":
     """Locate a photo.
 
     Args:
@@ -48,9 +49,9 @@ def locate_photo(
         intrinsics: ``fx,fy,cx,cy`` of its camera; None for those of the map's own.
         opened: the map, where it is open already.
     """
-    from avlmaps.core.poses import FRAME
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.modalities.image import read_picture
+    from avlmaps.query.schema import locate_answer
 
     rgb = read_picture(picture)
     given = None if intrinsics is None else camera_of(intrinsics, rgb.shape[1], rgb.shape[0])
@@ -58,15 +59,7 @@ def locate_photo(
     pose, camera = found.world_from_camera, found.camera
     if pose is not None and given is not None and camera != given:
         say(f"note: the focal length {given.fx:g} does not fit the photo; {camera.fx:.1f} was used.")
-    return {
-        "world_from_camera": None if pose is None else [[float(value) for value in row] for row in pose],
-        "inliers": int(found.inliers),
-        "reference": found.reference_stamp_s,
-        "frame": FRAME,
-        "score": found.score,
-        "intrinsics": [camera.fx, camera.fy, camera.cx, camera.cy],
-        "elapsed_ms": found.elapsed_ms,
-    }
+    return locate_answer(found)
 
 
 def camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":
@@ -82,7 +75,7 @@ def camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":
         ) from None
 
 
-def locate_lines(answer: dict[str, Any]) -> list[str]:
+def locate_lines(answer: "LocateAnswer") -> list[str]:
     """Lay out the answer of `locate`."""
     pose = answer["world_from_camera"]
     if pose is None:

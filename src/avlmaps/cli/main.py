@@ -22,6 +22,7 @@ from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, ki
 from avlmaps.cli.profiles import Profiles
 from avlmaps.cli.query import Query
 from avlmaps.cli.record import Record
+from avlmaps.cli.serve import Serve
 from avlmaps.cli.shell import Shell
 from avlmaps.cli.teach_sound import TeachSound
 from avlmaps.cli.things import Things
@@ -50,6 +51,7 @@ VERBS: dict[str, type[Verb]] = {
     "export": Export,
     "locate": Locate,
     "go": Go,
+    "serve": Serve,
     "teach-sound": TeachSound,
     "profiles": Profiles,
     "bench": Bench,

@@ -87,7 +87,8 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
         return _asked_in_words(verb, asked)
     question = Question.of(parts, Modality(verb.primary) if verb.primary else None)
     camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
-    return _plotted(verb, asked.ask(question, top=verb.top, intrinsics=camera))
+    answer = asked.ask(question, top=verb.top, intrinsics=camera)
+    return {**answer.to_json(), **_plotted(verb, answer)}
 
 
 def _by_rules(opened: "AVLMap", settings: "QuerySettings") -> "AVLMap":
@@ -97,42 +98,31 @@ def _by_rules(opened: "AVLMap", settings: "QuerySettings") -> "AVLMap":
     return opened if opened.settings == settings else AVLMap(opened.stored, settings)
 
 
-_MOST_COUNTED, _AS_LIKELY = 200, 0.5  # instances count that score at least half of the best one
-
-
 def _asked_in_words(verb: "Query", asked: "AVLMap") -> dict[str, Any]:
-    """Answer a sentence; several questions in it are alternatives, and the best answer counts."""
-    from avlmaps.core.question import Modality, Question
-    from avlmaps.language.commands import Given
-    from avlmaps.language.intents import Ask
-    from avlmaps.language.questions import read_question
+    """Answer a sentence."""
+    from avlmaps.core.question import Modality
+    from avlmaps.query.sentences import UnusedFileError, ask_sentence
 
-    files = (None if path is None else str(path) for path in (verb.image, verb.sound_clip))
-    sentence = read_question(verb.sentence, Given(*files, knows=lambda _: True))
-    counted = sentence.inquiry.ask is Ask.HOW_MANY
-    answers: list[Answer] = []
-    for question in sentence.questions:
-        if verb.primary:
-            question = Question.of(question.parts, Modality(verb.primary))
-        used = {part.query for part in question.parts}
-        if any(path is not None and str(path) not in used for path in (verb.image, verb.sound_clip)):
-            raise UsageError("The sentence does not speak of the file; say 'this photo' or 'this recording' in it.")
-        camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
-        answers.append(asked.ask(question, top=_MOST_COUNTED if counted else verb.top, intrinsics=camera))
-    answer = max(answers, key=lambda one: (one.found, one.goals[0].score if one.goals else 0.0))
-    told = _plotted(verb, answer)
-    if counted:
-        likely = [goal for goal in answer.goals if goal.score >= _AS_LIKELY * answer.goals[0].score]
-        told = {**told, "goals": told["goals"][: verb.top], "count": len(likely) if answer.found else 0}
-    notes = {"notes": list(sentence.notes)} if sentence.notes else {}
-    return {**told, **notes}
+    image, clip = (None if path is None else str(path) for path in (verb.image, verb.sound_clip))
+    try:
+        told = ask_sentence(
+            asked,
+            verb.sentence,
+            top=verb.top,
+            primary=Modality(verb.primary) if verb.primary else None,
+            image=image,
+            clip=clip,
+            camera_of=lambda question: _camera_for(verb.image or _first_image(question.parts), verb.intrinsics),
+        )
+    except UnusedFileError as error:
+        raise UsageError(str(error)) from None
+    return {**told.to_json(), **_plotted(verb, told.answer)}
 
 
 def _plotted(verb: "Query", answer: "Answer") -> dict[str, Any]:
-    told = answer.to_json()
-    if verb.plot is not None and answer.heat is not None:
-        told["plot"] = str(answer.heat.plot(verb.plot, top=verb.top))
-    return told
+    if verb.plot is None or answer.heat is None:
+        return {}
+    return {"plot": str(answer.heat.plot(verb.plot, top=verb.top))}
 
 
 def _parts(verb: "Query") -> list["Part"]:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional, arg
 
@@ -12,6 +12,7 @@ from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.schema import ContentsAnswer, RoomAnswer, SoundAnswer, ThingAnswer
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +41,7 @@ class Things(ModelVerb):
         emit(answer, contents_lines(answer), self.json)
 
 
-def contents(verb: Things, opened: "AVLMap | None" = None) -> dict[str, Any]:
+def contents(verb: Things, opened: "AVLMap | None" = None) -> "ContentsAnswer":
     """List the things, sounds and rooms of a map.
 
     Args:
@@ -53,28 +54,20 @@ def contents(verb: Things, opened: "AVLMap | None" = None) -> dict[str, Any]:
     if not 0.0 <= verb.least <= 1.0:
         raise UsageError(f"--least takes a confidence from 0 to 1, not {verb.least:g}.")
     opened = AVLMap.open(verb.map) if opened is None else opened
-    models = opened.stored.info.models
-    things = opened.things(verb.name or None, verb.least, verb.structure) if "pixels" in models else []
-    sounds, rooms = opened.sounds(), opened.rooms() if "views" in models else []
+    held = opened.contents(verb.least, verb.name or None, verb.structure)
     if verb.csv is not None:
-        say(f"wrote {write_table(verb.csv, things, sounds)}")
-    return {
-        "map": str(verb.map),
-        "frame": "recording",
-        "things": [thing.to_json() for thing in things],
-        "sounds": [sound.to_json() for sound in sounds],
-        "rooms": [room.to_json() for room in rooms],
-    }
+        say(f"wrote {write_table(verb.csv, held.things, held.sounds)}")
+    return held.to_json(str(verb.map))
 
 
-def contents_lines(answer: dict[str, Any]) -> list[str]:
+def contents_lines(answer: "ContentsAnswer") -> list[str]:
     """Lay out what `things` reports: three tables with an empty line between them."""
     lines = thing_lines(answer["things"])
     lines += ["", *sound_lines(answer["sounds"])] if answer["sounds"] else []
     return [*lines, "", *room_lines(answer["rooms"])] if answer["rooms"] else lines
 
 
-def thing_lines(things: list[dict[str, Any]]) -> list[str]:
+def thing_lines(things: "list[ThingAnswer]") -> list[str]:
     """Lay out things as a table."""
     if not things:
         return ["no things with this confidence; lower --least to list less certain ones"]
@@ -85,7 +78,7 @@ def thing_lines(things: list[dict[str, Any]]) -> list[str]:
     return table_lines(("thing", "confidence", "position", "size in m"), rows)
 
 
-def sound_lines(sounds: list[dict[str, Any]]) -> list[str]:
+def sound_lines(sounds: "list[SoundAnswer]") -> list[str]:
     """Lay out sounds as a table, in the order of their onset."""
     if not sounds:
         return ["no sounds"]
@@ -97,7 +90,7 @@ def sound_lines(sounds: list[dict[str, Any]]) -> list[str]:
     return table_lines(("sound", "time", "position of the robot"), rows)
 
 
-def room_lines(rooms: list[dict[str, Any]]) -> list[str]:
+def room_lines(rooms: "list[RoomAnswer]") -> list[str]:
     """Lay out rooms as a table, those with most views first."""
     if not rooms:
         return ["no rooms"]

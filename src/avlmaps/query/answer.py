@@ -1,12 +1,15 @@
 """The answer of a query: goals, and the outcome of each part; with their JSON (a contract of the command line)."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 from avlmaps.core.poses import FRAME
 from avlmaps.core.question import Part
 from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
+
+if TYPE_CHECKING:
+    from avlmaps.query.schema import PartOutcome, QueryAnswer
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +30,7 @@ class PartAnswer:
     understood: str = ""
     note: str = ""
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> "PartOutcome":
         """Return the part as the command line prints it."""
         return {
             "modality": str(self.part.modality),
@@ -58,7 +61,7 @@ class Answer:
     elapsed_ms: float
     heat: Heatmap | None = field(default=None, repr=False, compare=False)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> "QueryAnswer":
         """Return the answer with exactly the keys of the contract; positions are in the frame that ``frame`` names."""
         return {
             "goals": [goal.to_json() for goal in self.goals],

@@ -1,7 +1,7 @@
 """The map as a user meets it: four modalities, each a heatmap, and whole questions."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from avlmaps.core.camera import Pinhole
+from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import PixelEncoder
@@ -32,10 +33,12 @@ from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
-    from avlmaps.query.contents import Room, SoundEvent, Thing
+    from avlmaps.query.contents import Contents, Room, SoundEvent, Thing, Watch
     from avlmaps.query.locate import Located
     from avlmaps.query.photometric import Panoramas
 
+Attachment = UInt8[np.ndarray, "h w 3"] | Sound
+"""A picture or a sound that comes with a question, instead of a file."""
 
 # Keyframes that are matched one by one for a picture that cannot be located: more of them guess no better (measured).
 _GUESS_FROM = 20
@@ -119,6 +122,10 @@ class AVLMap:
         asked = Asked.of(encoder, word)
         return object_pieces(self.space, self.stored.voxels.feature, encoder, rivals, asked, self.settings.objects)
 
+    def rivals(self) -> Rivals:
+        """Return the two words of the encoder's vocabulary closest to each voxel; the first query works them out."""
+        return self._rivals_of(self.stored.profile.pixel_encoder(), None)
+
     def _rivals_of(self, encoder: PixelEncoder, vocabulary: Sequence[str] | None) -> Rivals:
         self.stored.require_model(Kind.PIXELS)
         names = tuple(encoder.vocabulary if vocabulary is None else vocabulary)
@@ -127,12 +134,35 @@ class AVLMap:
         return self._rivals[1]
 
     def things(
-        self, names: Sequence[str] | None = None, least_confidence: float = 0.5, structure: bool = False
+        self,
+        names: Sequence[str] | None = None,
+        least_confidence: float = 0.5,
+        structure: bool = False,
+        watch: "Watch" = lambda stage, done, total: None,
     ) -> list["Thing"]:
         """Return the things of the map, most confident first; see ``contents.find_things``."""
         from avlmaps.query.contents import find_things
 
-        return find_things(self.stored, self.space, self.pieces, names, least_confidence, structure)
+        return find_things(self.stored, self.space, self.pieces, names, least_confidence, structure, watch)
+
+    def contents(
+        self, least_confidence: float = 0.5, names: Sequence[str] | None = None, structure: bool = False
+    ) -> "Contents":
+        """Return the things, sounds and rooms of the map; none of a kind that the map has no model for.
+
+        Args:
+            least_confidence: things below it are left out, in [0, 1].
+            names: list these things only; by default the pixel encoder's vocabulary.
+            structure: list walls, floors and the like as well.
+
+        Raises:
+            QueryError: ``least_confidence`` lies outside [0, 1].
+        """
+        from avlmaps.query.contents import Contents
+
+        models = self.stored.info.models
+        things = self.things(names, least_confidence, structure) if "pixels" in models else []
+        return Contents(things, self.sounds(), self.rooms() if "views" in models else [])
 
     def sounds(self, most_names: int = 3) -> list["SoundEvent"]:
         """Return the sounds of the map in the order of their onset; see ``contents.find_sounds``."""
@@ -287,9 +317,16 @@ class AVLMap:
         rng = np.random.default_rng(self.settings.seed)
         return locate(self.stored, rgb, intrinsics, rng, LocateSettings(guess_references=guess_references))
 
-    def heat(self, part: Part, intrinsics: Pinhole | None = None) -> Heatmap:
-        """Return the heat of one part of a question."""
+    def heat(
+        self,
+        part: Part,
+        intrinsics: Pinhole | None = None,
+        attachments: "Mapping[str, Attachment] | None" = None,
+    ) -> Heatmap:
+        """Return the heat of one part of a question; see ``ask``."""
         primary = part.role is Role.PRIMARY
+        if part.is_file and attachments is not None:
+            return self._heat_of_attachment(part, intrinsics, attachments)
         if part.modality is Modality.OBJECT:
             return self.object(part.query, primary)
         if part.modality is Modality.AREA:
@@ -298,13 +335,32 @@ class AVLMap:
             return self.image(part.query, intrinsics, primary)
         return self.sound_clip(part.query, primary) if part.is_file else self.sound(part.query, primary)
 
-    def ask(self, question: Question | str, top: int = 3, intrinsics: Pinhole | None = None) -> Answer:
+    def _heat_of_attachment(
+        self, part: Part, intrinsics: Pinhole | None, attachments: "Mapping[str, Attachment]"
+    ) -> Heatmap:
+        attached, primary = attachments.get(part.query), part.role is Role.PRIMARY
+        if isinstance(attached, Sound) and part.modality is Modality.SOUND:
+            return self.sound_clip(attached, primary)
+        if isinstance(attached, np.ndarray) and part.modality is Modality.IMAGE:
+            return self.image(attached, intrinsics, primary)
+        what = "photo" if part.modality is Modality.IMAGE else "clip"
+        raise QueryError(f"The question speaks of a {what} that did not come with it; attach one.")
+
+    def ask(
+        self,
+        question: Question | str,
+        top: int = 3,
+        intrinsics: Pinhole | None = None,
+        attachments: "Mapping[str, Attachment] | None" = None,
+    ) -> Answer:
         """Answer a query with places.
 
         Args:
             question: a sentence, such as "the chair near the sound of glass breaking", or its parts.
             top: number of goals at most.
             intrinsics: of the camera that took the question's pictures; by default the map's own.
+            attachments: pictures and sounds by the name that the parts have for them. Where given, no file is opened: a
+                part of a file that is not among them is an error.
 
         Raises:
             QueryError: the sentence is not understood, or a part of the query cannot be used.
@@ -314,7 +370,7 @@ class AVLMap:
             from avlmaps.language.questions import parse_sentence
 
             question = parse_sentence(question)
-        heat = product([self.heat(part, intrinsics) for part in question.parts])
+        heat = product([self.heat(part, intrinsics, attachments) for part in question.parts])
         goals, found = heat.goals(top), heat.found
         elapsed_ms = 1e3 * (time.perf_counter() - begin)
         parts = [

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.poses import FRAME
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedViewEncoder
 from avlmaps.query.modalities.area import AREA_NAMES, AreaSettings, area_distribution, modes
@@ -22,6 +23,10 @@ from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.schema import ContentsAnswer, RoomAnswer, SoundAnswer, ThingAnswer
+
+Watch = Callable[[str, int, int], object]
+"""Is given a stage of work, the number of steps done, and of all."""
 
 # Surfaces that make up a building; they are everywhere, and listed only on request.
 STRUCTURE = ("wall", "floor", "ceiling", "column", "stairs", "railing")
@@ -53,7 +58,7 @@ class Thing:
     rows: Int[np.ndarray, " m"] = field(repr=False)
     points: Float[np.ndarray, "m 3"] = field(repr=False)
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> "ThingAnswer":
         """Return the thing as ``avlmaps things --json`` prints it."""
         return {
             "name": self.name,
@@ -87,7 +92,7 @@ class SoundEvent:
     track: Float[np.ndarray, "t 3"] = field(repr=False)
     clip: Path
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> "SoundAnswer":
         """Return the sound as ``avlmaps things --json`` prints it."""
         return {
             "names": list(self.names),
@@ -117,13 +122,38 @@ class Room:
     views: int
     places: Float[np.ndarray, "k 3"] = field(repr=False)
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> "RoomAnswer":
         """Return the room as ``avlmaps things --json`` prints it."""
         return {
             "name": self.name,
             "confidence": self.confidence,
             "position": list(self.position),
             "views": self.views,
+        }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contents:
+    """All that a map holds.
+
+    Attributes:
+        things: most confident first.
+        sounds: in the order of their onset.
+        rooms: those with most views first.
+    """
+
+    things: list[Thing]
+    sounds: list[SoundEvent]
+    rooms: list[Room]
+
+    def to_json(self, name: str) -> "ContentsAnswer":
+        """Return the contents as ``avlmaps things --json`` prints them, under a name for the map."""
+        return {
+            "map": name,
+            "frame": FRAME,
+            "things": [thing.to_json() for thing in self.things],
+            "sounds": [sound.to_json() for sound in self.sounds],
+            "rooms": [room.to_json() for room in self.rooms],
         }
 
 
@@ -134,6 +164,7 @@ def find_things(
     names: Sequence[str] | None = None,
     least_confidence: float = 0.5,
     structure: bool = False,
+    watch: Watch = lambda stage, done, total: None,
 ) -> list[Thing]:
     """Return the things of a map, most confident first.
 
@@ -144,6 +175,7 @@ def find_things(
         names: what to list; by default the pixel encoder's vocabulary.
         least_confidence: things below it are left out, in [0, 1].
         structure: list walls, floors and the like as well.
+        watch: is given "things", the number of names that were looked for, and of all; what it raises ends the search.
 
     Raises:
         QueryError: ``least_confidence`` lies outside [0, 1].
@@ -153,7 +185,10 @@ def find_things(
         raise QueryError(f"The least confidence is {least_confidence:g}; it must lie between 0 and 1.")
     vocabulary = stored.profile.pixel_encoder().vocabulary if names is None else names
     wanted = [name for name in vocabulary if structure or name not in STRUCTURE]
-    claims = [claim for name in wanted for claim in _claims(name, pieces_of(name), least_confidence)]
+    claims: list[tuple[str, float, Int[np.ndarray, " m"]]] = []
+    for number, name in enumerate(wanted):
+        watch("things", number, len(wanted))
+        claims += _claims(name, pieces_of(name), least_confidence)
     claims.sort(key=lambda claim: (-claim[1], -len(claim[2]), claim[0]))
     owned = np.zeros(len(space), bool)
     things: list[Thing] = []

@@ -8,12 +8,15 @@ the robot goes.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from avlmaps.query.factors import FOUND_AT, Factor, NearThings, lead_of
+
+if TYPE_CHECKING:
+    from avlmaps.query.schema import GoalAnswer
 
 # Where all parts of the query are in the map, but nowhere together by at least this much heat, the whole is not found.
 LEAST_TOGETHER = 0.1
@@ -43,7 +46,7 @@ class Goal:
     size: tuple[float, float, float]
     parts: dict[str, float]
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> "GoalAnswer":
         """Return the goal as the command line prints it."""
         return {
             "position": list(self.position),

@@ -84,6 +84,13 @@ def plot_map(
     Raises:
         QueryError: the picture cannot be written there.
     """
+    return save(draw_map(stored, things, rooms), Path(path))
+
+
+def draw_map(
+    stored: "StoredMap", things: "Sequence[Thing]" = (), rooms: "Sequence[Room]" = (), title: str | None = None
+) -> "Figure":
+    """Draw a map as ``plot_map`` does; by default its title is the folder's name."""
     space = Space(stored.grid, stored.voxels.index, stored.up_in_world, stored)
     view = TopDown.of(space)
     figure, axes = panels(view, 1)
@@ -96,10 +103,12 @@ def plot_map(
     if len(sounds):
         axes[0].plot([], [], color=_SOUND, linewidth=5, alpha=0.45, label="where a sound was heard, and when")
     _draw_names(axes[0], space, things, rooms)
-    title = f"{plot_text(Path(stored.path).name)}: {len(space):,} voxels, {len(sounds)} sounds"
-    axes[0].set_title(title, fontsize=10, color=INK, loc="left", fontweight="bold")
+    name = plot_text(Path(stored.path).name) if title is None else title
+    axes[0].set_title(
+        f"{name}: {len(space):,} voxels, {len(sounds)} sounds", fontsize=10, color=INK, loc="left", fontweight="bold"
+    )
     finish(figure, axes, with_heat=False)
-    return save(figure, Path(path))
+    return figure
 
 
 def _draw_names(ax: "Axes", space: Space, things: "Sequence[Thing]", rooms: "Sequence[Room]") -> None:

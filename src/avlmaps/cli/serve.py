@@ -1,0 +1,118 @@
+"""`avlmaps serve`: answer programs by HTTP and agents by MCP."""
+
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+from avlmaps.cli.output import UsageError, emit
+from avlmaps.cli.verb import ModelVerb
+from avlmaps.core.errors import BackendError
+from avlmaps.core.progress import say
+
+if TYPE_CHECKING:
+    from avlmaps.serve.service import Service
+
+_PACKAGES = ("starlette", "uvicorn", "multipart", "python_multipart", "mcp", "mcp_types", "anyio")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Serve(ModelVerb):
+    """Answer programs by HTTP and agents by MCP (pip install 'avlmaps[serve]').
+
+    The server prints its address. Its page lists every operation; /openapi.json describes them; agents connect to /mcp.
+    It listens on this machine only, until --host says otherwise; then clients need a token. SIGTERM and Ctrl-C end it
+    after the queries that are running. A map that is built again is picked up without a restart.
+
+    Examples:
+    avlmaps serve home.avlmap
+    curl -G http://127.0.0.1:8750/maps/home/ask --data-urlencode "sentence=the chair near the table"
+    avlmaps serve home.avlmap office=/data/day2.avlmap --host 0.0.0.0 --token-file token.txt
+    avlmaps serve home.avlmap --stdio
+    """
+
+    compiles: ClassVar[bool] = True
+
+    map: Positional[Annotated[str, arg(metavar="MAP")]]
+    """Map (NAME.avlmap); NAME=MAP gives it another name in addresses."""
+    more: Positional[Annotated[tuple[str, ...], arg(metavar="[MAP ...]")]] = ()
+    """Further maps."""
+    stdio: bool = False
+    """Serve one agent by standard input and output instead of HTTP."""
+    host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1"
+    """Address to listen on. Any other than this machine's loopback needs a token."""
+    port: Annotated[int, arg(metavar="N")] = 8750
+    """Port; 0 takes a free one."""
+    token_file: Annotated[Path | None, arg(metavar="FILE")] = None
+    """File with the token that clients must send. Default: the variable AVLMAPS_TOKEN, or no token."""
+    tls_cert: Annotated[Path | None, arg(metavar="FILE")] = None
+    """PEM certificate, for https."""
+    tls_key: Annotated[Path | None, arg(metavar="FILE")] = None
+    """PEM key of the certificate."""
+    allow_host: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = ()
+    """A further name of this server in the Host header, such as that of a reverse proxy; may be repeated."""
+
+    def run(self) -> None:
+        """Serve."""
+        if self.stdio and self.json:
+            raise UsageError("--stdio speaks a protocol on standard output, so --json cannot be used with it.")
+        try:
+            serve(self)
+        except ModuleNotFoundError as fault:
+            if (fault.name or "").partition(".")[0] not in _PACKAGES:
+                raise
+            raise BackendError(f"The server needs {fault.name}; get it with: pip install 'avlmaps[serve]'") from None
+
+
+def serve(verb: "Serve") -> None:
+    """Serve until the server is ended."""
+    from avlmaps.serve.running import listening_socket, read_token, run_http, url_of
+    from avlmaps.serve.service import Service
+    from avlmaps.serve.settings import ServeSettings
+    from avlmaps.serve.shelf import named_maps
+
+    logging.basicConfig(level=logging.WARNING, format="%(asctime)s %(name)s: %(message)s")
+    settings = ServeSettings(
+        host=verb.host,
+        port=verb.port,
+        token=None if verb.stdio else read_token(verb.token_file),
+        allowed_hosts=verb.allow_host,
+        tls_certificate=verb.tls_cert,
+        tls_key=verb.tls_key,
+    )
+    maps = named_maps([verb.map, *verb.more])
+    if verb.stdio:
+        _serve_stdio(Service.open(maps, settings, say))
+        return
+    from avlmaps.serve.app import create_app
+
+    with listening_socket(settings) as opened:
+        service = Service.open(maps, settings, say)
+        url = url_of(settings, opened)
+
+        def started() -> None:
+            names = list(service.shelf.names)
+            lines = [f"serving {', '.join(names)} at {url} (operations: {url}/, agents: {url}/mcp)"]
+            if not settings.is_loopback and settings.scheme == "http":
+                say("note: the token goes over the network unencrypted; give --tls-cert and --tls-key for https.")
+            emit(
+                {"url": url, "mcp": f"{url}/mcp", "maps": names, "token": settings.token is not None}, lines, verb.json
+            )
+
+        try:
+            run_http(create_app(service), service, opened, started)
+        finally:
+            service.close()
+
+
+def _serve_stdio(service: "Service") -> None:
+    import asyncio
+
+    from avlmaps.serve.agents import serve_stdio
+
+    try:
+        asyncio.run(serve_stdio(service))
+    finally:
+        service.close()

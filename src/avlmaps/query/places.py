@@ -1,0 +1,225 @@
+"""What is here: the names that the voxels of a place are taken for, when they were last seen, what is around."""
+
+from typing import TYPE_CHECKING, Annotated, TypedDict
+
+import numpy as np
+from jaxtyping import Float, Int
+from msgspec import Meta
+
+from avlmaps.core.errors import QueryError
+from avlmaps.core.poses import FRAME
+from avlmaps.core.question import Modality, Part, Role
+from avlmaps.perception.protocols import NamedPixelEncoder, NamedViewEncoder
+from avlmaps.query.factors import NearThings
+from avlmaps.query.modalities.area import AREA_NAMES, area_distribution
+from avlmaps.query.schema import Frame, Position
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
+
+MOST_NAMES = 5
+# A camera whose axis turns farther away from a place than this did not show it; half a wide lens.
+_HALF_VIEW_RAD = 0.7
+_MOST_VIEWS = 5
+_FAR_M = 1000.0
+
+
+class NameScore(TypedDict):
+    """A name and its confidence."""
+
+    name: str
+    confidence: Annotated[float, Meta(ge=0.0, le=1.0)]
+
+
+class ViewOfPlace(TypedDict):
+    """A keyframe whose camera looked at the place."""
+
+    time_s: float
+    camera: Position
+    distance_m: float
+
+
+class PlaceAnswer(TypedDict):
+    """What is at a place."""
+
+    position: Annotated[Position, Meta(description="the place that was queried, on the voxel nearest to it")]
+    known: Annotated[bool, Meta(description="whether any voxel lies within the radius")]
+    voxels: Annotated[int, Meta(description="voxels within the radius")]
+    distance_m: Annotated[float | None, Meta(description="from the place to the nearest voxel")]
+    names: Annotated[list[NameScore], Meta(description="what the voxels are taken for, best first")]
+    color: Annotated[list[int] | None, Meta(description="mean RGB of the voxels, 0 to 255")]
+    last_seen_s: Annotated[float | None, Meta(description="seconds from the start of the recording")]
+    hits: Annotated[int, Meta(description="number of pixels that fell into the voxels")]
+    rooms: Annotated[list[NameScore], Meta(description="kinds of room that the nearest views show, best first")]
+    views: Annotated[list[ViewOfPlace], Meta(description="keyframes that looked here, nearest first")]
+    frame: Frame
+
+
+def voxels_near(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: float) -> Int[np.ndarray, " m"]:
+    """Return the voxels whose middles lie within a radius of a point, nearest first."""
+    centres = avlmap.space.centres
+    if not len(centres):
+        return np.zeros(0, np.int64)
+    squared = np.square(centres - point).sum(axis=1)
+    rows = np.flatnonzero(squared <= radius_m**2)
+    return rows[np.argsort(squared[rows], kind="stable")]
+
+
+def column_point(avlmap: "AVLMap", level_xy: Float[np.ndarray, "2"], radius_m: float) -> Float[np.ndarray, "3"] | None:
+    """Return the place on the highest voxel under head height of a column, recording frame; None for an empty column.
+
+    What a person means who points at a floor plan is the thing that stands there, not the ceiling over it.
+    """
+    space = avlmap.space
+    level = space.level(space.centres)
+    rows = np.flatnonzero(np.square(level[:, :2] - level_xy).sum(axis=1) <= radius_m**2)
+    cameras = space.level(np.asarray(avlmap.stored.keyframes.world_from_camera)[:, :3, 3])
+    if len(cameras) and len(rows):
+        below = rows[level[rows, 2] <= cameras[:, 2].max() + 0.3]
+        rows = below if len(below) else rows
+    return space.centres[rows[np.argmax(level[rows, 2])]] if len(rows) else None
+
+
+def describe_place(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: float = 0.15) -> PlaceAnswer:
+    """Return what is at a point.
+
+    Args:
+        avlmap: the map.
+        point: metres, recording frame.
+        radius_m: voxels within it count; at most 5 m.
+
+    Raises:
+        QueryError: a number is not finite, or the radius not in (0, 5].
+    """
+    if not (np.isfinite(point).all() and np.abs(point).max(initial=0.0) < 1e6):
+        raise QueryError("The place is no point in metres; give finite numbers, such as 1.5,2.0,0.8.")
+    if not 0.0 < radius_m <= 5.0:
+        raise QueryError(f"The radius is {radius_m:g} m; it must be over 0 and at most 5.")
+    rows = voxels_near(avlmap, point, radius_m)
+    voxels, centres = avlmap.stored.voxels, avlmap.space.centres
+    away = float(np.linalg.norm(centres[rows[0]] - point)) if len(rows) else None
+    at = centres[rows[0]] if len(rows) else point
+    seen = float(np.asarray(voxels.last_seen_s)[rows].max()) if len(rows) else None
+    color = np.asarray(voxels.rgb)[rows].mean(axis=0).round().astype(int).tolist() if len(rows) else None
+    return {
+        "position": [float(value) for value in at],
+        "known": bool(len(rows)),
+        "voxels": len(rows),
+        "distance_m": away,
+        "names": _names(avlmap, rows),
+        "color": color,
+        "last_seen_s": seen,
+        "hits": int(np.asarray(voxels.hits)[rows].sum()),
+        "rooms": _rooms(avlmap, point),
+        "views": _views(avlmap, point),
+        "frame": FRAME,
+    }
+
+
+def _names(avlmap: "AVLMap", rows: Int[np.ndarray, " m"]) -> list[NameScore]:
+    """Return the names with the highest mean probability over some voxels."""
+    if not len(rows) or "pixels" not in avlmap.stored.info.models:
+        return []
+    encoder, rivals = avlmap.stored.profile.pixel_encoder(), avlmap.rivals()
+    feature = np.asarray(avlmap.stored.voxels.feature[rows], np.float32)
+    feature = feature[np.any(feature != 0.0, axis=1)]
+    if not len(feature) or not len(rivals.words):
+        return []
+    score = feature @ rivals.word_feature.T
+    if isinstance(encoder, NamedPixelEncoder):
+        confidence = np.square(np.maximum(score, 0.0)).mean(axis=0)  # the scores are roots of probabilities
+    else:
+        confidence = np.maximum(score.mean(axis=0), 0.0)
+    order = [i for i in np.argsort(-confidence, kind="stable") if rivals.words[i] != "other"][:MOST_NAMES]
+    return [{"name": rivals.words[i], "confidence": round(float(min(confidence[i], 1.0)), 3)} for i in order]
+
+
+def _rooms(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[NameScore]:
+    stored = avlmap.stored
+    if "views" not in stored.info.models or not len(stored.keyframes):
+        return []
+    encoder = stored.profile.view_encoder()
+    names = encoder.names if isinstance(encoder, NamedViewEncoder) else AREA_NAMES
+    places = np.asarray(stored.keyframes.centre, np.float64).reshape(-1, 3)
+    space = avlmap.space
+    away = np.linalg.norm(space.level(places)[:, :2] - space.level(point)[:2], axis=1)
+    near = np.argsort(away, kind="stable")[:_MOST_VIEWS]
+    if away[near[0]] > _FAR_M:
+        return []
+    share = area_distribution(
+        np.asarray(stored.keyframes.view), encoder, names, avlmap.settings.areas, places
+    )[near].mean(axis=0)  # fmt: skip
+    order = np.argsort(-share, kind="stable")[:3]
+    return [{"name": names[i], "confidence": round(float(np.clip(share[i], 0.0, 1.0)), 3)} for i in order]
+
+
+def _views(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[ViewOfPlace]:
+    """Return the keyframes whose camera looked towards a point; what stands between is not looked at."""
+    keyframes = avlmap.stored.keyframes
+    if not len(keyframes):
+        return []
+    poses = np.asarray(keyframes.world_from_camera, np.float64)
+    ray = point - poses[:, :3, 3]
+    away = np.linalg.norm(ray, axis=1)
+    ahead = np.einsum("ij,ij->i", ray, poses[:, :3, 2]) / np.maximum(away, 1e-9)
+    rows = np.flatnonzero(ahead >= np.cos(_HALF_VIEW_RAD))
+    rows = rows[np.argsort(away[rows], kind="stable")][:_MOST_VIEWS]
+    return [
+        {
+            "time_s": float(keyframes.stamp_s[i]),
+            "camera": [float(value) for value in poses[i, :3, 3]],
+            "distance_m": float(away[i]),
+        }
+        for i in rows
+    ]
+
+
+class SeenPlace(TypedDict):
+    """One place of a thing and when it was seen there."""
+
+    position: Position
+    score: Annotated[float, Meta(ge=0.0, le=1.0)]
+    last_seen_s: Annotated[float, Meta(description="seconds from the start of the recording")]
+    before_end_s: Annotated[float, Meta(description="seconds before the end of the recording")]
+
+
+class LastSeenAnswer(TypedDict):
+    """Where a thing is and when it was last seen there, most confident first."""
+
+    thing: str
+    found: bool
+    places: list[SeenPlace]
+    note: Annotated[str, Meta(description="why it is not found, or empty")]
+    frame: Frame
+
+
+def last_seen(avlmap: "AVLMap", thing: str, top: int = 3) -> LastSeenAnswer:
+    """Return when a thing was last seen: the latest time of any voxel of each of its instances.
+
+    Args:
+        avlmap: the map.
+        thing: its name.
+        top: most places.
+
+    Raises:
+        QueryError: the name is empty, or the pixel encoder understands nothing of it.
+    """
+    heat = avlmap.heat(Part(Modality.OBJECT, thing, Role.PRIMARY))
+    factor = heat.factors[0]
+    stamps = np.asarray(avlmap.stored.voxels.last_seen_s)
+    end_s = avlmap.stored.info.recording.duration_s
+    places: list[SeenPlace] = []
+    if isinstance(factor, NearThings) and len(factor.anchors):
+        rows = np.flatnonzero(factor.mask)
+        for goal in heat.goals(top):
+            nearest = int(np.argmin(np.square(factor.anchors - np.array(goal.position)).sum(axis=1)))
+            seen = float(stamps[rows[factor.instance == factor.instance[nearest]]].max())
+            places.append(
+                {
+                    "position": list(goal.position),
+                    "score": goal.score,
+                    "last_seen_s": seen,
+                    "before_end_s": max(end_s - seen, 0.0),
+                }
+            )
+    return {"thing": thing, "found": heat.found, "places": places, "note": factor.note, "frame": FRAME}

@@ -1,0 +1,170 @@
+"""The JSON answers about a map: one schema for the command line, the server and agents.
+
+Each ``TypedDict`` is one JSON object. The command line prints these objects under ``--json``; the server derives its
+OpenAPI document and the schemas of its agent tools from the same types. Positions are metres in the frame that
+``frame`` names.
+"""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
+
+from msgspec import Meta
+
+from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.poses import FRAME
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.locate import Located
+
+Position = Annotated[list[float], Meta(min_length=3, max_length=3, description="x, y, z in metres, recording frame")]
+Size = Annotated[
+    list[float],
+    Meta(min_length=3, max_length=3, description="extent in metres along the level frame's x, y (horizontal) and z"),
+]
+Unit = Annotated[float, Meta(ge=0.0, le=1.0)]
+Matrix = Annotated[
+    list[Annotated[list[float], Meta(min_length=4, max_length=4)]],
+    Meta(min_length=4, max_length=4, description="4x4 transform, row by row"),
+]
+Frame = Annotated[str, Meta(description="the frame of the positions: recording")]
+
+
+class GoalAnswer(TypedDict):
+    """One distinct place that answers a query."""
+
+    position: Position
+    score: Annotated[float, Meta(ge=0.0, le=1.0, description="heat there times the confidence of the thing there")]
+    size: Size
+    parts: Annotated[dict[str, float], Meta(description="heat of each part there, by modality")]
+
+
+class PartOutcome(TypedDict):
+    """One part of a query and its outcome."""
+
+    modality: Annotated[str, Meta(description="object, sound, area or image")]
+    query: str
+    role: Annotated[str, Meta(description="primary (sought) or context (says where it is)")]
+    peak: Annotated[float, Meta(description="its highest heat anywhere")]
+    found: bool
+    understood: Annotated[str, Meta(description="the words that the encoder acts on")]
+    note: Annotated[str, Meta(description="why it is not found, or empty")]
+
+
+class QueryAnswer(TypedDict):
+    """Goals of a query, best first. With ``found`` false they are guesses."""
+
+    goals: list[GoalAnswer]
+    found: bool
+    parts: list[PartOutcome]
+    elapsed_ms: float
+    frame: Frame
+    level_from_recording: Matrix | None
+    notes: NotRequired[Annotated[list[str], Meta(description="how words of the sentence were read")]]
+    count: NotRequired[Annotated[int, Meta(description="the number of things, for a sentence such as 'how many'")]]
+    plot: NotRequired[str]
+
+
+class ThingAnswer(TypedDict):
+    """One thing of a map."""
+
+    name: str
+    confidence: Unit
+    position: Position
+    size: Size
+    color: Annotated[list[int], Meta(min_length=3, max_length=3, description="mean RGB, 0 to 255")]
+    voxels: int
+
+
+class SoundAnswer(TypedDict):
+    """One sound of a map; the position is that of the robot at the time."""
+
+    names: Annotated[list[str], Meta(description="likeliest names, best first; empty without a list of names")]
+    confidences: list[float]
+    onset_s: Annotated[float, Meta(description="seconds from the start of the recording")]
+    offset_s: float
+    position: Position
+    clip: Annotated[str, Meta(description="file name of the clip")]
+
+
+class RoomAnswer(TypedDict):
+    """One room of a map."""
+
+    name: str
+    confidence: Unit
+    position: Position
+    views: Annotated[int, Meta(description="number of keyframes that show it")]
+
+
+class ContentsAnswer(TypedDict):
+    """Things, sounds and rooms of a map."""
+
+    map: str
+    frame: Frame
+    things: list[ThingAnswer]
+    sounds: list[SoundAnswer]
+    rooms: list[RoomAnswer]
+
+
+class LocateAnswer(TypedDict):
+    """The camera pose of a photo, or null where the photo cannot be located."""
+
+    world_from_camera: Matrix | None
+    inliers: Annotated[int, Meta(description="keypoints that agree with the pose")]
+    reference: Annotated[float | None, Meta(description="time of the keyframe with most of them, seconds")]
+    frame: Frame
+    score: Unit
+    intrinsics: Annotated[
+        list[float], Meta(min_length=4, max_length=4, description="fx, fy, cx, cy that the pose holds for, pixels")
+    ]
+    elapsed_ms: float
+
+
+class ErrorDetail(TypedDict):
+    """The kind of an error, for programs, and one sentence, for people."""
+
+    kind: str
+    message: str
+
+
+class ErrorAnswer(TypedDict):
+    """An error."""
+
+    error: ErrorDetail
+
+
+def locate_answer(located: "Located") -> LocateAnswer:
+    """Return the answer about a photo."""
+    pose, camera = located.world_from_camera, located.camera
+    return {
+        "world_from_camera": None if pose is None else [[float(value) for value in row] for row in pose],
+        "inliers": int(located.inliers),
+        "reference": located.reference_stamp_s,
+        "frame": FRAME,
+        "score": located.score,
+        "intrinsics": [camera.fx, camera.fy, camera.cx, camera.cy],
+        "elapsed_ms": located.elapsed_ms,
+    }
+
+
+def map_answer(avlmap: "AVLMap", note: Callable[[AvlmapsError], object] = lambda _: None) -> dict[str, Any]:
+    """Return the description of a map that ``avlmaps info`` prints: counts, models, sounds with names, rules.
+
+    Args:
+        avlmap: the map.
+        note: is given the error where the sounds have no names since their model is not here.
+    """
+    from avlmaps.maps.store.reader import describe
+    from avlmaps.query.rules import rules_of
+
+    described = describe(avlmap.stored)
+    try:
+        events = avlmap.sounds()
+    except AvlmapsError as error:
+        note(error)
+    else:
+        described["sounds"] = [
+            {**sound, "names": list(event.names), "confidences": list(event.confidences)}
+            for sound, event in zip(described["sounds"], events, strict=True)
+        ]
+    return {**described, "rules": rules_of(avlmap.stored.info.settings)}

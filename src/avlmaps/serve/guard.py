@@ -1,0 +1,200 @@
+"""The guard before every request: Host, Origin, token, connections, size and time of the body, security headers.
+
+It is plain ASGI and stands before the whole application, sub-applications and MCP included.
+"""
+
+import asyncio
+import hashlib
+import hmac
+import json
+import socket
+from collections.abc import Awaitable, Callable, MutableMapping
+from ipaddress import ip_address
+from typing import Any
+from urllib.parse import urlsplit
+
+from avlmaps.serve.errors import RequestError
+from avlmaps.serve.settings import ServeSettings, is_loopback
+
+Scope = MutableMapping[str, Any]
+Message = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[Message]]
+Send = Callable[[Message], Awaitable[None]]
+App = Callable[[Scope, Receive, Send], Awaitable[None]]
+
+# What every response says: no type guessing, no framing, no use by other sites, no copy in caches.
+HEADERS = (
+    (b"x-content-type-options", b"nosniff"),
+    (b"x-frame-options", b"DENY"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+)
+_NO_STORE = (b"cache-control", b"no-store")
+_OPEN_PATHS = frozenset({"/health"})
+
+
+class Guard:
+    """ASGI middleware; see the module."""
+
+    def __init__(self, app: App, settings: ServeSettings) -> None:
+        self._app = app
+        self._settings = settings
+        self._token = None if settings.token is None else _digest(settings.token)
+        self._hosts = {name.lower().rstrip(".") for name in settings.allowed_hosts}
+        if is_loopback(settings.host):
+            self._hosts |= {"localhost", "127.0.0.1", "::1", settings.host}
+        else:
+            self._hosts |= {settings.host.lower(), socket.gethostname().lower(), socket.getfqdn().lower()}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, or answer it with an error."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        if scope["type"] != "http":  # no WebSocket is served
+            await send({"type": "websocket.close", "code": 1008})
+            return
+        try:
+            self._check(scope)
+        except RequestError as error:
+            await refuse(error, send)
+            return
+        body = _LimitedBody(receive, self._settings.limits.body_bytes, self._settings.limits.body_s)
+        started = False
+
+        async def sent(message: Message) -> None:
+            nonlocal started
+            if message["type"] == "http.response.start":
+                started = True
+                headers = list(message.get("headers", ()))
+                names = {name.lower() for name, _ in headers}
+                headers += [pair for pair in (*HEADERS, _NO_STORE) if pair[0] not in names]
+                message = {**message, "headers": headers}
+            await send(message)
+
+        try:
+            await self._app(scope, body, sent)
+        except RequestError as error:  # of the body, which the application reads
+            if started:
+                raise
+            await refuse(error, send)
+
+    def _check(self, scope: Scope) -> None:
+        headers = _headers(scope)
+        if self._settings.limits.body_bytes < _length(headers.get("content-length", "0")):
+            raise too_large(self._settings.limits.body_bytes)
+        host = headers.get("host", "")
+        if not self._is_ours(host):
+            raise RequestError(
+                "The Host header names no host of this server; connect by its own name or address, or start it with "
+                "--allow-host NAME.",
+                421,
+                "host",
+            )
+        self._check_site(headers, host)
+        if self._token is not None and scope["path"] not in _OPEN_PATHS:
+            self._check_token(headers.get("authorization", ""))
+
+    def _is_ours(self, host: str) -> bool:
+        """Return whether a Host header names this server. An address cannot be rebound by DNS, a name can."""
+        name = _host_name(host)
+        if name in self._hosts:
+            return True
+        if is_loopback(self._settings.host):
+            return False
+        try:
+            return bool(ip_address(name))
+        except ValueError:
+            return False
+
+    def _check_site(self, headers: dict[str, str], host: str) -> None:
+        """Refuse requests that a page of another site sends."""
+        origin = headers.get("origin")
+        same = origin is None or urlsplit(origin).netloc.lower() == host.lower()
+        site, mode = headers.get("sec-fetch-site", "none"), headers.get("sec-fetch-mode", "navigate")
+        if not same or (site in ("cross-site", "same-site") and mode != "navigate"):
+            raise RequestError("Pages of other sites may not use this server.", 403, "origin")
+
+    def _check_token(self, authorization: str) -> None:
+        scheme, _, given = authorization.partition(" ")
+        right = hmac.compare_digest(_digest(given.strip()), self._token or b"")
+        if scheme.lower() != "bearer" or not right:
+            raise RequestError(
+                "This server needs a token; send the header 'Authorization: Bearer TOKEN'.",
+                401,
+                "token",
+                WWW_Authenticate='Bearer realm="avlmaps"',
+            )
+
+
+class _LimitedBody:
+    """Receives a body up to a size and within a time."""
+
+    def __init__(self, receive: Receive, most_bytes: int, most_s: float) -> None:
+        self._receive, self._most_bytes, self._most_s = receive, most_bytes, most_s
+        self._bytes, self._until, self._complete = 0, None, False
+
+    async def __call__(self) -> Message:
+        if self._complete:  # from here on, this waits for the client to leave
+            return await self._receive()
+        loop = asyncio.get_running_loop()
+        if self._until is None:
+            self._until = loop.time() + self._most_s
+        try:
+            async with asyncio.timeout_at(self._until):
+                message = await self._receive()
+        except TimeoutError:
+            raise RequestError(
+                f"The body did not arrive within {self._most_s:g} s; send it again.", 408, "timeout"
+            ) from None
+        self._bytes += len(message.get("body", b""))
+        if self._bytes > self._most_bytes:
+            raise too_large(self._most_bytes)
+        self._complete = not message.get("more_body", False)
+        return message
+
+
+def too_large(most_bytes: int) -> RequestError:
+    """Return the error of a body that is too large."""
+    return RequestError(f"The body is larger than {most_bytes:,} bytes; send smaller files.", 413, "size")
+
+
+async def refuse(error: RequestError, send: Send) -> None:
+    """Send an error as JSON and close the connection, since its body may be unread."""
+    body = json.dumps({"error": {"kind": error.kind, "message": str(error)}}).encode()
+    headers = [
+        (b"content-type", b"application/json"),
+        (b"content-length", str(len(body)).encode()),
+        (b"connection", b"close"),
+        *HEADERS,
+        _NO_STORE,
+        *((name.lower().encode(), value.encode()) for name, value in error.headers.items()),
+    ]
+    await send({"type": "http.response.start", "status": error.status, "headers": headers})
+    await send({"type": "http.response.body", "body": body})
+
+
+def _headers(scope: Scope) -> dict[str, str]:
+    """Return the headers; two Host headers or tokens are a trick, so they count as a wrong one."""
+    found: dict[str, str] = {}
+    for name, value in scope["headers"]:
+        key = name.decode("latin-1").lower()
+        found[key] = value.decode("latin-1") if key not in found else f"{found[key]}, {value.decode('latin-1')}"
+    return found
+
+
+def _length(text: str) -> int:
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 20 else 1 << 62
+
+
+def _host_name(host: str) -> str:
+    """Return the name in a Host header, without its port and in lower case."""
+    host = host.strip().lower()
+    if host.startswith("["):
+        return host[1:].partition("]")[0]
+    return host.partition(":")[0].rstrip(".") if host.count(":") <= 1 else host
+
+
+def _digest(token: str) -> bytes:
+    """Return a hash of equal length for every token, so that a comparison shows nothing of it."""
+    return hashlib.sha256(token.encode("utf-8", "surrogatepass")).digest()

@@ -1,0 +1,84 @@
+"""The operations of the HTTP interface: one table that makes the routes and the OpenAPI document."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from avlmaps.navigate.paths import PathAnswer
+from avlmaps.query.places import PlaceAnswer
+from avlmaps.query.schema import ContentsAnswer, LocateAnswer, QueryAnswer
+from avlmaps.serve import work
+from avlmaps.serve.requests import (
+    AskQuery,
+    LocateQuery,
+    NoQuery,
+    PathQuery,
+    PictureQuery,
+    PlaceQuery,
+    RoomsQuery,
+    ThingsQuery,
+    TilesQuery,
+)
+from avlmaps.serve.tiles import TilesAnswer
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """One thing that a client can do with a map.
+
+    Attributes:
+        name: for the OpenAPI document, ``operationId``.
+        path: below ``/maps/{map}``; ``{name:count}`` and ``{name:index}`` are
+            whole numbers, the latter also below 0.
+        about: one sentence.
+        query: the type of the request.
+        answer: the type of the answer's JSON, or a media type.
+        work: makes the answer, in a thread.
+        lane: quick for queries in words, slow for all else.
+        body: what a POST may bring: nothing (then there is only GET), JSON and forms, or forms and a photo as the body.
+        files: names of the files of a form.
+    """
+
+    name: str
+    path: str
+    about: str
+    query: type
+    answer: Any
+    work: Callable[[Any, Any], Any]
+    lane: Literal["quick", "slow"] = "quick"
+    body: Literal["none", "form", "photo"] = "none"
+    files: tuple[str, ...] = ()
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """HTTP methods: GET with values in the address, POST with a body."""
+        if self.body == "none":
+            return ("GET",)
+        return ("GET", "POST") if self.body == "form" else ("POST",)
+
+
+OPERATIONS = (
+    Operation("describeMap", "", "Describe a map, as `avlmaps info` does.", NoQuery, dict, work.describe_map, "slow"),
+    Operation("listContents", "/contents", "List things, sounds and rooms, as `avlmaps things` does.",
+              ThingsQuery, ContentsAnswer, work.list_contents, "slow"),
+    Operation("listThings", "/things", "List the things of a map.",
+              ThingsQuery, work.ThingsAnswer, work.list_things, "slow"),
+    Operation("listSounds", "/sounds", "List the sounds of a map.",
+              NoQuery, work.SoundsAnswer, work.list_sounds, "slow"),
+    Operation("getSound", "/sounds/{sound:count}/clip", "Return the clip of a sound, counted from 0.",
+              NoQuery, "audio/flac", work.sound_clip, "slow"),
+    Operation("listRooms", "/rooms", "List the rooms of a map.", RoomsQuery, work.RoomsAnswer, work.list_rooms, "slow"),
+    Operation("ask", "/ask", "Query a map in a sentence or part by part, as `avlmaps query` does.",
+              AskQuery, QueryAnswer, work.ask, "quick", "form", ("photo", "clip")),
+    Operation("locate", "/locate", "Return the camera pose of a photo, as `avlmaps locate` does.",
+              LocateQuery, LocateAnswer, work.locate, "slow", "photo", ("photo",)),
+    Operation("describePlace", "/place", "Return what is at a place.", PlaceQuery, PlaceAnswer, work.place),
+    Operation("findPath", "/path", "Return the path between two places for a robot's body.",
+              PathQuery, PathAnswer, work.path),
+    Operation("drawAnswer", "/picture", "Draw the answer of a query, or the map.",
+              PictureQuery, "image/png", work.picture, "slow", "form", ("photo", "clip")),
+    Operation("listTiles", "/tiles", "List the tiles of a map's voxels, by level of detail.",
+              NoQuery, TilesAnswer, work.tiles, "slow"),
+    Operation("getTile", "/tiles/{level:count}/{i:index}/{j:index}/{k:index}", "Return one tile of voxels.",
+              TilesQuery, "application/octet-stream", work.tile, "slow"),
+)  # fmt: skip

@@ -1,0 +1,182 @@
+"""What clients may ask: one type for each request, the source of its checks, its documentation and its tool schema."""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Literal, TypeVar
+
+import msgspec
+import numpy as np
+from jaxtyping import Float
+from msgspec import Meta, Struct
+
+from avlmaps.core.errors import QueryError
+from avlmaps.core.question import MOST_CHARACTERS, Modality, Part
+from avlmaps.serve.errors import RequestError
+
+T = TypeVar("T", bound=Struct)
+Words = Annotated[str, Meta(max_length=MOST_CHARACTERS)]
+Short = Annotated[str, Meta(max_length=200)]
+PHOTO, CLIP = "photo", "clip"
+_COORDINATE = Meta(ge=-1e6, le=1e6)
+
+
+class NoQuery(Struct, forbid_unknown_fields=True):
+    """No values."""
+
+
+class ThingsQuery(Struct, forbid_unknown_fields=True):
+    """Which things are listed."""
+
+    least: Annotated[float, Meta(ge=0.0, le=1.0, description="List things with at least this confidence.")] = 0.5
+    name: Annotated[list[Words], Meta(max_length=64, description="List these things only.")] = []
+    structure: Annotated[bool, Meta(description="List walls, floors and ceilings as well.")] = False
+
+
+class RoomsQuery(Struct, forbid_unknown_fields=True):
+    """Which rooms are listed."""
+
+    least: Annotated[float, Meta(ge=0.0, le=1.0, description="List rooms with at least this confidence.")] = 0.0
+
+
+class AskQuery(Struct, forbid_unknown_fields=True):
+    """A query: a sentence, or its parts. A photo and a clip come as files of a form."""
+
+    sentence: Annotated[
+        Words | None,
+        Meta(
+            description="The query in words, such as 'the chair near the sound of glass breaking' or 'how many chairs'."
+        ),
+    ] = None
+    object: Annotated[Words | None, Meta(description="Instead of a sentence: the object.")] = None
+    sound: Annotated[Words | None, Meta(description="Instead of a sentence: the sound, in words.")] = None
+    area: Annotated[Words | None, Meta(description="Instead of a sentence: the area, such as a room.")] = None
+    primary: Annotated[
+        Literal["object", "sound", "image", "area"] | None,
+        Meta(description="Which part is sought; the others say where it is. Default: object, image, sound, area."),
+    ] = None
+    top: Annotated[int, Meta(ge=1, le=100, description="Most goals.")] = 3
+    intrinsics: Annotated[
+        Short | None,
+        Meta(description="fx,fy,cx,cy of the photo's camera in pixels. Default: the map's own camera."),
+    ] = None
+
+    def parts(self, with_photo: bool, with_clip: bool) -> list[Part]:
+        """Return the parts, with files by the names of their form fields."""
+        named = (
+            (Modality.OBJECT, self.object, False),
+            (Modality.IMAGE, PHOTO if with_photo else None, True),
+            (Modality.SOUND, self.sound, False),
+            (Modality.SOUND, CLIP if with_clip else None, True),
+            (Modality.AREA, self.area, False),
+        )
+        return [Part(modality, query, is_file=is_file) for modality, query, is_file in named if query is not None]
+
+
+class PictureQuery(AskQuery, forbid_unknown_fields=True):
+    """A query whose answer is drawn; without a sentence and parts the map is drawn."""
+
+    size: Annotated[
+        Literal["small", "full"],
+        Meta(description="small: one top-down view, quick; full: one panel for each part, with axes and a scale."),
+    ] = "full"
+
+
+class LocateQuery(Struct, forbid_unknown_fields=True):
+    """A photo to locate; it comes as the file 'photo' of a form, or as the body itself."""
+
+    intrinsics: Annotated[
+        Short | None,
+        Meta(description="fx,fy,cx,cy of the photo's camera in pixels. Default: the map's own camera."),
+    ] = None
+
+
+class PlaceQuery(Struct, forbid_unknown_fields=True):
+    """A place: x, y, z in the recording frame; without z a column of the level frame."""
+
+    x: Annotated[float, _COORDINATE]
+    y: Annotated[float, _COORDINATE]
+    z: Annotated[
+        float | None, Meta(description="Without it, x and y are in the level frame: a place of the floor plan.")
+    ] = None
+    radius_m: Annotated[float, Meta(gt=0.0, le=5.0, description="Voxels within this distance count.")] = 0.15
+
+
+class PathQuery(Struct, forbid_unknown_fields=True, rename={"start": "from", "goal": "to"}):
+    """Two places; each is x,y,z in the recording frame, or x,y in the level frame."""
+
+    start: Annotated[str, Meta(max_length=100, description="Where the body starts, such as 1.5,2.0 or 1.5,2.0,0.3.")]
+    goal: Annotated[str, Meta(max_length=100, description="Where it goes; it stops beside what it cannot stand in.")]
+
+
+class TilesQuery(Struct, forbid_unknown_fields=True):
+    """How tiles are coloured."""
+
+    heat: Annotated[
+        Words | None, Meta(description="A query in words; each voxel then has its heat as a seventh byte, 0 to 255.")
+    ] = None
+
+
+def checked(values: Mapping[str, Any], kind: type[T]) -> T:
+    """Return a request of a kind from JSON values.
+
+    Raises:
+        RequestError: a value is missing, unknown, of the wrong type or out of range; the sentence names it.
+    """
+    try:
+        request = msgspec.convert(dict(values), kind, strict=True)
+    except msgspec.ValidationError as fault:
+        raise _unfit(fault) from None
+    return _finite(request)
+
+
+def checked_texts(pairs: Iterable[tuple[str, str]], kind: type[T]) -> T:
+    """Return a request of a kind from the texts of an address or a form.
+
+    Raises:
+        RequestError: as of ``checked``, or a value is given twice that can be given once.
+    """
+    lists = {field.encode_name for field in msgspec.structs.fields(kind) if _is_list(field.type)}
+    values: dict[str, Any] = {}
+    for name, text in pairs:
+        if name in lists:
+            values.setdefault(name, []).append(text)
+        elif name in values:
+            raise RequestError(f"{name[:80]!r} is given twice; give it once.")
+        else:
+            values[name] = text
+    try:
+        request = msgspec.convert(values, kind, strict=False)
+    except msgspec.ValidationError as fault:
+        raise _unfit(fault) from None
+    return _finite(request)
+
+
+def _unfit(fault: msgspec.ValidationError) -> RequestError:
+    return RequestError(f"The request does not fit: {str(fault)[:300]}; /openapi.json describes it.")
+
+
+def _is_list(kind: Any) -> bool:
+    return "list[" in str(kind)
+
+
+def _finite(request: T) -> T:
+    for name in request.__struct_fields__:
+        value = getattr(request, name)
+        if isinstance(value, float) and not math.isfinite(value):
+            raise RequestError(f"{name} is not a finite number; give one.")
+    return request
+
+
+def place_of(text: str) -> Float[np.ndarray, " n"]:
+    """Return the two or three numbers of a place.
+
+    Raises:
+        QueryError: they are not.
+    """
+    try:
+        numbers = [float(word) for word in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (2, 3) or not all(math.isfinite(one) and abs(one) <= 1e6 for one in numbers):
+        raise QueryError(f"A place is x,y or x,y,z in metres, such as 1.5,2.0; not {text[:80]!r}.")
+    return np.array(numbers)

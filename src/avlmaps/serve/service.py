@@ -1,0 +1,62 @@
+"""What every part of the server shares: settings, maps, lanes, and how errors are written."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from avlmaps.serve.errors import Privacy
+from avlmaps.serve.lanes import Lane
+from avlmaps.serve.settings import ServeSettings
+from avlmaps.serve.shelf import Shelf
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """What every part of the server shares.
+
+    Attributes:
+        settings: where it listens, and its limits.
+        shelf: the maps.
+        quick: the lane of queries in words.
+        slow: the lane of photos, clips, lists and pictures.
+        privacy: takes paths out of sentences.
+    """
+
+    settings: ServeSettings
+    shelf: Shelf
+    quick: Lane
+    slow: Lane
+    privacy: Privacy
+
+    @classmethod
+    def open(
+        cls,
+        maps: Mapping[str, Path],
+        settings: ServeSettings | None = None,
+        note: Callable[[str], None] = lambda _: None,
+    ) -> "Service":
+        """Open the maps and start the lanes.
+
+        Args:
+            maps: folders by name; see ``shelf.named_maps``.
+            settings: the defaults if None.
+            note: is given a line for the log.
+
+        Raises:
+            MapError: a map cannot be opened.
+        """
+        settings = settings or ServeSettings()
+        limits = settings.limits
+        shelf = Shelf(maps, limits, note)
+        return cls(
+            settings,
+            shelf,
+            Lane("quick", limits.quick_workers, limits.waiting, limits.answer_s),
+            Lane("slow", limits.slow_workers, limits.waiting, limits.answer_s),
+            Privacy((path, name) for name, path in maps.items()),
+        )
+
+    def close(self) -> None:
+        """End the lanes after the work that they have."""
+        self.quick.close()
+        self.slow.close()

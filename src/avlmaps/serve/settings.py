@@ -1,0 +1,110 @@
+"""Settings of the server: where it listens, who may query, and the limits of each request."""
+
+from dataclasses import dataclass, field
+from ipaddress import ip_address
+from pathlib import Path
+
+from avlmaps.core.errors import AvlmapsError
+
+DEFAULT_PORT = 8750
+MB = 1 << 20
+SHORTEST_TOKEN = 16
+_LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
+
+
+class ServeError(AvlmapsError):
+    """The server cannot be started as it is configured."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Limits of each request; a request beyond one gets an error, and the others continue."""
+
+    body_bytes: int = 32 * MB
+    """Largest body of a request."""
+    body_s: float = 20.0
+    """Longest time in which a body arrives."""
+    answer_s: float = 60.0
+    """Longest time until an answer; a query that is waiting by then is dropped."""
+    quick_workers: int = 2
+    """Queries in words that run at one time."""
+    slow_workers: int = 1
+    """Photos, clips, lists and pictures that run at one time."""
+    waiting: int = 64
+    """Queries that wait, for each of the two; more are refused with 503."""
+    connections: int = 256
+    """Open connections; more are refused with 503."""
+    picture_pixels: int = 1 << 25
+    """Largest photo."""
+    clip_s: float = 120.0
+    """Longest clip."""
+    goals: int = 100
+    """Most goals of an answer."""
+    cache_bytes: int = 192 * MB
+    """Memory for the heat of words that were queried before, for each map."""
+    shutdown_s: float = 30.0
+    """Longest time for running queries after SIGTERM."""
+
+    def __post_init__(self) -> None:
+        for name in ("body_bytes", "body_s", "answer_s", "quick_workers", "slow_workers", "connections"):
+            if getattr(self, name) <= 0:
+                raise ServeError(f"The limit {name} is {getattr(self, name)}; it must be over 0.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServeSettings:
+    """How a server listens.
+
+    Attributes:
+        host: address to listen on; every address but loopback needs a token.
+        port: 0 takes a free one.
+        token: clients must send it as ``Authorization: Bearer TOKEN``; None for no token.
+        allowed_hosts: more names in the Host header that are answered, such as that of a reverse proxy.
+        tls_certificate: PEM file of the certificate and its chain; None for plain HTTP.
+        tls_key: PEM file of its key.
+        limits: limits of each request.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = DEFAULT_PORT
+    token: str | None = field(default=None, repr=False)
+    allowed_hosts: tuple[str, ...] = ()
+    tls_certificate: Path | None = None
+    tls_key: Path | None = None
+    limits: Limits = field(default_factory=Limits)
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.port <= 65535:
+            raise ServeError(f"The port is {self.port}; it must lie between 0 (any free one) and 65535.")
+        if not self.is_loopback and self.token is None:
+            raise ServeError(
+                f"A server on {self.host} can be reached by other machines, so it needs a token; give --token-file "
+                "FILE or set AVLMAPS_TOKEN."
+            )
+        if self.token is not None and (len(self.token) < SHORTEST_TOKEN or not self.token.isascii()):
+            raise ServeError(
+                f"The token has {len(self.token)} characters; give at least {SHORTEST_TOKEN} of ASCII, such as from: "
+                "python -c 'import secrets; print(secrets.token_urlsafe())'"
+            )
+        if (self.tls_certificate is None) != (self.tls_key is None):
+            raise ServeError("TLS needs two files; give both --tls-cert and --tls-key.")
+
+    @property
+    def is_loopback(self) -> bool:
+        """Whether only programs of this machine can connect."""
+        return is_loopback(self.host)
+
+    @property
+    def scheme(self) -> str:
+        """``http`` or ``https``."""
+        return "http" if self.tls_certificate is None else "https"
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether an address is this machine's loopback."""
+    if host in _LOOPBACK_NAMES:
+        return True
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return False

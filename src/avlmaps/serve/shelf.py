@@ -1,0 +1,279 @@
+"""The maps of a server: opened once, queried by many, opened again when they are replaced on disk.
+
+A map is replaced when its ``map.json`` is. The new one is opened and prepared beside the old one, which answers until
+then; a query sees one of them from its beginning to its end. Where the new one cannot be opened, the old one stays.
+"""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, TypeVar, cast
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.question import Part
+from avlmaps.maps.integrity import stamp
+from avlmaps.maps.store.manifest import MANIFEST
+from avlmaps.maps.store.reader import open_stored
+from avlmaps.query.avlmap import Attachment, AVLMap, QuerySettings
+from avlmaps.query.factors import NearAnchors
+from avlmaps.query.heatmap import Heatmap
+from avlmaps.serve.errors import RequestError
+from avlmaps.serve.lanes import watch_here
+from avlmaps.serve.settings import Limits, ServeError
+
+if TYPE_CHECKING:
+    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.navigate.paths import PathFinder
+    from avlmaps.query.topdown import TopDown
+    from avlmaps.serve.tiles import Pyramid
+
+T = TypeVar("T")
+_LONGEST_NAME = 100
+
+
+class CachedMap(AVLMap):
+    """A map that remembers the heat of words, up to a size, and reports each part of a question as a step."""
+
+    def __init__(self, stored: "StoredMap", settings: QuerySettings | None, cache_bytes: int) -> None:
+        super().__init__(stored, settings)
+        self._kept: OrderedDict[Part, tuple[Heatmap, int]] = OrderedDict()
+        self._kept_bytes, self._cache_bytes = 0, cache_bytes
+        self._lock = threading.Lock()
+
+    def heat(
+        self, part: Part, intrinsics: Pinhole | None = None, attachments: Mapping[str, Attachment] | None = None
+    ) -> Heatmap:
+        """Return the heat of one part of a question; files are taken from the attachments only."""
+        watch_here().step(f"heat of the {part.modality}")
+        if part.is_file:
+            return super().heat(part, intrinsics, attachments or {})
+        with self._lock:
+            if part in self._kept:
+                self._kept.move_to_end(part)
+                return self._kept[part][0]
+        heat = super().heat(part, intrinsics)
+        self._keep(part, heat)
+        return heat
+
+    def _keep(self, part: Part, heat: Heatmap) -> None:
+        size = sum(_bytes_of(len(self.space), factor) for factor in heat.factors)
+        with self._lock:
+            if part in self._kept or size > self._cache_bytes:
+                return
+            self._kept[part] = heat, size
+            self._kept_bytes += size
+            while self._kept_bytes > self._cache_bytes:
+                self._kept_bytes -= self._kept.popitem(last=False)[1][1]
+
+    @property
+    def kept_bytes(self) -> int:
+        """Memory of the remembered heat, about."""
+        return self._kept_bytes
+
+
+def _bytes_of(voxels: int, factor: object) -> int:
+    """Return about how much a factor holds once it was used: heat, mask or winner, and its twin with unsure things."""
+    return voxels * 12 if isinstance(factor, NearAnchors) else voxels * 12 + 4096
+
+
+class ServedMap:
+    """One map of a server, and what is computed from it once.
+
+    Attributes:
+        name: as clients call it.
+        avlmap: the map.
+    """
+
+    def __init__(self, name: str, stored: "StoredMap", cache_bytes: int) -> None:
+        self.name = name
+        self.avlmap = CachedMap(stored, None, cache_bytes)
+        self._once = threading.RLock()
+        self._answers: OrderedDict[object, object] = OrderedDict()
+
+    @property
+    def version(self) -> str:
+        """A word that is another one for another content; clients may use it as an ETag."""
+        info = self.avlmap.stored.info
+        return f"{info.build_key[:16]}-{info.timings.finished}".replace('"', "")
+
+    def prepare(self) -> None:
+        """Work out what every query needs, so that the first one is as quick as the others."""
+        space = self.avlmap.space
+        if len(space):
+            _ = space.centres, space.blocks, space.horizontal
+        models = self.avlmap.stored.info.models
+        if "pixels" in models and len(space):
+            self.avlmap.rivals()
+
+    @cached_property
+    def paths(self) -> "PathFinder":
+        """The planner of this map's floor."""
+        from avlmaps.navigate.paths import PathFinder
+
+        return PathFinder(self.avlmap)
+
+    @cached_property
+    def top_down(self) -> "TopDown":
+        """The map from above."""
+        from avlmaps.query.topdown import TopDown
+
+        return TopDown.of(self.avlmap.space)
+
+    @cached_property
+    def pyramid(self) -> "Pyramid":
+        """The map's tiles."""
+        from avlmaps.serve.tiles import Pyramid
+
+        return Pyramid.of(self.avlmap)
+
+    def once(self, key: object, work: Callable[[], T], most: int = 64) -> T:
+        """Return what work returns, remembered for later under a key."""
+        with self._once:
+            if key in self._answers:
+                self._answers.move_to_end(key)
+                return cast(T, self._answers[key])
+            made = work()
+            self._answers[key] = made
+            while len(self._answers) > most:
+                self._answers.popitem(last=False)
+            return made
+
+
+class _Slot:
+    """One name, the map that answers for it now, and the one that is being opened."""
+
+    def __init__(self, name: str, path: Path, cache_bytes: int) -> None:
+        self.name, self.path = name, path
+        self._cache_bytes = cache_bytes
+        self._lock = threading.Lock()
+        self._opening: threading.Thread | None = None
+        self.fault: AvlmapsError | OSError | None = None
+        self._stamp, self.map = self._opened()
+
+    def _opened(self) -> tuple[object, ServedMap]:
+        before = stamp(self.path / MANIFEST)
+        opened = ServedMap(self.name, open_stored(self.path), self._cache_bytes)
+        opened.prepare()
+        return before, opened
+
+    def refresh(self, note: Callable[[str], None]) -> None:
+        """Begin to open the map that has replaced this one, if there is one."""
+        now = stamp(self.path / MANIFEST)
+        if now is None or now == self._stamp:
+            return
+        with self._lock:
+            if self._opening is not None and self._opening.is_alive():
+                return
+            if now == self._stamp:
+                return
+            self._opening = threading.Thread(target=self._reopen, args=(note,), name="avlmaps-reopen", daemon=True)
+            self._opening.start()
+
+    def _reopen(self, note: Callable[[str], None]) -> None:
+        begin = perf_counter()
+        tried = stamp(self.path / MANIFEST)
+        try:
+            before, opened = self._opened()
+        except (AvlmapsError, OSError) as error:
+            self._stamp, self.fault = tried, error
+            note(f"{self.name}: the map was replaced, and the new one cannot be opened ({error}); the old one answers.")
+            return
+        self._stamp, self.map, self.fault = before, opened, None
+        note(f"{self.name}: the map was replaced; the new one was opened in {perf_counter() - begin:.1f} s.")
+
+    def wait(self, timeout_s: float) -> None:
+        thread = self._opening
+        if thread is not None:
+            thread.join(timeout_s)
+
+
+class Shelf:
+    """The maps of a server by their names."""
+
+    def __init__(
+        self, maps: Mapping[str, Path], limits: Limits | None = None, note: Callable[[str], None] = lambda _: None
+    ) -> None:
+        """Open maps.
+
+        Args:
+            maps: folders by name; see ``named_maps``.
+            limits: how much each map may remember.
+            note: is given a line when a map was replaced.
+
+        Raises:
+            MapError: one of them cannot be opened.
+        """
+        cache_bytes = (limits or Limits()).cache_bytes
+        self._note = note
+        self._slots = {name: _Slot(name, path, cache_bytes) for name, path in maps.items()}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The maps' names, in the order in which they were given."""
+        return tuple(self._slots)
+
+    @property
+    def paths(self) -> Mapping[str, Path]:
+        """The maps' folders by name; for the server's own use, never for an answer."""
+        return {name: slot.path for name, slot in self._slots.items()}
+
+    def get(self, name: str | None = None) -> ServedMap:
+        """Return the map of a name; without a name the only map.
+
+        Raises:
+            RequestError: there is no map of this name, or there are several and no name.
+        """
+        if name is None:
+            if len(self._slots) > 1:
+                raise RequestError(f"This server has {len(self._slots)} maps; name one of: {', '.join(self.names)}.")
+            name = self.names[0]
+        slot = self._slots.get(name)
+        if slot is None:
+            raise RequestError(
+                f"There is no map {name[:80]!r} here; the maps are: {', '.join(self.names)}.", 404, "map-name"
+            )
+        slot.refresh(self._note)
+        return slot.map
+
+    def all(self) -> list[ServedMap]:
+        """Return every map."""
+        return [self.get(name) for name in self.names]
+
+    def is_stale(self, name: str) -> bool:
+        """Return whether a map was replaced by one that cannot be opened."""
+        return self._slots[name].fault is not None
+
+    def refresh(self, wait_s: float = 0.0) -> None:
+        """Look for replaced maps, and wait up to a time until they are open."""
+        for slot in self._slots.values():
+            slot.refresh(self._note)
+            if wait_s:
+                slot.wait(wait_s)
+
+
+def named_maps(words: Sequence[str]) -> dict[str, Path]:
+    """Return folders by name, from words such as ``home.avlmap`` or ``upstairs=/data/home.avlmap``.
+
+    Raises:
+        ServeError: two maps have one name, or a name has characters that an address cannot hold.
+    """
+    maps: dict[str, Path] = {}
+    for word in words:
+        given, mark, rest = word.partition("=")
+        named = bool(mark) and "/" not in given and "\\" not in given and not Path(word).expanduser().exists()
+        path = Path(rest if named else word).expanduser().absolute()
+        name = given if named else path.name.removesuffix(".avlmap")
+        if not name or len(name) > _LONGEST_NAME or not all(c.isalnum() or c in "-_. " for c in name) or name[0] == ".":
+            raise ServeError(f"{name!r} cannot be the name of a map; name it with letters, such as: home={path.name}.")
+        if name in maps:
+            raise ServeError(
+                f"Two maps are called {name!r} ({maps[name]} and {path}); name one of them: {name}-2={path}."
+            )
+        maps[name] = path
+    if not maps:
+        raise ServeError("The server needs a map; give the folder of at least one.")
+    return maps

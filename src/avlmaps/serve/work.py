@@ -1,0 +1,348 @@
+"""The work of each request: from a request's values to its answer, in a thread of a lane."""
+
+from dataclasses import dataclass, field
+from typing import Any, TypedDict
+
+import msgspec
+import numpy as np
+
+from avlmaps.core.errors import QueryError
+from avlmaps.core.poses import FRAME
+from avlmaps.core.question import Modality, Question
+from avlmaps.navigate.paths import PathAnswer
+from avlmaps.query.answer import Answer
+from avlmaps.query.places import PlaceAnswer, column_point, describe_place
+from avlmaps.query.schema import (
+    ContentsAnswer,
+    Frame,
+    LocateAnswer,
+    QueryAnswer,
+    RoomAnswer,
+    SoundAnswer,
+    ThingAnswer,
+    locate_answer,
+    map_answer,
+)
+from avlmaps.query.sentences import SentenceAnswer, UnusedFileError, ask_sentence
+from avlmaps.serve.errors import RequestError
+from avlmaps.serve.lanes import Watch
+from avlmaps.serve.requests import (
+    CLIP,
+    PHOTO,
+    AskQuery,
+    LocateQuery,
+    NoQuery,
+    PathQuery,
+    PictureQuery,
+    PlaceQuery,
+    RoomsQuery,
+    ThingsQuery,
+    TilesQuery,
+    place_of,
+)
+from avlmaps.serve.settings import Limits
+from avlmaps.serve.shelf import ServedMap, Shelf
+from avlmaps.serve.tiles import TilesAnswer
+from avlmaps.serve.uploads import Uploads, camera_of
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What a piece of work is given.
+
+    Attributes:
+        map: the map that it is about.
+        limits: of the server.
+        uploads: files of the request.
+        watch: reports progress; ends the work when nobody waits for it.
+        path: the numbers and names in the address, beside the map's.
+    """
+
+    map: ServedMap
+    limits: Limits
+    uploads: Uploads = field(default_factory=Uploads)
+    watch: Watch = field(default_factory=Watch)
+    path: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """An answer that is no JSON.
+
+    Attributes:
+        content: its bytes.
+        media_type: what it is.
+        headers: further headers.
+    """
+
+    content: bytes
+    media_type: str
+    headers: dict[str, str] = field(default_factory=dict)
+
+
+class MapEntry(TypedDict):
+    """One map of the server."""
+
+    name: str
+    voxels: int
+    keyframes: int
+    sounds: int
+    profile: str
+    voxel_size_m: float
+    finished: str
+    version: str
+    stale: bool
+
+
+class MapsAnswer(TypedDict):
+    """The maps of the server."""
+
+    maps: list[MapEntry]
+
+
+class ThingsAnswer(TypedDict):
+    """Things of a map, most confident first."""
+
+    map: str
+    frame: Frame
+    things: list[ThingAnswer]
+
+
+class SoundsAnswer(TypedDict):
+    """Sounds of a map in the order of their onset."""
+
+    map: str
+    frame: Frame
+    sounds: list[SoundAnswer]
+
+
+class RoomsAnswer(TypedDict):
+    """Rooms of a map, those with most views first."""
+
+    map: str
+    frame: Frame
+    rooms: list[RoomAnswer]
+
+
+def list_maps(shelf: Shelf) -> MapsAnswer:
+    """Return the server's maps."""
+    entries: list[MapEntry] = []
+    for one in shelf.all():
+        info = one.avlmap.stored.info
+        entries.append(
+            {
+                "name": one.name,
+                "voxels": info.counts.voxels,
+                "keyframes": info.counts.keyframes,
+                "sounds": info.counts.sounds,
+                "profile": info.profile,
+                "voxel_size_m": info.voxel_size_m,
+                "finished": info.timings.finished,
+                "version": one.version,
+                "stale": shelf.is_stale(one.name),
+            }
+        )
+    return {"maps": entries}
+
+
+def describe_map(task: Task, query: NoQuery) -> dict[str, Any]:
+    """Return what ``avlmaps info --json`` prints, with the map's name for its path."""
+    del query
+    return {**map_answer(task.map.avlmap), "path": task.map.name}
+
+
+def list_contents(task: Task, query: ThingsQuery) -> ContentsAnswer:
+    """Return what ``avlmaps things --json`` prints."""
+    return {
+        "map": task.map.name,
+        "frame": FRAME,
+        "things": list_things(task, query)["things"],
+        "sounds": list_sounds(task, NoQuery())["sounds"],
+        "rooms": list_rooms(task, RoomsQuery())["rooms"],
+    }
+
+
+def list_things(task: Task, query: ThingsQuery) -> ThingsAnswer:
+    """Return the things of a map."""
+    avlmap = task.map.avlmap
+
+    def found() -> list[ThingAnswer]:
+        if "pixels" not in avlmap.stored.info.models:
+            return []
+        names = tuple(query.name) or None
+        return [thing.to_json() for thing in avlmap.things(names, query.least, query.structure, watch=task.watch.step)]
+
+    key = ("things", query.least, tuple(query.name), query.structure)
+    return {"map": task.map.name, "frame": FRAME, "things": task.map.once(key, found)}
+
+
+def list_sounds(task: Task, query: NoQuery) -> SoundsAnswer:
+    """Return the sounds of a map."""
+    del query
+    sounds = task.map.once("sounds", lambda: [sound.to_json() for sound in task.map.avlmap.sounds()])
+    return {"map": task.map.name, "frame": FRAME, "sounds": sounds}
+
+
+def list_rooms(task: Task, query: RoomsQuery) -> RoomsAnswer:
+    """Return the rooms of a map."""
+    avlmap = task.map.avlmap
+
+    def found() -> list[RoomAnswer]:
+        return [room.to_json() for room in avlmap.rooms()] if "views" in avlmap.stored.info.models else []
+
+    rooms = [room for room in task.map.once("rooms", found) if room["confidence"] >= query.least]
+    return {"map": task.map.name, "frame": FRAME, "rooms": rooms}
+
+
+def sound_clip(task: Task, query: NoQuery) -> File:
+    """Return the FLAC file of a sound."""
+    del query
+    stored, number = task.map.avlmap.stored, int(task.path["sound"])
+    if number >= len(stored.sounds):
+        raise RequestError(f"The map has {len(stored.sounds)} sounds, counted from 0; there is no {number}.", 404)
+    try:
+        content = stored.clip_path(number).read_bytes()
+    except FileNotFoundError:
+        raise RequestError(
+            "The map is being replaced and its old clips are gone; try again in a second.", 503
+        ) from None
+    return File(content, "audio/flac", {"etag": f'"{task.map.version}"'})
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A query and its answer.
+
+    Attributes:
+        answer: with its heat, for pictures.
+        json: as it is sent.
+    """
+
+    answer: Answer
+    json: QueryAnswer
+
+
+def ask_map(task: Task, query: AskQuery) -> Asked:
+    """Answer a sentence or parts, with the files of the request.
+
+    Raises:
+        RequestError: there is neither a sentence nor a part, or both.
+        QueryError: the query cannot be answered.
+    """
+    attachments = task.uploads.attachments(task.limits)
+    photo = attachments.get(PHOTO)
+    camera = camera_of(query.intrinsics, photo if isinstance(photo, np.ndarray) else None)
+    words = bool((query.sentence or "").strip())
+    parts = query.parts(PHOTO in attachments, CLIP in attachments)
+    if (not words and not parts) or (words and any(not part.is_file for part in parts)):
+        raise RequestError(
+            "A query is a sentence, or parts (object, sound, area, photo, clip), and not both; for example: "
+            "sentence=the red cabinet near the sound of a dog."
+        )
+    primary = Modality(query.primary) if query.primary else None
+    top = min(query.top, task.limits.goals)
+    if not words:
+        answer = task.map.avlmap.ask(Question.of(parts, primary), top, camera, attachments)
+        return Asked(answer, answer.to_json())
+    told = _sentence_answer(task, query, top, primary, attachments, camera)
+    return Asked(told.answer, told.to_json())
+
+
+def _sentence_answer(
+    task: Task, query: AskQuery, top: int, primary: Modality | None, attachments: Any, camera: Any
+) -> SentenceAnswer:
+    try:
+        return ask_sentence(
+            task.map.avlmap,
+            query.sentence or "",
+            top=top,
+            primary=primary,
+            image=PHOTO if PHOTO in attachments else None,
+            clip=CLIP if CLIP in attachments else None,
+            attachments=attachments,
+            camera_of=lambda _: camera,
+        )
+    except UnusedFileError:
+        raise RequestError(
+            "The sentence does not speak of the file; say 'this photo' or 'this recording' in it."
+        ) from None
+    except QueryError as error:
+        # The language speaks of the command line's options; clients attach files.
+        sentence = (
+            str(error).replace("add --image FILE", "attach a photo").replace("add --sound-clip FILE", "attach a clip")
+        )
+        raise QueryError(sentence) from None
+
+
+def ask(task: Task, query: AskQuery) -> QueryAnswer:
+    """Return what ``avlmaps query --json`` prints."""
+    return ask_map(task, query).json
+
+
+def locate(task: Task, query: LocateQuery) -> LocateAnswer:
+    """Return what ``avlmaps locate --json`` prints."""
+    photo = task.uploads.attachments(task.limits).get(PHOTO)
+    if not isinstance(photo, np.ndarray):
+        raise RequestError("There is no photo; send one as the file 'photo' of a form, or as the body.")
+    camera = camera_of(query.intrinsics, photo)
+    task.watch.step("locating")
+    try:
+        return locate_answer(task.map.avlmap.locate(photo, camera))
+    except QueryError as error:
+        raise QueryError(str(error).replace("say which: --intrinsics fx", "send its intrinsics, fx")) from None
+
+
+def place(task: Task, query: PlaceQuery) -> PlaceAnswer:
+    """Return what is at a place."""
+    avlmap = task.map.avlmap
+    point = np.array([query.x, query.y, 0.0 if query.z is None else query.z])
+    if query.z is None:
+        above = column_point(avlmap, point[:2], query.radius_m)
+        point = avlmap.space.world(point) if above is None else above
+    return describe_place(avlmap, point, query.radius_m)
+
+
+def path(task: Task, query: PathQuery) -> PathAnswer:
+    """Return the path between two places."""
+    return task.map.paths.answer(place_of(query.start), place_of(query.goal))
+
+
+def picture(task: Task, query: PictureQuery) -> File:
+    """Return a PNG of an answer, or of the map."""
+    from avlmaps.serve.pictures import full_picture, map_picture, small_picture
+
+    values = {name: getattr(query, name) for name in AskQuery.__struct_fields__}
+    asks = any(values[name] for name in ("sentence", "object", "sound", "area")) or task.uploads != Uploads()
+    if not asks:
+        content = map_picture(task.map) if query.size == "full" else small_picture(task.map)
+        return File(content, "image/png")
+    asked = ask_map(task, AskQuery(**values))
+    task.watch.step("drawing")
+    draw = full_picture if query.size == "full" else small_picture
+    return File(draw(task.map, asked.answer), "image/png")
+
+
+def tiles(task: Task, query: NoQuery) -> TilesAnswer:
+    """Return the list of tiles."""
+    del query
+    return task.map.pyramid.index(task.map.version)
+
+
+def tile(task: Task, query: TilesQuery) -> File:
+    """Return one tile."""
+    heat = None
+    if query.heat is not None:
+        shown = ask_map(task, AskQuery(sentence=query.heat)).answer.heat
+        heat = None if shown is None else shown.shown
+    level, i, j, k = (int(task.path[name]) for name in ("level", "i", "j", "k"))
+    content = task.map.pyramid.tile(level, (i, j, k), heat)
+    if content is None:
+        raise RequestError("There is no such tile; /maps/{map}/tiles lists them.", 404, "tile")
+    return File(content, "application/octet-stream", {"etag": f'"{task.map.version}"'})
+
+
+def encoded(answer: Any) -> bytes:
+    """Return an answer as JSON bytes."""
+    from avlmaps.core.printable import printable_json
+
+    return printable_json(msgspec.json.encode(answer).decode()).encode()
