@@ -18,7 +18,7 @@ from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.query.avlmap import Attachment
 from avlmaps.query.modalities.sound import require_audible
 from avlmaps.recordings.audio import AudioTrack, Sound
-from avlmaps.recordings.images import check_whole, decoded, encoded_size
+from avlmaps.recordings.images import check_whole, decode_picture, encoded_size
 from avlmaps.serve.errors import RequestError
 from avlmaps.serve.requests import CLIP, PHOTO
 from avlmaps.serve.settings import Limits
@@ -80,7 +80,7 @@ def decode_photo(content: bytes, limits: Limits) -> UInt8[np.ndarray, "h w 3"]:
     except RecordingError:
         raise RequestError("The photo is cut off or damaged; send it again.", 415, "photo") from None
     # The pose is that of the picture as its pixels lie, so a camera's turn flag must not rotate it.
-    bgr = decoded(content, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    bgr = decode_picture(content, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if bgr is None or bgr.shape[:2] != (size[1], size[0]):
         raise RequestError("The photo cannot be decoded; send another one.", 415, "photo")
     return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
