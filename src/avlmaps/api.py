@@ -36,7 +36,7 @@ def build_map(
 
     Raises:
         RecordingError: the recording cannot be opened, or too many of its frames cannot be read.
-        MapError: the folder is no place for a map, holds another map, or cannot be written.
+        MapError: the folder is not a place for a map, holds another map, or cannot be written.
         BackendError: the profile is not known, or a package for it is missing.
     """
     from avlmaps.maps.build import build_map as build
@@ -55,7 +55,7 @@ def open_map(path: str | Path) -> "AVLMap":
     """Open a map's folder; its large arrays stay on disk until they are used.
 
     Raises:
-        MapError: it is no map, or damaged, or of another schema or profile.
+        MapError: it is not a map, or damaged, or of another schema or profile.
     """
     from avlmaps.query.avlmap import AVLMap
 

@@ -120,7 +120,7 @@ def test_bad_files_are_told_in_a_sentence(tmp_path: Path) -> None:
     missing, folder, empty, text, silent = (tmp_path / name for name in ("a.wav", "b.wav", "c.wav", "d.ogg", "e.wav"))
     folder.mkdir()
     empty.touch()
-    text.write_text("this is no sound")
+    text.write_text("this is not a sound")
     soundfile.write(silent, np.zeros(0, np.float32), RATE_HZ)
     formats = "give a wav, flac, ogg, mp3, m4a, mp4 or mkv file."
     assert refusal(missing) == f"FILE does not exist; {formats}"
@@ -164,7 +164,7 @@ def test_samples_that_are_no_numbers_are_told_with_their_time(tmp_path: Path) ->
     samples = tone(1.0)
     samples[RATE_HZ // 2] = np.nan
     soundfile.write(tmp_path / "a.wav", samples, RATE_HZ, subtype="FLOAT")
-    sentence = "FILE holds samples that are no finite numbers, the first at 0.500 s; convert it again from its source."
+    sentence = "FILE holds samples that are not finite numbers, the first at 0.500 s; convert it again from its source."
     assert refusal(tmp_path / "a.wav") == sentence
 
 

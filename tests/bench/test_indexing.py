@@ -185,7 +185,7 @@ def test_a_sound_heard_at_two_places_of_which_one_is_near_an_object_makes_a_task
     assert (task.sound_name, task.object_name) == ("snoring", "chair")
     assert task.sentence == "the sound of snoring near the chair"
     assert task.off_m((4.8, 0.5, 0.0)) == 0.0  # anywhere along the way on which the sound was heard
-    assert task.off_m((5.5, 0.0, 0.0)) > 0.5  # the object itself is no answer
+    assert task.off_m((5.5, 0.0, 0.0)) > 0.5  # the object itself is not an answer
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from avlmaps.bench.harness.models import shipped_checksums
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "benchmarks"))
 
-from page import (  # noqa: E402 - benchmarks is no package
+from page import (  # noqa: E402 - benchmarks is not a package
     BEGIN,
     END,
     ENTRIES,

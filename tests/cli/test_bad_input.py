@@ -92,7 +92,7 @@ def test_an_index_of_clips_in_another_encoding_is_named(walk: Path, run, tmp_pat
     (clips / "index.csv").write_bytes("path,category\nbeep/0.wav,T\xfcrklingel\n".encode("latin-1"))
     status, _, err = run("add-sounds", walk, "--clips", clips, "--out", tmp_path / "out")
     assert status == 1
-    assert "index.csv is no CSV table in UTF-8" in err
+    assert "index.csv is not a CSV table in UTF-8" in err
 
 
 def test_a_track_of_one_sample_a_second_is_no_sound(built: Path, run, tmp_path: Path) -> None:

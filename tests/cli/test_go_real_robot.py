@@ -169,13 +169,16 @@ def test_of_two_robots_the_one_of_the_file_drives(go: Started, name: str) -> Non
 @pytest.mark.parametrize(
     ("settings", "says"),
     [
-        ({"name_space": "/robot1"}, "sets 'name_space', which is no setting of a robot; the settings are namespace, "),
+        (
+            {"name_space": "/robot1"},
+            "sets 'name_space', which is not a setting of a robot; the settings are namespace,",
+        ),
         ({"speed_m_s": "fast"}, "speed_m_s is 'fast'; it is a number from 0.01 to 2."),
         ({"speed_m_s": 15}, "speed_m_s is 15; it is a number from 0.01 to 2."),
         ({"goal_timeout_s": True}, "goal_timeout_s is True; it is a number from 0.1 to 86400."),
         ({"pose_max_age_s": 3000}, "pose_max_age_s is 3000; it is a number from 0.1 to 60."),
-        ({"namespace": 3}, "namespace is 3, which is no ROS namespace"),
-        ({"namespace": ["a"]}, "which is no ROS namespace"),
+        ({"namespace": 3}, "namespace is 3, which is not a ROS namespace"),
+        ({"namespace": ["a"]}, "which is not a ROS namespace"),
         ({"radius_m": None}, "radius_m is None; it is a number"),
     ],
 )

@@ -125,7 +125,7 @@ def test_weights_in_the_hubs_cache_are_seen_without_its_library(tmp_path: Path, 
     snapshot = tmp_path / "hf" / "hub" / "models--facebook--dinov2-small" / "snapshots" / "abc"
     snapshot.mkdir(parents=True)
     (snapshot / "config.json").write_text("{}")
-    assert state_of(Kind.PLACE, "dinov2")[0] == "weights missing", "a configuration alone is no model"
+    assert state_of(Kind.PLACE, "dinov2")[0] == "weights missing", "a configuration alone is not a model"
     (snapshot / "model.safetensors").write_bytes(b"")
     assert state_of(Kind.PLACE, "dinov2")[0] == "ready"
 

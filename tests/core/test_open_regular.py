@@ -123,7 +123,7 @@ def test_a_header_that_is_not_true_takes_no_memory(tmp_path: Path, shape: str, s
 
 def test_objects_and_truncated_arrays_are_refused(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.array([{}], object), allow_pickle=True)
-    with pytest.raises(ValueError, match="which are no numbers"):
+    with pytest.raises(ValueError, match="which are not numbers"):
         load_npy(tmp_path / "a.npy", 10_000)
     np.save(tmp_path / "b.npy", np.zeros(100))
     os.truncate(tmp_path / "b.npy", 500)

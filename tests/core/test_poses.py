@@ -1,4 +1,4 @@
-"""Rigid transforms obey the laws of a group, and what is no rotation is refused by name."""
+"""Rigid transforms obey the laws of a group, and what is not a rotation is refused by name."""
 
 import re
 
@@ -117,7 +117,7 @@ def _nan() -> np.ndarray:
         (_scaled(), "off orthonormal by 3, determinant 8"),
         (_mirrored(), "determinant -1"),
         (_sheared_bottom(), "The pose of frame 000012 is not a rigid transform"),
-        (_nan(), "The pose of frame 000012 holds NaN or infinity; remove that frame or mend its pose."),
+        (_nan(), "The pose of frame 000012 holds NaN or infinity; remove that frame or fix its pose."),
     ],
 )
 def test_what_is_no_pose_is_refused_with_the_frames_name(pose: np.ndarray, sentence: str):

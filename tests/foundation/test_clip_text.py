@@ -133,7 +133,7 @@ def test_case_white_space_and_entities_do_not_matter():
         ("a\u00a0b\u2028c\u3000d", "a b c d"),
         ("\u03a3\u0391\u03a3", "\u03c3\u03b1\u03c2"),  # a sigma at a word's end
         ("\ud83d\ude00", "\U0001f600"),
-        ("a\udcff", "a\ufffd"),  # a byte of the command line that is no text
+        ("a\udcff", "a\ufffd"),  # a byte of the command line that is not a text
     ],
 )
 def test_letters_in_another_form_are_those_that_are_meant(typed, meant):

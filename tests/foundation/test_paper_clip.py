@@ -149,7 +149,7 @@ def test_another_file_is_refused_in_a_sentence(models: Path) -> None:
         PaperClipViews(FILE)
     write_lseg(models)
     (models / "demo_e200.ckpt").rename(models / FILE)
-    with pytest.raises(BackendError, match="no checkpoint of a CLIP with a vision transformer"):
+    with pytest.raises(BackendError, match="not a checkpoint of a CLIP with a vision transformer"):
         PaperClipViews(FILE)
     state = openai_weights()
     del state["visual.ln_post.bias"]

@@ -161,7 +161,7 @@ def huge_npy(rng: Rng, seed: Path) -> str:
 
 
 def other_kind(rng: Rng, seed: Path) -> str:
-    """Put something in a file's place that is no file of its size."""
+    """Put something in a file's place that is not a file of its size."""
     file = _one(rng, files_of(seed))
     kind = str(rng.choice(["pipe", "folder", "dangling", "loop", "zero", "sparse", "socket"]))
     if kind == "sparse":

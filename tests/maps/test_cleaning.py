@@ -1,4 +1,4 @@
-"""Removing what is no surface, beside the same rules written the long way."""
+"""Removing what is not a surface, beside the same rules written the long way."""
 
 import numpy as np
 import pytest

@@ -207,7 +207,7 @@ def test_without_h5py_the_sentence_says_what_to_install(tmp_path: Path, monkeypa
 
 def test_nothing_but_a_map_is_replaced(tmp_path: Path) -> None:
     _touch(tmp_path / "mine/thesis.txt")
-    with pytest.raises(MapError, match="is there already and is no map"):
+    with pytest.raises(MapError, match="is there already and is not a map"):
         import_reference_map(tmp_path, tmp_path / "mine")
 
 

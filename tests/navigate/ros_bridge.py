@@ -53,7 +53,7 @@ class FakeRobot:
         self.pose = pose or GroundPose(0.0, 0.0, 0.0)
         self.frames = ("map", "odom", "base_link")
         self.tf_on = True
-        self.spoiled: float | None = 0.0  # the x of a transform; None and NaN are no numbers
+        self.spoiled: float | None = 0.0  # the x of a transform; None and NaN are not numbers
         self.received: list[dict[str, Any]] = []
         self.clients: list[_Client] = []
         self.goals: dict[str, dict[str, Any]] = {}  # id: goal with its status

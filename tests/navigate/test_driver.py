@@ -268,7 +268,7 @@ FLOOR = of_plan(np.full((200, 100), CellState.FREE))
 def test_forward_stops_where_the_known_floor_ends(drive, told_m, heading_rad, gone_m):
     states = np.full((120, 100), CellState.UNKNOWN)
     states[:60] = CellState.FREE
-    states[30:34, 18:22] = CellState.UNKNOWN  # a small hole is no end
+    states[30:34, 18:22] = CellState.UNKNOWN  # a small hole is not an end
     body = Free(GroundPose(1.0, 1.0, heading_rad))
     arrival = MapDriver(of_plan(states), body, settings=drive).forward(told_m)
     assert not arrival.reached

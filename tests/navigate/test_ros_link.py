@@ -56,7 +56,7 @@ def test_without_roslibpy_the_extra_is_named(monkeypatch):
 
 @pytest.mark.parametrize("namespace", ["robot 1", "a//b", "/x/$(y)", "1robot"])
 def test_no_namespace_is_refused(namespace):
-    with pytest.raises(NavigationError, match="no ROS namespace"):
+    with pytest.raises(NavigationError, match="not a ROS namespace"):
         RosSettings(namespace=namespace)
 
 

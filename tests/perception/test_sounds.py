@@ -117,7 +117,7 @@ def test_samples_that_are_no_numbers_are_refused(encoder: EmbeddedSounds) -> Non
     with pytest.raises(AudioError) as refused:
         encoder.encode(Sound(samples, RATE_HZ))
     assert str(refused.value) == (
-        "The sound has 1 samples of 1000 that are no finite numbers; convert it again from its source."
+        "The sound has 1 samples of 1000 that are not finite numbers; convert it again from its source."
     )
 
 

@@ -81,7 +81,7 @@ def test_rooms_are_keyframes_side_by_side_with_one_name() -> None:
     view = np.array([[1.0, 0], [1, 0], [1, 0], [1, 0], [1, 0], [1, 0]], np.float32)
     stored = furnished_map(views=FakeViews(), keyframes=keyframes_at(places, view))
     rooms = [room for room in AVLMap(stored).rooms() if room.name == "kitchen"]
-    assert [room.views for room in rooms] == [3, 2], "the lone view at 20 m is no room"
+    assert [room.views for room in rooms] == [3, 2], "the lone view at 20 m is not a room"
     assert rooms[0].position == pytest.approx((1.4, 0.0, 1.0)), "the middle of what was seen, one metre ahead"
     assert all(0.0 <= room.confidence <= 1.0 for room in rooms)
 

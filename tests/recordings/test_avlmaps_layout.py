@@ -153,8 +153,8 @@ def test_a_sound_sequence_opens_with_its_track_and_no_depth(tmp_path: Path):
 @pytest.mark.parametrize(
     ("file", "content", "sentence"),
     [
-        ("poses.txt", "0 0 0 0 0 0 3\n", "poses.txt, line 1: the quaternion has length 3, so this is no rotation."),
-        ("poses.txt", "0 0 0\n", "poses.txt, line 1: there are 3 numbers where 7 or 16 belong; mend the line."),
+        ("poses.txt", "0 0 0 0 0 0 3\n", "poses.txt, line 1: the quaternion has length 3, so this is not a rotation."),
+        ("poses.txt", "0 0 0\n", "poses.txt, line 1: there are 3 numbers where 7 or 16 belong; fix the line."),
         (
             "poses.txt",
             "",

@@ -209,14 +209,14 @@ def test_a_clock_that_was_set_back_costs_the_shorter_part_and_no_more(tmp_path: 
     [
         ({"schema_version": 2}, "has schema version 2; this avlmaps reads version 1: update avlmaps."),
         ({"schema_version": 0}, "has schema version 0; this avlmaps reads version 1: write the recording again."),
-        ({"depth_units_per_m": "1000"}, "recording.json at depth_units_per_m: expected `float`, got `str`; mend the"),
+        ({"depth_units_per_m": "1000"}, "recording.json at depth_units_per_m: expected `float`, got `str`; fix the"),
         ({"depth_units_per_m": 0}, "recording.json: depth_units_per_m is 0; it must be positive and at most 1e+06, 10"),
         ({"depth_units_per_m": 1e300}, "depth_units_per_m is 1e+300; it must be positive and at most 1e+06, 1000 for"),
-        ({"rgb_rate_hz": -1}, "recording.json: rgb_rate_hz is -1.0; it must be positive; mend the file."),
-        ({"depth_scale": 5000}, "recording.json: object contains unknown field `depth_scale`; mend the file."),
+        ({"rgb_rate_hz": -1}, "recording.json: rgb_rate_hz is -1.0; it must be positive; fix the file."),
+        ({"depth_scale": 5000}, "recording.json: object contains unknown field `depth_scale`; fix the file."),
         ({"world_from_camera": "opengl"}, "recording.json at world_from_camera: invalid enum value 'opengl'; mend"),
-        ({"up_in_world": [0, 0, 9.81]}, "it must be a unit vector, or null where up is not known; mend the file."),
-        ({"intrinsics": {}}, "recording.json at intrinsics: object missing required field `rgb`; mend the file."),
+        ({"up_in_world": [0, 0, 9.81]}, "it must be a unit vector, or null where up is not known; fix the file."),
+        ({"intrinsics": {}}, "recording.json at intrinsics: object missing required field `rgb`; fix the file."),
     ],
 )
 def test_a_description_that_cannot_be_is_told_by_file_and_field(tmp_path: Path, change: dict, sentence: str):
@@ -229,12 +229,12 @@ def test_a_description_that_cannot_be_is_told_by_file_and_field(tmp_path: Path, 
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        (b"{", "recording.json is not JSON (input data was truncated); mend the file."),
+        (b"{", "recording.json is not JSON (input data was truncated); fix the file."),
         (
             b'{"schema_version": 1,\n "origin": "caf\xe9"}',
             "recording.json, line 2: this is not UTF-8 text; save the file",
         ),
-        (b"[]", "recording.json: expected `object`, got `array`; mend the file."),
+        (b"[]", "recording.json: expected `object`, got `array`; fix the file."),
     ],
 )
 def test_a_description_that_is_no_json_is_told(tmp_path: Path, content: bytes, sentence: str):
@@ -247,10 +247,10 @@ def test_a_description_that_is_no_json_is_told(tmp_path: Path, content: bytes, s
 @pytest.mark.parametrize(
     ("line", "sentence"),
     [
-        ("0.1,0,0", "poses.csv, line 3: there are 3 numbers where 8 belong; mend the line."),
-        ("0.1,0,0,zero,0,0,0,1", "poses.csv, line 3: '0.1,0,0,zero,0,0,0,1' is not all numbers; mend the line."),
-        ("0.1,0,0,0,0,0,0,2", "poses.csv, line 3: the quaternion has length 2, so this is no rotation;"),
-        ("0.1,0,0,0,0,0,0,0", "poses.csv, line 3: the quaternion has length 0, so this is no rotation;"),
+        ("0.1,0,0", "poses.csv, line 3: there are 3 numbers where 8 belong; fix the line."),
+        ("0.1,0,0,zero,0,0,0,1", "poses.csv, line 3: '0.1,0,0,zero,0,0,0,1' is not all numbers; fix the line."),
+        ("0.1,0,0,0,0,0,0,2", "poses.csv, line 3: the quaternion has length 2, so this is not a rotation;"),
+        ("0.1,0,0,0,0,0,0,0", "poses.csv, line 3: the quaternion has length 0, so this is not a rotation;"),
     ],
 )
 def test_a_bad_pose_is_told_by_its_line(tmp_path: Path, line: str, sentence: str):

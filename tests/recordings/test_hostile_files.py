@@ -100,7 +100,7 @@ def put(file: Path, kind: str) -> None:
 def test_a_table_without_line_ends_is_not_read_into_one_line(tmp_path: Path) -> None:
     path = write_folder(tmp_path / "walk")
     os.truncate(path / "poses.csv", 1_000_000_000)  # zeros
-    with pytest.raises(RecordingError, match=r"it has 16384 bytes or more; mend it"):
+    with pytest.raises(RecordingError, match=r"it has 16384 bytes or more; fix it"):
         open_recording(path)
 
 

@@ -117,9 +117,9 @@ def test_depth_arrays_that_cannot_be_used_are_named(tmp_path: Path):
     (tmp_path / "cut.npy").write_bytes(b"\x93NUMPY\x01")
     np.save(tmp_path / "objects.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
     np.save(tmp_path / "flat.npy", np.zeros(7))
-    with pytest.raises(RecordingError, match=r"cut.npy is no whole NPY file"):
+    with pytest.raises(RecordingError, match=r"cut.npy is not a whole NPY file"):
         read_depth(tmp_path / "cut.npy", CAMERA, 1000.0)
-    with pytest.raises(RecordingError, match=r"objects.npy is no whole NPY file"):
+    with pytest.raises(RecordingError, match=r"objects.npy is not a whole NPY file"):
         read_depth(tmp_path / "objects.npy", CAMERA, 1000.0)
     with pytest.raises(RecordingError, match=r"flat.npy holds float64 of \(7,\); depth must be numbers of"):
         read_depth(tmp_path / "flat.npy", CAMERA, 1000.0)

@@ -84,7 +84,7 @@ def test_a_shift_of_metres_is_told_and_one_of_kilometres_is_refused() -> None:
     found = plausible_walk(stamps_s, positions, names)
     assert len(found.index) == 200 and "between frames 000099 and 000100" in found.notices[0] and not found.fault
     positions[100:] += 1e4
-    assert "between frames 000099 and 000100; mend those poses" in plausible_walk(stamps_s, positions, names).fault
+    assert "between frames 000099 and 000100; fix those poses" in plausible_walk(stamps_s, positions, names).fault
 
 
 def test_walks_too_wide_or_too_far_from_the_origin_are_refused() -> None:

@@ -61,11 +61,11 @@ def test_replica_frames_beyond_the_trajectory_are_left_out_and_told(tmp_path: Pa
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        ("{", "cam_params.json is not as it should be (Input data was truncated); mend the file."),
+        ("{", "cam_params.json is not as it should be (Input data was truncated); fix the file."),
         ('{"camera": {"fx": 0}}', "cam_params.json holds no camera: a camera needs finite numbers and positive focal"),
         (
             '{"camera": {"scale": 0}}',
-            "cam_params.json holds no camera: scale is 0.0; it must be positive; mend the file.",
+            "cam_params.json holds no camera: scale is 0.0; it must be positive; fix the file.",
         ),
     ],
 )

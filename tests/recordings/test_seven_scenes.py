@@ -64,7 +64,7 @@ def test_a_wild_rotation_is_refused_with_the_frames_name_and_file(tmp_path: Path
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        ("1 0 0", "frame-000002.pose.txt holds 3 numbers where 4x4 belong; mend the file."),
+        ("1 0 0", "frame-000002.pose.txt holds 3 numbers where 4x4 belong; fix the file."),
         ("a b c", "frame-000002.pose.txt does not hold numbers only (could not convert string to float: 'a');"),
     ],
 )

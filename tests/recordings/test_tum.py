@@ -109,9 +109,9 @@ def test_clocks_that_never_meet_are_told_with_their_times(tmp_path: Path):
     ("file", "content", "sentence"),
     [
         ("rgb.txt", "# nothing\n", "rgb.txt lists no picture, so there is nothing to map."),
-        ("rgb.txt", "1.0 a.png\nnonsense\n", "rgb.txt, line 2: 'nonsense' is not a stamp and a file; mend the line."),
+        ("rgb.txt", "1.0 a.png\nnonsense\n", "rgb.txt, line 2: 'nonsense' is not a stamp and a file; fix the line."),
         ("groundtruth.txt", "# nothing\n", "groundtruth.txt holds no usable pose, so there is nothing to map."),
-        ("groundtruth.txt", "1 2 3\n", "groundtruth.txt, line 1: there are 3 numbers where 8 belong; mend the line."),
+        ("groundtruth.txt", "1 2 3\n", "groundtruth.txt, line 1: there are 3 numbers where 8 belong; fix the line."),
     ],
 )
 def test_a_damaged_list_is_told_by_file_and_line(tmp_path: Path, file: str, content: str, sentence: str):

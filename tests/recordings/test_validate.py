@@ -68,7 +68,7 @@ FAULTS: list[tuple[Callable[[Path], object], str, str, int | None, bool]] = [
     ),
     (
         lambda p: _replace_line(p / "poses.csv", 4, "0.2,0,0,0,0,0,0,1.5"),
-        "poses.csv, line 4: the quaternion has length 1.5, so this is no rotation;",
+        "poses.csv, line 4: the quaternion has length 1.5, so this is not a rotation;",
         "poses.csv",
         4,
         True,
@@ -84,7 +84,7 @@ FAULTS: list[tuple[Callable[[Path], object], str, str, int | None, bool]] = [
     (_foreign_text, "events.csv, line 2: this is not UTF-8 text; save the file as UTF-8.", "events.csv", 2, False),
     (
         lambda p: (p / "objects.json").write_text("[{"),
-        "objects.json is not JSON in UTF-8 (Input data was truncated); mend the file.",
+        "objects.json is not JSON in UTF-8 (Input data was truncated); fix the file.",
         "objects.json",
         None,
         False,

@@ -60,13 +60,13 @@ def test_a_building_without_a_floor_is_refused_and_nothing_is_recorded(tmp_path:
 
 @pytest.mark.parametrize(("factor", "sides"), [(100.0, "600 x 500 x 270"), (1000.0, "6e+03 x 5e+03 x 2.7e+03")])
 def test_a_building_in_another_unit_is_refused_with_its_size(tmp_path: Path, factor, sides) -> None:
-    with pytest.raises(RecordingError, match="no size of a building; scale it so that a unit is a metre") as error:
+    with pytest.raises(RecordingError, match="not a size of a building; scale it so that a unit is a metre") as error:
         require_floor(scene_of(tmp_path / "large.glb", FLOOR | room(), factor), WALK)
     assert sides in str(error.value)
 
 
 def test_a_building_much_too_small_is_refused_as_well(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="no size of a building"):
+    with pytest.raises(RecordingError, match="not a size of a building"):
         require_floor(scene_of(tmp_path / "small.glb", FLOOR | room(), 0.001), WALK)
 
 

@@ -191,7 +191,7 @@ def test_a_folder_that_holds_something_is_left_alone_and_an_unfinished_one_is_be
 def test_a_scene_of_no_size_of_a_building_is_refused(tmp_path: Path) -> None:
     builder = SceneBuilder("pole")
     builder.add("column", box((0.0, 0.0, 0.0), (0.1, 0.1, 3.0), Material()))
-    with pytest.raises(RecordingError, match=r"^pole measures 0.1 x 0.1 x 3 m, which is no size of a building"):
+    with pytest.raises(RecordingError, match=r"^pole measures 0.1 x 0.1 x 3 m, which is not a size of a building"):
         record_scene(builder.build(), tmp_path / "rec", SMALL)
     assert not (tmp_path / "rec").exists()
 

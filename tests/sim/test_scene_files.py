@@ -526,7 +526,7 @@ def removed(path: Path) -> Path:
 
 WRONG: dict[str, tuple[Callable[[Path], Path], str]] = {
     "missing": (lambda f: f / "no.glb", "there is no .*no.glb"),
-    "no building": (lambda f: _text(f / "a.txt", "hello"), "a.txt is no building that can be read"),
+    "no building": (lambda f: _text(f / "a.txt", "hello"), "a.txt is not a building that can be read"),
     "empty folder": (lambda f: f, "holds 0 glTF files"),
     "no glb": (lambda f: _text(f / "a.glb", "this is not a GLB file at all"), "does not begin with glTF"),
     "truncated glb": (
@@ -535,7 +535,7 @@ WRONG: dict[str, tuple[Callable[[Path], Path], str]] = {
     ),
     "gltf without bin": (lambda f: _without_bin(f), "cannot be read as glTF"),
     "old gltf": (lambda f: _text(f / "a.gltf", '{"asset": {"version": "1.0"}}'), "glTF 1.0; version 2 is read"),
-    "no json": (lambda f: _text(f / "a.gltf", '{"asset": '), "is no JSON"),
+    "no json": (lambda f: _text(f / "a.gltf", '{"asset": '), "is not JSON"),
     "packed": (packed, "packed with KHR_draco_mesh_compression; unpack it"),
     "no triangles": (
         lambda f: _text(f / "a.gltf", '{"asset": {"version": "2.0"}}'),

@@ -74,7 +74,7 @@ class KeptOut:
         return cls(frozenset(map(literal_key, queries)), frozenset(map(content_key, queries)))
 
     def allows(self, phrase: str) -> bool:
-        """Return whether the phrase is no copy of a query."""
+        """Return whether the phrase is not a copy of a query."""
         return literal_key(phrase) not in self.literal
 
     def allows_label(self, phrase: str) -> bool:

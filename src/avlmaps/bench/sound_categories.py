@@ -1,6 +1,6 @@
 """The categories of clip collections, and the kind of the embedded sound encoder for each one.
 
-A category that is no key here is looked up among the kinds' own names; one that is neither is unknown to the encoder.
+A category that is not a key here is looked up among the kinds' own names; else it is unknown to the encoder.
 """
 
 # The forty categories of ESC-50 (Piczak 2015) that are not in ESC-10.

@@ -102,7 +102,7 @@ def record(verb: "Record") -> dict[str, Any]:
     )
     scene = open_scene(verb.scene)
     made = record_scene(scene, verb.out, settings, verb.seed)
-    names = [*(thing.name for thing in scene.objects), None]  # an instance of -1 is no object
+    names = [*(thing.name for thing in scene.objects), None]  # an instance of -1 is not an object
     events = [
         {
             "onset_s": round(s.onset_s, 4),

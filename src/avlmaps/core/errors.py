@@ -9,14 +9,14 @@ from avlmaps.core.printable import printable
 
 
 class AvlmapsError(Exception):
-    """Base of every error that a user can cause and mend; its sentence is safe to print, including quoted text."""
+    """Base of every error that a user can cause and fix; its sentence is safe to print, including quoted text."""
 
     def __str__(self) -> str:
         return printable(super().__str__())
 
 
 class RecordingError(AvlmapsError):
-    """A recording cannot be read: a missing frame, a truncated file, a pose that is no pose."""
+    """A recording cannot be read: a missing frame, a truncated file, a pose that is not a pose."""
 
 
 class AudioError(AvlmapsError):
@@ -24,7 +24,7 @@ class AudioError(AvlmapsError):
 
 
 class NoAudioStreamError(AudioError):
-    """A video has no sound, which for most videos is no fault."""
+    """A video has no sound, which for most videos is not a fault."""
 
 
 class MapError(AvlmapsError):

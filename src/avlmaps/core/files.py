@@ -38,7 +38,7 @@ _KINDS = (
 
 
 class RefusedFileError(OSError):
-    """A file that is not read: it is no regular file, or larger than its kind may be; ``strerror`` says why."""
+    """A file that is not read: it is not a regular file, or larger than its kind may be; ``strerror`` says why."""
 
     def __init__(self, path: Path | str, why: str, code: int = errno.EINVAL) -> None:
         super().__init__(code, why, str(path))

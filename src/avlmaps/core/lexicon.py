@@ -195,7 +195,7 @@ class Lexicon:
 
         Args:
             other: ``red office chair``; its head counts.
-            wanted: ``chair``, ``chairs`` or ``seat``; a chair is no office chair.
+            wanted: ``chair``, ``chairs`` or ``seat``; a chair is not an office chair.
             kind: compare only entries of this kind.
         """
         for want in self.senses(wanted, kind):

@@ -54,7 +54,7 @@ def read_npy_header(stream: BinaryIO, size: int) -> NpyHeader:
         size: of the file, bytes.
 
     Raises:
-        ValueError: it is no NPY header, holds objects, or promises more or fewer bytes than there are.
+        ValueError: it is not an NPY header, holds objects, or promises more or fewer bytes than there are.
     """
     try:
         version = np.lib.format.read_magic(stream)  # pyright: ignore[reportArgumentType]
@@ -64,7 +64,7 @@ def read_npy_header(stream: BinaryIO, size: int) -> NpyHeader:
         reason = str(fault).splitlines()[0].rstrip(".") if str(fault) and size else "it is empty"
         raise ValueError(reason) from None
     if dtype.hasobject or dtype.itemsize == 0:
-        raise ValueError(f"it holds {dtype}, which are no numbers")
+        raise ValueError(f"it holds {dtype}, which are not numbers")
     if len(shape) > _MOST_DIMENSIONS or any(length < 0 for length in shape):
         raise ValueError(f"its shape {str(shape)[:60]} is none")
     header = NpyHeader(tuple(shape), dtype, bool(fortran), stream.tell())

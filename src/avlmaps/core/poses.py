@@ -30,19 +30,19 @@ def orthonormalize(
         max_fault: largest entry of RᵀR − I that still counts as rounding.
 
     Raises:
-        RecordingError: the pose holds NaN or infinity, is no rigid transform, mirrors, or is off by more.
+        RecordingError: the pose holds NaN or infinity, is not a rigid transform, mirrors, or is off by more.
     """
     if world_from_camera.shape != (4, 4):
         raise RecordingError(f"The pose of {name} has shape {world_from_camera.shape}; it must be 4x4.")
     if not np.isfinite(world_from_camera).all():
-        raise RecordingError(f"The pose of {name} holds NaN or infinity; remove that frame or mend its pose.")
+        raise RecordingError(f"The pose of {name} holds NaN or infinity; remove that frame or fix its pose.")
     rotation = world_from_camera[:3, :3]
     fault = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
     bottom_is_right = np.allclose(world_from_camera[3], (0.0, 0.0, 0.0, 1.0), atol=1e-6)
     if fault > max_fault or np.linalg.det(rotation) < 0.0 or not bottom_is_right:
         raise RecordingError(
             f"The pose of {name} is not a rigid transform (its rotation is off orthonormal by {fault:.3g}, determinant "
-            f"{np.linalg.det(rotation):.3g}; at most {max_fault} passes for rounding); mend it or leave the frame out."
+            f"{np.linalg.det(rotation):.3g}; at most {max_fault} passes for rounding); fix it or leave the frame out."
         )
     u, _, vt = np.linalg.svd(rotation)
     pose = np.eye(4)

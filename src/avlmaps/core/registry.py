@@ -206,7 +206,7 @@ def _load(kind: Kind, name: str) -> Any:
         made = getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError) as fault:
         raise BackendError(
-            f"The {kind} backend {name!r} cannot be loaded from {backend.target} ({fault}); mend or remove the package "
+            f"The {kind} backend {name!r} cannot be loaded from {backend.target} ({fault}); fix or remove the package "
             "that brings it."
         ) from fault
     chosen = model or backend.model

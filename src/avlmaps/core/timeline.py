@@ -47,7 +47,7 @@ def in_order(stamps_s: Float[np.ndarray, " n"], what: str) -> InOrder:
     notices: list[str] = []
     index = np.flatnonzero(np.isfinite(stamps_s))
     if len(index) < len(stamps_s):
-        notices.append(f"{len(stamps_s) - len(index)} {what} have a stamp that is no number and are left out.")
+        notices.append(f"{len(stamps_s) - len(index)} {what} have a stamp that is not a number and are left out.")
     back_s = -np.diff(stamps_s[index])
     jumps = np.flatnonzero(back_s > MAX_DISORDER_S)
     if len(jumps):

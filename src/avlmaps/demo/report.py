@@ -250,7 +250,7 @@ def _panels(step: "Step", answer: "Answer", sheet: Sheet, photo: "PhotoView | No
     ground = '<use href="#ground"/>'
     seen = sheet.camera(photo.world_from_camera) if photo else ""
     truth = sheet.band(ask.truth[1:]) if ask.kind == "clip" else sheet.rings(ask.truth, "truth")
-    told = answer.found or ask.truth  # where there is nothing, a guess is no goal
+    told = answer.found or ask.truth  # where there is nothing, a guess is not a goal
     goals = sheet.goals([goal.position for goal in answer.goals]) if told else ""
     layers = [ground, _layer(sheet, heat_from_above(heat.space, heat.shown)), sheet.rings(ask.others, "other")]
     large = _figure(

@@ -61,7 +61,7 @@ def run_demo(
         settings: how large it is.
 
     Raises:
-        MapError: the folder holds something that is no demonstration.
+        MapError: the folder holds something that is not a demonstration.
     """
     from avlmaps.demo.drive import drive
     from avlmaps.demo.evidence import Evidence

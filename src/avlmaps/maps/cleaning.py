@@ -21,7 +21,7 @@ from avlmaps.maps.store.manifest import Removed
 
 FEWEST_THROUGH = 2  # frames: one may have a wrong pose
 THROUGH_SHARE = 0.5  # a voxel goes when more frames see through it than this share of those that hit it
-SPECK_VIEWS = 2  # a group of which a voxel is hit by more frames is no speck
+SPECK_VIEWS = 2  # a group of which a voxel is hit by more frames is not a speck
 MOST_REACH = 4.0  # voxels: a smear is looked for no farther
 
 

@@ -243,7 +243,7 @@ class Tolerance:
             raise RecordingError(bad.why)
         raise RecordingError(
             f"{self._met} of {self._total} frames cannot be read, more than the {self._allowed} that may be left out; "
-            f"mend the recording or allow more (--max-bad-share). The last: {bad.why}"
+            f"fix the recording or allow more (--max-bad-share). The last: {bad.why}"
         )
 
 

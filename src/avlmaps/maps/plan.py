@@ -61,7 +61,7 @@ def make_plan(recording: Recording, path: Path, used: Profile, settings: BuildSe
     if len(recording) == 0:
         raise MapError(f"{recording.path} has no frames with a pose; there is nothing to build a map from.")
     if not is_map_or_free(path):
-        raise MapError(f"{path} is there already and is no map; give another --out, nothing in it was touched.")
+        raise MapError(f"{path} is there already and is not a map; give another --out, nothing in it was touched.")
     settings = settings.for_profile(used.weight_variance_m2)
     models = {kind.value: ModelInfo.of(used.chosen(kind), card) for kind, card in used.cards().items()}
     key = key_of("map", BUILD_VERSION, recording.fingerprint, audio_key(recording), used.name, models, settings)

@@ -13,7 +13,7 @@ from avlmaps.core.motion import Action, GroundPose, Moved
 class Body(Protocol):
     """A robot on the ground: a simulated one (`avlmaps.sim.body.SimulatedBody`), or one of a user's own.
 
-    A movement returns when it is over. An obstacle is no error: the body stops or slides, and reports a contact.
+    A movement returns when it is over. An obstacle is not an error: the body stops or slides, and reports a contact.
     """
 
     @property
@@ -53,7 +53,7 @@ class BodyShape:
     flies_m: float | None = None
     """Height of its lowest part over the floor, for a body that flies: lower things are not in its way."""
     ignores: tuple[str, ...] = ()
-    """Words for what is no obstacle to it: what the map holds for such a thing is passed over or through."""
+    """Words for what is not an obstacle to it: what the map holds for such a thing is passed over or through."""
     only: tuple[str, ...] | None = None
     """Where given, nothing but these words counts as an obstacle, as VLMaps lists them; unnamed things are passed."""
 

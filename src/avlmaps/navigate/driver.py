@@ -183,7 +183,7 @@ class MapDriver:
         """Turn on the spot, to the left by a positive angle; by actions as nearly as 5 degrees allow."""
         trip = self._trip()
         if not abs(angle_rad) <= _MOST_RAD:
-            return self._arrival(trip, False, f"{angle_rad} rad is no angle to turn by")
+            return self._arrival(trip, False, f"{angle_rad} rad is not an angle to turn by")
         left_rad = self._turned(angle_rad, trip)
         if abs(left_rad) > _TURNED_RAD:
             return self._arrival(trip, False, f"the turn ended {np.rad2deg(abs(left_rad)):.0f}° off")
@@ -194,7 +194,7 @@ class MapDriver:
         """Drive straight ahead until an obstacle; for a negative distance it turns round first."""
         trip = self._trip()
         if not abs(distance_m) <= _MOST_M:
-            return self._arrival(trip, False, f"{distance_m} m is no distance to drive")
+            return self._arrival(trip, False, f"{distance_m} m is not a distance to drive")
         if distance_m < 0.0 and abs(self._turned(pi, trip)) > _TURNED_RAD:
             return self._arrival(trip, False, "it could not turn round")
         start, distance_m = self.pose, abs(distance_m)

@@ -23,7 +23,7 @@ class Thing:
 
     Attributes:
         name: what it was called; ``""`` for a place that a program gives.
-        outline: what it covers of the ground, level frame; a single point where it is no thing.
+        outline: what it covers of the ground, level frame; a single point where it is not a thing.
         place: where the goal is, level frame, metres.
         sure: in [0, 1]: the map's confidence; 1 for a place that a program gives.
         solid: whether it is a thing with an extent, rather than a place.

@@ -107,7 +107,7 @@ def forget_sound(name: str, folder: Path | None = None) -> None:
     if not (place / "sound.json").is_file():
         known = ", ".join(taught.name for taught in enrolled_sounds(folder)) or "none"
         raise BackendError(f"No sound called {name!r} was taught; taught are: {known}.")
-    (place / "sound.json").unlink()  # first: a folder without notes is no sound, even with other files left in it
+    (place / "sound.json").unlink()  # first: a folder without notes is not a sound, even with other files left in it
     shutil.rmtree(place)
 
 

@@ -82,7 +82,7 @@ class AVLMap:
         """Open a map's folder; the features stay on the disk until a query needs them.
 
         Raises:
-            MapError: it is no map, damaged, or of another schema or profile.
+            MapError: it is not a map, damaged, or of another schema or profile.
         """
         from avlmaps.maps.store.reader import open_stored
 

@@ -71,7 +71,7 @@ class LocateSettings:
 
     min_spread: float = 0.02
     """And they must cover so large a part of the picture: the product of the spreads (two standard deviations) along
-    the two axes, as a part of width times height; a single poster or logo is no place."""
+    the two axes, as a part of width times height; a single poster or logo is not a place."""
 
     guess_references: int = 0
     """Where a picture is not located, match this many keyframes one by one and return the best of their poses."""

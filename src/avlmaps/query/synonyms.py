@@ -16,7 +16,7 @@ def is_a(other: str, wanted: str) -> bool:
 
     Args:
         other: ``office chair``.
-        wanted: ``chair``, ``chairs`` or ``seat``; a chair is no office chair.
+        wanted: ``chair``, ``chairs`` or ``seat``; a chair is not an office chair.
     """
     known = lexicon()
     if known.is_a(other, wanted, Kind.THING):

@@ -166,14 +166,14 @@ def read_events(path: Path) -> list[Event]:
     with path.open(newline="", encoding="utf-8") as stream:
         rows = csv.reader(stream)
         if tuple(next(rows, ()))[: len(EVENTS_HEADER)] != EVENTS_HEADER:  # a simulator knows more of each
-            raise AudioError(f"{path} does not begin with the line {','.join(EVENTS_HEADER)}; it is no list of events.")
+            raise AudioError(f"{path} does not begin with the line {','.join(EVENTS_HEADER)}; it lists no events.")
         for number, row in enumerate(rows, start=2):
             try:
                 onset, offset, category, clip, x, y, z, gain = row[: len(EVENTS_HEADER)]
                 place = (float(x), float(y), float(z))
                 events.append(Event(float(onset), float(offset), category, clip, place, float(gain)))
             except ValueError:
-                raise AudioError(f"{path}, line {number} does not hold {len(EVENTS_HEADER)} values; mend it.") from None
+                raise AudioError(f"{path}, line {number} does not hold {len(EVENTS_HEADER)} values; fix it.") from None
     return events
 
 

@@ -104,7 +104,7 @@ class AudioTrack:
             offset_s: where it ends; the track's end if None.
 
         Raises:
-            AudioError: the file cannot be read any more, or holds samples that are no finite numbers.
+            AudioError: the file cannot be read any more, or holds samples that are not finite numbers.
             ValueError: the piece ends before it begins.
         """
         from avlmaps.recordings import containers
@@ -126,7 +126,7 @@ class AudioTrack:
         """Go through the whole track in pieces of one length (the last may be shorter), one in memory at a time.
 
         Raises:
-            AudioError: the file breaks off, or holds samples that are no finite numbers.
+            AudioError: the file breaks off, or holds samples that are not finite numbers.
         """
         from avlmaps.recordings import containers
 
@@ -175,13 +175,13 @@ def _write_block(file: Any, block: Sound, rate_hz: int) -> None:
 
 
 def _checked(samples: Float[np.ndarray, " n"], path: Path, rate_hz: int, at: int) -> Float[np.ndarray, " n"]:
-    """Return the samples within [-1, 1], or say which are no numbers or come from another scale."""
+    """Return the samples within [-1, 1], or say which are not numbers or come from another scale."""
     finite = np.isfinite(samples)
     if not finite.all():
         where_s = (at + int(np.argmin(finite))) / rate_hz
         raise AudioError(
-            f"{path} holds samples that are no finite numbers, the first at {where_s:.3f} s; convert it again from its "
-            "source."
+            f"{path} holds samples that are not finite numbers, the first at {where_s:.3f} s; convert it again from "
+            "its source."
         )
     peak = float(np.abs(samples).max(initial=0.0))
     if peak > 16.0:

@@ -150,14 +150,14 @@ def _indexed(index: Path) -> list[Clip]:
         reader = csv.DictReader(lines)
         fields = set(reader.fieldnames or ())
     except (UnicodeDecodeError, csv.Error) as error:
-        raise AudioError(f"{index} is no CSV table in UTF-8 ({error}); save it as one.") from None
+        raise AudioError(f"{index} is not a CSV table in UTF-8 ({error}); save it as one.") from None
     missing = {"path", "category"} - fields
     if missing:
         raise AudioError(f"{index} lacks the column {' and '.join(sorted(missing))}; add it, or remove the file.")
     rows = [(row["path"], _plain(row["category"] or "")) for row in reader if row["path"]]
     clips = [Clip(index.parent / path, category, path) for path, category in rows]
     if absent := [clip.name for clip in clips if not clip.path.is_file()]:
-        raise AudioError(f"{index} lists {len(absent)} files that do not exist, the first {absent[0]}; mend the index.")
+        raise AudioError(f"{index} lists {len(absent)} files that do not exist, the first {absent[0]}; fix the index.")
     return clips
 
 

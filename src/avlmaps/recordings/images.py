@@ -84,7 +84,7 @@ def picture_size(path: Path, content: bytes | None = None) -> tuple[int, int]:
     """
     size = _npy_size(path) if path.suffix == ".npy" else encoded_size(_head(path) if content is None else content)
     if size is None:
-        raise RecordingError(f"{path} is no PNG, JPEG or NPY picture (or is cut off); copy it again.")
+        raise RecordingError(f"{path} is not a PNG, JPEG or NPY picture (or is cut off); copy it again.")
     if size[0] < 1 or size[1] < 1 or size[0] * size[1] > MOST_PIXELS:
         raise RecordingError(
             f"{path} says that it is {size[0]}x{size[1]}; pictures have 1 to {MOST_PIXELS:,} pixels, so copy it again."
@@ -226,7 +226,7 @@ def _npy_depth(path: Path, camera: Pinhole) -> Float32[np.ndarray, "h w"]:
         raw = load_npy(path, PICTURE_BYTES).reshape(shape)
     except (ValueError, OSError) as error:
         raise _no_npy(path, error) from None
-    with np.errstate(over="ignore"):  # float64 beyond float32 becomes infinity, which is no depth
+    with np.errstate(over="ignore"):  # float64 beyond float32 becomes infinity, which is not a depth
         depth_m = raw.astype(np.float32)
     depth_m[~(np.isfinite(depth_m) & (depth_m > 0.0))] = 0.0
     return depth_m
@@ -237,7 +237,7 @@ def _no_npy(path: Path, error: ValueError | OSError) -> RecordingError:
         return RecordingError(f"{path} is missing; restore it, or leave that frame out of the recording.")
     if isinstance(error, OSError):
         return RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.")
-    return RecordingError(f"{path} is no whole NPY file ({error}); copy it again.")
+    return RecordingError(f"{path} is not a whole NPY file ({error}); copy it again.")
 
 
 def _check_size(path: Path, shape: tuple[int, ...], camera: Pinhole) -> None:

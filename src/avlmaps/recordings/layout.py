@@ -123,7 +123,7 @@ def read_description(folder: Path, report: Report) -> Description:
         description = _decode(path)
         fault = _impossible(description)
         if fault:
-            raise RecordingError(f"{path}: {fault}; mend the file.")
+            raise RecordingError(f"{path}: {fault}; fix the file.")
     except RecordingError as error:
         report(Fault(str(error), path))
         raise
@@ -151,9 +151,9 @@ def _decode(path: Path) -> Description:
     except msgspec.ValidationError as error:
         message, _, where = str(error).partition(" - at ")
         at = f" at {where.strip('`').removeprefix('$.')}" if where else ""
-        raise RecordingError(f"{path}{at}: {_lower(message)}; mend the file.") from None
+        raise RecordingError(f"{path}{at}: {_lower(message)}; fix the file.") from None
     except msgspec.DecodeError as error:
-        raise RecordingError(f"{path} is not JSON ({_lower(str(error))}); mend the file.") from None
+        raise RecordingError(f"{path} is not JSON ({_lower(str(error))}); fix the file.") from None
 
 
 def _lower(message: str) -> str:

@@ -197,7 +197,7 @@ def _reachable(
                     f"{names[first]}"
                 )
                 if away_m > MAX_SHIFT_M:
-                    fault = fault or f"{told}; mend those poses, or cut the recording there."
+                    fault = fault or f"{told}; fix those poses, or cut the recording there."
                 else:
                     shifts.append(f"{told}; if tracking began again there, the map shows the place twice.")
             kept.append(stretch)
@@ -212,7 +212,7 @@ def _extent_fault(positions_m: Float[np.ndarray, "n 3"], names: Sequence[str]) -
         furthest = int(np.argmax(np.linalg.norm(positions_m - np.median(positions_m, axis=0), axis=1)))
         return (
             f"The poses extend over {extent_m:,.0f} m, the furthest of frame {names[furthest]}; a map has at most "
-            f"{MAX_EXTENT_M:,.0f} m, so mend the poses or cut the recording."
+            f"{MAX_EXTENT_M:,.0f} m, so fix the poses or cut the recording."
         )
     away_m = float(np.abs(positions_m).max())
     if away_m > MAX_FROM_ORIGIN_M:

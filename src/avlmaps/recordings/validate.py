@@ -139,4 +139,4 @@ def _check_truth(folder: Path, report: Report) -> None:
         except OSError as error:
             unhurried(Fault(f"{objects} cannot be read ({error.strerror or error}); check the file.", objects))
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
-            unhurried(Fault(f"{objects} is not JSON in UTF-8 ({error}); mend the file.", objects))
+            unhurried(Fault(f"{objects} is not JSON in UTF-8 ({error}); fix the file.", objects))

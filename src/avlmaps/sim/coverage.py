@@ -53,7 +53,7 @@ def require_floor(scene: Scene, walk: WalkSettings) -> FreeSpace:
     side, height = float(scene.mesh.size[:2].max()), float(scene.mesh.size[2])
     if side > MOST_SIDE_M or height > MOST_HEIGHT_M or height < LEAST_HEIGHT_M or side < LEAST_SIDE_M:
         raise RecordingError(
-            f"{scene.name} measures {_sides(scene)} m, which is no size of a building; scale it so that a unit is a "
+            f"{scene.name} measures {_sides(scene)} m, which is not a size of a building; scale it so that a unit is a "
             "metre (a file in centimetres by 0.01, one in millimetres by 0.001)."
         )
     if (facing := _floors_face(scene)) is not None:

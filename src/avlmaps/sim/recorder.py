@@ -172,7 +172,7 @@ def record_scene(
 
 
 def _plain(settings: RecordSettings) -> dict[str, Any]:
-    """Return the settings as JSON can hold them; how many processes drew is no part of what was made."""
+    """Return the settings as JSON can hold them; how many processes drew is not a part of what was made."""
     plain = asdict(replace(settings, sounds=None, workers=1))
     return {**plain, "sounds": None if settings.sounds is None else settings.sounds.name}
 

@@ -51,7 +51,7 @@ class DepthFaults:
         if min(self.noise_px, self.step_px, self.jitter_px, self.edge_ratio, self.weakest, self.blobs) < 0.0:
             raise SensorError("A sensor's depth cannot have less than no noise, steps, jitter or holes.")
         if not 0.0 <= self.edge_loss <= 1.0:
-            raise SensorError(f"edge_loss {self.edge_loss} is no probability; take a number from 0 to 1.")
+            raise SensorError(f"edge_loss {self.edge_loss} is not a probability; take a number from 0 to 1.")
 
 
 @dataclass(frozen=True, slots=True)

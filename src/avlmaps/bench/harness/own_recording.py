@@ -56,7 +56,7 @@ class OwnRecording:
 
         Raises:
             TaskError: a file of the truth is damaged, or the recording has fewer than 20 frames.
-            RecordingError: it is no recording.
+            RecordingError: it is not a recording.
         """
         from avlmaps.recordings.open import open_recording
 

@@ -55,13 +55,13 @@ class SegmentationSettings:
     background_window_s: float = 40.0
     """The background is found within this time, seconds; a longer sound is background."""
     range_db: float = 65.0
-    """A level this much below the loudest moment of the track is no sound, however silent the background."""
+    """A level this much below the loudest moment of the track is not a sound, however silent the background."""
     tail_db: float = 50.0
     """A sound ends where it has fallen this much below its own loudest moment."""
     merge_gap_s: float = 1.0
     """Pauses up to this long divide no sound."""
     min_length_s: float = 0.03
-    """A shorter stretch is no sound."""
+    """A shorter stretch is not a sound."""
     max_length_s: float = 30.0
     """A longer sound is cut where it is quietest."""
     padding_s: float = 0.02

@@ -31,7 +31,7 @@ def read_areas(path: Path) -> ReferenceAreas:
 
     Raises:
         BackendError: h5py is not installed.
-        MapError: the file is damaged, of another kind, or holds what is no feature or no pose.
+        MapError: the file is damaged, of another kind, or holds an invalid feature or pose.
     """
     with open_hdf5(path) as file:
         pose = file.numbers("robot_pose_list", (None, 4, 4), kinds="f").whole(np.float64)

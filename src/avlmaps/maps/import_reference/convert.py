@@ -100,7 +100,7 @@ def import_reference_map(
     """
     begin, path = perf_counter(), Path(path)
     if not is_map_or_free(path):
-        raise MapError(f"{path} is there already and is no map; give another --out, nothing in it was touched.")
+        raise MapError(f"{path} is there already and is not a map; give another --out, nothing in it was touched.")
     scene = find_scene(Path(source), areas, poses)
     with silence_progress(not progress), open_hdf5(scene.voxels) as file:
         voxels = ReferenceVoxels(file)

@@ -7,7 +7,7 @@ drafts ``init_height_id``, the layer of the base's height. ``vlmaps_multi_floor.
 ``pcd_min``, ``pcd_max`` (3,) and ``cs`` as well; the first stores cells as (x, z, y), the second as (x, y, z).
 
 The reference's running mean weighs a voxel's first pixel twice over (by its weight squared), so that a voxel that was
-hit once has the length of its weight; features are scaled to unit length here, which mends the latter.
+hit once has the length of its weight; features are scaled to unit length here, which corrects the latter.
 """
 
 import hashlib
@@ -165,7 +165,7 @@ def _corner(file: Hdf5, grid_shape: tuple[int, ...]) -> Corner:
     low, high = (file.numbers(name, (3,)).whole(np.float64) for name in ("pcd_min", "pcd_max"))
     cell_size_m = float(file.numbers("cs", ()).whole(np.float64))
     if not (np.isfinite([low, high]).all() and np.isfinite(cell_size_m) and 0.001 <= cell_size_m <= 10.0):
-        raise MapError(f"{file.path} is damaged: pcd_min, pcd_max or cs is no place or size (cs is {cell_size_m}).")
+        raise MapError(f"{file.path} is damaged: pcd_min, pcd_max or cs is not a place or size (cs is {cell_size_m}).")
     cells = np.ceil((high - low) / cell_size_m + 1.0)
     fits = {order: np.array_equal(cells[list(order)], grid_shape) for order in ((0, 1, 2), (0, 2, 1))}
     # Where a building is as long as it is high, the name of the file decides.

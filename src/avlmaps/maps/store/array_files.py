@@ -34,7 +34,7 @@ class FileInfo(msgspec.Struct, frozen=True, kw_only=True):
         path: below the manifest's folder, with ``/``.
         bytes: its size.
         sha256: hex checksum of the whole file.
-        dtype: numpy's name of the elements' type, little-endian (``<f2``); ``""`` for a file that is no array.
+        dtype: numpy's name of the elements' type, little-endian (``<f2``); ``""`` for a file that is not an array.
         shape: of the array.
     """
 

@@ -326,7 +326,7 @@ def read_manifest(path: Path) -> bytes:
 
     Raises:
         FileNotFoundError, NotADirectoryError: there is none.
-        MapError: it cannot be read, or is no regular file of a possible size.
+        MapError: it cannot be read, or is not a regular file of a possible size.
     """
     try:
         return read_regular(path, MANIFEST_BYTES)

@@ -116,7 +116,7 @@ class Frames:
         for name in ("map_frame", "base_frame"):
             bare = getattr(self, name).strip().lstrip("/")
             if not bare or len(bare) > 255:
-                raise NavigationError(f"{getattr(self, name)!r} is no name of a frame; {name} is often {name[:4]!r}.")
+                raise NavigationError(f"{getattr(self, name)!r} is not a frame; {name} is often {name[:4]!r}.")
             object.__setattr__(self, name, bare)
         if self.map_frame == self.base_frame:
             raise NavigationError(f"The robot's fixed frame and that of its body are both {self.map_frame!r}.")

@@ -64,7 +64,7 @@ def place_to_stand(
 def plan_turn(start: GroundPose, angle_rad: float, settings: RosSettings, tasks: Tasks) -> Plan | str:
     """Plan a turn on the spot, or return why that cannot be."""
     if not abs(angle_rad) < 100.0:
-        return f"{angle_rad} rad is no angle to turn by"
+        return f"{angle_rad} rad is not an angle to turn by"
 
     def off(now: GroundPose) -> str:
         wrong = abs(wrap_angle(now.heading_rad - start.heading_rad - angle_rad))
@@ -77,7 +77,7 @@ def plan_turn(start: GroundPose, angle_rad: float, settings: RosSettings, tasks:
 def ahead_of(start: GroundPose, distance_m: float, settings: RosSettings, tasks: Tasks) -> Plan | str:
     """Plan a straight drive, or return why that cannot be."""
     if not abs(distance_m) < LONGEST_M:
-        return f"{distance_m} m is no distance to drive"
+        return f"{distance_m} m is not a distance to drive"
     target = start.ahead(distance_m)
 
     def off(now: GroundPose) -> str:

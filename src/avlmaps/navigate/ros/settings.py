@@ -64,7 +64,7 @@ class RosSettings:
             given = getattr(self, name)
             bare = given.strip("/") if isinstance(given, str) else "?"
             if bare and not all(part.isascii() and part.isidentifier() for part in bare.split("/")):
-                raise NavigationError(f"{name} is {given!r}, which is no ROS namespace; write it as /robot1.")
+                raise NavigationError(f"{name} is {given!r}, which is not a ROS namespace; write it as /robot1.")
             object.__setattr__(self, name, f"/{bare}" if bare else "")
         for name, (least, most) in _RANGES.items():
             value = getattr(self, name)
@@ -83,7 +83,7 @@ class RosSettings:
         if unknown:
             known = ", ".join(cls.__slots__)
             raise NavigationError(
-                f"{path} sets {unknown[0]!r}, which is no setting of a robot; the settings are {known}."
+                f"{path} sets {unknown[0]!r}, which is not a setting of a robot; the settings are {known}."
             )
         try:
             return cls(**told)

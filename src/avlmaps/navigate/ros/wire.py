@@ -33,7 +33,7 @@ class Listener:
 
     Attributes:
         incoming: a message came.
-        fault: what came is no message.
+        fault: what came is not a message.
         opened: messages can go.
         over: the connection is lost, or nobody answered; called with the reason.
     """
@@ -45,7 +45,7 @@ class Listener:
 
 
 class _Protocol(AutobahnRosBridgeProtocol):
-    """Reads what comes as data, and hands it on; what is no message is counted and left out."""
+    """Reads what comes as data, and hands it on; what is not a message is counted and left out."""
 
     factory: "_Factory"
 

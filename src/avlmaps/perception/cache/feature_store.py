@@ -56,7 +56,7 @@ DEFAULT_CACHE = CacheSettings()
 class FeatureStore:
     """The features on the disk; safe to use from several threads and processes.
 
-    A file that cannot be read or written is no error: its features are made again, or not stored.
+    A file that cannot be read or written is not an error: its features are made again, or not stored.
 
     Attributes:
         found: how many features of each module came from here.

@@ -70,14 +70,14 @@ def check_audible(samples: Float[np.ndarray, " n"], name: str = "the sound") -> 
     """Refuse what holds no sound.
 
     Raises:
-        AudioError: no samples, samples that are no finite numbers, or silence.
+        AudioError: no samples, samples that are not finite numbers, or silence.
     """
     if len(samples) == 0:
         raise AudioError(f"{name[0].upper() + name[1:]} has no samples; give a sound of at least a few milliseconds.")
     if not np.isfinite(samples).all():
         bad = int((~np.isfinite(samples)).sum())
         raise AudioError(
-            f"{name[0].upper() + name[1:]} has {bad} samples of {len(samples)} that are no finite numbers; "
+            f"{name[0].upper() + name[1:]} has {bad} samples of {len(samples)} that are not finite numbers; "
             "convert it again from its source."
         )
 

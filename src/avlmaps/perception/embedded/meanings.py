@@ -2,7 +2,7 @@
 
 The lexicon decides where it knows the noun: by name, synonym, compound or wider kind. The nearness of words chooses
 between several names that fit, and reads descriptions ("something to boil water in"). A noun that nobody knows means
-nothing: a "desk dragon" is no desk.
+nothing: a "desk dragon" is not a desk.
 """
 
 from collections.abc import Sequence

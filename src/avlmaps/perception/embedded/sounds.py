@@ -118,7 +118,7 @@ class EmbeddedSounds:
         """Return a unit vector for each window of 5.2 s, one every 2.6 s.
 
         Raises:
-            AudioError: the sound has no samples, or some that are no finite numbers.
+            AudioError: the sound has no samples, or some that are not finite numbers.
         """
         logmel.check_audible(sound.samples)
         mels = logmel.normalised(logmel.mel_power(resample(sound, logmel.RATE_HZ).samples))

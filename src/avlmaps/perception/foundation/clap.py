@@ -76,7 +76,7 @@ class ClapSounds(ContrastSounds):
         """Return a unit vector for each window of ten seconds, one every five seconds.
 
         Raises:
-            AudioError: the sound has no samples, or some that are no finite numbers.
+            AudioError: the sound has no samples, or some that are not finite numbers.
         """
         pieces = windows(usable_samples(sound, self._rate_hz), self._window, round(self._window * (1.0 - _SHARED)))
         return by_portions(pieces, max(1, select_batch(_WINDOWS_ON_GPU)), self.card.dim, self._encode_windows)

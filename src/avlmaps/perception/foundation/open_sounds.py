@@ -80,14 +80,14 @@ def usable_samples(sound: Sound, rate_hz: int) -> Float32[np.ndarray, " n"]:
     """Return a sound's samples at a rate, at least one of them.
 
     Raises:
-        AudioError: the sound has no samples, or some that are no finite numbers.
+        AudioError: the sound has no samples, or some that are not finite numbers.
     """
     if not len(sound.samples):
         raise AudioError("The sound has no samples; give a sound of at least a few milliseconds.")
     bad = int((~np.isfinite(sound.samples)).sum())
     if bad:
         raise AudioError(
-            f"The sound has {bad} samples of {len(sound.samples)} that are no finite numbers; convert it again from "
+            f"The sound has {bad} samples of {len(sound.samples)} that are not finite numbers; convert it again from "
             "its source."
         )
     return resample(sound, rate_hz).samples

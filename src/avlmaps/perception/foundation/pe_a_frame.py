@@ -88,7 +88,7 @@ class FrameSounds:
         """Return a unit vector for each 40 ms, the last one of what is left.
 
         Raises:
-            AudioError: the sound has no samples, or some that are no finite numbers.
+            AudioError: the sound has no samples, or some that are not finite numbers.
         """
         samples = usable_samples(sound, self._rate_hz)
         parts = []
@@ -139,7 +139,7 @@ class FrameSounds:
     def _moments(
         self, rows: Float32[np.ndarray, "frames d"]
     ) -> tuple[Float32[np.ndarray, "moments e"], Float[np.ndarray, "moments k"]]:
-        """Return the direction of each second of a sound, and how likely it is of each kind that is no silence."""
+        """Return the direction of each second of a sound, and how likely it is of each kind that is not a silence."""
         starts = np.arange(0, len(rows), _MOMENT)
         count = np.diff(np.append(starts, len(rows)))[:, None]
         frames = np.add.reduceat(self._space.published(rows), starts, axis=0) / count

@@ -101,7 +101,7 @@ def _places(model: str) -> Iterator[Path]:
         return
     kept = _hub_cache() / f"models--{repository.replace('/', '--')}" / "snapshots"
     for revision in sorted(kept.glob("*")) if kept.is_dir() else ():
-        # A snapshot of which only a configuration was ever fetched is no model.
+        # A snapshot of which only a configuration was ever fetched is not a model.
         files = [revision / Path(name).name for name in known.files]
         yield from files or (*revision.glob("*.safetensors"), *revision.glob("*.bin"))
 

@@ -1,4 +1,4 @@
-"""Finding a model's files: a path, the folder of models, the hub's cache, the hub; errors say what mends them."""
+"""Finding a model's files: a path, the folder of models, the hub's cache, the hub; errors say how to get them."""
 
 from collections.abc import Sequence
 from pathlib import Path

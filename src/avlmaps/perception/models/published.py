@@ -160,7 +160,7 @@ def network_from(
             network = make()
     except (KeyError, ValueError, IndexError) as fault:
         raise BackendError(
-            f"{path} is no checkpoint of {what} (it lacks {fault}); get the published one with: {how_to_get}"
+            f"{path} is not a checkpoint of {what} (it lacks {fault}); get the published one with: {how_to_get}"
         ) from fault
     network = network.to_empty(device="cpu")
     load_strictly(network, state, path, how_to_get, not_needed=not_needed)

@@ -61,7 +61,7 @@ def _read(path: Path, how_to_get: str) -> Any:
     except _FAULTS as fault:
         raise BackendError(
             f"{path} cannot be read as a checkpoint ({type(fault).__name__}); it may be damaged, cut short, or hold "
-            f"what is no weight: get the published file: {how_to_get}"
+            f"what is not a weight: get the published file: {how_to_get}"
         ) from fault
 
 

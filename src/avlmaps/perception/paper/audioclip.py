@@ -84,7 +84,7 @@ class AudioClipSounds(ContrastSounds):
         """Return a unit vector for each window of five seconds.
 
         Raises:
-            AudioError: the sound has no samples, or some that are no finite numbers.
+            AudioError: the sound has no samples, or some that are not finite numbers.
         """
         samples = usable_samples(sound, RATE_HZ)
         samples = np.pad(samples, (0, max(0, WINDOW_SAMPLES - len(samples))))

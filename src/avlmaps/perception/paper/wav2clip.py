@@ -190,7 +190,7 @@ class Wav2ClipSounds(ContrastSounds):
         """Return a unit vector for each window: one for a sound of up to ten seconds.
 
         Raises:
-            AudioError: the sound has no samples, or some that are no finite numbers.
+            AudioError: the sound has no samples, or some that are not finite numbers.
         """
         samples = usable_samples(sound, RATE_HZ)
         # a sound too short to be mirrored around half a frame; the published code fails there

@@ -90,7 +90,7 @@ def read_habitat_poses(path: Path, report: Report = stop_at_first) -> Float[np.n
     wild = np.isfinite(norm) & (np.abs(norm - 1.0) > poses.MAX_ROTATION_FAULT)
     for row in np.flatnonzero(wild):
         line = int(table.lines[row])
-        sentence = f"{path}, line {line}: the quaternion has length {norm[row]:.3g}, so this is no rotation."
+        sentence = f"{path}, line {line}: the quaternion has length {norm[row]:.3g}, so this is not a rotation."
         report(Fault(sentence, path, line))
     usable = np.isfinite(values).all(axis=1) & ~wild
     habitat_from_body = poses.from_quaternion(
@@ -174,7 +174,7 @@ def read_camera_file(path: Path) -> tuple[CameraFile, list[str]]:
     try:
         given = decode_json(read_regular(path, DESCRIPTION_BYTES), CameraFile)
     except (msgspec.DecodeError, UnicodeDecodeError, OSError) as error:
-        raise RecordingError(f"{path} is not as it should be ({error}); mend the file.") from None
+        raise RecordingError(f"{path} is not as it should be ({error}); fix the file.") from None
     if not given.rate_hz > 0.0:
         raise RecordingError(f"{path}: rate_hz is {given.rate_hz}; it must be positive.")
     return given, []
@@ -206,5 +206,5 @@ def _rig(path: Path, shots: Shots, given: CameraFile) -> Rig:
     try:
         rgb = Pinhole(fx, fy, cx, cy, width, height)
     except ValueError as error:
-        raise RecordingError(f"{path / 'camera.json'} holds no camera: {error}; mend the file.") from None
+        raise RecordingError(f"{path / 'camera.json'} holds no camera: {error}; fix the file.") from None
     return Rig(rgb, rgb.resized(*first_picture_size(path, shots.depth)) if shots.depth else rgb)

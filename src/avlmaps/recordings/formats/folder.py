@@ -82,7 +82,7 @@ def _check_clocks(folder: Path, description: Description, found: "_Pictures", kn
 
 
 def _open_audio(path: Path, start_s: float, video: VideoFrames | None) -> AudioTrack | None:
-    """Open the sound track: a file of its own, else the video's (most have none, which is no fault)."""
+    """Open the sound track: a file of its own, else the video's (most have none, which is not a fault)."""
     file = find_audio(path)
     if file is not None:
         return AudioTrack.open(file, start_s=start_s)
@@ -127,7 +127,7 @@ def _read_poses(folder: Path, report: Report) -> _Poses:
     for row in np.flatnonzero(finite & ~rigid):
         line = int(table.lines[row])
         sentence = (
-            f"{path}, line {line}: the quaternion has length {length[row]:.3g}, so this is no rotation; "
+            f"{path}, line {line}: the quaternion has length {length[row]:.3g}, so this is not a rotation; "
             "write qx qy qz qw of length 1, or leave the line out."
         )
         report(Fault(sentence, path, line))
@@ -206,7 +206,7 @@ def _listed(path: Path, report: Report) -> Iterator[tuple[str, float]]:
                 raise ValueError(name)
             yield name, float(stamp)
         except ValueError:
-            report(Fault(f"{path}, line {number}: {text[:40]!r} is not name,stamp_s; mend the line.", path, number))
+            report(Fault(f"{path}, line {number}: {text[:40]!r} is not name,stamp_s; fix the line.", path, number))
 
 
 def _stamps_without_list(

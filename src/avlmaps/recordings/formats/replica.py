@@ -97,13 +97,13 @@ def _camera(path: Path, shots: Shots) -> tuple[Rig, float, tuple[str, ...]]:
         try:
             given = decode_json(read_regular(file, DESCRIPTION_BYTES), _Parameters).camera
         except (msgspec.DecodeError, UnicodeDecodeError, OSError) as error:
-            raise RecordingError(f"{file} is not as it should be ({error}); mend the file.") from None
+            raise RecordingError(f"{file} is not as it should be ({error}); fix the file.") from None
     try:
         camera = Pinhole(given.fx, given.fy, given.cx + 0.5, given.cy + 0.5, given.w, given.h)
         if not given.scale > 0.0:
             raise ValueError(f"scale is {given.scale}; it must be positive")
     except ValueError as error:
-        raise RecordingError(f"{file} holds no camera: {error}; mend the file.") from None
+        raise RecordingError(f"{file} holds no camera: {error}; fix the file.") from None
     rgb_size, depth_size = first_picture_size(path, shots.colour), first_picture_size(path, shots.depth)
     rig = Rig(camera.resized(*rgb_size), camera.resized(*depth_size))
     told = () if file else ("There is no cam_params.json; the camera of the published scenes is assumed.",)

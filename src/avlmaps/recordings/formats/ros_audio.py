@@ -123,9 +123,9 @@ def _coding_of(beginning: bytes, said: str, topic: str) -> str:
     if len(beginning) > 2 and beginning[0] == 0xFF and beginning[1] & 0xE6 == 0xE2:  # an MPEG frame of layer 3
         return "mp3"
     raise RecordingError(
-        f"The sound on {topic} has no AudioInfo and is no MP3, FLAC, OGG or WAV stream; if it is plain 16-bit samples, "
-        "say how many a second and in how many channels (--topics audio_pcm=16000,1), else give a file (--audio FILE) "
-        "or leave it out (--topics audio=none)."
+        f"The sound on {topic} has no AudioInfo and is not an MP3, FLAC, OGG or WAV stream; if it is plain 16-bit "
+        "samples, say how many a second and in how many channels (--topics audio_pcm=16000,1), else give a file "
+        "(--audio FILE) or leave it out (--topics audio=none)."
     )
 
 

@@ -113,7 +113,7 @@ def _decompressed_depth(message: Any, name: str, camera: Pinhole | None) -> Floa
     raw = np.asarray(message.data, np.uint8)
     picture = _decoded(raw[12:] if "compressedDepth" in message.format else raw, name, camera, colour=False)
     if picture.ndim != 2 or picture.dtype != np.uint16:
-        raise RecordingError(f"The depth {name} is no 16-bit picture of one channel; republish it as 16UC1 or 32FC1.")
+        raise RecordingError(f"The depth {name} is not a 16-bit picture of one channel; republish as 16UC1 or 32FC1.")
     if not message.format.startswith("32FC1"):
         return picture.astype(np.float32) / np.float32(1000.0)
     _, a, b = struct.unpack_from("<iff", raw.tobytes(), 0)
@@ -139,7 +139,7 @@ def camera_of(info: Any, name: str) -> tuple[Pinhole, bool]:
     try:
         camera = Pinhole(k[0], k[4], k[2] + 0.5, k[5] + 0.5, int(info.width), int(info.height))
     except ValueError as error:
-        raise RecordingError(f"The camera calibration {name} is no camera: {error}; calibrate it again.") from None
+        raise RecordingError(f"The camera calibration {name} is not a camera: {error}; calibrate it again.") from None
     return camera, bool(np.abs(d).max(initial=0.0) > 1e-9)
 
 

@@ -101,7 +101,7 @@ class _Bag:
             except Exception as error:  # rosbags, sqlite and yaml raise their own kinds
                 raise RecordingError(
                     f"{self.path} cannot be read as a ROS bag ({type(error).__name__}: {_first_line(error)}); if it "
-                    "was cut off while recording, mend it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
+                    "was cut off while recording, fix it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
                 ) from error
             self._local.reader = reader
         return self._local.reader
@@ -131,7 +131,7 @@ class _Bag:
         except Exception as error:
             raise RecordingError(
                 f"A message of {topic} in {self.path} cannot be read ({type(error).__name__}: {_first_line(error)}); "
-                "the bag is damaged: copy it, or mend it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
+                "the bag is damaged: copy it, or fix it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
             ) from error
 
     def stamps(self, topic: str) -> tuple[np.ndarray, np.ndarray]:

@@ -75,7 +75,7 @@ def _camera(file: Path, size: tuple[int, int]) -> Pinhole:
     try:
         return Pinhole(k[0][0], k[1][1], k[0][2] + 0.5, k[1][2] + 0.5, *size)
     except ValueError as error:
-        raise RecordingError(f"{file} holds no camera: {error}; mend the file.") from None
+        raise RecordingError(f"{file} holds no camera: {error}; fix the file.") from None
 
 
 def _extrinsic(file: Path) -> np.ndarray:

@@ -93,7 +93,7 @@ def _rig(path: Path, shots: Shots) -> tuple[Rig, tuple[str, ...]]:
         try:
             depth = Pinhole(k[0][0], k[1][1], k[0][2], k[1][2], *depth_size)
         except ValueError as error:
-            raise RecordingError(f"{file} holds no camera: {error}; mend the file.") from None
+            raise RecordingError(f"{file} holds no camera: {error}; fix the file.") from None
     if depth_size == (640, 480) and depth.fx == depth.fy == _KINECT_DEPTH_FOCAL:
         colour = Pinhole(_KINECT_COLOUR_FOCAL, _KINECT_COLOUR_FOCAL, 320.0, 240.0, 640, 480)
         told = (

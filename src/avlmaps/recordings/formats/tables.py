@@ -46,7 +46,7 @@ def text_lines(path: Path, report: Report) -> Iterator[tuple[int, str]]:
     with stream:
         for number, raw in enumerate(iter(lambda: stream.readline(_LINE_BYTES), b""), start=1):
             if len(raw) >= _LINE_BYTES:
-                report(Fault(f"{path}, line {number}: it has {_LINE_BYTES} bytes or more; mend it.", path, number))
+                report(Fault(f"{path}, line {number}: it has {_LINE_BYTES} bytes or more; fix it.", path, number))
                 return
             try:
                 text = raw.decode("utf-8-sig" if number == 1 else "utf-8").strip()
@@ -74,11 +74,11 @@ def read_table(path: Path, columns: tuple[int, ...], report: Report, header: boo
         except ValueError:
             if header and row_number == 0 and not _any_number(fields):
                 continue
-            report(Fault(f"{path}, line {number}: {text[:40]!r} is not all numbers; mend the line.", path, number))
+            report(Fault(f"{path}, line {number}: {text[:40]!r} is not all numbers; fix the line.", path, number))
             continue
         if len(row) not in columns or (width and len(row) != width):
             wanted = width or " or ".join(map(str, columns))
-            sentence = f"{path}, line {number}: there are {len(row)} numbers where {wanted} belong; mend the line."
+            sentence = f"{path}, line {number}: there are {len(row)} numbers where {wanted} belong; fix the line."
             report(Fault(sentence, path, number))
             continue
         width = len(row)
@@ -120,9 +120,9 @@ def read_matrix(path: Path, rows: int, columns: int) -> Float[np.ndarray, "rows 
         raise RecordingError(f"{path} is not UTF-8 text; save the file as UTF-8.") from None
     except ValueError as error:
         reason = str(error) if len(str(error)) < _QUOTED else f"{str(error)[:_QUOTED]}..."
-        raise RecordingError(f"{path} does not hold numbers only ({reason}); mend the file.") from None
+        raise RecordingError(f"{path} does not hold numbers only ({reason}); fix the file.") from None
     if len(numbers) != rows * columns:
-        raise RecordingError(f"{path} holds {len(numbers)} numbers where {rows}x{columns} belong; mend the file.")
+        raise RecordingError(f"{path} holds {len(numbers)} numbers where {rows}x{columns} belong; fix the file.")
     return np.array(numbers).reshape(rows, columns)
 
 

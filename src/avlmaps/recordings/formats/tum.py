@@ -91,7 +91,7 @@ def _stream(folder: Path, name: str, report: Report) -> _Stream:
             stamps.append(float(stamp))
             files.append(file.strip())
         except ValueError:
-            sentence = f"{path}, line {number}: {text[:40]!r} is not a stamp and a file; mend the line."
+            sentence = f"{path}, line {number}: {text[:40]!r} is not a stamp and a file; fix the line."
             report(Fault(sentence, path, number))
     if not files:
         raise RecordingError(f"{path} lists no picture, so there is nothing to map.")
@@ -135,7 +135,7 @@ def _trajectory(path: Path, report: Report) -> tuple[timeline.Trajectory, tuple[
     usable = np.isfinite(values).all(axis=1) & (np.abs(norm - 1.0) <= poses.MAX_ROTATION_FAULT)
     for row in np.flatnonzero(~usable):
         line = int(table.lines[row])
-        sentence = f"{path}, line {line}: this is no pose (NaN, or a quaternion of length {norm[row]:.3g}); not used."
+        sentence = f"{path}, line {line}: this is not a pose (NaN, or a quaternion of length {norm[row]:.3g}); unused."
         report(Fault(sentence, path, line, fatal=False))
     values = values[usable]
     order = timeline.in_order(values[:, 0] if len(values) else np.zeros(0), f"poses of {path.name}")

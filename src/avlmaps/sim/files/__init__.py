@@ -48,6 +48,6 @@ def load_scene(path: Path | str, up_axis: Axis = "auto") -> Scene:
             return load_gltf(models[0], up_axis)
         raise SceneError(f"{path} holds {len(models)} glTF files and no building of a known layout; name one file")
     raise SceneError(
-        f"{path.name} is no building that can be read: give a .glb or .gltf, a Matterport3D, HM3D or Replica folder, "
-        f"or a {ENDING[1:]}"
+        f"{path.name} is not a building that can be read: give a .glb or .gltf, a Matterport3D, HM3D or Replica "
+        f"folder, or a {ENDING[1:]}"
     )

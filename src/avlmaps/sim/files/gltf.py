@@ -117,7 +117,7 @@ def read_json(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise SceneError(f"cannot read {path}: {error.strerror or error}") from error
     except ValueError as error:
-        raise SceneError(f"{path} is no JSON ({error}); is it whole?") from error
+        raise SceneError(f"{path} is not JSON ({error}); is it whole?") from error
     if not isinstance(content, dict):
         raise SceneError(f"{path} holds a {type(content).__name__}, where a JSON object was expected")
     return content
@@ -142,7 +142,7 @@ def _glb_header(path: Path) -> dict[str, Any]:
         with path.open("rb") as file:
             start = file.read(20)
             if len(start) < 20 or start[:4] != _MAGIC:
-                raise SceneError(f"{path} is no GLB file: it does not begin with glTF")
+                raise SceneError(f"{path} is not a GLB file: it does not begin with glTF")
             version, whole, length, kind = struct.unpack("<4I", start[4:])
             text = file.read(length)
     except OSError as error:

@@ -77,7 +77,7 @@ def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
     """Return the byte order, the elements and where the values begin."""
     end = content.find(b"end_header", 0, _LONGEST_HEADER)
     if not content.startswith(b"ply") or end < 0:
-        raise SceneError(f"{path} is no PLY file: it has no PLY header")
+        raise SceneError(f"{path} is not a PLY file: it has no PLY header")
     start = content.index(b"\n", end) + 1 if b"\n" in content[end : end + 13] else len(content)
     order, elements = "", []
     for line in content[:end].decode("ascii", "replace").splitlines()[1:]:

@@ -32,7 +32,7 @@ def read_urdf(path: Path) -> list[tuple[Path, Float[np.ndarray, "4 4"]]]:
     except OSError as error:
         raise SceneError(f"cannot read {path}: {error.strerror or error}") from error
     except (ElementTree.ParseError, ValueError, RecursionError) as error:
-        raise SceneError(f"{path} is no URDF that can be read ({error})") from error
+        raise SceneError(f"{path} is not a URDF that can be read ({error})") from error
     return looks
 
 

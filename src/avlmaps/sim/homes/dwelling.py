@@ -41,7 +41,7 @@ def _plan(rng: np.random.Generator, programme: Programme, corridor: str, stairs:
     patience = 7.0
     while True:
         laid = [Room(kind, polygon, 0.0, height) for kind, polygon in floor_of(rng, programme, corridor, stairs=stairs)]
-        laid.sort(key=lambda room: room.kind == WELL)  # it is no area: the others keep their numbers
+        laid.sort(key=lambda room: room.kind == WELL)  # it is not an area: the others keep their numbers
         walls = joined_up(rng, laid, walls_between([room.polygon for room in laid]), open_plan, patience)
         patience *= 1.15
         if walls is not None:

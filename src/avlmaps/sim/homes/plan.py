@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 OUTSIDE = -1  # the room beyond an outer wall
-WELL = "stairwell"  # the room of the stairs; it is no area, since nobody stays there
+WELL = "stairwell"  # the room of the stairs; it is not an area, since nobody stays there
 WELL_LENGTH_M = 3.4
 
 HoleKind = Literal["door", "closed door", "doorless", "folding door", "gap", "window"]
