@@ -159,7 +159,7 @@ class Ground:
         sizes = np.bincount(label.ravel())
         if len(sizes) < 2:
             return False
-        most = int(np.argmax(sizes[1:])) + 1  # a pocket before a door is not a way into the room
+        most = int(np.argmax(sizes[1:])) + 1  # a pocket before a door does not lead into the room
         if any(not self._has_near(label == most, place, 0.1) for place in self.must_m):
             return False
         return also is None or self._has_near(label == most, also, 0.28)
