@@ -160,7 +160,7 @@ def test_forward_goes_as_far_as_told_or_as_nothing_is_in_the_way(drive):
     blocked = driver_in(BUILDING, drive, start=GroundPose(0.5, 1.2)).forward(2.0)
     assert not blocked.reached
     assert blocked.contacts == 0
-    assert blocked.note.startswith("something is in the way after 0.")
+    assert blocked.note.startswith("an obstacle is ahead after 0.")
     back = driver_in(BUILDING, drive, start=GroundPose(1.0, 0.5)).forward(-0.5)
     assert back.pose.x_m == pytest.approx(0.5, abs=0.06)
 

@@ -196,7 +196,7 @@ def test_a_robot_that_will_not_stop_is_told_of(robot):
         assert "may still be driving" in driver.go_to(PLACE).note
         stopped = driver.stop()
         assert not stopped.reached
-        assert "not seen to stand" in stopped.note
+        assert "pose changes or is lost" in stopped.note
 
 
 def test_a_connection_lost_on_the_way_calls_the_goal_off_and_is_made_again_for_the_next(robot):
@@ -487,7 +487,7 @@ def test_stopping_cancels_what_others_sent_and_sees_that_it_stands(robot):
 def test_a_robot_that_tells_nothing_is_not_seen_to_stand(robot):
     with opened(robot, settings=quick(cancel_timeout_s=1.0)) as driver:
         robot.tf_on = False
-        assert "not seen to stand" in driver.stop().note
+        assert "pose changes or is lost" in driver.stop().note
 
 
 def test_stopping_from_another_thread_ends_a_drive(robot):
