@@ -134,7 +134,7 @@ def test_a_plan_is_driven_only_when_it_is_confirmed(piped, built: Path, monkeypa
     said = objects(out)
     assert len(said) == 6
     assert said[0]["steps"] == said[1]["steps"] == []
-    assert said[2]["found"] is True, "a line that is no answer to the question is the next line"
+    assert said[2]["found"] is True, "a line that is not an answer to the question is the next line"
     left, right = said[3]["steps"][0]["result"], said[4]["steps"][0]["result"]
     assert left["heading_rad"] == pytest.approx(3.14, abs=0.1)
     assert right["heading_rad"] == pytest.approx(1.57, abs=0.1), "the robot stays where it stopped"
@@ -145,7 +145,7 @@ def test_a_plan_is_driven_only_when_it_is_confirmed(piped, built: Path, monkeypa
 
 def test_without_a_scene_nothing_is_driven(piped, built: Path) -> None:
     status, out, err = piped("go to the red thing\ny\n", built)
-    assert status == 1, "y is no question"
+    assert status == 1, "y is not a question"
     assert "robot.move_to_object" in out and "planned only" in out
     assert "Drive this plan" not in err
 

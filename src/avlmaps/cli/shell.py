@@ -117,7 +117,7 @@ def _piped() -> "Lines":
     from avlmaps.cli.shell_lines import PipedLines
 
     if isinstance(sys.stdin, TextIOWrapper):
-        sys.stdin.reconfigure(errors="replace")  # a line that is no UTF-8 is not understood, and the next one is
+        sys.stdin.reconfigure(errors="replace")  # a line that is not UTF-8 is not understood, and the next one is
     return PipedLines(sys.stdin)
 
 

@@ -18,7 +18,7 @@ _MOST_SHOWN = 40
 
 @dataclass(frozen=True, slots=True)
 class Completed:
-    """One way to go on.
+    """One completion.
 
     Attributes:
         text: what stands there then.
@@ -32,7 +32,7 @@ class Completed:
 
 
 def completions(line: str, verbs: Sequence[str], file_verbs: Sequence[str], here: Iterable[str]) -> list[Completed]:
-    """Return what a line may go on with, at most 40.
+    """Return the completions of a line, at most 40.
 
     Args:
         line: what stands before the cursor.

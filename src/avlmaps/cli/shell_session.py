@@ -153,7 +153,7 @@ class Session:
         if self._names is None and self._lock.acquire(blocking=False):
             try:
                 self._names = _names_in(self._opened)
-            except AvlmapsError:  # the map can be queried in part; the lexicon's names are completed all the same
+            except AvlmapsError:  # the map can be queried in part; the lexicon's names are still completed
                 self._names = ()
             finally:
                 self._lock.release()

@@ -37,7 +37,7 @@ class GroundPose:
 
     def __post_init__(self) -> None:
         if not all(abs(value) < 1e9 for value in (self.x_m, self.y_m, self.heading_rad)):  # NaN fails as well
-            raise ValueError(f"({self.x_m}, {self.y_m}) m, {self.heading_rad} rad is no pose")
+            raise ValueError(f"({self.x_m}, {self.y_m}) m, {self.heading_rad} rad is not a pose")
         object.__setattr__(self, "heading_rad", wrap_angle(self.heading_rad))
 
     def turned(self, angle_rad: float) -> "GroundPose":

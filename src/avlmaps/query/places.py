@@ -92,7 +92,7 @@ def describe_place(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: fl
         QueryError: a number is not finite, or the radius not in (0, 5].
     """
     if not (np.isfinite(point).all() and np.abs(point).max(initial=0.0) < 1e6):
-        raise QueryError("The place is no point in metres; give finite numbers, such as 1.5,2.0,0.8.")
+        raise QueryError("The place is not a point in metres; give finite numbers, such as 1.5,2.0,0.8.")
     if not 0.0 < radius_m <= 5.0:
         raise QueryError(f"The radius is {radius_m:g} m; it must be over 0 and at most 5.")
     rows = voxels_near(avlmap, point, radius_m)

@@ -37,7 +37,7 @@ class GroundTransform:
 
     def __post_init__(self) -> None:
         if not (isfinite(self.yaw_rad) and abs(self.x_m) < _FAR_M and abs(self.y_m) < _FAR_M):
-            raise ValueError(f"({self.x_m}, {self.y_m}) m, {self.yaw_rad} rad is no transform between two floors")
+            raise ValueError(f"({self.x_m}, {self.y_m}) m, {self.yaw_rad} rad is not a transform between two floors")
         object.__setattr__(self, "yaw_rad", wrap_angle(self.yaw_rad))
 
     def __matmul__(self, other: "GroundTransform") -> "GroundTransform":

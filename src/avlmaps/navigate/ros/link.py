@@ -168,7 +168,7 @@ def address(url: str) -> str:
         host, port, parts = None, None, urlsplit("")
     if parts.scheme not in ("ws", "wss") or not host or parts.username or any(c <= " " or c > "~" for c in url):
         raise NavigationError(
-            f"{sanitize_line(url)!r} is no address of a rosbridge; write it as ws://HOST:{DEFAULT_PORT}."
+            f"{sanitize_line(url)!r} is not an address of a rosbridge; write it as ws://HOST:{DEFAULT_PORT}."
         )
     port = port or (DEFAULT_PORT if parts.scheme == "ws" else 443)
     name = f"[{host}]" if ":" in host else host

@@ -34,14 +34,14 @@ class PairedNetworks:
         checksum: of both and of how they are mixed.
 
     Raises:
-        ValueError: the second network tells categories that the first does not.
+        ValueError: the second network has categories that the first lacks.
     """
 
     def __init__(self, first: SceneNetwork, second: SceneNetwork) -> None:
         self._first, self._second = first, second
         self.notes: Notes = first.notes
         if more := sorted(set(second.notes.categories) - set(first.notes.categories)):
-            raise ValueError(f"The second network tells {', '.join(more)}, which the first does not; swap them.")
+            raise ValueError(f"The second network has {', '.join(more)}, which the first lacks; swap them.")
         self._column = np.array([first.notes.categories.index(name) for name in second.notes.categories])
         both = f"{first.checksum} {second.checksum} {NO_SAY} {SAME_SAY}"
         self.checksum = sha256(both.encode()).hexdigest()
