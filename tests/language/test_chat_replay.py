@@ -50,7 +50,7 @@ def test_what_was_asked_twice_is_answered_in_order(path: Path) -> None:
 @pytest.mark.parametrize(
     ("request_", "why"),
     [
-        (_request("Command: “go”"), "nothing like “Command: “go”” was asked when it was recorded"),
+        (_request("Command: “go”"), "nothing like “Command: “go”” was requested when it was recorded"),
         (_request(model="n"), "it was recorded with the model 'm', not 'n'"),
         (_request(prompt="You draw."), "the skills or the words of the prompt have changed since"),
         (_request(temperature=0.5), "temperature, seed or most tokens, are others"),
@@ -63,7 +63,7 @@ def test_what_was_not_recorded_is_refused_and_the_difference_named(path: Path, r
     with pytest.raises(LanguageError) as told:
         replay.answer(request_)
     assert why in str(told.value)
-    assert "delete the file to record it anew" in str(told.value)
+    assert "delete the file to record it again" in str(told.value)
 
 
 def test_an_earlier_turn_of_the_conversation_counts(path: Path) -> None:
@@ -95,7 +95,7 @@ def test_an_empty_file_is_no_recording(path: Path) -> None:
 def test_a_file_of_anything_else_is_named_by_its_line(path: Path, line: bytes) -> None:
     _recorded(path, (_request(), TURN))
     path.write_bytes(path.read_bytes() + line + b"\n")
-    with pytest.raises(LanguageError, match=r"Line 2 of the replay file .*chat\.jsonl is no recorded exchange"):
+    with pytest.raises(LanguageError, match=r"Line 2 of the replay file .*chat\.jsonl is not a recorded exchange"):
         Replay.open(path)
 
 

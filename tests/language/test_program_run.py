@@ -255,7 +255,7 @@ def test_a_budget_of_nothing_is_a_mistake(name: str, limit: Any) -> None:
         ("x = 'a' if 2 > 1 else None\nget_map(obj=x, area=x)", "takes exactly one of"),
         ("a = 'x' if 2 > 1 else 1\nfor i in a:\n    pass", "Line 2: `for` goes through"),
         ("a = 2 if 2 > 1 else get_map('x')\na += [1]", "Line 2: `+` takes"),
-        ("a = [1] if 2 > 1 else 2\na += [1]", "Line 2: a list is not changed but made anew"),
+        ("a = [1] if 2 > 1 else 2\na += [1]", "Line 2: a list is not changed but made again"),
         ("a = get_map('x') if 2 > 1 else 2\nif a:\n    pass", "Line 2: a Heat is neither true nor false"),
     ],
 )  # fmt: skip

@@ -72,13 +72,13 @@ class Clip:
     path: str
 
 
-# What a movement can be told to go to: a phrase ("chair"), a place, or a heatmap (its best place).
+# The target of a movement: a phrase ("chair"), a place, or a heatmap (its best place).
 Target = str | Place | Heat
 
 
 @runtime_checkable
 class Vocabulary(Protocol):
-    """What a robot can be told to do. A skill whose thing is not in the map raises ``GoalNotFoundError``."""
+    """The skills of a robot. A skill whose thing is not in the map raises ``GoalNotFoundError``."""
 
     def load_image(self, path: str) -> Picture:
         """Load a picture from a file, to ask where it was taken."""

@@ -1,6 +1,6 @@
 """From a command to a program by a chat model: any endpoint of the OpenAI protocol, hosted or on the same machine.
 
-The extra `chat` brings the official client; it is imported when a model is asked, not before.
+The extra `chat` brings the official client; it is imported when a model is called, not before.
 """
 
 from avlmaps.language.chat.prompt import system_prompt

@@ -29,7 +29,7 @@ class Answer:
 
     Attributes:
         content: its text, empty where it gave none.
-        refusal: the sentence with which it refused, where the server tells that apart.
+        refusal: the sentence with which it refused, where the server marks refusals.
         finish: why it ended: "stop", "length", "content_filter", "tool_calls", or what else the server says.
         tool_calls: how many tools it wanted to call.
         model: the model that answered, as the server names it.

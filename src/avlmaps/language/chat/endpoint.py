@@ -1,4 +1,4 @@
-"""A server of the chat protocol, asked through the official `openai` client.
+"""A server of the chat protocol, called through the official `openai` client.
 
 The client makes the requests; attempts, the deadline, the limit on what is read and the sentences for faults are here,
 the same for every server: one deadline holds all attempts, nothing endless is read, no redirect is followed (it would
@@ -158,7 +158,7 @@ class Endpoint:
         )
 
     def _on_request(self, request: Any) -> None:
-        """Take away what the client adds from the environment of the hosted service when another is asked."""
+        """Take away what the client adds from the environment of the hosted service when another is called."""
         if not self._settings.hosted:
             for header in [name for name in request.headers if _FOR_THE_HOSTED.match(name)]:
                 del request.headers[header]

@@ -11,8 +11,8 @@ def fault_sentence(fault: EndpointFault, settings: ChatSettings, model: str, att
     Args:
         fault: what happened.
         settings: of the server.
-        model: that was asked.
-        attempts: how often it was asked.
+        model: the model that was called.
+        attempts: how often it was called.
         offered: names of models that the server has, empty where it does not say.
     """
     url = settings.shown_url

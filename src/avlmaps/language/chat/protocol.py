@@ -101,7 +101,7 @@ def read_models(raw: bytes) -> tuple[str, ...]:
 
 
 def read_error(status: int, raw: bytes, retry_after: str | None) -> EndpointFault:
-    """Return the fault that a body of an HTTP error tells, in whichever of the usual shapes."""
+    """Return the fault in a body of an HTTP error, in any of the usual shapes."""
     fault = EndpointFault("status", status, retry_after_s=_seconds(retry_after))
     try:
         body = msgspec.json.decode(raw)

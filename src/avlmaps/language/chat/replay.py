@@ -98,7 +98,7 @@ class Replay:
         if not answers:
             raise LanguageError(
                 f"The replay file {self.path} holds no answer to this request ({fingerprint[:12]}): "
-                f"{self._difference(request)}; delete the file to record it anew."
+                f"{self._difference(request)}; delete the file to record it again."
             )
         turn = self._used.get(fingerprint, 0)
         self._used[fingerprint] = turn + 1
@@ -135,7 +135,7 @@ class Replay:
         if not self._lines:
             return "the file is empty"
         if not like:
-            return f"nothing like {quoted(asked, 120)} was asked when it was recorded"
+            return f"nothing like {quoted(asked, 120)} was requested when it was recorded"
         if all(line.model != request.model for line in like):
             return f"it was recorded with the model {like[-1].model!r}, not {request.model!r}"
         if all(line.prompt != _prompt_hash(request.messages) for line in like):
@@ -154,10 +154,10 @@ def _line(path: Path, number: int, text: bytes) -> _Line:
         line = msgspec.json.decode(text, type=_Line)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         raise LanguageError(
-            f"Line {number} of the replay file {path} is no recorded exchange; delete the file to record it anew."
+            f"Line {number} of the replay file {path} is not a recorded exchange; delete the file to record it again."
         ) from None
     if line.version != _VERSION:
         raise LanguageError(
-            f"The replay file {path} has version {line.version}, not {_VERSION}; delete it to record it anew."
+            f"The replay file {path} has version {line.version}, not {_VERSION}; delete it to record it again."
         )
     return line

@@ -1,4 +1,4 @@
-"""What a chat translator is told: which model, where it is, and how long to wait for it."""
+"""The settings of a chat translator: which model, where it is, and how long to wait for it."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -43,7 +43,7 @@ class ChatSettings:
     seed: int | None = 0
     """Seed of the model's choices; none: as the server likes."""
     replay: Path | None = None
-    """A JSONL file: made and filled with every exchange where it is missing, asked instead of the model where it is."""
+    """A JSONL file: written with every exchange where it is missing, else read instead of calling the model."""
 
     def __post_init__(self) -> None:
         split = _split(self.base_url)

@@ -34,7 +34,7 @@ class ChatTranslator:
     A program that does not parse, or that loads a file which the command does not name, goes back to the model with
     the sentence that says why; so does one that failed while it ran, with what was done before. Each command has
     `ChatSettings.rounds` such corrections in all. A program that moves nothing goes back as well; one that asks for
-    something all the same is taken the second time, for the model may know that nothing more was said.
+    something again is taken the second time, for the model may know that nothing more was said.
     """
 
     def __init__(self, settings: ChatSettings | None = None) -> None:
@@ -62,7 +62,7 @@ class ChatTranslator:
     def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:
         """Return a program for what is left of a command after its program failed, None where no round is left.
 
-        The new program goes on from where the robot stands: it is not to repeat what was done, and nothing that the
+        The new program continues from where the robot stands: it is not to repeat what was done, and nothing that the
         failed program gave a name to is known in it.
 
         Args:
@@ -70,7 +70,7 @@ class ChatTranslator:
             program: the program that failed.
             error: the sentence that says why.
             done: the steps that were done before it failed, one text each, such as `move_to(target="sofa")`. Without
-                them the model is told that all before the failing line was done, and has to find out which that is.
+                them the prompt says that all before the failing line was done; the model has to find that line.
 
         Raises:
             LanguageError: no answer came, or none held a program.
@@ -142,11 +142,11 @@ class ChatTranslator:
 
 
 def check_moves(program: Program, *, insisted: bool = False) -> None:
-    """Refuse a program that moves nothing: it would be told as done, with nothing done.
+    """Refuse a program that moves nothing: it would be reported as done, with nothing done.
 
     Args:
         program: what a model wrote.
-        insisted: whether the model was told so before, or cannot be; then a program that asks for something is taken.
+        insisted: whether the model had this refusal before, or cannot have it; then a program that asks is taken.
 
     Raises:
         UnusableAnswerError: it moves nothing.

@@ -1,6 +1,6 @@
 """Programs for robots: a small subset of Python, parsed and run over the table of skills, never by Python.
 
-``parse_program`` refuses whatever is no part of a program; ``run_program`` runs what is left within a budget.
+``parse_program`` refuses everything that is no part of a program; ``run_program`` runs the rest within a budget.
 """
 
 from avlmaps.language.program.budget import Budget

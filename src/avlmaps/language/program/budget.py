@@ -15,11 +15,11 @@ class Budget:
     """What one run of a program may use up; running past any of them stops it."""
 
     steps: int = 100_000
-    """Parts of the program that are worked out; going through a collection counts each of its elements."""
+    """Parts of the program that are computed; going through a collection counts each of its elements."""
     skill_calls: int = 200
     """Skills called."""
     elements: int = 200_000
-    """Elements of collections and characters of strings made, those kept in the trace too; never given back."""
+    """Elements of collections and characters of strings made, also those in the trace; never given back."""
     factors: int = 16
     """Heatmaps multiplied into one."""
     seconds: float = 1800.0

@@ -1,4 +1,4 @@
-"""What can be told of a program before it runs: names without a value, and kinds that do not fit.
+"""Checks of a program before it runs: names without a value, and kinds that do not fit.
 
 A robot that has begun to move should not stop half way for a slip that could be seen from the start.
 """
@@ -154,7 +154,7 @@ class _Kinds:
         return self.settled
 
     def see(self, statement: syntax.Statement) -> None:
-        """Add what one statement tells of its names' kinds; refuse what cannot be."""
+        """Add what one statement shows of its names' kinds; refuse what cannot be."""
         match statement:
             case syntax.Assign():
                 self._give(statement)
@@ -239,7 +239,7 @@ class _Kinds:
         return Kind.TRUTH
 
     def logical(self, part: syntax.Logical) -> Guess:
-        # Each operand is worked out once: twice at each level would double the work with every level of nesting.
+        # Each operand is computed once: twice at each level would double the work with every level of nesting.
         kinds = [self.of(operand) for operand in part.operands]
         for operand, kind in zip(part.operands[:-1], kinds, strict=False):
             if isinstance(kind, Kind):
@@ -299,7 +299,7 @@ _GUESS: dict[type, Callable[[_Kinds, Any], Guess]] = {
 def grown(statement: syntax.Update) -> ProgramError:
     """Return the refusal of `+=` on a list, which in Python changes it under all of its names."""
     name = statement.name
-    return refused(statement.line, f"a list is not changed but made anew; write `{name} = {name} + [...]`")
+    return refused(statement.line, f"a list is not changed but made again; write `{name} = {name} + [...]`")
 
 
 def misfit(line: int, target: syntax.Target, values: int) -> ProgramError:

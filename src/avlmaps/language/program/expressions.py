@@ -31,7 +31,7 @@ class Expressions:
         return self.tokens[self.at]
 
     def take(self) -> Token:
-        """Return the token that comes next, and go on."""
+        """Return the token that comes next, and advance."""
         token = self.tokens[self.at]
         self.at += 1
         return token

@@ -39,7 +39,7 @@ from avlmaps.language.program.values import (
 )
 from avlmaps.language.vocabulary import Vocabulary
 
-# Between two skills the clock is looked at once in so many steps.
+# Between two skills the clock is read once in this many steps.
 _STEPS_BETWEEN_LOOKS = 256
 
 
@@ -51,7 +51,7 @@ def run_program(
     *,
     clock: Callable[[], float] = monotonic,
 ) -> Trace:
-    """Run a program to its end, or to its first error; the trace tells which, and what was done.
+    """Run a program to its end, or to its first error; the trace holds the error, and what was done.
 
     Errors of the project's family that a skill raises end the program and stand in the trace. Any other exception is a
     mistake of the vocabulary's programmer and comes through, as does the user's interrupt.
@@ -60,7 +60,7 @@ def run_program(
         program: what to run.
         vocabulary: whose skills are called.
         budget: what the run may use up; the defaults where none is given.
-        on_step: told of each step once it is over, a failed one too.
+        on_step: called with each step once it is over, a failed one too.
         clock: seconds; replaced in tests.
 
     Raises:
@@ -88,7 +88,7 @@ class _SkillFailedError(Exception):
 
 
 class _Next(Enum):
-    """Where a run goes on after a statement."""
+    """Where a run continues after a statement."""
 
     STATEMENT = auto()
     ROUND = auto()
@@ -117,7 +117,7 @@ class _Run:
     # ---- the budget
 
     def step(self, line: int, count: int = 1) -> None:
-        """Count parts worked out; stop the program that has used them up."""
+        """Count computed parts; stop the program that has used them up."""
         before = self.worked_out
         self.worked_out += count
         if self.worked_out > self.budget.steps:

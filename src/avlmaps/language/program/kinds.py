@@ -54,7 +54,7 @@ def kind_of_result(line: int, operator: str, left: Kind, right: Kind) -> Kind:
     """Return the kind that an arithmetic operator makes of two.
 
     Raises:
-        ProgramError: it makes nothing of these.
+        ProgramError: it does not take these.
     """
     try:
         return _RESULTS[operator][left, right]

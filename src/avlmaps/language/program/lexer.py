@@ -1,4 +1,4 @@
-"""From text to tokens; whatever no program may contain is refused here, by name and line.
+"""From text to tokens; everything that no program may contain is refused here, by name and line.
 
 Python's own parser is not used: it opens files to quote them in errors, warns through hooks, changes between versions
 and can be made to blow up by nesting. What is read here means the same in Python, which a test holds it to.

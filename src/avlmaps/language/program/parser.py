@@ -28,7 +28,7 @@ _UPDATES = frozenset({"+=", "-=", "*=", "/=", "//=", "%="})
 
 
 def parse_program(text: str) -> Program:
-    """Return the program that a text is, everything checked that can be told before it runs.
+    """Return the program that a text is, with every check that can be made before it runs.
 
     Args:
         text: lines in a small subset of Python; see docs/programs.md.
@@ -164,5 +164,5 @@ class _Statements(Expressions):
             if len(names) == len(written.elements):
                 return Target(tuple(check_assignable(line, name) for name in names), unpacks=True)
         if isinstance(written, Element):
-            raise refused(line, "a list is not changed but made anew, as in `a = a + [b]`")
+            raise refused(line, "a list is not changed but made again, as in `a = a + [b]`")
         raise refused(line, "only a name is given a value, or several as in `a, b = 1, 2`; put it left of the `=`")

@@ -148,7 +148,7 @@ class Argument:
 
 @dataclass(frozen=True, slots=True)
 class SkillCall:
-    """A call of a skill, its arguments in the order in which they are worked out."""
+    """A call of a skill, its arguments in the order in which they are computed."""
 
     skill: str
     arguments: tuple[Argument, ...]

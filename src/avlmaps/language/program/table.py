@@ -27,7 +27,7 @@ _KINDS: dict[Any, tuple[Kind, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One thing that a skill is told.
+    """One parameter of a skill.
 
     Attributes:
         name: its keyword.
