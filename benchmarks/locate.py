@@ -36,7 +36,7 @@ def painted(rng: np.random.Generator) -> np.ndarray:
 
 
 def picture(wall: np.ndarray, shift_px: int, rng: np.random.Generator) -> np.ndarray:
-    """Return what a camera sees of a wall from a little to the side."""
+    """Return the view of a wall from a little to the side."""
     seen = wall[20:500, 20 + shift_px : 660 + shift_px].astype(np.int16)
     return (seen + rng.normal(scale=3.0, size=seen.shape)).clip(0, 255).astype(np.uint8)
 

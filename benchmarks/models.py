@@ -144,7 +144,7 @@ def loaded_weights(module: type) -> int:
 
 
 def shape(made: Any) -> str:
-    """Return what came out: its sizes, or the number of keypoints."""
+    """Return the size of the output, or the number of keypoints."""
     if isinstance(made, LocalFeatures):
         return f"{len(made.xy)} keypoints"
     made = made[0] if isinstance(made, list) else made

@@ -137,7 +137,7 @@ README_FIGURES = (
 
 
 def read_figures(path: Path = FIGURES) -> dict[str, Any]:
-    """Return what was measured, by the name of the entry."""
+    """Return the measurements, by the name of the entry."""
     return json.loads(path.read_text(encoding="utf-8"))
 
 

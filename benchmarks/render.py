@@ -28,7 +28,7 @@ CAMERA = Pinhole(277.0, 277.0, 160.0, 120.0, 320, 240)
 
 
 def embree_caster(scene: Scene) -> Callable[[np.ndarray], object] | None:
-    """Return what casts a view's rays through embree; None where it is not installed."""
+    """Return a caster of a view's rays through embree; None where it is not installed."""
     try:
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene

@@ -14,7 +14,7 @@ THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
 
 
 def use_one_thread() -> None:
-    """Keep every library to one thread; call it before numpy is imported."""
+    """Limit every library to one thread; call it before numpy is imported."""
     for variable in THREAD_VARIABLES:
         os.environ[variable] = "1"
 

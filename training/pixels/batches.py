@@ -43,11 +43,11 @@ class Frames:
 
     @property
     def is_real(self) -> bool:
-        """Say whether the frames are real ones; their cameras have one number more."""
+        """Return whether the frames are real ones; their cameras have one number more."""
         return self.camera.shape[1] > 8
 
     def height_is_known(self, index: int) -> bool:
-        """Say whether a camera's height is true; of some real frames it is an estimate."""
+        """Return whether a camera's height is true; for some real frames it is an estimate."""
         return not self.is_real or bool(self.camera[index, 8])
 
 
@@ -84,7 +84,7 @@ class Shards:
         self.refresh()
 
     def refresh(self) -> int:
-        """Look for shards that are new; return how many frames there are."""
+        """Search for new shards; return how many frames there are."""
         found: dict[str, tuple[int, Frames]] = {}
         for folder in sorted(self.folder.glob("[0-9]*")):
             try:

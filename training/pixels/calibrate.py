@@ -70,7 +70,7 @@ class Scores:
 
 @torch.no_grad()
 def scores_of(network: nn.Module, chosen: list, seed: int) -> Scores:
-    """Look at frames as the running system does: whole, and in colour where they have it."""
+    """Encode frames as the running system does: whole, and in colour where they have it."""
     rng = np.random.default_rng(seed)
     category, label, room, share = [], [], [], []
     for frames, index in chosen:

@@ -18,7 +18,7 @@ def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
 
 
 def write_start(network: RoomNetwork, path: Path) -> None:
-    """Keep the weights, in half precision, so that another training can continue from them."""
+    """Store the weights, in half precision, so that another training can continue from them."""
     arrays = {name: value.numpy() for name, value in network.state_dict().items()}
     path.write_bytes(b"")
     np.savez_compressed(path, **{n: a.astype(np.float16) if a.dtype == np.float32 else a for n, a in arrays.items()})
@@ -43,7 +43,7 @@ def write_onnx(network: RoomNetwork, path: Path) -> None:
 
 
 def _halve(path: Path) -> None:
-    """Keep large weights in half precision; a cast widens them when the file is loaded."""
+    """Store large weights in half precision; a cast widens them when the file is loaded."""
     model = onnx.load(path)
     graph, casts = model.graph, []
     for weight in list(graph.initializer):

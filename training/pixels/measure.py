@@ -85,7 +85,7 @@ class Options:
     rendered: Path = Path("build/pixels/held-out")
     """Rendered frames held out."""
     flip: bool = False
-    """Look at mirror images as well."""
+    """Encode mirror images as well."""
 
 
 def main(options: Options) -> None:

@@ -37,7 +37,7 @@ class Joint(nn.Module):
         nn.init.zeros_(self.norm.weight)
 
     def forward(self, x: Tensor) -> Tensor:
-        """Return what is added."""
+        """Return the residual."""
         return self.norm(self.mix(x))
 
 
@@ -114,7 +114,7 @@ def _doubled(x: Tensor) -> Tensor:
 
 
 def has_bfloat16(device: torch.device) -> bool:
-    """Say whether the device multiplies bfloat16 rather than imitates it (three times slower than float32)."""
+    """Return whether the device multiplies bfloat16 rather than imitates it (three times slower than float32)."""
     return device.type != "cpu" or torch.cpu._is_avx512_bf16_supported()
 
 

@@ -40,7 +40,7 @@ class Options:
 
 @torch.no_grad()
 def pooled(network: RoomNetwork, options: Options) -> tuple[Tensor, Tensor]:
-    """Return what the room head is given for each picture, and the share of the view in each kind of room."""
+    """Return the room head's input for each picture, and the share of the view in each kind of room."""
     rng, shards = np.random.default_rng(options.seed), Shards(options.frames)
     kept: list[Tensor] = []
     handle = network.room.register_forward_pre_hook(lambda _, inputs: kept.append(inputs[0].clone()))

@@ -86,7 +86,7 @@ def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.Calibra
 def notes(
     corpus: Corpus, words: EmbeddedWords, c: calibrate.Calibration, each: int, examples: list[int]
 ) -> dict[str, Any]:
-    """Return what is shipped beside the network."""
+    """Return the notes that ship beside the network."""
     shipped = [clip for clip in corpus.clips if clip.may_ship]
     counts = Counter(NAMES[clip.kind] for clip in shipped)
     kinds = [

@@ -77,7 +77,7 @@ def moved(power: Tensor, how: Augmentation, generator: torch.Generator) -> Tenso
 
 
 def trimmed(power: Tensor, how: Augmentation, generator: torch.Generator) -> Tensor:
-    """Keep only a piece around a loud frame of some sounds, as a segmented track gives them."""
+    """Cut some sounds to a piece around a loud frame, as a segmented track gives them."""
     n = len(power)
     chosen = torch.rand(n, generator=generator) < how.trimmed
     loud = power.sum(dim=2).sqrt()

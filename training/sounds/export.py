@@ -30,7 +30,7 @@ class _Graph:
         return name
 
     def half(self, values: np.ndarray) -> str:
-        """Keep weights in half precision; they are widened when the file is loaded."""
+        """Store weights in half precision; they are widened when the file is loaded."""
         self._count += 1
         name = f"weight{self._count}"
         self.weights.append(numpy_helper.from_array(values.astype(np.float16), name))

@@ -69,7 +69,7 @@ class KeptOut:
 
     @classmethod
     def of(cls, queries: Iterable[str]) -> "KeptOut":
-        """Return what has to be held out for these queries."""
+        """Return the phrases that must be held out for these queries."""
         queries = list(queries)
         return cls(frozenset(map(literal_key, queries)), frozenset(map(content_key, queries)))
 

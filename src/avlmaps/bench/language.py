@@ -68,7 +68,7 @@ def read_list(path: Path) -> list[Row]:
 
 
 def judge(row: Row) -> Judged:
-    """Return what becomes of a row."""
+    """Return the outcome of a row."""
     if "question" in row:
         return _judge_question(row)
     got = _intents_of(row)

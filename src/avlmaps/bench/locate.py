@@ -40,7 +40,7 @@ _LOCATING, _KEYFRAMES = LocateSettings(), KeyframeSettings()
 
 @dataclass(frozen=True, slots=True)
 class MapOfPictures:
-    """As much of a map as locating needs.
+    """The parts of a map that locating needs.
 
     Attributes:
         keyframes: what was seen.
@@ -152,7 +152,7 @@ def foreign_errors(
     seed: int,
     settings: LocateSettings = _LOCATING,
 ) -> Errors:
-    """Ask for photos of another place; the errors of those that were located are not numbers."""
+    """Locate photos of another place; the errors of those that were located are not numbers."""
     answers: list[tuple[float, float, float]] = []
     for rgb in progress(pictures, "locating others", unit="photo"):
         found = locate(stored, rgb, None, np.random.default_rng(seed), settings)

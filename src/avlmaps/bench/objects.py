@@ -83,7 +83,7 @@ class ObjectFigures:
 
 
 def measure(asked: "AVLMap", things: Sequence[SceneObject], same: Mapping[str, str], scene: str) -> ObjectFigures:
-    """Ask a map for everything that it could hold and compare with what is there.
+    """Query a map for everything that it could hold and compare with the truth.
 
     Args:
         asked: the map.

@@ -206,7 +206,7 @@ def drive(
 
 
 def translator_for(verb: "Go", asked: "AVLMap | None" = None) -> "Translator":
-    """Return what turns the command into a program.
+    """Return the translator of the command.
 
     Args:
         verb: the command; it names the translator.

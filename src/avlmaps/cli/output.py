@@ -21,7 +21,7 @@ _SHOWN = 200
 
 
 def system_sentence(error: OSError | MemoryError) -> str:
-    """Return what the system refused, without its numbers for it."""
+    """Return the reason of the system's refusal, without its error number."""
     if isinstance(error, MemoryError):
         return "there is not enough memory for this; check the sizes in the input, or free some"
     if error.filename is None or error.strerror is None:
@@ -37,7 +37,7 @@ def error_answer(kind: str, message: str) -> dict[str, Any]:
 
 
 def kind_of(error: BaseException) -> str:
-    """Return what scripts call a kind of error: ``recording``, ``goal-not-found``, ``usage`` and so on."""
+    """Return the name of a kind of error for scripts: ``recording``, ``goal-not-found``, ``usage`` and so on."""
     return "system" if isinstance(error, OSError) else kind_named(type(error).__name__)
 
 

@@ -1,4 +1,4 @@
-"""Says so where the first run on a machine compiles its loops, which takes up to a minute; later runs load them."""
+"""The notice that the first run on a machine compiles its loops, which takes up to a minute; later runs load them."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -35,7 +35,7 @@ def plural_of(phrase: str) -> str:
 
 
 def singulars_of(phrase: str) -> tuple[str, ...]:
-    """Return what a phrase may be the plural of, the likeliest first; not all of them are words."""
+    """Return the possible singulars of a phrase, the likeliest first; not all of them are words."""
     out: dict[str, None] = {}
     for text in (phrase.lower(), phrase.lower().replace("-", " ")):
         words = text.split()

@@ -217,7 +217,7 @@ class Lexicon:
         return tuple(spelling for spelling, _ in self.scored_suggestions(word, kind, most))
 
     def scored_suggestions(self, word: str, kind: Kind | None = None, most: int = 3) -> tuple[tuple[str, float], ...]:
-        """Return what `suggest` does, each with how alike it is: 1 is the word itself, 0 nothing in common."""
+        """Return the names of `suggest`, each with its likeness: 1 is the word itself, 0 nothing in common."""
         return self._spellers[kind].suggest(word, most)
 
     def words(self) -> frozenset[str]:

@@ -23,7 +23,7 @@ def silence(quiet: bool = True) -> None:
 
 @contextmanager
 def silence_progress(quiet: bool = True) -> Iterator[None]:
-    """Keep progress off for a while, and put it back as it was; with ``quiet=False`` change nothing."""
+    """Switch progress off for a while, and put it back as it was; with ``quiet=False`` change nothing."""
     before = _quiet
     silence(before or quiet)
     try:

@@ -91,7 +91,7 @@ def spoken(categories: Iterable[str]) -> list[str]:
 
 
 def by_words(evidence: Evidence) -> Ask | None:
-    """Ask for the largest shown thing by a word that was never a label."""
+    """Query the largest shown thing by a word that was never a label."""
     for category in spoken(thing.category for thing in evidence.objects):
         own = evidence.of_category(category)
         if evidence.shown[own].any():
@@ -102,7 +102,7 @@ def by_words(evidence: Evidence) -> Ask | None:
 
 
 def near_a_sound(evidence: Evidence, rng: np.random.Generator, used: Sequence[str] = ()) -> Ask | None:
-    """Ask for a thing of which there are several, by a sound that was heard in one place."""
+    """Query a thing of which there are several, by a sound that played in one place."""
     names = [event.category for event in evidence.events]
     once = [evidence.events[i] for i in rng.permutation(len(names)) if names.count(evidence.events[i].category) == 1]
     for wanted, near_m, margin_m in _RULES:
@@ -118,7 +118,7 @@ def near_a_sound(evidence: Evidence, rng: np.random.Generator, used: Sequence[st
 
 
 def like_a_clip(evidence: Evidence, folder: Path, rng: np.random.Generator, used: Sequence[str] = ()) -> Ask | None:
-    """Ask where a sound of the same kind as another recording was heard; the caller writes that recording."""
+    """Query the place of a sound of the same kind as another recording; the caller writes that recording."""
     if not evidence.events:
         return None
     order = [evidence.events[i] for i in rng.permutation(len(evidence.events))]
@@ -132,7 +132,7 @@ def like_a_clip(evidence: Evidence, folder: Path, rng: np.random.Generator, used
 
 
 def in_a_room(evidence: Evidence, rng: np.random.Generator, used: Sequence[str] = ()) -> Ask | None:
-    """Ask for a thing that stands in rooms of several kinds, in one of these."""
+    """Query a thing that stands in rooms of several kinds, in one of these."""
     rooms = sorted(ROOMS, key=lambda kind: (ROOMS.index(kind) > 4, rng.random()))
     for wanted in (FURNITURE, SMALL):
         for (category, own), kind in product(_several(evidence, wanted, used), rooms):
@@ -152,7 +152,7 @@ def in_a_room(evidence: Evidence, rng: np.random.Generator, used: Sequence[str] 
 def near_a_photo(
     evidence: Evidence, photos: Sequence[PhotoView], folder: Path, used: Sequence[str] = ()
 ) -> tuple[Ask, PhotoView] | None:
-    """Ask for a thing of which there are several, by a photo that shows one; the caller writes that photo."""
+    """Query a thing of which there are several, by a photo that shows one; the caller writes that photo."""
     for wanted, near_m, margin_m in _RULES:
         for (category, own), photo in product(_several(evidence, wanted, used), photos):
             place = photo.world_from_camera[:3, 3].tolist()
@@ -169,7 +169,7 @@ def near_a_photo(
 
 
 def not_there(evidence: Evidence, rng: np.random.Generator) -> Ask | None:
-    """Ask for what the home lacks."""
+    """Query a thing that the home lacks."""
     there = {thing.category for thing in evidence.objects}
     lacking = [name for name in RARE if name not in there]
     if not lacking:

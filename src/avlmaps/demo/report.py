@@ -123,7 +123,7 @@ def _home(sheet: Sheet, home: Plan, evidence: "Evidence") -> str:
 
 
 def _strip(recording: "Recording", asked: "AVLMap", moments: int) -> Strip:
-    """Look again at some moments of the walk, as the map's own pixel encoder does."""
+    """Encode some moments of the walk again, as the map's own pixel encoder does."""
     from avlmaps.core.progress import progress
     from avlmaps.maps.gravity.stage import attach_estimated_ground
     from avlmaps.maps.settings import DEFAULTS

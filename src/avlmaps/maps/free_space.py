@@ -69,7 +69,7 @@ class FreeViewCollector:
         self._pose.append(np.array(frame.world_from_camera, np.float64))
 
     def views(self) -> FreeViews:
-        """Return what was collected."""
+        """Return the collected evidence."""
         clear = np.stack(self._clear) if self._clear else np.zeros((0, *self._shape), np.uint16)
         return FreeViews(clear, np.stack(self._pose) if self._pose else np.zeros((0, 4, 4)))
 

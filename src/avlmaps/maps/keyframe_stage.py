@@ -65,7 +65,7 @@ def describe_keyframes(plan: Plan, parts: Sequence[Part]) -> KeyframeResult:
 def _learn(
     plan: Plan, good: Recording, chosen: Int[np.ndarray, " k"], folder: Path, key: str
 ) -> tuple[dict[str, np.ndarray], dict[int, LocalFeatures], float]:
-    """Return what the place encoder learns, the keypoints that it learned from (if it did now), and the seconds."""
+    """Return the state of the place encoder, the keypoints that it learned from (if it did now), and the seconds."""
     local: dict[int, LocalFeatures] = {}
     found = find_checkpoint(folder, _Facts, key)
     if found is None:
@@ -85,7 +85,7 @@ def _look(
     local: dict[int, LocalFeatures],
     key: str,
 ) -> None:
-    """Look at lots of keyframes and keep each in its folder."""
+    """Encode lots of keyframes and store each lot in its folder."""
     left = sum(map(len, lots.values()))
     blind = replace(plan.used, views="")  # the views are encoded ahead, in batches
     with closing(_viewed(plan, good, list(lots.values()))) as viewed:

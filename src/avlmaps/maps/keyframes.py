@@ -121,7 +121,7 @@ def perceive_keyframes(
     progress: Callable[..., Iterable[int]] = progress,
     settings: KeyframeSettings = KeyframeSettings(),
 ) -> tuple[Keyframes, dict[str, np.ndarray]]:
-    """Look at the chosen frames: local, place and view features, 3D points, thumbnails.
+    """Encode the chosen frames: local, place and view features, 3D points, thumbnails.
 
     Args:
         recording: where the frames are; read one at a time.

@@ -69,7 +69,7 @@ def make_plan(recording: Recording, path: Path, used: Profile, settings: BuildSe
 
 
 def audio_key(recording: Recording) -> list[str | float] | None:
-    """Return what identifies a sound track: a recording can be given another one."""
+    """Return the values that identify a sound track: a recording can be given another one."""
     track = recording.audio
     if track is None:
         return None
@@ -126,7 +126,7 @@ def require_unchanged(plan: Plan, stamp: str) -> None:
 
 
 def _difference(plan: Plan, there: MapInfo) -> str:
-    """Say in words what the finished map was built with that this build is not."""
+    """Return in words how the finished map's ingredients differ from this build's."""
     if there.recording.fingerprint != plan.recording.fingerprint:
         return "(another recording, or it has changed)"
     if there.profile != plan.used.name:

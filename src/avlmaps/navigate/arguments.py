@@ -25,5 +25,5 @@ def number_of(value: object, skill: str, most: float, unit: str) -> float:
 
 
 def kind_of(value: object) -> str:
-    """Return what a value is, for the sentence of an error."""
+    """Return the kind of a value, for the sentence of an error."""
     return f"a {type(value).__name__.lower()}"

@@ -77,7 +77,7 @@ class Watch:
         self._in_vain = 0
 
     def fault(self, pose: GroundPose) -> str:
-        """Return what is wrong after another movement, ``""`` while nothing is."""
+        """Return the fault after another movement, ``""`` while there is none."""
         x_m, y_m = self._route.at(self._route.along_m)
         self._in_vain += 1
         if self._route.along_m > self._farthest_m + _FARTHER_M:
@@ -116,7 +116,7 @@ class ActionController:
         self._aligned = False
 
     def action(self, pose: GroundPose) -> Action | None:
-        """Return what to do at a pose: `Action.STOP` at the end, None where no step is safe."""
+        """Return the next action at a pose: `Action.STOP` at the end, None where no step is safe."""
         if self._turns:
             left = self._turns > 0
             self._turns += -1 if left else 1

@@ -64,7 +64,7 @@ def named_files(command: str) -> tuple[str, ...]:
 
 
 def offered_by(command: str, roots: Sequence[Path] | None = None) -> Readable:
-    """Return what a command's program may read: what the command names, and what lies in some folders.
+    """Return the files that a command's program may read: those that the command names, and those in some folders.
 
     Args:
         command: what a person said.

@@ -18,7 +18,7 @@ from avlmaps.query.heatmap import Heatmap
 
 
 class Seeker:
-    """Asks a map what a program means.
+    """Finds in a map what a program means.
 
     Attributes:
         asked: the map.

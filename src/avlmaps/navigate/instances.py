@@ -37,7 +37,7 @@ class Thing:
 
 
 def describe_query(heat: Heatmap) -> str:
-    """Return what a heatmap asks for in words: ``'chair' near 'glass breaking'``."""
+    """Return the query of a heatmap in words: ``'chair' near 'glass breaking'``."""
     lead = heat.lead
     others = [f"{factor.part.query!r}" for factor in heat.factors if factor is not lead]
     return f"{lead.part.query!r}" + (f" near {' and '.join(others)}" if others else "")
@@ -68,7 +68,7 @@ def things_in(heat: Heatmap, guess: bool = False) -> list[Thing]:
 
 
 def _guesses(heat: Heatmap) -> Iterator[Heatmap]:
-    """Yield what may be meant by a heatmap, the highest confidence first."""
+    """Yield the possible meanings of a heatmap, the highest confidence first."""
     lead = Heatmap.of(heat.lead)
     yield heat
     yield heat.include_uncertain()

@@ -57,7 +57,7 @@ class Interrupted(KeyboardInterrupt):
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Return what the command line prints under --json."""
+        """Return the object that the command line prints under --json."""
         stopped = None if self.halt is None else self.halt.stopped
         return {"ok": False, "error": str(self), "signal": self.name, "robot_stopped": stopped}
 

@@ -83,7 +83,7 @@ class BatchPixelEncoder(PixelEncoder, Protocol):
         ...
 
     def encode_batch(self, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
-        """Return what ``encode`` returns for each frame (to rounding)."""
+        """Return the features of ``encode`` for each frame (to rounding)."""
         ...
 
 

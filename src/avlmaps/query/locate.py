@@ -35,7 +35,7 @@ class LocatableMap(Protocol):
 
     @property
     def profile(self) -> Profile:
-        """Whose encoders made the keyframes."""
+        """Profile of the encoders that made the keyframes."""
         ...
 
     @property
@@ -268,7 +268,7 @@ def _fit(
 def _from_the_nearest(
     stored: LocatableMap, local: LocalFeatures, fit: _Fit, rng: np.random.Generator, settings: LocateSettings
 ) -> _Fit:
-    """Ask the keyframe nearest to a pose alone, with the camera as it is known now; keep the fit where that is weak."""
+    """Match the keyframe nearest to a pose alone, with the refined camera; return the old fit where that is weak."""
     closest = np.array([nearest(stored.keyframes, fit.world_from_camera)])
     if np.array_equal(closest, fit.references):
         return fit

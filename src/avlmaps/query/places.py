@@ -81,7 +81,7 @@ def column_point(avlmap: "AVLMap", level_xy: Float[np.ndarray, "2"], radius_m: f
 
 
 def describe_place(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: float = 0.15) -> PlaceAnswer:
-    """Return what is at a point.
+    """Return the content of a map at a point.
 
     Args:
         avlmap: the map.

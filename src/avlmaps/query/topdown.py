@@ -34,7 +34,7 @@ class TopDown:
 
     @classmethod
     def of(cls, space: Space) -> "TopDown":
-        """Look at a map from above."""
+        """Project a map top-down."""
         voxel_size_m = space.grid.voxel_size_m
         level = space.level(space.centres)
         if not len(space):

@@ -24,7 +24,7 @@ def unknown_note(phrase: str, kind: Kind = Kind.THING) -> str:
 
 
 def _respelt(phrase: str, noun: str, kind: Kind) -> tuple[str, str]:
-    """Return what of a phrase is misspelt and the known name that it was probably meant to be, or ``""`` for that."""
+    """Return the misspelt words of a phrase and the known name that was probably meant, or ``""`` for that."""
     known = lexicon()
     before = phrase.lower().split()[: phrase.split().index(noun)]
     nouns = [(noun, near) for near in known.suggest(noun, kind)]

@@ -294,7 +294,7 @@ def _mixed(
 
 
 def _there(track: AudioTrack | None, rate_hz: int) -> Iterator[Float32[np.ndarray, " second"]]:
-    """Yield what a recording's own track holds, second by second from the recording's time 0, then silence."""
+    """Yield a recording's own track, second by second from the recording's time 0, then silence."""
     waiting = np.zeros(0, np.float32)
     if track is not None:
         late = round(track.start_s * rate_hz)

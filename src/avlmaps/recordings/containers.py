@@ -203,7 +203,7 @@ def _ends_at(file: "soundfile.SoundFile", count: int) -> bool:
 
 
 def _readable(path: Path) -> Iterator[Float32[np.ndarray, " _"]]:
-    """Yield what can be read of a file, from its beginning to its end or its first fault."""
+    """Yield the readable samples of a file, from its beginning to its end or its first fault."""
     with _opened_plain(path) as file:
         while True:
             try:

@@ -162,7 +162,7 @@ def _lower(message: str) -> str:
 
 
 def _impossible(description: Description) -> str:
-    """Return what in a well-formed description cannot be, or an empty string."""
+    """Return the impossible value of a well-formed description, or an empty string."""
     try:
         description.rig()
     except ValueError as error:

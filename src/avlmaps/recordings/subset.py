@@ -45,7 +45,7 @@ class Subset(Recording):
         return replace(self.whole.frame(int(self.indices[index])), index=index)
 
     def name(self, index: int) -> str:
-        """Return what the whole recording calls the frame."""
+        """Return the whole recording's name of the frame."""
         return self.whole.name(int(self.indices[index]))
 
     def colour_file(self, index: int) -> Path | None:

@@ -148,7 +148,7 @@ class Recording(ABC):
         return ""
 
     def name(self, index: int) -> str:
-        """Return what the recording calls a frame, without reading it."""
+        """Return the recording's name of a frame, without reading it."""
         return f"{index:06d}"
 
     def colour_file(self, index: int) -> Path | None:

@@ -85,7 +85,7 @@ class Building:
         self._room_m, self._floor_room_m = _room_m(blocked), _room_m(~np.pad(ground, 1))[1:-1, 1:-1]
 
     def arrays(self, radius_m: float) -> tuple:
-        """Return what the compiled loops need for a body of some radius."""
+        """Return the arrays that the compiled loops need for a body of some radius."""
         room_m = np.minimum(self._room_m, self._floor_room_m + radius_m)
         return (*self._sorted, room_m, self._ground, _FINE_M)
 

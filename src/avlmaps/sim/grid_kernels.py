@@ -6,7 +6,7 @@ from numba import njit
 
 @njit(cache=True)
 def _clip(polygon, count, axis, limit, sign, clipped):  # pragma: no cover - compiled
-    """Keep the part of a convex polygon with sign * (coordinate - limit) >= 0; return how many corners it has."""
+    """Clip a convex polygon to sign * (coordinate - limit) >= 0; return how many corners it has."""
     kept = 0
     for i in range(count):
         j = (i + 1) % count

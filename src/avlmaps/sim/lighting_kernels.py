@@ -212,7 +212,7 @@ def _seen(empty, sent, coarse, sky, px, py, pz, dx, dy, dz, out):  # pragma: no 
 
 @njit(cache=True)
 def gather(probe, ray, empty, low, cell_m, sent, coarse, sky, cube, free):  # pragma: no cover - compiled
-    """Look round from each probe and keep what comes from each of the six sides.
+    """Sample all directions from each probe and store the light from each of the six sides.
 
     Args:
         probe: (p, 3) places, metres.

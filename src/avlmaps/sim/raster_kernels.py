@@ -43,7 +43,7 @@ def _outside(box, rotation, shift, lens, width, height):  # pragma: no cover - c
 
 @njit(cache=True)
 def _coarsen(inverse, width, height, coarse):  # pragma: no cover - compiled
-    """Keep for each tile the least inverse depth of its pixels: what is farther than all of it is hidden."""
+    """Store for each tile the least inverse depth of its pixels: a triangle farther than all of it is hidden."""
     for r in range(coarse.shape[0]):
         for c in range(coarse.shape[1]):
             coarse[r, c] = np.float32(1e30)

@@ -157,7 +157,7 @@ class Renderer:
         self._layers: tuple[_Layer, _Layer] | None = None
 
     def render(self, camera: Pinhole, world_from_camera: Float[np.ndarray, "4 4"]) -> View:
-        """Return what the camera sees from a pose."""
+        """Return the view of the camera from a pose."""
         rotation = np.ascontiguousarray(world_from_camera[:3, :3].T, np.float64)
         origin = np.asarray(world_from_camera[:3, 3], np.float64)
         lens = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
@@ -182,7 +182,7 @@ class Renderer:
         return self._layers
 
     def _draw(self, front: _Layer, behind: _Layer, eye: _Eye) -> None:
-        """Find what each pixel shows first, and what it shows first that nothing shines through."""
+        """Find the first surface of each pixel, and the first surface that nothing shines through."""
         groups = self._groups
         front.inverse.fill(0.0)
         front.shown.fill(NOTHING)

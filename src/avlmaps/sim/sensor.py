@@ -62,7 +62,7 @@ class Sensor:
     """An RGB-D camera with faults."""
 
     def __init__(self, settings: SensorSettings = CLEAN) -> None:
-        """Keep what is wrong with it."""
+        """Store the camera's faults."""
         self.settings = settings
 
     def shifts(self, n: int, rng: np.random.Generator) -> list[Shift]:

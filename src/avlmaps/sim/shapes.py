@@ -106,7 +106,7 @@ def rounded_rectangle(width: float, depth: float, radius: float, steps: int = 4)
 def lathe(
     profile: Sequence[Pair], material: Material, x: float = 0.0, y: float = 0.0, sides: int = 16, squash: float = 1.0
 ) -> Mesh:
-    """Return what a profile of (radius, z) makes when it is turned round an upright axis at (x, y).
+    """Return the solid of a profile of (radius, z) turned round an upright axis at (x, y).
 
     ``squash`` stretches it along y.
     """

@@ -93,7 +93,7 @@ def viewpoints(
 
 
 def _turned_to(new: Bool[np.ndarray, " t"], targets: Targets) -> Int[np.ndarray, " m"]:
-    """Return what to turn to: the things that a place shows; bare floor only where it shows no thing."""
+    """Return the targets to turn to: the things that a place shows; bare floor only where it shows no thing."""
     things = np.flatnonzero(new & (targets.worth >= _OBJECT))
     return things if len(things) else np.flatnonzero(new)
 
@@ -129,7 +129,7 @@ def _entered(scene: Scene, space: FreeSpace, candidates: Float[np.ndarray, "c 2"
 
 
 def targets_of(scene: Scene, space: FreeSpace, eye_m: float) -> Targets:
-    """Return what is to be seen on a floor by a camera at a height above it."""
+    """Return the targets on a floor for a camera at a height above it."""
     things = [
         thing for thing in scene.objects
         if thing.category not in STRUCTURE and max(thing.size) >= _OBJECT_M

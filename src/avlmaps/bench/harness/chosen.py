@@ -1,4 +1,4 @@
-"""Which of our choices were made on the very scenes that a table is measured on."""
+"""The choices of ours that were made on the very scenes that a table is measured on."""
 
 from collections.abc import Sequence
 

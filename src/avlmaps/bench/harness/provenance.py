@@ -14,7 +14,7 @@ _SHOWN = 12  # of a checksum
 def provenance(
     settings: SceneSettings, recorded: Recorded, scenes: Sequence[str], weights: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Return what a suite on scenes writes beside its tables."""
+    """Return the provenance that a suite on scenes writes beside its tables."""
     return {
         "scenes": [shown_scene(scene) for scene in scenes],
         "profile": settings.profile,

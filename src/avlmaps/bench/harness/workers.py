@@ -22,7 +22,7 @@ def side_by_side(
     done: Callable[[], int] | None = None,
     total: int | None = None,
 ) -> list[T]:
-    """Return what becomes of every scene, in their order, and show the progress.
+    """Return the result of every scene, in their order, and show the progress.
 
     Args:
         do: the work, a function of a module.

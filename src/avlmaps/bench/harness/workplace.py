@@ -263,7 +263,7 @@ class Workplace:
         return Event(event.category, event.robot, tuple(places))
 
     def photos(self, count: int) -> Sequence[Photo]:
-        """Look from places where the robot never stood, held out from the walk; only on the floor that it walked."""
+        """Render from places where the robot never stood, held out from the walk; only on the floor that it walked."""
         if self.own is not None:
             return self.own.photos(count)
         from avlmaps.sim.views import random_views

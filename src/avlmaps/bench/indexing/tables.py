@@ -21,7 +21,7 @@ _PAPER = "paper (Matterport3D, other data)"
 
 
 def columns() -> list[str]:
-    """Return what the columns of a table are called."""
+    """Return the names of a table's columns."""
     recalls = [title for limit in LIMITS_M for title in (f"R@1 < {limit:g} m %", "95 %")]
     return ["configuration", "tasks", *recalls, "mean m", "95 %", "answered %"]
 

@@ -189,7 +189,7 @@ def _spot(form: Form, parts: Sequence[Goal], place: tuple[float, float, float], 
 
 
 def _argument(part: Goal) -> str:
-    """Return what a skill is given: a phrase for the name of a thing, else a heat."""
+    """Return the argument of a skill: a phrase for the name of a thing, else a heat."""
     return heat_of(part)
 
 

@@ -95,7 +95,7 @@ class Journal:
         self.path = path
 
     def read(self) -> dict[str, Episode]:
-        """Return what is there, by its key."""
+        """Return the stored episodes, by their keys."""
         return {episode.key: episode for episode in self._lines()}
 
     def _lines(self) -> Iterator[Episode]:

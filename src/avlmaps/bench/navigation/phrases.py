@@ -44,7 +44,7 @@ def an_object(category: str, boxes: Sequence[Box]) -> Goal:
 
 
 def spoken(sound: str) -> str:
-    """Return what a person calls a kind of sound: of "fan or air conditioner" the first."""
+    """Return a person's word for a kind of sound: of "fan or air conditioner" the first."""
     return sound.split(" or ")[0]
 
 

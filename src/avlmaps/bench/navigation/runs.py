@@ -202,7 +202,7 @@ def _key(settings: NavigationSettings, built: str, mission: Mission, one: Config
 
 
 def translator_named(language: str) -> Translator | None:
-    """Return what turns sentences into programs; None for programs as they are."""
+    """Return the translator of sentences into programs; None for programs as they are."""
     if language == "none":
         return None
     if language == "chat":

@@ -105,7 +105,7 @@ class NavigationPlace:
         return self.job.rng(_STREAM + stream)
 
     def pilot(self, missions: list[Mission], translator: Translator | None) -> Pilot:
-        """Return what sends robots on missions."""
+        """Return the runner of missions."""
         asked = self.work.asked
         if not np.allclose(asked.stored.up_in_world, (0.0, 0.0, 1.0), atol=1e-9):
             raise BackendError(f"The map of {self.job.spec} is not level; its stops cannot be compared with the truth.")

@@ -50,7 +50,7 @@ def tables(outcome: Outcome) -> dict[str, dict[str, Any]]:
 
 
 def columns(series: Series) -> list[str]:
-    """Return what the columns of a series are called."""
+    """Return the names of a series' columns."""
     rows = [title for k in range(1, LENGTH[series] + 1) for title in (f"{k} in a row %", "95 %")]
     whole = [] if LENGTH[series] else ["all reached %", "95 %"]
     kinds = [title for name, _ in _KINDS.get(series, ()) for title in (name, "95 %")]
@@ -113,7 +113,7 @@ def _whole(episodes: list[Episode]) -> object:
 
 
 def _figures(outcome: Outcome) -> dict[str, Any]:
-    """Return what holds for all experiments together."""
+    """Return the notes that hold for all experiments together."""
     true = [one for one in outcome.episodes if one.configuration == CEILING]
     reachable = share_of(true, is_reachable, outcome.settings.seed)
     rows: list[list[Any]] = []

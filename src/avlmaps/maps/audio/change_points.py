@@ -117,7 +117,7 @@ def split_at_changes(
 def _gains(
     features: Float32[np.ndarray, "frames d"], ends: Int[np.ndarray, " e"], longest: int
 ) -> Float[np.ndarray, "e longest"]:
-    """Return what a stretch from each start to each end saves: n·|mean|²; the last column starts one frame before.
+    """Return the gain of a stretch from each start to each end: n·|mean|²; the last column starts one frame before.
 
     Sums of squares are the same however a sequence is divided, so that what is saved is all that counts.
     """

@@ -93,7 +93,7 @@ _Piece = tuple[Segment, Sound, Float32[np.ndarray, "windows d"]]
 
 
 def _by_energy(track: AudioTrack, encoder: SoundEncoder, settings: HearingSettings) -> Iterator[_Piece]:
-    """Yield what stands out from the background, as it was heard, and its features without the background."""
+    """Yield each sound that stands out from the background, as recorded, and its features without the background."""
     found = segment(track, settings.segmentation)
     each = range(len(found))
     for i in progress(each, "hearing", unit="sound") if found else each:

@@ -124,7 +124,7 @@ class VoxelAccumulator:
         return self._table.sums(feature_out)
 
     def evidence(self) -> Evidence:
-        """Return what is known of each voxel's surface, sorted by index: what `cleaning.clean` decides on."""
+        """Return the evidence of each voxel's surface, sorted by index, for `cleaning.clean`."""
         return self._table.evidence()
 
     def voxels(
@@ -139,7 +139,7 @@ class VoxelAccumulator:
         return self._table.voxels(feature_out, kept)
 
     def _limits(self) -> tuple[float, ...]:
-        """Return what `fusion_kernels.trace` takes as limits."""
+        """Return the limits for `fusion_kernels.trace`."""
         settings, sensor, half = self.settings, self.sensor, 0.5 * self.grid.voxel_size_m
         farthest = min(settings.max_depth_m, sensor.farthest_m(self.grid.voxel_size_m))
         noise = sensor.noise_m / half, sensor.noise_per_m / half

@@ -172,7 +172,7 @@ class VoxelTable:
         )
 
     def evidence(self) -> Evidence:
-        """Return what is known of each voxel's surface, sorted."""
+        """Return the evidence of each voxel's surface, sorted."""
         rows = self.sort_rows()
         return Evidence(self.index[rows], self.hits[rows], self.views[rows], self.sharp[rows])
 

@@ -107,7 +107,7 @@ def _view(
     under_m: Float[np.ndarray, " k"],
     band: Int[np.ndarray, " m"],
 ) -> View:
-    """Return what is known round a group of cameras."""
+    """Return the surfaces round a group of cameras."""
     middle_m = float(np.median(cameras_m[band]))
     near = [sight for sight, at_m in zip(sights, cameras_m, strict=True) if abs(at_m - middle_m) < _STOREY_M]
     return View(

@@ -104,7 +104,7 @@ class Sight:
 
 
 def sight_of(frame: Frame, up_in_world: Float[np.ndarray, "3"]) -> Sight:
-    """Return what a frame shows within 6 m, as voxels in level axes.
+    """Return the surfaces of a frame within 6 m, as voxels in level axes.
 
     Args:
         frame: any frame with a pose.

@@ -120,7 +120,7 @@ def read_walk(scene: SceneFiles, needs_first_pose: bool) -> Walk:
 
 
 def _listed(scene: SceneFiles) -> tuple[CameraFile, Float64[np.ndarray, "n 4 4"], Pinhole]:
-    """Return what ``camera.json`` says, the poses of ``poses.txt``, and the camera."""
+    """Return the content of ``camera.json``, the poses of ``poses.txt``, and the camera."""
     try:
         given, _ = read_camera_file(scene.camera)
         listed = np.zeros((0, 4, 4))

@@ -32,7 +32,7 @@ class Source:
     ears: Ears
 
     def models(self) -> dict[str, ModelInfo]:
-        """Return what is known of the models: of the reference's own which, and not from what weights."""
+        """Return the known models: the names of the reference's own, without their weights."""
         dims = {Kind.PIXELS: voxels_h5.DIM} | ({Kind.VIEWS: areas_h5.DIM} if self.walk.has_views else {})
         models = {kind.value: _unweighed(kind, dim) for kind, dim in dims.items()}
         return models if self.ears.model is None else {**models, Kind.SOUNDS.value: self.ears.model}

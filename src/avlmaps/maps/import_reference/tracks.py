@@ -71,7 +71,7 @@ class Ears:
         return cls(walks, start_s, backend, ModelInfo.of(_with_model(backend), card))
 
     def ingredients(self) -> list[Any]:
-        """Return what identifies these sounds."""
+        """Return the values that identify these sounds."""
         return [[walk.fingerprint for walk in self.walks], self.start_s.tolist(), self.model]
 
     def detect_events(self, clips_folder: Path) -> HeardSounds:

@@ -84,7 +84,7 @@ def _check_offsets(where: str, offsets: np.ndarray, rows: int, count: int) -> No
 
 
 def content_fault(name: str, array: np.ndarray) -> str:
-    """Return what is wrong with the numbers of an array, or of a piece of one, in words; nothing where all is well.
+    """Return the fault in the numbers of an array, or of a piece of one, in words; nothing where all is well.
 
     Args:
         name: what it holds, such as ``voxels/feature``.

@@ -337,7 +337,7 @@ def read_manifest(path: Path) -> bytes:
 
 
 def parse_manifest(content: bytes, path: Path) -> MapInfo:
-    """Return what ``map.json`` says.
+    """Return the content of ``map.json``.
 
     Args:
         content: of the file.

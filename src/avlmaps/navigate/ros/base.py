@@ -95,7 +95,7 @@ class RosDriver(ABC):
 
     @abstractmethod
     def _cancel(self, goal: Goal) -> None:
-        """Ask that one goal be cancelled."""
+        """Request the cancel of one goal."""
 
     @abstractmethod
     def _cancel_all(self, link: Link, wait_s: float) -> bool:
@@ -120,7 +120,7 @@ class RosDriver(ABC):
         return f"{self.settings.namespace}/avlmaps/heartbeat"
 
     def _remind(self, goal: Goal) -> None:  # noqa: B027 - most need none
-        """Say a goal again where it may have been lost."""
+        """Send a goal again where it may have been lost."""
 
     # The Driver protocol.
 

@@ -57,13 +57,13 @@ class Guard:
         return self._process.poll() is None
 
     def beat(self) -> None:
-        """Say that a goal is active and watched; a guard that has done its work, or died, is started again."""
+        """Report that a goal is active and watched; a guard that has done its work, or died, is started again."""
         if not self.stands:
             self._start()
         self._write(_ACTIVE)
 
     def rest(self) -> None:
-        """Say that no goal is active."""
+        """Report that no goal is active."""
         self._write(_IDLE)
 
     def close(self) -> None:

@@ -64,7 +64,7 @@ def open_ros_driver(
 
 
 def standable_goal(obstacles: "Obstacles", radius_m: float) -> Standing:
-    """Return what moves goals to where a body can stand and get to, by a map's obstacles.
+    """Return a function that moves goals to where a body can stand and get to, by a map's obstacles.
 
     Args:
         obstacles: of the map.

@@ -91,7 +91,7 @@ class LiveTree:
         return Sighting(pose, oldest_s, now_s - oldest_s)
 
     def why_not(self, fixed: str, body: str) -> str:
-        """Return what is missing between two frames, in part of a sentence."""
+        """Return the missing link between two frames, as part of a sentence."""
         with self._lock:
             if not self._edges:
                 return "nothing arrives on /tf"

@@ -60,7 +60,7 @@ class _Protocol(AutobahnRosBridgeProtocol):
             self.factory.listener.fault(sanitize_line(str(fault)))
 
     def onClose(self, wasClean: bool, code: int | None, reason: str | None) -> None:  # noqa: N802, N803
-        """Keep why the connection ended."""
+        """Store why the connection ended."""
         self.factory.told = sanitize_line(str(reason or ""))
 
     def send_message(self, payload: bytes) -> None:

@@ -91,7 +91,7 @@ class FeatureStore:
         return array
 
     def put(self, kind: Kind, card: ModelCard, key: str, array: np.ndarray) -> None:
-        """Keep features, if there is room for them."""
+        """Store features, if there is room for them."""
         if self._full:
             return
         if array.nbytes > _LARGEST_SHARE * self.limit_bytes:

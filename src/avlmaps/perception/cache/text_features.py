@@ -35,7 +35,7 @@ class KeptWords:
         return row if fits else None
 
     def put(self, phrase: str, row: Float32[np.ndarray, " d"]) -> None:
-        """Keep the unit vector of a phrase."""
+        """Store the unit vector of a phrase."""
         self._store.put(Kind.WORDS, self._card, self._key(phrase), row)
 
     def _key(self, phrase: str) -> str:

@@ -32,7 +32,7 @@ class NamedEncoder:
 
     @cached_property
     def meanings(self) -> Meanings:
-        """Which of the names a phrase means."""
+        """Finds the meaning of a phrase among the names."""
         notes = self._network.notes
         called = tuple((name, *notes.called.get(name, ())) for name in self.names)
         kind = words_known.Kind.ROOM if self.names == notes.rooms else words_known.Kind.THING

@@ -178,7 +178,7 @@ class ColourWords:
         return self._table[(level[:, 0] << 10) | (level[:, 1] << 5) | level[:, 2]]
 
     def without_colours(self, phrase: str) -> str:
-        """Return what is left of a phrase when its words of colour are taken out."""
+        """Return the rest of a phrase without its words of colour."""
         left = f" {phrase.lower()} "
         for text, _, _ in _colours_in(phrase):
             for form in (text, text.replace("-", " ")):

@@ -25,7 +25,7 @@ _ARTICLES = frozenset({"a", "an", "the", "some", "any", "my", "our", "your", "hi
 
 @dataclass(frozen=True)
 class Meanings:
-    """Which of some names a phrase means, and how much.
+    """Finds the names that a phrase means, and the share of each.
 
     Attributes:
         names: what can be meant.
@@ -92,13 +92,13 @@ class Meanings:
         return ()
 
     def _general(self, phrase: str, head: Entry) -> Float32[np.ndarray, " k"]:
-        """Return what a phrase about an appliance, a piece of furniture ... means: the nearest name that there is."""
+        """Return the meaning of a phrase about an appliance, a piece of furniture ...: the nearest name."""
         near = self._nearest(phrase, self.names, self.least_cosine)
         fitting = [entry.name for entry in lexicon().members(head.name) if entry.name in self.names]
         return near if near.any() else self._nearest(phrase, fitting, self.least_within)
 
     def _described(self, phrase: str, head: Entry) -> Float32[np.ndarray, " k"]:
-        """Return what a known noun with words round it means: of several names that fit the nearest to the phrase."""
+        """Return the meaning of a known noun with words round it: of several fitting names the nearest."""
         fitting = self.names_of(head)
         if len(fitting) > 1:
             near = self._nearest(phrase, fitting, self.least_within)

@@ -47,7 +47,7 @@ class PairedNetworks:
         self.checksum = sha256(both.encode()).hexdigest()
 
     def see(self, frame: Frame) -> Seen:
-        """Look at a frame with both networks."""
+        """Encode a frame with both networks."""
         seen = self._first.see(frame)
         other = np.zeros_like(seen.category)
         other[..., self._column] = self._second.see(frame).category

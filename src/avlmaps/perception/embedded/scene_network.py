@@ -117,7 +117,7 @@ class SceneNetwork:
         self._bias = np.array(notes.bias, np.float32)
 
     def see(self, frame: Frame) -> Seen:
-        """Look at a frame; its ``ground`` says the up direction, where it is known."""
+        """Encode a frame; its ``ground`` gives the up direction, where it is known."""
         camera, depth_m, rgb = at_working_size(frame, self.notes.width_px)
         up, height_m = _ground_of(frame)
         multiple = self.notes.multiple

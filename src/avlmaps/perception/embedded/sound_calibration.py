@@ -69,7 +69,7 @@ def typical_examples(examples: Float[np.ndarray, "n d"], starts: np.ndarray) -> 
 def evidence_for(
     cosines: Float[np.ndarray, "windows kinds"], typical: Float[np.ndarray, "windows kinds"]
 ) -> Float[np.ndarray, "windows kinds"]:
-    """Return what speaks for every kind: the cosine to its words and that to its typical example, both alike.
+    """Return the evidence for every kind: the cosine to its words and that to its typical example, both alike.
 
     Where a kind has few examples, their mean names new clips better than the nearest of them does.
     """
@@ -102,7 +102,7 @@ def kinds_of_windows(
 def kinds_of_phrases(
     cosines: Float[np.ndarray, "phrases kinds"], c: Calibration
 ) -> tuple[Float[np.ndarray, "phrases kinds"], Float[np.ndarray, " phrases"]]:
-    """Return what share of each phrase means which kind, and how likely it names a known kind at all."""
+    """Return the share of each phrase for each kind, and how likely it names a known kind at all."""
     bias, highest = c.phrase
     return (
         softmax(np.asarray(cosines, np.float64) / c.phrase_temperature),

@@ -168,7 +168,7 @@ class EmbeddedSounds:
         return np.asarray(same_kind(cosines, agreement, self.calibration), np.float32).reshape(len(sounds))
 
     def describe(self, features: Float32[np.ndarray, "windows d"]) -> Heard:
-        """Return what is made of a sound, for lists of what a map holds."""
+        """Return the scores of a sound, for lists of what a map holds."""
         return self._hear(features, self.taught)
 
     @cached_property

@@ -70,7 +70,7 @@ class ClipPatches(OpenPixels):
 
 
 def _before_the_last(vision: Any, pixels: torch.Tensor) -> torch.Tensor:
-    """Return what a ``CLIPVisionModel`` gives its last block: class token and patches (b, 1 + n, d)."""
+    """Return the input of a ``CLIPVisionModel``'s last block: class token and patches (b, 1 + n, d)."""
     hidden = vision.pre_layrnorm(vision.embeddings(pixels, interpolate_pos_encoding=True))
     for layer in vision.encoder.layers[:-1]:
         hidden = layer(hidden, None)
@@ -100,7 +100,7 @@ def _last_block(layer: Any, hidden: torch.Tensor, grid: tuple[int, int], way: st
 
 
 def _nearness(grid: tuple[int, int], device: torch.device, precision: torch.dtype) -> torch.Tensor:
-    """Return what is added to the likeness of two patches: exp(−d² / (2σ²)), d in patches; 0 for the class token."""
+    """Return the bias on the likeness of two patches: exp(−d² / (2σ²)), d in patches; 0 for the class token."""
     rows, columns = grid
     number = torch.arange(rows * columns, device=device)
     place = torch.stack([number // columns, number % columns], dim=1).to(torch.float32)

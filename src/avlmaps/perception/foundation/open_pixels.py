@@ -43,7 +43,7 @@ class OpenPixels(ABC):
         return self.encode_batch([frame])[0]
 
     def encode_batch(self, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
-        """Return what ``encode`` returns for each frame (to rounding)."""
+        """Return the features of ``encode`` for each frame (to rounding)."""
         return encode_in_batches(frames, max(self.batch, 1), self._encode_pictures)
 
     def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:

@@ -113,7 +113,7 @@ def licence_of(model: str, known: Mapping[str, str] = _LICENCES) -> str:
 
 
 def note_of(licence: str) -> str:
-    """Return what a user must know of a licence, one sentence, or ``""``."""
+    """Return the warning of a licence, one sentence, or ``""``."""
     if licence == UNKNOWN_LICENCE:
         return "The licence of these weights is not known here; look at the model's page."
     if licence == APPLE_RESEARCH:
@@ -145,7 +145,7 @@ def hub_model(model: str, classes: Mapping[str, str]) -> tuple[Any, Path]:
 
 
 def image_processor(folder: Path, model: str) -> Any:
-    """Return what prepares pictures as ``preprocessor_config.json`` says.
+    """Return the preparation of pictures as ``preprocessor_config.json`` says.
 
     It is always the one that resizes with Pillow, as these models were trained: the same pictures give the same numbers
     whether torchvision is installed or not.

@@ -96,7 +96,7 @@ class _Attention(nn.Module):
         self.bn = nn.BatchNorm2d(out_channels)
 
     def forward(self, before: torch.Tensor, after: torch.Tensor) -> torch.Tensor:
-        """Return what came out, weighted; the input is brought to its size by the maximum of each place."""
+        """Return the output, weighted; the input is brought to its size by the maximum of each place."""
         pooled = functional.adaptive_max_pool2d(before, (after.shape[-2], after.shape[-1]))
         return after * torch.sigmoid(self.bn(self.conv_point(self.conv_depth(pooled))))
 

@@ -108,7 +108,7 @@ def _plain(phrase: str) -> str:
 
 
 def _plain_letters() -> dict[int, str | None]:
-    """Return what stands for a letter in a joined, wide or curly form, and None for other characters, as in ftfy."""
+    """Return the plain form of a letter in a joined, wide or curly form, and None for other characters, as in ftfy."""
     joined = (0x132, 0x133, 0x149, *range(0x1C4, 0x1CD), *range(0x1F1, 0x1F4), *range(0xFB00, 0xFB07))
     wide = (0x3000, *range(0xFF01, 0xFFF0))
     quotes = {

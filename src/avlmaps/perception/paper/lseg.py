@@ -94,7 +94,7 @@ class LSegPixels(OpenPixels):
             ]
 
     def published(self, rgb: UInt8[np.ndarray, "h w 3"]) -> Float32[np.ndarray, "d hf wf"]:
-        """Return what the published code returns for a picture: all pixels, about 14.3 long and not of unit length."""
+        """Return the published code's features of a picture: all pixels, about 14.3 long and not of unit length."""
         with mixed_precision(self._device):
             windows = cut_into_windows(rgb, self._device)
             features = joined(windows, self._features([windows])[0], *every_nth(windows.size, 1))

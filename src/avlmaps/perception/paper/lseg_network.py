@@ -134,7 +134,7 @@ class _JoinClassToken(nn.Module):
 
 
 def _rescaling(level: int, channels: int) -> list[nn.Module]:
-    """Return what brings a level from the patches' scale to its own."""
+    """Return the layer that brings a level from the patches' scale to its own."""
     if level in (1, 2):
         times = 4 if level == 1 else 2
         return [nn.ConvTranspose2d(channels, channels, times, times)]

@@ -59,7 +59,7 @@ def cut_into_windows(rgb: UInt8[np.ndarray, "h w 3"], device: torch.device) -> W
 def joined(
     windows: Windows, features: torch.Tensor, rows: Int[np.ndarray, " r"], columns: Int[np.ndarray, " c"]
 ) -> torch.Tensor:
-    """Return what the published code has at some pixels of the resized picture, (r, c, d) in float32.
+    """Return the published code's features at some pixels of the resized picture, (r, c, d) in float32.
 
     Args:
         windows: the picture.

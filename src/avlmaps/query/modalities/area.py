@@ -121,7 +121,7 @@ def area_distribution(
 def pool_posteriors(
     share: Float[np.ndarray, "k n"], places: Float[np.ndarray, "k 3"], pool_m: float
 ) -> Float[np.ndarray, "k n"]:
-    """Return what views say together with those that looked at about the same place.
+    """Return the scores of views pooled with those that looked at about the same place.
 
     That is their mean, weighted by exp(−d² / 2·pool_m²), d the 3D distance: one odd view is outvoted. An average is
     less confident than views that agree should be; so, where the weights add up to two views or more, it is squared and

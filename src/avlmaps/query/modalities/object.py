@@ -73,7 +73,7 @@ class Asked:
 
     @classmethod
     def of(cls, encoder: PixelEncoder, word: str) -> "Asked":
-        """Ask an encoder for a word; there are no rows where it understands nothing of it."""
+        """Encode a word; there are no rows where the encoder does not understand it."""
         if isinstance(encoder, NamedPixelEncoder):
             meant = encoder.meant(word)
             some, clear = meant > 0.0, meant >= CLEARLY_MEANT

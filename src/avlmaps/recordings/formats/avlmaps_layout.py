@@ -72,7 +72,7 @@ def base_poses(habitat_from_base: Float[np.ndarray, "*n 4 4"]) -> Float[np.ndarr
 
 
 def reference_map_from_world(first_habitat_from_base: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "4 4"]:
-    """Return what takes a point of a recording's world to the reference's map frame, whose origin is the first base."""
+    """Return the transform from a recording's world to the reference's map frame, whose origin is the first base."""
     return poses.inverse(base_poses(first_habitat_from_base))
 
 

@@ -181,7 +181,7 @@ class FileRecording(Recording):
         return images.read_colour(self.path / self.shots.colour[index], self.rig.rgb)
 
     def name(self, index: int) -> str:
-        """Return what the recording calls a frame."""
+        """Return the recording's name of a frame."""
         return self.shots.names[index]
 
     def colour_file(self, index: int) -> Path | None:

@@ -72,7 +72,7 @@ class TransformTree:
         return (max(map(min, moving)), min(map(max, moving))) if moving else None
 
     def moves(self, frame: str) -> bool:
-        """Say whether the frame moves relative to its tree's root."""
+        """Return whether the frame moves relative to its tree's root."""
         return any(not self._edges[name].static for name in self._chain(frame))
 
     def root(self, frame: str) -> str:

@@ -83,7 +83,7 @@ class _DataSet:
         return self.meshes[model]
 
     def category(self, template: str, config: dict[str, Any]) -> str:
-        """Return what a template shows."""
+        """Return the category of a template."""
         short = Path(template).name
         known = self.categories.get(short) or self.words.get(int(config.get("semantic_id", -1)), "")
         for prefix in _PREFIXES:

@@ -192,7 +192,7 @@ def _outline(house: House, region: int, low: np.ndarray, high: np.ndarray) -> Fl
 
 
 def _meanings(house: House, area_of_region: dict[int, int]) -> dict[int, Label]:
-    """Return what each object is: one of forty categories, named by the annotator's word."""
+    """Return the category of each object: one of forty, named by the annotator's word."""
     meanings = {}
     for index, (region, category) in house.thing.items():
         raw, one_of_forty = house.category.get(category, ("", ""))

@@ -81,7 +81,7 @@ def _button(x: float, y: float, z: float, look: Material) -> Mesh:
 
 
 def _flush(rng: np.random.Generator, deep: float, wide: float, top: float, metal: Material) -> list[Mesh]:
-    """Return what the tank is flushed with: a button on its lid, two buttons, or a lever at its front."""
+    """Return the flush of the tank: a button on its lid, two buttons, or a lever at its front."""
     if chance(rng, 0.3):
         return [tube([(deep, -wide * 0.35, top - 0.07), (deep + 0.02, -wide * 0.35, top - 0.07),
                       (deep + 0.022, -wide * 0.15, top - 0.075)], 0.006, metal, 5)]  # fmt: skip

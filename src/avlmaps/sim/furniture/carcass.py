@@ -52,7 +52,7 @@ class FrontStyle:
 
 
 def board_look(rng: np.random.Generator) -> Material:
-    """Draw what a cabinet is made of."""
+    """Draw the materials of a cabinet."""
     return material(pick(rng, ("wood", "wood", "wood", "white", "white", "painted", "black")), rng)
 
 
@@ -144,7 +144,7 @@ def _panel(style: FrontStyle, room: Room, panel: Panel, glass: Material) -> Mesh
 
 
 def glazing(rng: np.random.Generator, panel: Panel) -> Material:
-    """Return what fills a glazed or mirrored front."""
+    """Return the pane of a glazed or mirrored front."""
     return material("mirror" if panel == "mirror" else "glass", rng)
 
 

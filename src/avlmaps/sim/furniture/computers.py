@@ -133,7 +133,7 @@ def _laptop_tent(rng: np.random.Generator) -> Piece:
 
 
 def _case_front(rng: np.random.Generator, deep: float, wide: float, high: float, look: Material) -> list[Mesh]:
-    """Return what the front of a computer shows: drive bays, button, lamp, grille."""
+    """Return the parts on the front of a computer: drive bays, button, lamp, grille."""
     parts: list[Mesh] = []
     dark = material("black", rng)
     for i in range(count(rng, 0, 3)):

@@ -147,5 +147,5 @@ def hanging(rng: np.random.Generator, room: Room, looks: list[Material], full: f
 
 
 def cloth_looks(rng: np.random.Generator, number: int = 6) -> list[Material]:
-    """Draw what clothes are made of."""
+    """Draw the materials of clothes."""
     return [material("fabric", rng) for _ in range(number)]

@@ -228,7 +228,7 @@ def _subwoofer(rng: np.random.Generator) -> Piece:
 
 
 def _key_look(rng: np.random.Generator) -> tuple[Material, Material]:
-    """Return what a keyboard's case and keys are made of."""
+    """Return the materials of a keyboard's case and keys."""
     case = material("plastic", rng,
                     pick(rng, ((0.08, 0.08, 0.08), (0.85, 0.83, 0.76), (0.9, 0.9, 0.9), (0.3, 0.3, 0.32))))  # fmt: skip
     return case, case if chance(rng, 0.4) else material("plastic", rng, (g := pick(rng, (0.1, 0.92, 0.6)), g, g))

@@ -21,7 +21,7 @@ def screen(rng: np.random.Generator, on: float = 0.55) -> Material:
 
 
 def casing(rng: np.random.Generator) -> Material:
-    """Draw what the body of a device is made of: dark mostly, a grey or bare metal."""
+    """Draw the material of a device's body: dark mostly, a grey or bare metal."""
     kind = rng.random()
     if kind < 0.6:
         return material("black", rng)

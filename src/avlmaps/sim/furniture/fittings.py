@@ -52,7 +52,7 @@ def open_bowl(levels: Sequence[Level], look: Material) -> list[Mesh]:
 def spindle(
     profile: Sequence[Pair], look: Material, y: float = 0.0, z: float = 0.0, sides: int = 14, capped: bool = True
 ) -> Mesh:
-    """Return what a profile of (radius, x) makes, turned round an axis along x through (y, z): dials, drums."""
+    """Return the solid of a profile of (radius, x), turned round an axis along x through (y, z): dials, drums."""
     rings = [
         np.column_stack([np.full(sides, x), circle(max(r, 1e-4), sides) + np.array((y, z))]) for r, x in profile
     ]  # fmt: skip
@@ -84,7 +84,7 @@ def chrome(rng: np.random.Generator) -> Material:
 
 
 def enamel(rng: np.random.Generator) -> Material:
-    """Draw what household machines are coated with: white mostly, steel, black or a colour."""
+    """Draw the coating of household machines: white mostly, steel, black or a colour."""
     kind = rng.random()
     if kind < 0.5:
         return material("white", rng)

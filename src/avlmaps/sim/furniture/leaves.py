@@ -11,7 +11,7 @@ Rows = list[tuple[float, int, str]]
 
 
 def opaque(rng: np.random.Generator) -> Material:
-    """Draw what a door or a frame is made of: mostly white or wood."""
+    """Draw the material of a door or a frame: mostly white or wood."""
     kind = pick(rng, ("white", "wood", "wood", "painted", "white"))
     return material(kind, rng)
 

@@ -156,7 +156,7 @@ def star_base(
 
 
 def cabinet_base(rng: np.random.Generator, depth: float, width: float, look: Material) -> tuple[Mesh, float]:
-    """Draw what a cabinet stands on, about the origin, and return it with its height, metres."""
+    """Draw the legs of a cabinet, about the origin, and return them with their height, metres."""
     style = pick(rng, ("plinth", "plinth", "legs", "feet", "buns", "sled", "sides"))
     if style == "plinth":
         height = draw(rng, 0.03, 0.1)

@@ -15,7 +15,7 @@ from avlmaps.sim.shapes import circle, cylinder, ellipsoid, lathe, loft, rounded
 
 
 def shining(rng: np.random.Generator, kind: str | None = None) -> Material:
-    """Draw what a lamp's shade or globe is made of, lit or not."""
+    """Draw the material of a lamp's shade or globe, lit or not."""
     green = draw(rng, 0.88, 0.98)
     warm = (1.0, green, green * draw(rng, 0.72, 0.97))
     plain = material(kind, rng) if kind else material("white", rng, warm)

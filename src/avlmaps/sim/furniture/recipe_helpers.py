@@ -25,7 +25,7 @@ def count(rng: np.random.Generator, low: int, high: int) -> int:
 
 
 def chance(rng: np.random.Generator, share: float) -> bool:
-    """Say yes in a share of the cases."""
+    """Return True in a share of the cases."""
     return bool(rng.random() < share)
 
 
@@ -104,7 +104,7 @@ def finished(meshes: Sequence[Mesh], light: Sequence[Triple] = (), supports: Seq
 def turned_ring(
     profile: Sequence[tuple[float, float]], look: Material, x: float = 0.0, y: float = 0.0, sides: int = 18
 ) -> Mesh:
-    """Return what a profile of (radius, z) makes round an upright axis at (x, y), open at both ends."""
+    """Return the surface of a profile of (radius, z) round an upright axis at (x, y), open at both ends."""
     return loft(
         [np.column_stack([circle(r, sides) + np.array([x, y]), np.full(sides, z)]) for r, z in profile],
         look,

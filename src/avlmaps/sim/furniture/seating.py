@@ -33,7 +33,7 @@ def _frame_look(rng: np.random.Generator) -> Material:
 
 
 def _wooden(rng: np.random.Generator, frame: ChairFrame, look: Material, seat: str = "", finial: float = 0.0) -> Mesh:
-    """Return what most wooden chairs share: seat, rails, legs, posts, perhaps rungs and arms."""
+    """Return the parts that most wooden chairs share: seat, rails, legs, posts, perhaps rungs and arms."""
     style = leg_style(rng, 0.026, 0.045)
     posts = LegStyle(((0.0, 0.75), (0.2, 1.0), (1.0, 1.0)), style.sides, style.thickness_m)
     rungs = count(rng, 1, 2) if chance(rng, 0.45) else 0

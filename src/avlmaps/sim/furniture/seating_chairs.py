@@ -60,7 +60,7 @@ def shell(
 
 
 def shell_base(rng: np.random.Generator, width: float, depth: float, seat: float, style: str) -> list[Mesh]:
-    """Return what carries a shell: dowels, wire, four tubes, runners, a star, a tulip foot."""
+    """Return the support of a shell: dowels, wire, four tubes, runners, a star, a tulip foot."""
     metal = material(pick(rng, ("metal", "black", "white")), rng)
     if style == "dowels":
         wood = material("wood", rng)

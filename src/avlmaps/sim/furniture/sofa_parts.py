@@ -164,7 +164,7 @@ def loose_back(
 
 
 def strewn(rng: np.random.Generator, plan: SofaPlan, seats: int) -> list[Mesh]:
-    """Return what people leave on a sofa: pillows against the back, a throw over it, or nothing."""
+    """Return the things that people leave on a sofa: pillows against the back, a throw over it, or nothing."""
     parts = []
     if chance(rng, 0.5):
         half = plan.width / 2

@@ -63,7 +63,7 @@ def _coil(x: float, y: float, z: float, size: float, look: Material, metal: Mate
 
 
 def _hob(rng: np.random.Generator, low: Pair, high: Pair, z: float, kind: str) -> list[Mesh]:
-    """Return what one cooks on, between two corners (x, y): gas, plates, coils or glass."""
+    """Return the hob between two corners (x, y): gas, plates, coils or glass."""
     deep, wide = high[0] - low[0], high[1] - low[1]
     dark, metal = material("black", rng), steel(rng)
     columns = 3 if wide > 0.72 else 2 if wide > 0.4 else 1

@@ -56,7 +56,7 @@ def top_support(kind: Outline, depth: float, width: float, z: float, clear: floa
 
 
 def table_look(rng: np.random.Generator, stone: float = 0.06) -> Material:
-    """Draw what a table is made of."""
+    """Draw the materials of a table."""
     if chance(rng, stone):
         return material(pick(rng, ("marble", "stone")), rng)
     return material(pick(rng, ("wood", "wood", "wood", "wood", "white", "painted", "black")), rng)

@@ -12,7 +12,7 @@ from avlmaps.sim.shapes import rounded_box
 
 
 def covering(rng: np.random.Generator, leather: float = 0.25) -> Material:
-    """Draw what a seat is covered with: fabric, or leather in a share of the cases."""
+    """Draw the cover of a seat: fabric, or leather in a share of the cases."""
     return material("leather" if chance(rng, leather) else "fabric", rng)
 
 

@@ -43,7 +43,7 @@ def acoustic(
     rng: np.random.Generator,
     settings: AcousticSettings | None = None,
 ) -> Sound:
-    """Return what one omnidirectional microphone on the robot records (see ``impulse`` for the model).
+    """Return the recording of one omnidirectional microphone on the robot (see ``impulse`` for the model).
 
     A track whose peaks would be cut off is made quieter as a whole.
 

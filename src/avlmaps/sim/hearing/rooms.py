@@ -92,7 +92,7 @@ class Rooms:
         return float(24.0 * np.log(10.0) * self.volume_m3[room] / (SPEED_M_S * lost))
 
     def mean_absorption(self, room: int) -> float:
-        """Return what share of the energy a room takes at each bounce around 1 kHz, all that is in it shared out."""
+        """Return the share of the energy that a room absorbs at each bounce around 1 kHz, over all its surfaces."""
         lost = (self.absorbing_m2[2:5, room] + self.joint_m2[2:5, room].sum(axis=1)).mean()
         return float(np.clip(lost / self.surface_m2[room], 0.01, 0.95))
 

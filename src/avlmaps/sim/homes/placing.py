@@ -179,7 +179,7 @@ class Ground:
     def take(
         self, foot: Footprint, centre: np.ndarray, heading_rad: float, z: float = 0.0, front_m: float = 0.0
     ) -> int:
-        """Keep the place of a piece, and a zone before it clear of others; return the piece's number."""
+        """Reserve the place of a piece, and a clear zone before it; return the piece's number."""
         corner = corners_of(centre, foot.half, np.asarray(heading_rad))
         self._corner.append(corner)
         self._height.append((z + foot.low_m, z + foot.high_m))

@@ -55,7 +55,7 @@ def _pale(rng: np.random.Generator) -> Triple:
 
 
 def looks_of(rng: np.random.Generator, room: Room, home: Looks | None) -> Looks:
-    """Draw what a room looks like; most rooms share the home's own looks."""
+    """Draw the looks of a room; most rooms share the home's own looks."""
     entry = lexicon().find(room.kind, Kind.ROOM)
     wet = entry is not None and entry.wet
     floor_kind = pick(rng, ("tile", "tile", "stone", "marble") if wet else

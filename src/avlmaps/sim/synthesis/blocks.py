@@ -36,7 +36,7 @@ def filtered(samples: np.ndarray, gain: Callable[[np.ndarray], np.ndarray]) -> n
 
 
 def band(samples: np.ndarray, low_hz: float, high_hz: float, order: int = 2) -> np.ndarray:
-    """Keep a band with soft edges (the magnitude of a Butterworth filter, without its phase)."""
+    """Pass a band with soft edges (the magnitude of a Butterworth filter, without its phase)."""
 
     def gain(hz: np.ndarray) -> np.ndarray:
         hz = np.maximum(hz, 1.0)

@@ -88,7 +88,7 @@ def ceramic(rng: np.random.Generator) -> Texture:
 
 
 def mirror(rng: np.random.Generator) -> Texture:
-    """Draw what a mirror gives back of a room out of focus: soft bands of light and dark."""
+    """Draw the reflection of a room in a mirror, out of focus: soft bands of light and dark."""
     size = 128
     _, y = grid(size)
     value = 0.85 + 0.12 * np.cos(2 * np.pi * (y + rng.random())) + 0.05 * cloud(rng, size, 2.2)
