@@ -20,6 +20,8 @@ FOUND_AT = 0.5
 # Scores are products of float32 vectors of unit length. Their last digits depend on the order of summation, which
 # depends on the processor and on how many vectors are multiplied at once; a difference below this means nothing.
 ROUNDING = 1e-6
+# Pairs of a point and an anchor that are compared at once: some megabytes.
+_PAIRS = 1 << 18
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,9 +162,21 @@ class NearThings(Factor):
         return np.maximum(1.0 - self.falloff_per_m * distance, 0.0)
 
     def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
-        """Return the nearest voxel of the object."""
-        bound = 1.0 / self.falloff_per_m + self.space.grid.voxel_size_m
-        return np.asarray(self._tree.query(self.space.centres[voxels], distance_upper_bound=bound)[1])
+        """Return the nearest voxel of the object; each voxel of the map is looked up once."""
+        nearest = self._nearest
+        unknown = voxels[nearest[voxels] < 0]
+        if len(unknown):
+            bound = 1.0 / self.falloff_per_m + self.space.grid.voxel_size_m
+            nearest[unknown] = self._tree.query(self.space.centres[unknown], distance_upper_bound=bound)[1]
+        return nearest[voxels].astype(np.int64)
+
+    @cached_property
+    def _nearest(self) -> Int[np.ndarray, " n"]:
+        """The nearest voxel of the object for each voxel of the map, -1 where it is not known yet.
+
+        Threads may fill it at one time: they write the same numbers.
+        """
+        return np.full(len(self.space), -1, np.int32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,8 +226,11 @@ class NearAnchors(Factor):
         """Return the heat at any points."""
         heat = np.zeros(len(points_world))
         points, anchors = self.space.level(points_world)[:, :2], self.space.level(self.anchors)[:, :2]
-        for anchor, score in zip(anchors, self.scores, strict=True):
-            np.maximum(heat, score - self.falloff_per_m * np.hypot(*(points - anchor).T), out=heat)
+        several = max(1, _PAIRS // max(len(anchors), 1))
+        for a in range(0, len(points) if len(anchors) else 0, several):
+            away = points[a : a + several, None] - anchors[None]
+            cones = self.scores - self.falloff_per_m * np.hypot(away[..., 0], away[..., 1])
+            heat[a : a + several] = np.maximum(cones.max(axis=1), 0.0)
         return heat
 
     def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:

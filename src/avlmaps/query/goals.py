@@ -6,7 +6,7 @@ thing it is the middle of the part that is nearly as hot, so that one stray voxe
 the robot goes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -57,25 +57,27 @@ class Goal:
 
 
 @dataclass(frozen=True, slots=True)
-class _Shares:
+class Shares:
     """Heated voxels and anchors, each with the instance whose share it lies in.
 
     Attributes:
         points: metres, world; voxels first.
-        voxels: how many of them are voxels.
+        rows: the map's rows of those that are voxels.
         heat: the product there.
         instance: whose share.
         peak: (instances,) highest heat in each share.
     """
 
     points: Float[np.ndarray, "m 3"]
-    voxels: int
+    rows: Int[np.ndarray, " v"]
     heat: Float[np.ndarray, " m"]
     instance: Int[np.ndarray, " m"]
     peak: Float[np.ndarray, " i"]
 
 
-def _shares(factors: Sequence[Factor], values: Float32[np.ndarray, " n"], lead: Factor) -> _Shares:
+def share_voxels(factors: Sequence[Factor], values: Float32[np.ndarray, " n"]) -> Shares:
+    """Divide the heated voxels among the instances of the lead."""
+    lead = lead_of(factors)
     if isinstance(lead, NearThings) and len(factors) == 1:
         rows = np.flatnonzero(lead.mask)
         instance = lead.instance
@@ -91,24 +93,28 @@ def _shares(factors: Sequence[Factor], values: Float32[np.ndarray, " n"], lead: 
         heat, instance = np.append(heat, at_anchors), np.append(instance, lead.instance)
     peak = np.zeros(len(lead.confidence))
     np.maximum.at(peak, instance, heat)
-    return _Shares(points, len(rows), heat, instance, peak)
+    return Shares(points, rows, heat, instance, peak)
 
 
-def is_found(factors: Sequence[Factor], values: Float32[np.ndarray, " n"]) -> bool:
-    """Return whether all that was queried is in the map and comes together around a likely instance of the lead."""
+def is_found(factors: Sequence[Factor], shares_of: Callable[[], Shares]) -> bool:
+    """Return whether all that was queried is in the map and comes together around a likely instance of the lead.
+
+    Args:
+        factors: of the heat.
+        shares_of: returns ``share_voxels`` of them; called only where it decides.
+    """
     if not all(factor.found for factor in factors):
         return False
     if len(factors) == 1:
         return True
     lead = lead_of(factors)
     likely = np.asarray(lead.confidence) >= FOUND_AT
-    return bool((_shares(factors, values, lead).peak[likely] >= LEAST_TOGETHER).any())
+    return bool((shares_of().peak[likely] >= LEAST_TOGETHER).any())
 
 
-def find_goals(factors: Sequence[Factor], values: Float32[np.ndarray, " n"], top: int) -> list[Goal]:
+def find_goals(factors: Sequence[Factor], shares: Shares, top: int) -> list[Goal]:
     """Return up to ``top`` goals, best first, by heat times the confidence of the lead's instance."""
     lead = lead_of(factors)
-    shares = _shares(factors, values, lead)
     goals: list[Goal] = []
     taken: list[np.ndarray] = []
     score = np.round(shares.peak * lead.confidence, 3)  # more digits would be noise; of equals the larger leads
@@ -125,12 +131,12 @@ def find_goals(factors: Sequence[Factor], values: Float32[np.ndarray, " n"], top
     return goals
 
 
-def _position(factors: Sequence[Factor], lead: Factor, shares: _Shares, instance: int) -> Float[np.ndarray, "3"]:
+def _position(factors: Sequence[Factor], lead: Factor, shares: Shares, instance: int) -> Float[np.ndarray, "3"]:
     """Return the hottest place of a share; the middle one of a plateau, and an anchor rather than a voxel."""
     if isinstance(lead, NearThings):
         return _place_on_thing(lead, shares, instance)
     rows = np.flatnonzero((shares.instance == instance) & (shares.heat >= shares.peak[instance] - _SAME))
-    at_anchors = rows[rows >= shares.voxels]
+    at_anchors = rows[rows >= len(shares.rows)]
     plateau = shares.points[at_anchors if len(at_anchors) else rows]
     middle = plateau[np.argmin(np.linalg.norm(plateau - plateau.mean(axis=0), axis=1))]
     if len(at_anchors) or not all(factor.flat for factor in factors):
@@ -142,10 +148,10 @@ def _position(factors: Sequence[Factor], lead: Factor, shares: _Shares, instance
     return lead.space.world(place)
 
 
-def _place_on_thing(lead: NearThings, shares: _Shares, instance: int) -> Float[np.ndarray, "3"]:
+def _place_on_thing(lead: NearThings, shares: Shares, instance: int) -> Float[np.ndarray, "3"]:
     """Return the voxel in the middle of the hot part of a thing, never one beside it."""
     share = np.flatnonzero(shares.instance == instance)
-    on_it = share[lead.at(shares.points[share]) >= 1.0 - _SAME]
+    on_it = share[lead.mask[shares.rows[share]]]
     heat = shares.heat[on_it]
     hot = shares.points[on_it[heat >= _NEARLY * heat.max()]]
     return hot[np.argmin(np.linalg.norm(hot - hot.mean(axis=0), axis=1))]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
@@ -10,7 +11,7 @@ from jaxtyping import Float32
 
 from avlmaps.core.question import Modality
 from avlmaps.query.factors import Factor, lead_of
-from avlmaps.query.goals import Goal, find_goals, is_found
+from avlmaps.query.goals import Goal, Shares, find_goals, is_found, share_voxels
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
@@ -79,14 +80,18 @@ class Heatmap:
         """The modalities of the query's parts."""
         return tuple(factor.part.modality for factor in self.factors)
 
+    @cached_property
+    def _shares(self) -> Shares:
+        return share_voxels(self.factors, self.values)
+
     @property
     def found(self) -> bool:
         """Whether all parts of the query are in the map and come together somewhere."""
-        return is_found(self.factors, self.values)
+        return is_found(self.factors, lambda: self._shares)
 
     def goals(self, top: int = 3) -> list[Goal]:
         """Return the best distinct places, best first; fewer where there are fewer, none where there is no heat."""
-        return find_goals(self.factors, self.values, top)
+        return find_goals(self.factors, self._shares, top)
 
     @overload
     def plot(self, path: str | Path, *, top: int = 3) -> Path: ...

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Question
 from avlmaps.language.commands import Given
 from avlmaps.language.intents import Ask
-from avlmaps.language.questions import read_question
+from avlmaps.language.questions import AskedSentence, read_question
 from avlmaps.query.answer import Answer
 
 if TYPE_CHECKING:
@@ -78,13 +79,13 @@ def ask_sentence(
         UnusedFileError: the sentence does not speak of a file that was given.
         QueryError: the sentence is not understood, or a part of it cannot be used.
     """
-    read = read_question(sentence, Given(image, clip, knows=lambda _: True))
+    read = _read(sentence, image, clip)
     counted = read.inquiry.ask is Ask.HOW_MANY
     answers: list[Answer] = []
     for question in read.questions:
         if primary is not None:
             question = Question.of(question.parts, primary)
-        used = {part.query for part in question.parts}
+        used = {part.query for part in question.parts if part.is_file}
         if any(name is not None and name not in used for name in (image, clip)):
             raise UnusedFileError(
                 "The sentence does not speak of the file; say 'this photo' or 'this recording' in it."
@@ -96,3 +97,9 @@ def ask_sentence(
         return SentenceAnswer(answer, top, read.notes)
     likely = [goal for goal in answer.goals if goal.score >= _AS_LIKELY * answer.goals[0].score]
     return SentenceAnswer(answer, top, read.notes, len(likely) if answer.found else 0)
+
+
+@lru_cache(maxsize=512)
+def _read(sentence: str, image: str | None, clip: str | None) -> AskedSentence:
+    """Return the reading of a sentence; it depends on nothing but the words, and agents repeat theirs."""
+    return read_question(sentence, Given(image, clip, knows=lambda _: True))

@@ -10,7 +10,7 @@ from jaxtyping import Float, UInt8
 
 from avlmaps.core.printable import plot_text
 from avlmaps.query.answer import Answer
-from avlmaps.query.plots import draw_heat, draw_map
+from avlmaps.query.plots import draw_map
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +29,7 @@ def full_picture(served: "ServedMap", answer: Answer) -> bytes:
     if answer.heat is None:
         return b""
     with _drawing:
-        return _png(draw_heat(answer.heat, answer.goals))
+        return _png(answer.heat.plot(top=max(len(answer.goals), 1)))
 
 
 def map_picture(served: "ServedMap") -> bytes:

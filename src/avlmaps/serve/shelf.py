@@ -7,14 +7,16 @@ then; a query sees one of them from its beginning to its end. Where the new one 
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, TypeVar, cast
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.core.errors import AvlmapsError
-from avlmaps.core.question import Part
+from avlmaps.core.errors import AvlmapsError, BackendError, QueryError
+from avlmaps.core.question import Modality, Part
+from avlmaps.language.questions import parse_sentence
 from avlmaps.maps.integrity import stamp
 from avlmaps.maps.store.manifest import MANIFEST
 from avlmaps.maps.store.reader import open_stored
@@ -32,6 +34,12 @@ if TYPE_CHECKING:
     from avlmaps.serve.tiles import Pyramid
 
 T = TypeVar("T")
+# A query of each kind loads its model and compiles its loops.
+_WARM = (
+    ("pixels", (Modality.OBJECT, "chair")),
+    ("views", (Modality.AREA, "kitchen")),
+    ("sounds", (Modality.SOUND, "water")),
+)
 _LONGEST_NAME = 100
 
 
@@ -101,13 +109,25 @@ class ServedMap:
         return f"{info.build_key[:16]}-{info.timings.finished}".replace('"', "")
 
     def prepare(self) -> None:
-        """Work out what every query needs, so that the first one is as quick as the others."""
-        space = self.avlmap.space
-        if len(space):
-            _ = space.centres, space.blocks, space.horizontal
-        models = self.avlmap.stored.info.models
-        if "pixels" in models and len(space):
-            self.avlmap.rivals()
+        """Compute what every query needs, so that the first one is as quick as the others.
+
+        Raises:
+            MapError: a large file of the map is damaged.
+        """
+        avlmap, models = self.avlmap, self.avlmap.stored.info.models
+        words = [(kind, word) for kind, word in _WARM if kind in models]
+        if len(avlmap.space):
+            _ = avlmap.space.centres, avlmap.space.blocks, avlmap.space.horizontal
+            parts = [Part(modality, word) for kind, (modality, word) in words if kind == "pixels" or self._has(kind)]
+            for part in parts:
+                with suppress(QueryError, BackendError):  # a model that is not here; its queries say so
+                    avlmap.heat(part)
+        with suppress(QueryError):
+            parse_sentence("the chair near the table in the kitchen")
+
+    def _has(self, kind: str) -> bool:
+        stored = self.avlmap.stored
+        return bool(len(stored.sounds) if kind == "sounds" else len(stored.keyframes))
 
     @cached_property
     def paths(self) -> "PathFinder":

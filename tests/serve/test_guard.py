@@ -1,0 +1,166 @@
+"""The guard before every request: who is let through, and what the others are answered."""
+
+import asyncio
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.testclient import TestClient
+
+from avlmaps.serve.errors import Privacy
+from avlmaps.serve.guard import Guard
+from avlmaps.serve.settings import Limits, ServeError, ServeSettings
+
+TOKEN = "a-token-of-some-length"
+
+
+async def behind(scope: Any, receive: Any, send: Any) -> None:
+    """An application that returns the length of the body."""
+    body = await Request(scope, receive).body()
+    await PlainTextResponse(str(len(body)))(scope, receive, send)
+
+
+def guarded(**settings: Any) -> TestClient:
+    return TestClient(Guard(behind, ServeSettings(**settings)), base_url="http://127.0.0.1:8750")
+
+
+def refused(response: Response | Any, status: int, kind: str) -> str:
+    assert response.status_code == status
+    assert response.json()["error"]["kind"] == kind
+    return response.json()["error"]["message"]
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:8750", "localhost", "LOCALHOST:1", "[::1]:8750", "localhost."])
+def test_names_of_this_machine_are_answered(host: str) -> None:
+    assert guarded().get("/", headers={"host": host}).status_code == 200
+
+
+@pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "", "10.0.0.7", "localhost@evil.example"])
+def test_other_names_are_refused_against_dns_rebinding(host: str) -> None:
+    refused(guarded().get("/", headers={"host": host}), 421, "host")
+
+
+def test_a_server_for_other_machines_takes_addresses_and_named_hosts() -> None:
+    client = guarded(host="0.0.0.0", token=TOKEN, allowed_hosts=("maps.example",))
+    bearer = {"authorization": f"Bearer {TOKEN}"}
+    for host in ("10.0.0.7:8750", "[fe80::1]:8750", "maps.example"):
+        assert client.get("/", headers={"host": host, **bearer}).status_code == 200
+    refused(client.get("/", headers={"host": "evil.example", **bearer}), 421, "host")
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:9999", "https://127.0.0.1.evil"])
+def test_pages_of_other_sites_are_refused(origin: str) -> None:
+    refused(guarded().post("/", headers={"origin": origin}), 403, "origin")
+    answer = guarded().options("/", headers={"origin": origin, "access-control-request-method": "POST"})
+    assert not [name for name in answer.headers if name.startswith("access-control")]
+
+
+def test_its_own_page_and_a_click_on_a_link_are_let_through_and_embedding_is_not() -> None:
+    assert guarded().get("/", headers={"origin": "http://127.0.0.1:8750"}).status_code == 200
+    linked = {"sec-fetch-site": "cross-site", "sec-fetch-mode": "navigate"}
+    assert guarded().get("/", headers=linked).status_code == 200
+    refused(guarded().get("/", headers={**linked, "sec-fetch-mode": "no-cors"}), 403, "origin")
+
+
+@pytest.mark.parametrize(
+    "header", ["", "Bearer", "Bearer x", f"Basic {TOKEN}", f"Bearer {TOKEN} x", f"bearer {TOKEN[:-1]}", "Bearer ü"]
+)
+def test_a_wrong_token_is_refused(header: str) -> None:
+    answer = guarded(token=TOKEN).get("/", headers={"authorization": header.encode("latin-1")})
+    refused(answer, 401, "token")
+    assert answer.headers["www-authenticate"].startswith("Bearer")
+    assert TOKEN not in answer.text
+
+
+def test_the_token_opens_and_health_needs_none() -> None:
+    client = guarded(token=TOKEN)
+    assert client.get("/", headers={"authorization": f"Bearer {TOKEN}"}).text == "0"
+    assert client.get("/", headers={"authorization": f"bearer {TOKEN}"}).text == "0"
+    assert client.get("/health").status_code == 200
+
+
+@given(st.text(max_size=40))
+def test_no_other_text_opens(text: str) -> None:
+    if text.strip() == TOKEN:
+        return
+    from avlmaps.serve.errors import RequestError
+
+    with pytest.raises(RequestError) as fault:
+        Guard(behind, ServeSettings(token=TOKEN))._check_token(f"Bearer {text}")
+    assert fault.value.status == 401
+
+
+def test_a_large_body_is_refused_by_its_length_and_by_its_bytes() -> None:
+    client = guarded(limits=Limits(body_bytes=100))
+    assert client.post("/", content=b"x" * 100).text == "100"
+    refused(client.post("/", content=b"x" * 101), 413, "size")
+
+    def pieces():
+        for _ in range(50):
+            yield b"x" * 10
+
+    refused(client.post("/", content=pieces()), 413, "size")
+    refused(client.post("/", headers={"content-length": "9" * 30}), 413, "size")
+
+
+def test_a_body_that_does_not_come_is_given_up() -> None:
+    sent: list[dict[str, Any]] = []
+
+    async def run() -> None:
+        async def never() -> dict[str, Any]:
+            await asyncio.sleep(60)
+            return {}
+
+        async def send(message: Any) -> None:
+            sent.append(dict(message))
+
+        scope = {"type": "http", "method": "POST", "path": "/", "headers": [(b"host", b"localhost")]}
+        await Guard(behind, ServeSettings(limits=Limits(body_s=0.05)))(scope, never, send)
+
+    asyncio.run(run())
+    assert sent[0]["status"] == 408
+
+
+def test_every_answer_forbids_guessing_framing_and_storing() -> None:
+    for answer in (guarded().get("/"), guarded().get("/", headers={"host": "evil.example"})):
+        assert answer.headers["x-content-type-options"] == "nosniff"
+        assert answer.headers["x-frame-options"] == "DENY"
+        assert answer.headers["cache-control"] == "no-store"
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"host": "0.0.0.0"}, "--token-file"),
+        ({"host": "192.168.1.7"}, "--token-file"),
+        ({"token": "short"}, "5 characters"),
+        ({"port": 70000}, "65535"),
+        ({"tls_key": "a.pem"}, "both"),
+    ],
+)
+def test_unsafe_settings_are_refused(settings: dict[str, Any], says: str) -> None:
+    with pytest.raises(ServeError, match=says):
+        ServeSettings(**settings)
+
+
+def test_settings_do_not_show_their_token() -> None:
+    assert TOKEN not in repr(ServeSettings(token=TOKEN))
+
+
+@pytest.mark.parametrize(
+    ("sentence", "cleaned"),
+    [
+        ("/data/maps/home.avlmap/map.json is damaged.", "home/map.json is damaged."),
+        ("it lies in /usr/lib/python3/x.py.", ""),
+        (r"it lies in C:\Users\me\x.py.", ""),
+        ("Answer 3/4 of http://localhost:8750/maps.", "Answer 3/4 of http://localhost:8750/maps."),
+    ],
+)
+def test_paths_of_the_machine_leave_sentences(sentence: str, cleaned: str, tmp_path: Any) -> None:
+    from pathlib import Path
+
+    told = Privacy([(Path("/data/maps/home.avlmap"), "home")]).cleaned(sentence)
+    assert told == cleaned if cleaned else "/" not in told and "\\" not in told

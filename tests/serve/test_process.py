@@ -1,0 +1,148 @@
+"""The server as a process of its own: it starts, answers programs and agents, and ends as it should."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import anyio
+import httpx
+import pytest
+from mcp.client.client import Client
+from mcp.client.stdio import StdioServerParameters, stdio_client
+
+from avlmaps.cli import main
+
+Start = Callable[..., tuple[subprocess.Popen[str], dict[str, Any]]]
+
+
+@pytest.fixture
+def start(room: Path) -> Iterator[Start]:
+    """Start servers; return the process and what it printed when it was ready."""
+    running: list[subprocess.Popen[str]] = []
+
+    def go(*words: object) -> tuple[subprocess.Popen[str], dict[str, Any]]:
+        command = [sys.executable, "-m", "avlmaps", "serve", str(room), "--json", *map(str, words)]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        running.append(process)
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert line, process.stderr.read() if process.stderr else ""
+        return process, json.loads(line)
+
+    yield go
+    for process in running:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+def test_a_process_answers_programs_and_agents_and_finishes_what_runs(start: Start) -> None:
+    process, ready = start("--port", "0")
+    assert ready["maps"] == ["room"]
+    assert ready["token"] is False
+    url = ready["url"]
+    assert url.startswith("http://127.0.0.1:")
+    answer = httpx.get(f"{url}/maps/room/ask", params={"sentence": "the red thing"}).json()
+    assert answer["goals"]
+    assert "server" not in httpx.get(f"{url}/maps").headers
+
+    async def agent(mode: str) -> Any:
+        async with Client(f"{url}/mcp", mode=mode) as client:
+            assert len((await client.list_tools()).tools) == 8
+            return (await client.call_tool("ask", {"sentence": "the red thing"})).structured_content
+
+    for mode in ("auto", "legacy"):
+        assert anyio.run(agent, mode)["goals"] == answer["goals"]
+
+    got: list[httpx.Response] = []
+    client = httpx.Client(timeout=60)
+    asking = threading.Thread(target=lambda: got.append(client.get(f"{url}/maps/room/picture?sentence=the+red+thing")))
+    with client.stream("GET", f"{url}/maps/room/contents?least=0.07", headers={"accept": "text/event-stream"}) as work:
+        events = work.iter_lines()
+        assert next(events) == "event: progress"
+        asking.start()
+        threading.Event().wait(0.2)
+        process.send_signal(signal.SIGTERM)
+        lines = list(events)
+    assert any(line.startswith("event: answer") for line in lines), "what was running was finished"
+    asking.join(60)
+    assert [one.status_code for one in got] == [200]
+    assert process.wait(30) == 0
+    assert process.stderr is not None
+    assert "Traceback" not in process.stderr.read()
+
+
+def test_a_killed_server_starts_again_on_the_same_port_with_the_same_answers(start: Start) -> None:
+    process, ready = start("--port", "0")
+    port = ready["url"].rpartition(":")[2]
+    before = httpx.get(f"{ready['url']}/maps/room/ask?sentence=the+red+thing").json()
+    process.kill()
+    process.wait(10)
+    again, ready = start("--port", port)
+    after = httpx.get(f"{ready['url']}/maps/room/ask?sentence=the+red+thing").json()
+    assert after["goals"] == before["goals"]
+    again.send_signal(signal.SIGINT)
+    assert again.wait(30) == 0
+
+
+def test_an_agent_is_served_by_standard_input_and_output(room: Path) -> None:
+    async def conversation() -> Any:
+        words = ["-m", "avlmaps", "serve", str(room), "--stdio"]
+        parameters = StdioServerParameters(command=sys.executable, args=words, env=dict(os.environ))
+        async with Client(stdio_client(parameters)) as client:
+            assert len((await client.list_tools()).tools) == 8
+            return (await client.call_tool("ask", {"sentence": "the red thing"})).structured_content
+
+    assert anyio.run(conversation)["goals"]
+
+
+def failed(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str]:
+    with pytest.raises(SystemExit) as stop:
+        main(["serve", *map(str, words)])
+    return int(stop.value.code or 0), capsys.readouterr().err
+
+
+def test_faults_of_starting_are_one_sentence(
+    room: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("AVLMAPS_TOKEN", raising=False)
+    (tmp_path / "empty").write_text("")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        cases: list[tuple[tuple[object, ...], int, str]] = [
+            ((room, "--port", port), 1, f"Port {port} of 127.0.0.1 is taken"),
+            ((room, room), 1, "Two maps are called 'room'"),
+            ((tmp_path / "none.avlmap", "--port", 0), 1, "none.avlmap is not there"),
+            ((room, "--host", "0.0.0.0", "--port", 0), 1, "needs a token"),
+            ((room, "--token-file", tmp_path / "empty"), 1, "is empty"),
+            ((room, "--token-file", tmp_path / "absent"), 1, "cannot be read"),
+            ((room, "--tls-cert", "a.pem"), 1, "both --tls-cert and --tls-key"),
+            ((room, "--host", "256.0.0.1.invalid", "--token-file", tmp_path / "absent"), 1, "cannot"),
+            ((room, "--stdio", "--json"), 2, "--json cannot be used"),
+            ((), 2, ""),
+        ]
+        for words, status, says in cases:
+            code, said = failed(capsys, *words)
+            assert code == status, said
+            assert says in said
+            assert "Traceback" not in said
+
+
+def test_a_missing_package_is_one_sentence(
+    room: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in [name for name in sys.modules if name.partition(".")[0] in ("uvicorn",)]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    code, said = failed(capsys, room, "--port", 0)
+    assert code == 1
+    assert "pip install 'avlmaps[serve]'" in said
