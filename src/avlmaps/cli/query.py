@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
@@ -12,7 +12,7 @@ from avlmaps.cli.verb import ModelVerb
 
 if TYPE_CHECKING:
     from avlmaps.core.camera import Pinhole
-    from avlmaps.core.question import Part
+    from avlmaps.core.question import Part, Question
     from avlmaps.query.answer import Answer
     from avlmaps.query.avlmap import AVLMap, QuerySettings
 
@@ -25,8 +25,6 @@ class Query(ModelVerb):
     avlmaps query MAP "the red cabinet near the sound of a dog barking"
     avlmaps query MAP --object "red cabinet" --sound-clip bark.ogg --plot heat.png
     """
-
-    compiles: ClassVar[bool] = True
 
     map: Annotated[Positional[Path], arg(metavar="MAP")]
     """Map folder (NAME.avlmap)."""
@@ -68,7 +66,6 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
         verb: the query.
         opened: the map, where it is open already.
     """
-    from avlmaps.core.question import Modality, Question
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.rules import query_settings
 
@@ -83,9 +80,43 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
         raise UsageError(f"--top is {verb.top}; it must be 1 or more.")
     settings = query_settings(verb.rules)
     asked = AVLMap.open(verb.map, settings) if opened is None else _by_rules(opened, settings)
-    if verb.sentence.strip():
+    thing = _thing_alone(verb, asked, parts)
+    if thing is not None and opened is None and verb.plot is None and len(asked.stored.voxels) <= _SMALL_MAP:
+        from avlmaps.query.loops import plain_loops
+
+        with plain_loops():  # loading the compiled loops would take longer than the question
+            return {**asked.ask(thing, top=verb.top).to_json()}
+    from avlmaps.core.compiling import announce_compiling
+
+    with announce_compiling():
+        return _answer(verb, asked, parts, thing)
+
+
+def _thing_alone(verb: "Query", asked: "AVLMap", parts: "list[Part]") -> "Question | None":
+    """Return the question for one thing and nothing else: the grammar need not be read for a name that is known."""
+    from avlmaps.core.lexicon import Kind, lexicon
+    from avlmaps.core.question import Modality, Part, Question
+    from avlmaps.perception.protocols import NamedPixelEncoder
+
+    if verb.intrinsics is not None or verb.primary not in (None, "object"):
+        return None
+    if not verb.sentence:
+        return Question.of(parts) if [part.modality for part in parts] == [Modality.OBJECT] else None
+    if parts or "pixels" not in asked.stored.info.models:
+        return None
+    encoder = asked.stored.profile.pixel_encoder()
+    is_name = isinstance(encoder, NamedPixelEncoder) and verb.sentence in encoder.vocabulary
+    # Stairs are a thing and an area; which is meant is for the grammar to say.
+    is_name = is_name and {entry.kind for entry in lexicon().senses(verb.sentence)} == {Kind.THING}
+    return Question.of([Part(Modality.OBJECT, verb.sentence)]) if is_name else None
+
+
+def _answer(verb: "Query", asked: "AVLMap", parts: "list[Part]", thing: "Question | None") -> dict[str, Any]:
+    from avlmaps.core.question import Modality, Question
+
+    if thing is None and verb.sentence.strip():
         return _asked_in_words(verb, asked)
-    question = Question.of(parts, Modality(verb.primary) if verb.primary else None)
+    question = thing or Question.of(parts, Modality(verb.primary) if verb.primary else None)
     camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
     answer = asked.ask(question, top=verb.top, intrinsics=camera)
     return {**answer.to_json(), **_plotted(verb, answer)}
@@ -96,6 +127,9 @@ def _by_rules(opened: "AVLMap", settings: "QuerySettings") -> "AVLMap":
     from avlmaps.query.avlmap import AVLMap
 
     return opened if opened.settings == settings else AVLMap(opened.stored, settings)
+
+
+_SMALL_MAP = 400_000  # voxels; plain NumPy takes 0.1 s for so many
 
 
 def _asked_in_words(verb: "Query", asked: "AVLMap") -> dict[str, Any]:

@@ -16,7 +16,7 @@ from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.query.answer import Answer, PartAnswer
-from avlmaps.query.factors import Factor, HeatSettings, NearAnchors
+from avlmaps.query.factors import Factor, HeatSettings, NearAnchors, NearThings
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.modalities.area import AreaSettings, area_factor
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
@@ -381,7 +381,9 @@ class AVLMap:
 
 
 def _peak(factor: Factor) -> float:
-    """Return the highest heat; that of places is highest where the robot stood, far from any voxel maybe."""
+    """Return the highest heat: 1 on an object; that of places may lie where the robot stood, far from any voxel."""
+    if isinstance(factor, NearThings):
+        return float(factor.mask.any())
     at_places = factor.scores.max(initial=0.0) if isinstance(factor, NearAnchors) else 0.0
     return float(max(factor.values.max(initial=0.0), at_places))
 

@@ -20,6 +20,8 @@ FOUND_AT = 0.5
 # Scores are products of float32 vectors of unit length. Their last digits depend on the order of summation, which
 # depends on the processor and on how many vectors are multiplied at once; a difference below this means nothing.
 ROUNDING = 1e-6
+# The distances of this many pairs of points are worked out one by one, sooner than a search tree is made.
+_FEW_PAIRS = 65_536
 # Pairs of a point and an anchor that are compared at once: some megabytes.
 _PAIRS = 1 << 18
 
@@ -158,7 +160,11 @@ class NearThings(Factor):
         """Return the heat at any points."""
         if not len(self.anchors):
             return np.zeros(len(points_world))
-        distance = self._tree.query(points_world)[0]
+        if len(points_world) * len(self.anchors) <= _FEW_PAIRS:
+            apart = points_world[:, None, :] - self.anchors
+            distance = np.sqrt(np.einsum("mak,mak->ma", apart, apart)).min(axis=1)
+        else:
+            distance = self._tree.query(points_world)[0]
         return np.maximum(1.0 - self.falloff_per_m * distance, 0.0)
 
     def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:

@@ -75,16 +75,22 @@ class Shares:
     peak: Float[np.ndarray, " i"]
 
 
-def share_voxels(factors: Sequence[Factor], values: Float32[np.ndarray, " n"]) -> Shares:
-    """Divide the heated voxels among the instances of the lead."""
+def share_voxels(factors: Sequence[Factor], values: Callable[[], Float32[np.ndarray, " n"]]) -> Shares:
+    """Divide the heated voxels among the instances of the lead.
+
+    Args:
+        factors: one or more, of one map.
+        values: returns their product at every voxel; not called for one object alone, whose heat is 1 on it.
+    """
     lead = lead_of(factors)
     if isinstance(lead, NearThings) and len(factors) == 1:
         rows = np.flatnonzero(lead.mask)
-        instance = lead.instance
+        instance, heat = lead.instance, np.ones(len(rows))  # an object's own voxels are as hot as can be
     else:
-        rows = np.flatnonzero(values > 0.0) if len(lead.anchors) else np.zeros(0, np.int64)
+        rows = np.flatnonzero(values() > 0.0) if len(lead.anchors) else np.zeros(0, np.int64)
         instance = lead.instance[lead.anchor_of(rows)] if len(rows) else np.zeros(0, np.int64)
-    points, heat = lead.space.centres[rows], values[rows].astype(np.float64)
+        heat = values()[rows].astype(np.float64)
+    points = lead.space.centres[rows]
     if lead.flat:
         at_anchors = np.ones(len(lead.anchors))
         for factor in factors:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
@@ -25,21 +25,20 @@ class Heatmap:
     Attributes:
         space: the map's voxels.
         factors: the parts of the query, one factor each.
-        values: the product of the factors' heat.
     """
 
     space: Space
     factors: tuple[Factor, ...]
-    values: Float32[np.ndarray, " n"]
 
     @classmethod
     def of(cls, factor: Factor) -> "Heatmap":
         """Return the heatmap of one thing."""
-        return cls(factor.space, (factor,), factor.values)
+        return cls(factor.space, (factor,))
 
-    def __post_init__(self) -> None:
-        if self.values.shape != (len(self.space),):
-            raise ValueError(f"heat has shape {self.values.shape}; the map has {len(self.space)} voxels")
+    @cached_property
+    def values(self) -> Float32[np.ndarray, " n"]:
+        """The product of the factors' heat, worked out when it is first used."""
+        return reduce(np.multiply, (factor.values for factor in self.factors))
 
     def __mul__(self, other: "Heatmap") -> "Heatmap":
         if not isinstance(other, Heatmap):
@@ -47,7 +46,7 @@ class Heatmap:
         if self.space is not other.space:
             raise ValueError("two heatmaps of different maps cannot be multiplied; ask both of the same AVLMap")
         one, two = self._in_company(), other._in_company()
-        return Heatmap(self.space, one.factors + two.factors, one.values * two.values)
+        return Heatmap(self.space, one.factors + two.factors)
 
     def include_uncertain(self) -> "Heatmap":
         """Return the heatmap that includes instances of low confidence: for a caller that must guess."""
@@ -58,7 +57,7 @@ class Heatmap:
         return Heatmap.of(self.factors[0].for_product()) if len(self.factors) == 1 else self
 
     def __len__(self) -> int:
-        return len(self.values)
+        return len(self.space)
 
     @property
     def peak(self) -> float:
@@ -82,7 +81,7 @@ class Heatmap:
 
     @cached_property
     def _shares(self) -> Shares:
-        return share_voxels(self.factors, self.values)
+        return share_voxels(self.factors, lambda: self.values)
 
     @property
     def found(self) -> bool:

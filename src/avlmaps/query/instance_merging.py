@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from avlmaps.query.factors import NearThings
+from avlmaps.query.loops import connected
 
 _SPECK_M2 = 0.0199  # a guess shows at least as much surface as a mug
 
@@ -30,9 +31,6 @@ def joined_pieces(
     pieces are one thing where at least half of the smaller one's columns (of ``cell_m``, top-down) hold the
     other too, with nothing else between them and at most ``join_m`` in height.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     count = int(instance.max(initial=-1)) + 1
     cell = np.unique(np.floor(points_level[:, :2] / cell_m), axis=0, return_inverse=True)[1].reshape(-1)
     columns = np.bincount(np.unique(np.stack([instance, cell]), axis=1)[0], minlength=count)
@@ -44,8 +42,7 @@ def joined_pieces(
     met = np.unique(np.stack([a, b, cell[below][meeting]]), axis=1)[:2]
     (a, b), times = np.unique(met, axis=1, return_counts=True)
     same = 2 * times >= np.minimum(columns[a], columns[b])
-    links = coo_array((np.ones(int(same.sum()), bool), (a[same], b[same])), shape=(count, count))
-    return connected_components(links, directed=False)[1]
+    return connected(count, a[same], b[same])
 
 
 def likeliest(things: NearThings) -> NearThings:

@@ -8,12 +8,11 @@ that learnt from rendered worlds and real frames, and one that saw rendered worl
 import json
 import os
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from hashlib import sha256
 from importlib.resources import files
 from typing import Any
 
-import cv2
 import msgspec
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
@@ -105,19 +104,26 @@ class SceneNetwork:
     """The network, loaded."""
 
     def __init__(self, weights: bytes, notes: Notes, checksum: str) -> None:
-        """Start a session on some weights."""
+        """Keep the weights until the first frame comes."""
+        self._weights = weights
+        self.notes = notes
+        self.checksum = checksum
+        self._bias = np.array(notes.bias, np.float32)
+
+    @cached_property
+    def _session(self) -> Any:
+        """The network, ready to run: made for the first frame, since a query of words needs its notes alone."""
         import onnxruntime
 
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = min(4, _cores())
         options.inter_op_num_threads = 1
-        self._session = onnxruntime.InferenceSession(weights, options, providers=["CPUExecutionProvider"])
-        self.notes = notes
-        self.checksum = checksum
-        self._bias = np.array(notes.bias, np.float32)
+        return onnxruntime.InferenceSession(self._weights, options, providers=["CPUExecutionProvider"])
 
     def see(self, frame: Frame) -> Seen:
         """Encode a frame; its ``ground`` gives the up direction, where it is known."""
+        import cv2
+
         camera, depth_m, rgb = at_working_size(frame, self.notes.width_px)
         up, height_m = _ground_of(frame)
         multiple = self.notes.multiple
@@ -166,6 +172,8 @@ def at_working_size(
     frame: Frame, width_px: int
 ) -> tuple[Pinhole, Float32[np.ndarray, "h w"], UInt8[np.ndarray, "h w 3"]]:
     """Return the colour camera, the depth as it sees it, and its picture, at the size that the network looks at."""
+    import cv2
+
     camera, depth_m = depth_in_colour(frame.depth_m, frame.rig)
     width = min(width_px, round(width_px / camera.fx * camera.width))
     height = max(1, round(width * camera.height / camera.width))

@@ -20,8 +20,10 @@ LONGEST_PHRASE_WORDS = 64
 
 def clean_phrase(phrase: str) -> str:
     """Return the phrase in lower case, without accents, punctuation, articles in front and filler words."""
-    text = unicodedata.normalize("NFKD", phrase.casefold())
-    text = "".join(letter for letter in text if not unicodedata.combining(letter))
+    text = phrase.casefold()
+    if not text.isascii():
+        text = unicodedata.normalize("NFKD", text)
+        text = "".join(letter for letter in text if not unicodedata.combining(letter))
     text = re.sub(r"['’`]", "", text)
     words = [word for word in _WORD.findall(text) if word[0].isalnum()]
     text = " ".join(words[:LONGEST_PHRASE_WORDS])

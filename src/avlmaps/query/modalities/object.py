@@ -15,6 +15,7 @@ from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Part
 from avlmaps.core.spelling import squeezed
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, ScaledEncoder
+from avlmaps.query import loops
 from avlmaps.query.colour_filter import Tint, is_tinted, tint_of, tinted_share
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearThings
 from avlmaps.query.instance_merging import joined_pieces, likeliest, without_specks
@@ -115,7 +116,7 @@ class Rivals:
         encoded = np.asarray(encoder.encode_words(names), np.float32)
         known = np.any(encoded != 0.0, axis=1)
         words = tuple(word for word, is_known in zip(names, known, strict=True) if is_known)
-        return cls(words, encoded[known], bool(known[-1]), *_two_closest(feature, encoded[known]))
+        return cls(words, encoded[known], bool(known[-1]), *loops.two_closest(feature, encoded[known]))
 
     def silent_for(self, encoder: PixelEncoder, asked: "Asked", cosine: float) -> Bool[np.ndarray, " v"]:
         """Return which words do not compete because they name the queried thing; ``other`` always competes."""
@@ -127,26 +128,6 @@ class Rivals:
         if self.has_other:
             silent[-1] = False
         return silent
-
-
-def _two_closest(feature: Float16[np.ndarray, "n d"], words: Float32[np.ndarray, "v d"]):
-    from avlmaps.query.kernels import best_two, share, widen
-
-    n = len(feature)
-    best, second = np.full(n, -np.inf, np.float32), np.full(n, -np.inf, np.float32)
-    best_word, second_word = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
-    columns = np.ascontiguousarray(words.T)
-
-    def work(start: int, stop: int) -> None:
-        wide = np.empty((min(_CHUNK, max(stop - start, 1)), feature.shape[1]), np.float32)
-        for a in range(start, stop, _CHUNK):
-            rows = np.ascontiguousarray(feature[a : min(a + _CHUNK, stop)], np.float16)
-            widen(rows.view(np.uint16), wide)
-            best_two(wide[: len(rows)] @ columns, best, best_word, second, second_word, a)
-
-    if len(words):
-        share(work, n, least=_CHUNK)
-    return best, best_word, second, second_word
 
 
 def object_margins(
@@ -167,24 +148,15 @@ def object_margins(
         silent: which of the rivals' words do not compete.
         least_score: what the word must beat besides where ``other`` has no feature.
     """
-    from avlmaps.query.kernels import feature_scores, margins, share
-
-    score = feature_scores(feature, asked[0])
+    score = loops.feature_scores(feature, asked[0])
     if len(asked) > 1:
         total = np.square(score)
         for row in asked[1:]:
-            total += np.square(feature_scores(feature, row))
+            total += np.square(loops.feature_scores(feature, row))
         score = np.sqrt(total)
     floor = np.float32(-np.inf if rivals.has_other else least_score)
-    out, unsure = np.empty(len(score), np.float32), np.empty(len(score), np.bool_)
-    mute = np.append(silent, True)
-    share(
-        lambda a, b: margins(
-            score, rivals.best, rivals.best_word, rivals.second, rivals.second_word, mute, floor, out, unsure, a, b
-        ),
-        len(score),
-        least=50_000,
-    )
+    closest = rivals.best, rivals.best_word, rivals.second, rivals.second_word
+    out, unsure = loops.margins(score, closest, silent, floor)
     rows = np.flatnonzero(unsure)
     if len(rows) and not silent.all():
         others = rivals.word_feature[~silent].T
@@ -197,10 +169,8 @@ def object_margins(
 
 def instances_of(space: Space, mask: Bool[np.ndarray, " n"], link_m: float) -> Int[np.ndarray, " a"]:
     """Return for each voxel of the mask the number of the instance that it belongs to."""
-    from avlmaps.query.kernels import linked
-
     reach = max(1, round(link_m / space.grid.voxel_size_m))
-    return linked(np.ascontiguousarray(space.index[mask], np.int64), reach)
+    return loops.linked(np.asarray(space.index[mask]), reach)
 
 
 def instance_confidence(

@@ -1,0 +1,151 @@
+"""The loops over voxels that a query for a thing needs, compiled or in plain NumPy.
+
+The compiled ones (``kernels``) are faster by far, but loading numba takes longer than one question to a map of a room.
+``plain_loops`` is for a process that asks just one: ``avlmaps query`` on a small map. Both give the same answers; sums
+of floats differ in their last digits.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+import numpy as np
+from jaxtyping import Bool, Float16, Float32, Int, Int64
+
+_CHUNK = 16_384
+_PLAIN: ContextVar[bool] = ContextVar("plain", default=False)
+
+
+@contextmanager
+def plain_loops(wanted: bool = True) -> Iterator[None]:
+    """Use plain NumPy in this context, so that numba is not loaded."""
+    before = _PLAIN.set(wanted)
+    try:
+        yield
+    finally:
+        _PLAIN.reset(before)
+
+
+def feature_scores(feature: Float16[np.ndarray, "n d"], word: Float32[np.ndarray, " d"]) -> Float32[np.ndarray, " n"]:
+    """Return the dot product of every feature with one word."""
+    if not _PLAIN.get():
+        from avlmaps.query.kernels import feature_scores as compiled
+
+        return compiled(feature, word)
+    out = np.empty(len(feature), np.float32)
+    for a in range(0, len(feature), _CHUNK):
+        out[a : a + _CHUNK] = np.asarray(feature[a : a + _CHUNK], np.float32) @ np.asarray(word, np.float32)
+    return out
+
+
+Closest = tuple[
+    Float32[np.ndarray, " n"], Int[np.ndarray, " n"], Float32[np.ndarray, " n"], Int[np.ndarray, " n"]
+]  # the best score of each voxel and whose it is, and the second best
+
+
+def two_closest(feature: Float16[np.ndarray, "n d"], words: Float32[np.ndarray, "v d"]) -> Closest:
+    """Return the two words closest to each feature; −inf and −1 where there are none."""
+    n = len(feature)
+    best, second = np.full(n, -np.inf, np.float32), np.full(n, -np.inf, np.float32)
+    best_word, second_word = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
+    columns = np.ascontiguousarray(words.T)
+
+    def compiled(start: int, stop: int) -> None:
+        wide = np.empty((min(_CHUNK, max(stop - start, 1)), feature.shape[1]), np.float32)
+        for a in range(start, stop, _CHUNK):
+            rows = np.ascontiguousarray(feature[a : min(a + _CHUNK, stop)], np.float16)
+            widen(rows.view(np.uint16), wide)
+            best_two(wide[: len(rows)] @ columns, best, best_word, second, second_word, a)
+
+    def plain(start: int, stop: int) -> None:
+        for a in range(start, stop, _CHUNK):
+            b = min(a + _CHUNK, stop)
+            scores = np.asarray(feature[a:b], np.float32) @ columns
+            rows = np.arange(b - a)
+            best_word[a:b] = scores.argmax(axis=1)
+            best[a:b] = scores[rows, best_word[a:b]]
+            if scores.shape[1] > 1:
+                scores[rows, best_word[a:b]] = -np.inf
+                second_word[a:b] = scores.argmax(axis=1)
+                second[a:b] = scores[rows, second_word[a:b]]
+
+    if not len(words):
+        pass
+    elif _PLAIN.get():
+        plain(0, n)
+    else:
+        from avlmaps.query.kernels import best_two, share, widen
+
+        share(compiled, n, least=_CHUNK)
+    return best, best_word, second, second_word
+
+
+def margins(
+    score: Float32[np.ndarray, " n"], closest: Closest, silent: Bool[np.ndarray, " v"], least: float
+) -> tuple[Float32[np.ndarray, " n"], Bool[np.ndarray, " n"]]:
+    """Return score minus the best competing rival's, and where a third word may be that rival.
+
+    Args:
+        score: of the queried word.
+        closest: of ``two_closest``.
+        silent: which words do not compete.
+        least: what the word must beat in any case.
+    """
+    best, best_word, second, second_word = closest
+    mute = np.append(silent, True)  # number −1 is no word
+    if _PLAIN.get():
+        first_mute, second_mute = mute[best_word], mute[second_word]
+        rival = np.where(first_mute, np.where(second_mute, np.float32(-np.inf), second), best)
+        return score - np.maximum(rival, np.float32(least)), first_mute & second_mute & (second_word >= 0)
+    from avlmaps.query.kernels import margins as compiled
+    from avlmaps.query.kernels import share
+
+    out, unsure = np.empty(len(score), np.float32), np.empty(len(score), np.bool_)
+    share(
+        lambda a, b: compiled(score, best, best_word, second, second_word, mute, np.float32(least), out, unsure, a, b),
+        len(score),
+        least=50_000,
+    )
+    return out, unsure
+
+
+def linked(index: Int[np.ndarray, "n 3"], reach: int) -> Int64[np.ndarray, " n"]:
+    """Label voxels so that those within ``reach`` along every axis share a label; labels rise by their first voxel.
+
+    Args:
+        index: sorted by x, then y, then z, without repeats.
+        reach: in voxels.
+    """
+    voxels = np.ascontiguousarray(index, np.int64)
+    if not _PLAIN.get():
+        from avlmaps.query.kernels import linked as compiled
+
+        return compiled(voxels, reach)
+    if not len(voxels):
+        return np.zeros(0, np.int64)
+    low = voxels.min(axis=0)
+    size = voxels.max(axis=0) - low + 1 + 2 * reach
+    key = ((voxels[:, 0] - low[0]) * size[1] + voxels[:, 1] - low[1]) * size[2] + voxels[:, 2] - low[2]
+    side = np.arange(-reach, reach + 1)
+    steps = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
+    pairs: list[np.ndarray] = []
+    for dx, dy, dz in steps[len(steps) // 2 + 1 :]:  # the other half are the same pairs again
+        wanted = key + (dx * size[1] + dy) * size[2] + dz
+        at = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
+        here = np.flatnonzero(key[at] == wanted)
+        pairs.append(np.stack([here, at[here]]))
+    a, b = np.concatenate(pairs, axis=1)
+    return connected(len(voxels), a, b)
+
+
+def connected(count: int, a: Int[np.ndarray, " e"], b: Int[np.ndarray, " e"]) -> Int64[np.ndarray, " n"]:
+    """Return the label of each of ``count`` nodes, equal for those that edges join; labels rise by their first node."""
+    root = np.arange(count)
+    while True:
+        one, other = root[a], root[b]
+        apart = one != other
+        if not apart.any():
+            return np.unique(root, return_inverse=True)[1].reshape(-1).astype(np.int64)
+        np.minimum.at(root, np.maximum(one, other)[apart], np.minimum(one, other)[apart])
+        while (root[root] != root).any():
+            root = root[root]

@@ -1,0 +1,77 @@
+"""A question of one word loads none of the heavy packages, and answers as the loaded ones do."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from avlmaps.cli import main
+from avlmaps.cli.query import Query, _thing_alone
+from avlmaps.core.question import Modality, Part, Question
+from avlmaps.core.registry import Kind, load
+from avlmaps.language.questions import parse_sentence
+
+HEAVY = {
+    "numba", "llvmlite", "scipy", "onnxruntime", "cv2", "av", "matplotlib", "trimesh", "soundfile", "PIL",
+    "avlmaps.language", "avlmaps.sim",
+}  # fmt: skip
+ASK = """
+import json, sys
+from avlmaps.cli.main import main
+try:
+    main(["query", sys.argv[1], sys.argv[2], "--json"])
+except SystemExit as end:
+    assert not end.code, end.code
+print(json.dumps(sorted(sys.modules)))
+"""
+
+
+@pytest.fixture(scope="module")
+def encoder():
+    return load(Kind.PIXELS, "embedded")
+
+
+@pytest.fixture(scope="module")
+def room_map(walk: Path) -> Path:
+    out = walk.parent / "embedded.avlmap"
+    with pytest.raises(SystemExit) as stop:
+        main(["build", str(walk), "--out", str(out), "--voxel-size-m", "0.1", "--frame-step", "8"])
+    assert stop.value.code == 0
+    return out
+
+
+def asked(word: str, encoder: object) -> Question | None:
+    stored = SimpleNamespace(
+        info=SimpleNamespace(models={"pixels": None}), profile=SimpleNamespace(pixel_encoder=lambda: encoder)
+    )
+    return _thing_alone(Query(map=Path("m"), sentence=word), SimpleNamespace(stored=stored), [])  # pyright: ignore[reportArgumentType]
+
+
+def test_one_word_loads_no_heavy_package(room_map: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", ASK, room_map, "chair"], capture_output=True, text=True, timeout=200)
+    assert done.returncode == 0, done.stderr
+    answer, loaded = (json.loads(line) for line in done.stdout.splitlines())
+    assert answer["parts"][0]["query"] == "chair"
+    assert HEAVY & set(loaded) == set()
+
+
+def test_a_name_is_read_as_the_grammar_reads_it(encoder: object) -> None:
+    alone = {word: asked(word, encoder) for word in encoder.vocabulary}  # pyright: ignore[reportAttributeAccessIssue]
+    short = {word: question for word, question in alone.items() if question is not None}
+    assert len(short) > 0.75 * len(alone)  # the others are sounds or areas as well
+    assert {word: parse_sentence(word) for word in short} == short
+
+
+@pytest.mark.parametrize(
+    "words", ["stairs", "kitchen", "red chair", "the chair near the sound of a dog", "dog barking"]
+)
+def test_all_else_is_left_to_the_grammar(words: str, encoder: object) -> None:
+    assert asked(words, encoder) is None
+
+
+def test_a_part_alone_is_a_question(encoder: object) -> None:
+    verb, parts = Query(map=Path("m"), object="red sofa"), [Part(Modality.OBJECT, "red sofa")]
+    assert _thing_alone(verb, SimpleNamespace(), parts) == Question.of(parts)  # pyright: ignore[reportArgumentType]
