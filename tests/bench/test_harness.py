@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from avlmaps.bench.harness.chosen import chosen_on
 from avlmaps.bench.harness.clips import unheard_folder, unheard_rows
 from avlmaps.bench.harness.evidence import Box
-from avlmaps.bench.harness.models import chosen_profile, shipped_checksums
+from avlmaps.bench.harness.models import shipped_checksums
 from avlmaps.bench.harness.own_recording import OwnRecording, is_recording
 from avlmaps.bench.harness.paper import paper_figures
 from avlmaps.bench.harness.provenance import clip_table, in_words, outdated, shown_scene
@@ -28,6 +28,7 @@ from avlmaps.bench.output import as_csv, table_markdown, write_answer
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.registry import Kind
+from avlmaps.perception.profiles import choose_models
 from avlmaps.recordings.audio import Sound, write_flac
 from avlmaps.recordings.clips import find_clips
 from avlmaps.recordings.types import Frame
@@ -79,8 +80,8 @@ def test_a_folder_that_does_not_say_what_was_trained_on_is_refused(tmp_path: Pat
 
 
 def test_a_model_is_chosen_by_its_word():
-    assert chosen_profile("embedded", ["views=clip"]).backend_name(Kind.VIEWS) == "clip"
-    assert chosen_profile("embedded").backend_name(Kind.VIEWS) == "embedded"
+    assert choose_models("embedded", ["views=clip"]).backend_name(Kind.VIEWS) == "clip"
+    assert choose_models("embedded").backend_name(Kind.VIEWS) == "embedded"
 
 
 @pytest.mark.parametrize(
@@ -88,7 +89,7 @@ def test_a_model_is_chosen_by_its_word():
 )
 def test_a_word_that_chooses_no_model_is_refused(words: list[str]):
     with pytest.raises(BackendError):
-        chosen_profile("embedded", words)
+        choose_models("embedded", words)
 
 
 def test_weights_are_outdated_where_their_checksum_is_not_the_shipped_one():

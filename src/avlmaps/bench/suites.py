@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from avlmaps.bench.harness.models import checksums, chosen_profile, shipped_checksums
+from avlmaps.bench.harness.models import checksums, shipped_checksums
 from avlmaps.bench.harness.provenance import in_words
 from avlmaps.bench.output import BenchError, Table, draw, markdown, write_answer
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.registry import Kind
-from avlmaps.perception.profiles import Profile
+from avlmaps.perception.profiles import Profile, choose_models
 
 if TYPE_CHECKING:
     from avlmaps.bench.indexing import IndexingSettings
@@ -64,7 +64,7 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
         from avlmaps.bench.navigation.suite import run_navigation
 
         return run_navigation(asked.navigation, out)
-    used = chosen_profile(asked.profile, asked.models)
+    used = choose_models(asked.profile, asked.models)
     weights = _weights(suite, used)
     if suite == "objects":
         from avlmaps.bench.objects import run_objects
@@ -132,7 +132,7 @@ def _locate(asked: Asked) -> Mapping[str, Table]:
         if len(recording) < 20:
             raise RecordingError(f"{path} has {len(recording)} frames; half as map and half as photos takes 20.")
         tables[f"photos located in {path.resolve().name}"] = locate.run(
-            recording, asked.seed, used=chosen_profile(asked.profile, asked.models)
+            recording, asked.seed, used=choose_models(asked.profile, asked.models)
         )
     return tables
 

@@ -96,7 +96,7 @@ def build(verb: "Build") -> dict[str, Any]:
             f"The paper's rules use every depth as it is; leave out --sensor {verb.sensor} or --rules paper."
         )
     used, cache = (
-        _chosen_profile(verb.profile, [word for words in verb.model for word in words]),
+        _choose_models(verb.profile, [word for words in verb.model for word in words]),
         _cache(verb.feature_cache, verb.feature_cache_gb),
     )
     recording = open_recording(verb.recording, format=verb.format, audio=verb.audio, topics=_topics(verb.topics))
@@ -121,23 +121,13 @@ def build(verb: "Build") -> dict[str, Any]:
     return {**describe_map(stored), "elapsed_s": round(perf_counter() - begin, 3)}
 
 
-def _chosen_profile(name: str, words: "Sequence[str]") -> "Profile":
-    """Return the profile with the backends and models that were chosen instead of its own."""
-    from avlmaps.core.registry import Kind
-    from avlmaps.perception.profiles import profile
+def _choose_models(name: str, words: "Sequence[str]") -> "Profile":
+    from avlmaps.perception.profiles import profile, read_choices
 
-    perceived = {kind.value: kind for kind in Kind if kind is not Kind.WORDS}
-    choices: dict[Kind, str] = {}
-    for word in words:
-        module, _, backend = word.partition("=")
-        if module not in perceived or not backend.partition("@")[0]:
-            raise UsageError(
-                f"--model takes words like pixels=clip-patches@openai/clip-vit-large-patch14, not {word!r}; the "
-                f"modules are {', '.join(perceived)}."
-            )
-        if perceived[module] in choices:
-            raise UsageError(f"--model names {module} twice; choose one.")
-        choices[perceived[module]] = backend
+    try:
+        choices = read_choices(words)
+    except ValueError as problem:
+        raise UsageError(f"--model {problem}") from None
     return profile(name).choosing(choices)
 
 

@@ -1,6 +1,6 @@
 """Profiles: which backend serves which module. A map stores the name of its profile and every model's card."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
@@ -139,6 +139,45 @@ def register_profile(profile: Profile) -> None:
 def profiles() -> list[Profile]:
     """Return every known profile."""
     return list(_PROFILES.values())
+
+
+def choose_models(name: str, words: Sequence[str] = ()) -> Profile:
+    """Return a profile with other backends or models for some modules.
+
+    Args:
+        name: of the profile.
+        words: ``module=backend`` or ``module=backend@model``.
+
+    Raises:
+        BackendError: a word is not of that form, or there is no such profile or backend.
+    """
+    try:
+        choices = read_choices(words)
+    except ValueError as problem:
+        raise BackendError(f"A choice of models {problem}") from None
+    return profile(name).choosing(choices)
+
+
+def read_choices(words: Sequence[str]) -> dict[Kind, str]:
+    """Return the backend and model that ``module=backend`` or ``module=backend@model`` choose for each module.
+
+    Raises:
+        ValueError: a word names no module or backend, or two words name the same module; the text continues the name
+            of a flag.
+    """
+    modules = {kind.value: kind for kind in Kind if kind is not Kind.WORDS}
+    choices: dict[Kind, str] = {}
+    for word in words:
+        module, _, backend = word.partition("=")
+        if module not in modules or not backend.partition("@")[0]:
+            raise ValueError(
+                f"takes words like pixels=clip-patches@openai/clip-vit-large-patch14, not {word!r}; the modules are "
+                f"{', '.join(modules)}."
+            )
+        if modules[module] in choices:
+            raise ValueError(f"names {module} twice; choose one.")
+        choices[modules[module]] = backend
+    return choices
 
 
 def profile(name: str | Profile) -> Profile:

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Literal
 
 from avlmaps.bench.harness.clips import unheard_rows
-from avlmaps.bench.harness.models import checksums, chosen_profile
+from avlmaps.bench.harness.models import checksums
 from avlmaps.core.errors import AvlmapsError
-from avlmaps.perception.profiles import Profile
+from avlmaps.perception.profiles import Profile, choose_models
 from avlmaps.query.rules import Rules
 from avlmaps.recordings.clips import find_clips
 
@@ -97,7 +97,7 @@ class SceneSettings:
         Raises:
             BackendError: there is no such profile or backend.
         """
-        return chosen_profile(self.profile, self.models)
+        return choose_models(self.profile, self.models)
 
     def checked(self) -> dict[str, str]:
         """Check everything that is given before anything is recorded; return the models' checksums by module.

@@ -15,7 +15,6 @@ from jaxtyping import Float, Int, UInt8
 
 from avlmaps.bench.harness.clips import unheard_folder
 from avlmaps.bench.harness.evidence import Event, Evidence, Photo
-from avlmaps.bench.harness.models import chosen_profile
 from avlmaps.bench.harness.own_recording import OwnRecording, is_recording
 from avlmaps.bench.harness.settings import Recorded, SceneSettings, TaskError
 from avlmaps.bench.harness.true_voxels import TrueVoxels
@@ -24,7 +23,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
-from avlmaps.perception.profiles import Profile
+from avlmaps.perception.profiles import Profile, choose_models
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.modalities.image import read_picture
 from avlmaps.query.rules import Rules, build_settings, query_settings
@@ -65,7 +64,7 @@ class SceneJob:
     @property
     def used(self) -> Profile:
         """The profile with the models that were chosen."""
-        return chosen_profile(self.profile, self.models)
+        return choose_models(self.profile, self.models)
 
     @property
     def map_name(self) -> str:
