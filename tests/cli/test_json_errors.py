@@ -30,6 +30,11 @@ ERRORS = (
     (("go", "MAP", "gabble gabble the", "--scene", "house:7"), 1, "unclear"),
     (("things", "nowhere.avlmap"), 1, "map"),
     (("shell", "nowhere.avlmap"), 1, "map"),
+    (("view", "nowhere.avlmap"), 1, "map"),
+    (("view", "MAP", "--host", "no.such.host.invalid", "--no-browser"), 1, "query"),
+    (("view", "MAP", "--questions", "the chair"), 2, "usage"),
+    (("view", "MAP", "--out", "OUT.txt"), 2, "usage"),
+    (("view", "MAP", "--out", "OUT.html", "--questions", "near near"), 1, "query"),
     (("export", "nowhere.avlmap", "--out", "OUT.ply"), 1, "map"),
     (("teach-sound", "x"), 2, "usage"),
     (("teach-sound", "x", "nothing.wav"), 1, "audio"),
@@ -46,6 +51,7 @@ ERRORS = (
 def test_an_error_is_one_json_object(words, status, kind, built: Path, walk: Path, run, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     places = {"MAP": built, "REC": walk, "OUT": tmp_path / "out", "FILE/below": tmp_path / "file" / "below"}
+    places |= {"OUT.html": tmp_path / "page.html"}
     code, out, err = run(*[places.get(word, word) for word in words], "--json")
     assert code == status
     said = json.loads(out)

@@ -28,6 +28,7 @@ from avlmaps.cli.teach_sound import TeachSound
 from avlmaps.cli.things import Things
 from avlmaps.cli.usage import CONFIG, usage_sentence
 from avlmaps.cli.verb import Verb, models_in_force
+from avlmaps.cli.view import View
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars
@@ -48,6 +49,7 @@ VERBS: dict[str, type[Verb]] = {
     "query": Query,
     "things": Things,
     "shell": Shell,
+    "view": View,
     "export": Export,
     "locate": Locate,
     "go": Go,

@@ -40,6 +40,8 @@ class RobotSettings:
     """Go to the best guess where the map's confidence is below 0.5."""
     persist: bool = False
     """Continue with a program where a place is not reached, as the paper's evaluation does, instead of stopping."""
+    waits: bool = True
+    """Let the seconds of a `wait` pass; a plan passes over them."""
 
 
 def _silent(_: str) -> None:
@@ -230,7 +232,9 @@ class Robot:
 
     def wait(self, duration_s: float) -> None:
         """Stand still for some seconds, at most 600."""
-        sleep(max(0.0, number_of(duration_s, "wait", _MOST_WAIT_S, "seconds")))
+        seconds = max(0.0, number_of(duration_s, "wait", _MOST_WAIT_S, "seconds"))
+        if self.settings.waits:
+            sleep(seconds)
 
     @property
     def actions(self) -> list[Action]:

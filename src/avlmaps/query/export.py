@@ -47,9 +47,9 @@ def thing_colors(count: int, things: "Sequence[Thing]") -> UInt8[np.ndarray, "n 
     """Return a colour for each voxel: one for each name, gray where no thing is."""
     colors = np.full((count, 3), 170, np.uint8)
     names = sorted({thing.name for thing in things})
-    palette = _palette(len(names))
+    shades = palette(len(names))
     for thing in reversed(things):  # the most confident is drawn last
-        colors[thing.rows] = palette[names.index(thing.name)]
+        colors[thing.rows] = shades[names.index(thing.name)]
     return colors
 
 
@@ -63,7 +63,7 @@ def heat_colors(values: Float32[np.ndarray, " n"]) -> UInt8[np.ndarray, "n 3"]:
     return colors
 
 
-def _palette(count: int) -> UInt8[np.ndarray, "k 3"]:
+def palette(count: int) -> UInt8[np.ndarray, "k 3"]:
     """Return colours far apart in hue; the same for the same count."""
     from matplotlib.colors import hsv_to_rgb
 

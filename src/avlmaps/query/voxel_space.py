@@ -113,6 +113,25 @@ class Space:
         return Blocks.of(np.asarray(self.index))
 
     @cached_property
+    def _keys(self) -> tuple[Int[np.ndarray, "3"], Int[np.ndarray, "3"], Int[np.ndarray, " n"]]:
+        """The lowest index, the extent in voxels, and one number for each voxel, ascending as the voxels are sorted."""
+        index = np.asarray(self.index, np.int64)
+        low = index.min(axis=0) if len(index) else np.zeros(3, np.int64)
+        span = index.max(axis=0) - low + 1 if len(index) else np.zeros(3, np.int64)
+        shifted = index - low
+        return low, span, (shifted[:, 0] * span[1] + shifted[:, 1]) * span[2] + shifted[:, 2]
+
+    def holds(self, cells: Int[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
+        """Return which cells of the grid are occupied voxels."""
+        low, span, keys = self._keys
+        shifted = np.asarray(cells, np.int64) - low
+        held = np.all((shifted >= 0) & (shifted < span), axis=1)
+        key = (shifted[held, 0] * span[1] + shifted[held, 1]) * span[2] + shifted[held, 2]
+        at = np.searchsorted(keys, key)
+        held[held] = keys[np.minimum(at, len(keys) - 1)] == key
+        return held
+
+    @cached_property
     def horizontal(self) -> Float[np.ndarray, "n 2"]:
         """The middles of the voxels in the order of ``blocks``, horizontal coordinates of the level frame, metres."""
         return np.ascontiguousarray(self.level(self.centres[self.blocks.order])[:, :2])

@@ -1,0 +1,119 @@
+"""What a voxel is taken for: the likeliest names, and which keyframes saw it."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float, Float32, Int
+
+from avlmaps.core.registry import Kind
+from avlmaps.perception.protocols import NamedPixelEncoder, ScaledEncoder
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
+
+_CHUNK = 1 << 14
+_NEAR_M, _FAR_M = 0.1, 8.0  # from how far a keyframe counts as having seen a voxel
+_OWN_VOXELS = 1.5  # a ray ends so many voxels before the voxel itself
+
+
+class VoxelNamer:
+    """Names voxels by the pixel encoder's vocabulary.
+
+    Attributes:
+        asked: the map.
+        names: what is told apart.
+        calibrated: whether confidences are probabilities; else they are cosines.
+    """
+
+    def __init__(self, asked: "AVLMap", vocabulary: Sequence[str] | None = None) -> None:
+        """Take the encoder's names, or a vocabulary for one that has none of its own.
+
+        Raises:
+            BackendError: the map's profile has no pixel encoder.
+            MapError: the map was built with another encoder than is installed.
+        """
+        self.asked = asked
+        encoder = asked.stored.profile.pixel_encoder()
+        asked.stored.require_model(Kind.PIXELS)
+        self._named = isinstance(encoder, NamedPixelEncoder)
+        self._scale = float(encoder.logit_scale) if isinstance(encoder, ScaledEncoder) and not self._named else None
+        if isinstance(encoder, NamedPixelEncoder):
+            names, features = encoder.names, np.asarray(encoder.codes, np.float32)
+        else:
+            names = tuple(encoder.vocabulary if vocabulary is None else vocabulary)
+            features = np.asarray(encoder.encode_words(list(names)), np.float32).reshape(len(names), -1)
+        known = np.any(features != 0.0, axis=1) if len(names) else np.zeros(0, bool)
+        self.names = tuple(name for name, is_known in zip(names, known, strict=True) if is_known)
+        self._columns = np.ascontiguousarray(features[known].T)
+        self.calibrated = self._named or self._scale is not None
+
+    def confidences(self, rows: Int[np.ndarray, " m"]) -> Float32[np.ndarray, "m k"]:
+        """Return how likely each voxel is each name; all zero where the map has no feature.
+
+        Args:
+            rows: numbers of the voxels in the map.
+        """
+        feature = np.asarray(self.asked.stored.voxels.feature[rows], np.float32)
+        score = feature @ self._columns if len(self.names) else np.zeros((len(rows), 0), np.float32)
+        if self._named:
+            return np.square(np.clip(score, 0.0, 1.0))
+        if self._scale is None or not len(self.names):
+            return np.clip(score, 0.0, 1.0)
+        raised = np.exp(self._scale * (score - score.max(axis=1, keepdims=True)))
+        share = raised / raised.sum(axis=1, keepdims=True)
+        share[~feature.any(axis=1)] = 0.0
+        return share.astype(np.float32)
+
+    def likeliest(self, row: int, most: int = 5) -> list[tuple[str, float]]:
+        """Return the likeliest names of one voxel, best first, each with its confidence."""
+        confidence = self.confidences(np.array([row]))[0]
+        best = np.argsort(-confidence, kind="stable")[:most]
+        return [(self.names[k], float(confidence[k])) for k in best if confidence[k] > 0.0]
+
+    def best(self) -> tuple[Int[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
+        """Return for every voxel the number of its likeliest name (-1 for none) and its confidence."""
+        n = len(self.asked.space)
+        number, confidence = np.full(n, -1, np.int64), np.zeros(n, np.float32)
+        for start in range(0, n if self.names else 0, _CHUNK):
+            rows = np.arange(start, min(start + _CHUNK, n))
+            share = self.confidences(rows)
+            number[rows], confidence[rows] = share.argmax(axis=1), share.max(axis=1)
+        number[confidence <= 0.0] = -1
+        return number, confidence
+
+
+def keyframes_that_saw(asked: "AVLMap", row: int) -> Int[np.ndarray, " k"]:
+    """Return the keyframes that had a voxel in view with nothing of the map in between, the nearest first.
+
+    Args:
+        asked: the map.
+        row: number of the voxel in the map.
+    """
+    stored, grid = asked.stored, asked.space.grid
+    poses = np.asarray(stored.keyframes.world_from_camera, np.float64)
+    if not len(poses):
+        return np.zeros(0, np.int64)
+    point = asked.points[row]
+    away = point - poses[:, :3, 3]
+    at = np.einsum("kji,kj->ki", poses[:, :3, :3], away)
+    distance_m = np.linalg.norm(away, axis=1)
+    camera = stored.rig.depth
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pixel = camera.project(at)
+    inside = (at[:, 2] > _NEAR_M) & (distance_m < _FAR_M)
+    inside &= np.all((pixel >= 0) & (pixel <= [camera.width, camera.height]), axis=1)
+    candidates = np.flatnonzero(inside)
+    step_m = 0.5 * grid.voxel_size_m
+    seen = [k for k in candidates if _is_free(asked, poses[k, :3, 3], point, step_m)]
+    return np.array(sorted(seen, key=lambda k: float(distance_m[k])), np.int64)
+
+
+def _is_free(asked: "AVLMap", start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"], step_m: float) -> bool:
+    """Return whether no voxel of the map lies on the line between a camera and a voxel."""
+    length_m = float(np.linalg.norm(end - start)) - _OWN_VOXELS * asked.space.grid.voxel_size_m
+    if length_m <= 0.0:
+        return True
+    along = np.arange(step_m, length_m, step_m)[:, None] / float(np.linalg.norm(end - start))
+    cells = np.floor((start + along * (end - start)) / asked.space.grid.voxel_size_m).astype(np.int64)
+    return not asked.space.holds(cells).any()

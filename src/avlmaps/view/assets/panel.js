@@ -1,0 +1,627 @@
+// The panel: what is asked, what is shown, and what came back, in words as well as in the picture.
+
+const $ = (id) => document.getElementById(id);
+const metres = (value) => `${value.toFixed(2)} m`;
+const placeText = (place) => `(${place.map((value) => value.toFixed(2)).join(", ")}) m`;
+const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
+const percent = (share) => `${Math.round(100 * share)} %`;
+
+function made(tag, properties = {}, ...children) {
+  const element = document.createElement(tag);
+  Object.assign(element, properties);
+  element.append(...children);
+  return element;
+}
+
+/** Rooms without those of the same name close to a larger one: one name is enough there. */
+function apart(rooms) {
+  const kept = [];
+  for (const room of rooms) {
+    if (!kept.some((one) => one.name === room.name && length(sub(one.position, room.position)) < 4)) kept.push(room);
+  }
+  return kept;
+}
+
+class Panel {
+  constructor(source, told) {
+    this.source = source;
+    this.told = told;
+    this.maps = told.maps;
+    this.contents = told.maps.map(() => null);
+    this.files = {};
+    this.viewer = new Viewer($("canvas"), $("overlay"), told);
+    this.viewer.onClick = (hit) => this.clicked(hit);
+    this.tape = [];
+  }
+
+  /** Fill the page: first the voxels, then what takes longer. */
+  async start() {
+    const names = this.maps.map((map) => map.name.replace(/\.avlmap$/, ""));
+    $("name").textContent = names.join(" and ");
+    $("summary").textContent = this.maps.map((map) => map.summary).join("; ");
+    document.title = `${names.join(" and ")} · avlmaps`;
+    this.bindAsking();
+    this.bindLook();
+    this.bindPath();
+    this.bindDrive();
+    this.bindTools();
+    this.viewer.frameAll();
+    try {
+      await Promise.all(this.maps.map((_, k) => this.load(k)));
+      $("loading").hidden = true;
+    } catch (fault) {
+      this.fault(fault);
+      return;
+    }
+    this.drawPath();
+    await Promise.all(this.maps.map((_, k) => this.fill(k).catch((fault) => this.note(fault.message))));
+    document.documentElement.dataset.ready = "yes";
+  }
+
+  async load(k) {
+    const { layer } = this.viewer.fields[k];
+    let drawn = 0;
+    await this.source.voxels(k, (bytes, start) => {
+      layer.addRecords(bytes, start);
+      if (layer.loaded < Math.min(layer.count, drawn * 1.6 + 4000)) return;
+      drawn = layer.loaded;
+      this.viewer.changed();
+      document.documentElement.dataset.drawn ??= String(Math.round(performance.now()));
+    });
+    this.viewer.changed();
+  }
+
+  async fill(k) {
+    this.contents[k] = await this.source.contents(k);
+    const { layer } = this.viewer.fields[k];
+    layer.setPalettes(this.contents[k].palettes);
+    layer.setLabels(await this.source.labels(k));
+    if (k === 0) this.list();
+    for (const note of this.contents[k].notes) this.note(note);
+    this.marks();
+    this.legend();
+    this.viewer.changed();
+  }
+
+  fault(fault) {
+    $("loading").hidden = false;
+    $("loading").classList.add("fault");
+    $("loading").textContent = fault.message;
+  }
+
+  note(text) {
+    $("notes").append(made("li", { textContent: text }));
+  }
+
+  toLevel(k, place) {
+    return moved(fromRows(this.maps[k].level_from_recording), place);
+  }
+
+  // ---- asking ----
+
+  bindAsking() {
+    if (!this.source.live) {
+      $("ask").hidden = true;
+      $("drive-section").hidden = true;
+      for (const { question } of this.told.questions) this.offer(question);
+      if (this.told.questions.length) this.ask(this.told.questions[0].question, false);
+    }
+    $("ask").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.ask($("sentence").value);
+    });
+    for (const kind of ["photo", "clip"]) {
+      $(kind).addEventListener("change", () => this.give(kind, $(kind).files[0]));
+    }
+    $("clear").addEventListener("click", () => {
+      $("sentence").value = "";
+      for (const kind of ["photo", "clip"]) this.give(kind, null);
+      this.forget();
+    });
+    document.addEventListener("keydown", (event) => {
+      if (event.key !== "/" || /INPUT|SELECT|TEXTAREA/.test(document.activeElement?.tagName ?? "")) return;
+      event.preventDefault();
+      $("sentence").focus();
+    });
+    const stage = $("stage");
+    stage.addEventListener("dragover", (event) => event.preventDefault());
+    stage.addEventListener("drop", (event) => {
+      event.preventDefault();
+      const file = event.dataTransfer.files[0];
+      if (!file || !this.source.live) return;
+      this.give(file.type.startsWith("audio/") ? "clip" : "photo", file).then(() => this.ask($("sentence").value));
+    });
+  }
+
+  offer(question) {
+    const button = made("button", { type: "button", textContent: question });
+    button.addEventListener("click", () => {
+      $("sentence").value = question;
+      this.ask(question);
+    });
+    $("questions").append(button);
+  }
+
+  /** Take a photo or a clip to ask with; null takes it away. */
+  async give(kind, file) {
+    const label = $(kind).closest("label");
+    delete this.files[kind];
+    if (!file) $(kind).value = "";
+    label.classList.toggle("given", Boolean(file));
+    label.firstChild.textContent = file ? file.name.slice(0, 18) : kind === "photo" ? "Photo" : "Sound";
+    if (!file) return;
+    try {
+      this.files[kind] = await this.source.upload(kind, file);
+      this.say(`${file.name} is ready; press Ask.`, "");
+    } catch (fault) {
+      await this.give(kind, null);
+      this.say(fault.message, "lost");
+    }
+  }
+
+  async ask(sentence, turnToHeat = true) {
+    const number = (this.askedNumber = (this.askedNumber ?? 0) + 1);
+    $("ask").querySelector(".main").disabled = true;
+    try {
+      const begun = performance.now();
+      const told = await this.source.ask({ sentence, ...this.files });
+      if (number !== this.askedNumber) return;
+      let at = 0;
+      for (const { layer } of this.viewer.fields) {
+        layer.setHeat(told.heat.subarray(at, at + layer.count));
+        at += layer.count;
+      }
+      this.answers = told.answers;
+      if (turnToHeat) this.colourBy("heat");
+      this.showAnswer(sentence, told.answers, performance.now() - begun);
+    } catch (fault) {
+      this.forget();
+      this.say(fault.message, "lost");
+    } finally {
+      $("ask").querySelector(".main").disabled = false;
+    }
+  }
+
+  say(text, state) {
+    $("answer").replaceChildren(made("p", { className: `verdict ${state}`, textContent: text }));
+  }
+
+  forget() {
+    this.answers = null;
+    for (const { layer } of this.viewer.fields) layer.setHeat(new Uint8Array(layer.count));
+    $("answer").replaceChildren();
+    $("goals").replaceChildren();
+    if ($("colour").value === "heat") this.colourBy("picture");
+    this.marks();
+    this.viewer.changed();
+  }
+
+  showAnswer(sentence, answers, tookMs) {
+    $("answer").replaceChildren();
+    $("goals").replaceChildren();
+    answers.forEach((answer, k) => {
+      const of = this.maps.length > 1 ? `${this.maps[k].name}: ` : "";
+      const count = answer.count === undefined ? "" : ` ${answer.count} of them.`;
+      const [first] = answer.goals;
+      const where = first ? ` The best goal is at ${placeText(first.position)}, score ${first.score.toFixed(2)}.` : "";
+      const verdict = answer.found ? "Found." : first ? "Not found here; the best guesses follow." : "Not found here.";
+      const texts = [made("p", { className: `verdict ${answer.found ? "found" : "lost"}`,
+        textContent: `${of}${verdict}${count}${where}` })];
+      for (const part of answer.parts) {
+        const name = `${part.modality}: ${part.query}`;
+        const taken = part.understood && part.understood !== part.query ? `, understood as ${part.understood}` : "";
+        const state = part.found ? "found" : "not found";
+        texts.push(made("p", { className: "soft", textContent: `${name}${taken} (${part.role}), ${state}` +
+          (part.note ? `: ${part.note}` : "") }));
+      }
+      for (const note of answer.notes ?? []) texts.push(made("p", { className: "soft", textContent: note }));
+      $("answer").append(...texts);
+      $("goals").append(made("ol", {}, ...answer.goals.map((goal, i) => this.goalItem(k, goal, i))));
+    });
+    $("answer").append(made("p", { className: "soft", textContent: `${Math.round(tookMs)} ms` }));
+    $("answer").dataset.question = sentence;
+    this.marks();
+    this.viewer.changed();
+  }
+
+  goalItem(k, goal, i) {
+    const place = this.toLevel(k, goal.position);
+    const button = made("button", { type: "button" },
+      made("span", {}, made("span", { className: "number", textContent: i + 1 }), placeText(goal.position)),
+      made("small", { textContent: `score ${goal.score.toFixed(2)}` }));
+    button.addEventListener("click", () => this.viewer.flyTo(place));
+    const parts = made("div", { className: "parts" });
+    for (const [name, heat] of Object.entries(goal.parts)) {
+      parts.append(made("span", { textContent: name.replace("_", " ") }),
+        made("meter", { min: 0, max: 1, value: heat, ariaLabel: name }), made("span", { textContent: heat.toFixed(2) }));
+    }
+    return made("li", {}, button, parts);
+  }
+
+  // ---- what is shown ----
+
+  bindLook() {
+    const low = Math.min(...this.maps.map((map) => map.low[2]));
+    const high = Math.max(...this.maps.map((map) => map.high[2]));
+    const ceiling = Math.max(...this.maps.map((map) => map.ceiling_m));
+    this.viewer.look.heights = [Math.min(...this.maps.map((map) => map.floor_m)), Math.max(high, low + 0.5)];
+    for (const [id, start] of [["high", Math.min(ceiling, high + 0.1)], ["low", low - 0.1]]) {
+      Object.assign($(id), { min: low - 0.1, max: high + 0.1, step: 0.05, value: start });
+      $(id).addEventListener("input", () => this.cut());
+    }
+    this.cut();
+    $("colour").addEventListener("change", () => this.colourBy($("colour").value));
+    for (const kind of ["things", "boxes", "sounds", "rooms", "path"]) {
+      $(`show-${kind}`).addEventListener("change", () => {
+        this.marks();
+        this.drawPath();
+      });
+    }
+    $("arrangement-field").hidden = this.maps.length < 2;
+    $("arrangement").addEventListener("change", () => {
+      this.viewer.arrangement = $("arrangement").value;
+      $("divider").hidden = $("arrangement").value !== "divided";
+      this.viewer.moved();
+    });
+    $("divide").addEventListener("input", () => {
+      this.viewer.divide = Number($("divide").value);
+      this.viewer.changed();
+    });
+  }
+
+  cut() {
+    const [low, high] = [Number($("low").value), Number($("high").value)];
+    $("low-m").textContent = metres(low);
+    $("high-m").textContent = metres(high);
+    const all = Number($("high").value) >= Number($("high").max) - 1e-6;
+    this.viewer.look.cut = [low, all ? 1e9 : high];
+    if (low <= Number($("low").min) + 1e-6) this.viewer.look.cut[0] = -1e9;
+    this.viewer.changed();
+  }
+
+  colourBy(name) {
+    $("colour").value = name;
+    this.viewer.look.colour = name;
+    $("overlay").classList.toggle("hot", name === "heat");
+    this.legend();
+    this.viewer.changed();
+  }
+
+  legend() {
+    const list = $("legend");
+    list.replaceChildren();
+    const name = this.viewer.look.colour;
+    const palettes = this.contents[0]?.palettes ?? this.told.palettes;
+    const shade = (kind, k) => `rgb(${palettes[kind].slice(3 * k, 3 * k + 3).join(",")})`;
+    if (name === "height" || name === "heat") {
+      const canvas = made("canvas", { width: 256, height: 1 });
+      const pen = canvas.getContext("2d");
+      for (let k = 0; k < 256; k++) {
+        pen.fillStyle = shade(name, k);
+        pen.fillRect(k, 0, 1, 1);
+      }
+      const [low, high] = this.viewer.look.heights;
+      const ends = name === "heat" ? ["0", "1"] : [metres(low), metres(high)];
+      list.append(made("li", { className: "ramp" }, ends[0], canvas, ends[1]));
+    } else if (name === "thing" || name === "room") {
+      const names = this.contents[0]?.[name === "thing" ? "names" : "room_names"];
+      if (!names) list.append(made("li", { textContent: "being worked out" }));
+      (names ?? []).forEach((text, k) => {
+        const tint = made("i");
+        tint.style.background = shade(name, k + 1);
+        list.append(made("li", {}, tint, text));
+      });
+    }
+  }
+
+  /** All names and numbers over the picture. */
+  marks() {
+    this.viewer.fields.forEach(({ marks, map }, k) => {
+      const contents = this.contents[k];
+      const shown = (kind) => contents && $(`show-${kind}`).checked;
+      const answer = this.answers?.[k];
+      marks.set("goal", 0, (answer?.goals ?? []).map((goal, i) => ({
+        place: this.toLevel(k, goal.position), text: String(i + 1), always: true,
+        title: `goal ${i + 1}, score ${goal.score.toFixed(2)}: ` +
+          Object.entries(goal.parts).map(([name, heat]) => `${name} ${heat.toFixed(2)}`).join(", "),
+        onClick: () => this.viewer.flyTo(this.toLevel(k, goal.position)),
+      })));
+      for (const { element } of marks.kinds.get("goal").marks) element.classList.toggle("guess", !answer?.found);
+      marks.set("sound", 2, shown("sounds") ? contents.sounds.map((sound, i) => ({
+        place: this.toLevel(k, sound.position), text: `♪ ${sound.names[0] ?? `sound ${i + 1}`}`,
+        title: `play what was heard at ${clock(sound.onset_s)}`, onClick: (event) => this.play(k, i, event.target),
+      })) : []);
+      marks.set("room", 3, shown("rooms") ? apart(contents.rooms).map((room) => {
+        const place = this.toLevel(k, room.position);
+        return { place: [place[0], place[1], map.floor_m + 0.02], text: room.name };
+      }) : []);
+      marks.set("thing", 4, shown("things") ? contents.things.map((thing) => {
+        const [r, g, b] = contents.palettes.thing.slice(3 * thing.label, 3 * thing.label + 3);
+        return {
+          place: this.toLevel(k, thing.position), text: thing.name, tint: `rgb(${r},${g},${b})`,
+          title: `${thing.name}, confidence ${thing.confidence.toFixed(2)}`,
+          onClick: () => this.viewer.flyTo(this.toLevel(k, thing.position)),
+        };
+      }) : []);
+      this.viewer.setLines(k, "boxes", $("show-boxes").checked && contents ? contents.things.map((thing) => ({
+        kind: "line", places: boxEdges(thing.low, thing.high),
+        tint: contents.palettes.thing.slice(3 * thing.label, 3 * thing.label + 3).map((value) => value / 255),
+      })) : null);
+      this.viewer.setLines(k, "goals", answer ? answer.goals.map((goal) => {
+        const place = this.toLevel(k, goal.position);
+        return { kind: "line", tint: INK_TINT, places: new Float32Array([...place, place[0], place[1], map.floor_m]) };
+      }) : null);
+    });
+    this.viewer.changed();
+  }
+
+  list() {
+    const { things, sounds, rooms } = this.contents[0];
+    const row = (text, more, place, distance) => {
+      const button = made("button", { type: "button" }, text, made("small", { textContent: more }));
+      button.addEventListener("click", () => this.viewer.flyTo(this.toLevel(0, place), distance));
+      return made("li", {}, button);
+    };
+    $("things").replaceChildren(...things.map((thing) =>
+      row(thing.name, `${percent(thing.confidence)} · ${thing.size.map((side) => side.toFixed(1)).join(" × ")} m`,
+        thing.position, 3)));
+    $("sounds").replaceChildren(...sounds.map((sound, i) => {
+      const item = row(sound.names[0] ?? `sound ${i + 1}`,
+        `${clock(sound.onset_s)}, ${(sound.offset_s - sound.onset_s).toFixed(1)} s` +
+          (sound.confidences.length ? ` · ${percent(sound.confidences[0])}` : ""), sound.position, 5);
+      item.append(made("audio", { controls: true, preload: "none", src: this.source.clip(0, i),
+        ariaLabel: `clip of ${sound.names[0] ?? "the sound"}` }));
+      return item;
+    }));
+    $("rooms").replaceChildren(...rooms.map((room) =>
+      row(room.name, `${percent(room.confidence)} · ${room.views} views`, room.position, 7)));
+    for (const [id, list] of [["things", things], ["sounds", sounds], ["rooms", rooms]]) {
+      $(`${id}-count`).textContent = `(${list.length})`;
+    }
+    if (!this.source.live) return;
+    const examples = [...new Set(things.map((thing) => thing.name))].slice(0, 3).map((name) => `the ${name}`);
+    const [sound] = sounds.filter((one) => one.names.length);
+    if (sound) examples.push(`the sound of ${sound.names[0]}`);
+    for (const example of examples) this.offer(example);
+  }
+
+  play(k, i, mark) {
+    this.audio?.pause();
+    document.querySelector(".mark.playing")?.classList.remove("playing");
+    if (this.playing === mark) {
+      this.playing = null;
+      return;
+    }
+    this.playing = mark;
+    mark.classList.add("playing");
+    this.audio = new Audio(this.source.clip(k, i));
+    this.audio.addEventListener("ended", () => {
+      mark.classList.remove("playing");
+      this.playing = null;
+    });
+    this.audio.play().catch((fault) => this.note(`The clip cannot be played: ${fault.message}`));
+  }
+
+  // ---- a click ----
+
+  async clicked(hit) {
+    if ($("measure").getAttribute("aria-pressed") === "true") {
+      this.measureTo(hit);
+      return;
+    }
+    const { layer, map } = this.viewer.fields[hit.k];
+    const middle = layer.middle(hit.number);
+    const half = Array(3).fill(0.55 * map.voxel_size_m);
+    this.viewer.fields.forEach((_, k) => this.viewer.setLines(k, "voxel", k === hit.k ? [
+      { kind: "line", places: boxEdges(sub(middle, half), add(middle, half)), tint: [1, 0.69, 0], through: true },
+    ] : null));
+    try {
+      this.showVoxel(hit.k, (await this.source.voxel(hit.k, hit.number)) ?? this.keptVoxel(hit));
+    } catch (fault) {
+      $("voxel").replaceChildren(made("p", { className: "verdict lost", textContent: fault.message }));
+    }
+  }
+
+  /** What a page without a server knows of a voxel. */
+  keptVoxel({ k, number }) {
+    const { layer, map } = this.viewer.fields[k];
+    const contents = this.contents[k];
+    const [thing, , name, confidence] = layer.labels?.subarray(4 * number, 4 * number + 4) ?? [0, 0, 0, 0];
+    const seen = new Uint16Array(layer.records.buffer, number * map.record_bytes, 4)[3];
+    const recordingFromLevel = invertedPose(fromRows(map.level_from_recording));
+    return {
+      position: moved(recordingFromLevel, layer.middle(number)),
+      names: name ? [{ name: contents.voxel_names[name - 1], confidence: confidence / 255 }] : [],
+      calibrated: true, thing: thing ? { name: contents.names[thing - 1] } : null,
+      last_seen_s: (seen / 65535) * map.duration_s,
+    };
+  }
+
+  showVoxel(k, voxel) {
+    const rows = voxel.names.map(({ name, confidence }) => made("tr", {}, made("td", { textContent: name }),
+      made("td", { textContent: voxel.calibrated ? percent(confidence) : `similarity ${confidence.toFixed(2)}` })));
+    const thing = voxel.thing ? `Part of: ${voxel.thing.name}. ` : "";
+    const seen = `Last seen at ${clock(voxel.last_seen_s)}` + (voxel.views === undefined ? "." :
+      `; ${voxel.views} keyframe${voxel.views === 1 ? "" : "s"} saw it (${voxel.pixels.toLocaleString("en")} pixels).`);
+    $("voxel").replaceChildren(
+      made("p", {}, rows.length ? "Taken for:" : voxel.note || "The map has no name for it."),
+      made("table", {}, made("tbody", {}, ...rows)),
+      made("p", { className: "soft", textContent: `${thing}${seen} At ${placeText(voxel.position)}.` }));
+    if (!voxel.seen_by?.length) return;
+    const button = made("button", { type: "button", textContent: "Show the nearest view" });
+    button.addEventListener("click", () => this.showMoment(k, voxel.seen_by[0], true));
+    $("voxel").append(button);
+  }
+
+  bindTools() {
+    $("whole").addEventListener("click", () => this.viewer.frameAll());
+    $("above").addEventListener("click", () => {
+      this.viewer.frameAll();
+      this.viewer.camera.pitch = STEEPEST;
+      this.viewer.moved();
+    });
+    const press = (on) => {
+      $("measure").setAttribute("aria-pressed", String(on));
+      $("canvas").classList.toggle("measuring", on);
+      this.tape = [];
+      this.showTape();
+    };
+    $("measure").addEventListener("click", () => press($("measure").getAttribute("aria-pressed") !== "true"));
+    document.addEventListener("keydown", (event) => event.key === "Escape" && press(false));
+  }
+
+  measureTo(hit) {
+    const end = { k: hit.k, place: hit.place };
+    this.tape = this.tape.length === 1 && this.tape[0].k === hit.k ? [this.tape[0], end] : [end];
+    this.showTape();
+  }
+
+  showTape() {
+    const [from, to] = this.tape;
+    const along = to && sub(to.place, from.place);
+    const text = along ? `${metres(length(along))}; level ${metres(Math.hypot(along[0], along[1]))}, ` +
+      `up ${metres(along[2])}` : "";
+    const pressed = $("measure").getAttribute("aria-pressed") === "true";
+    $("length").textContent = text || (pressed ? (from ? "Click the other end." : "Click one end.") : "");
+    this.viewer.fields.forEach(({ marks }, k) => {
+      const mine = from?.k === k ? this.tape : [];
+      marks.set("tape", 1, mine.map(({ place }, i) => ({ place, text: i ? metres(length(along)) : "•", always: true })));
+      this.viewer.setLines(k, "tape", mine.length === 2 ? [{ kind: "line", tint: [1, 0.5, 0], through: true,
+        places: new Float32Array([...from.place, ...to.place]) }] : null);
+    });
+  }
+
+  // ---- the walk ----
+
+  bindPath() {
+    const { keyframes } = this.maps[0];
+    $("path-section").hidden = !keyframes.length;
+    $("moment").max = Math.max(0, keyframes.length - 1);
+    $("moment").addEventListener("input", () => this.showMoment(0, Number($("moment").value)));
+    $("stand").addEventListener("click", () => {
+      this.viewer.camera.standAt(this.maps[0].keyframes[this.moment ?? 0]);
+      this.viewer.moved();
+    });
+    $("path-section").addEventListener("toggle", () => {
+      if ($("path-section").open) this.showMoment(0, this.moment ?? 0);
+      else this.viewer.setLines(0, "camera", null);
+    });
+  }
+
+  showMoment(k, asked, open = false) {
+    const number = this.source.nearestKeyframe(k, asked);
+    const frame = this.maps[k].keyframes[number];
+    if (k === 0) {
+      this.moment = number;
+      if (!open) this.source.live || ($("moment").value = number);
+      else $("moment").value = number;
+    }
+    if (open) $("path-section").open = true;
+    $("frame").src = this.source.keyframe(k, number);
+    $("frame").alt = `what the camera saw at ${clock(frame.stamp_s)}`;
+    $("frame-time").textContent = `${clock(frame.stamp_s)}, view ${number + 1} of ${this.maps[k].keyframes.length}`;
+    $("moment").setAttribute("aria-valuetext", clock(frame.stamp_s));
+    this.viewer.setLines(k, "camera", [{ kind: "line", tint: [0.85, 0.1, 0.35], through: true,
+      places: cameraEdges(frame, this.maps[k].field_of_view) }]);
+  }
+
+  drawPath() {
+    this.maps.forEach((map, k) => {
+      const heights = map.keyframes.map(({ position }) => position[2]).sort((a, b) => a - b);
+      const carried = heights.length ? heights[heights.length >> 1] - map.floor_m - 0.04 : 0;
+      const places = map.keyframes.map(({ position: [x, y, z] }) => [x, y, z - carried]);
+      this.viewer.setLines(k, "path", $("show-path").checked && places.length > 1 ?
+        [{ kind: "band", places: band(places, 0.045), tint: PATH_TINT }] : null);
+    });
+  }
+
+  // ---- driving ----
+
+  bindDrive() {
+    $("robot").textContent = this.told.robot ? "The simulated robot stands where the last command left it." :
+      "There is no scene, so that commands are planned on the map and nothing drives (--scene).";
+    $("go").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.go($("command").value);
+    });
+    $("at").addEventListener("input", () => this.stepTo(Number($("at").value)));
+    $("step").addEventListener("click", () => this.stepTo(Math.min(Number($("at").value) + 1, Number($("at").max))));
+    $("play").addEventListener("click", () => (this.ticking ? this.halt() : this.run()));
+  }
+
+  async go(command) {
+    const button = $("go").querySelector(".main");
+    button.disabled = true;
+    this.halt();
+    $("trip").replaceChildren(made("p", { textContent: "Planning." }));
+    try {
+      this.showTrip(await this.source.go({ command, ...this.files }));
+    } catch (fault) {
+      $("trip").replaceChildren(made("p", { className: "verdict lost", textContent: fault.message }));
+      $("steps").hidden = true;
+    } finally {
+      button.disabled = false;
+    }
+  }
+
+  showTrip({ plan, program, readings, notes, planned, driven }) {
+    const done = driven ?? planned;
+    const said = done.error ?? (done.ok ? "" : done.subgoals.filter((goal) => !goal.reached).map((goal) =>
+      `${goal.name || goal.skill} was not reached${goal.note ? `: ${goal.note}` : ""}`).join("; "));
+    const verb = driven ? "driven" : "planned";
+    $("trip").replaceChildren(
+      made("p", { textContent: plan || "The command is understood." }),
+      made("pre", { textContent: program }),
+      made("p", { className: `verdict ${done.ok ? "found" : "lost"}`,
+        textContent: (done.ok ? "Done: " : "Not done: ") + `${done.path_m.toFixed(1)} m ${verb}, ` +
+          `${done.actions.length} actions. ${said ?? ""}` }),
+      ...[...new Set([...notes, ...done.notes])].map((note) => made("p", { className: "soft", textContent: note })),
+      made("details", {}, made("summary", { textContent: "Readings" }), made("pre", { textContent: readings.join("\n") })));
+    const lift = (places) => places.map(([x, y, z]) => [x, y, z + 0.06]);
+    const bands = [{ kind: "band", places: band(lift(planned.places), 0.1), tint: [0.42, 0.25, 0.72] }];
+    if (driven) bands.push({ kind: "band", places: band(lift(lift(driven.places)), 0.05), tint: [1, 0.69, 0] });
+    this.viewer.setLines(0, "trip", bands.filter(({ places }) => places.length > 6));
+    this.trip = done.places;
+    $("steps").hidden = !this.trip.length;
+    $("at").max = Math.max(0, this.trip.length - 1);
+    this.stepTo(0);
+    if (this.trip.length > 1) this.run();
+  }
+
+  stepTo(at) {
+    $("at").value = at;
+    const place = this.trip[at];
+    if (!place) return;
+    $("at-text").textContent = `step ${at} of ${this.trip.length - 1}, at ${placeText(place)}`;
+    this.viewer.fields[0].marks.set("robot", 1, [{ place: add(place, [0, 0, 0.2]), text: "●", always: true }]);
+    this.viewer.changed();
+  }
+
+  run() {
+    if (Number($("at").value) >= Number($("at").max)) this.stepTo(0);
+    $("play").textContent = "Pause";
+    this.ticking = setInterval(() => {
+      this.stepTo(Number($("at").value) + 1);
+      if (Number($("at").value) >= Number($("at").max)) this.halt();
+    }, 100);
+  }
+
+  halt() {
+    clearInterval(this.ticking);
+    this.ticking = null;
+    $("play").textContent = "Play";
+  }
+}
+
+(async () => {
+  const told = JSON.parse($("told").textContent);
+  const source = told ? new PageSource(told) : new LiveSource();
+  try {
+    const panel = new Panel(source, await source.describe());
+    window.avlmapsView = panel; // for tests and for the curious
+    await panel.start();
+  } catch (fault) {
+    $("loading").classList.add("fault");
+    $("loading").textContent = fault.message;
+  }
+})();

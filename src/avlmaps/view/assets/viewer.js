@@ -1,0 +1,172 @@
+// The picture: layers, lines and marks under one camera, on one, two or a divided field.
+
+const REST_MS = 140;
+const PATH_TINT = [0.12, 0.44, 0.75];
+const INK_TINT = [0.09, 0.1, 0.11];
+
+/** A band over the floor along a path. */
+function band(places, width) {
+  const strip = [];
+  for (let i = 0; i < places.length; i++) {
+    const before = places[Math.max(0, i - 1)];
+    const after = places[Math.min(places.length - 1, i + 1)];
+    const way = unit([after[0] - before[0], after[1] - before[1], 0]);
+    const side = [(-way[1] * width) / 2, (way[0] * width) / 2, 0];
+    strip.push(...add(places[i], side), ...sub(places[i], side));
+  }
+  return new Float32Array(strip);
+}
+
+/** The edges of a box. */
+function boxEdges(low, high) {
+  const corner = (k) => [k & 1 ? high[0] : low[0], k & 2 ? high[1] : low[1], k & 4 ? high[2] : low[2]];
+  const edges = [];
+  for (let k = 0; k < 8; k++) {
+    for (const bit of [1, 2, 4]) if (!(k & bit)) edges.push(...corner(k), ...corner(k | bit));
+  }
+  return new Float32Array(edges);
+}
+
+/** What a camera sees, as lines from its place to the corners of its picture. */
+function cameraEdges(frame, [width, height]) {
+  const depth = 0.5;
+  const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([u, v]) =>
+    add(frame.position, scaled(add(frame.ahead, add(scaled(frame.right, (u * width) / 2),
+      scaled(frame.down, (v * height) / 2))), depth)));
+  const edges = corners.flatMap((corner, k) => [...frame.position, ...corner, ...corner, ...corners[(k + 1) % 4]]);
+  return new Float32Array(edges);
+}
+
+class Viewer {
+  constructor(canvas, overlay, told) {
+    this.canvas = canvas;
+    this.renderer = new Renderer(canvas);
+    this.camera = new Camera();
+    this.look = { colour: "picture", cut: [-Infinity, Infinity], heights: [0, 2.5], background: [0.9, 0.9, 0.88] };
+    this.arrangement = "beside";
+    this.divide = 0.5;
+    this.fields = told.maps.map((map) => {
+      const layer = new Layer(this.renderer.gl, map);
+      layer.setPalettes(told.palettes);
+      const box = document.createElement("div");
+      box.className = "marks";
+      overlay.append(box);
+      return { map, layer, marks: new Marks(box), lines: new Map() };
+    });
+    this.onClick = () => {};
+    this.waiting = false;
+    steer(canvas, this.camera, () => this.moved(), (x, y) => this.clicked(x, y));
+    new ResizeObserver(() => this.moved()).observe(canvas);
+    window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.changed());
+  }
+
+  /** The whole of what is shown, for the first picture. */
+  frameAll() {
+    const lows = this.fields.map(({ map }) => map.low);
+    const highs = this.fields.map(({ map }) => [map.high[0], map.high[1], Math.min(map.high[2], map.ceiling_m)]);
+    const least = lows.reduce((a, b) => a.map((value, k) => Math.min(value, b[k])));
+    const most = highs.reduce((a, b) => a.map((value, k) => Math.max(value, b[k])));
+    const [field] = this.places();
+    this.camera.frame(least, most, field.aspect);
+    this.moved();
+  }
+
+  /** Where each field lies on the canvas: in CSS pixels from the top left, and in those of WebGL. */
+  places() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const ratio = this.canvas.width / Math.max(1, width);
+    return this.fields.map((field, k) => {
+      const two = this.fields.length === 2;
+      const beside = two && this.arrangement === "beside";
+      const tall = beside && height > width * 1.1;
+      const seen = beside ? (tall ? [width, height / 2] : [width / 2, height]) : [width, height];
+      const origin = beside ? (tall ? [0, (k * height) / 2] : [(k * width) / 2, 0]) : [0, 0];
+      const split = Math.round(width * this.divide);
+      const cut = two && !beside ? (k ? [split, 0, width - split, height] : [0, 0, split, height]) : [...origin, ...seen];
+      const inWebgl = ([x, y, w, h]) =>
+        [x, height - y - h, w, h].map((value) => Math.round(value * ratio));
+      return {
+        aspect: Math.max(0.1, seen[0] / Math.max(1, seen[1])), field, k,
+        viewport: inWebgl([...origin, ...seen]), scissor: inWebgl(cut),
+        box: { left: cut[0], top: cut[1], width: cut[2], height: cut[3], x: origin[0] - cut[0], y: origin[1] - cut[1],
+          seenWidth: seen[0], seenHeight: seen[1] },
+      };
+    });
+  }
+
+  setLines(k, name, lines) {
+    if (lines) this.fields[k].lines.set(name, lines);
+    else this.fields[k].lines.delete(name);
+    this.changed();
+  }
+
+  /** The camera moved. */
+  moved() {
+    this.movedAt = performance.now();
+    this.changed();
+  }
+
+  /** Something else is to be drawn. */
+  changed() {
+    this.dirty = true;
+    this.canvas.dataset.state = "moving";
+    this.renderer.rest = null;
+    this.schedule();
+  }
+
+  schedule() {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => {
+      this.waiting = false;
+      this.draw();
+    });
+  }
+
+  draw() {
+    if (this.renderer.busy()) return this.schedule();
+    this.renderer.resize();
+    const colour = getComputedStyle(this.canvas).backgroundColor.match(/[\d.]+/g) ?? [230, 230, 225];
+    this.look.background = colour.slice(0, 3).map((value) => value / 255);
+    const views = this.places().map((place) => ({
+      ...place, layer: place.field.layer, camera: this.camera.seen(place.aspect),
+      lines: [...place.field.lines.values()].flat(),
+    }));
+    if (this.dirty) {
+      this.dirty = false;
+      this.resting = true;
+      this.renderer.drawMoving(views, this.look);
+      for (const view of views) view.field.marks.update(view.camera, view.box, this.look.cut);
+      return this.schedule();
+    }
+    if (!this.resting) return undefined;
+    if (performance.now() - (this.movedAt ?? 0) < REST_MS) return this.schedule();
+    this.resting = this.renderer.drawResting(views, this.look);
+    this.canvas.dataset.state = this.resting ? "resting" : "whole";
+    return this.resting ? this.schedule() : undefined;
+  }
+
+  /** Which field and which voxel lie under a place of the canvas. */
+  under(x, y) {
+    const place = this.places().find(({ box }) =>
+      x >= box.left && x < box.left + box.width && y >= box.top && y < box.top + box.height);
+    if (!place) return null;
+    const { box, aspect, field, k } = place;
+    const camera = this.camera.seen(aspect);
+    const u = (2 * (x - box.left - box.x)) / box.seenWidth - 1;
+    const v = 1 - (2 * (y - box.top - box.y)) / box.seenHeight;
+    const along = unit(add(camera.ahead, add(scaled(camera.right, u * SLOPE * aspect), scaled(camera.up, v * SLOPE))));
+    const hit = field.layer.pick(camera.eye, along, this.look.cut);
+    return hit && { k, ...hit };
+  }
+
+  clicked(x, y) {
+    const hit = this.under(x, y);
+    if (hit) this.onClick(hit);
+  }
+
+  flyTo(place, distance = 3.5) {
+    this.camera.approach(place, distance);
+    this.moved();
+  }
+}

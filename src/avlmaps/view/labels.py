@@ -1,0 +1,175 @@
+"""What a page writes on a map: its things, sounds and rooms, and for each voxel the thing, the room and the name."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Int, UInt8
+
+from avlmaps.core.errors import AvlmapsError
+from avlmaps.query.export import heat_colors, palette
+from avlmaps.query.naming import VoxelNamer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.contents import Room, SoundEvent, Thing
+    from avlmaps.view.layout import Layout
+
+NONE = 0
+"""The label of a voxel that is no thing, in no room, or without a name; others count from 1."""
+_MOST = 255
+_GRAY = (150, 150, 150)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Labels:
+    """The contents of a map, and what each voxel is.
+
+    Attributes:
+        things: most confident first.
+        sounds: in the order of their onset.
+        rooms: those with most views first.
+        names: of things, in the order of their colours; a voxel's first label counts into it from 1.
+        room_names: likewise, for the second label.
+        voxel_names: likewise, for the third label.
+        voxels: (n, 4) the labels of each voxel in the order of drawing: thing, room, name, confidence of the name.
+        notes: one sentence each on what could not be worked out.
+    """
+
+    things: "tuple[Thing, ...]"
+    sounds: "tuple[SoundEvent, ...]"
+    rooms: "tuple[Room, ...]"
+    names: tuple[str, ...]
+    room_names: tuple[str, ...]
+    voxel_names: tuple[str, ...]
+    voxels: UInt8[np.ndarray, "n 4"]
+    notes: tuple[str, ...]
+
+    @classmethod
+    def of(cls, layout: "Layout") -> "Labels":
+        """Work out all of it; a map whose models are not here has less, and its notes say why."""
+        asked, notes = layout.asked, []
+        things = _or_note(asked.things, notes)
+        sounds = _or_note(asked.sounds, notes)
+        rooms = _or_note(asked.rooms, notes)
+        names, thing = _thing_labels(len(layout), things)
+        room_names, room = _room_labels(asked, rooms)
+        voxel_names, best, confidence = _name_labels(asked, notes)
+        voxels = np.stack([thing, room, best, confidence], axis=1)[layout.order]
+        return cls(
+            tuple(things), tuple(sounds), tuple(rooms), names, room_names, voxel_names, voxels,
+            tuple(dict.fromkeys(notes)),
+        )  # fmt: skip
+
+    def describe(self, layout: "Layout") -> dict[str, Any]:
+        """Return things, sounds and rooms as the page reads them; boxes and places in the level frame."""
+        level = layout.asked.space.level
+        things = []
+        for thing in self.things:
+            points, half_m = level(thing.points), 0.5 * layout.asked.space.grid.voxel_size_m
+            things.append(
+                thing.to_json()
+                | {
+                    "label": 1 + self.names.index(thing.name) if thing.name in self.names else NONE,
+                    "low": (points.min(axis=0) - half_m).round(4).tolist(),
+                    "high": (points.max(axis=0) + half_m).round(4).tolist(),
+                }
+            )
+        return {
+            "things": things,
+            "sounds": [
+                {key: value for key, value in sound.to_json().items() if key != "clip"}
+                | {"track": level(sound.track).round(4).tolist()}
+                for sound in self.sounds
+            ],
+            "rooms": [room.to_json() | {"label": self._room_label(room)} for room in self.rooms],
+            "names": list(self.names),
+            "room_names": list(self.room_names),
+            "voxel_names": list(self.voxel_names),
+            "notes": list(self.notes),
+        }
+
+    def _room_label(self, room: "Room") -> int:
+        return 1 + self.room_names.index(room.name) if room.name in self.room_names else NONE
+
+
+def palettes(labels: Labels | None = None) -> dict[str, list[int]]:
+    """Return 256 colours each, red, green and blue in turn, for things, rooms, height and heat."""
+    from matplotlib import colormaps
+
+    ramp = np.linspace(0.0, 1.0, 256)
+    heights = (255 * colormaps["viridis"](ramp)[:, :3]).round().astype(np.uint8)
+    return {
+        "thing": _padded(() if labels is None else labels.names),
+        "room": _padded(() if labels is None else labels.room_names),
+        "height": heights.ravel().tolist(),
+        "heat": heat_colors(np.maximum(ramp, 1 / 255).astype(np.float32)).ravel().tolist(),
+    }
+
+
+def _padded(names: tuple[str, ...]) -> list[int]:
+    colours = np.full((256, 3), _GRAY, np.uint8)
+    colours[1 : 1 + len(names)] = palette(len(names))
+    return colours.ravel().tolist()
+
+
+def _or_note(find: "Callable[[], Sequence[Any]]", notes: list[str]) -> "Sequence[Any]":
+    """Return what is found; nothing, and the reason in the notes, where the map or this install lacks a model."""
+    try:
+        return find()
+    except AvlmapsError as fault:
+        notes.append(str(fault))
+        return ()
+
+
+def _thing_labels(count: int, things: "Sequence[Thing]") -> tuple[tuple[str, ...], UInt8[np.ndarray, " n"]]:
+    names = tuple(sorted({thing.name for thing in things}))[:_MOST]
+    label = np.zeros(count, np.uint8)
+    for thing in reversed(things):  # the most confident is drawn last
+        label[thing.rows] = 1 + names.index(thing.name) if thing.name in names else NONE
+    return names, label
+
+
+def _room_labels(asked: "AVLMap", rooms: "Sequence[Room]") -> tuple[tuple[str, ...], UInt8[np.ndarray, " n"]]:
+    """Give every voxel the room whose views lie nearest to it, seen from above."""
+    from scipy.spatial import KDTree
+
+    names = tuple(sorted({room.name for room in rooms}))[:_MOST]
+    if not names or not len(asked.space):
+        return names, np.zeros(len(asked.space), np.uint8)
+    level = asked.space.level
+    places = np.concatenate([level(room.places)[:, :2] for room in rooms])
+    label = np.concatenate([np.full(room.views, 1 + names.index(room.name), np.uint8) for room in rooms])
+    column, member = np.unique(np.asarray(asked.space.index)[:, :2], axis=0, return_inverse=True)
+    if not _is_level(asked):
+        return names, label[KDTree(places).query(level(asked.space.centres)[:, :2])[1]]
+    middles = (column + 0.5) * asked.space.grid.voxel_size_m
+    return names, label[KDTree(places).query(middles)[1]][member.ravel()]
+
+
+def _is_level(asked: "AVLMap") -> bool:
+    return bool(np.allclose(asked.space.level_from_world, np.eye(3), atol=1e-6))
+
+
+def _name_labels(
+    asked: "AVLMap", notes: list[str]
+) -> tuple[tuple[str, ...], UInt8[np.ndarray, " n"], UInt8[np.ndarray, " n"]]:
+    """Give every voxel its likeliest name; where there are more than 255, the rarest are left out."""
+    n = len(asked.space)
+    try:
+        namer = VoxelNamer(asked)
+        number, confidence = namer.best()
+    except AvlmapsError as fault:
+        notes.append(str(fault))
+        return (), np.zeros(n, np.uint8), np.zeros(n, np.uint8)
+    count = np.bincount(number[number >= 0], minlength=len(namer.names))
+    kept: Int[np.ndarray, " k"] = np.argsort(-count, kind="stable")[:_MOST]
+    kept = kept[count[kept] > 0]
+    label_of = np.zeros(len(namer.names) + 1, np.uint8)  # the last is that of no name
+    label_of[kept] = 1 + np.arange(len(kept))
+    return (
+        tuple(namer.names[k] for k in kept), label_of[number],
+        np.round(255 * np.clip(confidence, 0.0, 1.0)).astype(np.uint8),
+    )  # fmt: skip

@@ -1,0 +1,154 @@
+"""A map laid out for a page: its voxels as bytes in the order of drawing, and the numbers that place them.
+
+The page draws in the level frame (metres, z up). A voxel is three whole numbers from the map's lowest corner, which
+`level_from_cells` turns into that frame; positions in answers stay in the recording frame, as everywhere.
+"""
+
+from copy import copy
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float, Float32, UInt8
+
+from avlmaps.core.errors import MapError
+from avlmaps.core.poses import FRAME
+from avlmaps.query.topdown import walked
+from avlmaps.view.detail import detail_order
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
+
+RECORD = np.dtype([("cell", "<u2", (3,)), ("seen", "<u2"), ("rgb", "u1", (3,)), ("spare", "u1")])
+"""One voxel as the page reads it: where, when it was last seen (65535 is the end of the recording), its colour."""
+_MOST_CELLS = 65535
+_HEADROOM_M = 0.3  # the page opens with what is higher over the highest camera cut away
+
+
+class Layout:
+    """One map for a page.
+
+    Attributes:
+        asked: the map.
+        order: (n,) the map's row of each voxel that is drawn, in the order of drawing.
+        levels: of detail.
+        low: (3,) index of the map's lowest corner.
+    """
+
+    def __init__(self, asked: "AVLMap") -> None:
+        """Lay out a map.
+
+        Raises:
+            MapError: it is too wide to be drawn.
+        """
+        self.asked = asked
+        index = np.asarray(asked.space.index, np.int64)
+        self.order, self.levels = detail_order(index)
+        self.low = index.min(axis=0) if len(index) else np.zeros(3, np.int64)
+        if len(index) and int((index.max(axis=0) - self.low).max()) > _MOST_CELLS:
+            span_m = float((index.max(axis=0) - self.low).max() * asked.space.grid.voxel_size_m)
+            raise MapError(
+                f"{asked.stored.path} is {span_m:.0f} m wide, more than {_MOST_CELLS} voxels; build it with larger "
+                "voxels to view it."
+            )
+
+    def __len__(self) -> int:
+        return len(self.order)
+
+    def with_map(self, asked: "AVLMap") -> "Layout":
+        """Return the same layout of another object of the same map."""
+        twin = copy(self)
+        twin.asked = asked
+        return twin
+
+    @property
+    def level_from_cells(self) -> Float[np.ndarray, "4 4"]:
+        """From cells (the corner of the lowest voxel is 0) to the level frame, metres."""
+        space, pose = self.asked.space, np.eye(4)
+        voxel_m = space.grid.voxel_size_m
+        pose[:3, :3] = space.level_from_world * voxel_m
+        pose[:3, 3] = space.level_from_world @ (self.low * voxel_m)
+        return pose
+
+    @cached_property
+    def records(self) -> bytes:
+        """All voxels as `RECORD`, in the order of drawing."""
+        voxels, records = self.asked.stored.voxels, np.zeros(len(self), RECORD)
+        records["cell"] = (np.asarray(self.asked.space.index, np.int64) - self.low)[self.order]
+        records["rgb"] = np.asarray(voxels.rgb)[self.order]
+        share = np.asarray(voxels.last_seen_s, np.float64)[self.order] / self.duration_s
+        records["seen"] = np.clip(np.round(share * 65535), 0, 65535)
+        return records.tobytes()
+
+    @property
+    def duration_s(self) -> float:
+        """The last moment of the map, seconds from the start of the recording; never 0."""
+        stored = self.asked.stored
+        ends = [*np.asarray(stored.keyframes.stamp_s), *np.asarray(stored.sounds.offset_s)]
+        latest = float(np.asarray(stored.voxels.last_seen_s).max(initial=0.0))
+        return max(1e-3, latest, *map(float, ends)) if ends else max(1e-3, latest)
+
+    def in_order(self, values: Float32[np.ndarray, " n"]) -> UInt8[np.ndarray, " n"]:
+        """Return heat in [0, 1] as whole bytes in the order of drawing; any heat at all is at least 1."""
+        return np.ceil(np.clip(values, 0.0, 1.0) * 255).astype(np.uint8)[self.order]
+
+    def describe(self) -> dict[str, Any]:
+        """Return all that the page needs before it draws the first voxel."""
+        stored, space = self.asked.stored, self.asked.space
+        level = space.level(space.centres) if len(space) else np.zeros((1, 3))
+        low, high = np.percentile(level, [0.1, 99.9], axis=0)
+        cameras = walked(space)
+        ceiling = float(cameras[:, 2].max()) + _HEADROOM_M if len(cameras) else float(level[:, 2].max())
+        camera = stored.rig.rgb
+        return {
+            "name": stored.path.name,
+            "summary": repr(self.asked).partition(": ")[2].removesuffix(")"),
+            "voxels": len(self),
+            "voxel_size_m": space.grid.voxel_size_m,
+            "record_bytes": RECORD.itemsize,
+            "levels": [[level.count, level.edge] for level in self.levels],
+            "level_from_cells": self.level_from_cells.ravel().tolist(),
+            "level_from_recording": space.level_from_recording.ravel().tolist(),
+            "low": low.tolist(),
+            "high": high.tolist(),
+            "floor_m": _floor_m(level, cameras),
+            "ceiling_m": ceiling,
+            "duration_s": self.duration_s,
+            "frame": FRAME,
+            "profile": stored.info.profile,
+            "field_of_view": [camera.width / camera.fx, camera.height / camera.fy],
+            "keyframes": self._keyframes(),
+        }
+
+    def _keyframes(self) -> list[dict[str, Any]]:
+        """Return where each keyframe's camera was, and when; level frame."""
+        keyframes, turn = self.asked.stored.keyframes, self.asked.space.level_from_world
+        poses = np.asarray(keyframes.world_from_camera, np.float64)
+        return [
+            {
+                "stamp_s": round(float(stamp), 3),
+                "position": np.round(turn @ pose[:3, 3], 4).tolist(),
+                "right": np.round(turn @ pose[:3, 0], 4).tolist(),
+                "down": np.round(turn @ pose[:3, 1], 4).tolist(),
+                "ahead": np.round(turn @ pose[:3, 2], 4).tolist(),
+            }
+            for stamp, pose in zip(np.asarray(keyframes.stamp_s), poses, strict=True)
+        ]
+
+    def thumbnail(self, number: int) -> bytes | None:
+        """Return the JPEG of a keyframe, None where there is none."""
+        keyframes = self.asked.stored.keyframes
+        if not 0 <= number < len(keyframes):
+            return None
+        start, stop = (int(value) for value in keyframes.thumbnail_offsets[number : number + 2])
+        return np.asarray(keyframes.thumbnails[start:stop]).tobytes() or None
+
+
+def _floor_m(level: Float[np.ndarray, "n 3"], cameras: Float[np.ndarray, "k 3"]) -> float:
+    """Return the most crowded height under the cameras: the floor."""
+    heights = level[:, 2]
+    below = heights[heights < np.median(cameras[:, 2])] if len(cameras) else heights
+    if not len(below):
+        return float(heights.min())
+    counts, edges = np.histogram(below, bins=max(1, int(np.ceil(np.ptp(below) / 0.05))))
+    return float(edges[int(np.argmax(counts))])

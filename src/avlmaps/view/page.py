@@ -1,0 +1,143 @@
+"""The page itself: one HTML text with its style and its script inside, served live or written as one file."""
+
+import base64
+import gzip
+import hashlib
+import json
+import re
+from collections.abc import Sequence
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from avlmaps.core.errors import AvlmapsError, QueryError
+from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.progress import progress
+from avlmaps.view.asking import ask
+from avlmaps.view.session import ViewSession
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.view.labels import Labels
+    from avlmaps.view.session import MapOnPage
+
+SCRIPTS = ("matrix.js", "source.js", "shaders.js", "renderer.js", "camera.js", "marks.js", "viewer.js", "panel.js")
+_MARK = re.compile(r"\{\{(\w+)\}\}")
+_MOST_PICTURES = 60
+_MOST_QUESTIONS = 8
+_POLICY = (
+    "default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; img-src 'self' data: blob:; "
+    "media-src 'self' data: blob:; connect-src {connect}; base-uri 'none'; form-action 'none'"
+)
+
+
+def live_page() -> str:
+    """Return the page that asks its server."""
+    return _page("avlmaps view", None)
+
+
+def write_page(out: Path, maps: "Sequence[AVLMap]", questions: Sequence[str] = ()) -> dict[str, Any]:
+    """Write one file that opens from the disk without a network: the maps, their contents, and some questions' heat.
+
+    Args:
+        out: the file.
+        maps: one, or two that are compared.
+        questions: asked now, since nobody answers later; by default some that fit the first map.
+
+    Returns:
+        The file, its size, and the questions with what became of them.
+
+    Raises:
+        QueryError: a question is not understood, or the file cannot be written.
+    """
+    session = ViewSession(maps)
+    asked = list(questions) or default_questions(session.maps[0].labels)
+    told: dict[str, Any] = {
+        **session.describe(),
+        "robot": False,
+        "contents": [one.describe_contents() for one in session.maps],
+        "records": [_packed(one.layout.records) for one in session.maps],
+        "labels": [_packed(one.labels.voxels.tobytes()) for one in session.maps],
+        "pictures": [_pictures(one) for one in session.maps],
+        "clips": [_clips(one) for one in session.maps],
+        "questions": [],
+    }
+    for sentence in progress(asked, "asking", unit="question"):
+        answer, heat = session.ask(sentence)
+        told["questions"].append(answer | {"heat": _packed(heat)})
+    names = " and ".join(one.layout.asked.stored.path.name.removesuffix(".avlmap") for one in session.maps)
+    content = _page(names, told).encode("utf-8")
+    try:
+        write_bytes_atomically(out, content)
+    except OSError as fault:
+        raise QueryError(f"{out} cannot be written: {fault.strerror or fault}; check the folder.") from fault
+    return {
+        "page": str(out),
+        "bytes": len(content),
+        "questions": [{"question": one["question"], "found": one["answers"][0]["found"]} for one in told["questions"]],
+    }
+
+
+def default_questions(labels: "Labels") -> list[str]:
+    """Return questions that fit a map: its most certain things, a sound, a room, and two of them together."""
+    things = list(dict.fromkeys(thing.name for thing in labels.things))
+    rooms = list(dict.fromkeys(room.name for room in labels.rooms))
+    sounds = list(dict.fromkeys(sound.names[0] for sound in labels.sounds if sound.names))
+    asked = [f"the {name}" for name in things[:4]]
+    asked += [f"the sound of {name}" for name in sounds[:1]]
+    asked += [f"the {name}" for name in rooms[:1]]
+    if things and rooms:
+        asked.append(f"the {things[0]} in the {rooms[0]}")
+    if len(things) > 1 and sounds:
+        asked.append(f"the {things[1]} near the sound of {sounds[0]}")
+    return asked[:_MOST_QUESTIONS]
+
+
+def answered(maps: "Sequence[AVLMap]", sentence: str) -> str | None:
+    """Return why a question cannot be asked of the maps, None where it can."""
+    try:
+        for one in maps:
+            ask(one, sentence)
+    except AvlmapsError as fault:
+        return str(fault)
+    return None
+
+
+def _page(title: str, told: dict[str, Any] | None) -> str:
+    own = files("avlmaps.view") / "assets"
+    script = "\n".join((own / name).read_text(encoding="utf-8") for name in SCRIPTS)
+    script = f'"use strict";\n(() => {{\n{script}\n}})();\n'
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+    policy = _POLICY.format(digest=digest, connect="'self'" if told is None else "'none'")
+    texts = {
+        "title": escape(title),
+        "policy": escape(policy),
+        "style": (own / "page.css").read_text(encoding="utf-8"),
+        # In a script element only the end of one must not stand.
+        "data": json.dumps(told, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
+        "script": script,
+    }
+    page = (own / "page.html").read_text(encoding="utf-8")
+    return _MARK.sub(lambda mark: texts[mark[1]], page)
+
+
+def _packed(content: bytes) -> str:
+    return base64.b64encode(gzip.compress(content, 6, mtime=0)).decode("ascii")
+
+
+def _pictures(one: "MapOnPage") -> dict[str, str]:
+    """Return some keyframes' pictures, evenly over the walk, by their numbers."""
+    count = len(one.asked.stored.keyframes)
+    chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_PICTURES)).round().astype(int)) if count else ()
+    pictures = {str(number): one.layout.thumbnail(int(number)) for number in chosen}
+    return {number: base64.b64encode(jpeg).decode("ascii") for number, jpeg in pictures.items() if jpeg}
+
+
+def _clips(one: "MapOnPage") -> list[str]:
+    stored = one.asked.stored
+    return [
+        base64.b64encode(stored.clip_path(number).read_bytes()).decode("ascii") for number in range(len(stored.sounds))
+    ]

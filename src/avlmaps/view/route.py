@@ -1,0 +1,188 @@
+"""A command typed into a page: its readings, its program, the path planned on the map, and a simulated drive."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import cos, sin
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.errors import AvlmapsError, NavigationError
+from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved
+from avlmaps.language.commands import Given
+from avlmaps.language.rules import RulesTranslator, explanation
+from avlmaps.navigate.bodies import BASE, BodyShape
+from avlmaps.navigate.costmap import costmap_of, obstacles_for
+from avlmaps.navigate.driver import MapDriver
+from avlmaps.navigate.file_access import Readable
+from avlmaps.navigate.instruct import Outcome, instruct
+from avlmaps.navigate.skills import RobotSettings
+
+if TYPE_CHECKING:
+    from avlmaps.maps.obstacles import Obstacles
+    from avlmaps.navigate.driver import Driver
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.view.asking import Upload
+
+MakeRobot = Callable[["AVLMap"], "Driver"]
+"""Puts a robot that really moves (a simulated one) into the world that a map was made of."""
+_MOST_READINGS = 5
+_MARGIN_M = 0.05
+
+
+class MapBody:
+    """A body that moves exactly as it is told: the driver's own map keeps it out of walls."""
+
+    def __init__(self, pose: GroundPose) -> None:
+        self.pose = pose
+
+    def act(self, action: Action) -> Moved:
+        """Take an action."""
+        if action is Action.FORWARD:
+            self.pose = self.pose.ahead(FORWARD_M)
+        elif action is not Action.STOP:
+            self.pose = self.pose.turned(TURN_RAD if action is Action.LEFT else -TURN_RAD)
+        return Moved(self.pose)
+
+    def drive(self, speed_m_s: float, turn_rad_s: float, duration_s: float) -> Moved:
+        """Move along an arc for a while."""
+        turn = turn_rad_s * duration_s
+        chord_m = speed_m_s * duration_s * float(np.sinc(0.5 * turn / np.pi))
+        heading = self.pose.heading_rad + 0.5 * turn
+        x_m, y_m = self.pose.x_m + chord_m * cos(heading), self.pose.y_m + chord_m * sin(heading)
+        self.pose = GroundPose(x_m, y_m, self.pose.heading_rad + turn)
+        return Moved(self.pose)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drive:
+    """One drive.
+
+    Attributes:
+        outcome: what came of it.
+        places: (n, 3) the places passed, level frame, on the floor.
+    """
+
+    outcome: Outcome
+    places: Float[np.ndarray, "n 3"]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the outcome with the keys of ``avlmaps go --json``, and the places."""
+        return self.outcome.to_json() | {"places": self.places.round(4).tolist()}
+
+
+class Guide:
+    """Plans commands on one map, and drives the robot of the map's scene where there is one.
+
+    The robot stays where a command left it; the next one begins there.
+
+    Attributes:
+        asked: the map.
+    """
+
+    def __init__(self, asked: "AVLMap", robot: MakeRobot | None = None, shape: BodyShape = BASE) -> None:
+        self.asked = asked
+        self._make_robot, self._shape = robot, shape
+        self._obstacles: Obstacles | None = None
+        self._robot: Driver | None = None
+        self._pose: GroundPose | None = None
+
+    @property
+    def has_robot(self) -> bool:
+        """Whether a robot moves; else commands are planned only."""
+        return self._make_robot is not None
+
+    def prepare(self) -> None:
+        """Put the robot into its scene now.
+
+        Raises:
+            SceneError: the scene is not the one that was mapped.
+            NavigationError: there is no room for the robot.
+        """
+        self._driver()
+
+    def obey(
+        self, command: str, photo: "Upload | None" = None, clip: "Upload | None" = None, *, again: bool = False
+    ) -> dict[str, Any]:
+        """Read a command, plan it on the map, and drive it where there is a robot.
+
+        Args:
+            command: what a person says.
+            photo: what "this photo" means.
+            clip: what "this recording" means.
+            again: put the robot back to where it began, first.
+
+        Raises:
+            LanguageError: the command is not understood.
+            NavigationError: there is no room for the robot.
+        """
+        if again:
+            self._robot = self._pose = None
+        files = [None if upload is None else str(upload.path) for upload in (photo, clip)]
+        translator = RulesTranslator(Given(files[0], files[1], self.asked.knows))
+        readings = explanation(translator, command)[:_MOST_READINGS]
+        translation = translator.program_for(command)
+        readable = Readable((), tuple(path for path in files if path is not None))
+        settings = RobotSettings(waits=False)
+
+        def run(driver: "Driver") -> Drive:
+            outcome = instruct(
+                command, self.asked, driver, translator, settings=settings, readable=readable, translation=translation
+            )
+            return Drive(outcome, self._on_floor(outcome.path))
+
+        told: dict[str, Any] = {
+            "command": command,
+            "readings": readings,
+            "plan": translation.plan,
+            "program": translation.program,
+            "notes": list(translation.notes),
+        }
+        robot = self._driver()
+        start = self._start() if robot is None else robot.pose
+        planner = MapDriver(self.obstacles, MapBody(start), self._shape)
+        told["planned"] = run(planner).to_json()
+        if robot is None:
+            self._pose = planner.pose
+            return told | {"driven": None}
+        return told | {"driven": run(robot).to_json()}
+
+    @property
+    def obstacles(self) -> "Obstacles":
+        """What the map knows to stand in the way."""
+        if self._obstacles is None:
+            self._obstacles = obstacles_for(self.asked, self._shape)
+        return self._obstacles
+
+    def _driver(self) -> "Driver | None":
+        if self._robot is None and self._make_robot is not None:
+            self._robot = self._make_robot(self.asked)
+        return self._robot
+
+    def _start(self) -> GroundPose:
+        """Return where a planned command begins: where the last one ended, else near where the walk began."""
+        if self._pose is not None:
+            return self._pose
+        obstacles = self.obstacles
+        costmap = costmap_of(obstacles, self._shape.radius_m)
+        places = costmap.middle_of(np.argwhere(costmap.passable & (costmap.room_m >= self._shape.radius_m + _MARGIN_M)))
+        if not len(places):
+            raise NavigationError("Nowhere in the map is there room for the robot; map more of the floor.")
+        level = np.asarray(obstacles.level_from_world)
+        cameras = np.asarray(self.asked.stored.keyframes.world_from_camera)
+        begin, heading = places.mean(axis=0), 0.0
+        if len(cameras):
+            begin = (level @ cameras[0, :3, 3])[:2]
+            ahead = level @ cameras[0, :3, 2]
+            heading = float(np.arctan2(ahead[1], ahead[0]))
+        x, y = places[np.argmin(np.linalg.norm(places - begin, axis=1))]
+        return GroundPose(float(x), float(y), heading)
+
+    def _on_floor(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
+        return np.column_stack([xy, np.full(len(xy), self.obstacles.floor_m)])
+
+
+def sentence_of(error: BaseException) -> str:
+    """Return an error as a person reads it; what is no known error names its class."""
+    return str(error) if isinstance(error, AvlmapsError) else f"{type(error).__name__}: {error}"

@@ -1,0 +1,214 @@
+"""A user's session in a real browser, judged by what is on the screen: open, ask, see the goal, click, cut, drive."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.view.page import write_page
+from avlmaps.view.server import ViewServer
+
+pytestmark = pytest.mark.browser
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+# Software rendering, and no request of its own.
+_ARGUMENTS = [
+    "--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--no-first-run", "--mute-audio",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator:
+    sync_api = pytest.importorskip("playwright.sync_api", reason="needs playwright, which drives the browser")
+    found = os.environ.get("AVLMAPS_BROWSER") or next(filter(None, map(shutil.which, _BROWSERS)), None)
+    if found is None:
+        pytest.skip("needs Chromium (apt install chromium), or its path in AVLMAPS_BROWSER")
+    with sync_api.sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=found, args=_ARGUMENTS, timeout=120_000)
+        yield opened
+        opened.close()
+
+
+def opened(browser, url: str, width: int = 1000, height: int = 640):
+    page = browser.new_page(viewport={"width": width, "height": height})
+    page.faults = []
+    page.on("pageerror", lambda fault: page.faults.append(str(fault)))
+    page.set_default_timeout(60_000)
+    page.goto(url)
+    page.wait_for_selector("html[data-ready]", state="attached")
+    return page
+
+
+def picture(page) -> np.ndarray:
+    """Return the map's canvas as it is on the screen, RGB, once all voxels are drawn; nothing lies over it."""
+    page.wait_for_selector("#canvas[data-state=whole]")
+    page.add_style_tag(content="#overlay *, #tools { opacity: 0 !important; pointer-events: none !important }")
+    shot = page.locator("#canvas").screenshot()
+    return cv2.cvtColor(cv2.imdecode(np.frombuffer(shot, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+
+
+def goal_at(page) -> tuple[float, float]:
+    """Return the middle of the best goal's number on the screen."""
+    box = page.locator(".mark.goal", has_text="1").first.bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def coloured(shown: np.ndarray) -> float:
+    """Return the share of pixels with a clear colour."""
+    return float((np.ptp(shown.astype(int), axis=2) > 60).mean())
+
+
+@pytest.fixture
+def page(browser, served: ViewServer) -> Iterator:
+    one = opened(browser, served.url)
+    yield one
+    assert one.faults == []
+    one.close()
+
+
+def test_a_question_is_typed_and_its_goal_is_seen(page, room: AVLMap) -> None:
+    before = picture(page)
+    assert (before != before[0, 0]).any(axis=2).mean() > 0.1, "the map is on the screen"
+    page.keyboard.press("/")
+    page.keyboard.type("the red thing")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#answer .verdict.found")
+    goal = room.ask("the red thing").goals[0]
+    assert f"{goal.position[0]:.2f}, {goal.position[1]:.2f}, {goal.position[2]:.2f}" in page.inner_text("#goals")
+    marker = page.locator(".mark.goal", has_text="1").first
+    assert marker.evaluate("element => getComputedStyle(element).visibility") == "visible"
+    x, y = map(int, goal_at(page))  # the canvas begins at the page's corner
+    shown = picture(page)
+    around = shown[max(0, y - 25) : y + 25, max(0, x - 25) : x + 25]
+    assert coloured(around) > 0.03, "there is heat round the goal's number"
+    assert coloured(shown) < coloured(around), "and what is not it stays gray"
+
+
+def test_a_wrong_question_is_told_on_the_page(page) -> None:
+    page.fill("#sentence", "near near")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#answer .verdict.lost")
+    assert len(page.inner_text("#answer")) > 20
+    assert not page.locator("#ask button.main").is_disabled()
+
+
+def test_a_click_names_the_voxel_and_two_clicks_measure(page) -> None:
+    page.fill("#sentence", "the red thing")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#answer .verdict.found")
+    picture(page)
+    x, y = goal_at(page)
+    page.mouse.click(x, y)
+    page.wait_for_selector("#voxel table tr")
+    told = page.inner_text("#voxel")
+    assert "red" in told and "Last seen at" in told and "saw it" in told
+    page.focus("#measure")
+    page.keyboard.press("Enter")
+    page.mouse.click(x - 8, y)
+    page.mouse.click(x + 8, y)
+    page.wait_for_selector(".mark.tape >> nth=1", state="attached")
+    assert " m; level " in page.inner_text("#length")
+    page.keyboard.press("Escape")
+    assert page.inner_text("#length") == ""
+
+
+def test_colours_and_cuts_change_the_picture(page) -> None:
+    shots = [picture(page)]
+    for name in ("thing", "height"):
+        page.select_option("#colour", name)
+        shots.append(picture(page))
+    assert all((shots[0] != shot).any(axis=2).mean() > 0.03 for shot in shots[1:])
+    page.locator("#high").evaluate("e => { e.value = 0.2; e.dispatchEvent(new Event('input')); }")
+    cut = picture(page)
+    gone = (cut == cut[0, 0]).all(axis=2).mean() - (shots[-1] == cut[0, 0]).all(axis=2).mean()
+    assert gone > 0.02, "walls are cut away"
+
+
+def test_the_keyboard_alone_moves_the_view(page) -> None:
+    before = picture(page)
+    page.focus("#canvas")
+    for key in ("ArrowLeft", "ArrowLeft", "w", "+"):
+        page.keyboard.press(key)
+    assert (picture(page) != before).any(axis=2).mean() > 0.05
+
+
+def test_a_photo_is_asked_with_and_a_bad_one_refused(page, room: AVLMap, tmp_path: Path) -> None:
+    from avlmaps.view.layout import Layout
+
+    (tmp_path / "there.jpg").write_bytes(Layout(room).thumbnail(3) or b"")
+    (tmp_path / "bad.jpg").write_bytes(b"no picture")
+    page.set_input_files("#photo", tmp_path / "bad.jpg")
+    page.wait_for_selector("#answer .verdict.lost")
+    assert "bad.jpg" in page.inner_text("#answer")
+    page.set_input_files("#photo", tmp_path / "there.jpg")
+    page.wait_for_selector("#answer .verdict:has-text('ready')")
+    page.click("#ask button.main")
+    page.wait_for_selector("#goals li")
+    assert "there.jpg" in page.inner_text("#answer")
+
+
+def test_a_command_is_planned_and_stepped_through(page) -> None:
+    page.locator("#drive-section summary").first.click()
+    page.fill("#command", "go to the red thing")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#trip .verdict.found")
+    assert "move_to" in page.inner_text("#trip pre >> nth=0")
+    page.wait_for_selector(".mark.robot", state="attached")
+    page.click("#play")
+    page.locator("#at").evaluate("e => { e.value = 2; e.dispatchEvent(new Event('input')); }")
+    page.click("#step")
+    assert page.inner_text("#at-text").startswith("step 3 of ")
+
+
+def test_controls_have_names_and_the_page_fits_a_phone(browser, served: ViewServer) -> None:
+    page = opened(browser, served.url, 390, 780)
+    unnamed = page.evaluate(
+        """() => [...document.querySelectorAll("button, input, select, canvas")].filter((e) => e.offsetParent &&
+        !e.closest("#overlay") && !e.ariaLabel && !e.labels?.length && !e.textContent.trim()).map((e) => e.outerHTML)"""
+    )
+    assert unnamed == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert page.locator("#canvas").bounding_box()["height"] > 300
+    assert page.faults == []
+    page.close()
+
+
+def test_the_file_opens_without_a_server(browser, room: AVLMap, tmp_path: Path) -> None:
+    write_page(tmp_path / "room.html", [room], ["the red thing", "the blue thing"])
+    page = opened(browser, (tmp_path / "room.html").as_uri())
+    requested: list[str] = []
+    page.on("request", lambda request: requested.append(request.url))
+    page.click("#questions button:has-text('the red thing')")
+    page.wait_for_selector("#answer .verdict.found")
+    assert coloured(picture(page)) > 0.001
+    assert page.locator("#sounds audio").count() == 1
+    page.mouse.click(*goal_at(page))
+    page.wait_for_selector("#voxel table tr")
+    assert "red" in page.inner_text("#voxel")
+    assert not [url for url in requested if not url.startswith(("data:", "blob:"))]
+    assert page.faults == []
+    page.close()
+
+
+def test_two_maps_are_seen_side_by_side_and_one_over_the_other(browser, room: AVLMap) -> None:
+    from avlmaps.view.session import ViewSession
+    from view.conftest import serving
+
+    for server in serving(ViewSession([room, AVLMap(room.stored)])):
+        page = opened(browser, server.url)
+        shown = picture(page)
+        half = shown.shape[1] // 2
+        first, second = (shown[:, part] for part in (slice(0, half), slice(half, 2 * half)))
+        assert (first != second).any(axis=2).mean() < 0.02, "the same map under the same view"
+        page.select_option("#arrangement", "divided")
+        assert (picture(page) != shown).any(axis=2).mean() > 0.1
+        page.fill("#sentence", "the red thing")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("#goals ol >> nth=1")
+        assert page.faults == []
+        page.close()
