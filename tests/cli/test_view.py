@@ -35,7 +35,7 @@ def test_a_page_is_written_and_told(answer: Callable[..., dict[str, Any]], run, 
     status, _, err = run("view", built, "--out", out)
     assert status == 2 and "--overwrite" in err
     status, said, _ = run("view", built, built, "--out", out, "--overwrite", "--questions", "the red thing")
-    assert status == 0 and "asked: the red thing: found" in said
+    assert status == 0 and "query: the red thing: found" in said
 
 
 def test_a_scene_that_is_not_the_maps_is_refused_before_a_page_opens(

@@ -26,7 +26,7 @@ def caller(server: ViewServer) -> Call:
     port = server.server_address[1]
 
     def call(path: str, body: bytes | None = None, **headers: str) -> tuple[int, dict[str, str], bytes]:
-        line = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+        line = http.client.HTTPConnection("127.0.0.1", port, timeout=280)
         named = {name.replace("_", "-"): value for name, value in headers.items()}
         line.request("GET" if body is None else "POST", path, body, named)
         answer = line.getresponse()
@@ -173,7 +173,7 @@ def test_bodies_have_a_length_and_a_limit(call: Call, served: ViewServer) -> Non
     assert call("/api/ask", b"no json", Content_Type="application/json")[0] == 400
     assert call("/api/ask", b"[" * 90_000, Content_Type="application/json")[0] == 400
     assert call("/api/ask", b"[]", Content_Type="application/json")[0] == 400
-    line = http.client.HTTPConnection("127.0.0.1", served.server_address[1], timeout=60)
+    line = http.client.HTTPConnection("127.0.0.1", served.server_address[1], timeout=280)
     line.putrequest("POST", "/api/uploads/photo")
     line.putheader("Content-Type", "application/octet-stream")
     line.putheader("Content-Length", str(sessions.MOST_UPLOAD_BYTES + 1))

@@ -28,25 +28,26 @@ class View(ModelVerb):
     prints. Stop it with Ctrl-C. With --out it writes one file instead, which opens without avlmaps and without a
     network.
 
-    Example: avlmaps view home.avlmap
-    Example: avlmaps view home.avlmap --scene house:7
-    Example: avlmaps view before.avlmap after.avlmap
-    Example: avlmaps view home.avlmap --out home.html --questions "the sofa" "the chair near the tv"
+    Examples:
+    avlmaps view home.avlmap
+    avlmaps view home.avlmap --scene house:7
+    avlmaps view before.avlmap after.avlmap
+    avlmaps view home.avlmap --out home.html --questions "the sofa" "the chair near the tv"
     """
 
     compiles: ClassVar[bool] = True
 
-    map: Positional[Path]
+    map: Annotated[Positional[Path], arg(metavar="MAP")]
     """Map folder (NAME.avlmap)."""
     other: Annotated[Positional[Path | None], arg(metavar="[MAP]")] = None
     """Second map of the same place, to compare: side by side, or before and after."""
-    host: str = "127.0.0.1"
+    host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1"
     """Address to listen on. One that other machines reach makes the page need a token."""
-    port: int = 8080
+    port: Annotated[int, arg(metavar="NUMBER")] = 8080
     """Port to listen on; 0 takes a free one."""
     no_browser: bool = False
     """Do not open a browser."""
-    scene: str | None = None
+    scene: Annotated[str | None, arg(metavar="SCENE")] = None
     """Scene in which a simulated robot drives the commands typed in the page, as for `avlmaps go`."""
     out: Annotated[Path | None, arg(metavar="FILE")] = None
     """Write one HTML file, and serve nothing."""
@@ -93,7 +94,7 @@ def _written(verb: View, out: Path) -> dict[str, Any]:
 
 
 def _lines(answer: dict[str, Any]) -> list[str]:
-    lines = [f"asked: {one['question']}: {'found' if one['found'] else 'not found'}" for one in answer["questions"]]
+    lines = [f"query: {one['question']}: {'found' if one['found'] else 'not found'}" for one in answer["questions"]]
     return [*lines, f"wrote {answer['page']} ({size_of(answer['bytes'])})"]
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 _CHUNK = 1 << 14
 _NEAR_M, _FAR_M = 0.1, 8.0  # from how far a keyframe counts as having seen a voxel
-_OWN_VOXELS = 1.5  # a ray ends so many voxels before the voxel itself
+_OWN_VOXELS = 1.5  # a ray ends this far before the voxel itself, in voxels
 
 
 class VoxelNamer:
@@ -22,7 +22,7 @@ class VoxelNamer:
 
     Attributes:
         asked: the map.
-        names: what is told apart.
+        names: what it distinguishes.
         calibrated: whether confidences are probabilities; else they are cosines.
     """
 

@@ -1,21 +1,17 @@
-"""A question typed into a page: words, a photo, a sound clip, or words that speak of the photo and the clip."""
+"""A query typed into a page: words, a photo, a sound clip, or words that speak of the photo and the clip."""
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Question
-from avlmaps.language.commands import Given
-from avlmaps.language.intents import Ask
-from avlmaps.language.questions import read_question
+from avlmaps.query.sentences import SentenceAnswer, UnusedFileError, ask_sentence
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.question import Answer
 
 TOP = 5
-_MOST_COUNTED, _AS_LIKELY = 200, 0.5  # of "how many": instances count that score at least half of the best one
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +19,7 @@ class Upload:
     """A file that a person gave to the page.
 
     Attributes:
-        path: where it is kept here; no answer names it.
+        path: where it lies on this machine; no answer names it.
         name: what its owner calls it.
     """
 
@@ -31,64 +27,32 @@ class Upload:
     name: str
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """The answer to a typed question.
-
-    Attributes:
-        answer: goals, parts and heat.
-        notes: how words were taken.
-        count: how many there are, where that was the question.
-    """
-
-    answer: "Answer"
-    notes: tuple[str, ...] = ()
-    count: int | None = None
-
-    def to_json(self) -> dict[str, Any]:
-        """Return it with the keys of ``avlmaps query --json``."""
-        told = self.answer.to_json()
-        if self.count is not None:
-            told = {**told, "goals": told["goals"][:TOP], "count": self.count}
-        return {**told, "notes": list(self.notes)} if self.notes else told
-
-
-def ask(asked: "AVLMap", sentence: str, photo: Upload | None = None, clip: Upload | None = None) -> Asked:
-    """Ask a map as ``avlmaps query`` does.
+def ask(avlmap: "AVLMap", sentence: str, photo: Upload | None = None, clip: Upload | None = None) -> SentenceAnswer:
+    """Query a map as ``avlmaps query`` does.
 
     Args:
-        asked: the map.
-        sentence: words; may be empty where a file is given, which is then asked for by itself.
+        avlmap: the map.
+        sentence: words; may be empty where there is a file, which is then a query by itself.
         photo: what "this photo" in the sentence means.
         clip: what "this recording" in the sentence means.
 
     Raises:
-        QueryError: nothing is asked, the words are not understood, or they do not speak of the file.
+        QueryError: the query is empty, the words are not understood, or they do not speak of the file.
     """
-    files = {Modality.IMAGE: photo, Modality.SOUND: clip}
-    given = {modality: upload for modality, upload in files.items() if upload is not None}
-    if not sentence.strip():
-        if not given:
-            raise QueryError("The question is empty; type what is sought, such as the chair near the sofa.")
-        parts = [Part(modality, str(upload.path), is_file=True) for modality, upload in given.items()]
-        return Asked(asked.ask(Question.of(parts), top=TOP))
-    names = {modality: str(upload.path) for modality, upload in given.items()}
-    read = read_question(
-        sentence, Given(names.get(Modality.IMAGE), names.get(Modality.SOUND), knows=lambda _: True)
-    )  # fmt: skip
-    counted = read.inquiry.ask is Ask.HOW_MANY
-    used = {part.query for question in read.questions for part in question.parts}
-    if not used.issuperset(names.values()):
-        raise QueryError(
-            "The words do not speak of the file; say 'near where this photo was taken' or 'near the sound of this "
-            "recording', or take the words or the file away."
-        )
-    answers = [asked.ask(question, top=_MOST_COUNTED if counted else TOP) for question in read.questions]
-    answer = max(answers, key=lambda one: (one.found, one.goals[0].score if one.goals else 0.0))
-    if not counted:
-        return Asked(answer, read.notes)
-    likely = [goal for goal in answer.goals if goal.score >= _AS_LIKELY * answer.goals[0].score]
-    return Asked(answer, read.notes, len(likely) if answer.found else 0)
+    if sentence.strip():
+        image, sound = (None if upload is None else str(upload.path) for upload in (photo, clip))
+        try:
+            return ask_sentence(avlmap, sentence, top=TOP, image=image, clip=sound)
+        except UnusedFileError:
+            raise QueryError(
+                "The words do not speak of the file; say 'near where this photo was taken' or 'near the sound of this "
+                "recording', or take the words or the file away."
+            ) from None
+    files = ((Modality.IMAGE, photo), (Modality.SOUND, clip))
+    parts = [Part(modality, str(upload.path), is_file=True) for modality, upload in files if upload is not None]
+    if not parts:
+        raise QueryError("The query is empty; type what is sought, such as the chair near the sofa.")
+    return SentenceAnswer(avlmap.ask(Question.of(parts), top=TOP), TOP)
 
 
 def without_paths(text: str, *uploads: Upload | None) -> str:

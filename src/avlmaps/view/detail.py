@@ -15,7 +15,7 @@ class Level:
     """One level of detail.
 
     Attributes:
-        count: voxels that are drawn at this level: the first so many of the order.
+        count: voxels that are drawn at this level: the first ones of the order.
         edge: of the blocks that they stand for, in voxels.
     """
 

@@ -35,7 +35,7 @@ class Labels:
         room_names: likewise, for the second label.
         voxel_names: likewise, for the third label.
         voxels: (n, 4) the labels of each voxel in the order of drawing: thing, room, name, confidence of the name.
-        notes: one sentence each on what could not be worked out.
+        notes: one sentence each on what could not be computed.
     """
 
     things: "tuple[Thing, ...]"
@@ -49,7 +49,7 @@ class Labels:
 
     @classmethod
     def of(cls, layout: "Layout") -> "Labels":
-        """Work out all of it; a map whose models are not here has less, and its notes say why."""
+        """Compute all of it; a map whose models are not here has less, and its notes say why."""
         asked, notes = layout.asked, []
         things = _or_note(asked.things, notes)
         sounds = _or_note(asked.sounds, notes)
@@ -133,7 +133,7 @@ def _thing_labels(count: int, things: "Sequence[Thing]") -> tuple[tuple[str, ...
 
 
 def _room_labels(asked: "AVLMap", rooms: "Sequence[Room]") -> tuple[tuple[str, ...], UInt8[np.ndarray, " n"]]:
-    """Give every voxel the room whose views lie nearest to it, seen from above."""
+    """Give every voxel the room whose views lie nearest to it on the ground."""
     from scipy.spatial import KDTree
 
     names = tuple(sorted({room.name for room in rooms}))[:_MOST]

@@ -13,7 +13,7 @@ from jaxtyping import Float, Float32, UInt8
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import FRAME
-from avlmaps.query.topdown import walked
+from avlmaps.query.topdown import camera_path
 from avlmaps.view.detail import detail_order
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ class Layout:
         stored, space = self.asked.stored, self.asked.space
         level = space.level(space.centres) if len(space) else np.zeros((1, 3))
         low, high = np.percentile(level, [0.1, 99.9], axis=0)
-        cameras = walked(space)
+        cameras = camera_path(space)
         ceiling = float(cameras[:, 2].max()) + _HEADROOM_M if len(cameras) else float(level[:, 2].max())
         camera = stored.rig.rgb
         return {

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from avlmaps.core.errors import AvlmapsError, QueryError
+from avlmaps.core.errors import QueryError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.progress import progress
-from avlmaps.view.asking import ask
 from avlmaps.view.session import ViewSession
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ _POLICY = (
 
 
 def live_page() -> str:
-    """Return the page that asks its server."""
+    """Return the page that queries its server."""
     return _page("avlmaps view", None)
 
 
@@ -45,7 +44,7 @@ def write_page(out: Path, maps: "Sequence[AVLMap]", questions: Sequence[str] = (
     Args:
         out: the file.
         maps: one, or two that are compared.
-        questions: asked now, since nobody answers later; by default some that fit the first map.
+        questions: answered now and stored in the file; by default some that fit the first map.
 
     Returns:
         The file, its size, and the questions with what became of them.
@@ -94,16 +93,6 @@ def default_questions(labels: "Labels") -> list[str]:
     if len(things) > 1 and sounds:
         asked.append(f"the {things[1]} near the sound of {sounds[0]}")
     return asked[:_MOST_QUESTIONS]
-
-
-def answered(maps: "Sequence[AVLMap]", sentence: str) -> str | None:
-    """Return why a question cannot be asked of the maps, None where it can."""
-    try:
-        for one in maps:
-            ask(one, sentence)
-    except AvlmapsError as fault:
-        return str(fault)
-    return None
 
 
 def _page(title: str, told: dict[str, Any] | None) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.errors import AvlmapsError, NavigationError
+from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved
 from avlmaps.language.commands import Given
 from avlmaps.language.rules import RulesTranslator, explanation
@@ -32,7 +32,7 @@ _MARGIN_M = 0.05
 
 
 class MapBody:
-    """A body that moves exactly as it is told: the driver's own map keeps it out of walls."""
+    """A body that makes each movement exactly; the driver's own map holds it off the walls."""
 
     def __init__(self, pose: GroundPose) -> None:
         self.pose = pose
@@ -150,7 +150,7 @@ class Guide:
 
     @property
     def obstacles(self) -> "Obstacles":
-        """What the map knows to stand in the way."""
+        """The obstacles that the map knows."""
         if self._obstacles is None:
             self._obstacles = obstacles_for(self.asked, self._shape)
         return self._obstacles
@@ -181,8 +181,3 @@ class Guide:
 
     def _on_floor(self, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
         return np.column_stack([xy, np.full(len(xy), self.obstacles.floor_m)])
-
-
-def sentence_of(error: BaseException) -> str:
-    """Return an error as a person reads it; what is no known error names its class."""
-    return str(error) if isinstance(error, AvlmapsError) else f"{type(error).__name__}: {error}"

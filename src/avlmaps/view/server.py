@@ -1,4 +1,4 @@
-"""The page over HTTP, from this machine alone unless another host is asked for, and then behind a token.
+"""The page over HTTP, on this machine alone; on another host, behind a token.
 
 | path | answer |
 |---|---|
@@ -128,7 +128,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._answered(self._read)
 
     def do_POST(self) -> None:
-        """Answer what is asked."""
+        """Answer what is posted."""
         self._answered(self._asked)
 
     def _answered(self, answer: Any) -> None:
@@ -142,7 +142,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._send_json({"error": {"message": str(fault)}}, 400)
         except (BrokenPipeError, ConnectionResetError, TimeoutError):
             self.close_connection = True
-        except Exception as fault:  # noqa: BLE001 - the page shows it, and the server goes on
+        except Exception as fault:  # noqa: BLE001 - the page shows it, and the server continues
             self.close_connection = True
             message = f"{type(fault).__name__}: {fault}; this is a fault of avlmaps, please report it."
             self._send_json({"error": {"message": message}}, 500)

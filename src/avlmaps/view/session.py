@@ -31,7 +31,7 @@ _SUFFIXES = {
 
 
 class MapOnPage:
-    """One map on the page: how it is drawn, and what is written on it, which is worked out in the background.
+    """One map on the page: how it is drawn, and what is written on it, which is computed in the background.
 
     Attributes:
         asked: the map.
@@ -47,7 +47,7 @@ class MapOnPage:
 
     @property
     def labels(self) -> Labels:
-        """Its contents; the first call works them out, others wait for it."""
+        """Its contents; the first call computes them, others wait for it."""
         with self._lock:
             if self._labels is None:
                 # A map object of its own, so that questions need not wait for it.
@@ -88,7 +88,7 @@ class MapOnPage:
         }
 
     def _thing_at(self, row: int) -> "Thing | None":
-        if self._labels is None:  # not worked out yet: nothing waits for it here
+        if self._labels is None:  # not computed yet: nothing waits for it here
             return None
         return next((thing for thing in self._labels.things if (thing.rows == row).any()), None)
 
@@ -110,7 +110,7 @@ class ViewSession:
         self._counted = 0
 
     def prepare(self) -> None:
-        """Work out in the background what pages need soon: the contents, and the models of a first question."""
+        """Compute in the background what pages need soon: the contents."""
 
         def work() -> None:
             for one in self.maps:
@@ -138,7 +138,7 @@ class ViewSession:
             The answers, and after one another the heat of each map's voxels in the order of drawing, a byte each.
 
         Raises:
-            QueryError: nothing is asked, or it is not understood.
+            QueryError: the query is empty, or not understood.
         """
         files = self._upload(photo), self._upload(clip)
         answers, heats = [], []
@@ -214,7 +214,7 @@ class ViewSession:
             return None
         kept = self._uploads.get(number)
         if kept is None:
-            raise QueryError("The file is not kept any more; choose it again.")
+            raise QueryError("The file is not stored any more; choose it again.")
         return kept
 
 

@@ -305,7 +305,7 @@ class Panel {
       list.append(made("li", { className: "ramp" }, ends[0], canvas, ends[1]));
     } else if (name === "thing" || name === "room") {
       const names = this.contents[0]?.[name === "thing" ? "names" : "room_names"];
-      if (!names) list.append(made("li", { textContent: "being worked out" }));
+      if (!names) list.append(made("li", { textContent: "The map's contents are still being computed." }));
       (names ?? []).forEach((text, k) => {
         const tint = made("i");
         tint.style.background = shade(name, k + 1);
