@@ -97,7 +97,7 @@ def test_lines_that_are_empty_comments_too_long_or_no_utf_8_do_no_harm(piped, bu
     assert status == 1
     assert "\x1b" not in out + err
     assert "avlmaps: 3 of 4 lines failed." in err
-    assert out.count("asked: ") == 1, "quit ends the shell"
+    assert out.count("query: ") == 1, "quit ends the shell"
 
 
 def test_a_line_that_begins_like_a_verb_may_be_a_question(piped, built: Path) -> None:
@@ -240,12 +240,12 @@ def test_at_a_prompt_questions_completion_history_and_the_end(built: Path, tmp_p
     shell.type("the turquo")
     shell.until("turquoise")  # the menu
     shell.type("\t cabinet\r")
-    shell.until("asked: object 'turquoise cabinet'")
+    shell.until("query: object 'turquoise cabinet'")
     shell.until("avlmaps>")
     shell.type("\x1b[A")  # up: the last question again
     shell.until("turquoise cabinet")
     shell.type("\r")
-    shell.until("asked: object 'turquoise cabinet'")
+    shell.until("query: object 'turquoise cabinet'")
     shell.until("avlmaps>")
     shell.type("\x04")
     assert shell.ended() == 0

@@ -99,7 +99,7 @@ def test_a_transform_of_no_numbers_is_refused(bad):
     for place in range(3):
         values = [0.0, 0.0, 0.0]
         values[place] = bad if place < 2 or bad != 1e9 else float("nan")
-        with pytest.raises(ValueError, match="no transform"):
+        with pytest.raises(ValueError, match="not a transform"):
             GroundTransform(*values)
 
 

@@ -35,7 +35,7 @@ def test_an_address_is_completed(given, meant):
     ["", "ws://", "http://robot:9090", "ws://robot:99999", "ws://robot:x", "ws://me:secret@robot", "ro bot", "a\r\nb"],
 )
 def test_no_address_is_refused_without_trying(given):
-    with pytest.raises(NavigationError, match="no address of a rosbridge") as error:
+    with pytest.raises(NavigationError, match="not an address of a rosbridge") as error:
         address(given)
     assert "\n" not in str(error.value)
 

@@ -104,7 +104,7 @@ def test_a_map_that_is_tilted_is_driven_on_its_level_ground() -> None:
 
 def test_what_is_not_there_is_told_in_one_sentence_with_what_to_do() -> None:
     robot = furnished_robot(sounds=sounds_of([track(5.0, 3.1)], [0.2]))
-    with pytest.raises(GoalNotFoundError, match=r"'dog' is not found in the map: sound 'dog': none of the 1 heard"):
+    with pytest.raises(GoalNotFoundError, match=r"'dog' is not found in the map: sound 'dog': none of the 1 detected"):
         robot.move_to(robot.get_major_map(sound="dog"))
     with pytest.raises(GoalNotFoundError, match=r"or let the robot go to the best guess\.$"):
         robot.move_to(robot.get_major_map(obj="chair") * robot.get_map(sound="dog"))

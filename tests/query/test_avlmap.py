@@ -96,7 +96,7 @@ def test_a_profile_without_view_encoder_says_so(heard: AVLMap) -> None:
 def test_a_sound_that_was_not_heard_is_absent(heard: AVLMap) -> None:
     heat = heard.sound("helicopter")
     assert (heat.peak, heat.found) == (0.0, False)
-    expected = "none of the 1 heard sounds is like 'helicopter'; the best score is 0.00, below 0.50"
+    expected = "none of the 1 detected sounds is like 'helicopter'; the best score is 0.00, below 0.50"
     assert heat.factors[0].note == expected
 
 

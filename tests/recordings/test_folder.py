@@ -214,7 +214,7 @@ def test_a_clock_that_was_set_back_costs_the_shorter_part_and_no_more(tmp_path: 
         ({"depth_units_per_m": 1e300}, "depth_units_per_m is 1e+300; it must be positive and at most 1e+06, 1000 for"),
         ({"rgb_rate_hz": -1}, "recording.json: rgb_rate_hz is -1.0; it must be positive; fix the file."),
         ({"depth_scale": 5000}, "recording.json: object contains unknown field `depth_scale`; fix the file."),
-        ({"world_from_camera": "opengl"}, "recording.json at world_from_camera: invalid enum value 'opengl'; mend"),
+        ({"world_from_camera": "opengl"}, "recording.json at world_from_camera: invalid enum value 'opengl'; fix"),
         ({"up_in_world": [0, 0, 9.81]}, "it must be a unit vector, or null where up is not known; fix the file."),
         ({"intrinsics": {}}, "recording.json at intrinsics: object missing required field `rgb`; fix the file."),
     ],

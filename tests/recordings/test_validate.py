@@ -80,7 +80,7 @@ FAULTS: list[tuple[Callable[[Path], object], str, str, int | None, bool]] = [
         5,
         False,
     ),
-    (_short_sound, "audio.flac ends at 1.00 s, but the frames go on to 2.00 s;", "audio.flac", None, False),
+    (_short_sound, "audio.flac ends at 1.00 s, but the frames continue to 2.00 s;", "audio.flac", None, False),
     (_foreign_text, "events.csv, line 2: this is not UTF-8 text; save the file as UTF-8.", "events.csv", 2, False),
     (
         lambda p: (p / "objects.json").write_text("[{"),

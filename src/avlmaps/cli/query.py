@@ -193,7 +193,7 @@ def _camera_for(picture: Path | None, intrinsics: str | None) -> "Pinhole | None
 def query_lines(answer: dict[str, Any]) -> list[str]:
     """Lay out the answer of `query`."""
     asked = ", ".join(f"{part['modality']} {part['query']!r} ({part['role']})" for part in answer["parts"])
-    lines = [f"asked: {asked}"]
+    lines = [f"query: {asked}"]
     lines += [f"note: {part['note']}" for part in answer["parts"] if part.get("note")]
     rows = [
         (i, place(goal["position"]), f"{goal['score']:.2f}", " x ".join(f"{side:.2f}" for side in goal["size"]))

@@ -68,7 +68,7 @@ class Drive:
 
     def lines(self) -> list[str]:
         """Return it as a person reads it."""
-        lines = [f"told: {self.command}"]
+        lines = [f"command: {self.command}"]
         for ask, right, off in zip(self.asks, self.right, self.off_m, strict=True):
             where = "never stopped for it" if off is None else f"stopped {off:.2f} m from the true one"
             lines.append(f"{'right' if right else 'WRONG'}  {ask.title}  ->  {where}")

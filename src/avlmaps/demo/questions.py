@@ -111,7 +111,7 @@ def near_a_sound(evidence: Evidence, rng: np.random.Generator, used: Sequence[st
             if chosen is None or chosen != alone_near(evidence, own, event.robot, near_m, margin_m):
                 continue
             text = f"the {category} near the sound of {event.category}"
-            why = f"There are {len(own)} things of that kind here; the sound was heard near one of them."
+            why = f"There are {len(own)} things of that kind here; the sound played near one of them."
             right = [Box.of(evidence.objects[chosen])]
             return _sentence("sound", text, why, right, _others(evidence, own, chosen), category)
     return None

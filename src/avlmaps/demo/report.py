@@ -310,7 +310,7 @@ def _said(step: "Step") -> str:
     if step.off_m is None:
         return f"{told}; but there is none here."
     if step.ask.kind == "clip":
-        return f"{told}: {step.off_m:.2f} m from where the robot was when it heard it."
+        return f"{told}: {step.off_m:.2f} m from the robot's position during the sound."
     return f"{told}: {step.off_m:.2f} m from the true one." if step.off_m > 0.0 else f"{told}: on the true one."
 
 

@@ -179,7 +179,7 @@ class Seeker:
 
     def _chosen(self, thing: Thing, of: int) -> Thing:
         place = ", ".join(f"{value:.2f}" for value in self.asked.space.world(thing.place))
-        line = f"{thing.name}: at ({place}) m, {thing.sure:.2f} sure"
+        line = f"{thing.name}: at ({place}) m, confidence {thing.sure:.2f}"
         if thing.name and not self._last_told.startswith(line):
             self._last_told = line + (f", one of {of}" if of > 1 else "")
             self._tell(self._last_told)

@@ -101,7 +101,7 @@ def draw_map(
         axes[0].plot(*track[:, :2].T, color=_SOUND, linewidth=5, alpha=0.45, solid_capstyle="round")
         mark(axes[0], track.mean(axis=0), f"{sounds.onset_s[k]:.0f} s", _SOUND)
     if len(sounds):
-        axes[0].plot([], [], color=_SOUND, linewidth=5, alpha=0.45, label="where a sound was heard, and when")
+        axes[0].plot([], [], color=_SOUND, linewidth=5, alpha=0.45, label="sound position, with the time")
     _draw_names(axes[0], space, things, rooms)
     name = plot_text(Path(stored.path).name) if title is None else title
     axes[0].set_title(
@@ -219,7 +219,7 @@ def _draw_anchors(ax: "Axes", factor: Factor) -> None:
     if factor.part.modality is Modality.IMAGE:
         ax.plot(*anchors[0, :2], marker="^", color=_SOUND, markeredgecolor="white", markersize=11, linestyle="none")
         return
-    what = "heard here" if factor.part.modality is Modality.SOUND else "seen from here"
+    what = "sound position" if factor.part.modality is Modality.SOUND else "seen from here"
     if likely.any():
         style = {"linestyle": "none", "marker": "o", "markersize": 4, "markeredgecolor": "white"}
         ax.plot(*anchors[likely, :2].T, color=_SOUND, label=what, **style)

@@ -59,7 +59,7 @@ def sound_factor(
         note = "the map holds no sounds"
     elif best < FOUND_AT:
         note = (
-            f"none of the {len(sounds)} heard sounds is like {part.query!r}; the best score is {best:.2f}, "
+            f"none of the {len(sounds)} detected sounds is like {part.query!r}; the best score is {best:.2f}, "
             f"below {FOUND_AT:.2f}"
         )
     used = (
