@@ -161,8 +161,18 @@ def _target(target: Any) -> Any:
         target = {"object": target}
     kind = next(name for name in ("object", "sound", "area", "image", "clip", "here") if name in target)
     pick = target.get("pick", "")
+    name = _name(kind, target[kind])
+    if kind in ("object", "area") and _is_both(str(target[kind])):
+        kind, name = "area", _name("area", target[kind])  # "the closet": a list may call it a thing or a room
     near = frozenset(_target(one) for one in target.get("near", ()))
-    return kind, _name(kind, target[kind]), near, "" if pick == "nearest" else pick
+    return kind, name, near, "" if pick == "nearest" else pick
+
+
+def _is_both(name: str) -> bool:
+    """Return whether a name is one of a thing and of a room."""
+    words = name.lower().split()
+    tail = words[-1] if words else ""
+    return lexicon().find(tail, Kind.THING) is not None and lexicon().find(tail, Kind.ROOM) is not None
 
 
 def _name(kind: str, name: Any) -> Any:

@@ -24,6 +24,16 @@ _LINKS = frozenset({"of", "with", "for", "on", "in", "at", "to", "from", "under"
 _ES = ("s", "x", "z", "ch", "sh")
 
 
+def forms_of(verb: str) -> tuple[str, str, str, str]:
+    """Return the forms of a regular verb: "stop", "stopping", "stopped", "stops"."""
+    short = verb[:-1] if verb.endswith("e") and not verb.endswith("ee") else verb
+    if 2 < len(verb) < 5 and verb[-1] not in "aeiouwxyk" and verb[-2] in "aeiou" and verb[-3] not in "aeiou":
+        short = verb + verb[-1]
+    past = f"{verb[:-1]}ied" if verb.endswith("y") and verb[-2] not in "aeiou" else f"{short}ed"
+    ends = "es" if verb[-1] in "sxz" or verb[-2:] in ("sh", "ch") else "s"
+    return verb, f"{short}ing", past, f"{verb[:-1]}ies" if past.endswith("ied") else verb + ends
+
+
 def plural_of(phrase: str) -> str:
     """Return the plural of a noun or noun phrase; its head is made plural: chests of drawers."""
     words = phrase.split()

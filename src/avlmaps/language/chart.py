@@ -12,6 +12,7 @@ from avlmaps.language.grammar import BUILT_IN, Grammar, Part, Template
 from avlmaps.language.lexer import Token
 
 _COMMA = 0.4
+_MARKS = {",": _COMMA, "-": _COMMA, "(": 0.05, ")": 0.05, "+": 0.05}
 _FILLER = 0.3
 _MOST_A_SPAN = 3
 _MOST_REPEATS = 6
@@ -193,9 +194,11 @@ class Chart:
 
     def _skips(self, at: int, part: Part) -> list[tuple[int, float]]:
         """Return where a part may begin behind a comma or words that say nothing."""
-        if self.tokens[at].text in (",", "-"):
-            return [(at + 1, _COMMA)] if part.name not in (",", "-") else []
-        return [(edge.end, _FILLER) for edge in self.terminal("FILLER", at) if edge.end == at + 1]
+        text = self.tokens[at].text
+        if text in _MARKS:
+            return [(at + 1, _MARKS[text])] if part.name not in (",", "-") else []
+        fillers = [(edge.end, _FILLER) for edge in self.terminal("FILLER", at) if edge.end == at + 1]
+        return fillers + [(edge.end, _FILLER) for edge in self.terminal("SLOW", at)]
 
 
 def _value(template: Template, slots: Slots, start: int, end: int) -> Any:

@@ -125,6 +125,10 @@ def _decided(weighed: tuple[Weighed, ...], sentence: Sentence) -> Command:
         return Command((Clarify(question),), best.notes, weighed)
     close = (one for one in weighed[1:] if one.cost - best.cost < _MARGIN)
     rivals = [one for one in close if not isinstance(one.intents[0], Clarify | Refuse)]
+    fuller = next((one for one in rivals if _is_fuller(one.intents, best.intents)), None)
+    if fuller is not None:  # the same places, said more exactly
+        return Command(fuller.intents, fuller.notes, weighed)
+    rivals = [one for one in rivals if not _is_fuller(best.intents, one.intents)]
     if rivals:
         from avlmaps.language.verbalise import verbalise
 
@@ -138,6 +142,35 @@ def _decided(weighed: tuple[Weighed, ...], sentence: Sentence) -> Command:
 def _same(a: tuple[Intent, ...], b: tuple[Intent, ...]) -> bool:
     """Return whether two readings drive alike; a wait makes no difference."""
     return tuple(one for one in a if not isinstance(one, Wait)) == tuple(one for one in b if not isinstance(one, Wait))
+
+
+def _is_fuller(a: tuple[Intent, ...], b: tuple[Intent, ...]) -> bool:
+    """Return whether two readings differ only in that one says more of where its targets are."""
+    fuller: list[bool] = []
+
+    def bare(target: Target) -> Target:
+        return replace(target, near=())
+
+    for one, other in zip(a, b, strict=len(a) == len(b)) if len(a) == len(b) else ():
+        if on_targets(one, bare) != on_targets(other, bare):
+            return False
+        of_one, of_other = (next(iter(_targets_of(each)), None) for each in (one, other))
+        if of_one is not None and of_other is not None:
+            if not set(of_other.near) <= set(of_one.near):
+                return False
+            fuller.append(len(of_one.near) > len(of_other.near))
+    return any(fuller)
+
+
+def _targets_of(intent: Intent) -> list[Target]:
+    found: list[Target] = []
+
+    def note(target: Target) -> Target:
+        found.append(target)
+        return target
+
+    on_targets(intent, note)
+    return found
 
 
 def check_length(text: str, what: str, example: str) -> None:

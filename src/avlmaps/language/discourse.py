@@ -103,8 +103,6 @@ class _Composer:
                 self.join = "BUT_FIRST" if self.groups else ""
             case "CORRECT" | "MAKE_IT":
                 self.join = "CORRECT" if self.groups else self.join
-            case "SLOW":
-                self.notes.append(f"'{item.value}' has no effect: the robot has one speed.")
             case "THOUGH" if (
                 len(self.groups) > 1 and not rest and item.value in ("first", "beforehand", "first though")
             ):
@@ -152,6 +150,8 @@ class _Composer:
             metres = float(tree.get("metres"))
             back = isinstance(last, Move) and last.metres < 0
             self.groups[-1].intents[-1] = replace(last, metres=-metres if back else metres)
+        elif self.groups and isinstance(self.groups[-1].intents[-1], Turn) and tree.get("metres") is not None:
+            self.groups.append(_Group([Move(float(tree.get("metres")))], "move", self.number))
         elif isinstance(last, Turn) and last.degrees is not None and tree.get("degrees") is not None:
             self.groups[-1].intents[-1] = replace(last, degrees=copysign(float(tree.get("degrees")), last.degrees))
         elif isinstance(last, Wait) and tree.get("seconds") is not None:
@@ -171,8 +171,6 @@ class _Composer:
         found, notes = intents_of(tree, self.memory)
         intents = list(found)
         self.notes += notes
-        if isinstance(intents[0], Return) and not self.groups:
-            raise UnresolvedError(Clarify("I do not know where you are. Which thing or room are you near?"))
         if isinstance(tree, Tree) and tree.get("arrive") and self.groups:
             last = self.groups[-1].intents[-1]
             if isinstance(last, Go) and intents == [last]:
@@ -180,6 +178,9 @@ class _Composer:
             if before is not None and before.kind == "order":
                 self.join = "AFTER"
         if self.groups and self.groups[-1].kind in ("beside", "between", "standoff") and _is_there(tree):
+            return
+        if isinstance(tree, Tree) and tree.rule == "on_way" and not self.groups:
+            self.held.append(_Group(intents, "go", self.number))
             return
         if self.groups and self.groups[-1].kind == "lead" and self.groups[-1].sentence == self.number:
             intents = self.led(intents)
@@ -309,7 +310,7 @@ class _Composer:
 
 def compose(sentence: Sentence, reading: Reading) -> Composed:
     """Return what a reading means."""
-    composer = _Composer(sentence)
+    composer = _Composer(sentence, notes=_without_effect(sentence))
     stop: Refuse | Clarify | None = None
     try:
         for k, item in enumerate(reading.items):
@@ -327,11 +328,25 @@ def compose(sentence: Sentence, reading: Reading) -> Composed:
         before = [intent for group in composer.groups[: composer.loop_from] for intent in group.intents]
         body = tuple(intents[len(before) :])
         intents = [*before, Repeat(composer.loop_times, body)] if composer.loop_times > 1 else intents
+    if stop is None and intents and isinstance(intents[0], Return):
+        stop = Clarify("I do not know where you are. Which thing or room are you near?")
     if stop is None and not intents:
         stop = _nothing(composer, reading)
     return Composed(
         tuple(_tidied(intents)) if stop is None else (), stop, tuple(composer.notes), tuple(_phrases(composer, reading))
     )
+
+
+def _without_effect(sentence: Sentence) -> list[str]:
+    """Return a note for each word that says how fast or how quietly."""
+    notes: list[str] = []
+    end = 0
+    for at in range(len(sentence.tokens)):
+        slow = max(sentence.chart.terminal("SLOW", at), key=lambda edge: edge.end, default=None)
+        if slow is not None and at >= end:
+            end = slow.end
+            notes.append(f"'{slow.value}' has no effect: the robot has one speed.")
+    return notes
 
 
 def _phrases(composer: _Composer, reading: Reading) -> list[str]:

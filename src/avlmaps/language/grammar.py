@@ -13,9 +13,11 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from avlmaps.core.inflection import forms_of
+
 # Classes that the lexer and the lexicon match, and no list of words.
 BUILT_IN = frozenset({
-    "NUMBER", "LENGTH", "ANGLE", "DURATION", "CLOCK", "IMAGE", "CLIP", "NAME", "OPEN", "NOISE", "WORDS", "ROOM",
+    "NUMBER", "LENGTH", "ANGLE", "DURATION", "CLOCK", "IMAGE", "CLIP", "NAME", "OPEN", "NOISE", "WORDS", "ROOM", "VERB",
 })  # fmt: skip
 _PIECE = re.compile(r"\s*(?:(?P<slot>[a-z_]+)=)?(?P<part><[a-z_]+>|[A-Z_]+|[^\s\[\](){}|=<>]+|[\[\](){}|])")
 
@@ -85,6 +87,7 @@ def load_grammar(name: str = "grammar.toml") -> Grammar:
     """
     data = tomllib.loads(files("avlmaps.language").joinpath(name).read_text(encoding="utf-8"))
     tree, words = Node(), {}
+    data["words"]["GO"] += " | " + " | ".join(f for verb in data["lists"]["motion"].split() for f in forms_of(verb))
     for key, told in data["words"].items():
         told = told if isinstance(told, dict) else {"": told}
         words[key] = frozenset(_grow(tree, key, told))

@@ -5,6 +5,7 @@ of picture and sound files, and media in curly braces as the paper writes them.
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import degrees
 from unicodedata import normalize
@@ -61,7 +62,7 @@ LENGTHS = {
 }  # fmt: skip
 _ANGLES = {"degree": 1.0, "deg": 1.0, "°": 1.0, "radian": degrees(1.0), "rad": degrees(1.0)}
 _TIMES = {"second": 1.0, "sec": 1.0, "s": 1.0, "minute": 60.0, "min": 60.0, "moment": 2.0, "hour": 3600.0}
-_SIZES = frozenset({"more", "further", "full", "big", "small", "little", "long", "short", "tiny", "good", "another"})
+_SIZES = frozenset({"giant", "baby", "large", "huge", "quick", "slow", "more", "further", "full", "big", "small", "little", "long", "short", "tiny", "good", "another"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,11 +98,18 @@ def tokenise(sentence: str) -> list[Token]:
             tokens.append(Token(raw.strip("\"'"), raw, kind, found.start(), found.end()))
         elif kind == "word":
             tokens += _words(raw, found.start())
+        elif raw == "-" and _is_minus(plain, found.start()):
+            tokens.append(Token("minus", raw, "word", found.start(), found.end()))
         elif raw not in ("-", '"', "'", "`", "*", "_") or _stands_alone(plain, found.start(), raw):
             word = "word" if kind == "clock" or raw == "°" else kind
             text = {"->": ">", "=>": ">", "\n": "."}.get(raw, "." if raw.startswith(".") else raw.lower())
             tokens.append(Token("o'clock" if kind == "clock" else text, raw, word, found.start(), found.end()))
     return tokens
+
+
+def _is_minus(text: str, at: int) -> bool:
+    """Return whether a hyphen is the sign of a number; what a negative angle or distance means is asked."""
+    return (at == 0 or text[at - 1] in " =") and text[at + 1 : at + 2].isdigit()
 
 
 def _stands_alone(text: str, at: int, mark: str) -> bool:
@@ -208,7 +216,25 @@ def amounts_at(tokens: list[Token], i: int, units: dict[str, float]) -> list[tup
             unit = _unit(tokens, end, units)
             if unit is not None:
                 found += [(at, round(amount * unit, 4)) for at, amount in _with_part(tokens, end + 1, value)]
+                found += _and_smaller(tokens, end + 1, value * unit, unit, units)
     return found
+
+
+def _and_smaller(
+    tokens: list[Token], at: int, amount: float, unit: float, units: dict[str, float]
+) -> list[tuple[int, float]]:
+    """Return an amount with a second one in a smaller unit: "four feet six inches", "1 min 30 s"."""
+    at += at < len(tokens) and tokens[at].text == "and"
+    for end, value in number_at(tokens, at):
+        smaller = _unit(tokens, end, units) if end < len(tokens) else None
+        if smaller is not None and smaller < unit:
+            return [(end + 1, round(amount + value * smaller, 4))]
+    return []
+
+
+def is_unit(tokens: Sequence[Token], at: int) -> bool:
+    """Return whether a unit stands at a token."""
+    return at < len(tokens) and any(_unit(list(tokens), at, units) for units in (LENGTHS, _ANGLES, _TIMES))
 
 
 def _unit(tokens: list[Token], at: int, units: dict[str, float]) -> float | None:

@@ -7,11 +7,12 @@ much where its head is unknown; a misspelt head is mended where one word is clea
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 
+from avlmaps.core.inflection import forms_of
 from avlmaps.core.lexicon import Kind as Entries
 from avlmaps.core.lexicon import lexicon
 from avlmaps.language.grammar import load_grammar
 from avlmaps.language.intents import Kind, Target
-from avlmaps.language.lexer import Token
+from avlmaps.language.lexer import Token, is_unit
 
 _MOST_WORDS = 5
 _ADJECTIVE, _OPEN_WORD, _SIDE, _MENDED, _UNKNOWN = 0.02, 0.45, 0.25, 0.9, 1.6
@@ -55,7 +56,8 @@ class Names:
             if _known(words) is not None or any(word in _never() for word in words):
                 continue
             head = words[-1]
-            if len(head) < 2 or len(words) > 3 or _is_sounding(head) or head in _verbs():
+            asks = any(word in _listed("asking") for word in words)
+            if len(head) < 2 or len(words) > 3 or _is_sounding(head) or head in _verbs() or head in _adjectives() or asks:
                 continue
             mended = self._mend(words)
             if mended is not None:
@@ -68,6 +70,13 @@ class Names:
             found.append((end, cost, Target(Kind.OBJECT, " ".join(words))))
         return found
 
+    def verbs(self, at: int) -> list[tuple[int, float, str]]:
+        """Return the word at a token where nothing knows it: before "to the kitchen" it is some way to move."""
+        word = self.tokens[at].text
+        plain = self.tokens[at].kind == "word" and len(word) > 2 and word.isalpha()
+        unknown = plain and word not in _grammar_words() and word not in _never() and not _is_sounding(word)
+        return [(at + 1, 0.0, word)] if unknown and _known((word,)) is None else []
+
     def noises(self, at: int) -> Found:
         """Return the sounds that begin at a token: "dog barking", "the bark of a dog", "laughter", "glass broke"."""
         return [(end, cost, Target(Kind.SOUND, name)) for end, cost, name in self._noises(at)]
@@ -79,7 +88,8 @@ class Names:
     def _spans(self, at: int) -> Iterator[tuple[int, tuple[str, ...]]]:
         for end in range(at + 1, min(at + _MOST_WORDS, len(self.tokens)) + 1):
             token = self.tokens[end - 1]
-            if token.kind != "word" and not (token.kind == "number" and end > at + 1):
+            number = token.kind == "number" and end > at + 1 and not is_unit(self.tokens, end)
+            if token.kind != "word" and not number:
                 return
             yield end, tuple(t.text for t in self.tokens[at:end])
 
@@ -251,7 +261,7 @@ def _joined(words: tuple[str, ...]) -> tuple[float, Target] | None:
         return None
     at = words.index("of", 1)
     before, after = _known(words[:at]), words[at + 1 :]
-    if before is None or before[1].kind is not Kind.OBJECT or any(word in _never() for word in after):
+    if before is None or words[at - 1] in _adjectives() or before[1].kind is not Kind.OBJECT or any(word in _never() for word in after):
         return None
     return before[0] + 0.15, Target(Kind.OBJECT, " ".join(words))
 
@@ -296,7 +306,7 @@ def _sound_phrase(phrase: str) -> bool:
     if any(word in _never() for word in words):
         return False
     if len(words) == 1:
-        return phrase in _noise_words()
+        return phrase in _noise_words() or phrase.removesuffix("s") in _noise_words()
     return (lexicon().find(phrase, Entries.SOUND) is not None and lexicon().find(phrase, Entries.THING) is None) or (
         words[-1] in _noise_words() and _known(tuple(words[:-1])) is not None and _entry(phrase) is None
     )
@@ -316,14 +326,8 @@ def _forms() -> dict[str, str]:
     """Return all forms of the verbs that sound, with their -ing form."""
     forms = dict(pair.split("=") for pair in load_grammar().lists["irregular"].split())
     for verb in load_grammar().lists["verbs"].split():
-        short = verb[:-1] if verb.endswith("e") and not verb.endswith("ee") else verb
-        if len(verb) < 5 and verb[-1] not in "aeiouwxyk" and verb[-2] in "aeiou" and verb[-3] not in "aeiou":
-            short = verb + verb[-1]
-        ing = short + "ing"
-        past = verb[:-1] + "ied" if verb.endswith("y") and verb[-2] not in "aeiou" else short + "ed"
-        plural = "es" if verb[-1] in "sxz" or verb[-2:] in ("sh", "ch") else "s"
-        third = verb[:-1] + "ies" if past.endswith("ied") else verb + plural
-        forms |= {verb: ing, ing: ing, past: ing, third: ing}
+        ing = forms_of(verb)[1]
+        forms |= dict.fromkeys(forms_of(verb), ing)
     return forms
 
 

@@ -172,7 +172,14 @@ def _circle(tree: Tree, memory: Memory) -> Result:
     views = tree.get("views")
     if views is not None and not 1 <= float(views) <= 36:
         raise UnresolvedError(Clarify("From how many points? Say a number from 1 to 36."))
-    return [Circle(_target(tree.get("of"), memory), None if views is None else int(float(views)))], []
+    circle = Circle(_target(tree.get("of"), memory), None if views is None else int(float(views)))
+    return ([circle] if tree.get("laps") is None else _times(float(tree.get("laps")), circle)), []
+
+
+def _times(times: float, *body: Intent) -> list[Intent]:
+    if times != int(times) or not 1 <= times <= MOST_TIMES:
+        raise UnresolvedError(Clarify(f"How many times? Say a number from 1 to {MOST_TIMES}."))
+    return [Repeat(int(times), body)] if times > 1 else list(body)
 
 
 def _each(tree: Tree, memory: Memory) -> Result:
@@ -238,6 +245,6 @@ def on_targets(intent: Intent, change: Callable[[Target], Target]) -> Intent:
 _READ = {
     "go": _go, "face": _face, "turn": _turn, "move": _move, "between": _between, "beside": _beside,
     "standoff": _standoff,
-    "arrive": _go, "fromto": _fromto, "lead": _go, "circle": _circle, "each": _each,
+    "arrive": _go, "on_way": _go, "fromto": _fromto, "lead": _go, "circle": _circle, "each": _each,
     "wait": _wait, "shuttle": _shuttle, "return": _return, "roundtrip": _roundtrip,
 }  # fmt: skip

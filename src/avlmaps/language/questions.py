@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
+from avlmaps.language.asking import framed
 from avlmaps.language.chart import Tree
 from avlmaps.language.commands import Given, unknown
 from avlmaps.language.grammar import load_grammar
@@ -18,6 +19,8 @@ _MODALITIES = {
     Kind.IMAGE: Modality.IMAGE,
 }  # fmt: skip
 _SKIP, _FILLER, _REMARK, _WORST = 3.6, 0.2, 0.15, 3.5
+_INFINITE = float("inf")
+_PLACES = frozenset({"location", "position", "place", "whereabouts", "source", "coordinates"})
 _REMARKS = frozenset({"i", "it", "they", "we", "my", "he", "she", "its", "like", "because", "cos", "im", "so"})
 _NO_STARTS = frozenset(
     {
@@ -78,19 +81,27 @@ def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
             f"{_EXAMPLE}."
         )
     read = Sentence(sentence, given.knows)
-    tree, words = _best(read)
     starts = tuple(token.text for token in read.tokens[:2])
-    if starts[0] in _NO_QUESTIONS or starts in _NO_STARTS:
+    of_place = any(token.text in _PLACES for token in read.tokens[2:4])
+    if starts[0] in _NO_QUESTIONS or (starts in _NO_STARTS and not of_place):
         raise QueryError(f"A map knows where things and sounds are, and how many; ask it like: {_EXAMPLE}.")
-    if tree is None:
-        raise QueryError(f"{words} is not understood; say it like: {_EXAMPLE}.")
+    cost, tree, words = _best(read)
     try:
-        targets = _targets(tree)
+        free = framed(read)
+        if free is not None and free.cost < min(cost, _WORST):
+            ask, targets = free.ask, (free.target(),)
+        elif tree is not None:
+            ask, targets = Ask(tree.get("ask")), _targets(tree)
+        else:
+            raise QueryError(f"{words} is not understood; say it like: {_EXAMPLE}.")
+        if any(one.pick in (Pick.FARTHEST, Pick.OTHER) for one in targets):
+            question = f"'{targets[0].pick} {targets[0].name}' cannot be asked of a map; say what it is near."
+            raise UnresolvedError(Clarify(question))
     except UnresolvedError as fault:
         raise QueryError(fault.question.question) from None
     notes: list[str] = []
     checked = tuple(_checked(target, read, given, notes) for target in targets)
-    return AskedSentence(Inquiry(Ask(tree.get("ask")), checked), tuple(notes))
+    return AskedSentence(Inquiry(ask, checked), tuple(notes))
 
 
 def question_of(target: Target) -> Question:
@@ -99,7 +110,7 @@ def question_of(target: Target) -> Question:
     return Question.of(parts)
 
 
-def _best(read: Sentence) -> tuple[Tree | None, str]:
+def _best(read: Sentence) -> tuple[float, Tree | None, str]:
     """Return the cheapest reading of a whole sentence, or the words that are not understood."""
     tokens, chart = read.tokens, read.chart
     count = len(tokens)
@@ -120,8 +131,8 @@ def _best(read: Sentence) -> tuple[Tree | None, str]:
                 best = (before + edge.cost + after, edge.value)
     if best is None or best[0] > _WORST:
         rest = read.words(longest, count)
-        return None, repr((rest if any(mark.isalnum() for mark in rest) else read.text)[:80])
-    return best[1], ""
+        return _INFINITE, None, repr((rest if any(mark.isalnum() for mark in rest) else read.text)[:80])
+    return best[0], best[1], ""
 
 
 def _skip(read: Sentence, at: int) -> float:
@@ -147,8 +158,6 @@ def _targets(tree: Tree) -> tuple[Target, ...]:
     for at in tree.all("at"):
         whole = resolve(Tree("target", (("at", at),), 0, 0), memory)
         target = target.with_near(replace(whole, near=()), *whole.near)
-    if target.pick in (Pick.FARTHEST, Pick.OTHER):
-        raise UnresolvedError(Clarify(f"'{target.pick} {target.name}' cannot be asked of a map; say what it is near."))
     return (target,)
 
 

@@ -6,6 +6,7 @@ cost. The cheapest readings come first; a skipped word costs much, a word that c
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from avlmaps.language import lexer
@@ -18,9 +19,18 @@ from avlmaps.language.spelling import respelt
 MOST_READINGS = 4
 _RUN_ON_REMARK = 0.9
 _RUN_ON, _BARE, _MENTION, _REMARK, _REMARK_WORD = 0.8, 1.1, 0.9, 1.15, 0.04
+_OWN_WISH = 0.7  # "I want to wash my hands, ..." says why
+_WISHES = tuple([who, wish, "to"] for who in ("i", "we") for wish in ("want", "need", "have"))
+_INTERJECTION, _CLAUSE = 0.9, 0.7
+_PREPOSITIONS = frozenset({"of", "for", "from", "to", "at", "with", "in", "on"})
+_SPEAKERS = frozenset({"i", "we", "one"})
+_LEADS = frozenset({"to", "you", "u", "and", "if", "that"})  # how a wish goes on
+_AUXILIARIES = frozenset({"has", "have", "is", "was", "are", "were", "just", "been"})
 _SKIP, _SKIP_MARK, _SKIP_MEANING, _ORDER = 2.6, 0.05, 6.0, 0.3
 _LISTED = 0.6  # a name alone costs so much less where an order goes before
-_SILENT = frozenset({"THEN", "BUT", "mark", "POLITE", "GREETING", "FILLER", "INSTEAD_END"})
+_COURTESY, _COURTESY_WORD, _IDLE = 0.3, 0.05, 0.45
+_MOST_COURTESIES = 14
+_SILENT = frozenset({"THEN", "BUT", "mark", "POLITE", "GREETING", "FILLER", "INSTEAD_END", "courtesy"})
 _HARD = frozenset({".", "!", "?", ";"})
 _BREAKS = frozenset({*_HARD, ",", ":", "-", ">"})
 
@@ -90,7 +100,7 @@ def _built_in(tokens: list[Token], names: Names) -> dict[str, BuiltIn]:
         "NUMBER": amounts(lexer.number_at), "LENGTH": amounts(lexer.length_at), "ANGLE": amounts(lexer.angle_at),
         "DURATION": amounts(lexer.duration_at), "CLOCK": amounts(lexer.clock_at), "IMAGE": files("image"),
         "CLIP": files("clip"), "NAME": names.names, "OPEN": names.open_names, "NOISE": names.noises,
-        "ROOM": names.rooms,
+        "ROOM": names.rooms, "VERB": names.verbs,
         "WORDS": lambda at: list(_rest(tokens, at)),
     }  # fmt: skip
 
@@ -115,13 +125,15 @@ def readings(sentence: Sentence) -> list[Reading]:
         steps = list(_steps(sentence, at)) if states else []
         for state in states:
             for item, cost, fresh, needs_fresh in steps:
-                extra = _RUN_ON if item.kind in ("order", "bare") and not state.fresh else 0.0
+                run_on = item.kind in ("order", "bare") and not state.fresh
+                extra = _RUN_ON if run_on and not getattr(item.value, "rule", "") == "on_way" else 0.0
                 if needs_fresh and not state.fresh:
-                    if item.kind not in ("remark", "mention"):
+                    first = sentence.tokens[item.start].text
+                    if item.kind not in ("remark", "mention") or first in ("that", "which", "who"):
                         continue
                     extra = _RUN_ON_REMARK
                 if item.kind == "bare" and any(kind in ("order", "bare") for kind, _ in state.trail):
-                    extra -= _LISTED
+                    extra -= _LISTED - _CLAUSE * _tells(sentence, item)
                 keeps = state.fresh if fresh is None else fresh
                 trail = state.trail if item.kind in _SILENT else (*state.trail, (item.kind, item.value))
                 best[item.end].append(_State(state.cost + cost + extra, keeps, item, state, trail))
@@ -182,12 +194,46 @@ def _steps(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | No
         for edge in chart.terminal(name, at):
             yield Item(name, edge.value, at, edge.end), cost, fresh, name == "POLITE"
     yield from _remarks(sentence, at)
+    yield from _courtesies(sentence, at)
     mark = tokens[at].kind == "punct"
     if mark and chart.terminal("THEN", at):
         return
     begins = chart.begins(at)
     cost = _SKIP_MARK if mark else _SKIP_MEANING if not begins.isdisjoint(("NEGATION", "IF")) else _SKIP
     yield Item("mark" if mark else "skip", None, at, at + 1), cost, True if mark else None, False
+
+
+def _tells(sentence: Sentence, item: Item) -> bool:
+    """Return whether a name is a statement: "a guest has rung the bell" behind an order says why."""
+    return any(token.text in _AUXILIARIES for token in sentence.tokens[item.start : item.end])
+
+
+def _courtesies(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | None, bool]]:
+    """Yield the wishes and manners that begin at a token: "I should be most grateful were you to", "if you like"."""
+    chart, tokens = sentence.chart, sentence.tokens
+    courtesy, idle = _listed("courtesy"), _listed("idle")
+    conditional = not chart.begins(at).isdisjoint(("IF",))
+    if tokens[at].text in idle:
+        yield Item("courtesy", None, at, at + 1), _IDLE, None, False
+    if chart.terminal("VERB", at) and _begins_order(sentence, at + 1):
+        yield Item("courtesy", None, at, at + 1), _INTERJECTION, True, True
+    for end in range(at, min(at + _MOST_COURTESIES, len(tokens))):
+        word = tokens[end].text
+        if word not in courtesy and not (conditional and end > at and word == "not"):
+            return
+        after = tokens[end + 1] if end + 1 < len(tokens) else None
+        closes = after is None or after.kind == "punct"
+        dangling = tokens[at].text in _PREPOSITIONS if closes else tokens[at].text in _SPEAKERS and word not in _LEADS
+        if end > at and not dangling and (closes or _begins_order(sentence, end + 1)):
+            yield (
+                Item("courtesy", None, at, end + 1), _COURTESY + _COURTESY_WORD * (end + 1 - at),
+                None if closes else True, not closes,
+            )  # fmt: skip
+
+
+@cache
+def _listed(name: str) -> frozenset[str]:
+    return frozenset(load_grammar().lists[name].split())
 
 
 _ORDERS = frozenset({"GO", "DIRECT", "TURN", "FACE", "POLITE", "CIRCLE", "BACK_UP", "WAIT"})
@@ -201,6 +247,8 @@ def _begins_order(sentence: Sentence, at: int) -> bool:
 def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | None, bool]]:
     """Yield the statements that begin at a token: what people say about themselves, or why."""
     chart, tokens = sentence.chart, sentence.tokens
+    if [token.text for token in tokens[at : at + 3]] == ["as", "soon", "as"]:
+        return
     because = tokens[at].text in (
         "because",
         "since",
@@ -228,6 +276,7 @@ def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | 
             finite
             or bool(chart.terminal("FINITE", end))
             or token.text in ("minute", "moment", "o'clock", "noon", "arrive", "arrives", "starts", "sleep")
+            or (words[-2:-1] in (["its"], ["im"], ["theyre"]) and token.text.endswith("ing"))
         )
         if end > at and token.text in ("not", "never", "if", "unless") and "you" in words:
             return
@@ -236,7 +285,7 @@ def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | 
             orders = "you" in words and not because and words[:2] != ["you", "are"]
             yield (
                 Item("remark", None, at, end + 1),
-                _REMARK + _REMARK_WORD * len(words) + 1.5 * orders, after in _BREAKS or None, not because,
+                _REMARK + _REMARK_WORD * len(words) + 1.5 * orders - _OWN_WISH * (words[:3] in _WISHES), after in _BREAKS or None, not because,
             )  # fmt: skip
         if after in _BREAKS or (
             after in ("so", "and", "but", "please") and finite and _begins_order(sentence, end + 2)

@@ -15,6 +15,7 @@ from avlmaps.language.grammar import load_grammar
 from avlmaps.language.lexer import WORDS, Token
 from avlmaps.language.names import sounding_words
 
+_TWICE = frozenset({"the", "a", "an", "to", "go", "and", "in", "at", "of", "on", "is", "my"})
 _SHORTEST = 5  # shorter words have too many neighbours
 
 
@@ -23,6 +24,8 @@ def respelt(tokens: list[Token]) -> tuple[list[Token], dict[str, str]]:
     changed: dict[str, str] = {}
     found: list[Token] = []
     for token in tokens:
+        if found and token.text == found[-1].text and token.text in _TWICE:
+            continue
         better = _better(token.text) if token.kind == "word" else None
         if better is not None:
             changed[token.text] = better
@@ -40,9 +43,11 @@ def _better(word: str) -> str | None:
     for drawn in (re.sub(r"(.)\1{2,}", r"\1", word), re.sub(r"(.)\1{2,}", r"\1\1", word)):
         if drawn != word and drawn in _known():
             return drawn
-    if len(word) < _SHORTEST:
-        return None
     near = {other for other in _neighbours(word) if other in _known()}
+    if len(word) < _SHORTEST:  # only what cannot well be another word: two letters changed over, or one left out
+        swapped = {other for other in near if len(other) == len(word) and sorted(other) == sorted(word)}
+        longer = {other for other in near if len(other) > len(word)} if len(word) == _SHORTEST - 1 else set()
+        near = swapped or longer
     plain = {other for other in near if other.rstrip("s") not in near or other == other.rstrip("s")}
     return plain.pop() if len(plain) == 1 else None
 
