@@ -28,6 +28,7 @@ from avlmaps.language.orders import MOST_TIMES, count_of, intents_of, on_targets
 from avlmaps.language.readings import Item, Reading, Sentence
 from avlmaps.language.targets import Memory, UnresolvedError, resolve
 
+_SPEAKING = frozenset({"tell", "say", "sing", "translate", "explain", "write"})
 _HARD = frozenset({".", "!", "?", ";"})
 
 
@@ -316,6 +317,9 @@ def compose(sentence: Sentence, reading: Reading) -> Composed:
         for k, item in enumerate(reading.items):
             if item.kind in ("refuse", "chat", "inquire"):
                 if item.kind != "refuse" and any(one.kind == "order" for one in reading.items):
+                    if sentence.tokens[item.start].text in _SPEAKING:
+                        stop = refuse(Reason.MANIPULATION)
+                        break
                     continue
                 stop = refuse(item.value.get("reason"))
                 break

@@ -20,7 +20,7 @@ _MODALITIES = {
 }  # fmt: skip
 _SKIP, _FILLER, _REMARK, _WORST = 3.6, 0.2, 0.15, 3.5
 _INFINITE = float("inf")
-_PLACES = frozenset({"location", "position", "place", "whereabouts", "source", "coordinates"})
+_PLACES = frozenset({"location", "position", "place", "whereabouts", "source", "coordinates", "closest", "nearest"})
 _REMARKS = frozenset({"i", "it", "they", "we", "my", "he", "she", "its", "like", "because", "cos", "im", "so"})
 _NO_STARTS = frozenset(
     {
@@ -83,6 +83,8 @@ def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
     read = Sentence(sentence, given.knows)
     starts = tuple(token.text for token in read.tokens[:2])
     of_place = any(token.text in _PLACES for token in read.tokens[2:4])
+    if _asks_state(read):
+        raise QueryError(f"A map does not know the state of a thing, only where it is; ask it like: {_EXAMPLE}.")
     if starts[0] in _NO_QUESTIONS or (starts in _NO_STARTS and not of_place):
         raise QueryError(f"A map knows where things and sounds are, and how many; ask it like: {_EXAMPLE}.")
     cost, tree, words = _best(read)
@@ -102,6 +104,13 @@ def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
     notes: list[str] = []
     checked = tuple(_checked(target, read, given, notes) for target in targets)
     return AskedSentence(Inquiry(ask, checked), tuple(notes))
+
+
+def _asks_state(read: Sentence) -> bool:
+    """Return whether a sentence wants to know how something is: "is the window open"."""
+    words = [token.text for token in read.tokens if token.kind != "punct"]
+    opens = words[0] in ("is", "are", "was", "were") or words[-2:-1] in (["is"], ["are"])
+    return opens and words[-1] in load_grammar().lists["states"].split() and words[1:2] != ["there"]
 
 
 def question_of(target: Target) -> Question:
@@ -152,8 +161,9 @@ def _targets(tree: Tree) -> tuple[Target, ...]:
     memory = Memory()
     base = tree.get("of")
     target = Target(Kind.IMAGE) if tree.get("picture") else resolve(base, memory)
-    if tree.get("at_in") is not None:
-        inside = resolve(tree.get("at_in"), memory)
+    beside = tree.get("at_in") or tree.get("at_near")
+    if beside is not None:
+        inside = resolve(beside, memory)
         target = target.with_near(replace(inside, near=()), *inside.near)
     for at in tree.all("at"):
         whole = resolve(Tree("target", (("at", at),), 0, 0), memory)

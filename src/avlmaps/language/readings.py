@@ -21,7 +21,7 @@ _RUN_ON_REMARK = 0.9
 _RUN_ON, _BARE, _MENTION, _REMARK, _REMARK_WORD = 0.8, 1.1, 0.9, 1.15, 0.04
 _OWN_WISH = 0.7  # "I want to wash my hands, ..." says why
 _WISHES = tuple([who, wish, "to"] for who in ("i", "we") for wish in ("want", "need", "have"))
-_INTERJECTION, _CLAUSE = 0.9, 0.7
+_INTERJECTION, _CLAUSE, _FUNCTIONAL = 0.9, 0.7, 1.4
 _PREPOSITIONS = frozenset({"of", "for", "from", "to", "at", "with", "in", "on"})
 _SPEAKERS = frozenset({"i", "we", "one"})
 _LEADS = frozenset({"to", "you", "u", "and", "if", "that"})  # how a wish goes on
@@ -200,6 +200,8 @@ def _steps(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | No
         return
     begins = chart.begins(at)
     cost = _SKIP_MARK if mark else _SKIP_MEANING if not begins.isdisjoint(("NEGATION", "IF")) else _SKIP
+    if tokens[at].text in _listed("functional") and cost == _SKIP:
+        yield Item("courtesy", None, at, at + 1), _FUNCTIONAL, None, False
     yield Item("mark" if mark else "skip", None, at, at + 1), cost, True if mark else None, False
 
 

@@ -82,7 +82,7 @@ def resolve(value: Any, memory: Memory) -> Target:  # noqa: C901
     if value.get("deictic"):
         return Target(Kind(value.get("deictic")), "")
     match value.rule:
-        case "noun" | "strict" | "known" | "part_of":
+        case "noun" | "strict" | "known_noun" | "part_of":
             return _noun(value, memory)
         case "sound" | "heard" | "noise" | "noise_of" | "noise_there" | "heard_noise" | "clause_noise" | "bare_noise":
             return _sound(value, memory)
