@@ -1,10 +1,11 @@
 """A question whose words come in any order: what it asks for by its cues, and the targets that it names.
 
 People who learn English ask "toilet is where" and "in kitchen have how many chair". The rules of the grammar read
-questions in the usual order; here only the names, what they are near, and a few cues count. Every other word must be one
-of those that questions are made of (the list ``asking``).
+questions in the usual order; here only the names, what they are near, and a few cues count. Every other word must be
+one of those that questions are made of (the list ``asking``).
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -16,7 +17,7 @@ from avlmaps.language.readings import Sentence
 from avlmaps.language.targets import Memory, UnresolvedError, resolve
 
 _FREE, _CUE, _WORD, _MARK, _NAMED, _MANNERS = 0.9, 0.05, 0.12, 0.02, 0.3, 0.2
-_MOST_STATES = 16
+_MOST_STATES, _MOST_NAMED = 16, 2
 _CUES = {"ASK_MANY": Ask.HOW_MANY, "ASK_WHERE": Ask.WHERE, "ASK_EXISTS": Ask.EXISTS}
 _MANNER_CLASSES = ("GREETING", "FILLER", "POLITE")
 _AUXILIARIES = frozenset({"is", "are", "was", "were", "do", "does", "did", "has", "have", "had", "can", "could"})
@@ -69,7 +70,8 @@ def framed(read: Sentence) -> Framed | None:
     """Return the cheapest reading of a question in free order; None where a word is left over."""
     count = len(read.tokens)
     states: list[list[Framed]] = [[] for _ in range(count + 1)]
-    states[0] = [Framed(_FREE, opens=read.tokens[0].text in _AUXILIARIES)]
+    asks_where = any(token.text in ("where", "whereabouts") for token in read.tokens)
+    states[0] = [Framed(_FREE, opens=read.tokens[0].text in _AUXILIARIES and not asks_where)]
     for at in range(count):
         here = sorted(states[at], key=lambda state: state.cost)[:_MOST_STATES]
         for state in here:
@@ -78,33 +80,26 @@ def framed(read: Sentence) -> Framed | None:
     return min((s for s in states[count] if s.named and _fits(s)), key=lambda state: state.cost, default=None)
 
 
-def _steps(read: Sentence, at: int, state: Framed) -> list[tuple[int, Framed]]:
+def _steps(read: Sentence, at: int, state: Framed) -> Iterator[tuple[int, Framed]]:
+    """Yield where the next part of a question ends, and the reading with it."""
     chart, token = read.chart, read.tokens[at]
-    found: list[tuple[int, Framed]] = []
-
-    def add(end: int, cost: float, **more: Any) -> None:
-        found.append((end, replace(state, cost=state.cost + cost, **more)))
-
-    if token.kind == "punct":
-        add(at + 1, _MARK)
-    if token.text in _asking():
-        add(at + 1, _WORD)
+    if token.kind == "punct" or token.text in _asking():
+        yield at + 1, replace(state, cost=state.cost + (_MARK if token.kind == "punct" else _WORD))
     for name, ask in _CUES.items():
         for edge in chart.terminal(name, at):
-            add(edge.end, _CUE, cues=state.cues | {ask})
+            yield edge.end, replace(state, cost=state.cost + _CUE, cues=state.cues | {ask})
     for name in _MANNER_CLASSES:
         for edge in chart.terminal(name, at):
-            add(edge.end, _MANNERS)
-    if len(state.named) < 2:
-        for edge in chart.edges("asked", at):
-            if _resolves(edge.value.get("of")):
-                add(edge.end, _NAMED + edge.cost, named=(*state.named, edge.value.get("of")))
+            yield edge.end, replace(state, cost=state.cost + _MANNERS)
+    for edge in chart.edges("asked", at) if len(state.named) < _MOST_NAMED else ():
+        tree = edge.value.get("of")
+        if _resolves(tree):
+            yield edge.end, replace(state, cost=state.cost + _NAMED + edge.cost, named=(*state.named, tree))
     for edge in chart.edges("asked_at", at):
         at_tree = edge.value.get("at") or Tree("at", (("near", edge.value.get("near")),), at, edge.end)
         tree = Tree("target", (("at", at_tree),), at, edge.end)
         if _resolves(tree):
-            add(edge.end, _NAMED + edge.cost, near=(*state.near, tree))
-    return found
+            yield edge.end, replace(state, cost=state.cost + _NAMED + edge.cost, near=(*state.near, tree))
 
 
 def _resolves(tree: Any) -> bool:

@@ -12,7 +12,7 @@ from avlmaps.language.grammar import BUILT_IN, Grammar, Part, Template
 from avlmaps.language.lexer import Token
 
 _COMMA = 0.4
-_MARKS = {",": _COMMA, "-": _COMMA, "(": 0.05, ")": 0.05, "+": 0.05}
+_MARKS = {",": _COMMA, "-": _COMMA, "(": 0.05, ")": 0.05, "+": 0.05, ":": 0.1}
 _FILLER = 0.3
 _MOST_A_SPAN = 3
 _MOST_REPEATS = 6

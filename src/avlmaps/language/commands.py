@@ -125,7 +125,7 @@ def _decided(weighed: tuple[Weighed, ...], sentence: Sentence) -> Command:
         return Command((Clarify(question),), best.notes, weighed)
     close = (one for one in weighed[1:] if one.cost - best.cost < _MARGIN)
     rivals = [one for one in close if not isinstance(one.intents[0], Clarify | Refuse)]
-    fuller = next((one for one in rivals if _is_fuller(one.intents, best.intents)), None)
+    fuller = next((one for one in rivals if _is_fuller(one.intents, best.intents, strictly=True)), None)
     if fuller is not None:  # the same places, said more exactly
         return Command(fuller.intents, fuller.notes, weighed)
     rivals = [one for one in rivals if not _is_fuller(best.intents, one.intents)]
@@ -144,22 +144,25 @@ def _same(a: tuple[Intent, ...], b: tuple[Intent, ...]) -> bool:
     return tuple(one for one in a if not isinstance(one, Wait)) == tuple(one for one in b if not isinstance(one, Wait))
 
 
-def _is_fuller(a: tuple[Intent, ...], b: tuple[Intent, ...]) -> bool:
-    """Return whether two readings differ only in that one says more of where its targets are."""
+def _is_fuller(a: tuple[Intent, ...], b: tuple[Intent, ...], *, strictly: bool = False) -> bool:
+    """Return whether one reading says all that another says of where to go, and more if it must be strictly so.
+
+    How a sound is called makes no difference: "coughing" and "somebody coughing" are heard at the same place.
+    """
     fuller: list[bool] = []
 
     def bare(target: Target) -> Target:
-        return replace(target, near=())
+        return replace(target, near=(), name="" if target.kind is Kind.SOUND else target.name)
 
     for one, other in zip(a, b, strict=len(a) == len(b)) if len(a) == len(b) else ():
         if on_targets(one, bare) != on_targets(other, bare):
             return False
         of_one, of_other = (next(iter(_targets_of(each)), None) for each in (one, other))
         if of_one is not None and of_other is not None:
-            if not set(of_other.near) <= set(of_one.near):
+            if not {bare(near) for near in of_other.near} <= {bare(near) for near in of_one.near}:
                 return False
             fuller.append(len(of_one.near) > len(of_other.near))
-    return any(fuller)
+    return any(fuller) or (bool(fuller) and not strictly)
 
 
 def _targets_of(intent: Intent) -> list[Target]:

@@ -76,7 +76,7 @@ class _Composer:
     def item(self, item: Item, rest: tuple[Item, ...], before: Item | None) -> None:  # noqa: C901
         match item.kind:
             case "order":
-                self.order(item.value, rest, before)
+                self.order(item, rest, before)
             case "bare":
                 self.bare(item.value, rest)
             case "amount":
@@ -166,7 +166,8 @@ class _Composer:
         self.groups += self.held
         self.held = []
 
-    def order(self, tree: Any, rest: tuple[Item, ...], before: Item | None) -> None:
+    def order(self, item: Item, rest: tuple[Item, ...], before: Item | None) -> None:
+        tree = item.value
         if isinstance(tree, Tree) and tree.rule == "refuse":
             raise UnresolvedError(refuse(tree.get("reason")))  # type: ignore[arg-type]
         found, notes = intents_of(tree, self.memory)
@@ -180,12 +181,20 @@ class _Composer:
                 self.join = "AFTER"
         if self.groups and self.groups[-1].kind in ("beside", "between", "standoff") and _is_there(tree):
             return
+        if self.is_pointed_out(item, rest):
+            return
         if isinstance(tree, Tree) and tree.rule == "on_way" and not self.groups:
             self.held.append(_Group(intents, "go", self.number))
             return
         if self.groups and self.groups[-1].kind == "lead" and self.groups[-1].sentence == self.number:
             intents = self.led(intents)
         self.place(_Group(intents, tree.rule if isinstance(tree, Tree) else "go", self.number))
+
+    def is_pointed_out(self, item: Item, rest: tuple[Item, ...]) -> bool:
+        """Return whether an order only points at a thing: "see that vase? Circle it"."""
+        tokens = self.sentence.tokens
+        asked = item.end < len(tokens) and tokens[item.end].text == "?"
+        return asked and tokens[item.start].text in ("see", "spot", "remember") and self.is_referred_to(rest)
 
     def led(self, intents: list[Intent]) -> list[Intent]:
         """Return an order after "in the kitchen, ...": a thing is the one in there; anything else is done there."""

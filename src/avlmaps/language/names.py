@@ -7,7 +7,7 @@ much where its head is unknown; a misspelt head is mended where one word is clea
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 
-from avlmaps.core.inflection import forms_of
+from avlmaps.core.inflection import forms_of, singulars_of
 from avlmaps.core.lexicon import Kind as Entries
 from avlmaps.core.lexicon import lexicon
 from avlmaps.language.grammar import load_grammar
@@ -17,6 +17,7 @@ from avlmaps.language.lexer import Token, is_unit
 _MOST_WORDS = 5
 _ADJECTIVE, _OPEN_WORD, _SIDE, _MENDED, _UNKNOWN = 0.02, 0.45, 0.25, 0.9, 1.6
 _VERB_ALONE = 0.5
+_ENCODED = 0.8  # only the map's encoder knows it
 _NOUN = 0.1  # a noun before a noun; a second one costs four times as much
 _ALIKE, _APART = 0.78, 0.08  # a misspelt word is at least so much like its neighbour, and so much less like the next
 _ONLY_ROOMS = frozenset({"room", "area", "zone", "hall", "corner"})
@@ -57,7 +58,14 @@ class Names:
                 continue
             head = words[-1]
             asks = any(word in _listed("asking") for word in words)
-            if len(head) < 2 or len(words) > 3 or _is_sounding(head) or head in _verbs() or head in _adjectives() or asks:
+            if (
+                len(head) < 2
+                or len(words) > 3
+                or _is_sounding(head)
+                or head in _verbs()
+                or head in _adjectives()
+                or asks
+            ):
                 continue
             mended = self._mend(words)
             if mended is not None:
@@ -66,7 +74,7 @@ class Names:
                 continue
             cost = _UNKNOWN + _OPEN_WORD * sum(word not in _adjectives() for word in words[:-1])
             if self._knows is not None and self._knows(" ".join(words)):
-                cost = _OPEN_WORD + (1.5 if len(words) > 1 and _known(words[:-1]) is not None else 0.0)
+                cost = _ENCODED + (1.5 if len(words) > 1 and _known(words[:-1]) is not None else 0.0)
             found.append((end, cost, Target(Kind.OBJECT, " ".join(words))))
         return found
 
@@ -261,7 +269,12 @@ def _joined(words: tuple[str, ...]) -> tuple[float, Target] | None:
         return None
     at = words.index("of", 1)
     before, after = _known(words[:at]), words[at + 1 :]
-    if before is None or words[at - 1] in _adjectives() or before[1].kind is not Kind.OBJECT or any(word in _never() for word in after):
+    if (
+        before is None
+        or words[at - 1] in _adjectives()
+        or before[1].kind is not Kind.OBJECT
+        or any(word in _never() for word in after)
+    ):
         return None
     return before[0] + 0.15, Target(Kind.OBJECT, " ".join(words))
 
@@ -283,15 +296,13 @@ def _entry(phrase: str) -> Entries | None:
     described = words[0] in lexicon().words() or words[0] in _adjectives()
     if words[-1] in _ONLY_ROOMS and len(words) == 2 and words[0] not in _never() and described:
         return Entries.ROOM
-    if phrase in _ALSO_THINGS:
-        return Entries.THING
-    return None
+    return Entries.THING if any(name in _also_things() for name in (phrase, *singulars_of(phrase))) else None
 
 
-_ALSO_THINGS = frozenset({
-    "person", "people", "man", "woman", "child", "baby", "dog", "cat", "wall", "corner", "leak", "spider",
-    "mailbox", "aquarium", "fish tank", "car", "kid", "bird", "exit sign",
-})  # fmt: skip
+@cache
+def _also_things() -> frozenset[str]:
+    """Return the names of things that only a map's encoder knows."""
+    return frozenset(name.strip() for name in load_grammar().lists["also_things"].split(","))
 
 
 def _target(entry: Entries, words: tuple[str, ...]) -> Target:

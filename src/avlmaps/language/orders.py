@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from avlmaps.core.inflection import singulars_of
 from avlmaps.language.chart import Tree
 from avlmaps.language.intents import (
     Beside,
@@ -183,7 +184,9 @@ def _times(times: float, *body: Intent) -> list[Intent]:
 
 
 def _each(tree: Tree, memory: Memory) -> Result:
-    return [VisitEach(_target(tree.get("of"), memory))], []
+    target = _target(tree.get("of"), memory)
+    one = tree.get("plural") == "yes" and not any(single != target.name for single in singulars_of(target.name))
+    return [Go(target) if one else VisitEach(target)], []
 
 
 def _wait(tree: Tree, memory: Memory) -> Result:

@@ -20,7 +20,22 @@ _MODALITIES = {
 }  # fmt: skip
 _SKIP, _FILLER, _REMARK, _WORST = 3.6, 0.2, 0.15, 3.5
 _INFINITE = float("inf")
-_PLACES = frozenset({"location", "position", "place", "whereabouts", "source", "coordinates", "closest", "nearest"})
+_PLACES = frozenset(
+    {
+        "location",
+        "position",
+        "place",
+        "whereabouts",
+        "source",
+        "coordinates",
+        "closest",
+        "nearest",
+        "number",
+        "count",
+        "amount",
+        "total",
+    }
+)
 _REMARKS = frozenset({"i", "it", "they", "we", "my", "he", "she", "its", "like", "because", "cos", "im", "so"})
 _NO_STARTS = frozenset(
     {
@@ -32,10 +47,19 @@ _NO_STARTS = frozenset(
         ("how", "long"),
         ("how", "big"),
         ("how", "far"),
+        ("how", "old"),
+        ("what", "did"),
+        ("what", "do"),
+        ("what", "does"),
+        ("what", "can"),
+        ("what", "sound"),
+        ("what", "sounds"),
+        ("what", "hour"),
+        ("tell", "about"),
         ("how", "high"),
     }
 )
-_NO_QUESTIONS = frozenset({"who", "why", "when", "whose"})
+_NO_QUESTIONS = frozenset({"describe", "explain", "compare", "who", "why", "when", "whose"})
 _MEANING = frozenset({"not", "no", "without", "except", "never", "unless", "or", "if", "but"})
 
 
@@ -81,7 +105,7 @@ def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
             f"{_EXAMPLE}."
         )
     read = Sentence(sentence, given.knows)
-    starts = tuple(token.text for token in read.tokens[:2])
+    starts = tuple(token.text for token in read.tokens[:3] if token.text != "me")[:2]
     of_place = any(token.text in _PLACES for token in read.tokens[2:4])
     if _asks_state(read):
         raise QueryError(f"A map does not know the state of a thing, only where it is; ask it like: {_EXAMPLE}.")

@@ -25,7 +25,7 @@ _INTERJECTION, _CLAUSE, _FUNCTIONAL = 0.9, 0.7, 1.4
 _PREPOSITIONS = frozenset({"of", "for", "from", "to", "at", "with", "in", "on"})
 _SPEAKERS = frozenset({"i", "we", "one"})
 _LEADS = frozenset({"to", "you", "u", "and", "if", "that"})  # how a wish goes on
-_AUXILIARIES = frozenset({"has", "have", "is", "was", "are", "were", "just", "been"})
+_AUXILIARIES = frozenset({"has", "have", "is", "was", "are", "were", "just", "been", "it", "goes"})
 _SKIP, _SKIP_MARK, _SKIP_MEANING, _ORDER = 2.6, 0.05, 6.0, 0.3
 _LISTED = 0.6  # a name alone costs so much less where an order goes before
 _COURTESY, _COURTESY_WORD, _IDLE = 0.3, 0.05, 0.45
@@ -126,7 +126,7 @@ def readings(sentence: Sentence) -> list[Reading]:
         for state in states:
             for item, cost, fresh, needs_fresh in steps:
                 run_on = item.kind in ("order", "bare") and not state.fresh
-                extra = _RUN_ON if run_on and not getattr(item.value, "rule", "") == "on_way" else 0.0
+                extra = _RUN_ON if run_on and getattr(item.value, "rule", "") != "on_way" else 0.0
                 if needs_fresh and not state.fresh:
                     first = sentence.tokens[item.start].text
                     if item.kind not in ("remark", "mention") or first in ("that", "which", "who"):
@@ -285,10 +285,8 @@ def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | 
         after = tokens[end + 1].text if end + 1 < len(tokens) else "."
         if end > at and finite and (after in _BREAKS or after in ("so", "and", "but", "please", "go", "can", "could")):
             orders = "you" in words and not because and words[:2] != ["you", "are"]
-            yield (
-                Item("remark", None, at, end + 1),
-                _REMARK + _REMARK_WORD * len(words) + 1.5 * orders - _OWN_WISH * (words[:3] in _WISHES), after in _BREAKS or None, not because,
-            )  # fmt: skip
+            cost = _REMARK + _REMARK_WORD * len(words) + 1.5 * orders - _OWN_WISH * (words[:3] in _WISHES)
+            yield Item("remark", None, at, end + 1), cost, after in _BREAKS or None, not because
         if after in _BREAKS or (
             after in ("so", "and", "but", "please") and finite and _begins_order(sentence, end + 2)
         ):
