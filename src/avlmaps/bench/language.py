@@ -239,6 +239,8 @@ def run() -> dict[str, dict[str, list[Any]]]:
     at_first_use = {part: Counter[str]() for part in parts}
     every: list[Judged] = []
     for name, seal in sealed().items():
+        if "first use" not in seal:
+            continue  # sealed, not yet used
         for part, at_first in seal["first use"].items():
             at_first_use[part].update(at_first)
             first.append(_counted(f"{name}, {part}", at_first))

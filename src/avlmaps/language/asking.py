@@ -20,6 +20,7 @@ _FREE, _CUE, _WORD, _MARK, _NAMED, _MANNERS = 0.9, 0.05, 0.12, 0.02, 0.3, 0.2
 _MOST_STATES, _MOST_NAMED = 16, 2
 _CUES = {"ASK_MANY": Ask.HOW_MANY, "ASK_WHERE": Ask.WHERE, "ASK_EXISTS": Ask.EXISTS}
 _MANNER_CLASSES = ("GREETING", "FILLER", "POLITE")
+_HEARD = (Kind.SOUND, Kind.IMAGE, Kind.CLIP)
 _AUXILIARIES = frozenset({"is", "are", "was", "were", "do", "does", "did", "has", "have", "had", "can", "could"})
 
 
@@ -93,13 +94,17 @@ def _steps(read: Sentence, at: int, state: Framed) -> Iterator[tuple[int, Framed
             yield edge.end, replace(state, cost=state.cost + _MANNERS)
     for edge in chart.edges("asked", at) if len(state.named) < _MOST_NAMED else ():
         tree = edge.value.get("of")
-        if _resolves(tree):
+        if _resolves(tree) and (token.text != "where" or _resolved(tree).kind in _HEARD):
             yield edge.end, replace(state, cost=state.cost + _NAMED + edge.cost, named=(*state.named, tree))
     for edge in chart.edges("asked_at", at):
         at_tree = edge.value.get("at") or Tree("at", (("near", edge.value.get("near")),), at, edge.end)
         tree = Tree("target", (("at", at_tree),), at, edge.end)
         if _resolves(tree):
             yield edge.end, replace(state, cost=state.cost + _NAMED + edge.cost, near=(*state.near, tree))
+
+
+def _resolved(tree: Any) -> Target:
+    return resolve(tree, Memory())
 
 
 def _resolves(tree: Any) -> bool:

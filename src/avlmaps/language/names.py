@@ -107,7 +107,12 @@ class Names:
         for tail in range(min(2, len(words)), 0, -1):
             wrong = " ".join(words[-tail:])
             near = near_names(wrong)
-            if near and near[0][1] >= _ALIKE and (len(near) == 1 or near[0][1] - near[1][1] >= _APART):
+            if (
+                near
+                and not is_other_form(wrong, near[0][0])
+                and near[0][1] >= _ALIKE
+                and (len(near) == 1 or near[0][1] - near[1][1] >= _APART)
+            ):
                 read = _known((*words[:-tail], *near[0][0].split()))
                 if read is not None:
                     return read
@@ -125,6 +130,9 @@ class Names:
             phrase = " ".join(words[:count])
             if "" not in words[:count] and _sound_phrase(phrase):
                 add(count, 0.0, phrase)
+        if words and words[0] in _listed("loudness"):
+            for end, cost, name in self._noises(at + 1):
+                best[(end, name)] = cost
         self._clauses(words, add)
         if words and words[0] in _before_noise():
             for count, cost, name in self._subjects(words[1:], 2):
@@ -200,6 +208,12 @@ _MAKERS = frozenset({
     "birds", "phone", "telephone", "bell", "door bell", "kettle", "tap", "alarm clock", "engine", "music",
     "rooster", "hammer", "timer",
 })  # fmt: skip
+
+
+def is_other_form(word: str, other: str) -> bool:
+    """Return whether a known word may be another form of a right one: "marked" of "marker", "loading" of "leading"."""
+    same = sorted(word) == sorted(other)
+    return (word[:-1] in (other, other[:-1]) and not same) or (word.endswith(("ing", "ed", "ly")) and not same)
 
 
 def _with_object(subject: str, sounding: str, thing: str) -> str:

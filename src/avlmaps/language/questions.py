@@ -180,9 +180,11 @@ def _skip(read: Sentence, at: int) -> float:
 
 
 def _targets(tree: Tree) -> tuple[Target, ...]:
-    if tree.get("use") is not None:
-        return _for_use(str(tree.get("use")))
     memory = Memory()
+    if tree.get("use") is not None:
+        whole = [resolve(Tree("target", (("at", at),), 0, 0), memory) for at in tree.all("at")]
+        near = [flat for one in whole for flat in (replace(one, near=()), *one.near)]
+        return tuple(target.with_near(*near) for target in _for_use(str(tree.get("use"))))
     base = tree.get("of")
     target = Target(Kind.IMAGE) if tree.get("picture") else resolve(base, memory)
     beside = tree.get("at_in") or tree.get("at_near")

@@ -25,6 +25,7 @@ _INTERJECTION, _CLAUSE, _FUNCTIONAL = 0.9, 0.7, 1.4
 _PREPOSITIONS = frozenset({"of", "for", "from", "to", "at", "with", "in", "on"})
 _SPEAKERS = frozenset({"i", "we", "one"})
 _LEADS = frozenset({"to", "you", "u", "and", "if", "that"})  # how a wish goes on
+_AFTER_REMARK = ("so", "and", "but", "please", "go", "can", "could", "take", "show", "bring", "turn", "drive", "head")
 _AUXILIARIES = frozenset({"has", "have", "is", "was", "are", "were", "just", "been", "it", "goes"})
 _SKIP, _SKIP_MARK, _SKIP_MEANING, _ORDER = 2.6, 0.05, 6.0, 0.3
 _LISTED = 0.6  # a name alone costs so much less where an order goes before
@@ -200,7 +201,9 @@ def _steps(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | No
         return
     begins = chart.begins(at)
     cost = _SKIP_MARK if mark else _SKIP_MEANING if not begins.isdisjoint(("NEGATION", "IF")) else _SKIP
-    if tokens[at].text in _listed("functional") and cost == _SKIP:
+    last = at + 1 == len(tokens) or tokens[at + 1].kind == "punct"
+    dangling = last and tokens[at].text in _PREPOSITIONS
+    if tokens[at].text in _listed("functional") and cost == _SKIP and not dangling:
         yield Item("courtesy", None, at, at + 1), _FUNCTIONAL, None, False
     yield Item("mark" if mark else "skip", None, at, at + 1), cost, True if mark else None, False
 
@@ -215,6 +218,8 @@ def _courtesies(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool
     chart, tokens = sentence.chart, sentence.tokens
     courtesy, idle = _listed("courtesy"), _listed("idle")
     conditional = not chart.begins(at).isdisjoint(("IF",))
+    if tokens[at].text == "to" and at + 1 < len(tokens) and not chart.begins(at + 1).isdisjoint(("GO", "FACE", "TURN")):
+        yield Item("courtesy", None, at, at + 1), _COURTESY, True, True
     if tokens[at].text in idle:
         yield Item("courtesy", None, at, at + 1), _IDLE, None, False
     if chart.terminal("VERB", at) and _begins_order(sentence, at + 1):
@@ -283,7 +288,7 @@ def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | 
         if end > at and token.text in ("not", "never", "if", "unless") and "you" in words:
             return
         after = tokens[end + 1].text if end + 1 < len(tokens) else "."
-        if end > at and finite and (after in _BREAKS or after in ("so", "and", "but", "please", "go", "can", "could")):
+        if end > at and finite and (after in _BREAKS or after in _AFTER_REMARK):
             orders = "you" in words and not because and words[:2] != ["you", "are"]
             cost = _REMARK + _REMARK_WORD * len(words) + 1.5 * orders - _OWN_WISH * (words[:3] in _WISHES)
             yield Item("remark", None, at, end + 1), cost, after in _BREAKS or None, not because

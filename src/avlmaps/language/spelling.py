@@ -13,7 +13,7 @@ from string import ascii_lowercase
 from avlmaps.core.lexicon import lexicon
 from avlmaps.language.grammar import load_grammar
 from avlmaps.language.lexer import WORDS, Token
-from avlmaps.language.names import sounding_words
+from avlmaps.language.names import is_other_form, sounding_words
 
 _TWICE = frozenset({"the", "a", "an", "to", "go", "and", "in", "at", "of", "on", "is", "my"})
 _SHORTEST = 5  # shorter words have too many neighbours
@@ -43,7 +43,7 @@ def _better(word: str) -> str | None:
     for drawn in (re.sub(r"(.)\1{2,}", r"\1", word), re.sub(r"(.)\1{2,}", r"\1\1", word)):
         if drawn != word and drawn in _known():
             return drawn
-    near = {other for other in _neighbours(word) if other in _known()}
+    near = {other for other in _neighbours(word) if other in _known() and not is_other_form(word, other)}
     if len(word) < _SHORTEST:  # only what cannot well be another word: two letters changed over, or one left out
         swapped = {other for other in near if len(other) == len(word) and sorted(other) == sorted(word)}
         longer = {other for other in near if len(other) > len(word)} if len(word) == _SHORTEST - 1 else set()
