@@ -182,3 +182,23 @@ def test_a_known_compound_that_holds_a_colour_word_is_no_colour() -> None:
     assert not factor.mask.any()
     assert factor.note == "'whiteboard' is a known word, but this map's pixel encoder was not trained to detect it"
     assert ask("labtop", RGB).note.endswith("did you mean laptop?")
+
+
+@pytest.mark.parametrize(("p", "expected"), [(0.4, {0}), (0.05, {0}), (0.02, set())])
+def test_the_best_guess_is_where_a_name_is_likeliest_of_what_it_may_be_at_all(p: float, expected: set[int]) -> None:
+    probability = np.repeat([(0.0, 0.0, 1.0 - p, p, 0.0), (0, 1, 0, 0, 0), (1, 0, 0, 0, 0), (0, 1, 0, 0, 0)], 8, axis=0)
+    feature = features_of(probability, ENCODER.codes).astype(np.float16)
+    rivals = Rivals.of(feature, ENCODER, ENCODER.vocabulary)
+    part = Part(Modality.OBJECT, "floor", Role.PRIMARY)
+    guess = object_factor(SPACE, feature, ENCODER, rivals, part, ObjectSettings(), HeatSettings())
+    assert clumps(guess) == expected
+    assert not guess.found
+
+
+def test_a_guess_among_weaker_voxels_can_be_turned_off() -> None:
+    probability = np.tile(np.array([0.0, 0.0, 0.95, 0.05, 0.0]), (32, 1))
+    feature = features_of(probability, ENCODER.codes).astype(np.float16)
+    rivals = Rivals.of(feature, ENCODER, ENCODER.vocabulary)
+    part = Part(Modality.OBJECT, "floor", Role.PRIMARY)
+    settings = ObjectSettings(guess_below=0.0)
+    assert not object_factor(SPACE, feature, ENCODER, rivals, part, settings, HeatSettings()).mask.any()

@@ -54,7 +54,7 @@ class Options:
     work: Path = Path("build/pixels/homes")
     """Folder of the recordings and maps."""
     out: Path = Path("src/avlmaps/perception/embedded/weights")
-    """Folder of the notes, which are written anew."""
+    """Folder of the notes, which are written again."""
     profile: Literal["embedded", "synthetic"] = "embedded"
     """Whose weights."""
     furniture: Path | None = None

@@ -49,10 +49,22 @@ class ObjectSettings:
     confident one elsewhere (docs/experiments.md)."""
     score_in_company: float = 0.5
     """And there a voxel counts that scores at least this part of its best rival's score, for an encoder of names."""
+    least_score_in_company: float = 0.0
+    """And at least this, a score of its own."""
+    guess_below: float = 0.05
+    """Where the best of these is less confident, weaker voxels give the guess, for an encoder of names."""
+    score_for_guess: float = 0.2
+    """Then a voxel counts that scores at least this part of its best rival's score, and ``least_for_guess``."""
+    least_for_guess: float = 0.1
+    """A score, √p: 0.1 is a probability of 1 %."""
     link_m: float = 0.1
     """Voxels of an object no farther apart than this along every axis belong to one instance."""
     join_m: float = 0.3
     """Pieces over one another with no larger gap in height are one thing (the legs and the back of a chair)."""
+
+    def for_guess(self) -> "ObjectSettings":
+        """Return the settings under which weaker voxels count."""
+        return replace(self, score_in_company=self.score_for_guess, least_score_in_company=self.least_for_guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,8 +259,8 @@ def object_factor(
         )
     scored = object_scores(feature, encoder, rivals, asked, settings)
 
-    def things(with_uncertain: bool) -> NearThings:
-        pieces = pieces_of(space, encoder, asked, scored, settings, with_uncertain)
+    def things(with_uncertain: bool, chosen: ObjectSettings = settings) -> NearThings:
+        pieces = pieces_of(space, encoder, asked, scored, chosen, with_uncertain)
         if tint is not None and rgb is not None:
             share = tinted_share(rgb, pieces.mask, pieces.instance, tint)
             pieces = replace(pieces, confidence=pieces.confidence * share)
@@ -263,7 +275,13 @@ def object_factor(
         )
 
     alone = things(False)
-    return alone if len(alone.confidence) else likeliest(things(True))
+    if len(alone.confidence):
+        return alone
+    guess = likeliest(things(True))
+    if isinstance(encoder, NamedPixelEncoder) and guess.confidence.max(initial=0.0) < settings.guess_below:
+        weaker = likeliest(things(True, settings.for_guess()))
+        return weaker if len(weaker.confidence) else guess
+    return guess
 
 
 def colour_factor(
@@ -350,7 +368,7 @@ def pieces_of(
     mask = margin > 0.0
     won = int(mask.sum())
     if with_uncertain and isinstance(encoder, NamedPixelEncoder):
-        mask |= score > np.maximum(settings.score_in_company * (score - margin), 0.0)
+        mask |= score > np.maximum(settings.score_in_company * (score - margin), settings.least_score_in_company)
     instance = instances_of(space, mask, settings.link_m)
     confidence = confidence_of(mask, instance)
     best = float(confidence.max(initial=0.0))
