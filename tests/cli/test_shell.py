@@ -23,8 +23,8 @@ import pytest
 from avlmaps.cli.shell_lines import LONGEST_LINE, PipedLines
 from helpers.raycast import render
 from helpers.room import Room
+from helpers.walked_room import CAMERA
 
-from .conftest import CAMERA
 from .test_go import scene_of
 
 

@@ -129,7 +129,7 @@ def _by_rules(opened: "AVLMap", settings: "QuerySettings") -> "AVLMap":
     return opened if opened.settings == settings else AVLMap(opened.stored, settings)
 
 
-_SMALL_MAP = 400_000  # voxels; plain NumPy takes 0.1 s for so many
+_SMALL_MAP = 400_000  # voxels; plain NumPy takes 0.1 s for them
 
 
 def _asked_in_words(verb: "Query", asked: "AVLMap") -> dict[str, Any]:

@@ -20,7 +20,7 @@ FOUND_AT = 0.5
 # Scores are products of float32 vectors of unit length. Their last digits depend on the order of summation, which
 # depends on the processor and on how many vectors are multiplied at once; a difference below this means nothing.
 ROUNDING = 1e-6
-# The distances of this many pairs of points are worked out one by one, sooner than a search tree is made.
+# The distances of this many pairs of points are computed one by one, which is faster than a search tree.
 _FEW_PAIRS = 65_536
 # Pairs of a point and an anchor that are compared at once: some megabytes.
 _PAIRS = 1 << 18

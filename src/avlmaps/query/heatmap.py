@@ -37,7 +37,7 @@ class Heatmap:
 
     @cached_property
     def values(self) -> Float32[np.ndarray, " n"]:
-        """The product of the factors' heat, worked out when it is first used."""
+        """The product of the factors' heat, computed when it is first used."""
         return reduce(np.multiply, (factor.values for factor in self.factors))
 
     def __mul__(self, other: "Heatmap") -> "Heatmap":
