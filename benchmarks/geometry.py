@@ -20,12 +20,12 @@ use_one_thread()
 import numpy as np  # noqa: E402
 from scipy.spatial import cKDTree  # noqa: E402
 
-from avlmaps.maps.cleaning import clean  # noqa: E402
-from avlmaps.maps.free_space import FreeViewCollector  # noqa: E402
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator  # noqa: E402
+from avlmaps.maps.fusion.cleaning import clean  # noqa: E402
+from avlmaps.maps.fusion.free_space import FreeViewCollector  # noqa: E402
+from avlmaps.maps.fusion.sensor import NONE, SensorModel  # noqa: E402
+from avlmaps.maps.fusion.sensor_choice import find_sensor  # noqa: E402
 from avlmaps.maps.grid import GridSpec  # noqa: E402
-from avlmaps.maps.sensor import NONE, SensorModel  # noqa: E402
-from avlmaps.maps.sensor_stage import find_sensor  # noqa: E402
 from avlmaps.maps.settings import BuildSettings  # noqa: E402
 from avlmaps.recordings.open import open_recording  # noqa: E402
 from avlmaps.recordings.types import Recording  # noqa: E402

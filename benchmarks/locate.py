@@ -14,7 +14,7 @@ import numpy as np  # noqa: E402
 
 from avlmaps.bench.locate import MapOfPictures  # noqa: E402
 from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
-from avlmaps.maps.keyframes import SeenKeyframe, stack_keyframes  # noqa: E402
+from avlmaps.maps.keyframes.describe import SeenKeyframe, stack_keyframes  # noqa: E402
 from avlmaps.perception.embedded.matching import RATIO, match_mutual  # noqa: E402
 from avlmaps.perception.pose import estimate_pose  # noqa: E402
 from avlmaps.perception.profiles import profile  # noqa: E402

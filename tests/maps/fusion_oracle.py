@@ -6,10 +6,10 @@ import numpy as np
 
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.maps.fusion.sensor import NONE, SensorModel
 from avlmaps.maps.fusion.settings import FusionSettings
 from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.sensor import NONE, SensorModel
 from avlmaps.recordings.types import Frame
 
 DEPTH = Pinhole(30.0, 31.0, 15.7, 12.2, 32, 24)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.poses import apply, from_quaternion, inverse, rotation_angle_rad
 from avlmaps.core.registry import Backend, Kind, register
-from avlmaps.maps.keyframes import (
+from avlmaps.maps.keyframes.describe import (
     KeyframeSettings,
     describe_keyframe,
     keyframes_by_motion,
@@ -18,7 +18,7 @@ from avlmaps.maps.keyframes import (
     select_keyframes,
     stack_keyframes,
 )
-from avlmaps.maps.keypoint_depth import lift_keypoints, middle_of_view
+from avlmaps.maps.keyframes.keypoint_depth import lift_keypoints, middle_of_view
 from avlmaps.perception.profiles import Profile, profile
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.registration import depth_in_colour

@@ -9,8 +9,8 @@ import pytest
 
 from avlmaps.bench.locate import MapOfPictures, map_of
 from avlmaps.core.poses import inverse, rotation_angle_rad
-from avlmaps.maps.keyframe_stage import concat_keyframes
-from avlmaps.maps.keyframes import KeyframeSettings, describe_keyframe, stack_keyframes
+from avlmaps.maps.keyframes.describe import KeyframeSettings, describe_keyframe, stack_keyframes
+from avlmaps.maps.keyframes.stage import concat_keyframes
 from avlmaps.perception.embedded.rootsift import RootSift
 from avlmaps.perception.profiles import profile
 from avlmaps.perception.protocols import LocalFeatures, ModelCard

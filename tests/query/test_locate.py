@@ -8,7 +8,7 @@ from avlmaps.bench.locate import MapOfPictures, map_of
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import inverse, rotation_angle_rad
-from avlmaps.maps.keyframes import stack_keyframes
+from avlmaps.maps.keyframes.describe import stack_keyframes
 from avlmaps.perception.profiles import profile
 from avlmaps.query.locate import Located, LocateSettings, alike, locate, nearest
 from helpers.picture_room import CAMERA, Room, RoomWalk, looking, painting

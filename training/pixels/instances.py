@@ -23,7 +23,7 @@ from avlmaps.bench.objects import FEWEST_VOXELS, GROWN_M, STRUCTURE
 from avlmaps.core.errors import MapError
 from avlmaps.core.lexicon import Entry, Kind, lexicon
 from avlmaps.maps.build import build_map
-from avlmaps.maps.keyframes import KeyframeSettings
+from avlmaps.maps.keyframes.describe import KeyframeSettings
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.reader import StoredMap
 from avlmaps.perception.embedded.pixels import LARGEST_LOG_AREA, SMALLEST_LOG_AREA, EmbeddedPixels

@@ -11,7 +11,7 @@ from avlmaps.bench.harness.intervals import wilson
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.core.progress import progress
-from avlmaps.maps.keyframes import KeyframeSettings, perceive_keyframes, select_keyframes
+from avlmaps.maps.keyframes.describe import KeyframeSettings, perceive_keyframes, select_keyframes
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.profiles import Profile, profile
 from avlmaps.query.locate import Located, LocateSettings, locate

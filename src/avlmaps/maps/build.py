@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avlmaps.core.progress import silence_progress
-from avlmaps.maps.keyframe_stage import describe_keyframes
+from avlmaps.maps.keyframes.stage import describe_keyframes
 from avlmaps.maps.partial_maps import build_part, merge_parts
 from avlmaps.maps.plan import claim, make_plan, require_unchanged
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
-from avlmaps.maps.stages import attach_ground, commit, detect_sounds, find_up, fuse, identify_sensor, merge
+from avlmaps.maps.stages import detect_sounds, encode_and_fuse, find_floor, find_up, identify_sensor, merge, write
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.reader import StoredMap, describe, open_stored
 from avlmaps.perception.cache.cached_encoders import with_cache
@@ -58,12 +58,12 @@ def build_map(
     with silence_progress(not progress), lock_folder(plan.path):
         if claim(plan, resume, overwrite) is None:
             up = find_up(plan)
-            plan, ground, grounding_s = attach_ground(plan, up[0])
+            plan, floor = find_floor(plan, up)
             sensor = identify_sensor(plan)
-            fused = fuse(plan, parts, sensor)
-            pictures = describe_keyframes(plan, fused)
-            heard = detect_sounds(plan)
+            fused = encode_and_fuse(plan, parts, sensor)
+            keyframes = describe_keyframes(plan, fused)  # their keypoints, places and views
+            sounds = detect_sounds(plan)
             merged = merge(plan, fused, sensor)  # late, because it fills the memory
             require_unchanged(plan, stamp)
-            commit(plan, up, (ground, grounding_s), fused, pictures, heard, merged)
+            write(plan, up, floor, fused, keyframes, sounds, merged)
     return open_stored(plan.path)

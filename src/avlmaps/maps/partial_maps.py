@@ -19,12 +19,12 @@ from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
 from avlmaps.maps.encoding import EncodedFrame, encode_frames
-from avlmaps.maps.free_space import FreeViewCollector, FreeViews, concat_views
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator, VoxelSums
+from avlmaps.maps.fusion.free_space import FreeViewCollector, FreeViews, concat_views
+from avlmaps.maps.fusion.sensor import SensorModel
+from avlmaps.maps.fusion.sensor_choice import find_sensor
 from avlmaps.maps.gravity.stage import attach_estimated_ground
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.sensor import SensorModel
-from avlmaps.maps.sensor_stage import find_sensor
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.store.checkpoints import Checkpoint, find_checkpoint, key_of, load_checkpoint, save_checkpoint
 from avlmaps.maps.store.manifest import BadFrame

@@ -1,8 +1,10 @@
 """The plan of a build, and where it stores what it has finished."""
 
 import shutil
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Generic
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from avlmaps.core.files import sampled_digest
 from avlmaps.core.progress import say
 from avlmaps.maps.partial_maps import BUILD_VERSION, fusion_key
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.checkpoints import key_of
+from avlmaps.maps.store.checkpoints import Checkpoint, F, find_checkpoint, key_of, load_checkpoint, save_checkpoint
 from avlmaps.maps.store.manifest import MANIFEST, MapInfo, ModelInfo, parse_manifest, read_manifest
 from avlmaps.maps.store.reader import PARTS
 from avlmaps.maps.store.writer import is_map_or_free, sweep
@@ -49,6 +51,53 @@ class Plan:
     def rng(self, stage: int) -> np.random.Generator:
         """Return a stage's own source of randomness, the same in every run, independent of the other stages."""
         return np.random.default_rng([self.settings.seed, stage])
+
+
+@dataclass(frozen=True, slots=True)
+class Computed(Generic[F]):
+    """What a stage computed and its checkpoint stores.
+
+    Attributes:
+        facts: all that is not an array.
+        arrays: by name.
+        files: other files by name; they are copied.
+    """
+
+    facts: F
+    arrays: Mapping[str, np.ndarray] = field(default_factory=dict[str, np.ndarray])
+    files: Mapping[str, Path] = field(default_factory=dict[str, Path])
+
+
+def stage(
+    plan: Plan,
+    name: str,
+    key: str,
+    facts: type[F],
+    compute: Callable[[Path], Computed[F]],
+    *,
+    within: str = "",
+    usable: Callable[[F], bool] = lambda _: True,
+) -> Checkpoint[F]:
+    """Return the checkpoint of a stage; compute and store it where there is none.
+
+    A stage is read back even when it was computed a moment ago, so that a resumed build sees the same.
+
+    Args:
+        plan: of the build.
+        name: of the stage, for its folder.
+        key: hash of all that it depends on (``key_of``).
+        facts: type of its facts.
+        compute: is given the folder of the checkpoint; what it puts beside that folder it removes itself.
+        within: a folder within the stage's, where it has several checkpoints.
+        usable: whether a checkpoint may stand; else it is computed again.
+    """
+    folder = plan.folder(name, key) / within
+    found = find_checkpoint(folder, facts, key)
+    if found is None or not usable(found.facts):
+        done = compute(folder)
+        save_checkpoint(folder, key, done.facts, done.arrays, done.files)
+        found = load_checkpoint(folder, facts, key)
+    return found
 
 
 def make_plan(recording: Recording, path: Path, used: Profile, settings: BuildSettings) -> Plan:

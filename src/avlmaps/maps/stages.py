@@ -13,12 +13,13 @@ import numpy as np
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
-from avlmaps.maps.cleaning import clean
 from avlmaps.maps.encoding import strip_folder
+from avlmaps.maps.fusion.cleaning import clean
+from avlmaps.maps.fusion.sensor_choice import find_sensor
 from avlmaps.maps.gravity.floor import GroundedRecording
 from avlmaps.maps.gravity.stage import estimate_ground, estimate_up, ground_notices, spread
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.keyframe_stage import KeyframeResult
+from avlmaps.maps.keyframes.stage import KeyframeResult
 from avlmaps.maps.partial_maps import (
     BUILD_VERSION,
     Part,
@@ -29,10 +30,9 @@ from avlmaps.maps.partial_maps import (
     plan_spans,
     sum_parts,
 )
-from avlmaps.maps.plan import Plan, audio_key
-from avlmaps.maps.sensor_stage import find_sensor
+from avlmaps.maps.plan import Computed, Plan, audio_key, stage
 from avlmaps.maps.store.array_validation import array_fields, validate_arrays
-from avlmaps.maps.store.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
+from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.manifest import (
     Box,
     Counts,
@@ -73,6 +73,22 @@ class _Facts(msgspec.Struct):
 
 
 @dataclass(frozen=True, slots=True)
+class UpResult:
+    """Outcome of the first stage: the up direction, and the seconds it took."""
+
+    up: UpInfo
+    elapsed_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class FloorResult:
+    """Outcome of the second stage: the floors, and the seconds it took."""
+
+    ground: GroundInfo
+    elapsed_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class SoundResult:
     """Outcome of the sound stage: what was heard, where the clips lie, and the seconds it took."""
 
@@ -81,35 +97,36 @@ class SoundResult:
     elapsed_s: float
 
 
-def find_up(plan: Plan) -> tuple[UpInfo, float]:
-    """Return the up direction, from the recording or from the planes in view, and the seconds that it took."""
+def find_up(plan: Plan) -> UpResult:
+    """Return the up direction, from the recording or from the planes in view."""
     if plan.recording.up_in_world is not None:
-        return UpInfo.of(plan.recording.up_in_world, "recording", 1.0), 0.0
+        return UpResult(UpInfo.of(plan.recording.up_in_world, "recording", 1.0), 0.0)
     key = key_of("up", BUILD_VERSION, plan.recording.fingerprint, plan.settings.gravity, plan.settings.seed)
-    folder = plan.folder("up", key)
-    found = find_checkpoint(folder, _UpFacts, key)
-    if found is None:
+
+    def compute(_: Path) -> Computed[_UpFacts]:
         begin = perf_counter()
-        save_checkpoint(folder, key, _UpFacts(estimate_up(plan.recording, plan.settings), perf_counter() - begin), {})
-        found = load_checkpoint(folder, _UpFacts, key)
-    return found.facts.up, found.facts.elapsed_s
+        return Computed(_UpFacts(estimate_up(plan.recording, plan.settings), perf_counter() - begin))
+
+    found = stage(plan, "up", key, _UpFacts, compute)
+    return UpResult(found.facts.up, found.facts.elapsed_s)
 
 
-def attach_ground(plan: Plan, up: UpInfo) -> tuple[Plan, GroundInfo, float]:
-    """Return the plan with up and the floor in the recording's frames, the floors, and the seconds that it took."""
+def find_floor(plan: Plan, up: UpResult) -> tuple[Plan, FloorResult]:
+    """Return the plan with up and the floor in the recording's frames, and the floors."""
     recording = plan.recording
-    key = key_of("ground", BUILD_VERSION, recording.fingerprint, recording.base_height, plan.settings.gravity, up)
-    folder = plan.folder("ground", key)
-    found = find_checkpoint(folder, _GroundFacts, key)
-    if found is None or not found.facts.whole:  # a frame that could not be read then may be readable now
+    key = key_of("ground", BUILD_VERSION, recording.fingerprint, recording.base_height, plan.settings.gravity, up.up)
+
+    def compute(_: Path) -> Computed[_GroundFacts]:
         begin = perf_counter()
-        ground, info = estimate_ground(plan.recording, plan.settings, up)
+        ground, info = estimate_ground(plan.recording, plan.settings, up.up)
         arrays = {name: getattr(ground, name) for name in ("up_in_world", "camera_m", "floor_m")}
         whole = len(ground.camera_m) == len(spread(recording, plan.settings.gravity.frames))
-        save_checkpoint(folder, key, _GroundFacts(info, whole, perf_counter() - begin), arrays)
-        found = load_checkpoint(folder, _GroundFacts, key)
+        return Computed(_GroundFacts(info, whole, perf_counter() - begin), arrays)
+
+    # A frame that could not be read then may be readable now.
+    found = stage(plan, "ground", key, _GroundFacts, compute, usable=lambda facts: facts.whole)
     on_ground = replace(plan, recording=GroundedRecording(plan.recording, Ground(**found.arrays)))
-    return on_ground, found.facts.ground, found.facts.elapsed_s
+    return on_ground, FloorResult(found.facts.ground, found.facts.elapsed_s)
 
 
 def identify_sensor(plan: Plan) -> SensorInfo:
@@ -117,16 +134,15 @@ def identify_sensor(plan: Plan) -> SensorInfo:
     if plan.settings.fusion.sensor != "auto":
         return find_sensor(plan.recording, plan.settings)
     key = key_of("sensor", BUILD_VERSION, plan.recording.fingerprint)
-    folder = plan.folder("sensor", key)
-    found = find_checkpoint(folder, _SensorFacts, key)
-    if found is None:
-        save_checkpoint(folder, key, _SensorFacts(find_sensor(plan.recording, plan.settings)), {})
-        found = load_checkpoint(folder, _SensorFacts, key)
-    return found.facts.sensor
+
+    def compute(_: Path) -> Computed[_SensorFacts]:
+        return Computed(_SensorFacts(find_sensor(plan.recording, plan.settings)))
+
+    return stage(plan, "sensor", key, _SensorFacts, compute).facts.sensor
 
 
-def fuse(plan: Plan, given: Sequence[Path | str], sensor: SensorInfo) -> list[Part]:
-    """Fuse all frames that no part covers yet; return the parts that make up the map, in a fixed order."""
+def encode_and_fuse(plan: Plan, given: Sequence[Path | str], sensor: SensorInfo) -> list[Part]:
+    """Encode and fuse all frames that no part covers yet; return the parts that make up the map, in a fixed order."""
     brought = [load_part(Path(folder), plan.fusion_key) for folder in given]
     covered = [span for part in brought for span in part.info.spans]
     home = plan.folder("fusion", plan.fusion_key)
@@ -181,9 +197,8 @@ def detect_sounds(plan: Plan) -> SoundResult:
         return SoundResult(_silence(plan), plan.path, 0.0)
     settings, model = plan.settings.hearing, plan.models[Kind.SOUNDS.value]
     key = key_of("sounds", BUILD_VERSION, plan.recording.fingerprint, audio_key(plan.recording), settings, model)
-    folder = plan.folder("sounds", key)
-    found = find_checkpoint(folder, _Facts, key)
-    if found is None:
+
+    def compute(folder: Path) -> Computed[_Facts]:
         from avlmaps.maps.audio.events import detect_events
 
         begin = perf_counter()
@@ -193,12 +208,13 @@ def detect_sounds(plan: Plan) -> SoundResult:
         heard = detect_events(plan.recording, plan.used.sound_encoder(), settings, scratch)
         arrays = {name: getattr(heard, name) for name in array_fields(HeardSounds)}
         clips = {f"clips/{number:06d}": scratch / Path(clip).name for number, clip in enumerate(heard.clips)}
-        save_checkpoint(folder, key, _Facts(perf_counter() - begin), arrays, clips)
-        shutil.rmtree(scratch)
-        found = load_checkpoint(folder, _Facts, key)
+        return Computed(_Facts(perf_counter() - begin), arrays, clips)
+
+    found = stage(plan, "sounds", key, _Facts, compute)
+    shutil.rmtree(found.folder.with_name("clips.unfinished"), ignore_errors=True)
     names = tuple(path.name for path in found.files.values())
-    sounds = validate_arrays(HeardSounds, {**found.arrays, "clips": names}, str(folder))
-    return SoundResult(sounds, folder / "clips", found.facts.elapsed_s)
+    sounds = validate_arrays(HeardSounds, {**found.arrays, "clips": names}, str(found.folder))
+    return SoundResult(sounds, found.folder / "clips", found.facts.elapsed_s)
 
 
 def _silence(plan: Plan) -> HeardSounds:
@@ -214,10 +230,10 @@ def _silence(plan: Plan) -> HeardSounds:
     )
 
 
-def commit(
+def write(
     plan: Plan,
-    up: tuple[UpInfo, float],
-    ground: tuple[GroundInfo, float],
+    up: UpResult,
+    floor: FloorResult,
     parts: Sequence[Part],
     pictures: KeyframeResult,
     heard: SoundResult,
@@ -226,8 +242,8 @@ def commit(
     """Write the map and, last of all, its manifest; then the parts go."""
     content = MapContent(merged.voxels, pictures.keyframes, pictures.place_state, heard.sounds, heard.clips_folder)
     stages_s = {
-        "up": up[1],
-        "ground": ground[1],
+        "up": up.elapsed_s,
+        "ground": floor.elapsed_s,
         "fusion": sum(part.info.elapsed_s for part in parts),
         "keyframes": pictures.elapsed_s,
         "sounds": heard.elapsed_s,
@@ -235,7 +251,7 @@ def commit(
     }
     finished = datetime.now(UTC).isoformat(timespec="seconds")
     timings = Timings(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)
-    return write_map(plan.path, content, _manifest(plan, up[0], ground[0], parts, content, merged, timings))
+    return write_map(plan.path, content, _manifest(plan, up.up, floor.ground, parts, content, merged, timings))
 
 
 def _manifest(

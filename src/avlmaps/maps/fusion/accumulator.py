@@ -14,11 +14,11 @@ from avlmaps.core.errors import BackendError, MapError, RecordingError
 from avlmaps.maps.fusion import add_kernels as sums
 from avlmaps.maps.fusion import measure_kernels as kernels
 from avlmaps.maps.fusion.pixel_lookup import PixelLookup, look_up
+from avlmaps.maps.fusion.sensor import NONE, SensorModel
+from avlmaps.maps.fusion.sensor_kernels import drop_flying
 from avlmaps.maps.fusion.settings import FusionSettings
 from avlmaps.maps.fusion.voxel_sums import Evidence, VoxelSums, VoxelTable
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.sensor import NONE, SensorModel
-from avlmaps.maps.sensor_kernels import drop_flying
 from avlmaps.maps.types import Voxels
 from avlmaps.recordings.types import Frame
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from avlmaps.core.errors import MapError
-from avlmaps.maps.sensor import SensorModel, SensorName
+from avlmaps.maps.fusion.sensor import SensorModel, SensorName
 
 PAPERS_VARIANCE_M2 = 0.6
 

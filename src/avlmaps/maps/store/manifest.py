@@ -10,7 +10,7 @@ from jaxtyping import Float
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import MANIFEST_BYTES, decode_json, read_regular, write_bytes_atomically
-from avlmaps.maps.sensor import SensorModel
+from avlmaps.maps.fusion.sensor import SensorModel
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.array_files import FileInfo, explain_write_errors
 from avlmaps.perception.models.names import public_choice, public_name

@@ -8,7 +8,7 @@ from jaxtyping import Float, Float16, Float32, Int, Int64, UInt8
 
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.progress import progress
-from avlmaps.maps.keypoint_depth import lift_keypoints, middle_of_view
+from avlmaps.maps.keyframes.keypoint_depth import lift_keypoints, middle_of_view
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.profiles import Profile
 from avlmaps.perception.protocols import LocalFeatures

@@ -10,13 +10,13 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int32
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.maps import carving_kernels
-from avlmaps.maps.free_space import FreeViews, count_through
+from avlmaps.maps.fusion import carving_kernels
+from avlmaps.maps.fusion.free_space import FreeViews, count_through
 from avlmaps.maps.fusion.measure_kernels import SHARP_UNITS
+from avlmaps.maps.fusion.sensor import SensorModel
 from avlmaps.maps.fusion.voxel_kernels import rehash
 from avlmaps.maps.fusion.voxel_sums import Evidence
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.sensor import SensorModel
 from avlmaps.maps.store.manifest import Removed
 
 FEWEST_THROUGH = 2  # frames: one may have a wrong pose

@@ -13,9 +13,9 @@ from jaxtyping import Float32, Int
 
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
-from avlmaps.maps.keyframes import describe_keyframe, learn_places, select_keyframes, stack_keyframes
+from avlmaps.maps.keyframes.describe import describe_keyframe, learn_places, select_keyframes, stack_keyframes
 from avlmaps.maps.partial_maps import BUILD_VERSION, Part
-from avlmaps.maps.plan import Plan
+from avlmaps.maps.plan import Computed, Plan, stage
 from avlmaps.maps.prefetch import run_ahead
 from avlmaps.maps.store.array_validation import RAGGED, ROWS_OR_NONE, array_fields, validate_arrays
 from avlmaps.maps.store.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
@@ -52,7 +52,7 @@ def describe_keyframes(plan: Plan, parts: Sequence[Part]) -> KeyframeResult:
     seed, settings = plan.settings.seed, plan.settings.keyframes
     key = key_of("keyframes", BUILD_VERSION, plan.recording.fingerprint, settings, seed, cards, fused[chosen].tolist())
     home = plan.folder("keyframes", key)
-    place_state, local, learning_s = _learn(plan, good, chosen, home / "places", key)
+    place_state, local, learning_s = _learn(plan, good, chosen, key)
     size = max(1, plan.settings.frames.per_part // 4)  # looking takes longer than fusing
     lots = {home / f"{start:08d}": chosen[start : start + size] for start in range(0, len(chosen), size)}
     missing = {folder: lot for folder, lot in lots.items() if find_checkpoint(folder, _Facts, key) is None}
@@ -63,16 +63,18 @@ def describe_keyframes(plan: Plan, parts: Sequence[Part]) -> KeyframeResult:
 
 
 def _learn(
-    plan: Plan, good: Recording, chosen: Int[np.ndarray, " k"], folder: Path, key: str
+    plan: Plan, good: Recording, chosen: Int[np.ndarray, " k"], key: str
 ) -> tuple[dict[str, np.ndarray], dict[int, LocalFeatures], float]:
     """Return the state of the place encoder, the keypoints that it learned from (if it did now), and the seconds."""
     local: dict[int, LocalFeatures] = {}
-    found = find_checkpoint(folder, _Facts, key)
-    if found is None:
+
+    def compute(_: Path) -> Computed[_Facts]:
         begin = perf_counter()
-        state, local = learn_places(good, chosen, plan.used, plan.rng(_RANDOMNESS))
-        save_checkpoint(folder, key, _Facts(perf_counter() - begin), state)
-        found = load_checkpoint(folder, _Facts, key)
+        state, keypoints = learn_places(good, chosen, plan.used, plan.rng(_RANDOMNESS))
+        local.update(keypoints)
+        return Computed(_Facts(perf_counter() - begin), state)
+
+    found = stage(plan, "keyframes", key, _Facts, compute, within="places")
     return found.arrays, local, found.facts.elapsed_s
 
 

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from avlmaps.maps.fusion.sensor import MODELS, SensorModel, SensorName
 from avlmaps.maps.gravity.stage import spread_frames
-from avlmaps.maps.sensor import MODELS, SensorModel, SensorName
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.manifest import SensorInfo
 from avlmaps.recordings.types import Frame, Recording

@@ -12,10 +12,10 @@ from jaxtyping import Float64, Int32, UInt16
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.progress import progress
-from avlmaps.maps import carving_kernels
+from avlmaps.maps.fusion import carving_kernels
+from avlmaps.maps.fusion.sensor import SensorModel
+from avlmaps.maps.fusion.sensor_kernels import clear_blocks
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.sensor import SensorModel
-from avlmaps.maps.sensor_kernels import clear_blocks
 from avlmaps.recordings.types import Frame
 
 BLOCKS_WIDE = 80

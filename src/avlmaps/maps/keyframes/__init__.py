@@ -1,0 +1,1 @@
+"""Keyframes: which frames they are, and their keypoints, places and views."""
