@@ -343,7 +343,7 @@ def test_finished_keyframes_and_sounds_are_not_made_again(tmp_path: Path, monkey
         patch.setattr("avlmaps.maps.build.merge", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             build(walk, tmp_path / "a")
-    monkeypatch.setattr("avlmaps.maps.keyframe_stage.describe_keyframe", None)
+    monkeypatch.setattr("avlmaps.maps.keyframes.stage.describe_keyframe", None)
     monkeypatch.setattr("avlmaps.maps.audio.events.detect_events", None)
     assert len(build(walk, tmp_path / "a").sounds) == 2
 

@@ -5,16 +5,13 @@ OpenAPI document and the schemas of its agent tools from the same types. Positio
 ``frame`` names.
 """
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
 
 from msgspec import Meta
 
-from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.poses import FRAME
 
 if TYPE_CHECKING:
-    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.locate import Located
 
 Position = Annotated[list[float], Meta(min_length=3, max_length=3, description="x, y, z in metres, recording frame")]
@@ -145,26 +142,3 @@ def locate_answer(located: "Located") -> LocateAnswer:
         "intrinsics": [camera.fx, camera.fy, camera.cx, camera.cy],
         "elapsed_ms": located.elapsed_ms,
     }
-
-
-def map_answer(avlmap: "AVLMap", note: Callable[[AvlmapsError], object] = lambda _: None) -> dict[str, Any]:
-    """Return the description of a map that ``avlmaps info`` prints: counts, models, sounds with names, rules.
-
-    Args:
-        avlmap: the map.
-        note: is given the error where the sounds have no names since their model is not here.
-    """
-    from avlmaps.maps.store.reader import describe
-    from avlmaps.query.rules import rules_of
-
-    described = describe(avlmap.stored)
-    try:
-        events = avlmap.sounds()
-    except AvlmapsError as error:
-        note(error)
-    else:
-        described["sounds"] = [
-            {**sound, "names": list(event.names), "confidences": list(event.confidences)}
-            for sound, event in zip(described["sounds"], events, strict=True)
-        ]
-    return {**described, "rules": rules_of(avlmap.stored.info.settings)}

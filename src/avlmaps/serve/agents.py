@@ -20,6 +20,7 @@ from avlmaps.core.version import __version__
 from avlmaps.serve.guard import App
 from avlmaps.serve.lanes import Lane, Report, Watch
 from avlmaps.serve.requests import NoQuery, checked
+from avlmaps.serve.responses import error_response
 from avlmaps.serve.service import Service
 from avlmaps.serve.tools import TOOLS, AgentTool, ToolResult
 from avlmaps.serve.work import Task, describe_map, encoded, list_maps
@@ -80,8 +81,6 @@ def agent_server(service: Service, tools: Sequence[AgentTool] = TOOLS) -> Server
         try:
             return _result(await _called(service, tool, dict(params.arguments or {}), ctx))
         except Exception as error:  # noqa: BLE001 - every fault gets its sentence, and unknown ones go to the log
-            from avlmaps.serve.app import error_response
-
             answer = json.loads(bytes(error_response(service, error).body))
             return mcp.CallToolResult(content=[mcp.TextContent(text=answer["error"]["message"])], is_error=True)
 

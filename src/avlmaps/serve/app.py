@@ -1,7 +1,6 @@
 """The HTTP application: routes of the operations, errors as JSON, progress as server-sent events."""
 
 import asyncio
-import logging
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 from typing import Any
@@ -23,6 +22,7 @@ from avlmaps.serve.openapi import document
 from avlmaps.serve.operations import OPERATIONS, Operation
 from avlmaps.serve.page import CONTENT_POLICY, html_page
 from avlmaps.serve.requests import checked, checked_texts
+from avlmaps.serve.responses import JSON_TYPE, error_response
 from avlmaps.serve.service import Service
 from avlmaps.serve.tools import TOOLS, AgentTool
 from avlmaps.serve.uploads import Uploads
@@ -44,9 +44,8 @@ class _Whole(Convertor[int]):
 
 register_url_convertor("count", _Whole("[0-9]{1,9}"))
 register_url_convertor("index", _Whole("-?[0-9]{1,9}"))
-log = logging.getLogger("avlmaps.serve")
 Lifespan = Callable[[], AbstractAsyncContextManager[Any]]
-_JSON, _EVENTS = "application/json", "text/event-stream"
+_EVENTS = "text/event-stream"
 _POLL_S, _BEAT_S = 2.0, 10.0
 
 
@@ -111,15 +110,6 @@ async def _look_for_replaced_maps(service: Service) -> None:
         service.shelf.refresh()
 
 
-def error_response(service: Service, error: BaseException) -> Response:
-    """Return an error as the JSON that the command line prints; what is a fault of ours goes to the log."""
-    status, answer = service.privacy.described(error)
-    if status >= 500 and not isinstance(error, RequestError):
-        log.error("%s", error, exc_info=error if status == 500 else None)
-    headers = error.headers if isinstance(error, RequestError) else {}
-    return Response(encoded(answer), status, headers, _JSON)
-
-
 def _http_error(error: Exception) -> Response:
     status = error.status_code if isinstance(error, HTTPException) else 500
     message = {
@@ -127,11 +117,11 @@ def _http_error(error: Exception) -> Response:
         405: "This address does not take this method; /openapi.json lists the methods.",
     }.get(status, "The request cannot be read.")
     headers = dict(error.headers or {}) if isinstance(error, HTTPException) else {}
-    return Response(encoded({"error": {"kind": "usage", "message": message}}), status, headers, _JSON)
+    return Response(encoded({"error": {"kind": "usage", "message": message}}), status, headers, JSON_TYPE)
 
 
 def _json(answer: Any) -> Response:
-    return Response(encoded(answer), media_type=_JSON)
+    return Response(encoded(answer), media_type=JSON_TYPE)
 
 
 async def _page(request: Request) -> Response:
@@ -194,7 +184,7 @@ async def _answered(service: Service, operation: Operation, request: Request) ->
         return Response(file.content, 200, file.headers, file.media_type)
     if _EVENTS in request.headers.get("accept", ""):
         return StreamingResponse(_events(service, lane, job), media_type=_EVENTS)
-    return Response(await lane.run(job), media_type=_JSON)
+    return Response(await lane.run(job), media_type=JSON_TYPE)
 
 
 async def _events(service: Service, lane: Any, job: Callable[[Watch], bytes]) -> AsyncIterator[bytes]:
@@ -241,7 +231,7 @@ async def _read(operation: Operation, request: Request) -> tuple[Any, Uploads]:
     if request.method != "POST":
         return checked_texts(pairs, operation.query), Uploads()
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    if kind == _JSON:
+    if kind == JSON_TYPE:
         if pairs:
             raise RequestError("Values come in the address or in the body, not in both.")
         return checked(_object(await request.body()), operation.query), Uploads()

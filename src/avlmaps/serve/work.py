@@ -11,6 +11,7 @@ from avlmaps.core.poses import FRAME
 from avlmaps.core.question import Modality, Question
 from avlmaps.navigate.paths import PathAnswer
 from avlmaps.query.answer import Answer
+from avlmaps.query.description import map_answer
 from avlmaps.query.places import PlaceAnswer, column_point, describe_place
 from avlmaps.query.schema import (
     ContentsAnswer,
@@ -21,7 +22,6 @@ from avlmaps.query.schema import (
     SoundAnswer,
     ThingAnswer,
     locate_answer,
-    map_answer,
 )
 from avlmaps.query.sentences import SentenceAnswer, UnusedFileError, ask_sentence
 from avlmaps.serve.errors import RequestError
