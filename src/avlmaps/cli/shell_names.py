@@ -1,4 +1,4 @@
-"""What the prompt of `avlmaps shell` completes: verbs, names of things, sounds and rooms, and file names."""
+"""The completions of `avlmaps shell`: verbs, names of things, sounds and rooms, and file names."""
 
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -91,7 +91,7 @@ class NameCompleter(Completer):
     """Completes at the prompt."""
 
     def __init__(self, verbs: Sequence[str], file_verbs: Sequence[str], here: Callable[[], Iterable[str]]) -> None:
-        """Take what completes.
+        """Take the source of the completions.
 
         Args:
             verbs: the words that a line may begin with.

@@ -75,6 +75,6 @@ def _history() -> FileHistory | InMemoryHistory:
 
 
 def _shorten(path: Path) -> None:
-    """Keep the later half of a history; its entries begin with an empty line."""
+    """Drop the earlier half of a history; its entries begin with an empty line."""
     content = path.read_bytes()[-_MOST_HISTORY_BYTES // 2 :]
     path.write_bytes(content[max(content.find(b"\n\n"), 0) :])

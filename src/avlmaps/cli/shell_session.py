@@ -1,4 +1,4 @@
-"""What the lines of `avlmaps shell` mean: one open map, and an answer for each line."""
+"""The session of `avlmaps shell`: one open map, and an answer for each line."""
 
 import re
 import shlex
@@ -65,7 +65,7 @@ class Reply:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What a session is started with.
+    """The settings of a session.
 
     Attributes:
         map: folder of the map.
@@ -112,7 +112,7 @@ class Session:
         return AVLMap.open(self.given.map), seen
 
     def _signature(self) -> tuple[int, ...]:
-        """Return what changes when a build replaces the map."""
+        """Return the state that changes when a build replaces the map."""
         try:
             found = (self.given.map / "map.json").stat()
         except OSError:

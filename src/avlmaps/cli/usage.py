@@ -16,7 +16,7 @@ V = TypeVar("V", bound=Verb)
 
 
 def usage_sentence(printed: str) -> str:
-    """Return what is wrong with the words, out of the frame that the parser prints."""
+    """Return the fault in the words, out of the frame that the parser prints."""
     # a title, a rule, what is wrong, a rule, and help
     parts = re.split(r"\n *[-─]{3,} *\n", re.sub("[╭╮╰╯│]", " ", printed))
     return " ".join(parts[min(1, len(parts) - 1)].split())

@@ -44,7 +44,7 @@ class Framed:
 
     @property
     def ask(self) -> Ask:
-        """What is asked: a number before a place, a place before whether there is one."""
+        """The kind of question: a number before a place, a place before whether there is one."""
         if Ask.HOW_MANY in self.cues:
             return Ask.HOW_MANY
         if Ask.WHERE in self.cues:
@@ -52,7 +52,7 @@ class Framed:
         return Ask.EXISTS if Ask.EXISTS in self.cues or self.opens else Ask.WHERE
 
     def target(self) -> Target:
-        """Return the one thing that is asked for; a room that is named besides is where it is.
+        """Return the one thing that the question is about; a room that is named besides is where it is.
 
         Raises:
             UnresolvedError: a word refers to nothing that was named.

@@ -1,4 +1,4 @@
-"""A weighted chart parser: every rule at every place, each result once, the cheapest few kept.
+"""A weighted chart parser: every rule at every place, each result once, the cheapest few survive.
 
 Rules are read top down and their results are stored by place, so that no span is read twice. A result is an edge: where
 it ends, what it cost, and its value. Words have no cost; a comma inside a rule costs a little.
@@ -24,7 +24,7 @@ Slots = tuple[tuple[str, Any], ...]
 
 @dataclass(frozen=True, slots=True)
 class Tree:
-    """What a rule read.
+    """The result of a rule.
 
     Attributes:
         rule: its name.
@@ -70,7 +70,7 @@ class Chart:
         self._begins: list[frozenset[str] | None] = [None] * len(tokens)
 
     def edges(self, rule: str, at: int) -> list[Edge]:
-        """Return what a rule reads from a token on, the cheapest first."""
+        """Return the results of a rule from a token on, the cheapest first."""
         key = (rule, at)
         found = self._stored.get(key)
         if found is None:

@@ -20,11 +20,11 @@ from avlmaps.language.readings import Sentence, readings
 
 MOST_CHARACTERS = 1000
 _EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
-_FULLER = 0.2  # a reading with one more wait may cost so much more
+_FULLER = 0.2  # a reading with one more wait may cost this much more
 _SAFETY = 0.35
 _DANGERS = (Reason.HARM, Reason.FLYING, Reason.ENDLESS)
-_MARGIN = 0.06  # readings of different meaning that are closer are asked about
-_ASKING = 1.5  # a reading that ends in a question or a refusal counts as so much worse than one that does not
+_MARGIN = 0.06  # readings of different meaning that are closer lead to a question back
+_ASKING = 1.5  # a reading that ends in a question or a refusal counts as this much worse than one that does not
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Weighed:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What a command means.
+    """The meaning of a command.
 
     Attributes:
         intents: in the order of doing; a single `Refuse` or `Clarify` where the robot is to do nothing.
@@ -67,7 +67,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What came along with a command.
+    """The files and names that came along with a command.
 
     Attributes:
         image: the file that "this photo" means.
@@ -81,7 +81,7 @@ class Given:
 
 
 def read_command(text: str, given: Given | None = None) -> Command:
-    """Return what a command means; the same command always means the same.
+    """Return the meaning of a command; the same command always means the same.
 
     Raises:
         LanguageError: the command is empty or too long.
@@ -147,7 +147,7 @@ def _same(a: tuple[Intent, ...], b: tuple[Intent, ...]) -> bool:
 def _is_fuller(a: tuple[Intent, ...], b: tuple[Intent, ...], *, strictly: bool = False) -> bool:
     """Return whether one reading says all that another says of where to go, and more if it must be strictly so.
 
-    How a sound is called makes no difference: "coughing" and "somebody coughing" are heard at the same place.
+    The name of a sound makes no difference: "coughing" and "somebody coughing" play at the same place.
     """
     fuller: list[bool] = []
 

@@ -34,7 +34,7 @@ _HARD = frozenset({".", "!", "?", ";"})
 
 @dataclass(frozen=True, slots=True)
 class Composed:
-    """What a reading means.
+    """The meaning of a reading.
 
     Attributes:
         intents: in the order of doing; empty where ``stop`` says why.
@@ -319,7 +319,7 @@ class _Composer:
 
 
 def compose(sentence: Sentence, reading: Reading) -> Composed:
-    """Return what a reading means."""
+    """Return the meaning of a reading."""
     composer = _Composer(sentence, notes=_without_effect(sentence))
     stop: Refuse | Clarify | None = None
     try:

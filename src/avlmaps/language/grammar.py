@@ -204,7 +204,7 @@ def _firsts(rules: Mapping[str, tuple[Template, ...]]) -> dict[str, tuple[frozen
         return known[name]
 
     def of(part: Part) -> tuple[frozenset[str], bool]:
-        """Return what a part can begin with, and whether it may be empty."""
+        """Return the words that a part can begin with, and whether it may be empty."""
         if part.kind == "rule":
             return of_rule(part.name), False
         if part.kind in ("word", "class"):

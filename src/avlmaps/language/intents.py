@@ -1,4 +1,4 @@
-"""What a command or a question asks for: plain, typed values between the words and the program.
+"""The intents of a command or a question: plain, typed values between the words and the program.
 
 `Target` names one thing, sound, area or file of the map. An `Intent` is one step of a command. Angles are in degrees,
 clockwise (positive is to the right); distances are in metres.
@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 
 class Kind(StrEnum):
-    """What a target is; the value is its key in JSON."""
+    """The kind of a target; the value is its key in JSON."""
 
     OBJECT = "object"
     SOUND = "sound"
@@ -157,7 +157,7 @@ class StopAt:
 
 @dataclass(frozen=True, slots=True)
 class Circle:
-    """Drive around a target, once; with ``views`` stop at so many points and look at it."""
+    """Drive around a target, once; with ``views`` stop at this many points and look at it."""
 
     do: ClassVar[str] = "circle"
     of: Target
@@ -242,7 +242,7 @@ def _inner(value: Any) -> Any:
 
 
 class Ask(StrEnum):
-    """What a question wants to know of a target."""
+    """The kind of a question about a target."""
 
     WHERE = "where"
     HOW_MANY = "how_many"

@@ -128,7 +128,7 @@ def tokenise(sentence: str) -> list[Token]:
 
 
 def _is_minus(text: str, at: int) -> bool:
-    """Return whether a hyphen is the sign of a number; what a negative angle or distance means is asked."""
+    """Return whether a hyphen is the sign of a number; a negative angle or distance leads to a question back."""
     return (at == 0 or text[at - 1] in " =") and text[at + 1 : at + 2].isdigit()
 
 

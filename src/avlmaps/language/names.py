@@ -1,7 +1,7 @@
 """Names of things, rooms and sounds in a sentence: which words of it make one, and at what cost.
 
 A name costs nothing where the lexicon knows it, a little for each word before its head that is no usual adjective, and
-much where its head is unknown; a misspelt head is mended where one word is clearly nearest.
+much where its head is unknown; a misspelt head is corrected where one word is clearly nearest.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -19,7 +19,7 @@ _ADJECTIVE, _OPEN_WORD, _SIDE, _MENDED, _UNKNOWN = 0.02, 0.45, 0.25, 0.9, 1.6
 _VERB_ALONE = 0.5
 _ENCODED = 0.8  # only the map's encoder knows it
 _NOUN = 0.1  # a noun before a noun; a second one costs four times as much
-_ALIKE, _APART = 0.78, 0.08  # a misspelt word is at least so much like its neighbour, and so much less like the next
+_ALIKE, _APART = 0.78, 0.08  # least likeness of a misspelt word to its neighbour, and its lead over the next
 _ONLY_ROOMS = frozenset({"room", "area", "zone", "hall", "corner"})
 Found = list[tuple[int, float, Target]]
 
@@ -180,7 +180,7 @@ class Names:
         return found
 
     def _objects(self, words: list[str]) -> list[tuple[int, float, str]]:
-        """Return what may follow a sounding verb: "on the door", "a guitar", "keyboard"."""
+        """Return the words that may follow a sounding verb: "on the door", "a guitar", "keyboard"."""
         if words[:2] == ["for", "help"]:
             return [(2, 0.0, "for help")]
         at = 1 if words[:1] and words[0] in ("on", "at", "against", "with", "into") else 0

@@ -65,7 +65,7 @@ _MEANING = frozenset({"not", "no", "without", "except", "never", "unless", "or",
 
 @dataclass(frozen=True, slots=True)
 class AskedSentence:
-    """What a sentence asks the map.
+    """The query of a sentence.
 
     Attributes:
         inquiry: what is to be known, of which targets.
@@ -91,7 +91,7 @@ def parse_sentence(sentence: str) -> Question:
 
 
 def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
-    """Return what a sentence asks.
+    """Return the query of a sentence.
 
     Raises:
         QueryError: the sentence is empty, too long, or not understood; it says which words.
@@ -121,7 +121,7 @@ def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
         else:
             raise QueryError(f"{words} is not understood; say it like: {_EXAMPLE}.")
         if any(one.pick in (Pick.FARTHEST, Pick.OTHER) for one in targets):
-            question = f"'{targets[0].pick} {targets[0].name}' cannot be asked of a map; say what it is near."
+            question = f"A map cannot choose '{targets[0].pick} {targets[0].name}'; say what it is near."
             raise UnresolvedError(Clarify(question))
     except UnresolvedError as fault:
         raise QueryError(fault.question.question) from None
@@ -169,7 +169,7 @@ def _best(read: Sentence) -> tuple[float, Tree | None, str]:
 
 
 def _skip(read: Sentence, at: int) -> float:
-    """Return what it costs to leave out a token."""
+    """Return the cost of leaving out a token."""
     if read.tokens[at].kind == "punct":
         return 0.02
     for before in range(max(0, at - 4), at + 1):

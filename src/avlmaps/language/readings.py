@@ -24,11 +24,11 @@ _WISHES = tuple([who, wish, "to"] for who in ("i", "we") for wish in ("want", "n
 _INTERJECTION, _CLAUSE, _FUNCTIONAL = 0.9, 0.7, 1.4
 _PREPOSITIONS = frozenset({"of", "for", "from", "to", "at", "with", "in", "on"})
 _SPEAKERS = frozenset({"i", "we", "one"})
-_LEADS = frozenset({"to", "you", "u", "and", "if", "that"})  # how a wish goes on
+_LEADS = frozenset({"to", "you", "u", "and", "if", "that"})  # the words after a wish
 _AFTER_REMARK = ("so", "and", "but", "please", "go", "can", "could", "take", "show", "bring", "turn", "drive", "head")
 _AUXILIARIES = frozenset({"has", "have", "is", "was", "are", "were", "just", "been", "it", "goes"})
 _SKIP, _SKIP_MARK, _SKIP_MEANING, _ORDER = 2.6, 0.05, 6.0, 0.3
-_LISTED = 0.6  # a name alone costs so much less where an order goes before
+_LISTED = 0.6  # a name alone costs this much less where an order goes before
 _COURTESY, _COURTESY_WORD, _IDLE = 0.3, 0.05, 0.45
 _MOST_COURTESIES = 14
 _SILENT = frozenset({"THEN", "BUT", "mark", "POLITE", "GREETING", "FILLER", "INSTEAD_END", "courtesy"})
@@ -179,7 +179,7 @@ _JOINS = {
 
 
 def _steps(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | None, bool]]:
-    """Yield what may begin at a token: the item, its cost, whether a clause may follow, whether it begins one."""
+    """Yield the items that may begin at a token: item, cost, whether a clause may follow, whether it begins one."""
     chart, tokens = sentence.chart, sentence.tokens
     for rule, cost, fresh, needs in _RULES:
         for edge in chart.edges(rule, at):

@@ -32,11 +32,11 @@ class RulesTranslator:
     name = "rules"
 
     def __init__(self, given: Given | None = None) -> None:
-        """Take what came along with the commands."""
+        """Take the files and names that came along with the commands."""
         self.given = given or Given()
 
     def read(self, command: str) -> Command:
-        """Return what a command means, with all readings that were weighed."""
+        """Return the meaning of a command, with all readings that were weighed."""
         return read_command(command, self.given)
 
     def program_for(self, command: str) -> Translation:

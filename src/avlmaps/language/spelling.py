@@ -1,7 +1,7 @@
 """Misspelt words of a sentence: letters that are drawn out, words written as they sound, single wrong letters.
 
 A word that neither the grammar nor the lexicon has becomes the one known word that is a single letter away; where
-several are, it stays as it is, and its name is asked about later.
+several are, it stays as it is, and its name leads to a question back later.
 """
 
 import re

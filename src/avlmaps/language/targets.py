@@ -22,7 +22,7 @@ class UnresolvedError(Exception):
 
 @dataclass(slots=True)
 class Memory:
-    """What was named, in order, for "it", "there", "the two" and "the other one".
+    """The named things, in order, for "it", "there", "the two" and "the other one".
 
     Attributes:
         targets: things, sounds, areas and files, the last named last.
@@ -147,7 +147,7 @@ def _last_area(memory: Memory) -> Target:
 
 
 def _as_room(target: Target) -> Target:
-    """Return what something is in: a toilet as the room."""
+    """Return a target whose word names a thing and a room, such as a toilet, as the room."""
     is_room = target.kind is Kind.OBJECT and target.name in _ROOMS_OF_THINGS
     return replace(target, kind=Kind.AREA) if is_room else target
 
@@ -173,7 +173,7 @@ def _noun(value: Tree, memory: Memory) -> Target:
 
 @cache
 def _choices() -> frozenset[str]:
-    """Return the words that choose one of several in a way that a map cannot tell."""
+    """Return the words that choose one of several by a property that a map does not hold."""
     return frozenset(load_grammar().lists["choices"].split())
 
 

@@ -1,4 +1,4 @@
-"""What every way from a command to a program has in common."""
+"""The interface of every translator from a command to a program."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

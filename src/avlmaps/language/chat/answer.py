@@ -25,7 +25,7 @@ class UnusableAnswerError(LanguageError):
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a model answered.
+    """The answer of a model.
 
     Attributes:
         content: its text, empty where it gave none.

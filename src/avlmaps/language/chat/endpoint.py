@@ -29,7 +29,7 @@ _MOST_ERROR_BYTES = 1 << 16
 _MOST_MODELS_WAIT_S = 10.0
 _SHORTEST_KEY = 8
 _BUSY = frozenset({408, 425, 429, 500, 502, 503, 504, 529})
-# What the client adds for the hosted service alone; the one it reads back from its own request has to stay.
+# Headers that the client adds for the hosted service alone; the one it reads back from its own request has to stay.
 _FOR_THE_HOSTED = re.compile(r"openai-(?:organization|project)|x-stainless-(?!raw-response)")
 
 
@@ -235,7 +235,7 @@ def _read(chunks: Iterator[bytes], most: int, deadline: float) -> bytes:
 
 
 def _endpoint_fault(fault: Exception) -> EndpointFault:
-    """Return what an error of the client or of its HTTP library means."""
+    """Return the meaning of an error of the client or of its HTTP library."""
     causes: list[BaseException] = [fault]
     while (cause := causes[-1].__cause__ or causes[-1].__context__) is not None and cause not in causes:
         causes.append(cause)

@@ -1,4 +1,4 @@
-"""What servers of the chat protocol answer: completions, lists of models and errors, read strictly and forgivingly.
+"""The answers of servers of the chat protocol: completions, lists of models and errors, read strictly and forgivingly.
 
 Strictly, since a garbled answer must not become a program; forgivingly, since servers differ in all that does not
 matter here (extra fields, missing counts, text in parts, three shapes of an error).

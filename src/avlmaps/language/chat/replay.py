@@ -88,7 +88,7 @@ class Replay:
         return self._lines[0].model if self._lines else None
 
     def answer(self, request: Request) -> Answer:
-        """Return what was answered to this very request.
+        """Return the recorded answer to this very request.
 
         Raises:
             LanguageError: it was never made; what differs is said.

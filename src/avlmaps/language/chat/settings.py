@@ -12,7 +12,7 @@ from urllib.parse import SplitResult, urlsplit
 from avlmaps.core.errors import LanguageError
 
 HOSTED_URL = "https://api.openai.com/v1"
-# What servers on the same machine are sent, who ask for no key; the client insists on one.
+# The key for servers on the same machine, which need none; the client insists on one.
 NO_KEY = "none"
 _PREFIX = "AVLMAPS_CHAT_"
 

@@ -129,7 +129,7 @@ class ChatTranslator:
         return self._endpoint
 
     def _notes(self, model: str, corrected: Sequence[str], read: int, written: int) -> tuple[str, ...]:
-        """Return what a person should know of how a program came about."""
+        """Return the notes on how a program came about."""
         replay = self._replay
         replayed = replay is not None and not replay.recording
         where = f"replayed from {replay.path}" if replay and replayed else f"at {self._settings.shown_url}"

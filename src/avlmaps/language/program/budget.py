@@ -1,4 +1,4 @@
-"""What a program may use up before it is stopped, and the sentence that says so."""
+"""The limits of a program, and the sentence of a program that was stopped."""
 
 from dataclasses import dataclass, fields
 
@@ -12,7 +12,7 @@ def refused(line: int, text: str) -> ProgramError:
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """What one run of a program may use up; running past any of them stops it."""
+    """The limits of one run of a program; running past any of them stops it."""
 
     steps: int = 100_000
     """Parts of the program that are computed; going through a collection counts each of its elements."""

@@ -31,7 +31,7 @@ _MOST_PASSES = 6
 
 
 class Unsure(Enum):
-    """What is known of the kind of a value where that is no one kind."""
+    """The possible kinds of a value where that is no one kind."""
 
     ANYTHING = auto()
     NOT_YET = auto()

@@ -79,7 +79,7 @@ _LINE_START = re.compile(r"([ \t]*)((?:#[^\n]*)?)")
 
 
 class Form(Enum):
-    """What a token is."""
+    """The kind of a token."""
 
     NAME = auto()
     WORD = auto()
@@ -132,7 +132,7 @@ def tokens_of(text: str) -> list[Token]:
 
 
 def _check_characters(text: str) -> None:
-    # What is invisible or turns the direction of writing can hide what a line does.
+    # Characters that are invisible or turn the direction of writing can hide what a line does.
     found = next((found for found in UNSAFE.finditer(text) if found.group() not in "\n\t"), None)
     if found:
         line = text.count("\n", 0, found.start()) + 1

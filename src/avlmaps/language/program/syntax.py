@@ -1,4 +1,4 @@
-"""What a program is made of: a few frozen parts, and nothing that reaches outside them."""
+"""The parts of a program: a few frozen types, and nothing that reaches outside them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -133,7 +133,7 @@ class Element:
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """What one parameter of a skill is given.
+    """The argument of one parameter of a skill.
 
     Attributes:
         parameter: the name in the skill's signature.
@@ -191,7 +191,7 @@ Expression = (
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What is given a value: one name, or several that a collection is taken apart into."""
+    """The left side of an assignment: one name, or several that a collection is taken apart into."""
 
     names: tuple[str, ...]
     unpacks: bool

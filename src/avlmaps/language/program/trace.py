@@ -1,4 +1,4 @@
-"""What a program did: each skill that it called, what came of it, and how it ended."""
+"""The trace of a program: each skill that it called, its result, and how the program ended."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What a run of a program did.
+    """The trace of one run of a program.
 
     Attributes:
         steps: the skills that it called, in their order, a failed one last.
@@ -85,7 +85,7 @@ class Trace:
 
 
 def told(content: Any) -> str:
-    """Return what a trace shows of a value as a person reads it."""
+    """Return a value of a trace as a person reads it."""
     match content:
         case {"place": coordinates}:
             return f"({', '.join(f'{value:.2f}' for value in coordinates)})"

@@ -82,7 +82,7 @@ def size_of(line: int, value: Value, most: int) -> int:
 
 
 def combined(line: int, operator: str, left: Any, right: Any, factors: int) -> Value:
-    """Return what an arithmetic operator makes of two values.
+    """Return the result of an arithmetic operator on two values.
 
     Args:
         line: where it stands.
@@ -159,7 +159,7 @@ def is_among(value: Any, collection: list[Any] | tuple[Any, ...] | range) -> boo
 
 
 def call_function(line: int, function: str, arguments: list[Any]) -> Value:
-    """Return what one of the functions returns; its arguments are of kinds that it takes."""
+    """Return the result of one of the functions; its arguments are of kinds that it takes."""
     match function:
         case "len":
             return len(arguments[0])
@@ -197,7 +197,7 @@ def _rounded(line: int, arguments: list[Any]) -> int | float:
 
 
 def handed_on(value: Value) -> Any:
-    """Return what a skill is given for a value: the heatmap itself; floats, since signatures have no whole numbers."""
+    """Return a skill's argument for a value: the heatmap itself; floats, since signatures have no whole numbers."""
     if isinstance(value, Made):
         return value.heat
     return float(value) if type(value) is int else value

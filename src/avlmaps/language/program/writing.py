@@ -207,7 +207,7 @@ class _Writer:
         return self.names[target]
 
     def value(self, target: Target) -> str:
-        """Return what a skill is given for a target: a phrase, a heatmap's best place, or its variable."""
+        """Return a skill's argument for a target: a phrase, a heatmap's best place, or its variable."""
         if target.kind is Kind.HERE:
             return "robot.current_pos()"
         if target in self.names or self.repeats[target] > 1 or target.pick in (Pick.OTHER, Pick.FARTHEST):
