@@ -236,18 +236,18 @@ def run() -> dict[str, dict[str, list[Any]]]:
     columns = ["list", "sentences", *OUTCOMES]
     first, now = [], []
     parts = {"commands": False, "questions": True}
-    at_first_use = {part: Counter[str]() for part in parts}
+    at_first_use: dict[str, Counter[str]] = {}  # each round met another parser, so they are not added up
     every: list[Judged] = []
     for name, seal in sealed().items():
         if "first use" not in seal:
             continue  # sealed, not yet used
         for part, at_first in seal["first use"].items():
-            at_first_use[part].update(at_first)
+            at_first_use.setdefault(f"{seal['round']}, {part}", Counter()).update(at_first)
             first.append(_counted(f"{name}, {part}", at_first))
         judged = [judge(row) for row in shipped(name)]
         every += judged
         now += [row_of(f"{name}, {part}", these) for part, these in _by_part(judged, parts).items() if these]
-    first += [_counted(f"all, {part}", count) for part, count in at_first_use.items()]
+    first += [_counted(name, count) for name, count in at_first_use.items()]
     now += [row_of(f"all, {part}", these) for part, these in _by_part(every, parts).items()]
     return {
         "blind, at first use": {"columns": columns, "rows": first},
