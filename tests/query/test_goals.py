@@ -86,6 +86,23 @@ def test_a_goal_on_a_thing_is_one_of_its_own_voxels(seed) -> None:
         assert goal.parts["object"] == pytest.approx(1.0)
 
 
+@given(st.floats(0.3, 0.9))
+def test_a_goal_is_on_the_thing_where_the_context_ends_beside_it(reach_m) -> None:
+    thing, floor = np.array([[k, 0, 0] for k in range(4)]), np.array([[k, 0, 0] for k in range(4, 40)])
+    space = Space(GridSpec(0.05), np.concatenate([thing, floor]).astype(np.int32), np.array([0.0, 0.0, 1.0]))
+    mask = np.arange(len(space)) < len(thing)
+    chair = NearThings(
+        space, Part(Modality.OBJECT, "chair", Role.PRIMARY), 2.0, mask, np.zeros(4, np.int64), np.ones(1), True
+    )
+    place = np.array([[0.2 + reach_m, 0.0, 0.0]])  # its cone ends between the thing and the floor's warm part
+    sound = NearAnchors(
+        space, Part(Modality.SOUND, "dog"), 1.0 / reach_m, place, np.ones(1), np.zeros(1, np.int64), True
+    )
+    heat = Heatmap.of(chair) * Heatmap.of(sound)
+    for goal in heat.goals():
+        assert goal.position[0] == pytest.approx(0.175)
+
+
 def test_a_sound_alone_is_put_where_it_was_heard_not_at_any_height() -> None:
     m = AVLMap(furnished_map(sounds=sounds_of([track(1.0, 2.0, z=1.3), track(4.0, 1.0, z=0.9)], [0.9, 0.7])))
     first, second = m.sound("dog", primary=True).goals(top=5)

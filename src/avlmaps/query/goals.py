@@ -158,6 +158,9 @@ def _place_on_thing(lead: NearThings, shares: Shares, instance: int) -> Float[np
     """Return the voxel in the middle of the hot part of a thing, never one beside it."""
     share = np.flatnonzero(shares.instance == instance)
     on_it = share[lead.mask[shares.rows[share]]]
+    if not len(on_it):  # the context reaches beside the thing, and ends before it
+        hottest = shares.rows[share[[np.argmax(shares.heat[share])]]]
+        return lead.anchors[lead.anchor_of(hottest)[0]]
     heat = shares.heat[on_it]
     hot = shares.points[on_it[heat >= _NEARLY * heat.max()]]
     return hot[np.argmin(np.linalg.norm(hot - hot.mean(axis=0), axis=1))]
