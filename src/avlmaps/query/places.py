@@ -9,17 +9,16 @@ from msgspec import Meta
 from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME
 from avlmaps.core.question import Modality, Part, Role
-from avlmaps.perception.protocols import NamedPixelEncoder, NamedViewEncoder
+from avlmaps.perception.protocols import NamedViewEncoder
 from avlmaps.query.factors import NearThings
 from avlmaps.query.modalities.area import AREA_NAMES, area_distribution
+from avlmaps.query.naming import VoxelNamer, keyframes_that_saw
 from avlmaps.query.schema import Frame, Position
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
 
 MOST_NAMES = 5
-# A camera whose axis turns farther away from a place than this did not show it; half a wide lens.
-_HALF_VIEW_RAD = 0.7
 _MOST_VIEWS = 5
 _FAR_M = 1000.0
 
@@ -32,7 +31,7 @@ class NameScore(TypedDict):
 
 
 class ViewOfPlace(TypedDict):
-    """A keyframe whose camera looked at the place."""
+    """A keyframe whose camera saw the place."""
 
     time_s: float
     camera: Position
@@ -51,7 +50,7 @@ class PlaceAnswer(TypedDict):
     last_seen_s: Annotated[float | None, Meta(description="seconds from the start of the recording")]
     hits: Annotated[int, Meta(description="number of pixels that fell into the voxels")]
     rooms: Annotated[list[NameScore], Meta(description="kinds of room that the nearest views show, best first")]
-    views: Annotated[list[ViewOfPlace], Meta(description="keyframes that looked here, nearest first")]
+    views: Annotated[list[ViewOfPlace], Meta(description="keyframes that saw the voxel nearest to it, nearest first")]
     frame: Frame
 
 
@@ -111,27 +110,23 @@ def describe_place(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: fl
         "last_seen_s": seen,
         "hits": int(np.asarray(voxels.hits)[rows].sum()),
         "rooms": _rooms(avlmap, point),
-        "views": _views(avlmap, point),
+        "views": _views(avlmap, int(rows[0])) if len(rows) else [],
         "frame": FRAME,
     }
 
 
 def _names(avlmap: "AVLMap", rows: Int[np.ndarray, " m"]) -> list[NameScore]:
-    """Return the names with the highest mean probability over some voxels."""
+    """Return the names with the highest mean confidence over some voxels."""
     if not len(rows) or "pixels" not in avlmap.stored.info.models:
         return []
-    encoder, rivals = avlmap.stored.profile.pixel_encoder(), avlmap.rivals()
-    feature = np.asarray(avlmap.stored.voxels.feature[rows], np.float32)
-    feature = feature[np.any(feature != 0.0, axis=1)]
-    if not len(feature) or not len(rivals.words):
+    namer = VoxelNamer(avlmap)
+    confidence = namer.confidences(rows)
+    some = confidence[confidence.any(axis=1)]
+    if not len(some):
         return []
-    score = feature @ rivals.word_feature.T
-    if isinstance(encoder, NamedPixelEncoder):
-        confidence = np.square(np.maximum(score, 0.0)).mean(axis=0)  # the scores are roots of probabilities
-    else:
-        confidence = np.maximum(score.mean(axis=0), 0.0)
-    order = [i for i in np.argsort(-confidence, kind="stable") if rivals.words[i] != "other"][:MOST_NAMES]
-    return [{"name": rivals.words[i], "confidence": round(float(min(confidence[i], 1.0)), 3)} for i in order]
+    mean = some.mean(axis=0)
+    order = [i for i in np.argsort(-mean, kind="stable") if namer.names[i] != "other"][:MOST_NAMES]
+    return [{"name": namer.names[i], "confidence": round(float(mean[i]), 3)} for i in order]
 
 
 def _rooms(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[NameScore]:
@@ -153,24 +148,18 @@ def _rooms(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[NameScore]:
     return [{"name": names[i], "confidence": round(float(np.clip(share[i], 0.0, 1.0)), 3)} for i in order]
 
 
-def _views(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[ViewOfPlace]:
-    """Return the keyframes whose camera looked towards a point; what stands between is not looked at."""
+def _views(avlmap: "AVLMap", row: int) -> list[ViewOfPlace]:
+    """Return the keyframes that saw a voxel."""
     keyframes = avlmap.stored.keyframes
-    if not len(keyframes):
-        return []
-    poses = np.asarray(keyframes.world_from_camera, np.float64)
-    ray = point - poses[:, :3, 3]
-    away = np.linalg.norm(ray, axis=1)
-    ahead = np.einsum("ij,ij->i", ray, poses[:, :3, 2]) / np.maximum(away, 1e-9)
-    rows = np.flatnonzero(ahead >= np.cos(_HALF_VIEW_RAD))
-    rows = rows[np.argsort(away[rows], kind="stable")][:_MOST_VIEWS]
+    point = avlmap.space.centres[row]
+    cameras = np.asarray(keyframes.world_from_camera, np.float64)[:, :3, 3]
     return [
         {
-            "time_s": float(keyframes.stamp_s[i]),
-            "camera": [float(value) for value in poses[i, :3, 3]],
-            "distance_m": float(away[i]),
+            "time_s": float(keyframes.stamp_s[k]),
+            "camera": [float(value) for value in cameras[k]],
+            "distance_m": float(np.linalg.norm(point - cameras[k])),
         }
-        for i in rows
+        for k in keyframes_that_saw(avlmap, row)[:_MOST_VIEWS]
     ]
 
 

@@ -13,9 +13,9 @@ of a ``lanes.Lane``. ``guard`` stands before everything: Host, Origin, token, si
 It needs no checks of its own: a request reaches it only through the guard. It runs blocking work with
 ``await service.slow.run(lambda watch: ...)`` (bounded queue, time limit, ``watch.step`` for progress), or in a lane of
 its own, ``Lane("drive", workers=1, waiting=0, answer_s=600.0)``. It turns errors into the server's JSON with
-``error_response(service, error)``; ``RequestError(sentence, status, kind)`` is an error of its own. Maps come from
-``service.shelf.get(name)``: take one at the beginning of a piece of work and keep it to the end. Further tools for
-agents are ``AgentTool`` values: ``create_app(service, tools=(*TOOLS, drive_tool))``, and likewise ``serve_stdio``;
+``responses.error_response(service, error)``; ``RequestError(sentence, status, kind)`` is an error of its own. Maps come
+from ``service.shelf.get(name)``: take one at the beginning of a piece of work and keep it to the end. Further tools
+for agents are ``AgentTool`` values: ``create_app(service, tools=(*TOOLS, drive_tool))``, and likewise ``serve_stdio``;
 those that move something say ``read_only=False``.
 """
 
