@@ -13,6 +13,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
+    from avlmaps.serve.drive.opening import Driving
     from avlmaps.serve.service import Service
 
 _PACKAGES = ("starlette", "uvicorn", "multipart", "python_multipart", "mcp", "mcp_types", "anyio")
@@ -31,6 +32,7 @@ class Serve(ModelVerb):
     curl -G http://127.0.0.1:8750/maps/home/ask --data-urlencode "sentence=the chair near the table"
     avlmaps serve home.avlmap office=/data/day2.avlmap --host 0.0.0.0 --token-file token.txt
     avlmaps serve home.avlmap --stdio
+    avlmaps serve home.avlmap --drive robot.json
     """
 
     compiles: ClassVar[bool] = True
@@ -54,8 +56,17 @@ class Serve(ModelVerb):
     allow_host: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = ()
     """A further name of this server in the Host header, such as that of a reverse proxy; may be repeated."""
 
+    drive: Annotated[Path | None, arg(metavar="ROBOT.json")] = None
+    """Drive the robot of this file as well: plans, confirmations and stops under /drive, every order logged."""
+    drive_log: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Log of orders, for --drive. Default: $XDG_STATE_HOME/avlmaps/orders.jsonl."""
+
     def run(self) -> None:
         """Serve."""
+        if self.stdio and self.drive is not None:
+            raise UsageError("--drive is served by HTTP, not by --stdio; leave one of them out.")
+        if self.drive_log is not None and self.drive is None:
+            raise UsageError("--drive-log belongs to --drive.")
         if self.stdio and self.json:
             raise UsageError("--stdio speaks a protocol on standard output, so --json cannot be used with it.")
         try:
@@ -91,20 +102,41 @@ def serve(verb: "Serve") -> None:
     with listening_socket(settings) as opened:
         service = Service.open(maps, settings, say)
         url = url_of(settings, opened)
+        driving = _driving(verb, service)
 
         def started() -> None:
             names = list(service.shelf.names)
             lines = [f"serving {', '.join(names)} at {url} (operations: {url}/, agents: {url}/mcp)"]
             if not settings.is_loopback and settings.scheme == "http":
                 say("note: the token goes over the network unencrypted; give --tls-cert and --tls-key for https.")
-            emit(
-                {"url": url, "mcp": f"{url}/mcp", "maps": names, "token": settings.token is not None}, lines, verb.json
-            )
+            answer = {"url": url, "mcp": f"{url}/mcp", "maps": names, "token": settings.token is not None}
+            if driving is not None:
+                lines.append(f"driving {driving.robot} at {url}/drive (agents: {url}/drive/mcp, log: {driving.log})")
+                answer |= {"drive": f"{url}/drive", "robot": driving.robot, "log": str(driving.log)}
+            emit(answer, lines, verb.json)
 
         try:
-            run_http(create_app(service), service, opened, started)
+            if driving is None:
+                run_http(create_app(service), service, opened, started)
+            else:
+                app = create_app(service, driving.mounts, driving.lifespans)
+                run_http(app, service, opened, started, driving.ending)
         finally:
+            if driving is not None:
+                driving.dispatcher.close()
             service.close()
+
+
+def _driving(verb: "Serve", service: "Service") -> "Driving | None":
+    if verb.drive is None:
+        return None
+    from avlmaps.serve.drive.opening import open_driving
+
+    try:
+        return open_driving(verb.drive, service, verb.drive_log)
+    except BaseException:
+        service.close()
+        raise
 
 
 def _serve_stdio(service: "Service") -> None:

@@ -5,7 +5,7 @@ The whole path in one function; a program is data all along, and nothing but the
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter
+from time import perf_counter, sleep
 from typing import Any
 
 import numpy as np
@@ -134,6 +134,7 @@ def instruct(
     readable: Readable | None = None,
     translation: Translation | None = None,
     tell: Callable[[str], None] = _silent,
+    pause: Callable[[float], None] = sleep,
 ) -> Outcome:
     """Do what a command says.
 
@@ -148,13 +149,14 @@ def instruct(
             command names.
         translation: the translator's answer to the command, if it exists already.
         tell: called with each line: the program, what is found, each step.
+        pause: waits for some seconds, for the skill ``wait``.
 
     Raises:
         LanguageError: the command was not understood. All later faults are in the outcome.
     """
     begin = perf_counter()
     translation = translation or translator.program_for(command)
-    robot = Robot(asked, driver, settings, readable or offered_by(command), lambda line: tell(f"  {line}"))
+    robot = Robot(asked, driver, settings, readable or offered_by(command), lambda line: tell(f"  {line}"), pause)
     run = _Run(command, translator, robot, budget, tell)
     run.through(translation)
     run.judge()

@@ -70,6 +70,7 @@ class Robot:
         settings: RobotSettings | None = None,
         readable: Readable | None = None,
         tell: Callable[[str], None] = _silent,
+        pause: Callable[[float], None] = sleep,
     ) -> None:
         """Make a robot.
 
@@ -79,9 +80,11 @@ class Robot:
             settings: how skills are taken.
             readable: which files a program may load; those in the working directory by default.
             tell: is given a line for each thing found, as it happens.
+            pause: waits for some seconds; a rehearsal does not wait, and a stop ends the wait.
         """
         self.asked = asked
         self.driver = driver
+        self._pause = pause
         self.settings = settings or RobotSettings()
         self.seeker = Seeker(asked, self.settings.guess, readable or Readable(), tell)
         self.moves: list[Move] = []
@@ -234,7 +237,7 @@ class Robot:
         """Stand still for some seconds, at most 600."""
         seconds = max(0.0, number_of(duration_s, "wait", _MOST_WAIT_S, "seconds"))
         if self.settings.waits:
-            sleep(seconds)
+            self._pause(seconds)
 
     @property
     def actions(self) -> list[Action]:

@@ -9,6 +9,7 @@ import signal
 import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FrameType
 
 from avlmaps.core.files import read_regular
 from avlmaps.serve.guard import App
@@ -70,7 +71,13 @@ def url_of(settings: ServeSettings, opened: socket.socket) -> str:
     return f"{settings.scheme}://{host}:{opened.getsockname()[1]}"
 
 
-def run_http(app: App, service: Service, opened: socket.socket, started: Callable[[], None]) -> None:
+def run_http(
+    app: App,
+    service: Service,
+    opened: socket.socket,
+    started: Callable[[], None],
+    ending: Callable[[], None] = lambda: None,
+) -> None:
     """Serve until SIGTERM or SIGINT; what runs by then is finished, up to a time.
 
     Args:
@@ -78,6 +85,7 @@ def run_http(app: App, service: Service, opened: socket.socket, started: Callabl
         service: its service.
         opened: a bound socket.
         started: is called when the server answers.
+        ending: is called at the signal, before what runs is finished.
 
     Raises:
         ServeError: the TLS files cannot be used.
@@ -96,6 +104,10 @@ def run_http(app: App, service: Service, opened: socket.socket, started: Callabl
                 with contextlib.suppress(NotImplementedError, RuntimeError):  # Windows, or a thread of a test
                     loop.add_signal_handler(one, self.handle_exit, one, None)
             yield
+
+        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            ending()
+            super().handle_exit(sig, frame)
 
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
             await super().startup(sockets)

@@ -147,7 +147,7 @@ def _type_name(said: str) -> str:
     """Return numpy's name of a type; what a damaged manifest says, as it stands there."""
     try:
         return str(np.dtype(said))
-    except TypeError:
+    except (TypeError, ValueError, SyntaxError):
         return said[:_QUOTED]
 
 

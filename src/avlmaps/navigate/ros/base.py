@@ -159,6 +159,21 @@ class RosDriver(ABC):
         still = contact.stands_still(self.settings.cancel_timeout_s)
         return self._arrival(still, track, "" if still else "The robot was stopped, but its pose changes or is lost")
 
+    def fault(self) -> str:
+        """Return why the robot cannot be driven now, in part of a sentence; "" where it can.
+
+        A lost connection is made again, and a guard that ended is started again.
+        """
+        try:
+            self._contact.renew()
+        except NavigationError as fault:
+            return str(fault)
+        if self._contact.pose_within(self.settings.pose_max_age_s) is None:
+            return f"its pose is not known: {self._contact.unseen()}"
+        if self.guard is not None and not self.guard.revived():
+            return "the guard, which cancels its goals when this program dies, cannot be started"
+        return ""
+
     def halt(self) -> Halt:
         """Return whether the robot stands after an interrupt, which has cancelled the goal that was active.
 

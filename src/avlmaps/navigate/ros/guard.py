@@ -56,6 +56,12 @@ class Guard:
         """Whether the guard runs."""
         return self._process.poll() is None
 
+    def revived(self) -> bool:
+        """Start the guard again where it ended; return whether it runs."""
+        if not self.stands:
+            self._start()
+        return self.stands
+
     def beat(self) -> None:
         """Report that a goal is active and watched; a guard that has done its work, or died, is started again."""
         if not self.stands:

@@ -1,0 +1,93 @@
+"""A program run on the map alone, before any robot moves: where it would go, and whether it can be done at all."""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved
+from avlmaps.language.program import Budget
+from avlmaps.language.rules import RulesTranslator
+from avlmaps.language.translator import Translation
+from avlmaps.maps.obstacles import Obstacles
+from avlmaps.navigate.bodies import BASE, BodyShape
+from avlmaps.navigate.driver import MapDriver
+from avlmaps.navigate.file_access import Readable
+from avlmaps.navigate.instruct import Outcome, instruct
+from avlmaps.navigate.skills import RobotSettings
+from avlmaps.query.avlmap import AVLMap
+
+NO_FILES = Readable((), ())
+"""A program may load no file."""
+
+
+class FreeBody:
+    """A body without a world: every movement is done exactly."""
+
+    def __init__(self, pose: GroundPose) -> None:
+        """Put it at a pose of the level frame."""
+        self.pose = pose
+
+    def act(self, action: Action) -> Moved:
+        """Take one of the paper's actions."""
+        if action is Action.FORWARD:
+            self.pose = self.pose.ahead(FORWARD_M)
+        elif action is not Action.STOP:
+            self.pose = self.pose.turned(TURN_RAD if action is Action.LEFT else -TURN_RAD)
+        return Moved(self.pose)
+
+    def drive(self, speed_m_s: float, turn_rad_s: float, duration_s: float) -> Moved:
+        """Move at a velocity for a while; turns first by half."""
+        middle = self.pose.turned(0.5 * turn_rad_s * duration_s)
+        self.pose = middle.ahead(speed_m_s * duration_s).turned(0.5 * turn_rad_s * duration_s)
+        return Moved(self.pose)
+
+
+def rehearse(
+    words: str,
+    translation: Translation,
+    avlmap: AVLMap,
+    obstacles: Obstacles,
+    start: GroundPose,
+    *,
+    shape: BodyShape = BASE,
+    settings: RobotSettings | None = None,
+    budget: Budget | None = None,
+    readable: Readable = NO_FILES,
+    tell: Callable[[str], None] = lambda _: None,
+) -> Outcome:
+    """Run a program on the map with a body that nothing meets; waits take no time.
+
+    Args:
+        words: the command; "" where there is only a program.
+        translation: its program.
+        avlmap: the map.
+        obstacles: of the map, for the shape.
+        start: where the robot stands, level frame.
+        shape: of the body.
+        settings: how the robot takes its skills.
+        budget: of the program.
+        readable: which files the program may load.
+        tell: called with each line of progress.
+    """
+    driver = MapDriver(obstacles, FreeBody(start), shape)
+    return instruct(
+        words, avlmap, driver, RulesTranslator(), budget, settings=settings, readable=readable,
+        translation=translation, tell=tell, pause=lambda _: None,
+    )  # fmt: skip
+
+
+def path_in_world(outcome: Outcome, avlmap: AVLMap, floor_m: float, most: int = 500) -> Float[np.ndarray, "n 3"]:
+    """Return the path of an outcome in the recording frame, thinned evenly.
+
+    Args:
+        outcome: of a rehearsal or a drive.
+        avlmap: the map.
+        floor_m: level height of the floor.
+        most: at most this number of points; the first and the last are always there.
+    """
+    xy = outcome.path
+    if len(xy) > most:
+        xy = xy[np.unique(np.linspace(0, len(xy) - 1, most).round().astype(int))]
+    level = np.column_stack([xy, np.full(len(xy), floor_m)])
+    return np.array([avlmap.space.world(point) for point in level]).reshape(-1, 3)

@@ -1,0 +1,411 @@
+"""What may move the robot: one order at a time, planned on the map, confirmed by its token, stopped by anyone, logged.
+
+The only way to a movement is `Dispatcher.confirm` with a token that `Dispatcher.plan` made. Words from maps, photos and
+questions never get there by themselves: nothing here reads an order out of anything but the request for a plan.
+"""
+
+import logging
+import secrets
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import degrees
+from time import monotonic
+from typing import Any
+
+import numpy as np
+
+from avlmaps.core.errors import AvlmapsError, NavigationError
+from avlmaps.core.motion import GroundPose, wrap_angle
+from avlmaps.core.poses import FRAME
+from avlmaps.core.printable import printable
+from avlmaps.language.commands import Given
+from avlmaps.language.program import Budget, parse_program
+from avlmaps.language.rules import RulesTranslator, UnclearError
+from avlmaps.language.translator import Translation
+from avlmaps.navigate.instruct import Outcome, instruct
+from avlmaps.navigate.rehearsal import NO_FILES, path_in_world, rehearse
+from avlmaps.navigate.skills import Robot, RobotSettings
+from avlmaps.serve.drive.brake import Brake
+from avlmaps.serve.drive.order_log import OrderLog
+from avlmaps.serve.drive.plans import DriveError, MapNow, Plan, PlanBook, Who
+from avlmaps.serve.drive.robots import Machine
+
+log = logging.getLogger("avlmaps.serve.drive")
+_REHEARSAL = Budget(seconds=20.0)
+_MOVED_M, _MOVED_RAD = 0.5, 0.35  # a robot that stands elsewhere than its plan begins is not driven by it
+_LONGEST_STOP_S, _STOP_AGAIN_S = 15.0, 0.5
+_MOST_LINES, _LONGEST_LINE = 50, 500
+_KINDS = {"GoalNotFoundError": "goal-not-found", "NavigationError": "navigation", "ProgramError": "program"}
+
+
+@dataclass(slots=True)
+class Order:
+    """A confirmed plan that runs."""
+
+    plan: Plan
+    now: MapNow
+    brake: Brake = field(default_factory=Brake)
+    lines: deque[str] = field(default_factory=lambda: deque(maxlen=_MOST_LINES))
+    thread: threading.Thread | None = None
+
+
+class Dispatcher:
+    """Decides what moves the robot."""
+
+    def __init__(
+        self,
+        machine: Machine,
+        current: Callable[[], MapNow],
+        order_log: OrderLog,
+        *,
+        token_s: float = 60.0,
+        clock: Callable[[], float] = monotonic,
+    ) -> None:
+        """Take a robot.
+
+        Args:
+            machine: the robot.
+            current: returns the map as it is now.
+            order_log: every order is written there before it moves anything.
+            token_s: how long a token is good.
+            clock: seconds, for tokens; replaced in tests.
+        """
+        self._machine, self._current, self._log, self._clock = machine, current, order_log, clock
+        self._book = PlanBook(token_s)
+        self._preparing = threading.Lock()  # plans and confirmations, one at a time; never needed for a stop
+        self._lock = threading.Lock()  # of what follows; never held while something waits
+        self._running: Order | None = None
+        self._last: dict[str, Any] | None = None
+        self._fault = ""
+        self._change = 0
+        self._floor: tuple[str, float] | None = None
+        self._closed = False
+
+    # Planning.
+
+    def connect(self) -> None:
+        """Connect to the robot.
+
+        Raises:
+            NavigationError: it cannot be reached, or cannot stand on the map.
+        """
+        now = self._current()
+        self._machine.prepare(now.avlmap, now.version)
+        if fault := self._machine.fault():
+            raise NavigationError(f"The {self._machine.name} cannot be driven: {fault}.")
+
+    def plan(self, words: str, program: str, who: Who) -> dict[str, Any]:
+        """Plan a command or a program on the map, and return the plan with its token.
+
+        Args:
+            words: a command; "" where there is a program.
+            program: a program; "" where there is a command.
+            who: wants it.
+
+        Raises:
+            DriveError: there is no plan, and so no token; the sentence says why.
+        """
+        try:
+            with self._preparing:
+                self._require_idle()
+                plan = self._planned(words, program)
+        except AvlmapsError as error:
+            refused = _refusal(error)
+            entry = {"who": who.to_json(), "words": words, "program": program}
+            self._note("refused", {**entry, "kind": refused.kind, "outcome": str(refused)})
+            raise refused from None
+        try:
+            self._log.write("planned", {"who": who.to_json(), **plan.to_json()})
+        except NavigationError as error:
+            raise _refusal(error) from None
+        with self._lock:
+            token = self._book.add(plan, self._clock())
+        self._changed()
+        return {**plan.to_json(), "token": token, "expires_in_s": self._book.lifetime_s}
+
+    def _planned(self, words: str, program: str) -> Plan:
+        now = self._current()
+        translation = self._read(words, program, now)
+        obstacles = self._machine.prepare(now.avlmap, now.version)
+        if fault := self._machine.fault():
+            raise NavigationError(f"The robot cannot be driven: {fault.rstrip('.')}.")
+        start = self._machine.pose()
+        outcome = rehearse(
+            words, translation, now.avlmap, obstacles, start, shape=self._machine.shape,
+            settings=self._settings, budget=_REHEARSAL,
+        )  # fmt: skip
+        if outcome.error is not None:
+            kind = _KINDS.get(outcome.error_type or "", "refused")
+            raise DriveError(f"There is no plan: {outcome.error}", 422, kind)
+        path = path_in_world(outcome, now.avlmap, self._floor_m(now))
+        return Plan(
+            order=secrets.token_hex(8),
+            words=words,
+            reading=translation.plan or _reading(outcome),
+            program=translation.program,
+            notes=(*translation.notes, *(note for note in outcome.notes if note not in translation.notes)),
+            path=tuple((round(float(x), 3), round(float(y), 3), round(float(z), 3)) for x, y, z in path),
+            path_m=outcome.path_m,
+            subgoals=tuple(move.to_json() for move in outcome.subgoals),
+            start=start,
+            map=now.name,
+            version=now.version,
+            robot=self._machine.identity,
+        )
+
+    def _read(self, words: str, program: str, now: MapNow) -> Translation:
+        if bool(words.strip()) == bool(program.strip()):
+            raise DriveError("An order is a command (words) or a program, and not both.", 400, "usage")
+        if program.strip():
+            parse_program(program)
+            return Translation(program)
+        return RulesTranslator(Given(knows=now.avlmap.knows)).program_for(words)
+
+    @property
+    def _settings(self) -> RobotSettings:
+        return RobotSettings(guess=self._machine.guess)
+
+    def _floor_m(self, now: MapNow) -> float:
+        if self._floor is None or self._floor[0] != now.version:
+            # A robot that is only queried for the height of its floor.
+            self._floor = now.version, Robot(now.avlmap, _Standing(), self._settings, NO_FILES).floor_m
+        return self._floor[1]
+
+    # Driving.
+
+    def confirm(self, token: str, who: Who) -> dict[str, Any]:
+        """Start the plan of a token.
+
+        Raises:
+            DriveError: nothing is started; the sentence says why.
+        """
+        try:
+            with self._preparing:
+                order = self._begun(token)
+                try:
+                    self._require_ready(order)
+                    self._log.write("confirmed", {"who": who.to_json(), **order.plan.to_json()})
+                    if order.brake.pulled:
+                        raise DriveError("The robot was stopped before the order began; plan again.", 409, "stopped")
+                    order.thread = threading.Thread(target=self._run, args=(order, who), name="avlmaps-order")
+                    order.thread.start()
+                except BaseException:
+                    with self._lock:
+                        self._running = None
+                    raise
+        except AvlmapsError as error:
+            refused = _refusal(error)
+            self._note("refused", {"who": who.to_json(), "kind": refused.kind, "outcome": str(refused)})
+            raise refused from None
+        self._changed()
+        return {"order": order.plan.order, "state": "driving", "reading": order.plan.reading}
+
+    def _begun(self, token: str) -> Order:
+        """Take the token and reserve the robot."""
+        self._require_idle()
+        now = self._current()
+        with self._lock:
+            plan = self._book.take(token, self._clock())
+            if plan.version != now.version or plan.map != now.name:
+                raise DriveError("The map was replaced since the plan was made; plan again.", 409, "map-changed")
+            if plan.robot != self._machine.identity:
+                raise DriveError("The plan was made for another robot; plan again.", 409, "robot-changed")
+            if self._fault:
+                raise DriveError(
+                    f"The robot did not confirm its last stop ({self._fault}); stop it until it does.", 503, "unstopped"
+                )
+            self._book.clear()  # other plans begin where the robot stands now
+            self._running = Order(plan, now)
+            return self._running
+
+    def _require_idle(self) -> None:
+        with self._lock:
+            if self._closed:
+                raise DriveError("The server is ending; it takes no orders.", 503, "ending")
+            if self._running is not None:
+                raise DriveError(
+                    f"The robot is at another order ({self._running.plan.order}); wait for its end, or stop it.",
+                    409,
+                    "busy",
+                )
+
+    def _require_ready(self, order: Order) -> None:
+        self._machine.prepare(order.now.avlmap, order.now.version)
+        if fault := self._machine.fault():
+            raise DriveError(f"The robot cannot be driven: {fault.rstrip('.')}.", 503, "navigation")
+        here, start = self._machine.pose(), order.plan.start
+        turned_rad = abs(wrap_angle(here.heading_rad - start.heading_rad))
+        if here.distance_m(start) > _MOVED_M or turned_rad > _MOVED_RAD:
+            raise DriveError(
+                f"The robot stands {here.distance_m(start):.2f} m from where the plan begins, turned by "
+                f"{degrees(turned_rad):.0f} degrees; plan again.",
+                409,
+                "moved",
+            )
+
+    def _run(self, order: Order, who: Who) -> None:
+        outcome: Outcome | None = None
+        error = "The order ended by a fault of avlmaps; the server's log has the details."
+        try:
+            outcome = instruct(
+                order.plan.words, order.now.avlmap, self._machine.driver(order.brake), RulesTranslator(),
+                settings=self._settings, readable=NO_FILES,
+                translation=Translation(order.plan.program, order.plan.notes, order.plan.reading),
+                tell=lambda line: self._tell(order, line), pause=order.brake.pause,
+            )  # fmt: skip
+        except Exception:
+            log.exception("order %s", order.plan.order)
+            order.brake.pull()
+            self._halt()
+        answer = {"ok": False, "error": error} if outcome is None else outcome.to_json()
+        ended = {
+            "order": order.plan.order,
+            "words": order.plan.words,
+            "stopped": order.brake.pulled,
+            "outcome": answer,
+        }
+        self._note("ended", {"who": who.to_json(), **ended})
+        with self._lock:
+            self._running, self._last = None, ended
+        self._changed()
+
+    def _tell(self, order: Order, line: str) -> None:
+        order.lines.append(printable(line, _LONGEST_LINE))
+        self._changed()
+
+    def _note(self, event: str, entry: dict[str, Any]) -> None:
+        """Log what moves nothing; a log that cannot be written is reported in the server's own."""
+        try:
+            self._log.write(event, entry)
+        except NavigationError as fault:
+            log.error("%s", fault)
+
+    # Stopping.
+
+    def stop(self, who: Who) -> dict[str, Any]:
+        """Stop the robot at once, and forget every plan; never raises."""
+        order = self._brake()
+        stands, note = self._halt()
+        thread, until_s = None if order is None else order.thread, monotonic() + _LONGEST_STOP_S
+        while thread is not None and thread.is_alive() and monotonic() < until_s:
+            thread.join(_STOP_AGAIN_S)
+            if thread.is_alive():  # a goal that was sent in the same instant is cancelled as well
+                stands, note = self._halt()
+        if thread is not None and thread.is_alive():
+            stands, note = False, f"{note}; its program has not ended"
+        with self._lock:
+            self._fault = "" if stands else note
+        name = None if order is None else order.plan.order
+        answer: dict[str, Any] = {"stopped": stands, "note": note, "order": name}
+        self._note("stop", {"who": who.to_json(), **answer})
+        self._changed()
+        return answer
+
+    def brake_now(self) -> None:
+        """Pull the brake without waiting for the robot; `stop` follows."""
+        self._brake()
+
+    def _brake(self) -> Order | None:
+        with self._lock:
+            self._book.clear()
+            if self._running is not None:
+                self._running.brake.pull()
+            return self._running
+
+    def _halt(self) -> tuple[bool, str]:
+        try:
+            return self._machine.stop()
+        except Exception as error:
+            log.exception("stop")
+            return False, f"the stop failed ({printable(error, 200)}); use the robot's own stop"
+
+    def close(self) -> None:
+        """Stop the robot and end its connection."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+        self.stop(Who("server", "shutdown"))
+        self._machine.close()
+        self._log.close()
+
+    # Status.
+
+    @property
+    def change(self) -> int:
+        """A number that grows with each change of the status."""
+        return self._change
+
+    def _changed(self) -> None:
+        with self._lock:
+            self._change += 1
+
+    def status(self) -> dict[str, Any]:
+        """Return what the robot is at."""
+        with self._lock:
+            order, last, fault, waiting = self._running, self._last, self._fault, len(self._book)
+        state = "idle" if order is None else "stopping" if order.brake.pulled else "driving"
+        running = None
+        if order is not None:
+            plan = order.plan
+            running = {
+                "order": plan.order, "words": plan.words, "reading": plan.reading, "program": plan.program,
+                "lines": list(order.lines),
+            }  # fmt: skip
+        return {
+            "state": "unstopped" if fault and order is None else state,
+            "robot": self._machine.name,
+            "real": self._machine.is_real,
+            "pose": self._pose(),
+            "frame": FRAME,
+            "order": running,
+            "last": last,
+            "plans_waiting": waiting,
+            "fault": fault or None,
+        }
+
+    def _pose(self) -> dict[str, Any] | None:
+        try:
+            pose, now = self._machine.pose(), self._current()
+            place = now.avlmap.space.world(np.array([pose.x_m, pose.y_m, self._floor_m(now)]))
+        except AvlmapsError:
+            return None
+        return {
+            "position": [round(float(value), 3) for value in place],
+            "heading_deg": round(degrees(pose.heading_rad), 1),
+        }
+
+
+class _Standing:
+    """A driver that never moves."""
+
+    pose = GroundPose(0.0, 0.0)
+
+    def _refused(self, *_: Any, **__: Any) -> Any:
+        raise NavigationError("This robot only stands.")
+
+    go_to = turn = forward = stop = _refused
+
+
+def _refusal(error: AvlmapsError) -> DriveError:
+    if isinstance(error, DriveError):
+        return error
+    if isinstance(error, UnclearError):
+        return DriveError(str(error), 422, "unclear", error.choices)
+    kind = _KINDS.get(type(error).__name__, type(error).__name__.removesuffix("Error").lower())
+    return DriveError(str(error), 503 if isinstance(error, NavigationError) else 422, kind)
+
+
+def _reading(outcome: Outcome) -> str:
+    """Return in plain words what a program does, by what its rehearsal did."""
+    steps = []
+    for move in outcome.moves:
+        what = move.skill.replace("_", " ")
+        where = move.name or ("" if move.goal is None else f"({move.goal[0]:.2f}, {move.goal[1]:.2f})")
+        steps.append(f"{what} {where}".strip())
+    if not steps:
+        return "I will run the program, which moves nothing."
+    more = f", and {len(steps) - 20} more" if len(steps) > 20 else ""
+    return printable(f"I will run the program: {', then '.join(steps[:20])}{more}.")

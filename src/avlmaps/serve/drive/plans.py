@@ -1,0 +1,167 @@
+"""Plans that wait for their confirmation, and the tokens that confirm them."""
+
+import hashlib
+import hmac
+import secrets
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from typing import Any
+
+from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.motion import GroundPose
+from avlmaps.core.poses import FRAME
+from avlmaps.query.avlmap import AVLMap
+
+_MOST_PLANS = 16
+
+
+class DriveError(AvlmapsError):
+    """An order that is not carried out.
+
+    Attributes:
+        status: HTTP status.
+        kind: word for programs.
+        choices: answers that would do, for a command that is unclear.
+    """
+
+    def __init__(self, message: str, status: int, kind: str, choices: tuple[str, ...] = ()) -> None:
+        super().__init__(message)
+        self.status, self.kind, self.choices = status, kind, choices
+
+
+@dataclass(frozen=True, slots=True)
+class Who:
+    """Where an order comes from.
+
+    Attributes:
+        address: of the client.
+        by: ``http`` or ``mcp``.
+    """
+
+    address: str
+    by: str = "http"
+
+    def to_json(self) -> dict[str, str]:
+        """Return it as the log has it."""
+        return {"address": self.address, "by": self.by}
+
+
+@dataclass(frozen=True, slots=True)
+class MapNow:
+    """The map as it is now.
+
+    Attributes:
+        name: as clients call it.
+        version: another word for another content.
+        avlmap: the map.
+    """
+
+    name: str
+    version: str
+    avlmap: AVLMap = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What an order would do.
+
+    Attributes:
+        order: its name in the log.
+        words: the command; "" for a program.
+        reading: what the robot will do, in plain words.
+        program: what runs.
+        notes: one sentence each: how words were taken, what a person should know.
+        path: (x, y, z) places, metres, recording frame, as rehearsed on the map.
+        path_m: length.
+        subgoals: where it stops, as `go` reports them.
+        start: where the robot stood.
+        map: which map.
+        version: of the map.
+        robot: identity of the robot.
+    """
+
+    order: str
+    words: str
+    reading: str
+    program: str
+    notes: tuple[str, ...]
+    path: tuple[tuple[float, float, float], ...]
+    path_m: float
+    subgoals: tuple[dict[str, Any], ...]
+    start: GroundPose
+    map: str
+    version: str
+    robot: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the plan as clients and the log have it; a token is no part of it."""
+        return {
+            "order": self.order,
+            "words": self.words,
+            "reading": self.reading,
+            "program": self.program,
+            "notes": list(self.notes),
+            "path": [list(place) for place in self.path],
+            "path_m": round(self.path_m, 3),
+            "subgoals": list(self.subgoals),
+            "frame": FRAME,
+            "map": self.map,
+            "version": self.version,
+            "robot": self.robot,
+        }
+
+
+class PlanBook:
+    """Plans by the digests of their tokens; each token is good once, and for a short time. Not safe for threads."""
+
+    def __init__(self, lifetime_s: float) -> None:
+        """Begin empty.
+
+        Args:
+            lifetime_s: of a token.
+        """
+        self.lifetime_s = lifetime_s
+        self._waiting: OrderedDict[bytes, tuple[Plan, float]] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def add(self, plan: Plan, now_s: float) -> str:
+        """Keep a plan and return its token; the oldest of too many plans goes."""
+        token = secrets.token_urlsafe(32)
+        self._waiting[_digest(token)] = plan, now_s + self.lifetime_s
+        while len(self._waiting) > _MOST_PLANS:
+            self._waiting.popitem(last=False)
+        return token
+
+    def take(self, token: str, now_s: float) -> Plan:
+        """Return the plan of a token and forget both.
+
+        Raises:
+            DriveError: there is no such token, or it is too old.
+        """
+        given = _digest(token)
+        found = None
+        for digest in list(self._waiting):  # all of them, so that the time shows nothing
+            if hmac.compare_digest(digest, given):
+                found = digest
+        if found is None:
+            raise DriveError(
+                "This token confirms no plan: it was used, replaced by an order or a stop, or never given; plan again.",
+                403,
+                "token",
+            )
+        plan, until_s = self._waiting.pop(found)
+        if now_s > until_s:
+            raise DriveError(
+                f"The plan is older than {self.lifetime_s:g} s; plan again, and confirm sooner.", 410, "expired"
+            )
+        return plan
+
+    def clear(self) -> None:
+        """Forget every plan."""
+        self._waiting.clear()
+
+
+def _digest(token: str) -> bytes:
+    return hashlib.sha256(token.encode("utf-8", "surrogatepass")).digest()
