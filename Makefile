@@ -17,7 +17,12 @@ NUMERIC := tests/query/test_heatmap.py tests/query/test_goals.py tests/query/tes
   tests/maps/test_gravity.py tests/maps/test_grid.py
 NUMERIC_COMPILED := tests/query/test_heatmap.py tests/query/test_objects.py tests/query/test_half_precision.py tests/maps/test_fusion.py
 
-.PHONY: help demo test test-kernels bounds test-foundation types-foundation lint format docs fuzz bench train lock clean
+# What `make test-fast` runs: the quick tests of each room that is changed most.
+FAST := tests/core tests/test_imports.py tests/test_conventions.py tests/query/test_goals.py tests/query/test_loops.py \
+  tests/query/test_pieces.py tests/maps/test_grid.py tests/navigate/test_planner.py tests/perception/test_codes.py \
+  tests/perception/test_matching.py tests/language/test_program_run.py tests/cli/test_help.py
+
+.PHONY: help demo test test-fast dist-test test-kernels bounds test-foundation types-foundation lint format docs fuzz bench train lock clean
 
 help:  ## Show what can be made.
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -35,6 +40,12 @@ demo: $(READY)  ## Make a home, walk it, hear it, map it, ask it; pictures land 
 
 test: $(READY)  ## Run every test (offline, two cores, no GPU).
 	$(RUN)/python -m pytest -n 3 --dist loadfile
+
+test-fast: $(READY)  ## Run the quick tests: core, imports, laws of the query, planner, help (under a minute).
+	$(RUN)/python -m pytest -q -n 2 --dist loadfile -m "not slow and not shared" $(FAST)
+
+dist-test: $(READY)  ## Build the wheel and the sdist, and try both in empty environments (build/dist-test, offline).
+	$(RUN)/python tests/helpers/dist_smoke.py build/dist-test
 
 bounds: $(READY)  ## Run 100,000 random programs; print the worst processor time and the memory (20 minutes).
 	$(RUN)/python tests/helpers/program_bounds.py 100000 1

@@ -147,7 +147,7 @@ def main(count: int, seed: int) -> dict[str, Any]:
 
     from avlmaps.core.errors import ProgramError
     from avlmaps.language.program import parse_program, run_program
-    from avlmaps.language.program.text import program_text
+    from helpers.program_text import program_text
     from helpers.recording_robot import RecordingRobot
 
     random, told, worst_s, worst = Random(seed), Counter[str](), 0.0, ""

@@ -7,7 +7,6 @@ which shares the recording frame's origin; the YAML file holds the rotation betw
 import csv
 import io
 from collections.abc import Iterable, Sequence
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,14 +32,6 @@ _FACES = (
     ((0, 0, -1), ((0, 0, 0), (0, 1, 0), (1, 1, 0), (1, 0, 0))),
 )
 _PALETTE_SEED = 5
-
-
-class ColorBy(StrEnum):
-    """The source of an export's colours; the value is the word on the command line."""
-
-    PICTURE = "picture"
-    THING = "thing"
-    HEAT = "heat"
 
 
 def thing_colors(count: int, things: "Sequence[Thing]") -> UInt8[np.ndarray, "n 3"]:

@@ -195,14 +195,6 @@ class Ground:
         """Let nothing stand on an oriented rectangle: before furniture, or (``way``) before a door."""
         (self._way if way else self._zone).append(corners_of(centre, half_m, np.asarray(heading_rad)))
 
-    def free_share(self) -> float:
-        """Return which share of the room's floor a robot can stand on."""
-        return float(self._free.mean())
-
-    def open_places(self) -> Float[np.ndarray, "n 2"]:
-        """Return the places that a robot can stand on."""
-        return self._middles[self._free]
-
 
 def ground_of(plan: Plan, room: int) -> Ground:
     """Return the bare floor of a room, with clear zones before its doors."""
