@@ -1,7 +1,7 @@
 """The notice that the first run on a machine compiles its loops, which takes up to a minute; later runs load them."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Generator
+from contextlib import AbstractContextManager, contextmanager
 
 from avlmaps.core.progress import say
 
@@ -9,7 +9,7 @@ NOTICE = "compiling once (up to a minute or two; later runs skip this)"
 
 
 @contextmanager
-def announce_compiling() -> Iterator[None]:
+def announce_compiling() -> Generator[None]:
     """Print one line on standard error when a loop is not in the cache and is compiled, in this process or a fork."""
     from numba.core import event
 
@@ -24,5 +24,6 @@ def announce_compiling() -> Iterator[None]:
         def on_end(self, event: object) -> None:
             pass
 
-    with event.install_listener("numba:compile", Listener()):
+    install: Callable[..., AbstractContextManager[None]] = event.install_listener  # pyright: ignore[reportUnknownMemberType]
+    with install("numba:compile", Listener()):
         yield

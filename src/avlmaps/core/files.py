@@ -8,7 +8,7 @@ import errno
 import hashlib
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
@@ -138,7 +138,7 @@ def sampled_digest(path: Path | str, budget_bytes: int) -> bytes:
 
 
 @contextmanager
-def replace_atomically(path: Path) -> Iterator[BinaryIO]:
+def replace_atomically(path: Path) -> Generator[BinaryIO]:
     """Open a temporary file beside ``path``; on success sync it and rename it over ``path``.
 
     The folder is synced as well, so that the new name survives a power cut.

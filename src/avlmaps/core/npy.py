@@ -3,8 +3,9 @@
 import math
 import tokenize
 from dataclasses import dataclass
+from io import BufferedIOBase
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, cast
 
 import numpy as np
 
@@ -90,7 +91,8 @@ def load_npy(path: Path, limit_bytes: int, *, mapped: bool = False) -> np.ndarra
         if mapped and math.prod(header.shape):
             return np.memmap(stream, header.dtype, "r", header.offset, header.shape, order)
         flat = np.empty(math.prod(header.shape), header.dtype)
-        read = stream.readinto(flat.view(np.uint8)) if flat.size else 0  # pyright: ignore[reportAttributeAccessIssue]
+        into = cast(BufferedIOBase, stream)
+        read = into.readinto(flat.view(np.uint8).data) if flat.size else 0
     if read != flat.nbytes:
         raise ValueError(f"it ends after {header.offset + (read or 0):,} of {size:,} bytes")
     return flat.reshape(header.shape, order=order)

@@ -3,7 +3,7 @@
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
@@ -22,7 +22,7 @@ def silence(quiet: bool = True) -> None:
 
 
 @contextmanager
-def silence_progress(quiet: bool = True) -> Iterator[None]:
+def silence_progress(quiet: bool = True) -> Generator[None]:
     """Switch progress off for a while, and put it back as it was; with ``quiet=False`` change nothing."""
     before = _quiet
     silence(before or quiet)
@@ -39,7 +39,7 @@ def _keep_lock_to_this_process(bar: type) -> None:
     """
     global _lock_owner
     if _lock_owner != os.getpid():
-        bar.set_lock(threading.RLock())  # pyright: ignore[reportAttributeAccessIssue]
+        bar.set_lock(threading.RLock())  # pyright: ignore[reportAttributeAccessIssue, reportUnknownMemberType]
         _lock_owner = os.getpid()
 
 
