@@ -19,7 +19,7 @@ from avlmaps.recordings.types import Frame
 # Agreement at which the second network begins to count, and from which on both count the same; in between its share
 # grows evenly. Chosen on real frames of the development split and on frames of simulated homes with artists' furniture
 # (training/pixels/README.md).
-NO_SAY, SAME_SAY = 0.55, 0.85
+NO_SAY, SAME_SAY = 0.60, 0.90
 
 
 class PairedNetworks:
