@@ -24,6 +24,6 @@ def announce_compiling() -> Generator[None]:
         def on_end(self, event: object) -> None:
             pass
 
-    install: Callable[..., AbstractContextManager[None]] = event.install_listener  # pyright: ignore[reportUnknownMemberType]
+    install: Callable[..., AbstractContextManager[None]] = event.install_listener  # pyright: ignore[reportUnknownMemberType, reportUnknownVariableType]
     with install("numba:compile", Listener()):
         yield
