@@ -113,16 +113,18 @@ def _serve(verb: View) -> None:
     session = ViewSession(_maps(verb), None if verb.scene is None else _robot(verb.scene))
     server = ViewServer(session, verb.host, verb.port)
     try:
+        signal.signal(signal.SIGTERM, _stop)
         if verb.scene is not None:
             session.guide.prepare()  # a scene that is not the map's is an error before a page opens
         session.prepare()
         answer = {"url": server.url, "maps": [str(path) for path in (verb.map, verb.other) if path is not None]}
         emit(answer, [f"the map is at {server.url}"], verb.json)
         sys.stdout.flush()
+        if server.token is not None:
+            say("Other machines put this machine's name in the place of 127.0.0.1; the token stays.")
         say("Stop the viewer with Ctrl-C.")
         if not verb.no_browser:
             _open_browser(server.url)
-        signal.signal(signal.SIGTERM, _stop)
         server.serve_forever(poll_interval=0.2)
     except KeyboardInterrupt:
         say("The viewer is stopped.")

@@ -39,7 +39,7 @@ NEAR_M, MARGIN_M = 2.5, 1.5
 _RULES = ((FURNITURE, NEAR_M, MARGIN_M), (FURNITURE, 3.5, 0.8), (SMALL, NEAR_M, MARGIN_M), (SMALL, 3.5, 0.8))
 APART_M = 1.0
 LEAST_PHOTO_SHARE = 0.02
-CLIP, PHOTO, MAP = "another_recording.wav", "photo.png", "home.avlmap"
+CLIP, PHOTO, MAP, PAGE = "another_recording.wav", "photo.png", "home.avlmap", "map.html"
 # A first goal within this distance of a true place, horizontally, is right (the paper's success radius).
 REACH_M = 1.0
 

@@ -20,7 +20,7 @@ from avlmaps.demo.pictures import (
     map_from_above,
     strip_of,
 )  # fmt: skip
-from avlmaps.demo.questions import CLIP, MAP, PHOTO
+from avlmaps.demo.questions import CLIP, MAP, PAGE, PHOTO
 from avlmaps.demo.svg import Sheet, wave
 
 if TYPE_CHECKING:
@@ -334,7 +334,10 @@ def _honest(report: "DemoReport", recording: "Recording") -> str:
         "the package; they know about a hundred kinds of things and sixteen kinds of rooms. Six questions are a look, "
         "not a measurement: <code>avlmaps bench</code> measures, over many homes and with intervals.</p>"
         "<h2>Continue from here</h2>"
+        f'<p><a href="{PAGE}">Walk through the map in three dimensions</a>: one page with its things, its sounds and '
+        "the heat of these questions, without a network.</p>"
         f"<p>The map is <code>{MAP}</code> beside this page. In its folder:</p>"
+        f"<pre><code>avlmaps view {MAP} --scene {spec}</code></pre>"
         f'<pre><code>avlmaps query {MAP} "the lamp near the sofa" --plot heat.png\n'
         f'avlmaps query {MAP} "the chair in the kitchen" --json\n'
         f"avlmaps locate {MAP} your_photo.jpg\n"

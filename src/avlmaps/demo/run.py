@@ -16,7 +16,7 @@ import numpy as np
 from avlmaps.core.errors import MapError
 from avlmaps.core.progress import progress, say
 from avlmaps.demo.outcome import DemoReport, Step
-from avlmaps.demo.questions import CLIP, MAP, PHOTO, Ask
+from avlmaps.demo.questions import CLIP, MAP, PAGE, PHOTO, Ask
 
 if TYPE_CHECKING:
     from avlmaps.demo.evidence import Evidence
@@ -94,6 +94,8 @@ def run_demo(
     with _stage("drive", seconds, "A robot drives to goals by one command."):
         driven = drive(asks, asked, scene, out, say)
     report = DemoReport(out, scene.name, steps, describe(stored), located, seconds, driven)
+    with _stage("page", seconds, "The map becomes a page to walk through."):
+        _write_page(asked, [step.ask for step in steps], out)
     with _stage("report", seconds, "A page with pictures is written."):
         write_report(
             report, scene, recording, asked, evidence, photo, [answer for _, answer in answered], settings.moments
@@ -183,6 +185,14 @@ def _answer(asked: "AVLMap", ask: Ask, number: int, out: Path) -> "tuple[Step, A
     if answer.heat is not None:
         answer.heat.plot(out / picture)
     return Step(ask, answer.to_json(), picture), answer
+
+
+def _write_page(asked: "AVLMap", asks: "list[Ask]", out: Path) -> None:
+    """Write the map as one page with the questions that are words alone."""
+    from avlmaps.view.page import write_page
+
+    words = [(ask.title, ask.question) for ask in asks if not any(part.is_file for part in ask.question.parts)]
+    write_page(out / PAGE, [asked], words)
 
 
 def _located(asked: "AVLMap", photo: "PhotoView", out: Path) -> tuple[float, float] | None:

@@ -27,7 +27,14 @@ class Upload:
     name: str
 
 
-def ask(avlmap: "AVLMap", sentence: str, photo: Upload | None = None, clip: Upload | None = None) -> SentenceAnswer:
+def ask(
+    avlmap: "AVLMap",
+    sentence: str,
+    photo: Upload | None = None,
+    clip: Upload | None = None,
+    *,
+    question: Question | None = None,
+) -> SentenceAnswer:
     """Query a map as ``avlmaps query`` does.
 
     Args:
@@ -35,10 +42,13 @@ def ask(avlmap: "AVLMap", sentence: str, photo: Upload | None = None, clip: Uplo
         sentence: words; may be empty where there is a file, which is then a query by itself.
         photo: what "this photo" in the sentence means.
         clip: what "this recording" in the sentence means.
+        question: the query itself, where the sentence is only its title.
 
     Raises:
         QueryError: the query is empty, the words are not understood, or they do not speak of the file.
     """
+    if question is not None:
+        return SentenceAnswer(avlmap.ask(question, top=TOP), TOP)
     if sentence.strip():
         image, sound = (None if upload is None else str(upload.path) for upload in (photo, clip))
         try:

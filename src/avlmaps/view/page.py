@@ -19,6 +19,7 @@ from avlmaps.core.progress import progress
 from avlmaps.view.session import ViewSession
 
 if TYPE_CHECKING:
+    from avlmaps.core.question import Question
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.view.labels import Labels
     from avlmaps.view.session import MapOnPage
@@ -38,13 +39,16 @@ def live_page() -> str:
     return _page("avlmaps view", None)
 
 
-def write_page(out: Path, maps: "Sequence[AVLMap]", questions: Sequence[str] = ()) -> dict[str, Any]:
+def write_page(
+    out: Path, maps: "Sequence[AVLMap]", questions: "Sequence[str | tuple[str, Question]]" = ()
+) -> dict[str, Any]:
     """Write one file that opens from the disk without a network: the maps, their contents, and some questions' heat.
 
     Args:
         out: the file.
         maps: one, or two that are compared.
-        questions: answered now and stored in the file; by default some that fit the first map.
+        questions: sentences, or queries with their titles, answered now and stored in the file; by default some that
+            fit the first map.
 
     Returns:
         The file, its size, and the questions with what became of them.
@@ -64,8 +68,9 @@ def write_page(out: Path, maps: "Sequence[AVLMap]", questions: Sequence[str] = (
         "clips": [_clips(one) for one in session.maps],
         "questions": [],
     }
-    for sentence in progress(asked, "asking", unit="question"):
-        answer, heat = session.ask(sentence)
+    for one in progress(asked, "asking", unit="question"):
+        sentence, question = (one, None) if isinstance(one, str) else one
+        answer, heat = session.ask(sentence, question=question)
         told["questions"].append(answer | {"heat": _packed(heat)})
     names = " and ".join(one.layout.asked.stored.path.name.removesuffix(".avlmap") for one in session.maps)
     content = _page(names, told).encode("utf-8")

@@ -99,6 +99,7 @@ class ViewServer(ThreadingHTTPServer):
     def url(self) -> str:
         """Where a browser finds the page."""
         bare = self.host.strip("[]")
+        bare = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(bare, bare)
         host = f"[{bare}]" if ":" in bare else bare
         query = "" if self.token is None else f"?token={self.token}"
         return f"http://{host}:{self.server_address[1]}/{query}"

@@ -19,6 +19,7 @@ from avlmaps.view.layout import Layout
 from avlmaps.view.route import Guide, MakeRobot
 
 if TYPE_CHECKING:
+    from avlmaps.core.question import Question
     from avlmaps.query.contents import Thing
 
 MOST_UPLOAD_BYTES = 32_000_000
@@ -126,13 +127,16 @@ class ViewSession:
             "robot": self.guide.has_robot,
         }
 
-    def ask(self, sentence: str, photo: str | None = None, clip: str | None = None) -> tuple[dict[str, Any], bytes]:
+    def ask(
+        self, sentence: str, photo: str | None = None, clip: str | None = None, *, question: "Question | None" = None
+    ) -> tuple[dict[str, Any], bytes]:
         """Ask all maps.
 
         Args:
             sentence: the words.
             photo: number of an uploaded photo, as `upload` returned it.
             clip: of an uploaded clip.
+            question: the query itself, where the sentence is only its title.
 
         Returns:
             The answers, and after one another the heat of each map's voxels in the order of drawing, a byte each.
@@ -145,7 +149,7 @@ class ViewSession:
         with self._asking:
             for one in self.maps:
                 try:
-                    asked = ask(one.asked, sentence, *files)
+                    asked = ask(one.asked, sentence, *files, question=question)
                 except AvlmapsError as fault:
                     raise QueryError(without_paths(str(fault), *files)) from fault
                 heat = asked.answer.heat

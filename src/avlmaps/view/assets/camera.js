@@ -19,7 +19,7 @@ class Camera {
     if (sides[0] > sides[1]) this.yaw = -Math.PI / 2 + 0.35;
     else this.yaw = 0.35;
     this.pitch = 0.95;
-    this.distance = (0.46 * Math.hypot(...sides)) / (SLOPE * Math.min(1.25, Math.max(0.55, aspect)));
+    this.distance = (0.46 * Math.hypot(...sides)) / (SLOPE * Math.min(1.25, Math.max(0.45, aspect)));
   }
 
   look() {

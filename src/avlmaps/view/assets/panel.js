@@ -74,13 +74,30 @@ class Panel {
   async fill(k) {
     this.contents[k] = await this.source.contents(k);
     const { layer } = this.viewer.fields[k];
-    layer.setPalettes(this.contents[k].palettes);
+    this.alike();
     layer.setLabels(await this.source.labels(k));
     if (k === 0) this.list();
     for (const note of this.contents[k].notes) this.note(note);
     this.marks();
     this.legend();
     this.viewer.changed();
+  }
+
+  /** Give things and rooms of one name one colour in both maps. */
+  alike() {
+    const [first, ...others] = this.contents;
+    for (const one of others) {
+      if (!first || !one) continue;
+      for (const [kind, names] of [["thing", "names"], ["room", "room_names"]]) {
+        one[names].forEach((name, i) => {
+          const same = first[names].indexOf(name);
+          if (same < 0) return;
+          const shade = first.palettes[kind].slice(3 * same + 3, 3 * same + 6);
+          one.palettes[kind].splice(3 * i + 3, 3, ...shade);
+        });
+      }
+    }
+    this.contents.forEach((one, k) => one && this.viewer.fields[k].layer.setPalettes(one.palettes));
   }
 
   fault(fault) {
@@ -260,11 +277,12 @@ class Panel {
     $("arrangement-field").hidden = this.maps.length < 2;
     $("arrangement").addEventListener("change", () => {
       this.viewer.arrangement = $("arrangement").value;
-      $("divider").hidden = $("arrangement").value !== "divided";
+      $("divider").hidden = $("seam").hidden = $("arrangement").value !== "divided";
       this.viewer.moved();
     });
     $("divide").addEventListener("input", () => {
       this.viewer.divide = Number($("divide").value);
+      $("seam").style.left = `${100 * this.viewer.divide}%`;
       this.viewer.changed();
     });
   }

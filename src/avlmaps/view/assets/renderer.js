@@ -4,6 +4,7 @@
 const FRAME_MS = 45; // a moving picture should take no longer
 const FIRST_BUDGET = 120000;
 const LEAST_BUDGET = 15000;
+const RESTING = 3; // a part of a picture at rest may take this many times longer
 
 function compiled(gl, vertex, fragment) {
   const program = gl.createProgram();
@@ -211,7 +212,7 @@ class Renderer {
       gl.bindFramebuffer(gl.FRAMEBUFFER, this.target.buffer);
     }
     const most = Math.max(...views.map((view) => view.layer.loaded), 0);
-    const part = Math.max(LEAST_BUDGET, Math.round(this.budget / views.length));
+    const part = Math.max(LEAST_BUDGET, Math.round((RESTING * this.budget) / views.length));
     for (const view of views) {
       const count = Math.min(part, view.layer.loaded - this.rest.at);
       const whole = view.layer.loaded >= view.layer.count;
