@@ -148,7 +148,7 @@ def test_a_half_built_map(tmp_path: Path) -> None:
     assert has_unfinished_build(tmp_path)
     assert refused(tmp_path) == (
         f"{tmp_path} is a half-built map (its build was stopped); run the same `avlmaps build` again with --resume, "
-        "and it goes on from there."
+        "and it resumes from there."
     )
 
 
