@@ -10,7 +10,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.testclient import TestClient
 
-from avlmaps.serve.errors import Privacy
+from avlmaps.serve.errors import Privacy, without_folders
 from avlmaps.serve.guard import Guard
 from avlmaps.serve.settings import Limits, ServeError, ServeSettings
 
@@ -144,6 +144,18 @@ def test_every_answer_forbids_guessing_framing_and_storing() -> None:
 def test_unsafe_settings_are_refused(settings: dict[str, Any], says: str) -> None:
     with pytest.raises(ServeError, match=says):
         ServeSettings(**settings)
+
+
+@pytest.mark.parametrize(
+    ("text", "short"),
+    [
+        ("/data/rec/audio.wav has no end.", "audio.wav has no end."),
+        (r"C:\data\audio.wav has no end.", "audio.wav has no end."),
+        ("3/4 of the frames, 1 m/s", "3/4 of the frames, 1 m/s"),
+    ],
+)
+def test_folders_leave_notices(text: str, short: str) -> None:
+    assert without_folders(text) == short
 
 
 def test_settings_do_not_show_their_token() -> None:

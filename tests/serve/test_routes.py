@@ -369,6 +369,12 @@ def test_a_fault_of_ours_shows_nothing_of_itself(
     assert "secret" not in response.text
 
 
+@pytest.mark.parametrize("method", ["GET", "DELETE", "PUT"])
+def test_agents_are_served_by_post_alone(client: TestClient, method: str) -> None:
+    refused = client.request(method, "/mcp", headers={"accept": "text/event-stream"})
+    assert (refused.status_code, refused.headers["allow"]) == (405, "POST")
+
+
 def test_a_further_application_stands_behind_the_same_guard(
     service: Service, serving: Callable[..., TestClient]
 ) -> None:

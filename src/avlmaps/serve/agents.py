@@ -17,7 +17,8 @@ from mcp.server.streamable_http_manager import StreamableHTTPASGIApp, Streamable
 from mcp.shared.exceptions import MCPError
 
 from avlmaps.core.version import __version__
-from avlmaps.serve.guard import App
+from avlmaps.serve.errors import RequestError
+from avlmaps.serve.guard import App, Receive, Scope, Send, refuse
 from avlmaps.serve.lanes import Lane, Report, Watch
 from avlmaps.serve.requests import NoQuery, checked
 from avlmaps.serve.responses import error_response
@@ -119,7 +120,23 @@ def agent_app(service: Service, tools: Sequence[AgentTool] = TOOLS) -> tuple[App
         security_settings=None,  # the guard checks Host and Origin for the whole server
         max_request_body_size=service.settings.limits.body_bytes,
     )
-    return cast(App, StreamableHTTPASGIApp(manager)), manager.run
+    return _PostOnly(cast(App, StreamableHTTPASGIApp(manager))), manager.run
+
+
+class _PostOnly:
+    """Takes requests by POST alone.
+
+    A server without sessions has nothing to send unasked, and a stream that a client holds open would delay its end.
+    """
+
+    def __init__(self, app: App) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["method"] == "POST":
+            await self._app(scope, receive, send)
+        else:
+            await refuse(RequestError("Agents send their messages by POST.", 405, allow="POST"), send)
 
 
 async def serve_stdio(service: Service, tools: Sequence[AgentTool] = TOOLS) -> None:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from avlmaps.core.errors import AvlmapsError, BackendError, MapError
+from avlmaps.core.errors import AvlmapsError, LanguageError, NavigationError, QueryError
 from avlmaps.core.printable import printable
 from avlmaps.query.schema import ErrorAnswer
 
@@ -27,6 +27,11 @@ class RequestError(AvlmapsError):
         self.status = status
         self.kind = kind
         self.headers = {name.replace("_", "-"): value for name, value in headers.items()}
+
+
+def without_folders(text: str) -> str:
+    """Return a text in which each absolute path is the name of its file alone."""
+    return _ABSOLUTE.sub(lambda found: re.split(r"[/\\\\]", found.group())[-1], text)
 
 
 def busy(waiting: int) -> RequestError:
@@ -68,8 +73,9 @@ class Privacy:
             return error.status, _answer(error.kind, str(error))
         if isinstance(error, AvlmapsError):
             kind = _kind(error)
-            # Only these quote files; the others quote the client's own words, which may look like a path.
-            message = self.cleaned(str(error)) if isinstance(error, MapError | BackendError) else str(error)
+            # These quote nothing but the client's own words, which may look like a path; others may quote a file.
+            ours = not isinstance(error, QueryError | LanguageError | NavigationError)
+            message = self.cleaned(str(error)) if ours else str(error)
             return _STATUS.get(kind, 422), _answer(kind, message)
         if isinstance(error, OSError | MemoryError):
             what = "memory" if isinstance(error, MemoryError) else error.strerror or "a file"

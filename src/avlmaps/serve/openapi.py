@@ -130,13 +130,13 @@ def _described(one: Operation, method: str, of: dict[Any, Any], components: dict
     if one.name == "getTile":
         told["description"] = (tiles.__doc__ or "").partition("\n\n")[2]
     if method == "POST":
-        told["requestBody"] = {"required": True, "content": _bodies(one, of)}
+        told["requestBody"] = {"required": True, "content": _bodies(one, of, schema)}
     return told
 
 
-def _bodies(one: Operation, of: dict[Any, Any]) -> dict[str, Any]:
+def _bodies(one: Operation, of: dict[Any, Any], schema: dict[str, Any]) -> dict[str, Any]:
     files = {name: {"type": "string", "contentMediaType": "application/octet-stream"} for name in one.files}
-    form = {"allOf": [{"type": "object", "properties": files}]}
+    form = {"type": "object", "properties": {**schema.get("properties", {}), **files}}
     bodies: dict[str, Any] = {"multipart/form-data": {"schema": form}}
     if one.body == "form":
         bodies["application/json"] = {"schema": of[one.query]}

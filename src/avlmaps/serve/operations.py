@@ -74,7 +74,7 @@ OPERATIONS = (
               LocateQuery, LocateAnswer, work.locate, "slow", "photo", ("photo",)),
     Operation("describePlace", "/place", "Return what is at a place.", PlaceQuery, PlaceAnswer, work.place),
     Operation("findPath", "/path", "Return the path between two places for a robot's body.",
-              PathQuery, PathAnswer, work.path),
+              PathQuery, PathAnswer, work.path, "slow"),
     Operation("drawAnswer", "/picture", "Draw the answer of a query, or the map.",
               PictureQuery, "image/png", work.picture, "slow", "form", ("photo", "clip")),
     Operation("listTiles", "/tiles", "List the tiles of a map's voxels, by level of detail.",

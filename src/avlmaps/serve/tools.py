@@ -170,5 +170,5 @@ TOOLS = (
               LastSeenQuery, LastSeenAnswer, _last_seen),
     AgentTool("goal_near", "Nearest goal",
               "Return the goals of a query by the length of the path from a place, with the point where a robot stops.",
-              GoalNearQuery, NearGoalsAnswer, _goal_near),
+              GoalNearQuery, NearGoalsAnswer, _goal_near, slow=True),
 )  # fmt: skip

@@ -24,7 +24,7 @@ from avlmaps.query.schema import (
     locate_answer,
 )
 from avlmaps.query.sentences import SentenceAnswer, UnusedFileError, ask_sentence
-from avlmaps.serve.errors import RequestError
+from avlmaps.serve.errors import RequestError, without_folders
 from avlmaps.serve.lanes import Watch
 from avlmaps.serve.requests import (
     CLIP,
@@ -148,7 +148,9 @@ def list_maps(shelf: Shelf) -> MapsAnswer:
 def describe_map(task: Task, query: NoQuery) -> dict[str, Any]:
     """Return what ``avlmaps info --json`` prints, with the map's name for its path."""
     del query
-    return {**map_answer(task.map.avlmap), "path": task.map.name}
+    described = map_answer(task.map.avlmap)
+    notices = [without_folders(notice) for notice in described["notices"]]  # they name the recording's files
+    return {**described, "path": task.map.name, "notices": notices}
 
 
 def list_contents(task: Task, query: ThingsQuery) -> ContentsAnswer:
