@@ -313,3 +313,35 @@ def _who() -> Any:
     from avlmaps.serve.drive.plans import Who
 
     return Who("here")
+
+
+def call(client: TestClient, path: str, method: str, **params: Any) -> dict[str, Any]:
+    headers = {"accept": "application/json, text/event-stream", "mcp-protocol-version": "2025-06-18"}
+    body = {"jsonrpc": "2.0", "id": 1, "method": method, "params": params}
+    answer = client.post(path, json=body, headers=headers)
+    text = answer.text.partition("data: ")[2] if "event-stream" in answer.headers["content-type"] else answer.text
+    return json.loads(text)["result"]
+
+
+def test_agents_plan_confirm_and_stop_by_tools_of_their_own(client: TestClient, drive: Driven) -> None:
+    tools = {tool["name"]: tool for tool in call(client, "/drive/mcp", "tools/list")["tools"]}
+    assert set(tools) == {"plan_drive", "confirm_drive", "stop_robot", "robot_status"}
+    assert not set(tools) & {tool["name"] for tool in call(client, "/mcp", "tools/list")["tools"]}
+    hints = {name: tool["annotations"]["readOnlyHint"] for name, tool in tools.items()}
+    assert hints == {"plan_drive": True, "confirm_drive": False, "stop_robot": False, "robot_status": True}
+    assert tools["confirm_drive"]["annotations"]["destructiveHint"] is True
+
+    def tool(name: str, **arguments: Any) -> dict[str, Any]:
+        return call(client, "/drive/mcp", "tools/call", name=name, arguments=arguments)
+
+    refused = tool("plan_drive", words="gabble gabble the")
+    assert refused["isError"] is True and "token" not in json.loads(refused["content"][0]["text"])
+    planned = tool("plan_drive", words="turn left")["structuredContent"]
+    assert drive.machine.motions == 0
+    assert tool("confirm_drive", token="x", velocity=1.0)["isError"] is True
+    assert tool("confirm_drive", token=planned["token"])["structuredContent"]["state"] == "driving"
+    idle(client)
+    assert drive.machine.motions == 1
+    assert tool("stop_robot", nonsense=[1, 2])["structuredContent"]["stopped"] is True
+    assert tool("robot_status")["structuredContent"]["state"] == "idle"
+    assert {entry["who"]["by"] for entry in drive.entries} == {"mcp"}
