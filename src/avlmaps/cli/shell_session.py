@@ -3,7 +3,7 @@
 import re
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Lock
@@ -58,7 +58,7 @@ class Reply:
         ok: whether it did what the line asks for.
     """
 
-    answer: dict[str, Any]
+    answer: Mapping[str, Any]
     lines: Iterable[str]
     ok: bool = True
 
@@ -190,7 +190,7 @@ class Session:
         rooms = [room.to_json() for room in opened.rooms()] if "views" in opened.stored.info.models else []
         return Reply(self._listed("rooms", rooms), listing.room_lines(rooms))
 
-    def _listed(self, key: str, entries: list[dict[str, Any]]) -> dict[str, Any]:
+    def _listed(self, key: str, entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         from avlmaps.core.poses import FRAME
 
         return {"map": str(self.given.map), "frame": FRAME, key: entries}

@@ -29,11 +29,10 @@ from avlmaps.serve.uploads import Uploads
 from avlmaps.serve.work import File, Task, encoded, list_maps
 
 
-class _Whole(Convertor[int]):
+class _Count(Convertor[int]):
     """Whole numbers in addresses, of a few digits."""
 
-    def __init__(self, regex: str) -> None:
-        self.regex = regex
+    regex = "[0-9]{1,9}"
 
     def convert(self, value: str) -> int:
         return int(value)
@@ -42,8 +41,14 @@ class _Whole(Convertor[int]):
         return str(value)
 
 
-register_url_convertor("count", _Whole("[0-9]{1,9}"))
-register_url_convertor("index", _Whole("-?[0-9]{1,9}"))
+class _Index(_Count):
+    """The same, also below 0."""
+
+    regex = "-?[0-9]{1,9}"
+
+
+register_url_convertor("count", _Count())
+register_url_convertor("index", _Index())
 Lifespan = Callable[[], AbstractAsyncContextManager[Any]]
 _EVENTS = "text/event-stream"
 _POLL_S, _BEAT_S = 2.0, 10.0
