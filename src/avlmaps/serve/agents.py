@@ -3,10 +3,11 @@
 Every request stands for itself (no sessions), so that a server that is started again continues with the same clients.
 """
 
+import asyncio
 import base64
+import itertools
 import json
 from collections.abc import Sequence
-from functools import partial
 from typing import Any, cast
 
 import mcp_types as mcp
@@ -226,20 +227,15 @@ async def _called(
     return await lane.run(job, _reporter(ctx))
 
 
-def _reporter(ctx: ServerRequestContext[Any]) -> Report | None:
-    """Return what sends a client the progress that it wants."""
-    if not (ctx.meta or {}).get("progress_token") and not (ctx.meta or {}).get("progressToken"):
-        return None
-    import asyncio
-
+def _reporter(ctx: ServerRequestContext[Any]) -> Report:
+    """Return what sends a client the progress of its call; the SDK sends none to a client that wants none."""
     loop = asyncio.get_running_loop()
-    count = 0
+    steps = itertools.count(1)
 
     def report(stage: str, done: int, total: int) -> None:
-        nonlocal count
-        count += 1
-        send = partial(ctx.session.report_progress, float(count), None, f"{stage} {done}/{total}" if total else stage)
-        asyncio.run_coroutine_threadsafe(send(), loop)
+        message = f"{stage} {done}/{total}" if total else stage
+        sending = ctx.session.report_progress(float(next(steps)), None, message)
+        asyncio.run_coroutine_threadsafe(sending, loop)
 
     return report
 
