@@ -79,7 +79,14 @@ def test_sounds_and_rooms_are_those_of_things(piped, built: Path) -> None:
 
 
 def test_an_error_is_one_sentence_and_the_next_line_is_answered(piped, built: Path) -> None:
-    lines = ["the blorfle", 'query --object "red', "locate missing.jpg", "sounds --loud", "things --least two", "red"]
+    lines = [
+        "the blorfle",
+        'query --object "red',
+        "locate missing.jpg",
+        "sounds --loud",
+        "things --least two",
+        "the red cabinet",
+    ]
     status, out, err = piped("\n".join(lines), built, "--json")
     assert status == 1
     said = objects(out)
@@ -92,7 +99,11 @@ def test_an_error_is_one_sentence_and_the_next_line_is_answered(piped, built: Pa
 
 
 def test_lines_that_are_empty_comments_too_long_or_no_utf_8_do_no_harm(piped, built: Path) -> None:
-    lines = b"\n# a comment\n" + b"x" * (3 * LONGEST_LINE) + b"\n\xff\xfe\n\x1b]0;title\x07\nred\nquit\nblue\n"
+    lines = (
+        b"\n# a comment\n"
+        + b"x" * (3 * LONGEST_LINE)
+        + b"\n\xff\xfe\n\x1b]0;title\x07\nthe red cabinet\nquit\nthe blue table\n"
+    )
     status, out, err = piped(lines, built)
     assert status == 1
     assert "\x1b" not in out + err
@@ -285,7 +296,11 @@ def test_without_prompt_toolkit_a_terminal_gets_one_sentence_and_a_pipe_works(
     shell.until(r"pip install 'avlmaps\[shell\]'")
     assert shell.ended() == 1
     done = subprocess.run(
-        [sys.executable, "-c", without, "shell", str(built)], input="red\n", capture_output=True, text=True, check=False
+        [sys.executable, "-c", without, "shell", str(built)],
+        input="the red cabinet\n",
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     assert "found" in done.stdout
