@@ -6,6 +6,7 @@ from typing import Any
 
 from avlmaps.demo.drive import Drive
 from avlmaps.demo.questions import MAP, REACH_M, Ask
+from avlmaps.query.schema import QueryAnswer
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +20,7 @@ class Step:
     """
 
     ask: Ask
-    answer: dict[str, Any]
+    answer: QueryAnswer
     picture: str
 
     @property

@@ -166,7 +166,7 @@ def object_margins(
         for row in asked[1:]:
             total += np.square(loops.feature_scores(feature, row))
         score = np.sqrt(total)
-    floor = np.float32(-np.inf if rivals.has_other else least_score)
+    floor = float(np.float32(-np.inf if rivals.has_other else least_score))
     closest = rivals.best, rivals.best_word, rivals.second, rivals.second_word
     out, unsure = loops.margins(score, closest, silent, floor)
     rows = np.flatnonzero(unsure)
