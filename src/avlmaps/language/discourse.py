@@ -28,6 +28,7 @@ from avlmaps.language.orders import MOST_TIMES, count_of, intents_of, on_targets
 from avlmaps.language.readings import Item, Reading, Sentence
 from avlmaps.language.targets import Memory, UnresolvedError, resolve
 
+_SMALL_TALK = 5  # words of chat or of a question beside an order
 _SPEAKING = frozenset({"tell", "say", "sing", "translate", "explain", "write"})
 _HARD = frozenset({".", "!", "?", ";"})
 
@@ -153,6 +154,8 @@ class _Composer:
             self.groups[-1].intents[-1] = replace(last, metres=-metres if back else metres)
         elif self.groups and isinstance(self.groups[-1].intents[-1], Turn) and tree.get("metres") is not None:
             self.groups.append(_Group([Move(float(tree.get("metres")))], "move", self.number))
+        elif self.groups and self.groups[-1].intents[-1] == Wait(None) and tree.get("seconds") is not None:
+            self.groups[-1].intents[-1] = Wait(float(tree.get("seconds")))
         elif isinstance(last, Turn) and last.degrees is not None and tree.get("degrees") is not None:
             self.groups[-1].intents[-1] = replace(last, degrees=copysign(float(tree.get("degrees")), last.degrees))
         elif isinstance(last, Wait) and tree.get("seconds") is not None:
@@ -232,6 +235,9 @@ class _Composer:
         if correcting and self.groups:
             self.join = ""
             group = self.groups[-1]
+            if refining:  # "the table in the hall, the one with the vase": both say where it is
+                target = target.with_near(*_near_of(group.intents[-1], target))
+                self.memory.add(target)
             group.intents[-1] = _with_target(group.intents[-1], target)
             return
         intent: Intent = Face(target) if kind == "face" else VisitEach(target) if kind == "each" else Go(target)
@@ -329,6 +335,8 @@ def compose(sentence: Sentence, reading: Reading) -> Composed:
                     if sentence.tokens[item.start].text in _SPEAKING:
                         stop = refuse(Reason.MANIPULATION)
                         break
+                    if item.end - item.start > _SMALL_TALK:  # too much to be left out
+                        composer.skipped.append(sentence.words(item.start, item.end))
                     continue
                 stop = refuse(item.value.get("reason"))
                 break
@@ -366,7 +374,8 @@ def _phrases(composer: _Composer, reading: Reading) -> list[str]:
     """Return the skipped words, neighbours as one phrase."""
     phrases: list[list[int]] = []
     for item in reading.items:
-        if item.kind == "skip":
+        long_talk = item.kind in ("chat", "inquire") and item.end - item.start > _SMALL_TALK
+        if item.kind == "skip" or long_talk:
             if phrases and phrases[-1][1] == item.start:
                 phrases[-1][1] = item.end
             else:
@@ -401,6 +410,12 @@ def _tidied(intents: list[Intent]) -> list[Intent]:
             kept.pop()
         kept.append(intent)
     return kept
+
+
+def _near_of(intent: Intent, like: Target) -> tuple[Target, ...]:
+    """Return where the target of an intent is, if it has the name of another target."""
+    found = getattr(intent, "to", None) or getattr(intent, "of", None)
+    return found.near if isinstance(found, Target) and found.name == like.name else ()
 
 
 def _with_target(intent: Intent, target: Target) -> Intent:

@@ -18,6 +18,7 @@ _TOKEN = re.compile(
     (?P<brace>\{{[^{{}}]*\}})
   | (?P<image>"[^"]+{_IMAGES}"|'[^']+{_IMAGES}'|[^\s"',;:!?()<>{{}}]+{_IMAGES}(?![\w/]))
   | (?P<clip>"[^"]+{_CLIPS}"|'[^']+{_CLIPS}'|[^\s"',;:!?()<>{{}}]+{_CLIPS}(?![\w/]))
+  | (?P<model>\d[dD]\b)
   | (?P<number>\d+(?:[.,]\d+)?(?:/\d+)?)
   | (?P<clock>o['\s]?clock\b)
   | (?P<word>[^\W\d_]+(?:['’][^\W\d_]+)*)
@@ -116,13 +117,15 @@ def tokenise(sentence: str) -> list[Token]:
             tokens += [Token("{", "{", "punct", found.start(), found.start() + 1), *inner] if media else inner
         elif kind in ("image", "clip"):
             tokens.append(Token(raw.strip("\"'"), raw, kind, found.start(), found.end()))
+        elif kind == "model":
+            tokens.append(Token(raw.lower(), raw, "word", found.start(), found.end()))
         elif kind == "word":
             tokens += _words(raw, found.start())
         elif raw == "-" and _is_minus(plain, found.start()):
             tokens.append(Token("minus", raw, "word", found.start(), found.end()))
         elif raw not in ("-", '"', "'", "`", "*", "_") or _stands_alone(plain, found.start(), raw):
             word = "word" if kind == "clock" or raw == "°" else kind
-            text = {"->": ">", "=>": ">", "\n": "."}.get(raw, "." if raw.startswith(".") else raw.lower())
+            text = {"@": "at", "->": ">", "=>": ">", "\n": "."}.get(raw, "." if raw.startswith(".") else raw.lower())
             tokens.append(Token("o'clock" if kind == "clock" else text, raw, word, found.start(), found.end()))
     return tokens
 

@@ -109,6 +109,7 @@ class Names:
             near = near_names(wrong)
             if (
                 near
+                and near[0][0][0] == wrong[0]
                 and not is_other_form(wrong, near[0][0])
                 and near[0][1] >= _ALIKE
                 and (len(near) == 1 or near[0][1] - near[1][1] >= _APART)
@@ -249,6 +250,10 @@ def _known(words: tuple[str, ...]) -> tuple[float, Target] | None:  # noqa: C901
         return 0.0, _target(entry, words)
     if "of" in words[1:-1] or "and" in words[1:-1]:
         return _joined(words)
+    if len(words) > 1 and words[-1] in _colours() and words[-2] not in _colours():
+        before = _known(words[:-1])  # "the door red"
+        if before is not None and before[1].kind is Kind.OBJECT:
+            return before[0] + 0.2, Target(Kind.OBJECT, f"{words[-1]} {before[1].name}")
     for start in range(1, len(words)):
         tail = " ".join(words[start:])
         entry = _entry(tail)
@@ -290,6 +295,8 @@ def _joined(words: tuple[str, ...]) -> tuple[float, Target] | None:
         or any(word in _never() for word in after)
     ):
         return None
+    if len(after) == 1 and after[0] in _materials():
+        return before[0] + 0.1, Target(Kind.OBJECT, f"{after[0]} {before[1].name}")
     return before[0] + 0.15, Target(Kind.OBJECT, " ".join(words))
 
 
@@ -410,6 +417,11 @@ def _adjectives() -> frozenset[str]:
 @cache
 def _colours() -> frozenset[str]:
     return frozenset(word for phrase in lexicon().colours for word in phrase.split())
+
+
+@cache
+def _materials() -> frozenset[str]:
+    return frozenset(lexicon().materials)
 
 
 @cache

@@ -166,7 +166,8 @@ def _beside(tree: Tree, memory: Memory) -> Result:
 
 
 def _standoff(tree: Tree, memory: Memory) -> Result:
-    return [StopAt(_target(tree.get("of"), memory), float(tree.get("metres")))], []
+    target = memory.last("it") if tree.get("there") else _target(tree.get("of"), memory)
+    return [StopAt(target, float(tree.get("metres")))], []
 
 
 def _circle(tree: Tree, memory: Memory) -> Result:

@@ -1,7 +1,9 @@
 """From a sentence to a question for the map: where something is, how many there are, whether there is one."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
@@ -19,6 +21,8 @@ _MODALITIES = {
     Kind.IMAGE: Modality.IMAGE,
 }  # fmt: skip
 _SKIP, _FILLER, _REMARK, _WORST = 3.6, 0.2, 0.15, 3.5
+_WHERE = frozenset({"where", "which", "find", "show", "locate", "whereabouts", "room", "place"})
+_TAIL = re.compile(r",?\s+or\s+(was|did|is|am|what|nah|not|something|are)\b[^,;.]*$", re.IGNORECASE)
 _INFINITE = float("inf")
 _PLACES = frozenset(
     {
@@ -104,7 +108,7 @@ def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
             f"The sentence has {len(sentence)} characters, more than {MOST_CHARACTERS}; say it shorter, like: "
             f"{_EXAMPLE}."
         )
-    read = Sentence(sentence, given.knows)
+    read = Sentence(_TAIL.sub("?", sentence), given.knows)
     starts = tuple(token.text for token in read.tokens[:3] if token.text != "me")[:2]
     of_place = any(token.text in _PLACES for token in read.tokens[2:4])
     if _asks_state(read):
@@ -126,8 +130,16 @@ def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
     except UnresolvedError as fault:
         raise QueryError(fault.question.question) from None
     notes: list[str] = []
+    ask = Ask.EXISTS if ask is Ask.WHERE and _wants_yes(read) else ask
     checked = tuple(_checked(target, read, given, notes) for target in targets)
     return AskedSentence(Inquiry(ask, checked), tuple(notes))
+
+
+def _wants_yes(read: Sentence) -> bool:
+    """Return whether a statement is asked: "behind the curtain there is a box?"."""
+    words = [token.text for token in read.tokens]
+    states = {("there", "is"), ("there", "are"), ("there", "any")} & set(pairwise(words))
+    return words[-1] == "?" and (bool(states) or words[0] in ("anybody", "anyone")) and _WHERE.isdisjoint(words)
 
 
 def _asks_state(read: Sentence) -> bool:

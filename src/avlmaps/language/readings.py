@@ -7,6 +7,7 @@ cost. The cheapest readings come first; a skipped word costs much, a word that c
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 from avlmaps.language import lexer
@@ -25,6 +26,11 @@ _INTERJECTION, _CLAUSE, _FUNCTIONAL = 0.9, 0.7, 1.4
 _PREPOSITIONS = frozenset({"of", "for", "from", "to", "at", "with", "in", "on"})
 _SPEAKERS = frozenset({"i", "we", "one"})
 _LEADS = frozenset({"to", "you", "u", "and", "if", "that"})  # the words after a wish
+_PLAIN = 0.6  # an order that costs less is read without doubt
+_PLAIN_VERBS = frozenset({"go", "drive", "move", "head", "visit", "turn", "face", "look", "circle", "come", "take"})
+_NO_MANNERS = frozenset({"which", "that", "another", "to", "of", "for", "last", "next"})
+_KINDNESS = frozenset({"kind", "good", "dear", "love", "favour", "favor", "great", "angel", "kindness"})
+_DUTIES = frozenset({"should", "must", "have", "ought", "shall"})
 _AFTER_REMARK = ("so", "and", "but", "please", "go", "can", "could", "take", "show", "bring", "turn", "drive", "head")
 _AUXILIARIES = frozenset({"has", "have", "is", "was", "are", "were", "just", "been", "it", "goes"})
 _SKIP, _SKIP_MARK, _SKIP_MEANING, _ORDER = 2.6, 0.05, 6.0, 0.3
@@ -193,7 +199,9 @@ def _steps(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | No
             yield Item(kind, edge.value, at, edge.end), cost + edge.cost, after, needs
     for name, (cost, fresh) in _JOINS.items():
         for edge in chart.terminal(name, at):
-            yield Item(name, edge.value, at, edge.end), cost, fresh, name == "POLITE"
+            closes = edge.end == len(tokens) or tokens[edge.end].kind == "punct"
+            if name != "INSTEAD_END" or (at and closes):  # "the bed, go": at the end the verb says no more
+                yield Item(name, edge.value, at, edge.end), cost, fresh, name == "POLITE"
     yield from _remarks(sentence, at)
     yield from _courtesies(sentence, at)
     mark = tokens[at].kind == "punct"
@@ -206,6 +214,16 @@ def _steps(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | No
     if tokens[at].text in _listed("functional") and cost == _SKIP and not dangling:
         yield Item("courtesy", None, at, at + 1), _FUNCTIONAL, None, False
     yield Item("mark" if mark else "skip", None, at, at + 1), cost, True if mark else None, False
+
+
+def _orders_inside(sentence: Sentence, start: int, end: int) -> bool:
+    """Return whether a remark holds an order with a verb: "he is asleep just go to the nursery"."""
+    return any(
+        edge.end <= end and edge.cost < _PLAIN and getattr(edge.value, "rule", "") in ("go", "face", "beside", "circle")
+        for at in range(start + 1, end - 1)
+        if sentence.tokens[at].text in _PLAIN_VERBS
+        for edge in sentence.chart.edges("order", at)
+    )
 
 
 def _tells(sentence: Sentence, item: Item) -> bool:
@@ -231,6 +249,8 @@ def _courtesies(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool
         after = tokens[end + 1] if end + 1 < len(tokens) else None
         closes = after is None or after.kind == "punct"
         dangling = tokens[at].text in _PREPOSITIONS if closes else tokens[at].text in _SPEAKERS and word not in _LEADS
+        words = {token.text for token in tokens[at : end + 1]}
+        dangling = dangling or tokens[at].text in _NO_MANNERS or (word == "and" and words.isdisjoint(_KINDNESS))
         if end > at and not dangling and (closes or _begins_order(sentence, end + 1)):
             yield (
                 Item("courtesy", None, at, end + 1), _COURTESY + _COURTESY_WORD * (end + 1 - at),
@@ -290,6 +310,10 @@ def _remarks(sentence: Sentence, at: int) -> Iterator[tuple[Item, float, bool | 
         after = tokens[end + 1].text if end + 1 < len(tokens) else "."
         if end > at and finite and (after in _BREAKS or after in _AFTER_REMARK):
             orders = "you" in words and not because and words[:2] != ["you", "are"]
+            duty = any(pair[0] == "you" and pair[1] in _DUTIES for pair in pairwise(words))
+            which = words[:2] == ["the", "one"] or words[0] in ("which", "that")
+            if duty or which or _orders_inside(sentence, at, end + 1):
+                continue  # it says which one, or what to do: it cannot be left out
             cost = _REMARK + _REMARK_WORD * len(words) + 1.5 * orders - _OWN_WISH * (words[:3] in _WISHES)
             yield Item("remark", None, at, end + 1), cost, after in _BREAKS or None, not because
         if after in _BREAKS or (

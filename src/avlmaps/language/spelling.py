@@ -21,6 +21,7 @@ _SHORTEST = 5  # shorter words have too many neighbours
 
 def respelt(tokens: list[Token]) -> tuple[list[Token], dict[str, str]]:
     """Return the tokens with misspelt words put right, and which words those were."""
+    tokens = _misheard(tokens)
     changed: dict[str, str] = {}
     found: list[Token] = []
     for token in tokens:
@@ -31,6 +32,21 @@ def respelt(tokens: list[Token]) -> tuple[list[Token], dict[str, str]]:
             changed[token.text] = better
         found.append(token if better is None else replace(token, text=better))
     return found, changed
+
+
+def _misheard(tokens: list[Token]) -> list[Token]:
+    """Return tokens with words put right that sound like others: "go two the couch", "stop their"."""
+    pairs = [pair.strip().split("=") for pair in load_grammar().lists["misheard"].split(",")]
+    meant = {tuple(wrong.split()): right.split() for wrong, right in pairs}
+    found = list(tokens)
+    for at in range(len(found) - 1):
+        right = meant.get((found[at].text, found[at + 1].text))
+        if right is not None:
+            found[at] = replace(found[at], text=right[0], kind="word")
+            found[at + 1] = replace(found[at + 1], text=right[1], kind="word")
+        elif found[at].text == "n" and at and found[at + 1].kind == "word" and found[at - 1].kind == "word":
+            found[at] = replace(found[at], text="and")
+    return found
 
 
 @cache
@@ -49,7 +65,9 @@ def _better(word: str) -> str | None:
         longer = {other for other in near if len(other) > len(word)} if len(word) == _SHORTEST - 1 else set()
         near = swapped or longer
     plain = {other for other in near if other.rstrip("s") not in near or other == other.rstrip("s")}
-    return plain.pop() if len(plain) == 1 else None
+    better = plain.pop() if len(plain) == 1 else None
+    begins_alike = better is not None and (better[0] == word[0] or better[1:] == word or sorted(better) == sorted(word))
+    return better if begins_alike else None
 
 
 def _neighbours(word: str) -> Iterator[str]:
@@ -70,6 +88,7 @@ def _neighbours(word: str) -> Iterator[str]:
 def _known() -> frozenset[str]:
     """Return all words that the grammar and the lexicon have."""
     grammar = load_grammar()
-    listed = (word for text in grammar.lists.values() if isinstance(text, str) for word in text.split())
+    texts = (text for text in grammar.lists.values() if isinstance(text, str))
+    listed = (word.strip(",") for text in texts for word in text.split())
     classes = (word for phrases in grammar.words.values() for phrase in phrases for word in phrase.split())
     return frozenset({*listed, *classes, *lexicon().words(), *grammar.literals, *WORDS, *sounding_words()})
