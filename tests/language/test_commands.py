@@ -10,7 +10,7 @@ from development import NAMES, counted, rows
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from avlmaps.bench.language import judge, read_list
+from avlmaps.bench.language import counts, judge, read_list
 from avlmaps.core.errors import AvlmapsError, LanguageError
 from avlmaps.language.commands import Given, read_command
 from avlmaps.language.intents import Clarify, Go, Kind, Refuse, Target
@@ -27,6 +27,28 @@ REACHED = {
     "commands.tsv": (350, 10), "free.tsv": (645, 38), "paraphrases.jsonl": (58, 2), "paraphrases_2.jsonl": (72, 4),
     "paraphrases_3.jsonl": (69, 4), "paraphrases_4.jsonl": (63, 6),
 }  # fmt: skip
+
+
+# Of the lists of many speakers: as many are right at least, and misread at most.
+SPEAKERS = {
+    "speakers_commands.jsonl": (511, 12),
+    "speakers_commands_2.jsonl": (108, 4),
+    "speakers_commands_3.jsonl": (64, 5),
+    "speakers_commands_4.jsonl": (60, 3),
+    "speakers_commands_5.jsonl": (56, 4),
+    "speakers_questions.jsonl": (214, 8),
+    "speakers_questions_2.jsonl": (58, 4),
+    "speakers_questions_3.jsonl": (36, 4),
+    "speakers_questions_4.jsonl": (29, 3),
+    "speakers_questions_5.jsonl": (32, 4),
+}
+
+
+@pytest.mark.parametrize("name", SPEAKERS)
+def test_many_speakers_stay_understood(name: str) -> None:
+    found = counts([judge(row) for row in read_list(LISTS / name)])
+    assert found["right"] >= SPEAKERS[name][0]
+    assert found["misread"] <= SPEAKERS[name][1]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -250,7 +250,7 @@ def _known(words: tuple[str, ...]) -> tuple[float, Target] | None:  # noqa: C901
         return 0.0, _target(entry, words)
     if "of" in words[1:-1] or "and" in words[1:-1]:
         return _joined(words)
-    if len(words) > 1 and words[-1] in _colours() and words[-2] not in _colours():
+    if words[1:] and words[-1:][0] in _colours() and words[-2:-1][0] not in _colours():
         before = _known(words[:-1])  # "the door red"
         if before is not None and before[1].kind is Kind.OBJECT:
             return before[0] + 0.2, Target(Kind.OBJECT, f"{words[-1]} {before[1].name}")
