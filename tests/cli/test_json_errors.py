@@ -30,6 +30,7 @@ ERRORS = (
     (("go", "MAP", "gabble gabble the", "--scene", "house:7"), 1, "unclear"),
     (("things", "nowhere.avlmap"), 1, "map"),
     (("shell", "nowhere.avlmap"), 1, "map"),
+    (("serve", "nowhere.avlmap"), 1, "map"),
     (("view", "nowhere.avlmap"), 1, "map"),
     (("view", "MAP", "--host", "no.such.host.invalid", "--no-browser"), 1, "query"),
     (("view", "MAP", "--questions", "the chair"), 2, "usage"),
@@ -109,9 +110,9 @@ def test_each_error_of_the_family_has_a_kind_of_its_own() -> None:
 def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> None:
     code = (
         "import numpy as np\n"
-        "from avlmaps.core.compiling import announced\n"
+        "from avlmaps.core.compiling import announce_compiling\n"
         "from avlmaps.query.kernels import best_two, widen\n"
-        "with announced():\n"
+        "with announce_compiling():\n"
         "    for kind in (np.float32, np.float64):\n"
         "        widen(np.zeros((2, 2), np.uint16), np.zeros((2, 2), kind))\n"
     )
@@ -124,6 +125,8 @@ def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> No
 
 
 def test_verbs_that_run_compiled_loops_say_so(run, monkeypatch: pytest.MonkeyPatch) -> None:
-    compile_something = {"demo", "record", "build", "query", "locate", "go", "bench", "things", "export", "shell"}
+    compile_something = {
+        "demo", "record", "build", "locate", "go", "bench", "things", "export", "shell", "serve", "view"
+    }  # fmt: skip
     assert {name for name, verb in VERBS.items() if verb.compiles} == compile_something
     assert not Verb.compiles

@@ -301,7 +301,7 @@ def test_a_recorded_run_is_repeated_without_server_key_or_client(
     repaired = replaying.repair(COMMAND, GO, "no sofa", done=["turn(angle_deg=5)"])
     assert repaired is not None and repaired.program == second.program
     assert len(server.asked) == asked
-    with pytest.raises(LanguageError, match='nothing like “Command: "go to the bed"” was asked'):
+    with pytest.raises(LanguageError, match='nothing like “Command: "go to the bed"” was requested'):
         replaying.program_for("go to the bed")
 
 

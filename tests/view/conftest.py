@@ -1,6 +1,5 @@
 """The small map of the command line's tests, open on a page that is served."""
 
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.view.server import ViewServer
 from avlmaps.view.session import ViewSession
 from cli.conftest import built, walk  # noqa: F401 - fixtures
+from helpers.viewing import serving
 
 
 @pytest.fixture(scope="session")
@@ -21,16 +21,3 @@ def room(built: Path) -> AVLMap:  # noqa: F811
 def served(room: AVLMap) -> Iterator[ViewServer]:
     """A page of the map on a free port of this machine."""
     yield from serving(ViewSession([room]))
-
-
-def serving(session: ViewSession, host: str = "127.0.0.1") -> Iterator[ViewServer]:
-    server = ViewServer(session, host, 0)
-    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
-    thread.start()
-    try:
-        yield server
-    finally:
-        server.shutdown()
-        server.server_close()
-        session.close()
-        thread.join()

@@ -197,7 +197,7 @@ def test_the_file_opens_without_a_server(browser, room: AVLMap, tmp_path: Path) 
 
 def test_two_maps_are_seen_side_by_side_and_one_over_the_other(browser, room: AVLMap) -> None:
     from avlmaps.view.session import ViewSession
-    from view.conftest import serving
+    from helpers.viewing import serving
 
     for server in serving(ViewSession([room, AVLMap(room.stored)])):
         page = opened(browser, server.url)

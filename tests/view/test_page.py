@@ -78,7 +78,7 @@ def test_a_text_cannot_end_the_script_or_stand_for_another_part(room: AVLMap, tm
 
 def test_default_questions_are_answered_by_the_map(room: AVLMap) -> None:
     asked = default_questions(MapOnPage(room).labels)
-    assert asked and any(room.ask(sentence).found for sentence in asked)
+    assert asked and any(room.ask(question).found for _, question in asked)
 
 
 def test_a_file_that_cannot_be_written_is_one_sentence(room: AVLMap, tmp_path: Path) -> None:

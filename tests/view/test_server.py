@@ -17,7 +17,7 @@ from avlmaps.view import session as sessions
 from avlmaps.view.layout import RECORD
 from avlmaps.view.server import ViewServer, is_loopback
 from avlmaps.view.session import ViewSession
-from view.conftest import serving
+from helpers.viewing import serving
 
 Call = Callable[..., tuple[int, dict[str, str], bytes]]
 

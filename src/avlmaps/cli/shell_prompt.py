@@ -1,6 +1,7 @@
 """The prompt of `avlmaps shell`, with its history; needs prompt-toolkit."""
 
 import os
+import signal
 from pathlib import Path
 
 from prompt_toolkit import PromptSession
@@ -27,6 +28,8 @@ class PromptLines:
             with_history: read and write the history in the user's state folder.
         """
         output = create_output(always_prefer_tty=True)
+        # A shell that starts a command in the background has SIGINT ignored; at a prompt Ctrl-C stops an answer.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         history = _history() if with_history else InMemoryHistory()
         self._questions = PromptSession(
             "avlmaps> ", history=history, completer=completer, complete_in_thread=True, output=output

@@ -113,7 +113,9 @@ def _serve(verb: View) -> None:
     session = ViewSession(_maps(verb), None if verb.scene is None else _robot(verb.scene))
     server = ViewServer(session, verb.host, verb.port)
     try:
-        signal.signal(signal.SIGTERM, _stop)
+        # SIGINT too: a shell that starts a command in the background has it ignored.
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, _stop)
         if verb.scene is not None:
             session.guide.prepare()  # a scene that is not the map's is an error before a page opens
         session.prepare()

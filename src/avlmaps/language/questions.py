@@ -136,7 +136,7 @@ def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
 
 
 def _wants_yes(read: Sentence) -> bool:
-    """Return whether a statement is asked: "behind the curtain there is a box?"."""
+    """Return whether a statement is meant as a question: "behind the curtain there is a box?"."""
     words = [token.text for token in read.tokens]
     states = {("there", "is"), ("there", "are"), ("there", "any")} & set(pairwise(words))
     return words[-1] == "?" and (bool(states) or words[0] in ("anybody", "anyone")) and _WHERE.isdisjoint(words)

@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Sequence
+from functools import partial
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -16,10 +17,10 @@ import numpy as np
 from avlmaps.core.errors import QueryError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.progress import progress
+from avlmaps.core.question import Modality, Part, Question
 from avlmaps.view.session import ViewSession
 
 if TYPE_CHECKING:
-    from avlmaps.core.question import Question
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.view.labels import Labels
     from avlmaps.view.session import MapOnPage
@@ -85,19 +86,23 @@ def write_page(
     }
 
 
-def default_questions(labels: "Labels") -> list[str]:
-    """Return questions that fit a map: its most certain things, a sound, a room, and two of them together."""
+def default_questions(labels: "Labels") -> "list[tuple[str, Question]]":
+    """Return queries that fit a map, with their titles: its most certain things, a sound, a room, and two together.
+
+    The names are the map's own, so the parts are given as they are: a sentence would have to be read again.
+    """
     things = list(dict.fromkeys(thing.name for thing in labels.things))
     rooms = list(dict.fromkeys(room.name for room in labels.rooms))
     sounds = list(dict.fromkeys(sound.names[0] for sound in labels.sounds if sound.names))
-    asked = [f"the {name}" for name in things[:4]]
-    asked += [f"the sound of {name}" for name in sounds[:1]]
-    asked += [f"the {name}" for name in rooms[:1]]
+    thing, sound, room = (partial(Part, modality) for modality in (Modality.OBJECT, Modality.SOUND, Modality.AREA))
+    parts = [(f"the {name}", [thing(name)]) for name in things[:4]]
+    parts += [(f"the sound of {name}", [sound(name)]) for name in sounds[:1]]
+    parts += [(f"the {name}", [room(name)]) for name in rooms[:1]]
     if things and rooms:
-        asked.append(f"the {things[0]} in the {rooms[0]}")
+        parts.append((f"the {things[0]} in the {rooms[0]}", [thing(things[0]), room(rooms[0])]))
     if len(things) > 1 and sounds:
-        asked.append(f"the {things[1]} near the sound of {sounds[0]}")
-    return asked[:_MOST_QUESTIONS]
+        parts.append((f"the {things[1]} near the sound of {sounds[0]}", [thing(things[1]), sound(sounds[0])]))
+    return [(title, Question.of(of)) for title, of in parts[:_MOST_QUESTIONS]]
 
 
 def _page(title: str, told: dict[str, Any] | None) -> str:
