@@ -161,7 +161,7 @@ def changed(weights: dict[str, torch.Tensor], change: str) -> Any:
         ("unknown", "scratch.head2.bias"),
         ("shape", "scratch.refinenet2.out_conv.bias"),
         ("idle", "clip_pretrained.visual.proj"),
-        ("another", "no checkpoint of LSeg"),
+        ("another", "not a checkpoint of LSeg"),
     ],
 )
 def test_a_checkpoint_of_another_network_is_refused(

@@ -80,7 +80,7 @@ def precision_in_force() -> str:
     torch_side: Any = sys.modules.get("avlmaps.perception.models.device")  # this module stays without torch
     if torch_side is None:
         return model_settings().precision
-    return str(torch_side.chosen_type(torch_side.chosen_device())).removeprefix("torch.")
+    return str(torch_side.select_dtype(torch_side.select_device())).removeprefix("torch.")
 
 
 @dataclass(slots=True)
