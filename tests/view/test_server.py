@@ -12,10 +12,11 @@ import pytest
 import soundfile
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.network import is_loopback
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.view import session as sessions
 from avlmaps.view.layout import RECORD
-from avlmaps.view.server import ViewServer, is_loopback
+from avlmaps.view.server import ViewServer
 from avlmaps.view.session import ViewSession
 from helpers.viewing import serving
 

@@ -13,8 +13,9 @@ from ipaddress import ip_address
 from typing import Any
 from urllib.parse import urlsplit
 
+from avlmaps.core.network import is_loopback
 from avlmaps.serve.errors import RequestError
-from avlmaps.serve.settings import ServeSettings, is_loopback
+from avlmaps.serve.settings import ServeSettings
 
 Scope = MutableMapping[str, Any]
 Message = MutableMapping[str, Any]

@@ -1,15 +1,14 @@
 """Settings of the server: where it listens, who may query, and the limits of each request."""
 
 from dataclasses import dataclass, field
-from ipaddress import ip_address
 from pathlib import Path
 
 from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.network import is_loopback
 
 DEFAULT_PORT = 8750
 MB = 1 << 20
 SHORTEST_TOKEN = 16
-_LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
 
 
 class ServeError(AvlmapsError):
@@ -98,13 +97,3 @@ class ServeSettings:
     def scheme(self) -> str:
         """``http`` or ``https``."""
         return "http" if self.tls_certificate is None else "https"
-
-
-def is_loopback(host: str) -> bool:
-    """Return whether an address is this machine's loopback."""
-    if host in _LOOPBACK_NAMES:
-        return True
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return False

@@ -22,11 +22,11 @@ import secrets
 import socket
 from http.cookies import CookieError, SimpleCookie
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from ipaddress import ip_address
 from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from avlmaps.core.errors import AvlmapsError, QueryError
+from avlmaps.core.network import is_loopback
 from avlmaps.view.page import live_page
 from avlmaps.view.session import MOST_UPLOAD_BYTES, MapOnPage, ViewSession
 
@@ -52,17 +52,6 @@ class _RefusedError(Exception):
     def __init__(self, status: int, message: str) -> None:
         super().__init__(message)
         self.status = status
-
-
-def is_loopback(host: str) -> bool:
-    """Return whether only this machine reaches a host name or address."""
-    name = host.strip("[]")
-    if name == "localhost":
-        return True
-    try:
-        return ip_address(name).is_loopback
-    except ValueError:
-        return False
 
 
 class ViewServer(ThreadingHTTPServer):

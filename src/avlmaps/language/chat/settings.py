@@ -3,13 +3,13 @@
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
-from ipaddress import ip_address
 from math import isfinite
 from pathlib import Path
 from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
 from avlmaps.core.errors import LanguageError
+from avlmaps.core.network import is_loopback
 
 HOSTED_URL = "https://api.openai.com/v1"
 # The key for servers on the same machine, which need none; the client insists on one.
@@ -103,10 +103,7 @@ class ChatSettings:
     def on_this_machine(self) -> bool:
         """Whether the address is of the same machine, to which no proxy leads."""
         host = urlsplit(self.base_url).hostname or ""
-        try:
-            return ip_address(host).is_loopback
-        except ValueError:
-            return host == "localhost" or host.endswith(".localhost")
+        return is_loopback(host) or host.endswith(".localhost")
 
     @property
     def shown_url(self) -> str:

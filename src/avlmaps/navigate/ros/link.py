@@ -3,13 +3,13 @@
 import threading
 from collections.abc import Callable
 from importlib.util import find_spec
-from ipaddress import ip_address
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 import msgspec
 
 from avlmaps.core.errors import BackendError, NavigationError
+from avlmaps.core.network import is_loopback
 from avlmaps.navigate.ros.messages import Incoming, sanitize_line, text_in
 
 if TYPE_CHECKING:
@@ -179,15 +179,8 @@ def _checked(token: str, url: str) -> str:
     if not token or any(c <= " " or c > "~" for c in token):
         raise NavigationError("The token for the robot is empty or has a blank in it; give it as one word.")
     host = urlsplit(url).hostname or ""
-    if url.startswith("ws://") and not _is_own(host):
+    if url.startswith("ws://") and not is_loopback(host):
         raise NavigationError(
             f"A token would go to {url} in the clear; give a wss:// address, or reach the robot through an SSH tunnel."
         )
     return token
-
-
-def _is_own(host: str) -> bool:
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
