@@ -110,6 +110,8 @@ def test_a_photo_and_a_clip_are_asked_with_and_no_answer_names_a_file_of_the_ser
     [
         ("photo", b"no picture at all", "cannot be read as an image"),
         ("clip", b"RIFF....no sound", "cannot be read as sound"),
+        ("clip", b"#EXTM3U\n#EXTINF:1,\n/etc/hostname\n", "give a wav, flac, ogg"),
+        ("clip", b"ffconcat version 1.0\nfile 1.flac\n", "give a wav, flac, ogg"),
         ("photo", b"", "0 bytes"),
         ("program", b"x", "a photo or a clip"),
     ],

@@ -14,6 +14,11 @@ if TYPE_CHECKING:
     import soundfile
 
 _PLAIN = {".wav", ".w64", ".flac", ".ogg", ".oga", ".opus", ".aif", ".aiff", ".caf"}
+# First bytes of the containers that hold their own samples, and the suffix by which the readers know each.
+_SELF_CONTAINED = (
+    (0, b"RIFF", ".wav"), (0, b"fLaC", ".flac"), (0, b"OggS", ".ogg"), (4, b"ftyp", ".m4a"), (0, b"ID3", ".mp3"),
+    (0, b"\xff\xfb", ".mp3"), (0, b"\xff\xf3", ".mp3"), (0, b"\xff\xf2", ".mp3"), (0, b"\x1a\x45\xdf\xa3", ".mkv"),
+)  # fmt: skip
 _PIECE_SAMPLES = 1 << 16
 _UNKNOWN = 1 << 48  # a FLAC that was written to a pipe may say that it has this many samples or more
 _PREROLL_S = 1.0  # a decoder that starts in the middle needs a while until its output is right
@@ -22,6 +27,14 @@ _LOOKS, _LOOK_S = 20, 0.25  # of a file, to find out whether its channels cancel
 _CANCELLED = 0.01
 _AUDIBLE_POWER = 1e-8
 _SLACK_S = 0.5  # containers round their durations, encoders drop or pad a few hundred samples
+
+
+def self_contained_suffix(content: bytes) -> str | None:
+    """Return the suffix of a sound that another sent, by its first bytes; None where it may refer to other files.
+
+    A playlist would make FFmpeg open the files that it names. What comes from elsewhere is read only under this suffix.
+    """
+    return next((suffix for at, magic, suffix in _SELF_CONTAINED if content[at : at + len(magic)] == magic), None)
 
 
 def truncation_error(path: Path, found_s: float, promised_s: float) -> AudioError:

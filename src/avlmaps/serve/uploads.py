@@ -18,16 +18,12 @@ from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.query.avlmap import Attachment
 from avlmaps.query.modalities.sound import require_audible
 from avlmaps.recordings.audio import AudioTrack, Sound
+from avlmaps.recordings.containers import self_contained_suffix
 from avlmaps.recordings.images import check_whole, decode_picture, encoded_size
 from avlmaps.serve.errors import RequestError
 from avlmaps.serve.requests import CLIP, PHOTO
 from avlmaps.serve.settings import Limits
 
-# First bytes of each container, and the suffix by which the readers know it.
-_SOUNDS = (
-    (0, b"RIFF", ".wav"), (0, b"fLaC", ".flac"), (0, b"OggS", ".ogg"), (4, b"ftyp", ".m4a"), (0, b"ID3", ".mp3"),
-    (0, b"\xff\xfb", ".mp3"), (0, b"\xff\xf3", ".mp3"), (0, b"\xff\xf2", ".mp3"), (0, b"\x1a\x45\xdf\xa3", ".mkv"),
-)  # fmt: skip
 _HIGHEST_RATE_HZ = 96_000
 
 
@@ -92,7 +88,7 @@ def decode_clip(content: bytes, limits: Limits) -> Sound:
     Raises:
         RequestError: it is another kind of file, damaged, silent, or too long.
     """
-    suffix = next((suffix for at, magic, suffix in _SOUNDS if content[at : at + len(magic)] == magic), None)
+    suffix = self_contained_suffix(content)
     if suffix is None:
         raise RequestError("The clip is no wav, flac, ogg, mp3, m4a or mkv sound; send another one.", 415, "clip")
     with tempfile.TemporaryDirectory(prefix="avlmaps-serve-") as folder:

@@ -13,6 +13,7 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.modalities.image import read_picture
 from avlmaps.query.modalities.sound import read_clip
 from avlmaps.query.naming import VoxelNamer, keyframes_that_saw
+from avlmaps.recordings.containers import self_contained_suffix
 from avlmaps.view.asking import Upload, ask, without_paths
 from avlmaps.view.labels import Labels, palettes
 from avlmaps.view.layout import Layout
@@ -25,10 +26,7 @@ if TYPE_CHECKING:
 MOST_UPLOAD_BYTES = 32_000_000
 _MOST_UPLOADS = 12  # the oldest file is forgotten then
 _MOST_VIEWS = 12  # keyframes that are named of those which saw a voxel
-_SUFFIXES = {
-    "photo": (".png", ".jpg", ".jpeg", ".webp", ".bmp"),
-    "clip": (".wav", ".flac", ".ogg", ".mp3", ".m4a"),
-}
+_PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
 
 
 class MapOnPage:
@@ -180,19 +178,23 @@ class ViewSession:
         Raises:
             QueryError: it is neither, too large, or cannot be read.
         """
-        if kind not in _SUFFIXES:
+        if kind not in ("photo", "clip"):
             raise QueryError(f"A page takes a photo or a clip, not {kind[:40]!r}.")
         name = PurePath(name.replace("\\", "/")).name[:100] or kind
         if not content or len(content) > MOST_UPLOAD_BYTES:
             raise QueryError(
                 f"The {kind} {name} has {len(content):,} bytes; give one of up to {MOST_UPLOAD_BYTES:,} bytes."
             )
+        suffix = PurePath(name).suffix.lower()
+        if kind == "photo":
+            suffix = suffix if suffix in _PHOTO_SUFFIXES else ""
+        elif (suffix := self_contained_suffix(content)) is None:
+            raise QueryError(f"The clip {name} cannot be read as sound: give a wav, flac, ogg, mp3, m4a or mkv sound.")
         with self._asking:
             self._folder = self._folder or Path(tempfile.mkdtemp(prefix="avlmaps-view-"))
             self._counted += 1
-            suffix = PurePath(name).suffix.lower()
             number = str(self._counted)
-            path = self._folder / f"{number}{suffix if suffix in _SUFFIXES[kind] else ''}"
+            path = self._folder / f"{number}{suffix}"
             kept = Upload(path, name)
             path.write_bytes(content)
             try:
