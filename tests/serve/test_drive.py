@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from jsonschema import Draft202012Validator, ValidationError
 from starlette.testclient import TestClient
 
 from avlmaps.serve.app import create_app
@@ -68,6 +69,40 @@ def test_a_command_is_planned_confirmed_driven_and_logged(client: TestClient, dr
     for entry in drive.entries:
         assert {"time", "who"} <= entry.keys() and entry["words"] == "go to the red thing, then turn left"
     assert told["token"] not in drive.log.read_text(encoding="utf-8"), "a log that is read confirms nothing"
+
+
+def test_the_openapi_document_describes_what_the_addresses_answer(client: TestClient, drive: Driven) -> None:
+    document = client.get("/openapi.json").json()
+    assert {path for path in document["paths"] if path.startswith("/drive/")} == {
+        f"/drive/{name}" for name in ("plan", "confirm", "stop", "status")
+    }
+
+    def conforms(response: Any, path: str, method: str = "post") -> Any:
+        described = document["paths"][f"/drive/{path}"][method]["responses"][str(response.status_code)]
+        schema = described["content"]["application/json"]["schema"]
+        validator = Draft202012Validator({**schema, "components": document["components"]})
+        validator.validate(response.json())
+        with pytest.raises(ValidationError):
+            validator.validate([])
+        return response.json()
+
+    token = conforms(client.post("/drive/plan", json={"words": "turn left"}), "plan")["token"]
+    conforms(client.post("/drive/plan", json={"words": "go to the frobnicator"}), "plan")
+    conforms(client.post("/drive/plan", json={"wrods": "turn left"}), "plan")
+    conforms(client.get("/drive/status"), "status", "get")
+    conforms(client.post("/drive/confirm", json={"token": "none"}), "confirm")
+    drive.machine.body.let_go.clear()
+    conforms(client.post("/drive/confirm", json={"token": token}), "confirm")
+    conforms(client.get("/drive/status"), "status", "get")
+    conforms(client.post("/drive/stop"), "stop")
+    conforms(client.get("/drive/status"), "status", "get")
+
+
+def test_a_stop_is_accepted_with_a_body_of_any_size(client: TestClient, drive: Driven) -> None:
+    for size in ("40000000", "9" * 30):
+        answer = client.post("/drive/stop", content=b"x", headers={"content-length": size})
+        assert answer.status_code == 200 and answer.json()["stopped"] is True
+    assert client.post("/drive/plan", content=b"x", headers={"content-length": "9" * 30}).status_code == 413
 
 
 def test_a_program_is_planned_as_well(client: TestClient, drive: Driven) -> None:

@@ -65,14 +65,15 @@ def create_app(
     Args:
         service: maps, lanes and settings.
         mounts: further ASGI applications by path, such as ``{"/drive": drive_app(service)}``; the guard stands before
-            them, too. The longest path wins over shorter ones.
+            them, too. The longest path wins over shorter ones. A Starlette application says in ``state.document`` which
+            paths and schemas it adds to the OpenAPI document.
         lifespans: async context managers that are open while the server runs.
         tools: what agents can call under ``/mcp``; none serves no agents.
     """
     routes: list[BaseRoute] = [
         Route("/", _page, methods=["GET"]),
         Route("/health", _health, methods=["GET"]),
-        Route("/openapi.json", _openapi(service), methods=["GET"]),
+        Route("/openapi.json", _openapi(service, mounts or {}), methods=["GET"]),
         Route("/maps", _maps(service), methods=["GET"]),
         *(Route(f"/maps/{{map}}{one.path}", _endpoint(service, one), methods=list(one.methods)) for one in OPERATIONS),
     ]
@@ -139,10 +140,20 @@ async def _health(request: Request) -> Response:
     return _json({"status": "ok", "version": __version__})
 
 
-def _openapi(service: Service) -> Callable[[Request], Any]:
+def _openapi(service: Service, mounts: Mapping[str, App]) -> Callable[[Request], Any]:
+    described = {
+        path: app.state.document
+        for path, app in mounts.items()
+        if isinstance(app, Starlette) and hasattr(app.state, "document")
+    }
+
     async def endpoint(request: Request) -> Response:
         url = str(request.base_url).rstrip("/")
-        return _json(document(service.shelf.names, url, service.settings.token is not None))
+        whole = document(service.shelf.names, url, service.settings.token is not None)
+        for path, (paths, schemas) in described.items():
+            whole["paths"] |= {f"{path}{below}": item for below, item in paths.items()}
+            whole["components"]["schemas"] |= schemas
+        return _json(whole)
 
     return endpoint
 

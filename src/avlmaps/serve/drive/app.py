@@ -22,6 +22,7 @@ from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
 
 from avlmaps.core.printable import printable_json
+from avlmaps.serve.drive.described import drive_document
 from avlmaps.serve.drive.orders import Dispatcher
 from avlmaps.serve.drive.plans import DriveError, Who
 from avlmaps.serve.drive.requests import ConfirmRequest, PlanRequest
@@ -114,6 +115,7 @@ def drive_app(service: DriveService, agents: Any = None) -> Starlette:
         routes.append(Route("/mcp", agents))
     app = Starlette(routes=routes, exception_handlers={HTTPException: _http_error})
     app.router.redirect_slashes = False
+    app.state.document = drive_document()
     return app
 
 
