@@ -82,6 +82,16 @@ def test_names_that_count_as_one_are_asked_as_one() -> None:
     assert figures.reached["bed"] == 0.0
 
 
+def test_a_narrower_kind_answers_a_wider_name_and_not_the_reverse() -> None:
+    things = (thing("chair", (0, 0, 0)), thing("armchair", (2, 0, 0)), thing("bed", (4, 0, 0)))
+    claims = {"chair": [(1, 0.9)], "armchair": [(0, 0.9)], "bed": [(2, 0.9)]}
+    figures = measure(AskedMap(claims), things, {}, "room")  # pyright: ignore[reportArgumentType]
+    assert figures.reached["chair"] == 0.0, "an armchair is a chair"
+    assert figures.reached["armchair"] > 0.5, "a chair is no armchair"
+    assert figures.precise == (2, 3)
+    assert figures.found_count == 1, "a thing is found by its own name"
+
+
 def test_the_first_goal_of_a_map_lies_in_the_surest_instance() -> None:
     goals = AskedMap({"chair": [(0, 0.6), (1, 0.9)]}).object("chair").goals(2)
     assert [round(goal.position[0]) for goal in goals] == [2, 0]

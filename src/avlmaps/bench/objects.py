@@ -3,11 +3,14 @@
 Three figures for each scene. *First goal*: of the categories that stand there, how many have the first answer
 within half a metre of a true one. *Instances*: of the instances of confidence 0.5 or more how many are
 true, and of the true ones how many are found. *Found*: how well the best confidence separates categories that are there
-from those that are not (area under the ROC curve). Truth: boxes of things, of which the walk saw at least some.
+from those that are not (area under the ROC curve). Truth: boxes of things, of which the walk saw at least some. A thing
+of a narrower kind is true for a wider name: a dining table answers "table", a table does not answer "dining table".
+A true thing counts as found by its own name alone.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -98,13 +101,14 @@ def measure(asked: "AVLMap", things: Sequence[SceneObject], same: Mapping[str, s
     present = {name[number] for number in seen}
     vocabulary = [word for word in asked.stored.profile.pixel_encoder().vocabulary if word not in STRUCTURE]
     words = sorted({same.get(word, word) for word in vocabulary} | (present - set(STRUCTURE)))
+    answers = cache(lambda name, word: name == word or lexicon().is_a(name, word, Kind.THING))
     said, held, best, reached = [], np.zeros(len(centres), bool), {}, {}
     covered: dict[str, np.ndarray] = {}
     for word in words:
         heat = asked.object(word, primary=True)
         factor = heat.factors[0]
         rows = np.flatnonzero(getattr(factor, "mask", np.zeros(len(centres), bool)))
-        of_word = [number for number in seen if name[number] == word]
+        of_word = [number for number in seen if answers(name[number], word)]
         held[:] = False
         for number in of_word:
             held[inside[number]] = True
@@ -115,7 +119,7 @@ def measure(asked: "AVLMap", things: Sequence[SceneObject], same: Mapping[str, s
         good = (one.confidence >= 0.5) & one.is_true
         covered[word] = rows[good[factor.instance]]
         best[word] = (float(one.confidence.max(initial=0.0)), bool(of_word))
-        if of_word:
+        if word in present:
             goals = heat.goals(1)
             reached[word] = _distance(goals[0].position, [things[n] for n in of_word]) if goals else np.inf
     large = [n for n in seen if name[n] not in STRUCTURE and max(things[n].size) >= SMALLEST_M]
