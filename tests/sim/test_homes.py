@@ -2,15 +2,16 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
 from avlmaps.sim.free_space import free_space
 from avlmaps.sim.furniture import families
 from avlmaps.sim.homes import make_home, make_office
+from avlmaps.sim.homes.doors import _opened  # pyright: ignore[reportPrivateUsage]
 from avlmaps.sim.homes.layout import cut, floor_of
-from avlmaps.sim.homes.plan import OUTSIDE, walls_between
+from avlmaps.sim.homes.plan import OUTSIDE, Room, Wall, walls_between
 from avlmaps.sim.homes.polygons import area_m2, corners_of, half, inside, overlapping, rectangle, shrunk, widths_m
 from avlmaps.sim.homes.programme import home_programme
 from avlmaps.sim.scene import Scene
@@ -135,6 +136,17 @@ def test_training_homes_hold_no_shape_that_is_held_out() -> None:
         if thing.family and thing.category not in {"wall", "floor", "ceiling"}:
             held_out = set(families(thing.category, "held-out")) - set(families(thing.category, "training"))
             assert thing.family not in held_out
+
+
+@settings(max_examples=60, deadline=None)
+@given(length_m=st.floats(1.7, 9.0), seed=st.integers(0, 999))
+@example(length_m=4.169982735479752, seed=63)
+def test_a_gap_of_an_open_plan_fits_into_its_wall(length_m: float, seed: int) -> None:
+    wall = Wall(np.zeros(2), np.array([length_m, 0.0]), 0, 1)
+    rooms = [Room("kitchen", rectangle(0, 0, 2, 2)), Room("living room", rectangle(0, 0, 2, 2))]
+    for hole in _opened(np.random.default_rng(seed), wall, rooms).holes:
+        assert hole.at_m - hole.width_m / 2 > 0.14
+        assert hole.at_m + hole.width_m / 2 < length_m - 0.14
 
 
 @settings(max_examples=25, deadline=None)

@@ -112,7 +112,8 @@ def _opened(rng: np.random.Generator, wall: Wall, rooms: list[Room]) -> Wall:
     if chance(rng, 0.45) or wall.length_m < 1.7:
         return replace(wall, built=False)
     width = min(wall.length_m - 0.3, draw(rng, 1.2, 4.0))
-    at = draw(rng, 0.15 + width / 2, wall.length_m - 0.15 - width / 2)
+    nearest = 0.15 + width / 2  # a gap as wide as the wall allows has one place, and rounding must not take it
+    at = draw(rng, nearest, max(nearest, wall.length_m - 0.15 - width / 2))
     head = ceiling if chance(rng, 0.4) else min(draw(rng, 2.05, 2.5), ceiling - 0.1)
     return wall.with_hole(Hole("gap", at, width, 0.0, head))
 
