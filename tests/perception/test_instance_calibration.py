@@ -83,6 +83,18 @@ def test_an_artists_model_takes_the_box_of_the_piece_that_it_replaces(tmp_path: 
     assert after.family == plain[0].family
 
 
+def test_models_that_training_sees_and_models_to_measure_on_are_apart(tmp_path: Path):
+    for name in ("Couch_Large1", "Couch_Large2", "Couch_Large3", "Couch_Medium1", "Couch_Medium2", "loungeSofa"):
+        trimesh.creation.box((1.0, 1.0, 1.0)).export(tmp_path / f"{name}.glb")
+    seen: dict[str, set[str]] = {}
+    for which in ("training", "held-out"):
+        with borrowed.borrowed_furniture(tmp_path, which):
+            made = [furnish.make("sofa", np.random.default_rng(seed)).family for seed in range(60)]
+        seen[which] = {family for family in made if (tmp_path / f"{family}.glb").is_file()}
+    assert seen["training"] and seen["held-out"]
+    assert not seen["training"] & seen["held-out"]
+
+
 def test_a_folder_without_models_is_refused(tmp_path: Path):
     with pytest.raises(FileNotFoundError, match="none of the models"), borrowed.borrowed_furniture(tmp_path):
         pass

@@ -80,7 +80,7 @@ def pieces_of(options: Options, number: int) -> Iterator[Pieces]:
     seed, sensor, profile = FIRST_CALIBRATION_SEED + 1000 + number, SENSORS[number % len(SENSORS)], options.profile
     recording = options.work / f"{seed}-{sensor}"
     if not (recording / "objects.json").is_file():
-        with nullcontext() if options.furniture is None else borrowed_furniture(options.furniture):
+        with nullcontext() if options.furniture is None else borrowed_furniture(options.furniture, "held-out"):
             scene = open_scene(f"{'office' if number % 6 == 5 else 'house'}:{seed}:held-out")
         settings = RecordSettings(hearing="none", sensor=sensor, fps=5.0, max_frames=options.frames, workers=1)
         record_scene(scene, recording, settings, seed)

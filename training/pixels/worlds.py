@@ -9,12 +9,14 @@ import json
 import os
 import shutil
 import sys
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter, time
 
 import numpy as np
 import tyro
+from training.pixels.borrowed import borrowed_furniture
 from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED, room_of
 
 from avlmaps.core.camera import Pinhole
@@ -47,17 +49,21 @@ class Options:
     """Distance of the seeds, for several processes side by side."""
     which: Families = "training"
     """Families of shapes."""
+    furniture: Path | None = None
+    """Folder of artists' models (``borrowed.py``), which furnish half of the homes; those of ``which`` alone."""
     lit: float = 0.7
     """Share of homes rendered in colour; of the others only shape is learnt."""
     once: bool = False
     """Stop when there are enough shards instead of replacing old ones."""
 
 
-def scene_of(seed: int, which: Families, rng: np.random.Generator) -> Scene:
+def scene_of(seed: int, options: Options, rng: np.random.Generator) -> Scene:
     """Return the home or office of a seed, with some things in it that are nothing in particular."""
     from avlmaps.sim.homes import make_home, make_office
 
-    scene = make_office(seed, which) if seed % 6 == 5 else make_home(seed, which)
+    borrows = options.furniture is not None and seed // options.step % 2 == 0
+    with borrowed_furniture(options.furniture, options.which) if borrows and options.furniture else nullcontext():
+        scene = make_office(seed, options.which) if seed % 6 == 5 else make_home(seed, options.which)
     return with_oddities(scene, rng)
 
 
@@ -125,7 +131,7 @@ def add_home(shard: Shard, seed: int, options: Options) -> None:
     from avlmaps.sim.walk import random_views
 
     rng = np.random.default_rng([seed, 7])
-    scene = scene_of(seed, options.which, rng)
+    scene = scene_of(seed, options, rng)
     lit = rng.random() < options.lit
     renderer = Renderer(scene, lit=lit)
     names = scene.categories
