@@ -6,13 +6,16 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
+import anyio
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator, ValidationError
+from mcp.client.client import Client
 from starlette.testclient import TestClient
 
 from avlmaps.serve.app import create_app
+from avlmaps.serve.drive.agents import drive_agent_server
 from avlmaps.serve.drive.plans import DriveError, Plan, PlanBook
 from avlmaps.serve.service import Service
 from avlmaps.serve.settings import ServeSettings
@@ -96,6 +99,35 @@ def test_the_openapi_document_describes_what_the_addresses_answer(client: TestCl
     conforms(client.get("/drive/status"), "status", "get")
     conforms(client.post("/drive/stop"), "stop")
     conforms(client.get("/drive/status"), "status", "get")
+
+
+@pytest.mark.parametrize("mode", ["2026-07-28", "legacy"])
+def test_an_agent_plans_confirms_and_stops_by_tools(drive: Driven, mode: str) -> None:
+    async def conversation() -> None:
+        async with Client(drive_agent_server(drive.service), mode=mode) as client:  # pyright: ignore[reportArgumentType]
+            tools = {tool.name: tool.annotations for tool in (await client.list_tools()).tools}
+            assert {name for name, notes in tools.items() if notes and not notes.read_only_hint} == {
+                "confirm_drive",
+                "stop_robot",
+            }
+            planned = await client.call_tool("plan_drive", {"words": "turn left"})
+            assert planned.structured_content is not None and drive.machine.motions == 0
+            wrong = await client.call_tool("confirm_drive", {"token": "none"})
+            assert wrong.is_error and drive.machine.motions == 0
+            begun = await client.call_tool("confirm_drive", {"token": planned.structured_content["token"]})
+            assert not begun.is_error and begun.structured_content is not None
+            assert begun.structured_content["order"] == planned.structured_content["order"]
+            with anyio.fail_after(30):
+                while (await client.call_tool("robot_status", {})).structured_content["state"] != "idle":  # pyright: ignore[reportOptionalSubscript]
+                    await anyio.sleep(0.01)
+            assert drive.machine.motions == 1
+            again = await client.call_tool("confirm_drive", {"token": planned.structured_content["token"]})
+            assert again.is_error, "a token is good once"
+            stopped = await client.call_tool("stop_robot", {"nonsense": 1})
+            assert stopped.structured_content is not None and stopped.structured_content["stopped"] is True
+
+    anyio.run(conversation)
+    assert drive.events == ["planned", "refused", "confirmed", "ended", "refused", "stop"]
 
 
 def test_a_stop_is_accepted_with_a_body_of_any_size(client: TestClient, drive: Driven) -> None:

@@ -4,16 +4,23 @@ import json
 import os
 import signal
 import socket
+import ssl
 import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
 import anyio
 import httpx
 import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import NameOID
 from mcp.client.client import Client
 from mcp.client.stdio import StdioServerParameters, stdio_client
 
@@ -90,6 +97,46 @@ def test_a_killed_server_starts_again_on_the_same_port_with_the_same_answers(sta
     assert after["goals"] == before["goals"]
     again.send_signal(signal.SIGINT)
     assert again.wait(30) == 0
+
+
+def own_certificate(folder: Path) -> tuple[Path, Path]:
+    """Write a certificate for 127.0.0.1 that signs itself, and its key."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "avlmaps test")])
+    now = datetime.now(UTC)
+    built = x509.CertificateBuilder(name, name, key.public_key(), 1, now - timedelta(days=1), now + timedelta(days=1))
+    address = x509.SubjectAlternativeName([x509.IPAddress(ip_address("127.0.0.1"))])
+    certificate = built.add_extension(address, critical=False).sign(key, hashes.SHA256())
+    files = folder / "own.pem", folder / "own.key"
+    files[0].write_bytes(certificate.public_bytes(serialization.Encoding.PEM))
+    plain = serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+    files[1].write_bytes(key.private_bytes(serialization.Encoding.PEM, *plain))
+    return files
+
+
+def test_with_tls_files_it_speaks_https_and_nothing_else(start: Start, tmp_path: Path) -> None:
+    certificate, key = own_certificate(tmp_path)
+    process, ready = start("--port", "0", "--tls-cert", certificate, "--tls-key", key)
+    assert ready["url"].startswith("https://127.0.0.1:")
+    trusts = ssl.create_default_context(cafile=str(certificate))
+    with httpx.Client(verify=trusts) as client:
+        assert client.get(f"{ready['url']}/health").json()["status"] == "ok"
+        assert client.get(f"{ready['url']}/maps/room/ask", params={"sentence": "the red thing"}).json()["goals"]
+    with pytest.raises(httpx.ConnectError, match="CERTIFICATE_VERIFY_FAILED"):
+        httpx.get(f"{ready['url']}/health")
+    with pytest.raises(httpx.HTTPError):
+        httpx.get(f"http{ready['url'].removeprefix('https')}/health")
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(30) == 0
+
+
+def test_tls_files_that_are_none_are_one_sentence(
+    room: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "a.pem").write_text("no certificate")
+    code, error = failed(capsys, room, "--port", 0, "--tls-cert", tmp_path / "a.pem", "--tls-key", tmp_path / "a.pem")
+    assert code == 1
+    assert "The TLS files cannot be used" in error
 
 
 def test_an_agent_is_served_by_standard_input_and_output(room: Path) -> None:
