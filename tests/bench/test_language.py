@@ -42,3 +42,17 @@ def test_how_an_answer_counts(intents: list[object], outcome: str) -> None:
 def test_a_question_back_is_no_misreading() -> None:
     row = {"say": "go to the frobnicator", "intents": [{"do": "go", "to": {"object": "frobnicator"}}]}
     assert judge(row).outcome == "asked back"
+
+
+@pytest.mark.parametrize(
+    "near",
+    [
+        [{"object": "table"}, {"area": "kitchen"}],
+        [{"object": "table", "near": [{"area": "kitchen"}]}],
+        [{"area": "kitchen", "near": [{"object": "table"}]}],
+    ],
+)
+def test_a_chain_counts_alike_nested_or_flat(near: list[object]) -> None:
+    row = {"say": "go to the chair near the table in the kitchen"}
+    assert judge({**row, "intents": [{"do": "go", "to": {"object": "chair", "near": near}}]}).outcome == "right"
+    assert judge({**row, "intents": [{"do": "go", "to": {"object": "chair", "near": []}}]}).outcome != "right"

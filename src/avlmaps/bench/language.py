@@ -164,8 +164,10 @@ def _target(target: Any) -> Any:
     name = _name(kind, target[kind])
     if kind in ("object", "area") and _is_both(str(target[kind])):
         kind, name = "area", _name("area", target[kind])  # "the closet": a list may call it a thing or a room
-    near = frozenset(_target(one) for one in target.get("near", ()))
-    return kind, name, near, "" if pick == "nearest" else pick
+    # A chain counts alike whether a list has it nested or flat: the program multiplies all heats.
+    near = [_target(one) for one in target.get("near", ())]
+    flat = frozenset(each for one in near for each in ((*one[:2], frozenset(), one[3]), *one[2]))
+    return kind, name, flat, "" if pick == "nearest" else pick
 
 
 def _is_both(name: str) -> bool:

@@ -66,7 +66,8 @@ class Target:
     Attributes:
         kind: what it is.
         name: its words as they were said, without the article; the path of a file for an image and a clip.
-        near: what it is near, in, on, or between, in the order of the words.
+        near: what it is near, in, on, or between, in the order of the words; a chain ("the lamp on the table by the
+            sofa") is made flat, since a program multiplies all heats.
         pick: which one of several.
     """
 
@@ -74,6 +75,12 @@ class Target:
     name: str = ""
     near: "tuple[Target, ...]" = ()
     pick: Pick = Pick.ANY
+
+    def __post_init__(self) -> None:
+        """Make chains flat."""
+        if any(one.near for one in self.near):
+            flat = [each for one in self.near for each in (replace(one, near=()), *one.near)]
+            object.__setattr__(self, "near", tuple(dict.fromkeys(flat)))
 
     @property
     def is_file(self) -> bool:
