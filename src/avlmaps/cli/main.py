@@ -4,7 +4,7 @@ import io
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stderr, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stderr
 from typing import Annotated, Any, Union
 
 import tyro
@@ -19,6 +19,7 @@ from avlmaps.cli.import_map import ImportMap
 from avlmaps.cli.info import Info
 from avlmaps.cli.locate import Locate
 from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_of, system_sentence
+from avlmaps.cli.pipes import READER_GONE, drop, reader_gone
 from avlmaps.cli.profiles import Profiles
 from avlmaps.cli.query import Query
 from avlmaps.cli.record import Record
@@ -67,7 +68,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
         arguments: the words after ``avlmaps``; those of this process if None.
     """
     try:
-        _main(sys.argv[1:] if arguments is None else list(arguments))
+        try:
+            _main(sys.argv[1:] if arguments is None else list(arguments))
+        finally:
+            sys.stdout.flush()  # here, since Python reports a reader that has gone on standard error if it flushes last
+    except OSError as error:  # of what was printed last; a verb's own are a sentence already
+        if reader_gone():
+            sys.exit(READER_GONE)
+        drop(sys.stdout)
+        sys.exit(_complain(system_sentence(error), 1))
     except KeyboardInterrupt:  # while it was reading its words
         sys.exit(_complain("stopped", 130))
 
@@ -105,7 +114,7 @@ def _usage_in_json() -> Iterator[None]:
     except SystemExit as stop:
         sys.stderr.write(told.getvalue())
         if stop.code not in (0, None):
-            emit({"error": error_answer("usage", usage_sentence(told.getvalue()))}, (), as_json=True)
+            _emit_error("usage", usage_sentence(told.getvalue()))
         raise
 
 
@@ -129,10 +138,9 @@ def _run(verb: Verb) -> int:
         return _fail(verb, error, str(error), 2)
     except AvlmapsError as error:
         return _fail(verb, error, str(error), 1)
-    except BrokenPipeError:  # the reader of our output has gone (`avlmaps info MAP | head`): nothing to report
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     except (OSError, MemoryError) as error:
+        if isinstance(error, BrokenPipeError) and reader_gone():
+            return READER_GONE
         return _fail(verb, error, system_sentence(error), 1)
     except KeyboardInterrupt as stop:
         if (status := getattr(stop, "status", None)) is not None:  # of a robot that was driving; its answer is printed
@@ -140,7 +148,9 @@ def _run(verb: Verb) -> int:
         return _fail(verb, stop, "stopped; the same command continues where this one ended, where it can", 130)
     except Exception as fault:
         if verb.json:
-            _emit_error(fault, f"{type(fault).__name__}: {fault}; this is a fault of avlmaps, please report it.")
+            _emit_error(
+                kind_of(fault), f"{type(fault).__name__}: {fault}; this is a fault of avlmaps, please report it."
+            )
         raise
     return 0
 
@@ -156,14 +166,17 @@ def _compiling(verb: Verb) -> AbstractContextManager[None]:
 def _fail(verb: Verb, error: BaseException, message: str, status: int) -> int:
     """Print an error in one sentence on standard error, and as JSON on standard output with --json."""
     if verb.json:
-        _emit_error(error, message)
+        _emit_error(kind_of(error), message)
     return _complain(message, status)
 
 
-def _emit_error(error: BaseException, message: str) -> None:
-    """Print an error as JSON, unless standard output is what failed."""
-    with suppress(OSError):
-        emit({"error": error_answer(kind_of(error), message)}, (), as_json=True)
+def _emit_error(kind: str, message: str) -> None:
+    """Print an error as JSON, unless standard output is what failed: the sentence and the status report it too."""
+    try:
+        emit({"error": error_answer(kind, message)}, (), as_json=True)
+        sys.stdout.flush()
+    except OSError:
+        drop(sys.stdout)
 
 
 def _complain(what: object, status: int) -> int:

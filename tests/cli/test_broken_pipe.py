@@ -1,0 +1,92 @@
+"""A reader that goes away (`avlmaps ... | head -1`) ends any verb quietly, by a real pipe."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from avlmaps.cli.main import VERBS
+
+READER_GONE = 141
+
+
+def ended(*words: object, reads: int = 0, buffered: bool = True) -> tuple[int, bytes]:
+    """Run a command whose reader takes some bytes and goes; return its exit status and standard error."""
+    reader, writer = os.pipe()
+    command = [sys.executable, "-m", "avlmaps", *map(str, words)]
+    if not reads:
+        os.close(reader)
+    surroundings = {**os.environ, "PYTHONUNBUFFERED": "" if buffered else "1"}
+    process = subprocess.Popen(
+        command, stdout=writer, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, env=surroundings
+    )
+    os.close(writer)
+    if reads:
+        os.read(reader, reads)
+        os.close(reader)
+    _, said = process.communicate(timeout=200)
+    return process.returncode, said
+
+
+@pytest.mark.parametrize("words", [["--help"], ["bench", "--help"], ["--version"]])
+def test_help(words: list[str]) -> None:
+    assert ended(*words) == (READER_GONE, b"")
+
+
+@pytest.mark.parametrize(("words", "status"), [(["bench", "--nothing"], 2), (["info", "nothing.avlmap"], 1)])
+@pytest.mark.parametrize("buffered", [True, False])
+def test_an_error_keeps_its_status_and_its_sentence(words: list[str], status: int, buffered: bool) -> None:
+    got, said = ended(*words, "--json", buffered=buffered)
+    assert got == status and said
+    assert b"Traceback" not in said and b"BrokenPipe" not in said and b"Exception ignored" not in said
+
+
+def test_help_that_is_read_in_part() -> None:
+    """The pipe may hold the rest before its reader goes; either end is a quiet one."""
+    status, said = ended("bench", "--help", reads=64)
+    assert status in (0, READER_GONE) and said == b""
+
+
+@pytest.mark.parametrize("words", [["profiles"], ["profiles", "--json"]])
+def test_answers(words: list[str]) -> None:
+    assert ended(*words) == (READER_GONE, b"")
+
+
+def test_answers_about_a_map(built: Path) -> None:
+    for words in (["info", built], ["things", built, "--json"], ["query", built, "--object", "red", "--json"]):
+        status, said = ended(*words)
+        assert status == READER_GONE, (words, said)
+        assert said == b"" or said.startswith(b"compiling once"), said
+
+
+def test_a_table_written_to_a_pipe(built: Path, tmp_path: Path) -> None:
+    status, said = ended("things", built, "--csv", tmp_path / "things.csv")
+    assert status == READER_GONE and said.startswith(b"wrote ") and said.count(b"\n") == 1
+    assert (tmp_path / "things.csv").read_text().startswith("kind,name")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no full device")
+@pytest.mark.parametrize("words", [["--help"], ["profiles", "--json"], ["info", "nothing.avlmap", "--json"]])
+def test_a_full_disk_is_one_sentence(words: list[str]) -> None:
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run([sys.executable, "-m", "avlmaps", *words], stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1
+    assert done.stderr.startswith("avlmaps: ") and done.stderr.count("\n") == 1
+
+
+def test_another_broken_pipe_is_an_error(
+    run: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The connection to a robot that breaks is no reader that went away."""
+
+    def break_off(_: object) -> None:
+        raise BrokenPipeError(32, "Broken pipe")
+
+    monkeypatch.setattr(VERBS["profiles"], "run", break_off)
+    status, out, err = run("profiles", "--json")
+    assert status == 1 and "Broken pipe" in err
+    assert json.loads(out)["error"]["kind"] == "system"
