@@ -73,7 +73,7 @@ class KnownThings:
     def best(self, target: Any) -> Thing:
         return self.things[target]
 
-    def meant(self, target: Any, here: np.ndarray) -> Thing:
+    def referent(self, target: Any, here: np.ndarray) -> Thing:
         return self.things[target]
 
     def pair(self, a: Any, b: Any, here: np.ndarray) -> tuple[Thing, Thing]:

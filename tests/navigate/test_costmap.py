@@ -93,11 +93,11 @@ def test_a_careful_body_keeps_away_from_what_was_never_seen():
 
 def test_what_was_met_counts_as_the_map_does():
     states = np.full((40, 40), CellState.FREE, np.uint8)
-    met = np.zeros((40, 40), bool)
-    met[20, 20] = True
+    touched = np.zeros((40, 40), bool)
+    touched[20, 20] = True
     known = states.copy()
     known[20, 20] = CellState.OCCUPIED
-    one, other = costmap_of(of_states(states), 0.2, met=met), costmap_of(of_states(known), 0.2)
+    one, other = costmap_of(of_states(states), 0.2, contacts=touched), costmap_of(of_states(known), 0.2)
     np.testing.assert_array_equal(one.passable, other.passable)
     np.testing.assert_array_equal(one.cost, other.cost)
 

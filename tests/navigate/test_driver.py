@@ -93,8 +93,8 @@ def test_a_wall_that_the_map_does_not_know_is_found_and_driven_round(drive, on_c
     arrival = driver.go_to(place(4.0, 3.3))
     assert arrival.reached
     assert arrival.contacts > 0
-    assert driver.met.cells.any()
-    assert not (MAP.states == CellState.OCCUPIED)[driver.met.cells].any()
+    assert driver.contacts.cells.any()
+    assert not (MAP.states == CellState.OCCUPIED)[driver.contacts.cells].any()
     back = driver.go_to(place(0.5, 3.0))
     assert back.reached
     assert back.contacts <= 1
@@ -314,7 +314,7 @@ def test_a_turn_is_put_right_where_the_body_turns_inexactly(drive):
 def test_a_contact_in_a_turn_tells_of_nothing_ahead():
     driver = MapDriver(FLOOR, Free(GroundPose(2.0, 2.0), contact=True))
     assert driver.turn(1.0).contacts == 11
-    assert not driver.met.cells.any()
+    assert not driver.contacts.cells.any()
 
 
 @MODES

@@ -144,7 +144,7 @@ def test_a_budget_holds_for_the_robot_too() -> None:
 def test_the_way_is_drawn_with_start_goals_and_stops(tmp_path) -> None:
     outcome, _ = told("go to the table, then go to the chair")
     asked = AVLMap(furnished_map())
-    figure = draw_path(asked.space, GroundPose(3.0, 2.0), outcome.moves, met=np.array([[1.0, 1.0]]), title="there")
+    figure = draw_path(asked.space, GroundPose(3.0, 2.0), outcome.moves, contacts=np.array([[1.0, 1.0]]), title="there")
     labels = figure.axes[0].get_legend_handles_labels()[1]
     assert labels[0] == "start"
     assert any(label.startswith("2: 'chair'") for label in labels)

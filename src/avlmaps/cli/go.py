@@ -106,7 +106,7 @@ class Ready:
         driver: moves it.
         start: where it stands.
         obstacles: the obstacles that the map knows.
-        met: returns where it met something that the map does not know.
+        contacts: returns where it touched something that the map does not know.
         halt: returns how the robot stands after an interrupt.
         close: ends the connection; a real robot stops where it is.
     """
@@ -114,7 +114,7 @@ class Ready:
     driver: "Driver"
     start: "GroundPose"
     obstacles: "Obstacles"
-    met: "Callable[[], Float[np.ndarray, 'm 2'] | None]"
+    contacts: "Callable[[], Float[np.ndarray, 'm 2'] | None]"
     halt: "Callable[[], Halt]"
     close: "Callable[[], None]"
 
@@ -200,7 +200,7 @@ def drive(
         from avlmaps.navigate.trace_plot import plot_path
 
         title = f"“{verb.sentence}”"
-        plot_path(verb.plot, asked.space, robot.start, outcome.moves, robot.obstacles, robot.met(), title)
+        plot_path(verb.plot, asked.space, robot.start, outcome.moves, robot.obstacles, robot.contacts(), title)
         return {**outcome.to_json(), "plot": str(verb.plot)}
     return outcome.to_json()
 
@@ -253,7 +253,7 @@ def simulated_robot(verb: "Go", asked: "AVLMap", start: "GroundPose | None") -> 
 
     robot = robot_in(asked, open_scene(verb.scene or ""), SHAPES[verb.body], start)
     halt = Halt(True, "the simulated robot moves only while the command runs")
-    return Ready(robot.driver, robot.start, robot.obstacles, lambda: robot.met, lambda: halt, lambda: None)
+    return Ready(robot.driver, robot.start, robot.obstacles, lambda: robot.contacts, lambda: halt, lambda: None)
 
 
 def _real(verb: "Go", asked: "AVLMap") -> Ready:

@@ -112,7 +112,7 @@ def drive(asks: Sequence[Ask], asked: "AVLMap", scene: "Scene", out: Path, tell:
         )
     except AvlmapsError as fault:
         return Drive(command, legs, None, None, str(fault))
-    plot_path(out / PICTURE, asked.space, robot.start, outcome.moves, robot.obstacles, robot.met, f"“{command}”")
+    plot_path(out / PICTURE, asked.space, robot.start, outcome.moves, robot.obstacles, robot.contacts, f"“{command}”")
     return Drive(command, legs, robot.start, outcome, outcome.error)
 
 

@@ -40,9 +40,9 @@ class SimulatedRobot:
     obstacles: Obstacles
 
     @property
-    def met(self) -> Float[np.ndarray, "m 2"]:
-        """The places where it met something that the map does not know, level x and y."""
-        return self.obstacles.origin_m + (np.argwhere(self.driver.met.cells) + 0.5) * self.obstacles.cell_size_m
+    def contacts(self) -> Float[np.ndarray, "m 2"]:
+        """The places where it touched something that the map does not know, level x and y."""
+        return self.obstacles.origin_m + (np.argwhere(self.driver.contacts.cells) + 0.5) * self.obstacles.cell_size_m
 
 
 def robot_in(asked: AVLMap, scene: Scene, shape: BodyShape = BASE, start: GroundPose | None = None) -> SimulatedRobot:

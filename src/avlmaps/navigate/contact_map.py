@@ -18,7 +18,7 @@ class ContactMap:
     """Cells that the body found occupied, and cells that it stood on.
 
     Attributes:
-        cells: where it met something.
+        cells: where it touched something.
     """
 
     def __init__(self, obstacles: Obstacles, radius_m: float) -> None:
@@ -40,7 +40,7 @@ class ContactMap:
         self._been[tuple(cells.T)] = True
         self.cells[tuple(cells.T)] = False
 
-    def mark_contact(self, before: GroundPose, told: GroundPose, now: GroundPose) -> bool:
+    def mark_contact(self, before: GroundPose, planned: GroundPose, now: GroundPose) -> bool:
         """Mark the obstacle that stopped a movement, as far as the poses show it.
 
         A body that slides loses just the part of its way that leads into the thing, one that stops all of it. Where
@@ -49,15 +49,15 @@ class ContactMap:
 
         Args:
             before: where the movement began.
-            told: where it was to end.
+            planned: where it was to end.
             now: where it ended.
 
         Returns:
             Whether that is something new.
         """
-        lost = np.array([told.x_m - now.x_m, told.y_m - now.y_m])
+        lost = np.array([planned.x_m - now.x_m, planned.y_m - now.y_m])
         if np.hypot(*lost) < _LOST_M:
-            lost = np.array([told.x_m - before.x_m, told.y_m - before.y_m])
+            lost = np.array([planned.x_m - before.x_m, planned.y_m - before.y_m])
         towards = atan2(lost[1], lost[0])
         return any(self._mark(now, towards + beside) for beside in _WIDER_RAD)
 

@@ -159,7 +159,7 @@ def costmap_of(
     obstacles: Obstacles,
     radius_m: float,
     settings: CostSettings | None = None,
-    met: Bool[np.ndarray, "nx ny"] | None = None,
+    contacts: Bool[np.ndarray, "nx ny"] | None = None,
 ) -> Costmap:
     """Inflate obstacles for a body.
 
@@ -167,12 +167,12 @@ def costmap_of(
         obstacles: what the map knows.
         radius_m: of the body.
         settings: what it costs to come near.
-        met: cells that the body found occupied, though the map has nothing there.
+        contacts: cells that the body found occupied, though the map has nothing there.
     """
     settings = settings or CostSettings()
     occupied = obstacles.states == CellState.OCCUPIED
-    if met is not None:
-        occupied = occupied | met
+    if contacts is not None:
+        occupied = occupied | contacts
     free = (obstacles.states == CellState.FREE) & ~occupied
     cell_m = obstacles.cell_size_m
     room_m = np.maximum(_distance(occupied) - np.float32(_HALF_DIAGONAL), 0.0) * np.float32(cell_m)
@@ -186,8 +186,8 @@ def costmap_of(
     cost[holes] += np.float32(settings.hole_cost)
     tall = obstacles.tall
     opaque = occupied if tall is None else tall & (obstacles.states != CellState.FREE)
-    if met is not None:  # nobody knows how high it is
-        opaque = opaque | met
+    if contacts is not None:  # nobody knows how high it is
+        opaque = opaque | contacts
     return Costmap(
         np.asarray(obstacles.origin_m, np.float64),
         cell_m,

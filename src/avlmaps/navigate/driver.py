@@ -131,7 +131,7 @@ class MapDriver:
         body: what it moves.
         shape: of the body; radius and height must be those that the obstacles were found for.
         settings: how it drives.
-        met: what the map does not know.
+        contacts: what the body touched and the map does not know.
     """
 
     def __init__(
@@ -139,8 +139,8 @@ class MapDriver:
     ) -> None:
         self.obstacles, self.body, self.shape = obstacles, body, shape
         self.settings = settings or DriveSettings()
-        self.met = ContactMap(obstacles, shape.radius_m)
-        self.met.mark_free(body.pose)
+        self.contacts = ContactMap(obstacles, shape.radius_m)
+        self.contacts.mark_free(body.pose)
 
     @property
     def pose(self) -> GroundPose:
@@ -151,7 +151,7 @@ class MapDriver:
     def planner(self) -> Planner:
         """Finds paths round all obstacles that are known by now."""
         settings = self.settings
-        costmap = costmap_of(self.obstacles, self.shape.radius_m, settings.costs, self.met.cells)
+        costmap = costmap_of(self.obstacles, self.shape.radius_m, settings.costs, self.contacts.cells)
         return Planner(costmap, settings.planning)
 
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
@@ -374,27 +374,27 @@ class MapDriver:
         before = self.pose
         moved = self.body.act(action)
         trip.actions.append(action)
-        told = before.ahead(FORWARD_M) if action is Action.FORWARD else before
-        return self._noted(trip, before, told, moved)
+        planned = before.ahead(FORWARD_M) if action is Action.FORWARD else before
+        return self._noted(trip, before, planned, moved)
 
     def _drive(self, speed_m_s: float, turn_rad_s: float, trip: _Trip) -> bool:
         """Drive for a tick; return False where something stopped it."""
         tick_s, before = self.settings.velocities.tick_s, self.pose
         moved = self.body.drive(speed_m_s, turn_rad_s, tick_s)
-        told = before.turned(0.5 * turn_rad_s * tick_s).ahead(speed_m_s * tick_s)
-        return self._noted(trip, before, told, moved)
+        planned = before.turned(0.5 * turn_rad_s * tick_s).ahead(speed_m_s * tick_s)
+        return self._noted(trip, before, planned, moved)
 
-    def _noted(self, trip: _Trip, before: GroundPose, told: GroundPose, moved: Moved) -> bool:
+    def _noted(self, trip: _Trip, before: GroundPose, planned: GroundPose, moved: Moved) -> bool:
         trip.movements += 1
         trip.path.append((moved.pose.x_m, moved.pose.y_m))
-        meant_m = before.distance_m(told)
-        stopped = moved.contact or (meant_m > 2 * _STILL_M and before.distance_m(moved.pose) < _STILL_M)
-        if meant_m:
-            self.met.mark_free(moved.pose)
+        planned_m = before.distance_m(planned)
+        stopped = moved.contact or (planned_m > 2 * _STILL_M and before.distance_m(moved.pose) < _STILL_M)
+        if planned_m:
+            self.contacts.mark_free(moved.pose)
         if not stopped:
             return True
         trip.contacts += moved.contact
         # A turn has no direction in which it was stopped.
-        if meant_m and self.met.mark_contact(before, told, moved.pose):
+        if planned_m and self.contacts.mark_contact(before, planned, moved.pose):
             self.__dict__.pop("planner", None)
         return False

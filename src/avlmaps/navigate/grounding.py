@@ -82,8 +82,8 @@ class Seeker:
         things, _ = self._candidates(target)
         return self._chosen(things[0], len(things))
 
-    def meant(self, target: Target, here: Float[np.ndarray, "2"]) -> Thing:
-        """Return the thing that a target means to a robot: the best where it says which one, else the nearest.
+    def referent(self, target: Target, here: Float[np.ndarray, "2"]) -> Thing:
+        """Return the thing that a target refers to for a robot: the best where it says which one, else the nearest.
 
         Args:
             target: a phrase, a place or a heatmap.

@@ -135,7 +135,7 @@ class Robot:
 
     def get_nearest_pos(self, target: Target) -> Place:
         """Return the place of the nearest object of that name, or the best of a heatmap; it means the same later."""
-        return self.seeker.place_of_thing(self.seeker.meant(target, self._here))
+        return self.seeker.place_of_thing(self.seeker.referent(target, self._here))
 
     def get_all_pos(self, target: Target) -> list[Place]:
         """Return the places of all objects of that name that the map is confident of, the nearest first."""
@@ -156,7 +156,7 @@ class Robot:
 
     def move_to_object(self, name: Target) -> None:
         """Drive to the nearest point beside the nearest object of that name."""
-        thing = self.seeker.meant(name, self._here)
+        thing = self.seeker.referent(name, self._here)
         beside = np.append(thing.outline.nearest_to(self._here), thing.place[2])
         self._go("move_to_object", thing, beside, face=self._on_floor(thing.outline.centre))
 
@@ -173,34 +173,34 @@ class Robot:
 
     def move_to_left(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the left side of a thing, as seen from the robot, that distance from its edge."""
-        thing = self.seeker.meant(target, self._here)
+        thing = self.seeker.referent(target, self._here)
         self._go_beside("move_to_left", thing, to_the_left(self._towards(thing)), distance_m)
 
     def move_to_right(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the right side of a thing, as seen from the robot, that distance from its edge."""
-        thing = self.seeker.meant(target, self._here)
+        thing = self.seeker.referent(target, self._here)
         self._go_beside("move_to_right", thing, -to_the_left(self._towards(thing)), distance_m)
 
     def move_behind(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive behind a thing, as seen from the robot, that distance from its edge."""
-        thing = self.seeker.meant(target, self._here)
+        thing = self.seeker.referent(target, self._here)
         self._go_beside("move_behind", thing, self._towards(thing), distance_m)
 
     def move_north(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the north (+y) of a thing, that distance from its edge."""
-        self._go_beside("move_north", self.seeker.meant(target, self._here), _NORTH, distance_m)
+        self._go_beside("move_north", self.seeker.referent(target, self._here), _NORTH, distance_m)
 
     def move_south(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the south (−y) of a thing, that distance from its edge."""
-        self._go_beside("move_south", self.seeker.meant(target, self._here), -_NORTH, distance_m)
+        self._go_beside("move_south", self.seeker.referent(target, self._here), -_NORTH, distance_m)
 
     def move_east(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the east (+x) of a thing, that distance from its edge."""
-        self._go_beside("move_east", self.seeker.meant(target, self._here), _EAST, distance_m)
+        self._go_beside("move_east", self.seeker.referent(target, self._here), _EAST, distance_m)
 
     def move_west(self, target: Target, distance_m: float = 0.5) -> None:
         """Drive to the west (−x) of a thing, that distance from its edge."""
-        self._go_beside("move_west", self.seeker.meant(target, self._here), -_EAST, distance_m)
+        self._go_beside("move_west", self.seeker.referent(target, self._here), -_EAST, distance_m)
 
     def face(self, target: Target) -> None:
         """Turn on the spot until the thing is straight ahead."""
@@ -294,7 +294,7 @@ class Robot:
 
     def _turn_to_see(self, skill: str, target: Target, at_rad: float) -> None:
         """Turn until a thing is seen at an angle from straight ahead, counter-clockwise."""
-        thing = self.seeker.meant(target, self._here)
+        thing = self.seeker.referent(target, self._here)
         bearing = bearing_rad(self._here, thing.outline.centre)
         heading = self.driver.pose.heading_rad if bearing is None else bearing - at_rad
         self._turn_towards(skill, thing.name, heading)

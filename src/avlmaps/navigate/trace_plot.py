@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _WAY = "#d6336c"
 _GOAL = "#1f7a4d"
-_MET = "#c92a2a"
+_CONTACT = "#c92a2a"
 _OBSTACLE_RGBA = (0.15, 0.16, 0.18, 0.30)
 _LONGEST_NAME = 60
 
@@ -33,7 +33,7 @@ def plot_path(
     start: GroundPose,
     moves: Sequence[Move],
     obstacles: "Obstacles | None" = None,
-    met: Float[np.ndarray, "m 2"] | None = None,
+    contacts: Float[np.ndarray, "m 2"] | None = None,
     title: str = "",
 ) -> Path:
     """Write a picture of a robot's path; see ``draw_path``.
@@ -41,7 +41,7 @@ def plot_path(
     Raises:
         QueryError: the picture cannot be written there.
     """
-    return save(draw_path(space, start, moves, obstacles, met, title), path)
+    return save(draw_path(space, start, moves, obstacles, contacts, title), path)
 
 
 def draw_path(
@@ -49,7 +49,7 @@ def draw_path(
     start: GroundPose,
     moves: Sequence[Move],
     obstacles: "Obstacles | None" = None,
-    met: Float[np.ndarray, "m 2"] | None = None,
+    contacts: Float[np.ndarray, "m 2"] | None = None,
     title: str = "",
 ) -> "Figure":
     """Draw a robot's path, for a notebook.
@@ -59,7 +59,7 @@ def draw_path(
         start: where the robot stood at first.
         moves: what it did; those to a place are numbered.
         obstacles: the obstacles that the map knows.
-        met: (m, 2) places where it met something that the map did not know, level x and y.
+        contacts: (m, 2) places where it touched something that the map did not know, level x and y.
         title: such as the command.
     """
     view = TopDown.of(space)
@@ -71,8 +71,8 @@ def draw_path(
         ax.plot(*move.path.T, color="white", linewidth=3.2, alpha=0.9, zorder=4)
         ax.plot(*move.path.T, color=_WAY, linewidth=1.8, zorder=5)
     _draw_pose(ax, start, "start")
-    if met is not None and len(met):
-        ax.plot(*met.T, linestyle="none", marker="x", markersize=5, color=_MET, zorder=6, label="contacts")
+    if contacts is not None and len(contacts):
+        ax.plot(*contacts.T, linestyle="none", marker="x", markersize=5, color=_CONTACT, zorder=6, label="contacts")
     for number, move in enumerate((one for one in moves if one.goal is not None), 1):
         _draw_subgoal(ax, space, number, move)
     ax.set_title(plot_text(title), fontsize=10, color=INK, loc="left", fontweight="bold", wrap=True)
@@ -104,7 +104,7 @@ def _draw_subgoal(ax: "Axes", space: Space, number: int, move: Move) -> None:
     ax.plot(*np.stack([goal, stop])[:, :2].T, color=_GOAL, linewidth=1.2, linestyle=":", zorder=6)
     ax.plot(*goal[:2], linestyle="none", marker="o", markersize=11, markerfacecolor="none", markeredgecolor=_GOAL,
             markeredgewidth=2.0, zorder=7)  # fmt: skip
-    mark(ax, stop, str(number), _GOAL if move.reached else _MET)
+    mark(ax, stop, str(number), _GOAL if move.reached else _CONTACT)
     name = plot_text(move.name or move.skill.replace("_", " "), _LONGEST_NAME)
     reached = f"{move.distance_m:.2f} m from it" if move.reached else "not reached"
     ax.plot([], [], " ", label=f"{number}: {name}, {reached}")
