@@ -38,15 +38,15 @@ def test_probabilities_are_read_back_and_products_are_bhattacharyya_coefficients
 
 
 def test_a_name_means_itself_and_a_wider_word_all_that_it_takes_in() -> None:
-    np.testing.assert_array_equal(MEANINGS.meant("  Sofa "), [1, 0, 0, 0])
-    np.testing.assert_array_equal(MEANINGS.meant("couch"), [1, 0, 0, 0])
-    np.testing.assert_array_equal(MEANINGS.meant("table"), [0, 1, 1, 0])
+    np.testing.assert_array_equal(MEANINGS.name_weights("  Sofa "), [1, 0, 0, 0])
+    np.testing.assert_array_equal(MEANINGS.name_weights("couch"), [1, 0, 0, 0])
+    np.testing.assert_array_equal(MEANINGS.name_weights("table"), [0, 1, 1, 0])
 
 
 def test_a_word_that_is_in_no_list_finds_its_thing_by_the_words_own_nearness() -> None:
-    assert MEANINGS.meant("davenport sofa").argmax() == 0
-    assert MEANINGS.meant("flush toilet").argmax() == 3
+    assert MEANINGS.name_weights("davenport sofa").argmax() == 0
+    assert MEANINGS.name_weights("flush toilet").argmax() == 3
 
 
 def test_a_word_for_something_else_means_nothing() -> None:
-    assert not MEANINGS.meant("elephant").any()
+    assert not MEANINGS.name_weights("elephant").any()

@@ -27,7 +27,7 @@ class Rooms:
     )
     card: ModelCard = field(default_factory=lambda: ModelCard("test/rooms", 8, "MIT", "0" * 64))
 
-    def meant(self, word: str) -> np.ndarray:
+    def name_weights(self, word: str) -> np.ndarray:
         return np.array(MEANT.get(word, (0, 0, 0, 0)), np.float32)
 
     def encode(self, frames):

@@ -12,7 +12,7 @@ from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
 from avlmaps.query.colour_filter import tint_of
 from avlmaps.query.factors import HeatSettings, NearAnchors
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.modalities.object import Asked, ObjectSettings, Rivals, object_factor
+from avlmaps.query.modalities.object import EncodedWord, ObjectSettings, Rivals, object_factor
 from avlmaps.query.voxel_space import Space
 
 NAMES = ("chair", "dining table", "coffee table", "floor", "other")
@@ -39,12 +39,12 @@ class Names:
     def encode(self, frame):
         raise NotImplementedError
 
-    def meant(self, word: str) -> np.ndarray:
+    def name_weights(self, word: str) -> np.ndarray:
         return np.array(MEANT.get(word, (0, 0, 0, 0, 0)), np.float32)
 
     def encode_words(self, words):
-        meant = np.stack([self.meant(word) for word in words])
-        return features_of(meant / np.maximum(meant.sum(axis=1, keepdims=True), 1e-9), self.codes)
+        weights = np.stack([self.name_weights(word) for word in words])
+        return features_of(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-9), self.codes)
 
     def understood(self, word: str) -> str:
         return word if word in MEANT else ""
@@ -95,7 +95,7 @@ def test_confidence_is_the_mean_probability_that_the_encoder_is_asked_with() -> 
 
 
 def test_a_faintly_meant_name_still_competes() -> None:
-    assert Asked.of(ENCODER, "seat").span.shape == (1, 8)
+    assert EncodedWord.of(ENCODER, "seat").span.shape == (1, 8)
 
 
 def test_a_word_that_means_nothing_is_not_found_and_says_so() -> None:

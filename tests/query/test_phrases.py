@@ -17,8 +17,8 @@ PHRASES = Path(__file__).parent / "data" / "phrases_dev.csv"
 
 
 def names(phrase: str) -> list[str]:
-    meant = ENCODER.meant(phrase)
-    return [ENCODER.names[i] for i in np.argsort(-meant, kind="stable") if meant[i] > 0.0]
+    weights = ENCODER.name_weights(phrase)
+    return [ENCODER.names[i] for i in np.argsort(-weights, kind="stable") if weights[i] > 0.0]
 
 
 def test_phrases_of_strangers_mean_the_right_name_first() -> None:
@@ -64,7 +64,7 @@ def test_a_wider_kind_means_all_that_it_takes_in() -> None:
     ],
 )
 def test_a_noun_that_nobody_knows_means_nothing(phrase: str) -> None:
-    assert not ENCODER.meant(phrase).any()
+    assert not ENCODER.name_weights(phrase).any()
     assert ENCODER.understood(phrase) == ""
 
 
@@ -77,7 +77,7 @@ def test_a_noun_that_nobody_knows_means_nothing(phrase: str) -> None:
     ],
 )  # fmt: skip
 def test_a_misspelt_noun_is_answered_with_the_right_spelling(wrong: str, right: str) -> None:
-    assert not ENCODER.meant(wrong).any()
+    assert not ENCODER.name_weights(wrong).any()
     assert unknown_note(wrong).endswith(f"did you mean {right}?")
 
 

@@ -104,7 +104,7 @@ class NamedPixelEncoder(PixelEncoder, Protocol):
         """The code of each name."""
         ...
 
-    def meant(self, word: str) -> Float32[np.ndarray, " k"]:
+    def name_weights(self, word: str) -> Float32[np.ndarray, " k"]:
         """Return for each name how much a phrase means it, in [0, 1]; all zero where it means none."""
         ...
 
@@ -150,7 +150,7 @@ class NamedViewEncoder(ViewEncoder, Protocol):
         """The code of each name."""
         ...
 
-    def meant(self, word: str) -> Float32[np.ndarray, " k"]:
+    def name_weights(self, word: str) -> Float32[np.ndarray, " k"]:
         """Return for each name how much a phrase means it, in [0, 1]; all zero where it means none."""
         ...
 

@@ -20,7 +20,7 @@ from avlmaps.query.factors import Factor, HeatSettings, NearAnchors, NearThings
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.modalities.area import AreaSettings, area_factor
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
-from avlmaps.query.modalities.object import Asked, ObjectSettings, Pieces, Rivals, object_factor, object_pieces
+from avlmaps.query.modalities.object import EncodedWord, ObjectSettings, Pieces, Rivals, object_factor, object_pieces
 from avlmaps.query.modalities.sound import (
     SoundSettings,
     read_clip,
@@ -119,8 +119,8 @@ class AVLMap:
         """Return the voxels that a word wins against the vocabulary, and the instances that they make up."""
         encoder = self.stored.profile.pixel_encoder()
         rivals = self._rivals_of(encoder, None)
-        asked = Asked.of(encoder, word)
-        return object_pieces(self.space, self.stored.voxels.feature, encoder, rivals, asked, self.settings.objects)
+        encoded = EncodedWord.of(encoder, word)
+        return object_pieces(self.space, self.stored.voxels.feature, encoder, rivals, encoded, self.settings.objects)
 
     def rivals(self) -> Rivals:
         """Return the two words of the encoder's vocabulary closest to each voxel; the first query works them out."""

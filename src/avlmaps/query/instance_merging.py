@@ -22,7 +22,7 @@ def without_specks(
     return thinned, (np.cumsum(kept) - 1)[instance[stays]], confidence[kept]
 
 
-def joined_pieces(
+def merge_instances(
     points_level: Float[np.ndarray, "a 3"], instance: Int[np.ndarray, " a"], cell_m: float, join_m: float
 ) -> Int[np.ndarray, " i"]:
     """Return for each instance the number of the thing that it is a piece of.
@@ -39,8 +39,8 @@ def joined_pieces(
     near = (cell[below] == cell[above]) & (points_level[above, 2] - points_level[below, 2] <= join_m)
     meeting = near & (instance[below] != instance[above])
     a, b = np.sort(np.stack([instance[below], instance[above]])[:, meeting], axis=0)
-    met = np.unique(np.stack([a, b, cell[below][meeting]]), axis=1)[:2]
-    (a, b), times = np.unique(met, axis=1, return_counts=True)
+    meetings = np.unique(np.stack([a, b, cell[below][meeting]]), axis=1)[:2]
+    (a, b), times = np.unique(meetings, axis=1, return_counts=True)
     same = 2 * times >= np.minimum(columns[a], columns[b])
     return connected(count, a[same], b[same])
 

@@ -38,6 +38,6 @@ class NamedEncoder:
         kind = words_known.Kind.ROOM if self.names == notes.rooms else words_known.Kind.THING
         return Meanings(self.names, called, notes.kinds, self._words, kind)
 
-    def meant(self, word: str) -> Float32[np.ndarray, " k"]:
+    def name_weights(self, word: str) -> Float32[np.ndarray, " k"]:
         """Return for each of ``names`` how much a phrase means it, 1 for the most meant; zero where it means none."""
-        return self.meanings.meant(word)
+        return self.meanings.name_weights(word)

@@ -53,7 +53,7 @@ class Meanings:
     least_share: float = 0.2
     narrower: float = 0.15
 
-    def meant(self, phrase: str) -> Float32[np.ndarray, " k"]:
+    def name_weights(self, phrase: str) -> Float32[np.ndarray, " k"]:
         """Return for each name how much the phrase means it, 1 for the most meant; all zero where it means none."""
         clean = _clean(phrase)
         exact = np.array([clean in called for called in self.called], np.float32)

@@ -49,15 +49,15 @@ class EmbeddedPixels(NamedEncoder):
         """Return a unit vector for each phrase; zero for one that means none of the categories."""
         vectors = np.zeros((len(words), self.card.dim), np.float32)
         for row, word in enumerate(words):
-            meant = self.meant(word)
-            if meant.any():
-                vectors[row] = features_of(meant / meant.sum(), self.codes)
+            weights = self.name_weights(word)
+            if weights.any():
+                vectors[row] = features_of(weights / weights.sum(), self.codes)
         return vectors
 
     def understood(self, word: str) -> str:
         """Return the categories that a phrase is taken for, the most meant first, or ``""``."""
-        meant = self.meant(word)
-        best = [self.names[i] for i in np.argsort(-meant, kind="stable") if meant[i] > 0.0]
+        weights = self.name_weights(word)
+        best = [self.names[i] for i in np.argsort(-weights, kind="stable") if weights[i] > 0.0]
         clean = " ".join(word.lower().split())
         return clean if clean in best else " or ".join(best[:4])
 

@@ -40,8 +40,8 @@ class EmbeddedViews(NamedEncoder):
         """Return a unit vector for each phrase; one that means no kind of room lies across all of them."""
         vectors = np.zeros((len(words), self.card.dim), np.float32)
         for row, word in enumerate(words):
-            meant = self.meanings.meant(word)
-            vector = features_of(meant / meant.sum(), self.codes) if meant.any() else self._across(word)
+            weights = self.meanings.name_weights(word)
+            vector = features_of(weights / weights.sum(), self.codes) if weights.any() else self._across(word)
             vectors[row] = vector / np.linalg.norm(vector)
         return vectors
 

@@ -72,8 +72,8 @@ def area_scores(
     """
     if isinstance(encoder, NamedViewEncoder):
         share = np.square(np.asarray(view, np.float64).reshape(-1, encoder.codes.shape[1]) @ encoder.codes.T)
-        meant = np.asarray(encoder.meant(name), np.float64)
-        raw = np.clip(share @ meant, 0.0, 1.0)
+        name_weights = np.asarray(encoder.name_weights(name), np.float64)
+        raw = np.clip(share @ name_weights, 0.0, 1.0)
     else:
         others = [area for area in AREA_NAMES if not same_place(area, name)]
         words = np.asarray(encoder.encode_words([name, *others]), np.float64)
@@ -82,13 +82,17 @@ def area_scores(
         cosine = np.asarray(view, np.float64).reshape(-1, words.shape[1]) @ words[competes].T
         logits = cosine / _temperature(encoder, settings)
         weight = np.exp(logits - logits.max(axis=1, keepdims=True, initial=-np.inf))
-        share, meant, raw = weight / weight.sum(axis=1, keepdims=True), np.eye(1, weight.shape[1])[0], cosine[:, 0]
-    posterior = np.clip(share @ meant, 0.0, 1.0)
+        share, name_weights, raw = (
+            weight / weight.sum(axis=1, keepdims=True),
+            np.eye(1, weight.shape[1])[0],
+            cosine[:, 0],
+        )
+    posterior = np.clip(share @ name_weights, 0.0, 1.0)
     if settings.score == "min-max":
         return posterior, stretch_scores(raw)
     if places is None or not settings.pool_m > 0.0 or not len(share):
         return posterior, posterior
-    return posterior, np.clip(pool_posteriors(share, places, settings.pool_m) @ meant, 0.0, 1.0)
+    return posterior, np.clip(pool_posteriors(share, places, settings.pool_m) @ name_weights, 0.0, 1.0)
 
 
 def area_distribution(
@@ -192,9 +196,9 @@ def modes(points: Float[np.ndarray, "a 2"], score: Float[np.ndarray, " a"], link
     rank[order] = np.arange(len(order))
     group = np.empty(len(order), np.int64)
     count = 0
-    near = KDTree(points).query_ball_point(points, link_m) if len(points) else []
+    near: Sequence[Sequence[int]] = KDTree(points).query_ball_point(points, link_m).tolist() if len(points) else []
     for row in order:
-        uphill = [other for other in near[row] if rank[other] < rank[row]]
+        uphill = [other for other in near[int(row)] if rank[other] < rank[row]]
         if uphill:
             group[row] = group[min(uphill, key=lambda other: rank[other])]
         else:
@@ -213,7 +217,7 @@ def area_factor(
     best = float(posterior.max(initial=0.0))
     missed = f"no view is like {part.query!r}; the best score is {best:.2f}, below {FOUND_AT:.2f}"
     note = "" if best >= FOUND_AT else missed
-    if isinstance(encoder, NamedViewEncoder) and not encoder.meant(part.query).any():
+    if isinstance(encoder, NamedViewEncoder) and not encoder.name_weights(part.query).any():
         note = f"{unknown_note(part.query, Kind.ROOM)}; it knows: {', '.join(encoder.names)}"
     if not len(keyframes):
         note = "the map holds no keyframes"

@@ -18,7 +18,7 @@ from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, Scaled
 from avlmaps.query import loops
 from avlmaps.query.colour_filter import Tint, is_tinted, tint_of, tinted_share
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearThings
-from avlmaps.query.instance_merging import joined_pieces, likeliest, without_specks
+from avlmaps.query.instance_merging import likeliest, merge_instances, without_specks
 from avlmaps.query.synonyms import is_a, is_open
 from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.voxel_space import Space
@@ -68,7 +68,7 @@ class ObjectSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class EncodedWord:
     """A word as an encoder takes it.
 
     Attributes:
@@ -76,22 +76,22 @@ class Asked:
             vector for most encoders; for one with a closed set of names, the code of each name that is meant.
         span: unit vectors of what is clearly meant; words that lie among them do not compete.
         understood: what of the word the encoder can act on.
-        meant: for an encoder of names, how much each is meant; empty for others.
+        name_weights: for an encoder of names, how much the word means each; empty for others.
     """
 
     rows: Float32[np.ndarray, "m d"]
     span: Float32[np.ndarray, "s d"]
     understood: str
-    meant: Float32[np.ndarray, " k"]
+    name_weights: Float32[np.ndarray, " k"]
 
     @classmethod
-    def of(cls, encoder: PixelEncoder, word: str) -> "Asked":
+    def of(cls, encoder: PixelEncoder, word: str) -> "EncodedWord":
         """Encode a word; there are no rows where the encoder does not understand it."""
         if isinstance(encoder, NamedPixelEncoder):
-            meant = encoder.meant(word)
-            some, clear = meant > 0.0, meant >= CLEARLY_MEANT
-            rows = np.sqrt(meant[some])[:, None] * encoder.codes[some]
-            return cls(np.ascontiguousarray(rows), encoder.codes[clear], encoder.understood(word), meant)
+            weights = encoder.name_weights(word)
+            some, clear = weights > 0.0, weights >= CLEARLY_MEANT
+            rows = np.sqrt(weights[some])[:, None] * encoder.codes[some]
+            return cls(np.ascontiguousarray(rows), encoder.codes[clear], encoder.understood(word), weights)
         row = np.asarray(encoder.encode_words([word]), np.float32)
         row = row[np.any(row != 0.0, axis=1)]
         return cls(row, row, encoder.understood(word), np.zeros(0, np.float32))
@@ -130,13 +130,13 @@ class Rivals:
         words = tuple(word for word, is_known in zip(names, known, strict=True) if is_known)
         return cls(words, encoded[known], bool(known[-1]), *loops.two_closest(feature, encoded[known]))
 
-    def silent_for(self, encoder: PixelEncoder, asked: "Asked", cosine: float) -> Bool[np.ndarray, " v"]:
+    def silent_for(self, encoder: PixelEncoder, encoded: "EncodedWord", cosine: float) -> Bool[np.ndarray, " v"]:
         """Return which words do not compete because they name the queried thing; ``other`` always competes."""
-        close = np.linalg.norm(self.word_feature @ asked.span.T, axis=1) >= cosine
-        same = [bool(asked.understood) and encoder.understood(word) == asked.understood for word in self.words]
+        close = np.linalg.norm(self.word_feature @ encoded.span.T, axis=1) >= cosine
+        same = [bool(encoded.understood) and encoder.understood(word) == encoded.understood for word in self.words]
         silent = close | np.array(same, bool)
         if is_open(encoder):
-            silent |= np.array([is_a(word, asked.understood) for word in self.words], bool)
+            silent |= np.array([is_a(word, encoded.understood) for word in self.words], bool)
         if self.has_other:
             silent[-1] = False
         return silent
@@ -145,7 +145,7 @@ class Rivals:
 def object_margins(
     feature: Float16[np.ndarray, "n d"],
     rivals: Rivals,
-    asked: Float32[np.ndarray, "m d"],
+    word_rows: Float32[np.ndarray, "m d"],
     silent: Bool[np.ndarray, " v"],
     least_score: float,
 ) -> tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
@@ -156,14 +156,14 @@ def object_margins(
     Args:
         feature: of the voxels, zero where there is none.
         rivals: what competes.
-        asked: rows of ``Asked``.
+        word_rows: those of ``EncodedWord``.
         silent: which of the rivals' words do not compete.
         least_score: what the word must beat besides where ``other`` has no feature.
     """
-    score = loops.feature_scores(feature, asked[0])
-    if len(asked) > 1:
+    score = loops.feature_scores(feature, word_rows[0])
+    if len(word_rows) > 1:
         total = np.square(score)
-        for row in asked[1:]:
+        for row in word_rows[1:]:
             total += np.square(loops.feature_scores(feature, row))
         score = np.sqrt(total)
     floor = float(np.float32(-np.inf if rivals.has_other else least_score))
@@ -201,7 +201,7 @@ def instance_confidence(
 
 def named_confidence(
     encoder: NamedPixelEncoder,
-    asked: Asked,
+    encoded: EncodedWord,
     score: Float[np.ndarray, " a"],
     instance: Int[np.ndarray, " a"],
     voxel_size_m: float,
@@ -212,14 +212,14 @@ def named_confidence(
 
     Args:
         encoder: of names.
-        asked: the word.
+        encoded: the word, encoded.
         score: of each voxel, √p.
         instance: which each belongs to.
         voxel_size_m: edge of a voxel.
     """
     count = np.bincount(instance)
     mean = np.bincount(instance, weights=np.square(score)) / np.maximum(count, 1)
-    names = [encoder.names[index] for index in np.flatnonzero(asked.meant >= CLEARLY_MEANT)]
+    names = [encoder.names[index] for index in np.flatnonzero(encoded.name_weights >= CLEARLY_MEANT)]
     sure = [encoder.instance_probability(name, mean, count * voxel_size_m**2) for name in names]
     return np.max(sure, axis=0).astype(np.float32)
 
@@ -245,22 +245,22 @@ def object_factor(
     tint = tint_of(part.query) if rgb is not None and isinstance(encoder, NamedPixelEncoder) and not compound else None
     if tint and rgb is not None and not tint.thing:
         return colour_factor(space, rgb, tint, part, settings, heat)
-    asked = Asked.of(encoder, tint.thing if tint else part.query)
-    understood = f"{tint.text} {asked.understood}" if tint and asked.understood else asked.understood
-    if not len(asked.rows) and isinstance(encoder, NamedPixelEncoder):
+    encoded = EncodedWord.of(encoder, tint.thing if tint else part.query)
+    understood = f"{tint.text} {encoded.understood}" if tint and encoded.understood else encoded.understood
+    if not len(encoded.rows) and isinstance(encoder, NamedPixelEncoder):
         note = unknown_note(tint.thing if tint else part.query)
         nothing = np.zeros(0, np.int64), np.zeros(0, np.float32), False, "", note
         return NearThings(space, part, heat.falloff_per_m(part.role), np.zeros(len(feature), bool), *nothing)
-    if not len(asked.rows):
+    if not len(encoded.rows):
         known = ", ".join(encoder.vocabulary[:20]) or "nothing that it could list"
         raise QueryError(
             f"The pixel encoder {encoder.card.id} understands nothing of {part.query!r}; it knows: {known}."
             + (f" ({encoder.card.note})" if encoder.card.note else "")
         )
-    scored = object_scores(feature, encoder, rivals, asked, settings)
+    scored = object_scores(feature, encoder, rivals, encoded, settings)
 
     def things(with_uncertain: bool, chosen: ObjectSettings = settings) -> NearThings:
-        pieces = pieces_of(space, encoder, asked, scored, chosen, with_uncertain)
+        pieces = pieces_of(space, encoder, encoded, scored, chosen, with_uncertain)
         if tint is not None and rgb is not None:
             share = tinted_share(rgb, pieces.mask, pieces.instance, tint)
             pieces = replace(pieces, confidence=pieces.confidence * share)
@@ -329,29 +329,29 @@ def object_pieces(
     feature: Float16[np.ndarray, "n d"],
     encoder: PixelEncoder,
     rivals: Rivals,
-    asked: Asked,
+    encoded: EncodedWord,
     settings: ObjectSettings,
 ) -> Pieces:
     """Return the things that a word names: connected voxels that it wins, specks left out, thin parts joined."""
-    return pieces_of(space, encoder, asked, object_scores(feature, encoder, rivals, asked, settings), settings)
+    return pieces_of(space, encoder, encoded, object_scores(feature, encoder, rivals, encoded, settings), settings)
 
 
 def object_scores(
     feature: Float16[np.ndarray, "n d"],
     encoder: PixelEncoder,
     rivals: Rivals,
-    asked: Asked,
+    encoded: EncodedWord,
     settings: ObjectSettings,
 ) -> tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
     """Return ``object_margins`` of a word."""
-    silent = rivals.silent_for(encoder, asked, settings.same_word_cosine)
-    return object_margins(feature, rivals, asked.rows, silent, settings.least_score)
+    silent = rivals.silent_for(encoder, encoded, settings.same_word_cosine)
+    return object_margins(feature, rivals, encoded.rows, silent, settings.least_score)
 
 
 def pieces_of(
     space: Space,
     encoder: PixelEncoder,
-    asked: Asked,
+    encoded: EncodedWord,
     scored: tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]],
     settings: ObjectSettings,
     with_uncertain: bool = False,
@@ -362,7 +362,7 @@ def pieces_of(
 
     def confidence_of(mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"]) -> Float32[np.ndarray, " i"]:
         if isinstance(encoder, NamedPixelEncoder):
-            return named_confidence(encoder, asked, score[mask], instance, space.grid.voxel_size_m)
+            return named_confidence(encoder, encoded, score[mask], instance, space.grid.voxel_size_m)
         return instance_confidence(margin[mask], instance, space.grid.voxel_size_m, fitting(settings, encoder))
 
     mask = margin > 0.0
@@ -373,7 +373,7 @@ def pieces_of(
     confidence = confidence_of(mask, instance)
     best = float(confidence.max(initial=0.0))
     mask, instance, confidence = without_specks(mask, instance, confidence, least)
-    joined = joined_pieces(space.level(space.centres[mask]), instance, settings.link_m, settings.join_m)
+    joined = merge_instances(space.level(space.centres[mask]), instance, settings.link_m, settings.join_m)
     if len(confidence) > joined.max(initial=-1) + 1:
         instance = joined[instance]
         confidence = confidence_of(mask, instance)
