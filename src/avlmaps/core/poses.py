@@ -122,7 +122,7 @@ def from_quaternion(
 
 def to_quaternion(b_from_a: Float[np.ndarray, "*n 4 4"]) -> Float[np.ndarray, "*n 4"]:
     """Return unit quaternions x y z w with w >= 0."""
-    from scipy.spatial.transform import Rotation  # pyright: ignore[reportMissingTypeStubs]
+    from scipy.spatial.transform import Rotation
 
     flat = Rotation.from_matrix(b_from_a[..., :3, :3].reshape(-1, 3, 3)).as_quat(canonical=True)
     return flat.reshape(*b_from_a.shape[:-2], 4)

@@ -133,7 +133,8 @@ def _channels(path: Path, begin: int, end: int, rate_hz: int) -> Float32[np.ndar
                 return file.read(end - begin, dtype="float32", always_2d=True)
             except RuntimeError as error:
                 raise _unreadable(path, error) from None
-    frames, have = [], 0
+    frames: list[Float32[np.ndarray, "n channels"]] = []
+    have = 0
     for _, samples in _frames(path, begin / rate_hz):
         frames.append(samples)
         have += len(samples)

@@ -70,7 +70,7 @@ def _png_fault(content: bytes) -> str:
             return "truncated"
         if zlib.crc32(view[at + 4 : end - 4]) != struct.unpack_from(">I", content, end - 4)[0]:
             return f"damaged at byte {at}"
-        if view[at + 4 : at + 8] == b"IEND":
+        if content[at + 4 : at + 8] == b"IEND":
             return ""
         at = end
     return "truncated"

@@ -174,9 +174,10 @@ def _reachable(
     names: Sequence[str],
 ) -> tuple[Int[np.ndarray, " k"], list[str], str]:
     """Return the frames that belong together, notices of shifts between them, and a fault or nothing."""
-    stretches = [np.arange(a, b) for a, b in pairwise(edges.tolist())]
+    stretches = [np.arange(int(a), int(b)) for a, b in pairwise(edges)]
     longest = int(np.argmax(np.diff(edges)))
-    kept, shifts, fault = [stretches[longest]], [], ""
+    kept, fault = [stretches[longest]], ""
+    shifts: list[str] = []
     few = max(MAX_STRAYS, int(MAX_STRAY_SHARE * len(stamps_s)))
     left = 0
     for order in (range(longest + 1, len(stretches)), range(longest - 1, -1, -1)):

@@ -33,7 +33,7 @@ class Walk:
     def along(cls, stamps_s: Float[np.ndarray, " f"], position: Float[np.ndarray, "f 3"]) -> "Walk":
         """Interpolate a walk, known at some stamps, every tenth of a second."""
         grid = np.arange(stamps_s[0], stamps_s[-1] + 1e-9, _GRID_S)
-        fine = np.stack([np.interp(grid, stamps_s, axis) for axis in position.T], axis=1)
+        fine = np.stack([np.interp(grid, stamps_s, position[:, axis]) for axis in range(3)], axis=1)
         return cls(grid, fine, _walked(fine))
 
     def index(self, stamp_s: float) -> int:

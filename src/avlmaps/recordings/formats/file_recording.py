@@ -108,7 +108,8 @@ def _orthonormal(shots: Shots, report: Report, pose_files: Sequence[Path]) -> Sh
     try:
         mended = poses.orthonormalize_all(shots.world_from_camera, labels)
     except RecordingError:
-        good, kept = [], []
+        good: list[Float[np.ndarray, "4 4"]] = []
+        kept: list[int] = []
         for i, label in enumerate(labels):
             try:
                 good.append(poses.orthonormalize(shots.world_from_camera[i], f"{label} ({pose_files[i]})"))

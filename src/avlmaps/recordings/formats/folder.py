@@ -231,7 +231,8 @@ def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, tuple[str, .
         The shots, the notices about them, and the date that was subtracted from the stamps, seconds.
     """
     stamps_s = known.stamps_s if found.stamps_s is None else found.stamps_s
-    start_s, notices = 0.0, []
+    start_s = 0.0
+    notices: list[str] = []
     finite_s = stamps_s[np.isfinite(stamps_s)]
     if len(finite_s) and finite_s.min() > _DATE_S:
         start_s = float(finite_s.min())

@@ -10,7 +10,7 @@ import hashlib
 import os
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -122,7 +122,7 @@ class _Bag:
                     yield received_ns, self.reader.deserialize(raw, connection.msgtype)
 
     @contextmanager
-    def _readable(self, topic: str) -> Iterator[None]:
+    def _readable(self, topic: str) -> Generator[None]:
         """Turn what rosbags, sqlite and decompressors raise over damaged messages into one sentence."""
         try:
             yield

@@ -49,13 +49,13 @@ def open_tum(path: Path, report: Report = stop_at_first) -> FileRecording:
     trajectory, notices = _trajectory(path / "groundtruth.txt", report)
     of_colour, of_depth, unpaired = _pairs(path, colour, depth, trajectory)
     notices = [*colour.notices, *depth.notices, *notices, *unpaired]
-    colour_files = [colour.files[i] for i in of_colour]
+    colour_files = [colour.files[int(i)] for i in of_colour]
     stamps_s = depth.stamps_s[of_depth]
     start_s = min(colour.stamps_s[0], depth.stamps_s[0])
     shots = Shots(
         names=[Path(file).stem for file in colour_files],
         colour=colour_files,
-        depth=[depth.files[i] for i in of_depth],
+        depth=[depth.files[int(i)] for i in of_depth],
         stamps_s=stamps_s - start_s,
         world_from_camera=trajectory.at(stamps_s),
     )
@@ -82,7 +82,9 @@ class _Stream:
 
 def _stream(folder: Path, name: str, report: Report) -> _Stream:
     """Read a list of ``stamp file``, in the order of time."""
-    stamps, files, path = [], [], folder / name
+    stamps: list[float] = []
+    files: list[str] = []
+    path = folder / name
     for number, text in text_lines(path, report):
         stamp, _, file = text.partition(" ")
         try:
@@ -120,7 +122,8 @@ def _pairs(
             f"{path / 'groundtruth.txt'} goes from {known_s[0]:.3f} to {known_s[-1]:.3f} s, but the pictures from "
             f"{stamps_s[0]:.3f} to {stamps_s[-1]:.3f} s; check that both use one clock."
         )
-    notices, unpaired = [], len(colour.files) - len(of_colour)
+    notices: list[str] = []
+    unpaired = len(colour.files) - len(of_colour)
     if unpaired:
         notices.append(f"{unpaired} colour picture(s) have no depth picture within {_PAIR_TOLERANCE_S} s; left out.")
     if not covered.all():

@@ -1,0 +1,21 @@
+from collections.abc import Sequence
+from typing import Any, Literal, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+@overload
+def distance_transform_edt(input: ArrayLike, sampling: float | Sequence[float] | None = None) -> NDArray[np.float64]: ...
+@overload
+def distance_transform_edt(
+    input: ArrayLike,
+    sampling: float | Sequence[float] | None = None,
+    *,
+    return_distances: Literal[False],
+    return_indices: Literal[True],
+) -> NDArray[np.int32]: ...
+def uniform_filter1d(
+    input: ArrayLike, size: int, axis: int = -1, output: None = None, mode: str = "reflect"
+) -> NDArray[Any]: ...
+def label(input: ArrayLike, structure: ArrayLike | None = None) -> tuple[NDArray[np.int32], int]: ...
+def binary_closing(input: ArrayLike, structure: ArrayLike | None = None, iterations: int = 1) -> NDArray[np.bool_]: ...

@@ -1,0 +1,24 @@
+from typing import Literal, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scipy.sparse import csr_array, csr_matrix
+
+@overload
+def dijkstra(
+    csgraph: csr_array | csr_matrix,
+    directed: bool = True,
+    indices: ArrayLike | None = None,
+    *,
+    return_predecessors: Literal[True],
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]: ...
+@overload
+def dijkstra(
+    csgraph: csr_array | csr_matrix,
+    directed: bool = True,
+    indices: ArrayLike | None = None,
+    return_predecessors: Literal[False] = False,
+    *,
+    min_only: bool = False,
+) -> NDArray[np.float64]: ...

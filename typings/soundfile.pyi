@@ -1,0 +1,46 @@
+"""The part of soundfile that is used: files of one sample type, as float32, or written from float or 16-bit samples."""
+
+from os import PathLike
+from types import TracebackType
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+class SoundFileError(Exception): ...
+class SoundFileRuntimeError(SoundFileError, RuntimeError): ...
+
+class LibsndfileError(SoundFileRuntimeError):
+    @property
+    def error_string(self) -> str: ...
+
+class SoundFile:
+    def __init__(
+        self,
+        file: str | PathLike[str],
+        mode: Literal["r", "w"] | None = "r",
+        samplerate: int | None = None,
+        channels: int | None = None,
+        subtype: str | None = None,
+        endian: str | None = None,
+        format: str | None = None,
+    ) -> None: ...
+    @property
+    def samplerate(self) -> int: ...
+    @property
+    def frames(self) -> int: ...
+    @property
+    def channels(self) -> int: ...
+    @property
+    def format(self) -> str: ...
+    def __enter__(self) -> Self: ...
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+    def seek(self, frames: int, whence: int = 0) -> int: ...
+    def read(
+        self, frames: int = -1, dtype: Literal["float32"] = ..., always_2d: bool = False
+    ) -> NDArray[np.float32]: ...
+    def write(self, data: NDArray[Any]) -> None: ...
+
+def write(file: str | PathLike[str], data: NDArray[Any], samplerate: int) -> None: ...
