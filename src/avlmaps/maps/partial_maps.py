@@ -219,9 +219,8 @@ def check_disjoint(parts: Sequence[Part]) -> None:
             taken = np.flatnonzero(owner[start:stop:step] >= 0)
             if len(taken):
                 frame = start + step * int(taken[0])
-                raise MapError(
-                    f"{parts[owner[frame]].folder} and {part.folder} both cover frame {frame}; leave one of them out."
-                )
+                other = parts[int(owner[frame])]
+                raise MapError(f"{other.folder} and {part.folder} both cover frame {frame}; leave one of them out.")
             owner[start:stop:step] = number
 
 

@@ -239,7 +239,7 @@ def find_sounds(stored: "StoredMap", most_names: int = 3) -> list[SoundEvent]:
         track = np.asarray(heard.track[heard.track_offsets[k] : heard.track_offsets[k + 1]], np.float64)
         events.append(
             SoundEvent(
-                names=tuple(words[i] for i in best),
+                names=tuple(words[int(i)] for i in best),
                 confidences=tuple(round(float(scores[k, i]), 3) for i in best),
                 onset_s=float(heard.onset_s[k]),
                 offset_s=float(heard.offset_s[k]),
@@ -283,7 +283,8 @@ def find_rooms(stored: "StoredMap", space: Space, settings: AreaSettings, least_
             mean = float(share[members, number].mean())
             if len(members) < _FEWEST_VIEWS or mean < least_confidence:
                 continue
-            rooms.append(Room(names[number], round(mean, 3), _middle(places[members]), len(members), places[members]))
+            name, seen_from = names[int(number)], places[members]
+            rooms.append(Room(name, round(mean, 3), _middle(seen_from), len(members), seen_from))
     return sorted(rooms, key=lambda room: (-room.views, room.name))
 
 

@@ -7,6 +7,7 @@ which shares the recording frame's origin; the YAML file holds the rotation betw
 import csv
 import io
 from collections.abc import Iterable, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -109,7 +110,8 @@ def voxel_mesh(
     """
     index = np.asarray(index, np.int64)
     known = _keys(index, index)
-    vertices, shades = [], []
+    vertices: list[Float32[np.ndarray, "v 3"]] = []
+    shades: list[UInt8[np.ndarray, "v 3"]] = []
     for step, corners in _FACES:
         outer = ~np.isin(_keys(index + np.array(step), index), known)
         quads = (index[outer][:, None, :] + np.array(corners)) * voxel_size_m
@@ -143,7 +145,7 @@ def write_glb(
         QueryError: the map is empty, or the file cannot be written.
     """
     import trimesh
-    from trimesh.exchange.gltf import export_glb
+    from trimesh.exchange.gltf import export_glb  # pyright: ignore[reportUnknownVariableType]
 
     if not len(index):
         raise QueryError("The map holds no voxels, so that there is no mesh to export.")
@@ -221,7 +223,7 @@ def to_open3d(points: Float[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3"]
         BackendError: open3d is not installed.
     """
     try:
-        import open3d  # pyright: ignore[reportMissingImports]
+        open3d: Any = import_module("open3d")
     except ImportError as fault:
         raise BackendError("open3d is not installed; install it with: pip install open3d") from fault
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(np.asarray(points, np.float64)))

@@ -41,7 +41,7 @@ class Heatmap:
         return reduce(np.multiply, (factor.values for factor in self.factors))
 
     def __mul__(self, other: "Heatmap") -> "Heatmap":
-        if not isinstance(other, Heatmap):
+        if not isinstance(other, Heatmap):  # pyright: ignore[reportUnnecessaryIsInstance] - Python passes anything
             return NotImplemented
         if self.space is not other.space:
             raise ValueError("two heatmaps of different maps cannot be multiplied; ask both of the same AVLMap")

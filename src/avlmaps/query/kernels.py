@@ -12,10 +12,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32, UInt16
+from jaxtyping import Bool, Float32, Float64, Int, Int32, Int64, UInt16
 from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
+
+from avlmaps.core.kernel_types import Real, Whole
 
 # More threads than this gain little: the loops are bound by memory.
 _MAX_THREADS = 4
@@ -48,14 +50,14 @@ def share(work: Callable[[int, int], Any], count: int, least: int = 1) -> None:
 
 
 @intrinsic
-def _half_to_float(typing_context, bits):
+def _half_to_float(typing_context: Any, bits: Any) -> Any:  # numba and llvmlite give these no types
     """Widen the bits of a float16; numba on a CPU has no float16 of its own, the processor's instruction has.
 
     Where the code is compiled for an x86 without that instruction (NUMBA_CPU_NAME=generic, old or emulated
     processors) LLVM would call a function that is not there, so the bits are moved instead.
     """
 
-    def generate(context, builder, signature, arguments):
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         triple, _, features = context.codegen().magic_tuple()
         if triple.startswith(("x86", "i386", "i686")) and "+f16c" not in features.split(","):
             return _moved_bits(builder, arguments[0])
@@ -65,7 +67,7 @@ def _half_to_float(typing_context, bits):
     return types.float32(types.uint16), generate
 
 
-def _moved_bits(builder: ir.IRBuilder, half: ir.Value) -> Any:
+def _moved_bits(builder: Any, half: Any) -> Any:
     """Return the code of a float16's widening without float16: exact, for subnormals, infinities and NaN as well."""
     whole, single = ir.IntType(32), ir.FloatType()
     bits = builder.zext(half, whole)
@@ -79,7 +81,13 @@ def _moved_bits(builder: ir.IRBuilder, half: ir.Value) -> Any:
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def half_dot(bits, word, out, start, stop):
+def half_dot(
+    bits: UInt16[np.ndarray, "n d"],
+    word: Float32[np.ndarray, " d"],
+    out: Float32[np.ndarray, " n"],
+    start: Whole,
+    stop: Whole,
+):
     """Write the dot product of each float16 row (given as uint16 bits) with a float32 word."""
     for i in range(start, stop):
         total = np.float32(0.0)
@@ -89,7 +97,7 @@ def half_dot(bits, word, out, start, stop):
 
 
 @njit(cache=True, nogil=True)
-def widen(bits, out):
+def widen(bits: UInt16[np.ndarray, "n d"], out: Float32[np.ndarray, "n d"]):
     """Copy float16 rows (given as uint16 bits) to float32."""
     for i in range(bits.shape[0]):
         for k in range(bits.shape[1]):
@@ -97,7 +105,14 @@ def widen(bits, out):
 
 
 @njit(cache=True, nogil=True)
-def best_two(scores, best, best_word, second, second_word, offset):
+def best_two(
+    scores: Float32[np.ndarray, "n words"],
+    best: Float32[np.ndarray, " rows"],
+    best_word: Int[np.ndarray, " rows"],
+    second: Float32[np.ndarray, " rows"],
+    second_word: Int[np.ndarray, " rows"],
+    offset: Whole,
+):
     """Write the two highest scores of each row and whose they are, to rows from ``offset``."""
     for i in range(scores.shape[0]):
         a, b = np.float32(-np.inf), np.float32(-np.inf)
@@ -114,7 +129,19 @@ def best_two(scores, best, best_word, second, second_word, offset):
 
 
 @njit(cache=True, nogil=True)
-def margins(score, best, best_word, second, second_word, silent, least, out, unsure, start, stop):
+def margins(
+    score: Float32[np.ndarray, " n"],
+    best: Float32[np.ndarray, " n"],
+    best_word: Int[np.ndarray, " n"],
+    second: Float32[np.ndarray, " n"],
+    second_word: Int[np.ndarray, " n"],
+    silent: Bool[np.ndarray, " words"],
+    least: Real,
+    out: Float32[np.ndarray, " n"],
+    unsure: Bool[np.ndarray, " n"],
+    start: Whole,
+    stop: Whole,
+):
     """Write score minus the best rival's, where words that are ``silent`` (by number) do not compete.
 
     ``unsure`` is set where both stored rivals are silent and a third may be the best one.
@@ -134,7 +161,7 @@ def margins(score, best, best_word, second, second_word, silent, least, out, uns
 
 
 @njit(cache=True, nogil=True)
-def undominated(horizontal, score, falloff_per_m):
+def undominated(horizontal: Float64[np.ndarray, "n 2"], score: Float64[np.ndarray, " n"], falloff_per_m: Real):
     """Mark the cones that stick out somewhere; rows must come in falling score.
 
     Cone j lies under cone i everywhere if s_j <= s_i − ε·d(i, j). That relation carries over, so it is enough
@@ -162,7 +189,7 @@ def undominated(horizontal, score, falloff_per_m):
 
 
 @njit(cache=True, nogil=True)
-def _circle(points, first, last):
+def _circle(points: Float64[np.ndarray, "m 2"], first: Whole, last: Whole):
     """Return centre and radius of a circle round the bounding box of some points."""
     low_x = high_x = points[first, 0]
     low_y = high_y = points[first, 1]
@@ -174,7 +201,15 @@ def _circle(points, first, last):
 
 
 @njit(cache=True, nogil=True)
-def _cones_near(x, y, slack, anchors, score, falloff_per_m, near):
+def _cones_near(
+    x: Real,
+    y: Real,
+    slack: Real,
+    anchors: Float64[np.ndarray, "n 2"],
+    score: Float64[np.ndarray, " n"],
+    falloff_per_m: Real,
+    near: Int64[np.ndarray, " n"],
+):
     """Write which cones can be the highest somewhere within a circle, and return how many.
 
     ``slack`` is the falloff times the circle's radius: a cone's heat in it lies that much round its middle's. A
@@ -202,7 +237,17 @@ def _cones_near(x, y, slack, anchors, score, falloff_per_m, near):
 
 
 @njit(cache=True, nogil=True)
-def cone_heat(points, starts, anchors, score, falloff_per_m, out, winner, first_block, last_block):
+def cone_heat(
+    points: Float64[np.ndarray, "m 2"],
+    starts: Int64[np.ndarray, " edges"],
+    anchors: Float64[np.ndarray, "n 2"],
+    score: Float64[np.ndarray, " n"],
+    falloff_per_m: Real,
+    out: Float64[np.ndarray, " m"],
+    winner: Int[np.ndarray, " m"],
+    first_block: Whole,
+    last_block: Whole,
+):
     """Write max over anchors of s − ε·d, floored at 0, for horizontal points in blocks, and who won (−1: none).
 
     Anchors come in falling score.
@@ -225,7 +270,12 @@ def cone_heat(points, starts, anchors, score, falloff_per_m, out, winner, first_
 
 
 @njit(cache=True, nogil=True)
-def _box_gap(low_a, high_a, low_b, high_b):
+def _box_gap(
+    low_a: Int64[np.ndarray, "3"],
+    high_a: Int64[np.ndarray, "3"],
+    low_b: Int64[np.ndarray, "3"],
+    high_b: Int64[np.ndarray, "3"],
+):
     """Return the smallest and the largest squared distance between points of two boxes, in voxels."""
     least, most = 0, 0
     for k in range(3):
@@ -237,7 +287,15 @@ def _box_gap(low_a, high_a, low_b, high_b):
 
 
 @njit(cache=True, nogil=True)
-def _nearest_in(x, y, z, xs, ys, zs, best):
+def _nearest_in(
+    x: Whole,
+    y: Whole,
+    z: Whole,
+    xs: Int32[np.ndarray, " k"],
+    ys: Int32[np.ndarray, " k"],
+    zs: Int32[np.ndarray, " k"],
+    best: Whole,
+):
     """Return the smaller of ``best`` and the squared distance to the nearest of some voxels."""
     for k in range(len(xs)):
         dx, dy, dz = xs[k] - x, ys[k] - y, zs[k] - z
@@ -246,7 +304,15 @@ def _nearest_in(x, y, z, xs, ys, zs, best):
 
 
 @njit(cache=True, nogil=True)
-def _things_near(box_low, box_high, low, high, limit, near, gaps):
+def _things_near(
+    box_low: Int64[np.ndarray, "3"],
+    box_high: Int64[np.ndarray, "3"],
+    low: Int64[np.ndarray, "t 3"],
+    high: Int64[np.ndarray, "t 3"],
+    limit: Whole,
+    near: Int64[np.ndarray, " t"],
+    gaps: Int64[np.ndarray, " t"],
+):
     """Write which blocks of things can hold the nearest to some voxel of a box, nearest block first.
 
     Those are the blocks whose least distance from the box is within the smallest of all largest distances.
@@ -267,7 +333,20 @@ def _things_near(box_low, box_high, low, high, limit, near, gaps):
 
 
 @njit(cache=True, nogil=True)
-def nearest_squared(voxels, starts, low, high, things, thing_starts, thing_low, thing_high, limit, out, first, last):
+def nearest_squared(
+    voxels: Int32[np.ndarray, "3 n"],
+    starts: Int64[np.ndarray, " edges"],
+    low: Int64[np.ndarray, "b 3"],
+    high: Int64[np.ndarray, "b 3"],
+    things: Int32[np.ndarray, "3 m"],
+    thing_starts: Int64[np.ndarray, " ends"],
+    thing_low: Int64[np.ndarray, "t 3"],
+    thing_high: Int64[np.ndarray, "t 3"],
+    limit: Whole,
+    out: Int[np.ndarray, " n"],
+    first: Whole,
+    last: Whole,
+):
     """Write each voxel's squared distance, in voxels, to the nearest thing, or ``limit`` where that is farther.
 
     Voxels and things come in blocks: places ``starts[b]:starts[b + 1]`` of (3, n) int32 indices (one row an axis,
@@ -293,7 +372,7 @@ def nearest_squared(voxels, starts, low, high, things, thing_starts, thing_low, 
 
 
 @njit(cache=True)
-def _root(parent, i):
+def _root(parent: Int64[np.ndarray, " n"], i: Whole):
     while parent[i] != i:
         parent[i] = parent[parent[i]]
         i = parent[i]
@@ -301,7 +380,7 @@ def _root(parent, i):
 
 
 @njit(cache=True)
-def linked(index, reach):
+def linked(index: Int64[np.ndarray, "n 3"], reach: Whole):
     """Label voxels so that those within ``reach`` along every axis share a label (reach 1: the 26 neighbours).
 
     Args:

@@ -5,7 +5,7 @@ The compiled ones (``kernels``) are faster by far, but loading numba takes longe
 of floats differ in their last digits.
 """
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
@@ -17,7 +17,7 @@ _PLAIN: ContextVar[bool] = ContextVar("plain", default=False)
 
 
 @contextmanager
-def plain_loops(wanted: bool = True) -> Iterator[None]:
+def plain_loops(wanted: bool = True) -> Generator[None]:
     """Use plain NumPy in this context, so that numba is not loaded."""
     before = _PLAIN.set(wanted)
     try:
@@ -130,7 +130,7 @@ def linked(index: Int[np.ndarray, "n 3"], reach: int) -> Int64[np.ndarray, " n"]
     steps = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
     pairs: list[np.ndarray] = []
     for dx, dy, dz in steps[len(steps) // 2 + 1 :]:  # the other half are the same pairs again
-        wanted = key + (dx * size[1] + dy) * size[2] + dz
+        wanted: Int64[np.ndarray, " n"] = key + (dx * size[1] + dy) * size[2] + dz
         at = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
         here = np.flatnonzero(key[at] == wanted)
         pairs.append(np.stack([here, at[here]]))

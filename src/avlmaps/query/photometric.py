@@ -185,7 +185,7 @@ class Panoramas:
         ranked = score.ravel()
         order = np.argsort(-ranked, kind="stable")
         for flat_index in order[ranked[order] > 0.0]:
-            eye, pitch, heading = (int(i) for i in np.unravel_index(flat_index, score.shape))
+            eye, pitch, heading = (int(i) for i in np.unravel_index(int(flat_index), score.shape))
             near = np.linalg.norm(places - self.eyes_level[eye], axis=1) < 0.9 * settings.spacing_m
             apart = np.abs((headings - heading * heading_of + np.pi) % (2 * np.pi) - np.pi)
             if (near & (apart < np.deg2rad(25.0))).any():
@@ -299,7 +299,7 @@ def _level_from_camera(heading_rad: float, pitch_rad: float) -> Float[np.ndarray
 @cache
 def _motions(step_m: float, step_rad: float) -> list[Float[np.ndarray, "4 4"]]:
     """Return small motions of a camera, each way along and about each of its axes."""
-    motions = []
+    motions: list[Float[np.ndarray, "4 4"]] = []
     for axis in range(3):
         for sign in (1.0, -1.0):
             shift, turn = np.eye(4), np.eye(4)
@@ -322,7 +322,7 @@ def _eyes(cameras: Float[np.ndarray, "k 3"], settings: PhotometricSettings) -> F
     while True:
         axes = [np.arange(a, b, spacing_m) for a, b in zip(low, high, strict=True)]
         xy = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-        away_m, nearest = (np.asarray(told) for told in tree.query(xy))
+        away_m, nearest = tree.query(xy)
         near = away_m < settings.reach_m
         if near.sum() <= most:
             break

@@ -6,14 +6,27 @@ the correlation over all channels together, each about its own mean.
 """
 
 import numpy as np
+from jaxtyping import Float32, Float64, Int32, Int64, UInt8
 from numba import njit
+
+from avlmaps.core.kernel_types import Real, Whole
 
 UNSEEN = np.float32(1e9)
 _LEAST_M = 0.15  # a voxel nearer to the eye is not drawn: the eye stands in it
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def draw_panoramas(points, rgb, side_m, eyes, far_m, lowest_rad, bin_rad, out, depth):
+def draw_panoramas(
+    points: Float32[np.ndarray, "n 3"],
+    rgb: UInt8[np.ndarray, "n 3"],
+    side_m: Real,
+    eyes: Float32[np.ndarray, "e 3"],
+    far_m: Real,
+    lowest_rad: Real,
+    bin_rad: Real,
+    out: UInt8[np.ndarray, "e rows columns 4"],
+    depth: Float32[np.ndarray, "rows columns"],
+):
     """Draw voxels as seen from each eye: azimuth from +x to the left along a row, elevation up along the rows.
 
     Args:
@@ -53,7 +66,7 @@ def draw_panoramas(points, rgb, side_m, eyes, far_m, lowest_rad, bin_rad, out, d
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _cells(middle, half):
+def _cells(middle: Real, half: Real):
     """Return the cells whose middles a footprint covers, at least the one that it lies in."""
     first, past = int(np.floor(middle - half + 0.5)), int(np.floor(middle + half + 0.5))
     if past <= first:
@@ -63,7 +76,16 @@ def _cells(middle, half):
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def compare_panoramas(panoramas, picture, row, column, turn, least, colour_weight, score):
+def compare_panoramas(
+    panoramas: UInt8[np.ndarray, "e rows columns 4"],
+    picture: Float32[np.ndarray, "n 3"],
+    row: Int32[np.ndarray, "pitches n"],
+    column: Int32[np.ndarray, "pitches n"],
+    turn: Whole,
+    least: Real,
+    colour_weight: Real,
+    score: Float32[np.ndarray, "e pitches headings"],
+):
     """Compare a picture with every panorama, under every pitch and at every heading.
 
     Args:
@@ -119,13 +141,23 @@ def compare_panoramas(panoramas, picture, row, column, turn, least, colour_weigh
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _alike(both, one, other, n):
+def _alike(both: Real, one: Real, other: Real, n: Real | int):
     """Return a correlation in [-1, 1] from sums about the means; 0 where one picture is of one colour, rounded."""
     return both / np.sqrt(one * other) if min(one, other) > n else 0.0
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def compare_view(points, channels, side_m, camera, world_from_camera, picture, least, depth, drawn):
+def compare_view(
+    points: Float32[np.ndarray, "n 3"],
+    channels: Float32[np.ndarray, "n 3"],
+    side_m: Real,
+    camera: Float64[np.ndarray, "4"],
+    world_from_camera: Float64[np.ndarray, "4 4"],
+    picture: Float32[np.ndarray, "h w 3"],
+    least: Real,
+    depth: Float32[np.ndarray, "h w"],
+    drawn: Int64[np.ndarray, "h w"],
+):
     """Draw voxels as a camera sees them, and return how alike a picture is; -1 where the map shows too little.
 
     Args:
@@ -165,7 +197,14 @@ def compare_view(points, channels, side_m, camera, world_from_camera, picture, l
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _draw_view(points, side_m, camera, pose, depth, drawn):
+def _draw_view(
+    points: Float32[np.ndarray, "n 3"],
+    side_m: Real,
+    camera: Float64[np.ndarray, "4"],
+    pose: Float64[np.ndarray, "4 4"],
+    depth: Float32[np.ndarray, "h w"],
+    drawn: Int64[np.ndarray, "h w"],
+):
     """Write how far away each pixel's nearest voxel is, and which one it is."""
     height, width = depth.shape
     depth[:] = UNSEEN

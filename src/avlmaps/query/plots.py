@@ -1,8 +1,11 @@
 """Pictures: the map from above, the heat over it, the path walked, the sounds, the goals numbered."""
 
+# Matplotlib's stubs leave the keywords of every drawing method (**kwargs) without a type.
+# pyright: reportUnknownMemberType=false
+
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float, Float32
@@ -116,7 +119,7 @@ def _draw_names(ax: "Axes", space: Space, things: "Sequence[Thing]", rooms: "Seq
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=2.5, foreground="white", alpha=0.85)]
-    style = {"ha": "center", "va": "center", "path_effects": halo, "clip_on": True}
+    style: dict[str, Any] = {"ha": "center", "va": "center", "path_effects": halo, "clip_on": True}
     for thing in sorted(things, key=lambda one: -one.size[0] * one.size[1])[:MOST_NAMES]:
         x, y, _ = space.level(np.array(thing.position))
         ax.text(x, y, plot_text(thing.name), fontsize=6.5, color=INK, zorder=8, **style)
@@ -221,7 +224,7 @@ def _draw_anchors(ax: "Axes", factor: Factor) -> None:
         return
     what = "sound position" if factor.part.modality is Modality.SOUND else "seen from here"
     if likely.any():
-        style = {"linestyle": "none", "marker": "o", "markersize": 4, "markeredgecolor": "white"}
+        style: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4, "markeredgecolor": "white"}
         ax.plot(*anchors[likely, :2].T, color=_SOUND, label=what, **style)
 
 

@@ -126,7 +126,7 @@ class Space:
         low, span, keys = self._keys
         shifted = np.asarray(cells, np.int64) - low
         held = np.all((shifted >= 0) & (shifted < span), axis=1)
-        key = (shifted[held, 0] * span[1] + shifted[held, 1]) * span[2] + shifted[held, 2]
+        key: Int[np.ndarray, " k"] = (shifted[held, 0] * span[1] + shifted[held, 1]) * span[2] + shifted[held, 2]
         at = np.searchsorted(keys, key)
         held[held] = keys[np.minimum(at, len(keys) - 1)] == key
         return held

@@ -128,7 +128,8 @@ def _gains(
     own = ends - first
     products = sums[own] @ sums.T
     gains = np.zeros((len(ends), longest))
-    for row, (end, product) in enumerate(zip(own.tolist(), products, strict=True)):
+    for row, product in enumerate(products):
+        end = int(own[row])
         starts = np.arange(max(0, end - longest), end)
         apart = square[end] + square[starts] - 2.0 * product[starts]
         gains[row, longest - end + starts] = apart / (end - starts)

@@ -122,7 +122,8 @@ def track_of(recording: Recording, heard: Segment) -> Float32[np.ndarray, "place
     stamps_s = recording.stamps_s
     between = stamps_s[(stamps_s > heard.onset_s) & (stamps_s < heard.offset_s)]
     at_s = np.concatenate([[heard.onset_s], between, [heard.offset_s]])
-    positions = np.stack([np.interp(at_s, stamps_s, axis) for axis in recording.world_from_camera[:, :3, 3].T], axis=1)
+    camera = recording.world_from_camera[:, :3, 3]
+    positions = np.stack([np.interp(at_s, stamps_s, camera[:, axis]) for axis in range(3)], axis=1)
     moved = np.linalg.norm(np.diff(positions, axis=0), axis=1) > _NEAR_M
     return positions[np.append(True, moved)].astype(np.float32)
 

@@ -98,7 +98,8 @@ class VoxelAccumulator:
         table = self._table
         table.reserve(voxels)
         stamp_s = float(frame.stamp_s)
-        table.count = sums.commit(voxels, self._scratch, pose[2], stamp_s, table.slots, table.geometry, table.count)
+        known = sums.commit(voxels, self._scratch, pose[2], stamp_s, table.slots, table.geometry, table.count)
+        table.count = int(known)
         faults = sums.flush(voxels, pairs, self._scratch, cells, table.feature_sum, table.weight) if pairs else 0
         if faults:
             raise BackendError(
@@ -138,7 +139,7 @@ class VoxelAccumulator:
         """
         return self._table.voxels(feature_out, kept)
 
-    def _limits(self) -> tuple[float, ...]:
+    def _limits(self) -> kernels.Limits:
         """Return the limits for `fusion_kernels.trace`."""
         settings, sensor, half = self.settings, self.sensor, 0.5 * self.grid.voxel_size_m
         farthest = min(settings.max_depth_m, sensor.farthest_m(self.grid.voxel_size_m))

@@ -6,14 +6,34 @@ and reading and writing rows of 2 KB, is what limits fusion.
 """
 
 import numpy as np
+from jaxtyping import Bool, Float32, Float64, Int32, Int64
 from numba import njit
 
-from avlmaps.maps.fusion.measure_kernels import BLUE, GREEN, HITS, OFFSET_BITS, REACH_VOXELS, RED, RGB_WEIGHT, SHARP
-from avlmaps.maps.fusion.voxel_kernels import OPTIONS, REASSOCIATING, find_or_insert
+from avlmaps.core.kernel_types import Real, Whole
+from avlmaps.maps.fusion.measure_kernels import (
+    BLUE,
+    GREEN,
+    HITS,
+    OFFSET_BITS,
+    REACH_VOXELS,
+    RED,
+    RGB_WEIGHT,
+    SHARP,
+    Scratch,
+)
+from avlmaps.maps.fusion.voxel_kernels import OPTIONS, REASSOCIATING, Geometry, find_or_insert
 
 
 @njit(**OPTIONS)
-def commit(voxels, scratch, origin, stamp_s, slots, geometry, count):
+def commit(
+    voxels: Whole,
+    scratch: Scratch,
+    origin: Int64[np.ndarray, "3"],
+    stamp_s: Real,
+    slots: Int32[np.ndarray, " slots"],
+    geometry: Geometry,
+    count: Whole,
+):
     """Add colour and hits of a traced frame to the map, and find the map's row of each of the frame's voxels.
 
     Args:
@@ -51,7 +71,7 @@ def commit(voxels, scratch, origin, stamp_s, slots, geometry, count):
 
 
 @njit(**OPTIONS)
-def _group_pairs(voxels, pairs, scratch):
+def _group_pairs(voxels: Whole, pairs: Whole, scratch: Scratch):
     """Sort pairs by voxel, by counting: those of v are ``voxel_start[v] : voxel_start[v + 1]``, as they were met."""
     start = scratch.voxel_start
     for voxel in range(voxels + 1):
@@ -72,7 +92,7 @@ def _group_pairs(voxels, pairs, scratch):
 
 
 @njit(**OPTIONS)
-def _find_speaking(features, speaks):
+def _find_speaking(features: Float32[np.ndarray, "cells d"], speaks: Bool[np.ndarray, " cells"]):
     """Note which cells have a feature that is not all zero; nearly always the first number decides."""
     for cell in range(features.shape[0]):
         speaks[cell] = features[cell, 0] != 0.0
@@ -84,7 +104,15 @@ def _find_speaking(features, speaks):
 
 
 @njit(**OPTIONS)
-def _gather_pairs(first, last, cells, weights, speaks, live_cell, live_weight):
+def _gather_pairs(
+    first: Whole,
+    last: Whole,
+    cells: Int32[np.ndarray, " pairs"],
+    weights: Float64[np.ndarray, " pairs"],
+    speaks: Bool[np.ndarray, " cells"],
+    live_cell: Int64[np.ndarray, " live"],
+    live_weight: Float32[np.ndarray, " live"],
+):
     """Collect a voxel's pairs whose cell has a feature, and pad to fours; return their count and weight."""
     count = 0
     amount = 0.0
@@ -102,7 +130,13 @@ def _gather_pairs(first, last, cells, weights, speaks, live_cell, live_weight):
 
 
 @njit(**OPTIONS)
-def _sum_features(count, cells, weights, features, total):
+def _sum_features(
+    count: Whole,
+    cells: Int64[np.ndarray, " live"],
+    weights: Float32[np.ndarray, " live"],
+    features: Float32[np.ndarray, "cells d"],
+    total: Float32[np.ndarray, " d"],
+):
     """Set ``total`` to the weighted sum of the cells' features; the count is a multiple of four."""
     for column in range(total.shape[0]):
         total[column] = 0.0
@@ -115,7 +149,7 @@ def _sum_features(count, cells, weights, features, total):
 
 
 @njit(**REASSOCIATING)
-def _add_if_finite(row, total, feature_sum):
+def _add_if_finite(row: Whole, total: Float32[np.ndarray, " d"], feature_sum: Float32[np.ndarray, "rows d"]):
     """Add the total to a row of the map, unless it holds NaN or infinity; return whether it was added."""
     size = np.float32(0.0)
     for column in range(total.shape[0]):
@@ -128,7 +162,14 @@ def _add_if_finite(row, total, feature_sum):
 
 
 @njit(**OPTIONS)
-def flush(voxels, pairs, scratch, features, feature_sum, weight):
+def flush(
+    voxels: Whole,
+    pairs: Whole,
+    scratch: Scratch,
+    features: Float32[np.ndarray, "cells d"],
+    feature_sum: Float32[np.ndarray, "rows d"],
+    weight: Float64[np.ndarray, " rows"],
+):
     """Add the features of a traced and committed frame to the map.
 
     Args:

@@ -1,13 +1,23 @@
 """The compiled loops over all voxels of a map that decide which of them are no surface."""
 
 import numpy as np
+from jaxtyping import Bool, Float64, Int32, Int64, Shaped, UInt16
 from numba import njit
 
+from avlmaps.core.kernel_types import Real, Whole
 from avlmaps.maps.fusion.voxel_kernels import OPTIONS, find_row
 
 
 @njit(**OPTIONS)
-def count_through(index, voxel_size, clear, size, camera, pose, through):
+def count_through(
+    index: Int32[np.ndarray, "n 3"],
+    voxel_size: Real,
+    clear: UInt16[np.ndarray, "rows columns"],
+    size: Whole,
+    camera: tuple[float, float, float, float, float, float],
+    pose: Float64[np.ndarray, "4 4"],
+    through: Int32[np.ndarray, " n"],
+):
     """Add 1 to each voxel that a view sees through: all rays that may meet it continue for a voxel's edge behind it.
 
     Args:
@@ -50,7 +60,14 @@ def count_through(index, voxel_size, clear, size, camera, pose, through):
 
 
 @njit(**OPTIONS)
-def mark_smeared(index, sharp, reach, ratio, table, smeared):
+def mark_smeared(
+    index: Int32[np.ndarray, "n 3"],
+    sharp: Int64[np.ndarray, " n"],
+    reach: Shaped[np.ndarray, " n"],
+    ratio: Real,
+    table: Int32[np.ndarray, " slots"],
+    smeared: Bool[np.ndarray, " n"],
+):
     """Mark each voxel that has a much better seen one within its reach.
 
     Args:
@@ -77,7 +94,7 @@ def mark_smeared(index, sharp, reach, ratio, table, smeared):
 
 
 @njit(**OPTIONS)
-def group(index, table, parent):
+def group(index: Int32[np.ndarray, "n 3"], table: Int32[np.ndarray, " slots"], parent: Int64[np.ndarray, " n"]):
     """Give voxels that touch, at a corner at least, the same group: the lowest row among them.
 
     Args:
@@ -99,7 +116,7 @@ def group(index, table, parent):
 
 
 @njit(**OPTIONS)
-def _root(parent, n):
+def _root(parent: Int64[np.ndarray, " n"], n: Whole):
     while parent[n] != n:
         parent[n] = parent[parent[n]]
         n = parent[n]

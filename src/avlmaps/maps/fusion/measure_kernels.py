@@ -9,8 +9,10 @@ instead of once for a pixel. The second step is in `avlmaps.maps.fusion.add_kern
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float32, Float64, Int32, Int64, UInt8
 from numba import njit
 
+from avlmaps.core.kernel_types import Real, Whole
 from avlmaps.maps.fusion.voxel_kernels import OPTIONS
 
 # A voxel within one frame is named by one integer: three offsets from the camera's voxel, 21 bits each.
@@ -31,6 +33,11 @@ SHARP_UNITS = 256
 STEPS = 64
 GREATEST_EXPONENT = 30.0 * np.log(10.0)
 _EXPONENTIALS = np.exp(-np.arange(STEPS * (int(GREATEST_EXPONENT) + 1) + 1) / STEPS)
+
+# As `trace` takes them.
+Pose = tuple[np.ndarray, np.ndarray, np.ndarray]
+Limits = tuple[float, float, float, float, float, float]
+Projection = tuple[bool, np.ndarray, tuple[float, float, float, float], tuple[int, int], tuple[int, int]]
 
 
 class Scratch(NamedTuple):
@@ -93,7 +100,16 @@ def make_scratch(height: int, width: int) -> Scratch:
 
 
 @njit(**OPTIONS)
-def _measure_row(depth, x, y, pose, limits, key, weight, sharp):
+def _measure_row(
+    depth: Float32[np.ndarray, " w"],
+    x: Float64[np.ndarray, " w"],
+    y: Real,
+    pose: Pose,
+    limits: Limits,
+    key: Int64[np.ndarray, " w"],
+    weight: Float64[np.ndarray, " w"],
+    sharp: Int64[np.ndarray, " w"],
+):
     """Find the voxel (as an offset key, -1 without depth), the weight and the exactness of every pixel of a row."""
     rotation, translation, origin = pose
     voxel_size, nearest, farthest, falloff, noise, noise_growth = limits
@@ -124,7 +140,14 @@ def _measure_row(depth, x, y, pose, limits, key, weight, sharp):
 
 
 @njit(**OPTIONS)
-def _project_row(depth, x, y, projection, picture, cell):
+def _project_row(
+    depth: Float32[np.ndarray, " w"],
+    x: Float64[np.ndarray, " w"],
+    y: Real,
+    projection: Projection,
+    picture: Int32[np.ndarray, " w"],
+    cell: Int32[np.ndarray, " w"],
+):
     """Find the colour pixel and the feature cell (linear, -1 outside) of every pixel of a row, by projection."""
     _, rgb_from_depth, (fx, fy, cx, cy), (height, width), (cell_rows, cell_columns) = projection
     rows_ratio, columns_ratio = cell_rows / height, cell_columns / width
@@ -145,14 +168,14 @@ def _project_row(depth, x, y, projection, picture, cell):
 
 
 @njit(**OPTIONS)
-def _combine_row(of_column, of_row, out):
+def _combine_row(of_column: Int32[np.ndarray, " w"], of_row: Whole, out: Int32[np.ndarray, " w"]):
     """Write the linear index of a row of pixels from tables of their column and row, -1 outside."""
     for u in range(of_column.shape[0]):
         out[u] = of_column[u] + of_row if (of_column[u] >= 0) & (of_row >= 0) else -1
 
 
 @njit(**OPTIONS)
-def _find_slot(slot_key, mask, key):
+def _find_slot(slot_key: Int64[np.ndarray, " slots"], mask: Whole, key: Whole):
     """Return the slot that holds the key, or the free one where it belongs."""
     slot = ((key * np.int64(-7046029254386353131)) >> 40) & mask
     while slot_key[slot] != key and slot_key[slot] != -1:
@@ -161,7 +184,7 @@ def _find_slot(slot_key, mask, key):
 
 
 @njit(**OPTIONS)
-def _enter_voxel(slot, key, scratch, voxels, mask):
+def _enter_voxel(slot: Whole, key: Whole, scratch: Scratch, voxels: Whole, mask: Whole):
     """Number a voxel that the frame had not met, and double the table when it is half full; return its mask."""
     scratch.slot_key[slot] = key
     scratch.slot_voxel[slot] = voxels
@@ -181,7 +204,16 @@ def _enter_voxel(slot, key, scratch, voxels, mask):
 
 
 @njit(**OPTIONS)
-def _add_pair(voxel, cell, amount, recent, pair_voxel, pair_cell, pair_weight, pairs):
+def _add_pair(
+    voxel: Whole,
+    cell: Whole,
+    amount: Real,
+    recent: Int32[np.ndarray, " recent"],
+    pair_voxel: Int32[np.ndarray, " pairs"],
+    pair_cell: Int32[np.ndarray, " pairs"],
+    pair_weight: Float64[np.ndarray, " pairs"],
+    pairs: Whole,
+):
     """Add weight to the pair (voxel, cell) if it was met lately, else begin a new one; return the count of pairs."""
     slot = (np.int64(cell) * 5 + np.int64(voxel) * 1237) & (RECENT_PAIRS - 1)
     pair = recent[slot]
@@ -196,7 +228,17 @@ def _add_pair(voxel, cell, amount, recent, pair_voxel, pair_cell, pair_weight, p
 
 
 @njit(**OPTIONS)
-def _add_run(u, keys, cells, weights, sharp, picture, rgb, voxel, voxel_sum):
+def _add_run(
+    u: Whole,
+    keys: Int64[np.ndarray, " w"],
+    cells: Int32[np.ndarray, " w"],
+    weights: Float64[np.ndarray, " w"],
+    sharp: Int64[np.ndarray, " w"],
+    picture: Int32[np.ndarray, " w"],
+    rgb: UInt8[np.ndarray, "pixels 3"],
+    voxel: Whole,
+    voxel_sum: Float64[np.ndarray, "voxels columns"],
+):
     """Add the pixels from ``u`` on that share voxel and cell to the voxel; return where they end and their weight."""
     key, cell = keys[u], cells[u]
     start = u
@@ -223,7 +265,16 @@ def _add_run(u, keys, cells, weights, sharp, picture, rgb, voxel, voxel_sum):
 
 
 @njit(**OPTIONS)
-def trace(depth, rays, pose, limits, rgb, tables, projection, scratch):
+def trace(
+    depth: Float32[np.ndarray, "h w"],
+    rays: tuple[np.ndarray, np.ndarray],
+    pose: Pose,
+    limits: Limits,
+    rgb: UInt8[np.ndarray, "pixels 3"],
+    tables: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    projection: Projection,
+    scratch: Scratch,
+):
     """Measure one frame: its voxels, with what they get of colour and hits, and its pairs of voxel and cell.
 
     Args:

@@ -1,15 +1,18 @@
 """The compiled loops over one depth picture: which pixels are used, and how far the camera sees freely."""
 
 import numpy as np
+from jaxtyping import Float32, UInt16
 from numba import njit
 
-OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}}
+from avlmaps.core.kernel_types import Real, Whole
+from avlmaps.maps.fusion.voxel_kernels import OPTIONS
+
 CLEAR_UNITS_PER_M = 1000.0
 _FARTHEST_UNITS = 65535.0
 
 
 @njit(**OPTIONS)
-def _between(z, a, b, c, d, once, twice):
+def _between(z: Real, a: Real, b: Real, c: Real, d: Real, once: Real, twice: Real):
     """Return whether z lies between a nearer and a farther depth on either side (a, b: 1 and 2 pixels off; c, d)."""
     near_1 = (a > 0.0) & (a < z - once) | (b > 0.0) & (b < z - twice)
     far_1 = (a > z + once) | (b > z + twice)
@@ -19,7 +22,13 @@ def _between(z, a, b, c, d, once, twice):
 
 
 @njit(**OPTIONS)
-def drop_flying(depth, steps, noise, edge_sigmas, out):
+def drop_flying(
+    depth: Float32[np.ndarray, "h w"],
+    steps: tuple[float, float],
+    noise: tuple[float, float],
+    edge_sigmas: Real,
+    out: Float32[np.ndarray, "h w"],
+):
     """Copy a depth picture without the pixels that lie between a nearer and a farther surface; those become 0.
 
     Args:
@@ -61,7 +70,13 @@ def drop_flying(depth, steps, noise, edge_sigmas, out):
 
 
 @njit(**OPTIONS)
-def clear_blocks(depth, size, noise, clear_sigmas, out):
+def clear_blocks(
+    depth: Float32[np.ndarray, "h w"],
+    size: Whole,
+    noise: tuple[float, float],
+    clear_sigmas: Real,
+    out: UInt16[np.ndarray, "rows columns"],
+):
     """Write how far every ray of each block of pixels is free: 0 where a pixel of it has no depth.
 
     Args:

@@ -1,22 +1,30 @@
 """The compiled loops over a table of voxels: finding rows by index, adding rows, finishing features."""
 
 import numpy as np
+from jaxtyping import Float, Float32, Float64, Int, Int32
 from numba import njit
 
+from avlmaps.core.kernel_types import Options, Whole
+
+# (index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s) of a map's rows
+Geometry = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
 # No "nnan" among them: NaN must stay visible. "reassoc" lets sums over a row be vectorised.
-OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}}
-REASSOCIATING = {**OPTIONS, "fastmath": {"contract", "nsz", "reassoc"}}
+OPTIONS: Options = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}}
+REASSOCIATING: Options = {**OPTIONS, "fastmath": {"contract", "nsz", "reassoc"}}
 
 
 @njit(**OPTIONS)
-def _hash(i, j, k):
+def _hash(i: Whole, j: Whole, k: Whole):
     mixed = np.int64(i) * np.int64(73856093) ^ np.int64(j) * np.int64(19349669) ^ np.int64(k) * np.int64(83492791)
     mixed = mixed * np.int64(-7046029254386353131)
     return mixed ^ (mixed >> 29)
 
 
 @njit(**OPTIONS)
-def find_or_insert(i, j, k, table, index, count):
+def find_or_insert(
+    i: Whole, j: Whole, k: Whole, table: Int32[np.ndarray, " slots"], index: Int32[np.ndarray, "rows 3"], count: Whole
+):
     """Return the row of a voxel, entering it as row ``count`` where it is new; the table must have room."""
     mask = table.shape[0] - 1
     slot = _hash(i, j, k) & mask
@@ -33,7 +41,7 @@ def find_or_insert(i, j, k, table, index, count):
 
 
 @njit(**OPTIONS)
-def find_row(i, j, k, table, index):
+def find_row(i: Whole, j: Whole, k: Whole, table: Int32[np.ndarray, " slots"], index: Int32[np.ndarray, "rows 3"]):
     """Return the row of a voxel, -1 where it is not in the table."""
     mask = table.shape[0] - 1
     slot = _hash(i, j, k) & mask
@@ -46,7 +54,7 @@ def find_row(i, j, k, table, index):
 
 
 @njit(**OPTIONS)
-def rehash(table, index, count):
+def rehash(table: Int32[np.ndarray, " slots"], index: Int32[np.ndarray, "rows 3"], count: Whole):
     """Enter the first ``count`` voxels into an empty (all -1) table."""
     mask = table.shape[0] - 1
     for row in range(count):
@@ -57,7 +65,14 @@ def rehash(table, index, count):
 
 
 @njit(**OPTIONS)
-def add_rows(part, table, sums, feature_sum, weight, count):
+def add_rows(
+    part: tuple[np.ndarray, ...],
+    table: Int32[np.ndarray, " slots"],
+    sums: Geometry,
+    feature_sum: Float32[np.ndarray, "rows d"],
+    weight: Float64[np.ndarray, " rows"],
+    count: Whole,
+):
     """Add voxels of another map to this one; the table and the sums must have room for all of them.
 
     Args:
@@ -92,7 +107,7 @@ def add_rows(part, table, sums, feature_sum, weight, count):
 
 
 @njit(**REASSOCIATING)
-def unit_rows(feature_sum, rows, out):
+def unit_rows(feature_sum: Float32[np.ndarray, "rows d"], rows: Int[np.ndarray, " n"], out: Float[np.ndarray, "n d"]):
     """Write the rows of ``feature_sum`` scaled to length 1 (a zero row stays zero) into ``out`` (len(rows), d)."""
     for n in range(rows.shape[0]):
         square = 0.0

@@ -107,7 +107,7 @@ class VoxelTable:
         self.last_seen_s = np.zeros(SMALLEST_ROOM)
 
     @property
-    def geometry(self) -> tuple[np.ndarray, ...]:
+    def geometry(self) -> kernels.Geometry:
         """All sums but the features', as the kernels take them."""
         return self.index, self.rgb_sum, self.rgb_weight, self.hits, self.views, self.sharp, self.last_seen_s
 
@@ -139,7 +139,8 @@ class VoxelTable:
             every = (*arrays, part.last_seen_s, part.feature_sum, part.weight)
             block = tuple(np.array(array[rows], order="C") for array in every)
             self.reserve(len(block[0]))
-            self.count = kernels.add_rows(block, self.slots, self.geometry, self.feature_sum, self.weight, self.count)
+            count = kernels.add_rows(block, self.slots, self.geometry, self.feature_sum, self.weight, self.count)
+            self.count = int(count)
 
     def sort_rows(self) -> Int64[np.ndarray, " n"]:
         """Return the rows in the order of their index (x, then y, then z)."""
@@ -205,7 +206,7 @@ def blocks(count: int, dim: int) -> list[slice]:
     return [slice(start, min(start + step, count)) for start in range(0, count, step)]
 
 
-def feature_array(out: np.ndarray | None, shape: tuple[int, int], dtype: type) -> np.ndarray:
+def feature_array(out: np.ndarray | None, shape: tuple[int, int], dtype: type[np.generic]) -> np.ndarray:
     """Return the array that features are to be written to, checked, or a new one."""
     if out is None:
         return np.empty(shape, dtype)

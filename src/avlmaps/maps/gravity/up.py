@@ -48,7 +48,9 @@ def find_up(frames: Iterable[Frame], rng: np.random.Generator) -> Up:
     Raises:
         RecordingError: too little surface within 4 m to find up.
     """
-    normals, rotations, count = [], [], 0
+    normals: list[Float[np.ndarray, "n 3"]] = []
+    rotations: list[Float[np.ndarray, "3 3"]] = []
+    count = 0
     for frame in frames:
         rotation = np.asarray(frame.world_from_camera[:3, :3], np.float64)
         found = surface_normals(frame, rng)

@@ -4,7 +4,7 @@ h5py comes with the extra ``paper`` and is imported when a file is opened.
 """
 
 import importlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ def _h5py() -> Any:
 
 
 @contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _told(path: Path) -> Generator[None]:
     try:
         yield
     except _FAULTS as fault:
@@ -36,7 +36,7 @@ def _told(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def open_hdf5(path: Path) -> Iterator["Hdf5"]:
+def open_hdf5(path: Path) -> Generator["Hdf5"]:
     """Open a file for reading.
 
     Raises:
@@ -121,12 +121,12 @@ class Numbers:
         self._dataset = dataset
         self.shape = shape
 
-    def rows(self, part: slice, dtype: type) -> np.ndarray:
+    def rows(self, part: slice, dtype: type[np.generic]) -> np.ndarray:
         """Read some rows, as numbers of that type."""
         with _told(self._path):
             return np.asarray(self._dataset[part]).astype(dtype, copy=False)
 
-    def whole(self, dtype: type) -> np.ndarray:
+    def whole(self, dtype: type[np.generic]) -> np.ndarray:
         """Read all of it."""
         with _told(self._path):
             return np.asarray(self._dataset[()]).astype(dtype, copy=False)

@@ -104,7 +104,8 @@ def voxels_filled(cubes: Cubes, grid: GridSpec) -> tuple[Int[np.ndarray, " p"], 
     Returns:
         Pairs of a row of the file and a voxel, by rising row; a voxel may come with several rows.
     """
-    rows, voxels = [], []
+    rows: list[Int[np.ndarray, " p"]] = []
+    voxels: list[Int[np.ndarray, "p 3"]] = []
     for start in range(0, len(cubes.row), _CUBES_AT_ONCE):
         part = slice(start, start + _CUBES_AT_ONCE)
         row, voxel = _filled(cubes.middle[part], cubes.row[part], cubes, grid)
@@ -118,7 +119,9 @@ def _filled(
 ) -> tuple[Int[np.ndarray, " p"], Int[np.ndarray, "p 3"]]:
     grid_from_world = poses.inverse(cubes.world_from_grid)
     own = grid.index_of(poses.apply(cubes.world_from_grid, middle))
-    rows, voxels, starved = [], [], np.ones(len(row), bool)
+    rows: list[Int[np.ndarray, " p"]] = []
+    voxels: list[Int[np.ndarray, "p 3"]] = []
+    starved = np.ones(len(row), bool)
     for step in _NEIGHBOURS:
         voxel = own + step.astype(np.int32)
         off = poses.apply(grid_from_world, grid.centre_of(voxel)) - middle

@@ -157,7 +157,8 @@ def learn_places(
         return {}, {}
     encoder = profile.local_encoder()
     spread = np.unique(np.linspace(0, len(indices) - 1, min(len(indices), LEARN_FROM_KEYFRAMES)).round().astype(int))
-    local = {int(indices[i]): encoder.encode(recording.frame(int(indices[i])).rgb) for i in spread}
+    chosen = [int(indices[int(i)]) for i in spread]
+    local = {i: encoder.encode(recording.frame(i).rgb) for i in chosen}
     return profile.place_encoder().fit(list(local.values()), rng), local
 
 
@@ -244,11 +245,11 @@ def _scores(local: Sequence[LocalFeatures]) -> Float16[np.ndarray, " m_or_0"]:
     return _joined([one.score for one in local], (), np.float16)
 
 
-def _stacked(rows: Sequence[np.ndarray], shape: tuple[int, ...], dtype: type) -> np.ndarray:
+def _stacked(rows: Sequence[np.ndarray], shape: tuple[int, ...], dtype: type[np.generic]) -> np.ndarray:
     return np.stack(rows).astype(dtype) if len(rows) else np.zeros((0, *shape), dtype)
 
 
-def _joined(pieces: Sequence[np.ndarray], shape: tuple[int, ...], dtype: type) -> np.ndarray:
+def _joined(pieces: Sequence[np.ndarray], shape: tuple[int, ...], dtype: type[np.generic]) -> np.ndarray:
     return np.concatenate(pieces).astype(dtype) if len(pieces) else np.zeros((0, *shape), dtype)
 
 

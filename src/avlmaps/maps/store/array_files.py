@@ -8,7 +8,7 @@ import hashlib
 import io
 import itertools
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO
@@ -46,7 +46,7 @@ class FileInfo(msgspec.Struct, frozen=True, kw_only=True):
 
 
 @contextmanager
-def explain_write_errors(folder: Path) -> Iterator[None]:
+def explain_write_errors(folder: Path) -> Generator[None]:
     """Turn a full disk, a missing permission and their like into one sentence."""
     try:
         yield
