@@ -5,7 +5,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 @overload
-def distance_transform_edt(input: ArrayLike, sampling: float | Sequence[float] | None = None) -> NDArray[np.float64]: ...
+def distance_transform_edt(
+    input: ArrayLike, sampling: float | Sequence[float] | None = None
+) -> NDArray[np.float64]: ...
 @overload
 def distance_transform_edt(
     input: ArrayLike,

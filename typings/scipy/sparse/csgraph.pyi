@@ -2,7 +2,6 @@ from typing import Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
 from scipy.sparse import csr_array, csr_matrix
 
 @overload

@@ -2,7 +2,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
 from scipy.sparse import coo_matrix
 
 class QhullError(RuntimeError): ...
@@ -13,7 +12,11 @@ class ConvexHull:
 
 class KDTree:
     def __init__(
-        self, data: ArrayLike, leafsize: int = 10, compact_nodes: bool = True, copy_data: bool = False,
+        self,
+        data: ArrayLike,
+        leafsize: int = 10,
+        compact_nodes: bool = True,
+        copy_data: bool = False,
         balanced_tree: bool = True,
     ) -> None: ...
     # of many points at once, as here always; for one point SciPy returns numbers
