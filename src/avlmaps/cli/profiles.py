@@ -1,29 +1,61 @@
 """`avlmaps profiles`: which models there are, which of them are here, and how to get the others."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from tyro.conf import arg
 
 from avlmaps.cli.output import emit, table_lines
 from avlmaps.cli.verb import ModelVerb
+from avlmaps.core.errors import BackendError
 
 
 @dataclass(frozen=True, kw_only=True)
 class Profiles(ModelVerb):
     """List the profiles and their backends: which are installed, and which command installs the others.
 
-    Nothing is downloaded, and no large model is opened: only its files are searched in --models and in the hub's cache.
+    Without --fetch nothing is downloaded, and no large model is opened: only its files are searched in --models and in
+    the hub's cache.
 
     Example: avlmaps profiles --models models
     """
 
+    fetch: Literal["light"] | None = None
+    """Bring the files of this profile into the folder of models, checked by their SHA-256."""
+    source: Annotated[str | None, arg(name="from", metavar="URL|DIR")] = None
+    """Where --fetch finds them: a page or a folder. Default: AVLMAPS_LIGHT_FROM."""
+
     def run(self) -> None:
-        """List them."""
+        """List them, or fetch the files of one."""
+        if self.fetch is not None:
+            self._bring()
+            return
+        if self.source is not None:
+            raise BackendError("--from says where --fetch finds the files; add --fetch light.")
         answer = list_profiles()
         lines: list[str] = []
         for entry in answer["profiles"]:
             lines += [f"{entry['name']}: {entry['about']}", *_backend_lines(entry["backends"])]
         if answer["other_backends"]:
             lines += ["in no profile:", *_backend_lines(answer["other_backends"])]
+        emit(answer, lines, self.json)
+
+    def _bring(self) -> None:
+        from avlmaps.perception.light.fetch import fetch_light
+
+        found = fetch_light(self.source or "")
+        whole = sum(note.bytes for note in found.manifest.files.values())
+        answer = {
+            "fetched": found.manifest.id,
+            "folder": str(found.folder),
+            "bytes": whole,
+            "received_bytes": found.received_bytes,
+        }
+        came = f"{found.received_bytes / 1e6:.0f} MB came now" if found.received_bytes else "all was here already"
+        lines = [
+            f"{found.manifest.id}: {len(found.manifest.files)} files, {whole / 1e6:.0f} MB, in {found.folder} ({came})",
+            "build with them: avlmaps build REC --out MAP --profile light",
+        ]
         emit(answer, lines, self.json)
 
 

@@ -44,6 +44,9 @@ class Backend:
         model: for a backend that can run several models, the one that it runs unless another is chosen: a hub's id or
             the name of a file; its class is called with it. ``""`` where the class takes no argument.
         licence: of that model's weights, for ``avlmaps profiles``; ``""`` where the class alone decides it.
+        slow: whether it takes so long that its features are worth storing; every backend on torch does.
+        keyframes_only: of pixels: whether a build gives it keyframes alone, the other frames adding surfaces and
+            colours: for a model that takes a second a frame.
     """
 
     kind: Kind
@@ -53,6 +56,13 @@ class Backend:
     needs: tuple[str, ...] = ()
     model: str = ""
     licence: str = ""
+    slow: bool = False
+    keyframes_only: bool = False
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether its features are worth storing: ``slow``, or on torch."""
+        return self.slow or "torch" in self.needs
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -86,6 +96,25 @@ def _with_torch(package: str, kind: Kind, name: str, target: str, model: str, li
     return Backend(kind, name, place, extra=package, needs=("torch", *needs), model=model, licence=licence)
 
 
+def _light(kind: Kind, target: str) -> Backend:
+    """Return the entry of a backend that runs small copies of published models in onnxruntime."""
+    place = f"avlmaps.perception.light.{target}"
+    return Backend(
+        kind,
+        "light",
+        place,
+        model="avlmaps/light-1",
+        licence="Apache-2.0",
+        slow=True,
+        keyframes_only=kind is Kind.PIXELS,
+    )
+
+
+_LIGHT = (
+    _light(Kind.PIXELS, "pixels:LightPixels"),
+    _light(Kind.VIEWS, "views:LightViews"),
+    _light(Kind.SOUNDS, "sounds:LightSounds"),
+)
 _foundation, _paper = partial(_with_torch, "foundation"), partial(_with_torch, "paper")
 _OF_TORCH = (
     _foundation(Kind.PIXELS, "tipsv2", "tipsv2:TipsPixels", "google/tipsv2-b14", "Apache-2.0", "transformers"),
@@ -144,7 +173,7 @@ _OF_TORCH = (
         "transformers",
     ),
 )
-_registered: dict[tuple[Kind, str], Backend] = {(b.kind, b.name): b for b in (*_BUILT_IN, *_OF_TORCH)}
+_registered: dict[tuple[Kind, str], Backend] = {(b.kind, b.name): b for b in (*_BUILT_IN, *_LIGHT, *_OF_TORCH)}
 
 
 def register(backend: Backend) -> None:

@@ -3,7 +3,7 @@
 Both run ahead of the code that takes the frames, so that the slowest of decoding, encoding and fusion sets the pace.
 """
 
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from itertools import islice
 
@@ -17,11 +17,15 @@ from avlmaps.perception.cache.cached_encoders import encode_batch
 from avlmaps.perception.protocols import BatchPixelEncoder, PixelEncoder
 from avlmaps.recordings.types import Frame, Recording
 
+_MOST_HELD = 4  # frames in memory for each that is encoded
 EncodedFrame = tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]
 
 
 def encode_frames(
-    recording: Recording, stretches: Sequence[Sequence[int]], encoder: PixelEncoder | None
+    recording: Recording,
+    stretches: Sequence[Sequence[int]],
+    encoder: PixelEncoder | None,
+    chosen: Collection[int] | None = None,
 ) -> Generator[EncodedFrame]:
     """Yield the frames with their features, in order; one that cannot be read yields its fault in its place.
 
@@ -30,6 +34,7 @@ def encode_frames(
         stretches: numbers of frames; no batch reaches from one stretch into the next, so that a build that continues
             from a stretch encodes the same batches as one that was never stopped.
         encoder: None yields frames alone.
+        chosen: numbers of the frames to encode, the others coming alone; None encodes all.
     """
     every = [index for stretch in stretches for index in stretch]
     size = 1 if encoder is None else batch_of(encoder)
@@ -38,7 +43,7 @@ def encode_frames(
             yield from ((frame, None) for frame in frames)
             return
         lengths = [len(stretch) for stretch in stretches]
-        with closing(run_ahead(encode_batches(frames, lengths, encoder, size))) as seen:
+        with closing(run_ahead(encode_batches(frames, lengths, encoder, size, chosen))) as seen:
             yield from seen
 
 
@@ -52,26 +57,36 @@ def decode_frames(recording: Recording, indices: Iterable[int]) -> Generator[Fra
 
 
 def encode_batches(
-    frames: Iterator[Frame | BadFrame], lengths: Sequence[int], encoder: PixelEncoder, size: int
+    frames: Iterator[Frame | BadFrame],
+    lengths: Sequence[int],
+    encoder: PixelEncoder,
+    size: int,
+    chosen: Collection[int] | None = None,
 ) -> Generator[EncodedFrame]:
-    """Add features to frames, at most ``size`` frames at once, stretch by stretch."""
+    """Add features to frames, or to the chosen ones, at most ``size`` of them at once, stretch by stretch."""
+
+    def counts(frame: Frame | BadFrame) -> bool:
+        return isinstance(frame, Frame) and (chosen is None or frame.index in chosen)
+
     for length in lengths:
         stretch = islice(frames, length)
-        while group := _next_group(stretch, size):
-            good = [frame for frame in group if isinstance(frame, Frame)]
-            features = iter(encode_batch(encoder, good))
+        while group := _next_group(stretch, size, counts):
+            wanted = [frame for frame in group if isinstance(frame, Frame) and counts(frame)]
+            features = iter(encode_batch(encoder, wanted) if wanted else [])
             for frame in group:
-                yield frame, (next(features) if isinstance(frame, Frame) else None)
+                yield frame, (next(features) if counts(frame) else None)
 
 
-def _next_group(frames: Iterator[Frame | BadFrame], size: int) -> list[Frame | BadFrame]:
-    """Take ``size`` good frames, and the bad ones among them."""
+def _next_group(
+    frames: Iterator[Frame | BadFrame], size: int, counts: Callable[[Frame | BadFrame], bool]
+) -> list[Frame | BadFrame]:
+    """Take ``size`` frames that count, and the others among them; where none waits, one that does not goes alone."""
     group: list[Frame | BadFrame] = []
     good = 0
     for frame in frames:
         group.append(frame)
-        good += isinstance(frame, Frame)
-        if good == size:
+        good += counts(frame)
+        if good == size or not good or len(group) >= _MOST_HELD * size:
             break
     return group
 

@@ -25,6 +25,7 @@ from avlmaps.maps.fusion.sensor import SensorModel
 from avlmaps.maps.fusion.sensor_choice import find_sensor
 from avlmaps.maps.gravity.stage import attach_estimated_ground
 from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.keyframes.describe import keyframes_by_motion
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.store.checkpoints import Checkpoint, find_checkpoint, key_of, load_checkpoint, save_checkpoint
 from avlmaps.maps.store.manifest import BadFrame
@@ -95,7 +96,22 @@ def fusion_key(recording: Recording, settings: BuildSettings, used: Profile) -> 
     encoder = pixel_encoder_of(used)
     card = None if encoder is None else encoder.card
     ground = (settings.gravity, settings.seed, recording.base_height) if encoder is not None else None
-    return key_of("fusion", BUILD_VERSION, recording.fingerprint, settings.voxel_size_m, settings.fusion, card, ground)
+    basis = recording.fingerprint, settings.voxel_size_m, settings.fusion, card, ground
+    chosen = (settings.keyframes, settings.frames.step) if used.keyframes_only else ()
+    return key_of("fusion", BUILD_VERSION, *basis, *chosen)
+
+
+def encoded_frames(recording: Recording, settings: BuildSettings, used: Profile) -> frozenset[int] | None:
+    """Return the numbers of the frames whose pixels are encoded, None for all.
+
+    For a pixel encoder that is given keyframes alone they are those of every ``frames.step``-th frame of the whole
+    recording, by motion: the same on every machine that fuses a part of it, and known before a picture is read.
+    """
+    if not used.keyframes_only:
+        return None
+    numbers = np.arange(0, len(recording), settings.frames.step)
+    stamps, poses = recording.stamps_s[numbers], recording.world_from_camera[numbers]
+    return frozenset(numbers[keyframes_by_motion(stamps, poses, settings.keyframes)].tolist())
 
 
 def plan_spans(frames: int, settings: BuildSettings, covered: Sequence[Span] = ()) -> list[Span]:
@@ -276,7 +292,8 @@ def fuse_spans(
     tolerance = Tolerance(recording, settings, known_bad)
     stretches = [range(*span) for span, _ in jobs]
     total_frames = done + sum(map(len, stretches))
-    with closing(encode_frames(recording, stretches, encoder)) as ahead:
+    chosen = encoded_frames(recording, settings, used)
+    with closing(encode_frames(recording, stretches, encoder, chosen)) as ahead:
         seen = progress(ahead, "fusing", total=total_frames, done=done, note=lambda: cache_note(used, Kind.PIXELS))
         for span, folder in jobs:
             begin = perf_counter()

@@ -80,6 +80,16 @@ class Profile:
         name = self.backend_name(kind).partition("@")[0]
         return bool(name) and "torch" in find(kind, name).needs
 
+    def is_slow(self, kind: Kind) -> bool:
+        """Return whether a module's backend takes so long that its features are worth storing, by the registry."""
+        name = self.backend_name(kind).partition("@")[0]
+        return bool(name) and find(kind, name).is_slow
+
+    @property
+    def keyframes_only(self) -> bool:
+        """Whether only keyframes get features of pixels, by the registry: the others add surfaces and colours."""
+        return bool(self.pixels) and find(Kind.PIXELS, self.pixels.partition("@")[0]).keyframes_only
+
     def backend_name(self, kind: Kind) -> str:
         """Return the name of the backend for a module, ``""`` for none."""
         return cast(str, getattr(self, kind.value))
@@ -217,6 +227,16 @@ register_profile(
         views="",
         weight_variance_m2=0.6,
         about="objects by their colour alone: the quickest, and no network for pictures",
+    )
+)
+register_profile(
+    replace(
+        _EMBEDDED,
+        name="light",
+        pixels="light",
+        views="light",
+        sounds="light",
+        about="any word for things, rooms and sounds on a CPU without torch; files of 250 MB, fetched once",
     )
 )
 register_profile(

@@ -1,7 +1,7 @@
 """A profile whose models remember: what one of them has made of a frame or a sound it does not make again.
 
-Features of pixels on torch pass through float16 with the store and without, so that a map is the same, bit by bit, in
-both cases; all others are stored as they are.
+Features of pixels by slow models pass through float16 with the store and without, so that a map is the same, bit by
+bit, in both cases; all others are stored as they are.
 """
 
 from collections.abc import Sequence
@@ -45,7 +45,7 @@ class CachedProfile(Profile):
 
     def pixel_encoder(self) -> PixelEncoder:
         """Return the pixel encoder, or raise ``BackendError``."""
-        store, half = self._store_of(Kind.PIXELS), self.on_torch(Kind.PIXELS)
+        store, half = self._store_of(Kind.PIXELS), self.is_slow(Kind.PIXELS)
         encoder = Profile.pixel_encoder(self)
         return encoder if store is None and not half else CachedPixels(encoder, store, half)
 
@@ -79,14 +79,14 @@ class CachedProfile(Profile):
 def with_cache(used: Profile, settings: CacheSettings) -> Profile:
     """Return the profile with a store behind its encoders, as the settings say."""
     kinds = [kind for kind in Kind if kind is not Kind.WORDS and used.backend_name(kind)]
-    on_torch = frozenset(kind for kind in kinds if used.on_torch(kind))
+    slow = frozenset(kind for kind in kinds if used.is_slow(kind))
     if settings.place == "off":
         folder, kinds_kept = None, frozenset[Kind]()
     elif settings.place == "auto":
-        folder, kinds_kept = cache_folder() / "features", on_torch
+        folder, kinds_kept = cache_folder() / "features", slow
     else:
         folder, kinds_kept = settings.place, frozenset(kinds)
-    if not kinds_kept and Kind.PIXELS not in on_torch:
+    if not kinds_kept and Kind.PIXELS not in slow:
         return used
     store = FeatureStore(folder, 1e9 * settings.limit_gb) if folder is not None and kinds_kept else None
     same = {field.name: getattr(used, field.name) for field in fields(Profile)}
@@ -125,7 +125,7 @@ class _Remembering:
 
 
 class CachedPixels(_Remembering):
-    """A ``BatchPixelEncoder`` that encodes each frame once; features on torch are rounded to float16."""
+    """A ``BatchPixelEncoder`` that encodes each frame once; features of slow models are rounded to float16."""
 
     kind = Kind.PIXELS
 

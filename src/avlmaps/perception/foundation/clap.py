@@ -19,7 +19,8 @@ import numpy as np
 import torch
 from jaxtyping import Float32
 
-from avlmaps.perception.foundation.open_sounds import ContrastSounds, by_portions, usable_samples, windows
+from avlmaps.perception.foundation.open_sounds import ContrastSounds
+from avlmaps.perception.foundation.sound_windows import by_portions, usable_samples, windows
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import select_batch, select_device, unit_rows
 from avlmaps.perception.models.names import public_name

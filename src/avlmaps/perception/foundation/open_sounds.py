@@ -1,24 +1,19 @@
-"""Parts that the sound encoders of an open vocabulary share: usable samples, windows, phrases, and yes or no."""
+"""Parts that the sound encoders of an open vocabulary on torch share: phrases, and yes or no."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 import torch
 from jaxtyping import Float32
 
-from avlmaps.core.errors import AudioError
 from avlmaps.perception.foundation.sound_scores import OTHERS, Contrast
+from avlmaps.perception.foundation.sound_windows import WORDS_AT_ONCE, by_portions
 from avlmaps.perception.models.device import select_device, unit_rows
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resample
-
-T = TypeVar("T")
-WORDS_AT_ONCE = 64
 
 
 class ContrastSounds(ABC):
@@ -74,39 +69,3 @@ class ContrastSounds(ABC):
     @abstractmethod
     def _read(self, texts: Sequence[str]) -> torch.Tensor:
         """Return a feature for each text."""
-
-
-def usable_samples(sound: Sound, rate_hz: int) -> Float32[np.ndarray, " n"]:
-    """Return a sound's samples at a rate, at least one of them.
-
-    Raises:
-        AudioError: the sound has no samples, or some that are not finite numbers.
-    """
-    if not len(sound.samples):
-        raise AudioError("The sound has no samples; give a sound of at least a few milliseconds.")
-    bad = int((~np.isfinite(sound.samples)).sum())
-    if bad:
-        raise AudioError(
-            f"The sound has {bad} samples of {len(sound.samples)} that are not finite numbers; convert it again from "
-            "its source."
-        )
-    return resample(sound, rate_hz).samples
-
-
-def windows(samples: Float32[np.ndarray, " n"], length: int, step: int) -> list[Float32[np.ndarray, " m"]]:
-    """Return a sound in windows, evenly, the last one at its end; a sound that is no longer than one is left whole.
-
-    They are views of the sound, which is not copied.
-    """
-    count = len(samples)
-    starts = [*range(0, count - length, step), count - length] if count > length else [0]
-    return [samples[at : at + length] for at in starts]
-
-
-def by_portions(
-    items: Sequence[T], size: int, dim: int, encode: Callable[[Sequence[T]], Float32[np.ndarray, "n d"]]
-) -> Float32[np.ndarray, "n d"]:
-    """Return a row of ``dim`` numbers for each item, some of them going through at once."""
-    parts = [np.zeros((0, dim), np.float32)]
-    parts.extend(encode(items[at : at + size]) for at in range(0, len(items), size))
-    return np.concatenate(parts)

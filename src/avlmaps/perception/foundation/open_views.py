@@ -11,7 +11,7 @@ from jaxtyping import Float32, UInt8
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.cache.text_features import KeptWords
-from avlmaps.perception.foundation.prompts import Prompted
+from avlmaps.perception.foundation.prompts import AREA_PROMPTS, Prompted
 from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.device import select_batch, select_device, unit_rows
 from avlmaps.perception.models.names import public_name
@@ -19,9 +19,6 @@ from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.types import Frame
-
-AREA_PROMPTS = ("a photo of a {}.", "a photo of the {} of a building.", "a view inside a {}.")
-"""Captions of a picture taken there; the mean over a few sentences is steadier than one of them."""
 
 UNKNOWN_LICENCE = "LicenseRef-unknown"
 APPLE_RESEARCH = "LicenseRef-apple-amlr"

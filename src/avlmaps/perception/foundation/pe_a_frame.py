@@ -25,8 +25,8 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32
 
-from avlmaps.perception.foundation.open_sounds import WORDS_AT_ONCE, by_portions, usable_samples
 from avlmaps.perception.foundation.sound_scores import OTHERS, QUIET, joined, one_kind, sigmoid
+from avlmaps.perception.foundation.sound_windows import WORDS_AT_ONCE, by_portions, usable_samples
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import select_device, to_numpy
 from avlmaps.perception.models.names import public_name

@@ -1,4 +1,4 @@
-"""Pictures on their way into a transformer: how large, as which numbers, several at once."""
+"""Pictures on their way into a transformer: as which numbers, several at once."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Literal
@@ -8,28 +8,8 @@ import torch
 from jaxtyping import Float32, UInt8
 
 from avlmaps.core.errors import BackendError
+from avlmaps.perception.foundation.picture_sizes import Size
 from avlmaps.recordings.types import Frame
-
-Size = tuple[int, int]
-# A panorama of 10:1 would else become thousands of patches, whose attention fills any memory.
-_MOST_PATCHES = 4096
-
-
-def working_size(height: int, width: int, short_side: int, patch: int, most_patches: int = _MOST_PATCHES) -> Size:
-    """Return (height, width) to resize a picture to: whole patches, its shape preserved as nearly as they allow.
-
-    Args:
-        height: of the picture.
-        width: of the picture.
-        short_side: what the shorter side shall be, pixels.
-        patch: edge of a patch, pixels.
-        most_patches: of a picture; a very long one is looked at smaller.
-    """
-    scale = short_side / (patch * min(height, width))
-    scale = min(scale, (most_patches / (height * width)) ** 0.5)
-    rows, columns = max(1, round(height * scale)), max(1, round(width * scale))
-    # Rounding up must not pass the limit of a picture of one row.
-    return patch * min(rows, most_patches), patch * min(columns, most_patches // min(rows, most_patches))
 
 
 def stack_pictures(

@@ -6,12 +6,12 @@ that, which favours words whose sentences agree).
 """
 
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float, Float32
 
 from avlmaps.core.lexicon import Kind, lexicon
-from avlmaps.perception.cache.text_features import KeptWords
 
 # The subset of seven of its ImageNet sentences that the authors of CLIP found to do as well as all eighty.
 CLIP_PROMPTS = (
@@ -35,6 +35,8 @@ TIPS_PROMPTS = (
     "a photo of many {}.",
     "a photo of {}s.",
 )
+# Captions of a picture taken there; the mean over a few sentences is steadier than one of them.
+AREA_PROMPTS = ("a photo of a {}.", "a photo of the {} of a building.", "a view inside a {}.")
 # Things of homes and offices, as the embedded encoder knows them.
 THINGS = tuple(entry.name for entry in lexicon().entries(Kind.THING) if entry.split == "training")
 
@@ -44,6 +46,18 @@ _REMEMBERED = 4096
 def clean(word: str) -> str:
     """Return a phrase in small letters with single blanks, ``""`` for a blank one."""
     return " ".join(word.lower().split())
+
+
+class WordStore(Protocol):
+    """Features of words that were worked out before."""
+
+    def get(self, phrase: str) -> Float32[np.ndarray, " d"] | None:
+        """Return the unit vector of a phrase, None where it is not stored."""
+        ...
+
+    def put(self, phrase: str, row: Float32[np.ndarray, " d"]) -> None:
+        """Store the unit vector of a phrase."""
+        ...
 
 
 class Prompted:
@@ -64,7 +78,7 @@ class Prompted:
         encode_texts: Callable[[list[str]], Float[np.ndarray, "n d"]],
         dim: int,
         prompts: Sequence[str],
-        kept: KeptWords | None = None,
+        kept: WordStore | None = None,
     ) -> None:
         self._encode_texts, self._dim, self._prompts = encode_texts, dim, tuple(prompts)
         self.kept = kept

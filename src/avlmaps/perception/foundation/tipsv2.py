@@ -22,7 +22,8 @@ import torch
 from jaxtyping import Float32, UInt8
 
 from avlmaps.perception.foundation.open_pixels import OpenPixels
-from avlmaps.perception.foundation.pictures import split_model_way, stack_pictures, working_size
+from avlmaps.perception.foundation.picture_sizes import working_size
+from avlmaps.perception.foundation.pictures import split_model_way, stack_pictures
 from avlmaps.perception.foundation.prompts import TIPS_PROMPTS, Prompted
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import (

@@ -13,6 +13,7 @@ from typing import Literal
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, load
+from avlmaps.perception.models.files import folders_of
 from avlmaps.perception.models.published_models import ALSO, PUBLISHED, Published
 from avlmaps.perception.models.settings import model_settings
 
@@ -88,6 +89,9 @@ def _size(size_mb: float) -> str:
 
 def _places(model: str) -> Iterator[Path]:
     known, folder = _published(model), model_settings().folder
+    if known.fetched or (Path(model).expanduser() / "manifest.json").is_file():
+        yield from (place / "manifest.json" for place in folders_of(model))
+        return
     names = known.files or (model,)
     for name in names:
         if folder is not None:

@@ -21,7 +21,7 @@ def checksum_of(files: Sequence[Path], *constants: str) -> str:
         files: the weights; their order and names do not matter.
         constants: what else the features depend on.
     """
-    sums = sorted(_sum_of(path) for path in files)
+    sums = sorted(remembered_sha256(path) for path in files)
     return hashlib.sha256("\n".join([*sums, *constants]).encode()).hexdigest()
 
 
@@ -33,7 +33,8 @@ def weights_in(folder: Path) -> list[Path]:
     return []
 
 
-def _sum_of(path: Path) -> str:
+def remembered_sha256(path: Path) -> str:
+    """Return the hex SHA-256 of a file, read again only where its size or time has changed."""
     path = path.resolve()
     state = path.stat()
     stamp = [state.st_size, state.st_mtime_ns]

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.models.settings import model_settings
+from avlmaps.perception.user_folder import user_folder
 
 # The files of a model's folder that transformers or open_clip need; code and other formats stay where they are.
 _WANTED = ("*.json", "*.safetensors", "*.txt", "*.model", "*.jinja")
@@ -49,6 +50,16 @@ def _places(model: str) -> list[Path]:
     folder = model_settings().folder
     inside = [folder / model, folder / model.replace("/", "--"), folder / Path(model).name] if folder else []
     return [*inside, Path(model).expanduser()]
+
+
+def folders_of(model: str) -> list[Path]:
+    """Return where the folder of a model that no hub holds may lie, the likeliest first; the last is the user's own."""
+    return [*_places(model), fetched_folder() / model]
+
+
+def fetched_folder() -> Path:
+    """Return the folder of models that avlmaps fetched itself where the settings name none; it need not exist yet."""
+    return user_folder() / "models"
 
 
 def _fetched(model: str, wanted: Sequence[str]) -> Path:

@@ -12,6 +12,7 @@ class Published:
         repository: the hub's id of the repository that holds such a file.
         package: an installed package in whose folder such a file may lie.
         get: the command that brings it; ``hf download ID`` where it is ``""``.
+        fetched: the file that a folder of its name holds once avlmaps has fetched it; ``""`` for all others.
         size_mb: about how much that is; 0 where it is not known.
     """
 
@@ -19,6 +20,7 @@ class Published:
     repository: str = ""
     package: str = ""
     get: str = ""
+    fetched: str = ""
     size_mb: float = 0.0
 
 
@@ -37,6 +39,9 @@ _LIGHTGLUE = "kornia/lightglue"
 
 # By the name that a profile or the registry gives them. A model that is not here is looked for by its name.
 PUBLISHED: dict[str, Published] = {
+    "avlmaps/light-1": Published(
+        fetched="manifest.json", get="avlmaps profiles --fetch light --from URL|DIR", size_mb=250
+    ),
     "google/tipsv2-b14": Published(size_mb=750),
     "timm/PE-Core-B-16": Published(size_mb=1800),
     "google/siglip2-base-patch16-224": Published(size_mb=1500),

@@ -21,8 +21,9 @@ import torch
 from jaxtyping import Float32
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.foundation.open_sounds import ContrastSounds, by_portions, usable_samples, windows
+from avlmaps.perception.foundation.open_sounds import ContrastSounds
 from avlmaps.perception.foundation.sound_scores import OTHERS
+from avlmaps.perception.foundation.sound_windows import by_portions, usable_samples, windows
 from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.device import inference, select_batch, select_device, unit_rows
 from avlmaps.perception.models.names import public_name

@@ -21,8 +21,9 @@ from torch import nn
 from torch.nn import functional
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.foundation.open_sounds import ContrastSounds, usable_samples, windows
+from avlmaps.perception.foundation.open_sounds import ContrastSounds
 from avlmaps.perception.foundation.sound_scores import OTHERS
+from avlmaps.perception.foundation.sound_windows import usable_samples, windows
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import inference, select_device, unit_rows
 from avlmaps.perception.models.names import public_name

@@ -1,0 +1,77 @@
+"""Dense features of TIPSv2 by onnxruntime: what `foundation/tipsv2.py` gives, in int8 and at 336 pixels."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float32
+
+from avlmaps.perception.foundation.prompts import THINGS, clean
+from avlmaps.perception.light.bundle import MODEL, PICTURE_TOKENS, PICTURE_WORDS, PICTURES, Bundle, open_bundle
+from avlmaps.perception.light.tower import tower_of
+from avlmaps.perception.light.words import LightWords, TextTower
+from avlmaps.perception.protocols import ModelCard
+from avlmaps.recordings.types import Frame
+
+
+class LightPixels:
+    """A feature for every patch of the working size, in the space of TIPSv2's text encoder.
+
+    Args:
+        model: name or folder of the files.
+
+    Raises:
+        BackendError: they are not here, or damaged.
+    """
+
+    def __init__(self, model: str = MODEL) -> None:
+        bundle = open_bundle(model)
+        note = bundle.manifest.pictures
+        self.logit_scale = note.logit_scale
+        self.card = card_of(
+            bundle, "pixels", note.prompts, "a thing smaller than a patch is mixed with what is round it"
+        )
+        self.text = TextTower(bundle, PICTURE_WORDS, PICTURE_TOKENS, note.most_tokens)
+        self._tower, self._words = tower_of(bundle), LightWords(bundle, "pixels", self.text, self.card)
+
+    @property
+    def vocabulary(self) -> tuple[str, ...]:
+        """Things of homes and offices that compete with a queried word, without ``other``."""
+        return THINGS
+
+    def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
+        """Return a feature for each cell of the grid, of unit length."""
+        return self._tower.patches(frame.rgb)
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase, the mean over the card's sentences; all zero for a blank one."""
+        return self._words.encode(words)
+
+    def understood(self, word: str) -> str:
+        """Return the phrase: any word is taken."""
+        return clean(word)
+
+
+def card_of(bundle: Bundle, module: str, prompts: tuple[str, ...], note: str) -> ModelCard:
+    """Return the card of an encoder of pictures.
+
+    The vectors of words that come with the files are no part of the checksum: they are what the text tower gives.
+
+    Args:
+        bundle: the files.
+        module: pixels or views.
+        prompts: sentences round a phrase.
+        note: what to know of its limits.
+
+    Raises:
+        BackendError: a file is missing or damaged.
+    """
+    made = bundle.manifest.pictures
+    constants = (f"light {module} short side {made.short_side} scale {made.logit_scale}", *prompts)
+    return ModelCard(
+        id=f"{bundle.manifest.id} {module} ({made.source})",
+        dim=made.dim,
+        licence=made.licence,
+        checksum=bundle.checksum(PICTURES, PICTURE_WORDS, PICTURE_TOKENS, constants=constants),
+        prompts=prompts,
+        note=note,
+    )

@@ -1,0 +1,87 @@
+"""Sounds and words in one space by CLAP, by onnxruntime: what `foundation/clap.py` gives, in int8."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float32
+
+from avlmaps.perception.foundation.sound_scores import OTHERS, Contrast
+from avlmaps.perception.foundation.sound_windows import usable_samples, windows
+from avlmaps.perception.light.bundle import MODEL, SOUND_TOKENS, SOUND_WORDS, SOUNDS, open_bundle
+from avlmaps.perception.light.mel import log_mel
+from avlmaps.perception.light.words import LightWords, TextTower
+from avlmaps.perception.protocols import ModelCard
+from avlmaps.recordings.audio import Sound
+
+_SHARED = 0.5  # of a window, with the next one
+
+
+class LightSounds:
+    """A feature for each ten seconds of a sound, in the space of CLAP's text encoder.
+
+    Args:
+        model: name or folder of the files.
+
+    Raises:
+        BackendError: they are not here, or damaged.
+    """
+
+    vocabulary: tuple[str, ...] = ()
+
+    def __init__(self, model: str = MODEL) -> None:
+        self._bundle = open_bundle(model)
+        note = self._bundle.manifest.sounds
+        self._mel, self.logit_scale = note.mel, note.logit_scale
+        constants = (f"light sounds shared {_SHARED} {note.mel}", *note.prompts)
+        self.card = ModelCard(
+            id=f"{self._bundle.manifest.id} sounds ({note.source})",
+            dim=note.dim,
+            licence=note.licence,
+            checksum=self._bundle.checksum(SOUNDS, SOUND_WORDS, SOUND_TOKENS, constants=constants),
+            prompts=note.prompts,
+            note=(
+                "any phrase is understood; a yes means likelier than all of the everyday sounds that it is compared "
+                "with, which was not fitted to recordings"
+            ),
+        )
+        self.text = TextTower(self._bundle, SOUND_WORDS, SOUND_TOKENS, note.most_tokens)
+        self._words = LightWords(self._bundle, "sounds", self.text, self.card)
+
+    def encode(self, sound: Sound) -> Float32[np.ndarray, "windows d"]:
+        """Return a unit vector for each window of ten seconds, one every five seconds.
+
+        Raises:
+            AudioError: the sound has no samples, or some that are not finite numbers.
+        """
+        samples = usable_samples(sound, self._mel.rate_hz)
+        pieces = windows(samples, self._mel.window, round(self._mel.window * (1.0 - _SHARED)))
+        return np.stack([self._window(piece) for piece in pieces])
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase, as the name of a sound; all zero for a blank one."""
+        return self._words.encode(words)
+
+    def score_words(
+        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], words: Sequence[str]
+    ) -> Float32[np.ndarray, "sounds words"]:
+        """Return how likely each sound holds what each phrase names (``sound_scores.Contrast``)."""
+        return self._contrast.words(sounds, self.encode_words(words))
+
+    def score_sounds(
+        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
+    ) -> Float32[np.ndarray, " sounds"]:
+        """Return how likely each sound is of the same kind as the queried one (``sound_scores.Contrast``)."""
+        return self._contrast.alike(sounds, asked)
+
+    def _window(self, samples: Float32[np.ndarray, " n"]) -> Float32[np.ndarray, " d"]:
+        return self._network.run(None, {"mels": log_mel(samples, self._mel)[None, None]})[0].reshape(-1)
+
+    @cached_property
+    def _contrast(self) -> Contrast:
+        return Contrast(self.encode_words(OTHERS), self.logit_scale)
+
+    @cached_property
+    def _network(self) -> Any:
+        return self._bundle.session(SOUNDS)

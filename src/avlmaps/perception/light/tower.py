@@ -1,0 +1,103 @@
+"""The tower of pictures: one run gives the features of all patches and that of the whole view.
+
+A build encodes a keyframe's patches first and its view later, so the features of views are remembered by the picture's
+content (``_VIEWS`` of them, 3 kB each): the second encoder finds them and runs nothing.
+"""
+
+import hashlib
+import threading
+from collections import OrderedDict
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float32, UInt8
+
+from avlmaps.perception.foundation.picture_sizes import working_size
+from avlmaps.perception.light.bundle import PICTURES, Bundle
+
+_VIEWS = 4096
+
+
+class PictureTower:
+    """The network of pictures, read when the first comes.
+
+    Args:
+        bundle: the files.
+    """
+
+    def __init__(self, bundle: Bundle) -> None:
+        self._bundle, self._note = bundle, bundle.manifest.pictures
+        self._views: OrderedDict[bytes, Float32[np.ndarray, " d"]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def patches(self, rgb: UInt8[np.ndarray, "h w 3"]) -> Float32[np.ndarray, "hf wf d"]:
+        """Return a unit vector for each patch of the working size."""
+        return self._run(rgb)[0]
+
+    def view(self, rgb: UInt8[np.ndarray, "h w 3"]) -> Float32[np.ndarray, " d"]:
+        """Return a unit vector of the whole picture."""
+        with self._lock:
+            known = self._views.get(_key(rgb))
+        return self._run(rgb)[1] if known is None else known
+
+    def _run(self, rgb: UInt8[np.ndarray, "h w 3"]) -> tuple[np.ndarray, np.ndarray]:
+        note = self._note
+        height, width = working_size(*rgb.shape[:2], note.short_side, note.patch)
+        rows, columns = height // note.patch, width // note.patch
+        given = {
+            "pixels": resized(rgb, height, width).transpose(2, 0, 1)[None],
+            "rows": interpolation(note.grid, rows),
+            "columns": interpolation(note.grid, columns),
+        }
+        patches, view = self._network.run(["patches", "view"], given)
+        with self._lock:
+            self._views[_key(rgb)] = view
+            while len(self._views) > _VIEWS:
+                self._views.popitem(last=False)
+        return patches.reshape(rows, columns, -1), view
+
+    @cached_property
+    def _network(self) -> Any:
+        return self._bundle.session(PICTURES)
+
+
+@lru_cache(maxsize=2)
+def tower_of(bundle: Bundle) -> PictureTower:
+    """Return the tower of a folder, the same for the encoders of patches and of views."""
+    return PictureTower(bundle)
+
+
+def resized(rgb: UInt8[np.ndarray, "h w 3"], height: int, width: int) -> Float32[np.ndarray, "h2 w2 3"]:
+    """Return a picture of another size in [0, 1], bicubic, without aliasing."""
+    from PIL import Image
+
+    if rgb.shape[:2] != (height, width):
+        rgb = np.asarray(Image.fromarray(np.ascontiguousarray(rgb)).resize((width, height), Image.Resampling.BICUBIC))
+    return rgb.astype(np.float32) / np.float32(255.0)
+
+
+@lru_cache(maxsize=32)
+def interpolation(given: int, wanted: int) -> Float32[np.ndarray, "wanted given"]:
+    """Return the weights of a linear interpolation between cells, averaging where there are fewer than before.
+
+    As torch's ``interpolate`` with ``antialias``: a triangle round the middle of each cell, at least two cells wide.
+
+    Args:
+        given: cells that there are.
+        wanted: cells that there shall be.
+    """
+    scale = given / wanted
+    reach = max(scale, 1.0)
+    middle = (np.arange(wanted)[:, None] + 0.5) * scale
+    cell = np.arange(given)[None, :]
+    first = np.maximum((middle - reach + 0.5).astype(np.int64), 0)
+    last = np.minimum((middle + reach + 0.5).astype(np.int64), given)
+    weight = np.maximum(1.0 - np.abs(cell - middle + 0.5) / reach, 0.0) * ((cell >= first) & (cell < last))
+    return (weight / weight.sum(axis=1, keepdims=True)).astype(np.float32)
+
+
+def _key(rgb: UInt8[np.ndarray, "h w 3"]) -> bytes:
+    return hashlib.blake2b(
+        np.ascontiguousarray(rgb).data, digest_size=16, person=repr(rgb.shape)[:16].encode()
+    ).digest()
