@@ -14,6 +14,7 @@ from avlmaps.core.registry import Backend, Kind, find, forget_loaded
 from avlmaps.perception.models.availability import availability, how_to_get, is_here
 from avlmaps.perception.models.published_models import PUBLISHED
 from avlmaps.perception.models.settings import ModelSettings, from_environment, model_settings, using_models
+from helpers.light_files import write_light
 
 ON_MODELS = ("build", "query", "locate", "go", "bench", "profiles")
 
@@ -167,3 +168,22 @@ def test_listing_the_profiles_loads_no_torch() -> None:
     code = "import sys\nfrom avlmaps.cli.profiles import list_profiles\nlist_profiles()\nprint('torch' in sys.modules)"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert out.strip() == "False"
+
+
+def test_the_light_profile_is_fetched_by_a_verb(empty: Path, answer, run, tmp_path: Path) -> None:
+    published = write_light(tmp_path / "published")
+    told = answer("profiles", "--fetch", "light", "--from", published, "--models", empty)
+    assert told["fetched"] == "avlmaps/light-1"
+    assert Path(told["folder"]) == empty / "avlmaps" / "light-1"
+    assert told["bytes"] == told["received_bytes"] > 0
+    assert answer("profiles", "--fetch", "light", "--from", published, "--models", empty)["received_bytes"] == 0
+    light = next(e for e in answer("profiles", "--models", empty)["profiles"] if e["name"] == "light")
+    assert [b["state"] for b in light["backends"]] == ["ready"] * 6
+
+
+def test_fetching_without_a_place_says_how_to_make_the_files(empty: Path, run) -> None:
+    status, out, err = run("profiles", "--fetch", "light", "--models", empty)
+    assert (status, out, err.count("\n")) == (1, "", 1)
+    assert "No files of the profile light are published yet; make them with python -m training.light" in err
+    status, _, err = run("profiles", "--from", "somewhere")
+    assert status == 1 and "add --fetch light" in err

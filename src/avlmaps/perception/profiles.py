@@ -230,16 +230,6 @@ register_profile(
     )
 )
 register_profile(
-    replace(
-        _EMBEDDED,
-        name="light",
-        pixels="light",
-        views="light",
-        sounds="light",
-        about="any word for things, rooms and sounds on a CPU without torch; files of 250 MB, fetched once",
-    )
-)
-register_profile(
     Profile(
         name="foundation",
         pixels="tipsv2",
@@ -262,6 +252,16 @@ register_profile(
         place="netvlad",
         matcher="superglue",
         about="the models of the AVLMaps paper, to compare with; some of their weights are for research alone",
+    )
+)
+register_profile(
+    replace(
+        _EMBEDDED,
+        name="light",
+        pixels="light",
+        views="light",
+        sounds="light",
+        about="any word for things, rooms and sounds on a CPU without torch; files of 250 MB, fetched once",
     )
 )
 register_profile(
