@@ -4,6 +4,7 @@ A patch's feature is a product of its pixels, a text's the mean over its letters
 bands; each of unit length. That is enough to hold all round the networks to what it promises.
 """
 
+import gzip
 from pathlib import Path
 
 import msgspec
@@ -34,15 +35,15 @@ def write_light(folder: Path, seed: int = 0) -> Path:
         (out / name).write_bytes(_texts(table))
     (out / files.SOUNDS).write_bytes(_sounds())
     words = TokenList("words", LETTERS, [], unknown=0)
-    (out / files.PICTURE_TOKENS).write_bytes(msgspec.json.encode(words))
+    (out / files.PICTURE_TOKENS).write_bytes(gzip.compress(msgspec.json.encode(words)))
     pieces = TokenList("bytes", [*LETTERS, "Ġ", "T"], [], start=1, end=2, unknown=0)
-    (out / files.SOUND_TOKENS).write_bytes(msgspec.json.encode(pieces))
+    (out / files.SOUND_TOKENS).write_bytes(gzip.compress(msgspec.json.encode(pieces)))
     tables = {"pixels": KNOWN, "views": ROOMS, "sounds": HEARD}
     arrays: dict[str, np.ndarray] = {}
     for name, phrases in tables.items():
         rows = rng.standard_normal((len(phrases), DIM))
         arrays[f"{name}_names"] = np.frombuffer("\n".join(phrases).encode(), np.uint8)
-        arrays[f"{name}_rows"] = (rows / np.linalg.norm(rows, axis=1, keepdims=True)).astype(np.float16)
+        arrays[f"{name}_rows"] = np.round(127.0 * rows / np.abs(rows).max(axis=1, keepdims=True)).astype(np.int8)
     np.savez(out / files.KNOWN_WORDS, **arrays)  # pyright: ignore[reportArgumentType]
     write_manifest(out)
     return out

@@ -1,6 +1,7 @@
 """From published checkpoints to the files of the profile ``light``."""
 
 import tempfile
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -181,12 +182,12 @@ def export_sounds(
 
 
 def write_words(out: Path, made: Iterable[Made]) -> None:
-    """Write the vectors of all phrases, in half precision."""
+    """Write the vectors of all phrases in bytes; only their directions count, so that no scale is stored."""
     arrays: dict[str, np.ndarray] = {}
     for one in made:
         for table, (names, rows) in one.words.items():
             arrays[f"{table}_names"] = np.frombuffer("\n".join(names).encode(), np.uint8)
-            arrays[f"{table}_rows"] = rows.astype(np.float16)
+            arrays[f"{table}_rows"] = np.round(127.0 * rows / np.abs(rows).max(axis=1, keepdims=True)).astype(np.int8)
     np.savez(out / files.KNOWN_WORDS, **arrays)  # pyright: ignore[reportArgumentType]
 
 
@@ -276,7 +277,8 @@ def _write(
     bits: Bits,
 ) -> None:
     """Write a network with small weights."""
-    with tempfile.TemporaryDirectory() as scratch, torch.no_grad():
+    with tempfile.TemporaryDirectory() as scratch, torch.no_grad(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # tracing takes sizes as constants, as it shall
         whole = Path(scratch) / "float.onnx"
         torch.onnx.export(
             network, given, str(whole), input_names=inputs, output_names=outputs, dynamic_axes=sizes,

@@ -1,5 +1,6 @@
 """Writing a published tokenizer as the plain list that `perception/light/tokens.py` reads, and proving it equal."""
 
+import gzip
 import json
 from collections.abc import Iterable
 from pathlib import Path
@@ -36,7 +37,7 @@ def write_tokens(tokenizer: Any, path: Path, most: int, texts: Iterable[str]) ->
         found = made.encode(text)
         if found != expected:
             raise UnknownTokenizerError(f"{text!r} is {expected} by the published tokenizer and {found} by the list")
-    path.write_bytes(msgspec.json.encode(known))
+    path.write_bytes(gzip.compress(msgspec.json.encode(known), mtime=0))
     return made
 
 

@@ -11,8 +11,9 @@ The export holds every phrase of the lexicon to the published tokenizer before i
 """
 
 import unicodedata
+import zlib
 from functools import lru_cache
-from itertools import pairwise
+from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -22,6 +23,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 
 _MARK = "▁"
+_GZIP = 31  # a gzip header, the largest window
 _ENDINGS = ("s", "t", "re", "ve", "m", "ll", "d")
 
 
@@ -101,19 +103,21 @@ class Tokens:
 
 
 def read_tokens(path: Path, most: int) -> Tokens:
-    """Return the tokens of a file.
+    """Return the tokens of a file (gzip around JSON).
 
     Raises:
         BackendError: it cannot be read.
     """
     try:
-        return Tokens(decode_json(read_regular(path, DESCRIPTION_BYTES), TokenList), most)
-    except (OSError, msgspec.DecodeError, UnicodeDecodeError) as fault:
+        unpacked = zlib.decompressobj(wbits=_GZIP).decompress(read_regular(path, DESCRIPTION_BYTES), DESCRIPTION_BYTES)
+        return Tokens(decode_json(unpacked, TokenList), most)
+    except (OSError, zlib.error, msgspec.DecodeError, UnicodeDecodeError) as fault:
         raise BackendError(f"{path} is no list of tokens ({fault}); get the files again.") from fault
 
 
 def _words(text: str) -> list[str]:
-    return [_MARK + word for word in text.lower().split()]
+    runs = groupby(text.lower(), key=lambda letter: _class(letter) == " ")
+    return [_MARK + "".join(letters) for blank, letters in runs if not blank]
 
 
 def _gpt_pieces(text: str) -> list[str]:
