@@ -25,7 +25,7 @@ class Options:
     pictures: str = "google/tipsv2-b14"
     """TIPSv2 that sees: a hub's id or a folder."""
     sounds: str = "laion/clap-htsat-unfused"
-    """CLAP without fusion that hears."""
+    """CLAP without fusion, for sounds."""
     short_side: int = 336
     """Shorter side of the picture that the tower sees, pixels."""
     text_bits: Literal[4, 8] = 4
@@ -57,8 +57,8 @@ def main(options: Options) -> int:
     measured = {**seen.measured, **heard.measured}
     for what, figures in measured.items():
         print(
-            f"{what}: cosine {figures.cosine:.4f}, order of the phrases kept {figures.phrases:.4f}, order of the items "
-            f"kept {figures.items:.4f}, best phrase kept {figures.first:.3f}"
+            f"{what}: cosine {figures.cosine:.4f}, order of the phrases {figures.phrases:.4f}, of the items "
+            f"{figures.items:.4f}, best phrase the same {figures.first:.3f}"
         )
     sizes = {name: note.bytes / 1e6 for name, note in manifest.files.items()}
     for name, size in sizes.items():

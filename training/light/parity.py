@@ -36,7 +36,7 @@ class Parity:
 
     @property
     def kept(self) -> float:
-        """The lower of the two rank correlations: the share of float's ranking that is kept."""
+        """The lower of the two rank correlations: the share of float's ranking that is left."""
         return min(self.phrases, self.items)
 
 

@@ -1,6 +1,6 @@
 """Small weights for onnxruntime: int8 products that keep up with outliers, 4-bit ones where only size counts.
 
-- ``int8``: a weight has one scale for each output, an activation one for each token, worked out as it comes: a token
+- ``int8``: a weight has one scale for each output, an activation one for each token, computed as it comes: a token
   with a huge value, of which vision transformers have a few, costs the others nothing. Both are unsigned with zero at
   128, because onnxruntime's kernel for unsigned by signed bytes saturates on processors without VNNI.
 - ``int4``: blocks of a row share a scale that is searched for the least squared error; activations stay float.

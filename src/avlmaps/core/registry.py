@@ -44,7 +44,7 @@ class Backend:
         model: for a backend that can run several models, the one that it runs unless another is chosen: a hub's id or
             the name of a file; its class is called with it. ``""`` where the class takes no argument.
         licence: of that model's weights, for ``avlmaps profiles``; ``""`` where the class alone decides it.
-        slow: whether it takes so long that its features are worth storing; every backend on torch does.
+        slow: whether its features take longer to make than to store and read; those of every backend on torch do.
         keyframes_only: of pixels: whether a build gives it keyframes alone, the other frames adding surfaces and
             colours: for a model that takes a second a frame.
     """

@@ -81,7 +81,7 @@ class Profile:
         return bool(name) and "torch" in find(kind, name).needs
 
     def is_slow(self, kind: Kind) -> bool:
-        """Return whether a module's backend takes so long that its features are worth storing, by the registry."""
+        """Return whether a module's features take longer to make than to store and read, by the registry."""
         name = self.backend_name(kind).partition("@")[0]
         return bool(name) and find(kind, name).is_slow
 

@@ -49,7 +49,7 @@ def clean(word: str) -> str:
 
 
 class WordStore(Protocol):
-    """Features of words that were worked out before."""
+    """Features of words that were computed before."""
 
     def get(self, phrase: str) -> Float32[np.ndarray, " d"] | None:
         """Return the unit vector of a phrase, None where it is not stored."""

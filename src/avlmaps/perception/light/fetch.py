@@ -1,7 +1,7 @@
 """Fetching the files of the profile ``light``: from a page or a folder, once, whole or not at all.
 
 Nothing is published yet, so there is no default place: a person who has made the files (``python -m training.light``)
-says where they are. A download that broke off goes on where it stopped. Each file is held to the manifest's SHA-256,
+says where they are. A download that broke off resumes where it stopped. Each file is held to the manifest's SHA-256,
 and the folder gets its name only when all of them are right; until then no model is there.
 """
 
@@ -157,7 +157,7 @@ class _Page:
                 if attempt == _TRIES - 1:
                     raise BackendError(
                         f"{self.said(name)} broke off after {start:,} bytes ({fault}); run the same command again, it "
-                        "goes on from there."
+                        "resumes there."
                     ) from fault
                 time.sleep(attempt + 1.0)
 

@@ -33,7 +33,8 @@ def log_mel(samples: Float32[np.ndarray, " n"], note: MelNote) -> Float32[np.nda
 def _bands(note: MelNote) -> Float[np.ndarray, "bins bands"]:
     """Return the triangles of the mel bands over the bins, each of area one."""
     ends = np.array([note.lowest_hz, note.highest_hz])
-    corners = _to_hz(np.linspace(*_to_mel(ends), note.bands + 2))
+    lowest, highest = _to_mel(ends)
+    corners = _to_hz(np.linspace(lowest, highest, note.bands + 2))
     bins = np.linspace(0.0, note.rate_hz // 2, note.fft // 2 + 1)
     rising = (bins[:, None] - corners[None, :-2]) / np.diff(corners)[None, :-1]
     falling = (corners[None, 2:] - bins[:, None]) / np.diff(corners)[None, 1:]

@@ -43,7 +43,7 @@ class PictureTower:
 
     def _run(self, rgb: UInt8[np.ndarray, "h w 3"]) -> tuple[np.ndarray, np.ndarray]:
         note = self._note
-        height, width = working_size(*rgb.shape[:2], note.short_side, note.patch)
+        height, width = working_size(rgb.shape[0], rgb.shape[1], note.short_side, note.patch)
         rows, columns = height // note.patch, width // note.patch
         given = {
             "pixels": resized(rgb, height, width).transpose(2, 0, 1)[None],

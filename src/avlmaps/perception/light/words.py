@@ -81,7 +81,7 @@ class LightWords:
 
 
 class _KnownFirst:
-    """The vectors that came with the files, and behind them those that this machine has worked out."""
+    """The vectors that came with the files, and behind them those that this machine has computed."""
 
     def __init__(self, bundle: Bundle, table: str, card: ModelCard) -> None:
         self._bundle, self._table, self._dim = bundle, table, card.dim
@@ -105,7 +105,7 @@ class _KnownFirst:
         return dict(zip(names, rows, strict=True))
 
     def get(self, phrase: str) -> Float32[np.ndarray, " d"] | None:
-        """Return the vector of a phrase, None where it must be worked out."""
+        """Return the vector of a phrase, None where it must be computed."""
         known = self.rows.get(phrase)
         return self._kept.get(phrase) if known is None else known
 
