@@ -96,10 +96,10 @@ def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]
     from avlmaps.maps.store.reader import open_stored
 
     stored = open_stored(path, verify=verify)
-    told = describe_map(stored)
+    answer = describe_map(stored)
     if plot is not None:
-        told["plot"] = str(plot_named(stored, plot))
-    return told
+        answer["plot"] = str(plot_named(stored, plot))
+    return answer
 
 
 def plot_named(stored: "StoredMap", plot: Path) -> Path:

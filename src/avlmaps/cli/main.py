@@ -107,14 +107,14 @@ def _wants_json(words: Sequence[str]) -> bool:
 @contextmanager
 def _usage_in_json() -> Iterator[None]:
     """Print a command line that cannot be read as a JSON error, too."""
-    told = io.StringIO()
+    complaints = io.StringIO()
     try:
-        with redirect_stderr(told):
+        with redirect_stderr(complaints):
             yield
     except SystemExit as stop:
-        sys.stderr.write(told.getvalue())
+        sys.stderr.write(complaints.getvalue())
         if stop.code not in (0, None):
-            _emit_error("usage", usage_sentence(told.getvalue()))
+            _emit_error("usage", usage_sentence(complaints.getvalue()))
         raise
 
 

@@ -67,7 +67,7 @@ def list_profiles() -> dict[str, Any]:
 
     known = {(backend.kind, backend.name): backend for backend in backends()}
 
-    def told(kind: Kind, choice: str) -> dict[str, Any]:
+    def state_of(kind: Kind, choice: str) -> dict[str, Any]:
         name, _, model = choice.partition("@")
         entry = {"module": str(kind), "name": name or "-", "state": "none", "model": "", "licence": "", "note": ""}
         backend = known.get((kind, name))
@@ -81,12 +81,12 @@ def list_profiles() -> dict[str, Any]:
         {
             "name": profile.name,
             "about": profile.about,
-            "backends": [told(kind, profile.backend_name(kind)) for kind in Kind if kind is not Kind.WORDS],
+            "backends": [state_of(kind, profile.backend_name(kind)) for kind in Kind if kind is not Kind.WORDS],
         }
         for profile in profiles()
     ]
     in_profiles = {(b["module"], b["name"]) for entry in listed for b in entry["backends"]}
-    others = [told(b.kind, b.name) for b in known.values() if (str(b.kind), b.name) not in in_profiles]
+    others = [state_of(b.kind, b.name) for b in known.values() if (str(b.kind), b.name) not in in_profiles]
     return {"profiles": listed, "other_backends": others}
 
 

@@ -139,7 +139,7 @@ def _asked_in_words(verb: "Query", asked: "AVLMap") -> dict[str, Any]:
 
     image, clip = (None if path is None else str(path) for path in (verb.image, verb.sound_clip))
     try:
-        told = ask_sentence(
+        reply = ask_sentence(
             asked,
             verb.sentence,
             top=verb.top,
@@ -150,7 +150,7 @@ def _asked_in_words(verb: "Query", asked: "AVLMap") -> dict[str, Any]:
         )
     except UnusedFileError as error:
         raise UsageError(str(error)) from None
-    return {**told.to_json(), **_plotted(verb, told.answer)}
+    return {**reply.to_json(), **_plotted(verb, reply.answer)}
 
 
 def _plotted(verb: "Query", answer: "Answer") -> dict[str, Any]:

@@ -57,10 +57,10 @@ def models_in_force(verb: Verb) -> Iterator[None]:
     if "folder" in given:
         given["folder"] = given["folder"].expanduser().absolute()
     settings = replace(model_settings(), **given)
-    told = environment_of(settings)
-    before = {name: os.environ.get(name) for name in told}
+    variables = environment_of(settings)
+    before = {name: os.environ.get(name) for name in variables}
     with using_models(settings):
-        os.environ.update(told)
+        os.environ.update(variables)
         try:
             yield
         finally:

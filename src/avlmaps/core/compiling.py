@@ -14,11 +14,11 @@ def announce_compiling() -> Generator[None]:
     from numba.core import event
 
     class Listener(event.Listener):
-        told = False
+        announced = False
 
         def on_start(self, event: object) -> None:
-            if not self.told:
-                type(self).told = True
+            if not self.announced:
+                type(self).announced = True
                 say(NOTICE)
 
         def on_end(self, event: object) -> None:

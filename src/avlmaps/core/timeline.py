@@ -77,9 +77,9 @@ def gap_notices(stamps_s: Float[np.ndarray, " n"], what: str, show: int = 3) -> 
     if len(gaps) == 0:
         return ()
     longest = gaps[np.argsort(-interval_s[gaps], kind="stable")[:show]]
-    told = ", ".join(f"{interval_s[g]:.3g} s after {stamps_s[g] - stamps_s[0]:.2f} s" for g in sorted(longest))
+    pauses = ", ".join(f"{interval_s[g]:.3g} s after {stamps_s[g] - stamps_s[0]:.2f} s" for g in sorted(longest))
     more = f" and {len(gaps) - show} more" if len(gaps) > show else ""
-    return (f"There are no {what} for {told}{more}.",)
+    return (f"There are no {what} for {pauses}{more}.",)
 
 
 def associate(

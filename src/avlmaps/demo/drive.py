@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 PICTURE = "drive.png"
 # The robot is sent to the goals of these questions: together they need every modality, and nothing beside the command.
-_TOLD = ("sound", "area", "words")
+_KINDS = ("sound", "area", "words")
 _MOST_LEGS = 2
 
 
@@ -77,7 +77,7 @@ class Drive:
 
 def command_for(asks: Sequence[Ask]) -> tuple[str, tuple[Ask, ...]] | None:
     """Return a command and what its legs go to, chosen by the kinds of questions; None where there is nothing."""
-    legs = [ask for kind in _TOLD for ask in asks if ask.kind == kind and ask.truth][:_MOST_LEGS]
+    legs = [ask for kind in _KINDS for ask in asks if ask.kind == kind and ask.truth][:_MOST_LEGS]
     if not legs:
         return None
     first, *others = (f"go to {ask.title}" for ask in legs)
@@ -145,12 +145,12 @@ def drive_card(drive: Drive, sheet: Sheet, scene: str) -> str:
     )  # fmt: skip
     verdict = "right" if right == len(drive.asks) else "wrong"
     legs = "".join(f"<li>{escape(line)}</li>" for line in drive.lines()[1:])
-    told = f"{drive.outcome.path_m:.1f} m driven, {len(drive.outcome.actions)} actions"
+    summary = f"{drive.outcome.path_m:.1f} m driven, {len(drive.outcome.actions)} actions"
     return (
         f'{head}<article class="card question"><div class="head"><h3>“{escape(drive.command)}”</h3>'
         f'<span class="verdict {verdict}">{right} of {len(drive.asks)}</span></div>'
         f"<pre><code>{escape(drive.outcome.program.strip())}</code></pre>{drawing}"
-        f'<ul>{legs}</ul><p class="note">{told}. Yellow: where it began; numbers: where it stopped; green: what was '
+        f'<ul>{legs}</ul><p class="note">{summary}. Yellow: where it began; numbers: where it stopped; green: what was '
         f"meant; dashed: others of the kind.</p><p><code>avlmaps go {MAP} &quot;{escape(drive.command)}&quot; --scene "
         f'{escape(scene)} --guess --plot {PICTURE}</code> <a href="{PICTURE}">its plot</a></p></article>'
     )

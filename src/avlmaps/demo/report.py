@@ -203,7 +203,7 @@ def _facts(report: "DemoReport") -> str:
         (f"{built['keyframes']}", "keyframes"), (f"{len(built['sounds'])}", "sounds detected"),
         (f"{built['bytes'] / 1e6:.0f} MB", "on the disk"), (located, "error of the photo's place"),
     )  # fmt: skip
-    told = "".join(f"<li><b>{escape(value)}</b>{escape(name)}</li>" for value, name in facts)
+    items = "".join(f"<li><b>{escape(value)}</b>{escape(name)}</li>" for value, name in facts)
     total = sum(seconds.get(name, 0.0) for name, _, _ in _STAGES)
     stages = "".join(
         f'<span style="flex:{max(seconds.get(name, 0.0), 0.1):.1f} 1 0;background:{colour}" '
@@ -211,7 +211,7 @@ def _facts(report: "DemoReport") -> str:
         for name, label, colour in _STAGES
     )
     return (
-        f'<h2>The map</h2><ul class="facts">{told}</ul><div class="stages">{stages}</div>'
+        f'<h2>The map</h2><ul class="facts">{items}</ul><div class="stages">{stages}</div>'
         f'<p class="note">{total:.0f} seconds on this computer, without a graphics card and without the network.</p>'
     )
 
@@ -250,8 +250,8 @@ def _panels(step: "Step", answer: "Answer", sheet: Sheet, photo: "PhotoView | No
     ground = '<use href="#ground"/>'
     seen = sheet.camera(photo.world_from_camera) if photo else ""
     truth = sheet.band(ask.truth[1:]) if ask.kind == "clip" else sheet.rings(ask.truth, "truth")
-    told = answer.found or ask.truth  # where there is nothing, a guess is not a goal
-    goals = sheet.goals([goal.position for goal in answer.goals]) if told else ""
+    is_goal = answer.found or ask.truth  # where there is nothing, a guess is not a goal
+    goals = sheet.goals([goal.position for goal in answer.goals]) if is_goal else ""
     layers = [ground, _layer(sheet, heat_from_above(heat.space, heat.shown)), sheet.rings(ask.others, "other")]
     large = _figure(
         sheet, [*layers, truth, seen, goals], "all together" if len(heat.factors) > 1 else _label(answer, 0)
@@ -301,17 +301,17 @@ def _said(step: "Step") -> str:
     """Return the answer in a sentence, with the distance to the truth."""
     if not step.answer["found"]:
         notes = "; ".join(_without_folder(part["note"], step) for part in step.answer["parts"] if part["note"])
-        told = "The map says that there is none here" + (f" ({escape(notes)})" if notes else "")
+        finding = "The map says that there is none here" + (f" ({escape(notes)})" if notes else "")
         guess = "" if step.off_m is None else f" Its best guess is {step.off_m:.2f} m from the true one."
-        return f"{told}, and so it is." if not step.ask.truth else f"{told}, but there is.{guess}"
+        return f"{finding}, and so it is." if not step.ask.truth else f"{finding}, but there is.{guess}"
     goal = step.answer["goals"][0]
     place = ", ".join(f"{value:.1f}" for value in goal["position"])
-    told = f"First goal at ({place}) m, score {goal['score']:.2f}"
+    finding = f"First goal at ({place}) m, score {goal['score']:.2f}"
     if step.off_m is None:
-        return f"{told}; but there is none here."
+        return f"{finding}; but there is none here."
     if step.ask.kind == "clip":
-        return f"{told}: {step.off_m:.2f} m from the robot's position during the sound."
-    return f"{told}: {step.off_m:.2f} m from the true one." if step.off_m > 0.0 else f"{told}: on the true one."
+        return f"{finding}: {step.off_m:.2f} m from the robot's position during the sound."
+    return f"{finding}: {step.off_m:.2f} m from the true one." if step.off_m > 0.0 else f"{finding}: on the true one."
 
 
 def _without_folder(note: str, step: "Step") -> str:

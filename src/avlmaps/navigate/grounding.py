@@ -36,7 +36,7 @@ class Seeker:
         self._tell = tell
         self._handed_out: dict[Place, Thing] = {}
         self._instances: set[Place] = set()
-        self._last_told = ""
+        self._last_line = ""
 
     def heat(self, skill: str, obj: object, sound: object, img: object, area: object, *, primary: bool) -> Heatmap:
         """Return the heatmap of the one thing that is given.
@@ -180,7 +180,7 @@ class Seeker:
     def _chosen(self, thing: Thing, of: int) -> Thing:
         place = ", ".join(f"{value:.2f}" for value in self.asked.space.world(thing.place))
         line = f"{thing.name}: at ({place}) m, confidence {thing.sure:.2f}"
-        if thing.name and not self._last_told.startswith(line):
-            self._last_told = line + (f", one of {of}" if of > 1 else "")
-            self._tell(self._last_told)
+        if thing.name and not self._last_line.startswith(line):
+            self._last_line = line + (f", one of {of}" if of > 1 else "")
+            self._tell(self._last_line)
         return thing

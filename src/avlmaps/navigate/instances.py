@@ -114,9 +114,9 @@ def explain_absence(heat: Heatmap, guess: bool = False) -> str:
             f"{describe_query(heat)} is nowhere in the map: each is there, but they do not come together anywhere; "
             "name it by something that is nearer to it."
         )
-    told = "; ".join(_absence(factor) for factor in missing)
+    absences = "; ".join(_absence(factor) for factor in missing)
     advice = "say it in other words" if guess else "say it in other words, or let the robot go to the best guess"
-    return f"{describe_query(heat)} is not found in the map: {told}; {advice}."
+    return f"{describe_query(heat)} is not found in the map: {absences}; {advice}."
 
 
 def _absence(factor: Factor) -> str:

@@ -40,8 +40,8 @@ class Done:
 
     def to_json(self) -> dict[str, Any]:
         """Return the step as JSON has it; a movement is its result."""
-        told = self.step.to_json()
-        return told if self.move is None else {**told, "result": self.move.to_json()}
+        answer = self.step.to_json()
+        return answer if self.move is None else {**answer, "result": self.move.to_json()}
 
     def __str__(self) -> str:
         text = f"line {self.step.line}: {self.step.text}"

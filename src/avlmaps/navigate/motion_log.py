@@ -45,15 +45,15 @@ class Move:
 
     def to_json(self) -> dict[str, Any]:
         """Return it as a subgoal or a step's result is printed."""
-        told: dict[str, Any] = {"skill": self.skill, "name": self.name}
+        answer: dict[str, Any] = {"skill": self.skill, "name": self.name}
         if self.goal is not None:
-            told |= {"goal": _rounded(self.goal)}
-        told |= {"stop": _rounded(self.stop)}
+            answer |= {"goal": _rounded(self.goal)}
+        answer |= {"stop": _rounded(self.stop)}
         if self.distance_m is not None:
-            told |= {"distance_m": round(self.distance_m, 4)}
-        told |= {"heading_rad": round(self.heading_rad, 4), "reached": self.reached}
+            answer |= {"distance_m": round(self.distance_m, 4)}
+        answer |= {"heading_rad": round(self.heading_rad, 4), "reached": self.reached}
         return (
-            told | ({"contacts": self.contacts} if self.contacts else {}) | ({"note": self.note} if self.note else {})
+            answer | ({"contacts": self.contacts} if self.contacts else {}) | ({"note": self.note} if self.note else {})
         )
 
     def __str__(self) -> str:

@@ -193,14 +193,14 @@ def _reachable(
                 continue
             if away_m > within_m:
                 apart_s = abs(float(stamps_s[first] - stamps_s[last]))
-                told = (
+                jump = (
                     f"The camera jumps by {away_m:,.4g} m within {apart_s:.3g} s between frames {names[last]} and "
                     f"{names[first]}"
                 )
                 if away_m > MAX_SHIFT_M:
-                    fault = fault or f"{told}; fix those poses, or cut the recording there."
+                    fault = fault or f"{jump}; fix those poses, or cut the recording there."
                 else:
-                    shifts.append(f"{told}; if tracking began again there, the map shows the place twice.")
+                    shifts.append(f"{jump}; if tracking began again there, the map shows the place twice.")
             kept.append(stretch)
             last = int(stretch[end])
     return np.sort(np.concatenate(kept)), shifts[:_SHOWN], fault

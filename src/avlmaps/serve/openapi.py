@@ -120,18 +120,18 @@ def _described(one: Operation, method: str, of: dict[Any, Any], components: dict
     ]
     name = one.name if method == one.methods[0] else f"{one.name}By{method.title()}"
     answer = one.answer
-    told = _operation(name, one.about, in_path + (in_query if method == "GET" else []), {}, of[ErrorAnswer])
+    operation = _operation(name, one.about, in_path + (in_query if method == "GET" else []), {}, of[ErrorAnswer])
     if isinstance(answer, str):
         content = {answer: {"schema": {"type": "string", "contentMediaType": answer}}}
     else:
         given = of[answer] if answer is not dict else {"type": "object"}
         content = {"application/json": {"schema": given}, "text/event-stream": {"schema": {"type": "string"}}}
-    told["responses"]["200"] = {"description": "The answer.", "content": content}
+    operation["responses"]["200"] = {"description": "The answer.", "content": content}
     if one.name == "getTile":
-        told["description"] = (tiles.__doc__ or "").partition("\n\n")[2]
+        operation["description"] = (tiles.__doc__ or "").partition("\n\n")[2]
     if method == "POST":
-        told["requestBody"] = {"required": True, "content": _bodies(one, of, schema)}
-    return told
+        operation["requestBody"] = {"required": True, "content": _bodies(one, of, schema)}
+    return operation
 
 
 def _bodies(one: Operation, of: dict[Any, Any], schema: dict[str, Any]) -> dict[str, Any]:

@@ -246,8 +246,8 @@ def ask_map(task: Task, query: AskQuery) -> Asked:
     if not words:
         answer = task.map.avlmap.ask(Question.of(parts, primary), top, camera, attachments)
         return Asked(answer, answer.to_json())
-    told = _sentence_answer(task, query, top, primary, attachments, camera)
-    return Asked(told.answer, told.to_json())
+    reply = _sentence_answer(task, query, top, primary, attachments, camera)
+    return Asked(reply.answer, reply.to_json())
 
 
 def _sentence_answer(

@@ -59,7 +59,7 @@ def write_page(
     """
     session = ViewSession(maps)
     asked = list(questions) or default_questions(session.maps[0].labels)
-    told: dict[str, Any] = {
+    data: dict[str, Any] = {
         **session.describe(),
         "robot": False,
         "contents": [one.describe_contents() for one in session.maps],
@@ -72,9 +72,9 @@ def write_page(
     for one in progress(asked, "asking", unit="question"):
         sentence, question = (one, None) if isinstance(one, str) else one
         answer, heat = session.ask(sentence, question=question)
-        told["questions"].append(answer | {"heat": _packed(heat)})
+        data["questions"].append(answer | {"heat": _packed(heat)})
     names = " and ".join(one.layout.asked.stored.path.name.removesuffix(".avlmap") for one in session.maps)
-    content = _page(names, told).encode("utf-8")
+    content = _page(names, data).encode("utf-8")
     try:
         write_bytes_atomically(out, content)
     except OSError as fault:
@@ -82,7 +82,7 @@ def write_page(
     return {
         "page": str(out),
         "bytes": len(content),
-        "questions": [{"question": one["question"], "found": one["answers"][0]["found"]} for one in told["questions"]],
+        "questions": [{"question": one["question"], "found": one["answers"][0]["found"]} for one in data["questions"]],
     }
 
 
@@ -105,18 +105,18 @@ def default_questions(labels: "Labels") -> "list[tuple[str, Question]]":
     return [(title, Question.of(of)) for title, of in parts[:_MOST_QUESTIONS]]
 
 
-def _page(title: str, told: dict[str, Any] | None) -> str:
+def _page(title: str, data: dict[str, Any] | None) -> str:
     own = files("avlmaps.view") / "assets"
     script = "\n".join((own / name).read_text(encoding="utf-8") for name in SCRIPTS)
     script = f'"use strict";\n(() => {{\n{script}\n}})();\n'
     digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
-    policy = _POLICY.format(digest=digest, connect="'self'" if told is None else "'none'")
+    policy = _POLICY.format(digest=digest, connect="'self'" if data is None else "'none'")
     texts = {
         "title": escape(title),
         "policy": escape(policy),
         "style": (own / "page.css").read_text(encoding="utf-8"),
         # In a script element only the end of one must not stand.
-        "data": json.dumps(told, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
+        "data": json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
         "script": script,
     }
     page = (own / "page.html").read_text(encoding="utf-8")

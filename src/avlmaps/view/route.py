@@ -132,7 +132,7 @@ class Guide:
             )
             return Drive(outcome, self._on_floor(outcome.path))
 
-        told: dict[str, Any] = {
+        answer: dict[str, Any] = {
             "command": command,
             "readings": readings,
             "plan": translation.plan,
@@ -142,11 +142,11 @@ class Guide:
         robot = self._driver()
         start = self._start() if robot is None else robot.pose
         planner = MapDriver(self.obstacles, MapBody(start), self._shape)
-        told["planned"] = run(planner).to_json()
+        answer["planned"] = run(planner).to_json()
         if robot is None:
             self._pose = planner.pose
-            return told | {"driven": None}
-        return told | {"driven": run(robot).to_json()}
+            return answer | {"driven": None}
+        return answer | {"driven": run(robot).to_json()}
 
     @property
     def obstacles(self) -> "Obstacles":

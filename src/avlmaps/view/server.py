@@ -199,8 +199,8 @@ class _Handler(BaseHTTPRequestHandler):
             case ["api", "ask"]:
                 words = self._json()
                 answer, heat = session.ask(words.get("sentence", ""), words.get("photo"), words.get("clip"))
-                told = json.dumps(answer, allow_nan=False).encode("utf-8")
-                self._send(len(told).to_bytes(4, "little") + told + heat, "application/octet-stream")
+                header = json.dumps(answer, allow_nan=False).encode("utf-8")
+                self._send(len(header).to_bytes(4, "little") + header + heat, "application/octet-stream")
             case ["api", "go"]:
                 words = self._json()
                 again = words.get("again") == "yes"

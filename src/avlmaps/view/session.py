@@ -224,10 +224,10 @@ class ViewSession:
         return kept
 
 
-def _cleaned(told: Any, *uploads: Upload | None) -> Any:
+def _cleaned(answer: Any, *uploads: Upload | None) -> Any:
     """Return JSON whose texts name no file of this machine."""
-    if isinstance(told, str):
-        return without_paths(told, *uploads)
-    if isinstance(told, dict):
-        return {key: _cleaned(value, *uploads) for key, value in told.items()}
-    return [_cleaned(value, *uploads) for value in told] if isinstance(told, list | tuple) else told
+    if isinstance(answer, str):
+        return without_paths(answer, *uploads)
+    if isinstance(answer, dict):
+        return {key: _cleaned(value, *uploads) for key, value in answer.items()}
+    return [_cleaned(value, *uploads) for value in answer] if isinstance(answer, list | tuple) else answer

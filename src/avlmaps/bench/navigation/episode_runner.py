@@ -88,19 +88,19 @@ class Pilot:
     def _driven(self, mission: Mission, robot: Robot, driver: Driver) -> _Log:
         """Give the whole command; where its program breaks off, give the remaining goals one by one."""
         files, goals, log = self.photo_names(mission), mission.goals, _Log()
-        error = self._told(mission.sentence(files), mission.program(files), goals, robot, log)
+        error = self._command(mission.sentence(files), mission.program(files), goals, robot, log)
         broke_off = error is not None and log.understood and len(goals) > 1
         for number in range(len(log.legs), len(goals)):
             if broke_off:
                 alone = goals[number : number + 1]
-                own = self._told(mission.sentence(files, number), mission.program(files, number), alone, robot, log)
+                own = self._command(mission.sentence(files, number), mission.program(files, number), alone, robot, log)
             else:
                 own = error
             if len(log.legs) <= number:
                 log.legs.append(self._missed(goals[number], driver.pose, own or "The program ends before it."))
         return log
 
-    def _told(self, command: str, program: str, goals: Sequence[Goal], robot: Robot, log: _Log) -> str | None:
+    def _command(self, command: str, program: str, goals: Sequence[Goal], robot: Robot, log: _Log) -> str | None:
         """Give the robot a command and judge its stops; return why it broke off, None where it did not."""
         log.commands.append(command)
         try:

@@ -103,8 +103,8 @@ def _forms(outcome: Outcome) -> dict[str, Any]:
             own, true = (
                 [e for e in of(outcome, series, which) if e.mission in names] for which in (OURS, CEILING)
             )  # fmt: skip
-            told = sum(e.understood for e in true)
-            rows.append([str(series), form, len(names), _whole(own), _whole(true), f"{told} of {len(true)}"])
+            understood = sum(e.understood for e in true)
+            rows.append([str(series), form, len(names), _whole(own), _whole(true), f"{understood} of {len(true)}"])
     return {"columns": ["list", "command", "filled", f"{OURS} %", f"{CEILING} %", "understood"], "rows": rows}
 
 

@@ -27,7 +27,7 @@ def _h5py() -> Any:
 
 
 @contextmanager
-def _told(path: Path) -> Generator[None]:
+def _explain_faults(path: Path) -> Generator[None]:
     try:
         yield
     except _FAULTS as fault:
@@ -46,7 +46,7 @@ def open_hdf5(path: Path) -> Generator["Hdf5"]:
     h5py = _h5py()
     if not path.is_file():
         raise MapError(f"{path} is not there, or is not a file.")
-    with _told(path):
+    with _explain_faults(path):
         file = h5py.File(path, "r")
     with file:
         yield Hdf5(path, file, h5py)
@@ -78,7 +78,7 @@ class Hdf5:
         Raises:
             MapError: it is missing, no plain array, or of another shape or kind.
         """
-        with _told(self.path):
+        with _explain_faults(self.path):
             link, has = self._file.get(name, getlink=True), _listed(str(key) for key in self._file)
             found = self._own_array(self._file[name]) if isinstance(link, self._h5py.HardLink) else None
         if link is None:
@@ -123,10 +123,10 @@ class Numbers:
 
     def rows(self, part: slice, dtype: type[np.generic]) -> np.ndarray:
         """Read some rows, as numbers of that type."""
-        with _told(self._path):
+        with _explain_faults(self._path):
             return np.asarray(self._dataset[part]).astype(dtype, copy=False)
 
     def whole(self, dtype: type[np.generic]) -> np.ndarray:
         """Read all of it."""
-        with _told(self._path):
+        with _explain_faults(self._path):
             return np.asarray(self._dataset[()]).astype(dtype, copy=False)

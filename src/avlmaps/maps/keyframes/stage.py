@@ -132,8 +132,8 @@ def _encoded(
 def _from_store(plan: Plan) -> str:
     """Return how many keyframes the store holds whole: the lowest count of their kinds of features."""
     kinds = (Kind.VIEWS, Kind.LOCAL, Kind.PLACE)
-    told = [cache_note(plan.used, kind) for kind in kinds if plan.used.backend_name(kind)]
-    return min((words for words in told if words), key=lambda words: int(words.split()[0]), default="")
+    notes = [cache_note(plan.used, kind) for kind in kinds if plan.used.backend_name(kind)]
+    return min((words for words in notes if words), key=lambda words: int(words.split()[0]), default="")
 
 
 def fused_frames(parts: Sequence[Part]) -> Int[np.ndarray, " n"]:

@@ -306,16 +306,16 @@ class RosDriver(ABC):
         if link.lost is not None:
             goal.over(End.FAILED)  # before a message over the next connection ends it otherwise
             agreed = self._call_off_anew()
-            told = "it was reached again and stopped" if agreed else "it may still be driving: use its own stop"
-            goal.note = f"{why}; {told}"
+            outcome = "it was reached again and stopped" if agreed else "it may still be driving: use its own stop"
+            goal.note = f"{why}; {outcome}"
             return
         wait_s = self.settings.cancel_timeout_s
         agreed = self._called_off(goal, min(wait_s, 1.0) if absent else wait_s)
         agreed = agreed or self._call_off_anew() or absent
         goal.end = End.ABSENT if absent else End.CANCELLED
         goal.note = why if agreed else f"{why}; it does not say that it gave up, and may still be driving"
-        if absent and link.told:
-            goal.note += f" ({link.told[-1]})"
+        if absent and link.complaints:
+            goal.note += f" ({link.complaints[-1]})"
 
     def _beat(self, goal: Goal) -> None:
         """Publish that this loop runs and wants the goal to continue."""

@@ -136,19 +136,19 @@ class Frames:
         Raises:
             NavigationError: the file cannot be read or does not hold what it must.
         """
-        told = RobotFile.read(path)
-        shift = told.map_from_avlmap
+        file = RobotFile.read(path)
+        shift = file.map_from_avlmap
         try:
             lie = GroundTransform(shift.x_m, shift.y_m, radians(shift.yaw_deg))
         except ValueError as fault:
             raise _unreadable(path, fault) from None
-        return cls(told.map_frame, told.base_frame, lie)
+        return cls(file.map_frame, file.base_frame, lie)
 
     def write(self, path: Path | str) -> None:
         """Write them to a JSON file that ``read`` takes."""
         shift = self.map_from_avlmap
-        told = RobotFile(self.map_frame, self.base_frame, _Shift(shift.x_m, shift.y_m, degrees(shift.yaw_rad)))
-        write_bytes_atomically(Path(path), msgspec.json.format(msgspec.json.encode(told), indent=2) + b"\n")
+        file = RobotFile(self.map_frame, self.base_frame, _Shift(shift.x_m, shift.y_m, degrees(shift.yaw_rad)))
+        write_bytes_atomically(Path(path), msgspec.json.format(msgspec.json.encode(file), indent=2) + b"\n")
 
 
 class _Shift(msgspec.Struct, forbid_unknown_fields=True):

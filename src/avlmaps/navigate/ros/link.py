@@ -20,7 +20,7 @@ START_IT = (
     "start rosbridge on the robot with `ros2 launch rosbridge_server rosbridge_websocket_launch.xml` (ROS 1: "
     "`roslaunch rosbridge_server rosbridge_websocket.launch`), and check the address, the port and the firewall"
 )
-_MOST_TOLD = 20
+_MOST_COMPLAINTS = 20
 
 
 class Link:
@@ -33,7 +33,7 @@ class Link:
         url: where to.
         heard: notified whenever something has arrived or changed.
         lost: why the connection is over; None while it stands.
-        told: what the bridge complained about, the latest last.
+        complaints: those of the bridge, the latest last.
         unread: how many messages were none, and were left out.
     """
 
@@ -53,7 +53,7 @@ class Link:
         headers = {} if token is None else {"Authorization": f"Bearer {_checked(token, self.url)}"}
         self.heard = threading.Condition()
         self.lost: str | None = None
-        self.told: list[str] = []
+        self.complaints: list[str] = []
         self.unread = 0
         self._open = False
         self._listeners: list[Callable[[Incoming], None]] = []
@@ -135,8 +135,8 @@ class Link:
 
     def _keep(self, complaint: str) -> None:
         with self.heard:
-            self.told.append(complaint)
-            del self.told[:-_MOST_TOLD]
+            self.complaints.append(complaint)
+            del self.complaints[:-_MOST_COMPLAINTS]
 
     def _unreadable(self, _why: str) -> None:
         with self.heard:

@@ -125,9 +125,9 @@ def transforms_in(message: msgspec.Raw) -> tuple[list[tuple[str, str, Float[np.n
     read, refused = [], 0
     for raw in raws:
         try:
-            told = msgspec.json.decode(raw, type=_TransformStamped)
-            parent, child = told.header.frame_id.lstrip("/"), told.child_frame_id.lstrip("/")
-            read.append((parent, child, _rigid(told.transform)))
+            stamped = msgspec.json.decode(raw, type=_TransformStamped)
+            parent, child = stamped.header.frame_id.lstrip("/"), stamped.child_frame_id.lstrip("/")
+            read.append((parent, child, _rigid(stamped.transform)))
         except ValueError:
             refused += 1
     return read, refused
@@ -170,10 +170,10 @@ def duration(seconds: float) -> dict[str, int]:
 def text_in(raw: msgspec.Raw, most: int = 200) -> str:
     """Return the text of a value, fit to be shown in one sentence; empty where it is none."""
     try:
-        told = msgspec.json.decode(raw, type=str)
+        text = msgspec.json.decode(raw, type=str)
     except ValueError:
         return ""
-    return sanitize_line(told, most)
+    return sanitize_line(text, most)
 
 
 def sanitize_line(text: str, most: int = 200) -> str:

@@ -130,16 +130,16 @@ def _end_of(message: Incoming) -> tuple[End, str]:
             return End.ABSENT, "No action server takes the goal; start Nav2, or name its namespace"
         return End.FAILED, f"Nav2 refused the goal ({why or 'it does not say why'})"
     try:
-        told = msgspec.json.decode(message.values, type=ActionEnd)
-        inner = msgspec.json.decode(told.result, type=ActionEnd) if bytes(told.result)[:1] == b"{" else told
+        end = msgspec.json.decode(message.values, type=ActionEnd)
+        inner = msgspec.json.decode(end.result, type=ActionEnd) if bytes(end.result)[:1] == b"{" else end
     except ValueError:
-        told = inner = ActionEnd()
-    status = message.status if message.status is not None else told.status
+        end = inner = ActionEnd()
+    status = message.status if message.status is not None else end.status
     if status == _SUCCEEDED:
         return End.SUCCEEDED, ""
     if status == _CANCELLED:
         return End.CANCELLED, "The goal was cancelled, by the robot or another of its users"
-    code = told.error_code or inner.error_code
+    code = end.error_code or inner.error_code
     known = _WHY.get(code, "" if code == 0 else f"error {code}")
-    why = sanitize_line(told.error_msg or inner.error_msg) or known or "it does not say why"
+    why = sanitize_line(end.error_msg or inner.error_msg) or known or "it does not say why"
     return End.FAILED, f"Nav2 gave up ({why})"

@@ -78,14 +78,14 @@ class RosSettings:
         Raises:
             NavigationError: the file cannot be read, or sets what there is not.
         """
-        told: dict[str, Any] = RobotFile.read(path).settings
-        unknown = sorted(set(told) - set(cls.__slots__))
+        given: dict[str, Any] = RobotFile.read(path).settings
+        unknown = sorted(set(given) - set(cls.__slots__))
         if unknown:
             known = ", ".join(cls.__slots__)
             raise NavigationError(
                 f"{path} sets {unknown[0]!r}, which is not a setting of a robot; the settings are {known}."
             )
         try:
-            return cls(**told)
+            return cls(**given)
         except NavigationError as fault:
             raise NavigationError(f"In the settings of {path}, {fault}") from None

@@ -61,7 +61,7 @@ class _Protocol(AutobahnRosBridgeProtocol):
 
     def onClose(self, wasClean: bool, code: int | None, reason: str | None) -> None:  # noqa: N802, N803
         """Store why the connection ended."""
-        self.factory.told = sanitize_line(str(reason or ""))
+        self.factory.close_reason = sanitize_line(str(reason or ""))
 
     def send_message(self, payload: bytes) -> None:
         """Send one message, if the connection still stands by then."""
@@ -83,7 +83,7 @@ class _Factory(AutobahnRosBridgeClientFactory):
         super().__init__(url, headers=dict(headers))
         self.listener = listener
         self.timeout_s = timeout_s
-        self.told = ""
+        self.close_reason = ""
         self.setProtocolOptions(
             maxFramePayloadSize=MOST_BYTES,
             maxMessagePayloadSize=MOST_BYTES,
@@ -110,7 +110,7 @@ class _Factory(AutobahnRosBridgeClientFactory):
     def clientConnectionLost(self, connector: Any, reason: Any) -> None:  # noqa: N802 - twisted's name
         """Take note that it is over."""
         self._proto = None
-        self.listener.over(self.told or sanitize_line(reason.getErrorMessage()))
+        self.listener.over(self.close_reason or sanitize_line(reason.getErrorMessage()))
 
     def clientConnectionFailed(self, connector: Any, reason: Any) -> None:  # noqa: N802 - twisted's name
         """Take note that nobody answered."""

@@ -69,7 +69,7 @@ class FeatureStore:
         self._opened_s = time.time()
         self._total: float | None = None
         self._full = False
-        self._told: set[str] = set()
+        self._warned: set[str] = set()
         self._lock = threading.Lock()
 
     def get(self, kind: Kind, card: ModelCard, key: str) -> np.ndarray | None:
@@ -166,8 +166,8 @@ class FeatureStore:
         return found
 
     def _tell(self, sentence: str) -> None:
-        if sentence not in self._told:
-            self._told.add(sentence)
+        if sentence not in self._warned:
+            self._warned.add(sentence)
             say(f"note: {sentence}")
 
 

@@ -109,13 +109,13 @@ class Sam2Proposals:
     def _at(self, seen: list[torch.Tensor], points: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Return the masks (k, h, w), as logits, that are good enough at some points, and how good each is."""
         settings = self._settings
-        told = self._model(
+        output = self._model(
             image_embeddings=list(seen),
             input_points=points[None, :, None],
             input_labels=torch.ones((1, len(points), 1), dtype=torch.int64, device=points.device),
             multimask_output=True,
         )
-        logits, quality = told.pred_masks[0].flatten(0, 1).float(), told.iou_scores[0].flatten().float()
+        logits, quality = output.pred_masks[0].flatten(0, 1).float(), output.iou_scores[0].flatten().float()
         sure = (logits > settings.stability_offset).sum(dim=(1, 2))
         perhaps = (logits > -settings.stability_offset).sum(dim=(1, 2))
         covered = (logits > 0.0).float().mean(dim=(1, 2))

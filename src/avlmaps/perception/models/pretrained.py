@@ -59,7 +59,7 @@ def load_pretrained(
     load: Any = kind
     try:
         with _quietly():
-            made, told = load.from_pretrained(
+            made, loading = load.from_pretrained(
                 folder, output_loading_info=True, local_files_only=True, dtype=precision, weights_only=True
             )
     except Exception as fault:  # transformers, safetensors and torch raise many types for damaged files
@@ -67,9 +67,9 @@ def load_pretrained(
             f"{folder} cannot be loaded as {kind.__name__} ({type(fault).__name__}: {_short(fault)}); get it again "
             f"with: hf download {model}"
         ) from fault
-    missing = _uncomputed(told["missing_keys"])
-    unknown = [name for name in _uncomputed(told["unexpected_keys"]) if not name.startswith(tuple(ignored))]
-    sizes = [str(name) for name, *_ in told.get("mismatched_keys", ())]
+    missing = _uncomputed(loading["missing_keys"])
+    unknown = [name for name in _uncomputed(loading["unexpected_keys"]) if not name.startswith(tuple(ignored))]
+    sizes = [str(name) for name, *_ in loading.get("mismatched_keys", ())]
     if faults := differences(missing, unknown, sizes):
         raise BackendError(f"{folder} is not a whole {kind.__name__}: {faults}. Get it again with: hf download {model}")
     return made.eval().to(device)

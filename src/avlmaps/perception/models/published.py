@@ -169,8 +169,8 @@ def network_from(
 
 def differences(missing: Sequence[str], unknown: Sequence[str], sizes: Sequence[str]) -> str:
     """Return in words how a checkpoint differs from its network, ``""`` where it does not."""
-    told = (("it lacks", missing), ("nothing takes", unknown), ("of another size is", sizes))
-    return "; ".join(f"{what} {_some(names)}" for what, names in told if names)
+    faults = (("it lacks", missing), ("nothing takes", unknown), ("of another size is", sizes))
+    return "; ".join(f"{what} {_some(names)}" for what, names in faults if names)
 
 
 def _some(names: Sequence[str]) -> str:

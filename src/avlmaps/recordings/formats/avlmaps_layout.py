@@ -192,8 +192,8 @@ def camera_poses(
     if pose_type == "camera_base":
         return WORLD_FROM_HABITAT @ habitat_from_body, f"The poses are taken for the camera's own ({how})."
     camera = base_from_camera(given.camera_height_m)
-    told = f"The poses are taken for the robot's base ({how}), with the camera {given.camera_height_m:g} m above it."
-    return WORLD_FROM_HABITAT @ habitat_from_body @ camera, told
+    notice = f"The poses are taken for the robot's base ({how}), with the camera {given.camera_height_m:g} m above it."
+    return WORLD_FROM_HABITAT @ habitat_from_body @ camera, notice
 
 
 def _rig(path: Path, shots: Shots, given: CameraFile) -> Rig:

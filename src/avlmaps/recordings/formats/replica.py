@@ -106,5 +106,5 @@ def _camera(path: Path, shots: Shots) -> tuple[Rig, float, tuple[str, ...]]:
         raise RecordingError(f"{file} holds no camera: {error}; fix the file.") from None
     rgb_size, depth_size = first_picture_size(path, shots.colour), first_picture_size(path, shots.depth)
     rig = Rig(camera.resized(*rgb_size), camera.resized(*depth_size))
-    told = () if file else ("There is no cam_params.json; the camera of the published scenes is assumed.",)
-    return rig, given.scale, told
+    notices = () if file else ("There is no cam_params.json; the camera of the published scenes is assumed.",)
+    return rig, given.scale, notices

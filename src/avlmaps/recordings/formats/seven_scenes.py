@@ -96,8 +96,8 @@ def _rig(path: Path, shots: Shots) -> tuple[Rig, tuple[str, ...]]:
             raise RecordingError(f"{file} holds no camera: {error}; fix the file.") from None
     if depth_size == (640, 480) and depth.fx == depth.fy == _KINECT_DEPTH_FOCAL:
         colour = Pinhole(_KINECT_COLOUR_FOCAL, _KINECT_COLOUR_FOCAL, 320.0, 240.0, 640, 480)
-        told = (
+        notice = (
             "The intrinsics are a Kinect's depth camera's (585); for the colour camera 525 is used, which fits better."
         )
-        return Rig(colour.resized(*rgb_size), depth), (*notices, told)
+        return Rig(colour.resized(*rgb_size), depth), (*notices, notice)
     return Rig(depth.resized(*rgb_size), depth), notices

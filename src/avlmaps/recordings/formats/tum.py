@@ -160,6 +160,6 @@ def _camera(path: Path, shots: Shots) -> tuple[Rig, Float[np.ndarray, "3"] | Non
     rgb_size, depth_size = first_picture_size(path, shots.colour), first_picture_size(path, shots.depth)
     rig = Rig(camera.resized(*rgb_size), camera.resized(*depth_size))
     if key == "default":
-        told = "The folder is not called freiburg1, 2 or 3, so the default camera (525) is assumed; up is not known."
-        return rig, None, (told,)
+        notice = "The folder is not called freiburg1, 2 or 3, so the default camera (525) is assumed; up is not known."
+        return rig, None, (notice,)
     return rig, np.array([0.0, 0.0, 1.0]), ()
