@@ -65,7 +65,7 @@ def test_a_text_cannot_end_the_script_or_stand_for_another_part(room: AVLMap, tm
     sentence = "the red thing"
     hostile = AVLMap(room.stored)
     layout = MapOnPage(hostile)
-    assert layout.layout.asked is hostile
+    assert layout.layout.avlmap is hostile
     out = tmp_path / "{{script}}<script>.html"
     write_page(out, [hostile], [sentence])
     for text in ("</script><script>alert(1)</script>", "{{style}}", "<!--"):

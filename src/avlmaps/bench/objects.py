@@ -85,27 +85,27 @@ class ObjectFigures:
         return sum(int(a.sum()) for a in sure), sum(len(a) for a in sure)
 
 
-def measure(asked: "AVLMap", things: Sequence[SceneObject], same: Mapping[str, str], scene: str) -> ObjectFigures:
+def measure(avlmap: "AVLMap", things: Sequence[SceneObject], same: Mapping[str, str], scene: str) -> ObjectFigures:
     """Query a map for everything that it could hold and compare with the truth.
 
     Args:
-        asked: the map.
+        avlmap: the map.
         things: what is truly there.
         same: category to the one that it counts as (``picture frame`` to ``picture``); others count as themselves.
         scene: its name, for the tables.
     """
-    centres = asked.space.centres
+    centres = avlmap.space.centres
     inside = [_inside(centres, thing) for thing in things]
     name = [same.get(thing.category, thing.category) for thing in things]
     seen = [number for number, rows in enumerate(inside) if len(rows) >= FEWEST_VOXELS]
     present = {name[number] for number in seen}
-    vocabulary = [word for word in asked.stored.profile.pixel_encoder().vocabulary if word not in STRUCTURE]
+    vocabulary = [word for word in avlmap.stored.profile.pixel_encoder().vocabulary if word not in STRUCTURE]
     words = sorted({same.get(word, word) for word in vocabulary} | (present - set(STRUCTURE)))
     answers = cache(lambda name, word: name == word or lexicon().is_a(name, word, Kind.THING))
     said, held, best, reached = [], np.zeros(len(centres), bool), {}, {}
     covered: dict[str, np.ndarray] = {}
     for word in words:
-        heat = asked.object(word, primary=True)
+        heat = avlmap.object(word, primary=True)
         factor = heat.factors[0]
         rows = np.flatnonzero(getattr(factor, "mask", np.zeros(len(centres), bool)))
         of_word = [number for number in seen if answers(name[number], word)]

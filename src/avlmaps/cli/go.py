@@ -154,8 +154,8 @@ def plan_answer(translation: "Translation") -> dict[str, Any]:
 def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
     from avlmaps.query.avlmap import AVLMap
 
-    asked = AVLMap.open(verb.map)
-    translator = translator_for(verb, asked)
+    avlmap = AVLMap.open(verb.map)
+    translator = translator_for(verb, avlmap)
     if verb.explain:
         from avlmaps.language.rules import explanation
 
@@ -163,18 +163,18 @@ def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
             say(line)
     # A sentence that is not understood fails here, before a scene is made.
     translation = translator.program_for(verb.sentence)
-    robot = simulated_robot(verb, asked, start) if verb.robot == "simulated" else _real(verb, asked)
-    return drive(verb, asked, robot, translator, translation)
+    robot = simulated_robot(verb, avlmap, start) if verb.robot == "simulated" else _real(verb, avlmap)
+    return drive(verb, avlmap, robot, translator, translation)
 
 
 def drive(
-    verb: "Go", asked: "AVLMap", robot: Ready, translator: "Translator", translation: "Translation"
+    verb: "Go", avlmap: "AVLMap", robot: Ready, translator: "Translator", translation: "Translation"
 ) -> dict[str, Any]:
     """Run the program of a command on a robot, and close the robot's connection after it.
 
     Args:
         verb: the command, with what belongs to it.
-        asked: the map.
+        avlmap: the map.
         robot: what drives.
         translator: made the program, and repairs it where it can.
         translation: the program.
@@ -189,7 +189,7 @@ def drive(
     settings = RobotSettings(guess=verb.guess)
     try:
         outcome = instruct(
-            verb.sentence, asked, robot.driver, translator, settings=settings, translation=translation, tell=say
+            verb.sentence, avlmap, robot.driver, translator, settings=settings, translation=translation, tell=say
         )
     except Interrupted as stop:
         stop.halt = robot.halt()
@@ -200,23 +200,23 @@ def drive(
         from avlmaps.navigate.trace_plot import plot_path
 
         title = f"“{verb.sentence}”"
-        plot_path(verb.plot, asked.space, robot.start, outcome.moves, robot.obstacles, robot.contacts(), title)
+        plot_path(verb.plot, avlmap.space, robot.start, outcome.moves, robot.obstacles, robot.contacts(), title)
         return {**outcome.to_json(), "plot": str(verb.plot)}
     return outcome.to_json()
 
 
-def translator_for(verb: "Go", asked: "AVLMap | None" = None) -> "Translator":
+def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":
     """Return the translator of the command.
 
     Args:
         verb: the command; it names the translator.
-        asked: the map, whose encoder may know words that the lexicon does not.
+        avlmap: the map, whose encoder may know words that the lexicon does not.
     """
     from avlmaps.language.commands import Given
 
     came = Given(
         None if verb.image is None else str(verb.image), None if verb.sound_clip is None else str(verb.sound_clip),
-        None if asked is None else asked.knows,
+        None if avlmap is None else avlmap.knows,
     )  # fmt: skip
     if verb.language == "rules":
         from avlmaps.language.rules import RulesTranslator
@@ -244,19 +244,19 @@ def read_start(words: str | None) -> "GroundPose | None":
         raise UsageError(f"--start takes x,y,heading in metres and degrees, such as 1.5,2,90; not {words!r}.") from None
 
 
-def simulated_robot(verb: "Go", asked: "AVLMap", start: "GroundPose | None") -> Ready:
+def simulated_robot(verb: "Go", avlmap: "AVLMap", start: "GroundPose | None") -> Ready:
     """Put a simulated robot into the scene that was mapped."""
     from avlmaps.demo.driving import robot_in
     from avlmaps.navigate.bodies import SHAPES
     from avlmaps.navigate.interrupts import Halt
     from avlmaps.sim.scenes import open_scene
 
-    robot = robot_in(asked, open_scene(verb.scene or ""), SHAPES[verb.body], start)
+    robot = robot_in(avlmap, open_scene(verb.scene or ""), SHAPES[verb.body], start)
     halt = Halt(True, "the simulated robot moves only while the command runs")
     return Ready(robot.driver, robot.start, robot.obstacles, lambda: robot.contacts, lambda: halt, lambda: None)
 
 
-def _real(verb: "Go", asked: "AVLMap") -> Ready:
+def _real(verb: "Go", avlmap: "AVLMap") -> Ready:
     from avlmaps.navigate.bodies import SHAPES
     from avlmaps.navigate.costmap import obstacles_for
     from avlmaps.navigate.ros import Frames, RosSettings, open_ros_driver
@@ -264,7 +264,7 @@ def _real(verb: "Go", asked: "AVLMap") -> Ready:
     given = verb.ros_frames
     frames = None if given is None else Frames.read(given)
     settings = None if given is None else RosSettings.read(given)
-    obstacles = obstacles_for(asked, SHAPES[verb.body])
+    obstacles = obstacles_for(avlmap, SHAPES[verb.body])
     kind = "nav2" if verb.robot == "nav2" else "move_base"
     driver = open_ros_driver(kind, verb.ros, frames, obstacles, settings=settings, guarded=True)
     return Ready(driver, driver.pose, obstacles, lambda: None, driver.halt, driver.close)

@@ -79,20 +79,20 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
     if verb.top < 1:
         raise UsageError(f"--top is {verb.top}; it must be 1 or more.")
     settings = query_settings(verb.rules)
-    asked = AVLMap.open(verb.map, settings) if opened is None else _by_rules(opened, settings)
-    thing = _thing_alone(verb, asked, parts)
-    if thing is not None and opened is None and verb.plot is None and len(asked.stored.voxels) <= _SMALL_MAP:
+    avlmap = AVLMap.open(verb.map, settings) if opened is None else _by_rules(opened, settings)
+    thing = _thing_alone(verb, avlmap, parts)
+    if thing is not None and opened is None and verb.plot is None and len(avlmap.stored.voxels) <= _SMALL_MAP:
         from avlmaps.query.loops import plain_loops
 
         with plain_loops():  # loading the compiled loops would take longer than the question
-            return {**asked.ask(thing, top=verb.top).to_json()}
+            return {**avlmap.ask(thing, top=verb.top).to_json()}
     from avlmaps.core.compiling import announce_compiling
 
     with announce_compiling():
-        return _answer(verb, asked, parts, thing)
+        return _answer(verb, avlmap, parts, thing)
 
 
-def _thing_alone(verb: "Query", asked: "AVLMap", parts: "list[Part]") -> "Question | None":
+def _thing_alone(verb: "Query", avlmap: "AVLMap", parts: "list[Part]") -> "Question | None":
     """Return the question for one thing and nothing else: the grammar need not be read for a name that is known."""
     from avlmaps.core.lexicon import Kind, lexicon
     from avlmaps.core.question import Modality, Part, Question
@@ -102,23 +102,23 @@ def _thing_alone(verb: "Query", asked: "AVLMap", parts: "list[Part]") -> "Questi
         return None
     if not verb.sentence:
         return Question.of(parts) if [part.modality for part in parts] == [Modality.OBJECT] else None
-    if parts or "pixels" not in asked.stored.info.models:
+    if parts or "pixels" not in avlmap.stored.info.models:
         return None
-    encoder = asked.stored.profile.pixel_encoder()
+    encoder = avlmap.stored.profile.pixel_encoder()
     is_name = isinstance(encoder, NamedPixelEncoder) and verb.sentence in encoder.vocabulary
     # Stairs are a thing and an area; which is meant is for the grammar to say.
     is_name = is_name and {entry.kind for entry in lexicon().senses(verb.sentence)} == {Kind.THING}
     return Question.of([Part(Modality.OBJECT, verb.sentence)]) if is_name else None
 
 
-def _answer(verb: "Query", asked: "AVLMap", parts: "list[Part]", thing: "Question | None") -> dict[str, Any]:
+def _answer(verb: "Query", avlmap: "AVLMap", parts: "list[Part]", thing: "Question | None") -> dict[str, Any]:
     from avlmaps.core.question import Modality, Question
 
     if thing is None and verb.sentence.strip():
-        return _asked_in_words(verb, asked)
+        return _asked_in_words(verb, avlmap)
     question = thing or Question.of(parts, Modality(verb.primary) if verb.primary else None)
     camera = _camera_for(verb.image or _first_image(question.parts), verb.intrinsics)
-    answer = asked.ask(question, top=verb.top, intrinsics=camera)
+    answer = avlmap.ask(question, top=verb.top, intrinsics=camera)
     return {**answer.to_json(), **_plotted(verb, answer)}
 
 
@@ -132,7 +132,7 @@ def _by_rules(opened: "AVLMap", settings: "QuerySettings") -> "AVLMap":
 _SMALL_MAP = 400_000  # voxels; plain NumPy takes 0.1 s for them
 
 
-def _asked_in_words(verb: "Query", asked: "AVLMap") -> dict[str, Any]:
+def _asked_in_words(verb: "Query", avlmap: "AVLMap") -> dict[str, Any]:
     """Answer a sentence."""
     from avlmaps.core.question import Modality
     from avlmaps.query.sentences import UnusedFileError, ask_sentence
@@ -140,7 +140,7 @@ def _asked_in_words(verb: "Query", asked: "AVLMap") -> dict[str, Any]:
     image, clip = (None if path is None else str(path) for path in (verb.image, verb.sound_clip))
     try:
         reply = ask_sentence(
-            asked,
+            avlmap,
             verb.sentence,
             top=verb.top,
             primary=Modality(verb.primary) if verb.primary else None,
@@ -192,8 +192,8 @@ def _camera_for(picture: Path | None, intrinsics: str | None) -> "Pinhole | None
 
 def query_lines(answer: dict[str, Any]) -> list[str]:
     """Lay out the answer of `query`."""
-    asked = ", ".join(f"{part['modality']} {part['query']!r} ({part['role']})" for part in answer["parts"])
-    lines = [f"query: {asked}"]
+    parts = ", ".join(f"{part['modality']} {part['query']!r} ({part['role']})" for part in answer["parts"])
+    lines = [f"query: {parts}"]
     lines += [f"note: {part['note']}" for part in answer["parts"] if part.get("note")]
     rows = [
         (i, place(goal["position"]), f"{goal['score']:.2f}", " x ".join(f"{side:.2f}" for side in goal["size"]))

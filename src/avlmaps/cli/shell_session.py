@@ -251,8 +251,8 @@ class Session:
             map=given.map, sentence=rest[1:-1] if quoted else line, scene=given.scene, body=given.body,
             guess=given.guess,
         )  # fmt: skip
-        asked = self.opened
-        translator = going.translator_for(command, asked)
+        avlmap = self.opened
+        translator = going.translator_for(command, avlmap)
         translation = translator.program_for(command.sentence)
         plan = going.plan_answer(translation)
         if given.scene is None:
@@ -265,9 +265,9 @@ class Session:
 
         with raised_signals():
             if self._robot is None:
-                self._robot = going.simulated_robot(command, asked, given.start)
+                self._robot = going.simulated_robot(command, avlmap, given.start)
             here = replace(self._robot, start=self._robot.driver.pose)
-            answer = going.drive(command, asked, here, translator, translation)
+            answer = going.drive(command, avlmap, here, translator, translation)
         failed = going.failure(answer)
         if failed is not None:
             sys.stderr.write(f"avlmaps: {printable(failed['message'])}\n")

@@ -103,7 +103,7 @@ def _robot(scene: str) -> "MakeRobot":
     from avlmaps.sim.scenes import open_scene
 
     opened = open_scene(scene)
-    return lambda asked: robot_in(asked, opened).driver
+    return lambda avlmap: robot_in(avlmap, opened).driver
 
 
 def _serve(verb: View) -> None:

@@ -84,12 +84,14 @@ def command_for(asks: Sequence[Ask]) -> tuple[str, tuple[Ask, ...]] | None:
     return (f"first {first}, then {others[0]}" if others else first), tuple(legs)
 
 
-def drive(asks: Sequence[Ask], asked: "AVLMap", scene: "Scene", out: Path, tell: Callable[[str], None]) -> Drive | None:
+def drive(
+    asks: Sequence[Ask], avlmap: "AVLMap", scene: "Scene", out: Path, tell: Callable[[str], None]
+) -> Drive | None:
     """Send a robot in the home to the goals with one command, and draw its path.
 
     Args:
         asks: the questions of the demonstration.
-        asked: the map, all that the robot knows.
+        avlmap: the map, all that the robot knows.
         scene: the home, in which its body moves.
         out: the demonstration's folder.
         tell: is given the program and the steps as they go.
@@ -105,14 +107,14 @@ def drive(asks: Sequence[Ask], asked: "AVLMap", scene: "Scene", out: Path, tell:
         return None
     command, legs = chosen
     try:
-        robot = robot_in(asked, scene)
+        robot = robot_in(avlmap, scene)
         # The goals are truly there, so the robot may go to a best guess; the report says whether that was right.
         outcome = instruct(
-            command, asked, robot.driver, RulesTranslator(), settings=RobotSettings(guess=True), tell=tell
+            command, avlmap, robot.driver, RulesTranslator(), settings=RobotSettings(guess=True), tell=tell
         )
     except AvlmapsError as fault:
         return Drive(command, legs, None, None, str(fault))
-    plot_path(out / PICTURE, asked.space, robot.start, outcome.moves, robot.obstacles, robot.contacts, f"“{command}”")
+    plot_path(out / PICTURE, avlmap.space, robot.start, outcome.moves, robot.obstacles, robot.contacts, f"“{command}”")
     return Drive(command, legs, robot.start, outcome, outcome.error)
 
 

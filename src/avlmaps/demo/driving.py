@@ -45,11 +45,11 @@ class SimulatedRobot:
         return self.obstacles.origin_m + (np.argwhere(self.driver.contacts.cells) + 0.5) * self.obstacles.cell_size_m
 
 
-def robot_in(asked: AVLMap, scene: Scene, shape: BodyShape = BASE, start: GroundPose | None = None) -> SimulatedRobot:
+def robot_in(avlmap: AVLMap, scene: Scene, shape: BodyShape = BASE, start: GroundPose | None = None) -> SimulatedRobot:
     """Put a robot into a scene.
 
     Args:
-        asked: the map of it; by this alone the robot finds its way.
+        avlmap: the map of it; by this alone the robot finds its way.
         scene: what truly stands there; what the body touches.
         shape: of the body.
         start: where it stands at first; by default a free place near that where the map's walk began.
@@ -61,10 +61,10 @@ def robot_in(asked: AVLMap, scene: Scene, shape: BodyShape = BASE, start: Ground
     from avlmaps.navigate.driver import MapDriver
     from avlmaps.sim.body import SimulatedBody
 
-    cameras = np.asarray(asked.stored.keyframes.world_from_camera)
+    cameras = np.asarray(avlmap.stored.keyframes.world_from_camera)
     floor = _floor(scene, cameras)
-    _require_same_frame(asked, scene, cameras, floor)
-    obstacles = obstacles_for(asked, shape)
+    _require_same_frame(avlmap, scene, cameras, floor)
+    obstacles = obstacles_for(avlmap, shape)
     if start is None:
         room = free_space(scene, shape.radius_m, shape.height_m, floor=floor)
         start = _start_near(cameras, obstacles, room, shape)
@@ -81,8 +81,8 @@ def _floor(scene: Scene, cameras: Float[np.ndarray, "k 4 4"]) -> int | None:
     return int(np.flatnonzero(below)[-1]) if below.any() else None
 
 
-def _require_same_frame(asked: AVLMap, scene: Scene, cameras: Float[np.ndarray, "k 4 4"], floor: int | None) -> None:
-    off_deg = float(np.rad2deg(np.arccos(np.clip(asked.stored.up_in_world[2], -1.0, 1.0))))
+def _require_same_frame(avlmap: AVLMap, scene: Scene, cameras: Float[np.ndarray, "k 4 4"], floor: int | None) -> None:
+    off_deg = float(np.rad2deg(np.arccos(np.clip(avlmap.stored.up_in_world[2], -1.0, 1.0))))
     if off_deg > _LEVEL_DEG:
         raise SceneError(
             f"The map's world is tilted by {off_deg:.0f}° against the scene's; drive in the scene whose recording the "

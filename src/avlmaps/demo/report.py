@@ -46,7 +46,7 @@ def write_report(
     report: "DemoReport",
     scene: "Scene",
     recording: "Recording",
-    asked: "AVLMap",
+    avlmap: "AVLMap",
     evidence: "Evidence",
     photo: "PhotoView | None",
     answers: "Sequence[Answer]",
@@ -58,15 +58,15 @@ def write_report(
         report: the questions and what became of them.
         scene: the home, for its picture from above.
         recording: what the robot saw and heard.
-        asked: the map.
+        avlmap: the map.
         evidence: the truth.
         photo: where the photo of a question was taken, if there is one.
         answers: of the questions, with their heat.
         moments: of the walk that are shown.
     """
-    home, ground = from_above(scene), map_from_above(asked.space)
+    home, ground = from_above(scene), map_from_above(avlmap.space)
     sheet = Sheet.round(home.extent, ground.extent)
-    strip = _strip(recording, asked, moments)
+    strip = _strip(recording, avlmap, moments)
     shown = [
         _question(number, step, answer, sheet, photo if step.ask.kind == "photo" else None)
         for number, (step, answer) in enumerate(zip(report.steps, answers, strict=True), 1)
@@ -122,7 +122,7 @@ def _home(sheet: Sheet, home: Plan, evidence: "Evidence") -> str:
     )
 
 
-def _strip(recording: "Recording", asked: "AVLMap", moments: int) -> Strip:
+def _strip(recording: "Recording", avlmap: "AVLMap", moments: int) -> Strip:
     """Encode some moments of the walk again, as the map's own pixel encoder does."""
     from avlmaps.core.progress import progress
     from avlmaps.maps.gravity.stage import attach_estimated_ground

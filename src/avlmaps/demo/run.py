@@ -85,20 +85,20 @@ def run_demo(
         asks, photo = _choose(scene, recording, evidence, out, for_questions, for_photos)
         _write_clip(asks, out, for_clip)
     with _stage("ask", seconds, "The map is queried."):
-        asked = AVLMap(stored)
+        avlmap = AVLMap(stored)
         answered = [
-            _answer(asked, ask, number, out) for number, ask in enumerate(progress(asks, "asking", unit="question"), 1)
+            _answer(avlmap, ask, number, out) for number, ask in enumerate(progress(asks, "asking", unit="question"), 1)
         ]
-        located = None if photo is None else _located(asked, photo, out)
+        located = None if photo is None else _located(avlmap, photo, out)
     steps = tuple(step for step, _ in answered)
     with _stage("drive", seconds, "A robot drives to goals by one command."):
-        driven = drive(asks, asked, scene, out, say)
+        driven = drive(asks, avlmap, scene, out, say)
     report = DemoReport(out, scene.name, steps, describe(stored), located, seconds, driven)
     with _stage("page", seconds, "The map becomes a page to walk through."):
-        _write_page(asked, [step.ask for step in steps], out)
+        _write_page(avlmap, [step.ask for step in steps], out)
     with _stage("report", seconds, "A page with pictures is written."):
         write_report(
-            report, scene, recording, asked, evidence, photo, [answer for _, answer in answered], settings.moments
+            report, scene, recording, avlmap, evidence, photo, [answer for _, answer in answered], settings.moments
         )
     return report
 
@@ -179,28 +179,28 @@ def _write_clip(asks: list[Ask], out: Path, rng: np.random.Generator) -> None:
             soundfile.write(out / CLIP, sound.samples, sound.rate_hz)
 
 
-def _answer(asked: "AVLMap", ask: Ask, number: int, out: Path) -> "tuple[Step, Answer]":
-    answer = asked.ask(ask.question)
+def _answer(avlmap: "AVLMap", ask: Ask, number: int, out: Path) -> "tuple[Step, Answer]":
+    answer = avlmap.ask(ask.question)
     picture = f"question_{number}.png"
     if answer.heat is not None:
         answer.heat.plot(out / picture)
     return Step(ask, answer.to_json(), picture), answer
 
 
-def _write_page(asked: "AVLMap", asks: "list[Ask]", out: Path) -> None:
+def _write_page(avlmap: "AVLMap", asks: "list[Ask]", out: Path) -> None:
     """Write the map as one page with the questions that are words alone."""
     from avlmaps.view.page import write_page
 
     words = [(ask.title, ask.question) for ask in asks if not any(part.is_file for part in ask.question.parts)]
-    write_page(out / PAGE, [asked], words)
+    write_page(out / PAGE, [avlmap], words)
 
 
-def _located(asked: "AVLMap", photo: "PhotoView", out: Path) -> tuple[float, float] | None:
+def _located(avlmap: "AVLMap", photo: "PhotoView", out: Path) -> tuple[float, float] | None:
     """Return how far off the map takes the photo's camera to be, cm and degrees; None where it is not located."""
     from avlmaps.core.poses import rotation_angle_rad
     from avlmaps.query.modalities.image import read_picture
 
-    pose, truth = asked.locate(read_picture(out / PHOTO)).world_from_camera, photo.world_from_camera
+    pose, truth = avlmap.locate(read_picture(out / PHOTO)).world_from_camera, photo.world_from_camera
     if pose is None:
         return None
     off_cm = 100.0 * float(np.linalg.norm(pose[:3, 3] - truth[:3, 3]))

@@ -21,15 +21,15 @@ class Seeker:
     """Finds in a map what a program means.
 
     Attributes:
-        asked: the map.
+        avlmap: the map.
         guess: whether to take the best guess where the map's confidence is below 0.5.
         readable: which files a program may load.
         notes: what a person should know: words half understood, guesses.
     """
 
-    def __init__(self, asked: AVLMap, guess: bool, readable: Readable, tell: Callable[[str], None]) -> None:
+    def __init__(self, avlmap: AVLMap, guess: bool, readable: Readable, tell: Callable[[str], None]) -> None:
         """Take a map, and a function that is called with each note on things as they are found."""
-        self.asked = asked
+        self.avlmap = avlmap
         self.guess = guess
         self.readable = readable
         self.notes: list[str] = []
@@ -61,15 +61,15 @@ class Seeker:
         if img is not None:
             if not isinstance(img, Picture):
                 raise ProgramError(f"{skill} takes as img what load_image returns, not {kind_of(img)}.")
-            heat = self.asked.image(self.readable.find(img.path, "picture"), primary=primary)
+            heat = self.avlmap.image(self.readable.find(img.path, "picture"), primary=primary)
         elif isinstance(sound, Clip):
-            heat = self.asked.sound_clip(self.readable.find(sound.path, "clip"), primary=primary)
+            heat = self.avlmap.sound_clip(self.readable.find(sound.path, "clip"), primary=primary)
         elif sound is not None:
-            heat = self.asked.sound(text_of(sound, skill), primary)
+            heat = self.avlmap.sound(text_of(sound, skill), primary)
         elif area is not None:
-            heat = self.asked.area(text_of(area, skill), primary)
+            heat = self.avlmap.area(text_of(area, skill), primary)
         else:
-            heat = self.asked.object(text_of(obj, skill), primary)
+            heat = self.avlmap.object(text_of(obj, skill), primary)
         self._note(heat)
         return heat
 
@@ -120,10 +120,10 @@ class Seeker:
     def _candidates(self, target: Target) -> tuple[list[Thing], bool]:
         """Return the things that a target may mean, best first, and whether it says itself which one."""
         if isinstance(target, Place):
-            level = self.asked.space.level(np.array([target.x, target.y, target.z]))
+            level = self.avlmap.space.level(np.array([target.x, target.y, target.z]))
             known = self._handed_out.get(target, Thing("", Outline.at(level[:2]), level))
             return [known if target in self._instances else replace(known, outline=Outline.at(level[:2]))], True
-        heat = self.asked.object(target, primary=True) if isinstance(target, str) else target
+        heat = self.avlmap.object(target, primary=True) if isinstance(target, str) else target
         if not isinstance(heat, Heatmap):
             raise ProgramError(f"A skill takes a phrase, a place or a heatmap to go to, not {kind_of(target)}.")
         things = things_in(heat, self.guess)
@@ -163,7 +163,7 @@ class Seeker:
         return sorted(chosen, key=lambda thing: float(np.linalg.norm(thing.outline.nearest_to(here) - here)))
 
     def _handed(self, thing: Thing) -> Place:
-        x, y, z = (float(value) for value in self.asked.space.world(thing.place))
+        x, y, z = (float(value) for value in self.avlmap.space.world(thing.place))
         place = Place(x, y, z)
         self._handed_out[place] = thing
         return place
@@ -178,7 +178,7 @@ class Seeker:
         self.note(heat.factors[0].note)
 
     def _chosen(self, thing: Thing, of: int) -> Thing:
-        place = ", ".join(f"{value:.2f}" for value in self.asked.space.world(thing.place))
+        place = ", ".join(f"{value:.2f}" for value in self.avlmap.space.world(thing.place))
         line = f"{thing.name}: at ({place}) m, confidence {thing.sure:.2f}"
         if thing.name and not self._last_line.startswith(line):
             self._last_line = line + (f", one of {of}" if of > 1 else "")

@@ -125,7 +125,7 @@ def _silent(_: str) -> None:
 
 def instruct(
     command: str,
-    asked: AVLMap,
+    avlmap: AVLMap,
     driver: Driver,
     translator: Translator,
     budget: Budget | None = None,
@@ -140,7 +140,7 @@ def instruct(
 
     Args:
         command: what a person says, such as ``go to the chair near the sound of glass breaking``.
-        asked: the map.
+        avlmap: the map.
         driver: moves the robot, in the map's level frame.
         translator: turns the command into a program.
         budget: what each run of a program may use up.
@@ -156,7 +156,7 @@ def instruct(
     """
     begin = perf_counter()
     translation = translation or translator.program_for(command)
-    robot = Robot(asked, driver, settings, readable or offered_by(command), lambda line: tell(f"  {line}"), pause)
+    robot = Robot(avlmap, driver, settings, readable or offered_by(command), lambda line: tell(f"  {line}"), pause)
     run = _Run(command, translator, robot, budget, tell)
     run.through(translation)
     run.judge()

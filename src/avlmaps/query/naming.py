@@ -21,21 +21,21 @@ class VoxelNamer:
     """Names voxels by the pixel encoder's vocabulary.
 
     Attributes:
-        asked: the map.
+        avlmap: the map.
         names: what it distinguishes.
         calibrated: whether confidences are probabilities; else they are cosines.
     """
 
-    def __init__(self, asked: "AVLMap", vocabulary: Sequence[str] | None = None) -> None:
+    def __init__(self, avlmap: "AVLMap", vocabulary: Sequence[str] | None = None) -> None:
         """Take the encoder's names, or a vocabulary for one that has none of its own.
 
         Raises:
             BackendError: the map's profile has no pixel encoder.
             MapError: the map was built with another encoder than is installed.
         """
-        self.asked = asked
-        encoder = asked.stored.profile.pixel_encoder()
-        asked.stored.require_model(Kind.PIXELS)
+        self.avlmap = avlmap
+        encoder = avlmap.stored.profile.pixel_encoder()
+        avlmap.stored.require_model(Kind.PIXELS)
         self._named = isinstance(encoder, NamedPixelEncoder)
         self._scale = float(encoder.logit_scale) if isinstance(encoder, ScaledEncoder) and not self._named else None
         if isinstance(encoder, NamedPixelEncoder):
@@ -54,7 +54,7 @@ class VoxelNamer:
         Args:
             rows: numbers of the voxels in the map.
         """
-        feature = np.asarray(self.asked.stored.voxels.feature[rows], np.float32)
+        feature = np.asarray(self.avlmap.stored.voxels.feature[rows], np.float32)
         score = feature @ self._columns if len(self.names) else np.zeros((len(rows), 0), np.float32)
         if self._named:
             return np.square(np.clip(score, 0.0, 1.0))
@@ -73,7 +73,7 @@ class VoxelNamer:
 
     def best(self) -> tuple[Int[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
         """Return for every voxel the number of its likeliest name (-1 for none) and its confidence."""
-        n = len(self.asked.space)
+        n = len(self.avlmap.space)
         number, confidence = np.full(n, -1, np.int64), np.zeros(n, np.float32)
         for start in range(0, n if self.names else 0, _CHUNK):
             rows = np.arange(start, min(start + _CHUNK, n))
@@ -83,18 +83,18 @@ class VoxelNamer:
         return number, confidence
 
 
-def keyframes_that_saw(asked: "AVLMap", row: int) -> Int[np.ndarray, " k"]:
+def keyframes_that_saw(avlmap: "AVLMap", row: int) -> Int[np.ndarray, " k"]:
     """Return the keyframes that had a voxel in view with nothing of the map in between, the nearest first.
 
     Args:
-        asked: the map.
+        avlmap: the map.
         row: number of the voxel in the map.
     """
-    stored, grid = asked.stored, asked.space.grid
+    stored, grid = avlmap.stored, avlmap.space.grid
     poses = np.asarray(stored.keyframes.world_from_camera, np.float64)
     if not len(poses):
         return np.zeros(0, np.int64)
-    point = asked.points[row]
+    point = avlmap.points[row]
     away = point - poses[:, :3, 3]
     at = np.einsum("kji,kj->ki", poses[:, :3, :3], away)
     distance_m = np.linalg.norm(away, axis=1)
@@ -105,15 +105,15 @@ def keyframes_that_saw(asked: "AVLMap", row: int) -> Int[np.ndarray, " k"]:
     inside &= np.all((pixel >= 0) & (pixel <= [camera.width, camera.height]), axis=1)
     candidates = np.flatnonzero(inside)
     step_m = 0.5 * grid.voxel_size_m
-    seen = [k for k in candidates if _is_free(asked, poses[k, :3, 3], point, step_m)]
+    seen = [k for k in candidates if _is_free(avlmap, poses[k, :3, 3], point, step_m)]
     return np.array(sorted(seen, key=lambda k: float(distance_m[k])), np.int64)
 
 
-def _is_free(asked: "AVLMap", start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"], step_m: float) -> bool:
+def _is_free(avlmap: "AVLMap", start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"], step_m: float) -> bool:
     """Return whether no voxel of the map lies on the line between a camera and a voxel."""
-    length_m = float(np.linalg.norm(end - start)) - _OWN_VOXELS * asked.space.grid.voxel_size_m
+    length_m = float(np.linalg.norm(end - start)) - _OWN_VOXELS * avlmap.space.grid.voxel_size_m
     if length_m <= 0.0:
         return True
     along = np.arange(step_m, length_m, step_m)[:, None] / float(np.linalg.norm(end - start))
-    cells = np.floor((start + along * (end - start)) / asked.space.grid.voxel_size_m).astype(np.int64)
-    return not asked.space.holds(cells).any()
+    cells = np.floor((start + along * (end - start)) / avlmap.space.grid.voxel_size_m).astype(np.int64)
+    return not avlmap.space.holds(cells).any()

@@ -50,13 +50,13 @@ class Labels:
     @classmethod
     def of(cls, layout: "Layout") -> "Labels":
         """Compute all of it; a map whose models are not here has less, and its notes say why."""
-        asked, notes = layout.asked, []
-        things = _or_note(asked.things, notes)
-        sounds = _or_note(asked.sounds, notes)
-        rooms = _or_note(asked.rooms, notes)
+        avlmap, notes = layout.avlmap, []
+        things = _or_note(avlmap.things, notes)
+        sounds = _or_note(avlmap.sounds, notes)
+        rooms = _or_note(avlmap.rooms, notes)
         names, thing = _thing_labels(len(layout), things)
-        room_names, room = _room_labels(asked, rooms)
-        voxel_names, best, confidence = _name_labels(asked, notes)
+        room_names, room = _room_labels(avlmap, rooms)
+        voxel_names, best, confidence = _name_labels(avlmap, notes)
         voxels = np.stack([thing, room, best, confidence], axis=1)[layout.order]
         return cls(
             tuple(things), tuple(sounds), tuple(rooms), names, room_names, voxel_names, voxels,
@@ -65,10 +65,10 @@ class Labels:
 
     def describe(self, layout: "Layout") -> dict[str, Any]:
         """Return things, sounds and rooms as the page reads them; boxes and places in the level frame."""
-        level = layout.asked.space.level
+        level = layout.avlmap.space.level
         things = []
         for thing in self.things:
-            points, half_m = level(thing.points), 0.5 * layout.asked.space.grid.voxel_size_m
+            points, half_m = level(thing.points), 0.5 * layout.avlmap.space.grid.voxel_size_m
             things.append(
                 thing.to_json()
                 | {
@@ -132,34 +132,34 @@ def _thing_labels(count: int, things: "Sequence[Thing]") -> tuple[tuple[str, ...
     return names, label
 
 
-def _room_labels(asked: "AVLMap", rooms: "Sequence[Room]") -> tuple[tuple[str, ...], UInt8[np.ndarray, " n"]]:
+def _room_labels(avlmap: "AVLMap", rooms: "Sequence[Room]") -> tuple[tuple[str, ...], UInt8[np.ndarray, " n"]]:
     """Give every voxel the room whose views lie nearest to it on the ground."""
     from scipy.spatial import KDTree
 
     names = tuple(sorted({room.name for room in rooms}))[:_MOST]
-    if not names or not len(asked.space):
-        return names, np.zeros(len(asked.space), np.uint8)
-    level = asked.space.level
+    if not names or not len(avlmap.space):
+        return names, np.zeros(len(avlmap.space), np.uint8)
+    level = avlmap.space.level
     places = np.concatenate([level(room.places)[:, :2] for room in rooms])
     label = np.concatenate([np.full(room.views, 1 + names.index(room.name), np.uint8) for room in rooms])
-    column, member = np.unique(np.asarray(asked.space.index)[:, :2], axis=0, return_inverse=True)
-    if not _is_level(asked):
-        return names, label[KDTree(places).query(level(asked.space.centres)[:, :2])[1]]
-    middles = (column + 0.5) * asked.space.grid.voxel_size_m
+    column, member = np.unique(np.asarray(avlmap.space.index)[:, :2], axis=0, return_inverse=True)
+    if not _is_level(avlmap):
+        return names, label[KDTree(places).query(level(avlmap.space.centres)[:, :2])[1]]
+    middles = (column + 0.5) * avlmap.space.grid.voxel_size_m
     return names, label[KDTree(places).query(middles)[1]][member.ravel()]
 
 
-def _is_level(asked: "AVLMap") -> bool:
-    return bool(np.allclose(asked.space.level_from_world, np.eye(3), atol=1e-6))
+def _is_level(avlmap: "AVLMap") -> bool:
+    return bool(np.allclose(avlmap.space.level_from_world, np.eye(3), atol=1e-6))
 
 
 def _name_labels(
-    asked: "AVLMap", notes: list[str]
+    avlmap: "AVLMap", notes: list[str]
 ) -> tuple[tuple[str, ...], UInt8[np.ndarray, " n"], UInt8[np.ndarray, " n"]]:
     """Give every voxel its likeliest name; where there are more than 255, the rarest are left out."""
-    n = len(asked.space)
+    n = len(avlmap.space)
     try:
-        namer = VoxelNamer(asked)
+        namer = VoxelNamer(avlmap)
         number, confidence = namer.best()
     except AvlmapsError as fault:
         notes.append(str(fault))

@@ -29,42 +29,42 @@ class Layout:
     """One map for a page.
 
     Attributes:
-        asked: the map.
+        avlmap: the map.
         order: (n,) the map's row of each voxel that is drawn, in the order of drawing.
         levels: of detail.
         low: (3,) index of the map's lowest corner.
     """
 
-    def __init__(self, asked: "AVLMap") -> None:
+    def __init__(self, avlmap: "AVLMap") -> None:
         """Lay out a map.
 
         Raises:
             MapError: it is too wide to be drawn.
         """
-        self.asked = asked
-        index = np.asarray(asked.space.index, np.int64)
+        self.avlmap = avlmap
+        index = np.asarray(avlmap.space.index, np.int64)
         self.order, self.levels = detail_order(index)
         self.low = index.min(axis=0) if len(index) else np.zeros(3, np.int64)
         if len(index) and int((index.max(axis=0) - self.low).max()) > _MOST_CELLS:
-            span_m = float((index.max(axis=0) - self.low).max() * asked.space.grid.voxel_size_m)
+            span_m = float((index.max(axis=0) - self.low).max() * avlmap.space.grid.voxel_size_m)
             raise MapError(
-                f"{asked.stored.path} is {span_m:.0f} m wide, more than {_MOST_CELLS} voxels; build it with larger "
+                f"{avlmap.stored.path} is {span_m:.0f} m wide, more than {_MOST_CELLS} voxels; build it with larger "
                 "voxels to view it."
             )
 
     def __len__(self) -> int:
         return len(self.order)
 
-    def with_map(self, asked: "AVLMap") -> "Layout":
+    def with_map(self, avlmap: "AVLMap") -> "Layout":
         """Return the same layout of another object of the same map."""
         twin = copy(self)
-        twin.asked = asked
+        twin.avlmap = avlmap
         return twin
 
     @property
     def level_from_cells(self) -> Float[np.ndarray, "4 4"]:
         """From cells (the corner of the lowest voxel is 0) to the level frame, metres."""
-        space, pose = self.asked.space, np.eye(4)
+        space, pose = self.avlmap.space, np.eye(4)
         voxel_m = space.grid.voxel_size_m
         pose[:3, :3] = space.level_from_world * voxel_m
         pose[:3, 3] = space.level_from_world @ (self.low * voxel_m)
@@ -73,8 +73,8 @@ class Layout:
     @cached_property
     def records(self) -> bytes:
         """All voxels as `RECORD`, in the order of drawing."""
-        voxels, records = self.asked.stored.voxels, np.zeros(len(self), RECORD)
-        records["cell"] = (np.asarray(self.asked.space.index, np.int64) - self.low)[self.order]
+        voxels, records = self.avlmap.stored.voxels, np.zeros(len(self), RECORD)
+        records["cell"] = (np.asarray(self.avlmap.space.index, np.int64) - self.low)[self.order]
         records["rgb"] = np.asarray(voxels.rgb)[self.order]
         share = np.asarray(voxels.last_seen_s, np.float64)[self.order] / self.duration_s
         records["seen"] = np.clip(np.round(share * 65535), 0, 65535)
@@ -83,7 +83,7 @@ class Layout:
     @property
     def duration_s(self) -> float:
         """The last moment of the map, seconds from the start of the recording; never 0."""
-        stored = self.asked.stored
+        stored = self.avlmap.stored
         ends = [*np.asarray(stored.keyframes.stamp_s), *np.asarray(stored.sounds.offset_s)]
         latest = float(np.asarray(stored.voxels.last_seen_s).max(initial=0.0))
         return max(1e-3, latest, *map(float, ends)) if ends else max(1e-3, latest)
@@ -94,7 +94,7 @@ class Layout:
 
     def describe(self) -> dict[str, Any]:
         """Return all that the page needs before it draws the first voxel."""
-        stored, space = self.asked.stored, self.asked.space
+        stored, space = self.avlmap.stored, self.avlmap.space
         level = space.level(space.centres) if len(space) else np.zeros((1, 3))
         low, high = np.percentile(level, [0.1, 99.9], axis=0)
         cameras = camera_path(space)
@@ -102,7 +102,7 @@ class Layout:
         camera = stored.rig.rgb
         return {
             "name": stored.path.name,
-            "summary": repr(self.asked).partition(": ")[2].removesuffix(")"),
+            "summary": repr(self.avlmap).partition(": ")[2].removesuffix(")"),
             "voxels": len(self),
             "voxel_size_m": space.grid.voxel_size_m,
             "record_bytes": RECORD.itemsize,
@@ -122,7 +122,7 @@ class Layout:
 
     def _keyframes(self) -> list[dict[str, Any]]:
         """Return where each keyframe's camera was, and when; level frame."""
-        keyframes, turn = self.asked.stored.keyframes, self.asked.space.level_from_world
+        keyframes, turn = self.avlmap.stored.keyframes, self.avlmap.space.level_from_world
         poses = np.asarray(keyframes.world_from_camera, np.float64)
         return [
             {
@@ -137,7 +137,7 @@ class Layout:
 
     def thumbnail(self, number: int) -> bytes | None:
         """Return the JPEG of a keyframe, None where there is none."""
-        keyframes = self.asked.stored.keyframes
+        keyframes = self.avlmap.stored.keyframes
         if not 0 <= number < len(keyframes):
             return None
         start, stop = (int(value) for value in keyframes.thumbnail_offsets[number : number + 2])

@@ -58,7 +58,7 @@ def write_page(
         QueryError: a question is not understood, or the file cannot be written.
     """
     session = ViewSession(maps)
-    asked = list(questions) or default_questions(session.maps[0].labels)
+    sentences = list(questions) or default_questions(session.maps[0].labels)
     data: dict[str, Any] = {
         **session.describe(),
         "robot": False,
@@ -69,11 +69,11 @@ def write_page(
         "clips": [_clips(one) for one in session.maps],
         "questions": [],
     }
-    for one in progress(asked, "asking", unit="question"):
+    for one in progress(sentences, "asking", unit="question"):
         sentence, question = (one, None) if isinstance(one, str) else one
         answer, heat = session.ask(sentence, question=question)
         data["questions"].append(answer | {"heat": _packed(heat)})
-    names = " and ".join(one.layout.asked.stored.path.name.removesuffix(".avlmap") for one in session.maps)
+    names = " and ".join(one.layout.avlmap.stored.path.name.removesuffix(".avlmap") for one in session.maps)
     content = _page(names, data).encode("utf-8")
     try:
         write_bytes_atomically(out, content)
@@ -129,14 +129,14 @@ def _packed(content: bytes) -> str:
 
 def _pictures(one: "MapOnPage") -> dict[str, str]:
     """Return some keyframes' pictures, evenly over the walk, by their numbers."""
-    count = len(one.asked.stored.keyframes)
+    count = len(one.avlmap.stored.keyframes)
     chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_PICTURES)).round().astype(int)) if count else ()
     pictures = {str(number): one.layout.thumbnail(int(number)) for number in chosen}
     return {number: base64.b64encode(jpeg).decode("ascii") for number, jpeg in pictures.items() if jpeg}
 
 
 def _clips(one: "MapOnPage") -> list[str]:
-    stored = one.asked.stored
+    stored = one.avlmap.stored
     return [
         base64.b64encode(stored.clip_path(number).read_bytes()).decode("ascii") for number in range(len(stored.sounds))
     ]

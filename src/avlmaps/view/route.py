@@ -78,11 +78,11 @@ class Guide:
     The robot stays where a command left it; the next one begins there.
 
     Attributes:
-        asked: the map.
+        avlmap: the map.
     """
 
-    def __init__(self, asked: "AVLMap", robot: MakeRobot | None = None, shape: BodyShape = BASE) -> None:
-        self.asked = asked
+    def __init__(self, avlmap: "AVLMap", robot: MakeRobot | None = None, shape: BodyShape = BASE) -> None:
+        self.avlmap = avlmap
         self._make_robot, self._shape = robot, shape
         self._obstacles: Obstacles | None = None
         self._robot: Driver | None = None
@@ -120,7 +120,7 @@ class Guide:
         if again:
             self._robot = self._pose = None
         files = [None if upload is None else str(upload.path) for upload in (photo, clip)]
-        translator = RulesTranslator(Given(files[0], files[1], self.asked.knows))
+        translator = RulesTranslator(Given(files[0], files[1], self.avlmap.knows))
         readings = explanation(translator, command)[:_MOST_READINGS]
         translation = translator.program_for(command)
         readable = Readable((), tuple(path for path in files if path is not None))
@@ -128,7 +128,7 @@ class Guide:
 
         def run(driver: "Driver") -> Drive:
             outcome = instruct(
-                command, self.asked, driver, translator, settings=settings, readable=readable, translation=translation
+                command, self.avlmap, driver, translator, settings=settings, readable=readable, translation=translation
             )
             return Drive(outcome, self._on_floor(outcome.path))
 
@@ -152,12 +152,12 @@ class Guide:
     def obstacles(self) -> "Obstacles":
         """The obstacles that the map knows."""
         if self._obstacles is None:
-            self._obstacles = obstacles_for(self.asked, self._shape)
+            self._obstacles = obstacles_for(self.avlmap, self._shape)
         return self._obstacles
 
     def _driver(self) -> "Driver | None":
         if self._robot is None and self._make_robot is not None:
-            self._robot = self._make_robot(self.asked)
+            self._robot = self._make_robot(self.avlmap)
         return self._robot
 
     def _start(self) -> GroundPose:
@@ -170,7 +170,7 @@ class Guide:
         if not len(places):
             raise NavigationError("Nowhere in the map is there room for the robot; map more of the floor.")
         level = np.asarray(obstacles.level_from_world)
-        cameras = np.asarray(self.asked.stored.keyframes.world_from_camera)
+        cameras = np.asarray(self.avlmap.stored.keyframes.world_from_camera)
         begin, heading = places.mean(axis=0), 0.0
         if len(cameras):
             begin = (level @ cameras[0, :3, 3])[:2]

@@ -148,12 +148,12 @@ class _Handler(BaseHTTPRequestHandler):
             raise _RefusedError(403, "The viewer needs its token; open the address that `avlmaps view` printed.")
 
     def _shows_token(self) -> bool:
-        asked = parse_qs(urlsplit(self.path).query).get("token", [""])[0]
+        given = parse_qs(urlsplit(self.path).query).get("token", [""])[0]
         try:
             kept = SimpleCookie(self.headers.get("Cookie", "")).get(_COOKIE)
         except CookieError:
             kept = None
-        shown = (asked, "" if kept is None else kept.value)
+        shown = (given, "" if kept is None else kept.value)
         token = (self.server.token or "").encode()
         return any([hmac.compare_digest(one.encode("utf-8", "replace"), token) for one in shown])
 
@@ -181,8 +181,8 @@ class _Handler(BaseHTTPRequestHandler):
                 self._send_json(one.describe_voxel(_whole(number)))
             case ["keyframes", number] if (jpeg := one.layout.thumbnail(_whole(number))) is not None:
                 self._send(jpeg, "image/jpeg")
-            case ["clips", number] if 0 <= _whole(number) < len(one.asked.stored.sounds):
-                self._send(one.asked.stored.clip_path(_whole(number)).read_bytes(), "audio/flac")
+            case ["clips", number] if 0 <= _whole(number) < len(one.avlmap.stored.sounds):
+                self._send(one.avlmap.stored.clip_path(_whole(number)).read_bytes(), "audio/flac")
             case _:
                 raise _RefusedError(404, "The map has no such part.")
 

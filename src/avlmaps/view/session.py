@@ -33,13 +33,13 @@ class MapOnPage:
     """One map on the page: how it is drawn, and what is written on it, which is computed in the background.
 
     Attributes:
-        asked: the map.
+        avlmap: the map.
         layout: how it is drawn.
     """
 
-    def __init__(self, asked: AVLMap) -> None:
-        self.asked = asked
-        self.layout = Layout(asked)
+    def __init__(self, avlmap: AVLMap) -> None:
+        self.avlmap = avlmap
+        self.layout = Layout(avlmap)
         self._labels: Labels | None = None
         self._namer: VoxelNamer | None = None
         self._lock = threading.Lock()
@@ -50,7 +50,7 @@ class MapOnPage:
         with self._lock:
             if self._labels is None:
                 # A map object of its own, so that questions need not wait for it.
-                self._labels = Labels.of(self.layout.with_map(AVLMap(self.asked.stored, self.asked.settings)))
+                self._labels = Labels.of(self.layout.with_map(AVLMap(self.avlmap.stored, self.avlmap.settings)))
             return self._labels
 
     def describe_contents(self) -> dict[str, Any]:
@@ -62,19 +62,19 @@ class MapOnPage:
         """Return what a voxel is taken for, by its number in the order of drawing."""
         if not 0 <= drawn < len(self.layout):
             raise QueryError(f"There is no voxel {drawn}; the map has {len(self.layout):,}.")
-        row, asked = int(self.layout.order[drawn]), self.asked
+        row, avlmap = int(self.layout.order[drawn]), self.avlmap
         names: list[tuple[str, float]] = []
         note, calibrated = "", True
         try:
-            self._namer = self._namer or VoxelNamer(asked)
+            self._namer = self._namer or VoxelNamer(avlmap)
             names, calibrated = self._namer.likeliest(row), self._namer.calibrated
         except AvlmapsError as fault:
             note = str(fault)
-        views = keyframes_that_saw(asked, row)
-        voxels = asked.stored.voxels
+        views = keyframes_that_saw(avlmap, row)
+        voxels = avlmap.stored.voxels
         thing = self._thing_at(row)
         return {
-            "position": [round(float(value), 4) for value in asked.points[row]],
+            "position": [round(float(value), 4) for value in avlmap.points[row]],
             "color": [int(value) for value in voxels.rgb[row]],
             "names": [{"name": name, "confidence": round(share, 4)} for name, share in names],
             "calibrated": calibrated,
@@ -101,7 +101,7 @@ class ViewSession:
     """
 
     def __init__(self, maps: Sequence[AVLMap], robot: MakeRobot | None = None) -> None:
-        self.maps = [MapOnPage(asked) for asked in maps]
+        self.maps = [MapOnPage(avlmap) for avlmap in maps]
         self.guide = Guide(maps[0], robot)
         self._asking = threading.Lock()
         self._uploads: OrderedDict[str, Upload] = OrderedDict()
@@ -147,11 +147,11 @@ class ViewSession:
         with self._asking:
             for one in self.maps:
                 try:
-                    asked = ask(one.asked, sentence, *files, question=question)
+                    reply = ask(one.avlmap, sentence, *files, question=question)
                 except AvlmapsError as fault:
                     raise QueryError(without_paths(str(fault), *files)) from fault
-                heat = asked.answer.heat
-                answers.append(_cleaned(asked.to_json(), *files))
+                heat = reply.answer.heat
+                answers.append(_cleaned(reply.to_json(), *files))
                 heats.append(one.layout.in_order(heat.shown).tobytes() if heat is not None else bytes(len(one.layout)))
         return {"question": sentence, "answers": answers}, b"".join(heats)
 

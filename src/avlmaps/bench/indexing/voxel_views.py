@@ -33,19 +33,19 @@ _MOST_REGIONS = 12  # of a picture, the largest
 _Rows = Callable[[Frame, int], tuple[Float32[np.ndarray, "r d"], Int[np.ndarray, "h w"]]]
 
 
-def view_features(asked: AVLMap, recording: Recording) -> Float32[np.ndarray, "n d"]:
+def view_features(avlmap: AVLMap, recording: Recording) -> Float32[np.ndarray, "n d"]:
     """Return for each voxel the mean view feature of the keyframes that saw it, unit length; zero where none did."""
-    views = asked.stored.keyframes.view
+    views = avlmap.stored.keyframes.view
 
     def rows(frame: Frame, keyframe: int) -> tuple[Float32[np.ndarray, "r d"], Int[np.ndarray, "h w"]]:
         return np.asarray(views[keyframe], np.float32)[None], np.zeros(frame.depth_m.shape, np.int64)
 
-    return _spread(asked, recording, rows)
+    return _spread(avlmap, recording, rows)
 
 
-def region_features(asked: AVLMap, recording: Recording) -> Float32[np.ndarray, "n d"]:
+def region_features(avlmap: AVLMap, recording: Recording) -> Float32[np.ndarray, "n d"]:
     """Return for each voxel the mean feature of the regions that showed it, unit length; zero for one never shown."""
-    views, encoder = asked.stored.keyframes.view, asked.stored.profile.view_encoder()
+    views, encoder = avlmap.stored.keyframes.view, avlmap.stored.profile.view_encoder()
 
     def rows(frame: Frame, keyframe: int) -> tuple[Float32[np.ndarray, "r d"], Int[np.ndarray, "h w"]]:
         whole = np.asarray(views[keyframe], np.float32)
@@ -53,7 +53,7 @@ def region_features(asked: AVLMap, recording: Recording) -> Float32[np.ndarray, 
         cut = [cut_out(frame, label == number) for number in range(1, int(label.max()) + 1)]
         return np.concatenate([whole[None], mixed(whole, _encoded(encoder, cut, len(whole)))]), label
 
-    return _spread(asked, recording, rows)
+    return _spread(avlmap, recording, rows)
 
 
 def _encoded(encoder: ViewEncoder, cut: list[Frame], dim: int) -> Float32[np.ndarray, "r d"]:
@@ -112,9 +112,9 @@ def mixed(whole: Float32[np.ndarray, " d"], regions: Float32[np.ndarray, "r d"])
     return (both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), 1e-12)).astype(np.float32)
 
 
-def _spread(asked: AVLMap, recording: Recording, rows_of: _Rows) -> Float32[np.ndarray, "n d"]:
+def _spread(avlmap: AVLMap, recording: Recording, rows_of: _Rows) -> Float32[np.ndarray, "n d"]:
     """Add up rows over the voxels that their pixels lie in: each row counts once a voxel and keyframe."""
-    stored = asked.stored
+    stored = avlmap.stored
     key = _packed(np.asarray(stored.voxels.index, np.int64))
     total = np.zeros((len(key), stored.keyframes.view.shape[1]), np.float32)
     frame_of = np.searchsorted(recording.stamps_s, np.asarray(stored.keyframes.stamp_s) - 1e-6)
