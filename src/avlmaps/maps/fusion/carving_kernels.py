@@ -109,7 +109,7 @@ def group(index: Int32[np.ndarray, "n 3"], table: Int32[np.ndarray, " slots"], p
             i, j, k = step // 9 - 1, step // 3 % 3 - 1, step % 3 - 1
             row = find_row(index[n, 0] + i, index[n, 1] + j, index[n, 2] + k, table, index)
             if row >= 0:
-                a, b = _root(parent, n), _root(parent, row)
+                a, b = _root(parent, n), _root(parent, int(row))
                 parent[max(a, b)] = min(a, b)
     for n in range(index.shape[0]):
         parent[n] = _root(parent, n)

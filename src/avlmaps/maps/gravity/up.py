@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.types import Frame
@@ -64,7 +64,8 @@ def find_up(frames: Iterable[Frame], rng: np.random.Generator) -> Up:
             f"{MAX_DEPTH_M} m, and {FEWEST_NORMALS} are needed; write the recording's up direction into it."
         )
     direction = _refined(_most_shared(normal, np.stack(rotations), rng), normal)
-    return Up(direction, float(np.mean(np.abs(normal @ direction) > np.cos(NEAR_RAD))))
+    along: Bool[np.ndarray, " n"] = np.abs(normal @ direction) > np.cos(NEAR_RAD)
+    return Up(direction, float(along.mean()))
 
 
 def surface_normals(frame: Frame, rng: np.random.Generator) -> Float[np.ndarray, "n 3"]:
