@@ -100,6 +100,17 @@ def write_clap(folder: Path) -> None:
     write_roberta_tokenizer(place)
 
 
+def write_clap_unfused(folder: Path) -> None:
+    """CLAP with the smaller of the two networks that hear (HTSAT-tiny), as in clap-htsat-unfused."""
+    from tiny.clap import write_roberta_tokenizer
+    from transformers import ClapConfig, ClapFeatureExtractor, ClapModel
+
+    place = folder / "laion/clap-htsat-unfused"
+    ClapModel(ClapConfig()).save_pretrained(place)
+    ClapFeatureExtractor(frequency_min=50, frequency_max=14000, truncation="rand_trunc").save_pretrained(place)
+    write_roberta_tokenizer(place)
+
+
 def write_pe_a_frame(folder: Path) -> None:
     """PE-A-Frame base; the text model is ModernBERT's large one."""
     from tiny.pe_a_frame import letters

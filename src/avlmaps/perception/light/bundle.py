@@ -155,6 +155,7 @@ class Bundle:
         options.intra_op_num_threads = min(_MOST_THREADS, _cores())
         options.inter_op_num_threads = 1
         options.log_severity_level = 3
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # decoding needs the cores, too
         try:
             return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
         except Exception as fault:  # onnxruntime raises types of its own

@@ -68,10 +68,10 @@ def card_of(bundle: Bundle, module: str, prompts: tuple[str, ...], note: str) ->
     made = bundle.manifest.pictures
     constants = (f"light {module} short side {made.short_side} scale {made.logit_scale}", *prompts)
     return ModelCard(
-        id=f"{bundle.manifest.id} {module} ({made.source})",
+        id=bundle.manifest.id,
         dim=made.dim,
         licence=made.licence,
         checksum=bundle.checksum(PICTURES, PICTURE_WORDS, PICTURE_TOKENS, constants=constants),
         prompts=prompts,
-        note=note,
+        note=f"{made.source} in int8: {note}",
     )

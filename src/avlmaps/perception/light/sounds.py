@@ -36,14 +36,14 @@ class LightSounds:
         self._mel, self.logit_scale = note.mel, note.logit_scale
         constants = (f"light sounds shared {_SHARED} {note.mel}", *note.prompts)
         self.card = ModelCard(
-            id=f"{self._bundle.manifest.id} sounds ({note.source})",
+            id=self._bundle.manifest.id,
             dim=note.dim,
             licence=note.licence,
             checksum=self._bundle.checksum(SOUNDS, SOUND_WORDS, SOUND_TOKENS, constants=constants),
             prompts=note.prompts,
             note=(
-                "any phrase is understood; a yes means likelier than all of the everyday sounds that it is compared "
-                "with, which was not fitted to recordings"
+                f"{note.source} in int8: any phrase is understood; a yes means likelier than all of the everyday "
+                "sounds that it is compared with, which was not fitted to recordings"
             ),
         )
         self.text = TextTower(self._bundle, SOUND_WORDS, SOUND_TOKENS, note.most_tokens)
