@@ -21,7 +21,7 @@ from avlmaps.bench.nyu import (
     class_of_kinds,
     smooth_depth,
 )
-from avlmaps.bench.suites import Asked, BenchError, run_suite
+from avlmaps.bench.suites import BenchError, SuiteInputs, run_suite
 from avlmaps.core.errors import RecordingError
 from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS, load_network
 
@@ -145,13 +145,13 @@ def test_a_damaged_folder_is_refused_in_one_sentence(folder: Path, damage, says:
 
 def test_the_suite_needs_a_folder_and_an_encoder_of_kinds(tmp_path: Path, folder: Path) -> None:
     with pytest.raises(BenchError, match="--nyuv2"):
-        run_suite("frames", Asked(), tmp_path)
+        run_suite("frames", SuiteInputs(), tmp_path)
     with pytest.raises(BenchError, match="colours"):
-        run_suite("frames", Asked(nyuv2=folder, profile="colours"), tmp_path)
+        run_suite("frames", SuiteInputs(nyuv2=folder, profile="colours"), tmp_path)
 
 
 def test_the_suite_writes_its_tables_in_every_form(tmp_path: Path, folder: Path) -> None:
-    answer = run_suite("frames", Asked(nyuv2=folder, profile="synthetic"), tmp_path / "out")
+    answer = run_suite("frames", SuiteInputs(nyuv2=folder, profile="synthetic"), tmp_path / "out")
     assert set(answer["tables"]) == {"labelled frames", "by class"}
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"frames.json", "frames.md", "frames.png", "frames-labelled-frames.csv", "frames-by-class.csv"}

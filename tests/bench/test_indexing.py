@@ -19,7 +19,7 @@ from avlmaps.bench.indexing.configurations import CONFIGURATIONS, configurations
 from avlmaps.bench.indexing.metrics import LIMITS_M, Answered, bootstrapped_mean, judged, scored
 from avlmaps.bench.indexing.rules import area_tasks, near_sound_tasks, photo_tasks, sound_tasks
 from avlmaps.bench.indexing.runs import IndexingSettings, run
-from avlmaps.bench.indexing.scene_queries import AskedScene
+from avlmaps.bench.indexing.scene_queries import QueriedScene
 from avlmaps.bench.indexing.tables import tables
 from avlmaps.bench.indexing.tasks import Task, TaskKind, TaskSet, load_tasks, save_tasks
 from avlmaps.core.question import Modality, Part
@@ -78,7 +78,7 @@ class _Perfect:
     """A scene whose map holds exactly the voxels of its surfaces, and the evidence that its recording would give."""
 
     scene: Scene
-    asked: AskedScene
+    asked: QueriedScene
     evidence: Evidence
 
 
@@ -88,7 +88,7 @@ def perfect(scene: Scene, events: tuple[HeardEvent, ...]) -> _Perfect:
     stored = SimpleNamespace(grid=GRID, voxels=SimpleNamespace(index=index), up_in_world=np.array([0.0, 0.0, 1.0]))
     truth = Truth({}, events, scene.objects, scene.areas)
     label = voxels.label(index)
-    asked = AskedScene(AVLMap(stored), None, truth, label, "overlay", lambda task: None)  # pyright: ignore[reportArgumentType]
+    asked = QueriedScene(AVLMap(stored), None, truth, label, "overlay", lambda task: None)  # pyright: ignore[reportArgumentType]
     seen = np.bincount(label, minlength=len(scene.objects))
     own = tuple(Event(e.category, e.robot) for e in events)
     return _Perfect(scene, asked, Evidence("home", scene.objects, seen, scene.areas, own))

@@ -159,7 +159,7 @@ def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, Any
     jobs = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
     for job in progress(jobs, "measuring", unit="scene"):
         place = Workplace(job, open_scene)
-        figures.append(measure(place.asked, place.truth.objects, _same(place.truth.objects), shown_scene(job.spec)))
+        figures.append(measure(place.avlmap, place.truth.objects, _same(place.truth.objects), shown_scene(job.spec)))
     missed = {"columns": ["scene", "category", "first goal, m from a true one"], "rows": _missed(figures)}
     named = {"objects found by their names": table_of(figures), "categories whose first goal is elsewhere": missed}
     chosen = chosen_on(settings.scenes)

@@ -124,14 +124,14 @@ def by_name(encoder: EmbeddedSounds, features: Sequence[Features], kinds: Sequen
     rows = []
     for group, chosen in _groups(kinds).items():
         mine, right = [features[i] for i in chosen], [kinds[i] for i in chosen]
-        asked = _asked(right, group)
-        scores = encoder.score_words(mine, [called[name] for name in asked])
-        truth = np.array([asked.index(kind) for kind in right])
-        yes, is_right = scores >= _YES, truth[:, None] == np.arange(len(asked))
+        queries = _query_names(right, group)
+        scores = encoder.score_words(mine, [called[name] for name in queries])
+        truth = np.array([queries.index(kind) for kind in right])
+        yes, is_right = scores >= _YES, truth[:, None] == np.arange(len(queries))
         every = encoder.score_words(mine, list(called.values()))
         first = every.argmax(axis=1) == [list(called).index(kind) for kind in right]
         rows += [
-            [group, f"right name first among {len(asked)} names", *_share(scores.argmax(axis=1) == truth)],
+            [group, f"right name first among {len(queries)} names", *_share(scores.argmax(axis=1) == truth)],
             [group, f"right name first among all {len(called)} kinds", *_share(first)],
             [group, "right kind says yes", *_share(yes[is_right])],
             [group, "another kind says yes", *_share(yes[~is_right])],
@@ -146,13 +146,13 @@ def each_kind(encoder: EmbeddedSounds, features: Sequence[Features], kinds: Sequ
     about = {kind.name: kind for kind in encoder.kinds}
     rows = []
     for group, chosen in _groups(kinds).items():
-        asked = _asked([kinds[i] for i in chosen], group)
-        scores = encoder.score_words([features[i] for i in chosen], [about[name].called[0] for name in asked])
+        queries = _query_names([kinds[i] for i in chosen], group)
+        scores = encoder.score_words([features[i] for i in chosen], [about[name].called[0] for name in queries])
         for kind in sorted({kinds[i] for i in chosen}):
             mine = scores[[kinds[i] == kind for i in chosen]]
-            k = asked.index(kind)
+            k = queries.index(kind)
             order = np.argsort(-mine, axis=1)
-            wrong = Counter(asked[o] for o in order[:, 0] if o != k)
+            wrong = Counter(queries[o] for o in order[:, 0] if o != k)
             rows.append([
                 kind, f"{about[kind].origin} ({about[kind].clips})", len(mine), int((order[:, 0] == k).sum()),
                 int((order[:, :5] == k).any(axis=1).sum()), int((mine[:, k] >= _YES).sum()),
@@ -176,9 +176,9 @@ def in_rooms(encoder: EmbeddedSounds, sounds: Sequence[Sound], dry: Sequence[Fea
                 for s in sounds
             ]
         for group, chosen in _groups(kinds).items():
-            asked = _asked([kinds[i] for i in chosen], group)
-            scores = encoder.score_words([wet[i] for i in chosen], [called[name] for name in asked])
-            truth = np.array([asked.index(kinds[i]) for i in chosen])
+            queries = _query_names([kinds[i] for i in chosen], group)
+            scores = encoder.score_words([wet[i] for i in chosen], [called[name] for name in queries])
+            truth = np.array([queries.index(kinds[i]) for i in chosen])
             own = scores[np.arange(len(truth)), truth]
             where = f"RT60 {rt60_s} s" if rt60_s else "dry"
             first = _share(scores.argmax(axis=1) == truth)
@@ -240,7 +240,7 @@ def _groups(kinds: Sequence[str]) -> dict[str, list[int]]:
     return {name: chosen for name, chosen in groups.items() if chosen}
 
 
-def _asked(kinds: Sequence[str], group: str) -> list[str]:
+def _query_names(kinds: Sequence[str], group: str) -> list[str]:
     return list(ESC10) if group == "ESC-10" else [*ESC10, *sorted(set(kinds) - set(ESC10))]
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class SuiteInputs:
     """The inputs of a suite.
 
     Attributes:
@@ -44,13 +44,13 @@ class Asked:
     navigation: "NavigationSettings | None" = None
 
 
-def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
+def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
     """Run a suite and write SUITE.json, SUITE.md, SUITE.png and a CSV file for each table into ``out``.
 
     Args:
         suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``objects``, ``indexing``
             or ``navigation``.
-        asked: what it measures on.
+        inputs: what it measures on.
         out: folder to write into.
 
     Raises:
@@ -59,25 +59,25 @@ def run_suite(suite: str, asked: Asked, out: Path) -> dict[str, Any]:
     if suite == "indexing":
         from avlmaps.bench.indexing.suite import run_indexing
 
-        return run_indexing(asked.indexing, out)
+        return run_indexing(inputs.indexing, out)
     if suite == "navigation":
         from avlmaps.bench.navigation.suite import run_navigation
 
-        return run_navigation(asked.navigation, out)
-    used = choose_models(asked.profile, asked.models)
+        return run_navigation(inputs.navigation, out)
+    used = choose_models(inputs.profile, inputs.models)
     weights = _weights(suite, used)
     if suite == "objects":
         from avlmaps.bench.objects import run_objects
 
-        return run_objects(asked.indexing, out)
-    tables = _SUITES[suite](asked)
-    sources = (asked.sounds, asked.clips, asked.nyuv2, *asked.scenes)
+        return run_objects(inputs.indexing, out)
+    tables = _SUITES[suite](inputs)
+    sources = (inputs.sounds, inputs.clips, inputs.nyuv2, *inputs.scenes)
     answer = {
         "suite": suite,
         "scenes": [source.resolve().name for source in sources if source is not None],
-        "profile": asked.profile,
-        "models": list(asked.models),
-        "seed": asked.seed,
+        "profile": inputs.profile,
+        "models": list(inputs.models),
+        "seed": inputs.seed,
         "weights": weights,
         "tables": tables,
     }
@@ -98,69 +98,69 @@ def _weights(suite: str, used: Profile) -> dict[str, str]:
     return {kind.value: known[kind.value] for kind in _MEASURED.get(suite, ()) if kind.value in known}
 
 
-def _words(asked: Asked) -> Mapping[str, Table]:
+def _words(inputs: SuiteInputs) -> Mapping[str, Table]:
     from avlmaps.bench import words
 
-    _embedded_only(asked, "words")
+    _embedded_only(inputs, "words")
     return {"phrases kept out of training": words.run()}
 
 
-def _sounds(asked: Asked) -> Mapping[str, Table]:
+def _sounds(inputs: SuiteInputs) -> Mapping[str, Table]:
     from avlmaps.bench import sound_clips, sounds
 
-    _embedded_only(asked, "sounds")
-    if asked.clips is not None:
-        return sound_clips.run(asked.clips)
-    return sounds.run(_clips(asked))
+    _embedded_only(inputs, "sounds")
+    if inputs.clips is not None:
+        return sound_clips.run(inputs.clips)
+    return sounds.run(_clips(inputs))
 
 
-def _segmentation(asked: Asked) -> Mapping[str, Table]:
+def _segmentation(inputs: SuiteInputs) -> Mapping[str, Table]:
     from avlmaps.bench import segmentation
 
-    return {"sounds found in a track": segmentation.run(_clips(asked), asked.seed)}
+    return {"sounds found in a track": segmentation.run(_clips(inputs), inputs.seed)}
 
 
-def _locate(asked: Asked) -> Mapping[str, Table]:
+def _locate(inputs: SuiteInputs) -> Mapping[str, Table]:
     from avlmaps.bench import locate
     from avlmaps.recordings.open import open_recording
 
-    if not asked.scenes:
+    if not inputs.scenes:
         raise BenchError("This suite measures on recordings with poses; name one or more with --scenes.")
     tables: dict[str, Table] = {}
-    for path in asked.scenes:
+    for path in inputs.scenes:
         recording = open_recording(path)
         if len(recording) < 20:
             raise RecordingError(f"{path} has {len(recording)} frames; half as map and half as photos takes 20.")
         tables[f"photos located in {path.resolve().name}"] = locate.run(
-            recording, asked.seed, used=choose_models(asked.profile, asked.models)
+            recording, inputs.seed, used=choose_models(inputs.profile, inputs.models)
         )
     return tables
 
 
-def _frames(asked: Asked) -> Mapping[str, Table]:
+def _frames(inputs: SuiteInputs) -> Mapping[str, Table]:
     from avlmaps.bench.frames import run_frames
     from avlmaps.perception.embedded.pixels import EmbeddedPixels
     from avlmaps.perception.profiles import profile
 
-    if asked.nyuv2 is None:
+    if inputs.nyuv2 is None:
         raise BenchError("This suite measures on labelled frames in the layout of NYU Depth V2; name their folder with "
                          "--nyuv2.")  # fmt: skip
-    encoder = profile(asked.profile).pixel_encoder()
+    encoder = profile(inputs.profile).pixel_encoder()
     if not isinstance(encoder, EmbeddedPixels):
         raise BenchError(
-            f"The suite frames sums probabilities of kinds, which the pixel encoder of the profile {asked.profile!r} "
+            f"The suite frames sums probabilities of kinds, which the pixel encoder of the profile {inputs.profile!r} "
             "does not give. Choose embedded or synthetic."
         )
-    return run_frames(encoder, asked.nyuv2)
+    return run_frames(encoder, inputs.nyuv2)
 
 
-def _language(_: Asked) -> Mapping[str, Table]:
+def _language(_: SuiteInputs) -> Mapping[str, Table]:
     from avlmaps.bench import language
 
     return language.run()
 
 
-_SUITES: dict[str, Callable[[Asked], Mapping[str, Table]]] = {
+_SUITES: dict[str, Callable[[SuiteInputs], Mapping[str, Table]]] = {
     "words": _words,
     "language": _language,
     "sounds": _sounds,
@@ -170,12 +170,12 @@ _SUITES: dict[str, Callable[[Asked], Mapping[str, Table]]] = {
 }
 
 
-def _clips(asked: Asked) -> Path:
-    if asked.sounds is None:
+def _clips(inputs: SuiteInputs) -> Path:
+    if inputs.sounds is None:
         raise BenchError("This suite measures on a folder of clips with an index.csv; name it with --sounds.")
-    return asked.sounds
+    return inputs.sounds
 
 
-def _embedded_only(asked: Asked, suite: str) -> None:
-    if asked.profile != "embedded":
-        raise BenchError(f"The suite {suite} measures the embedded encoder; it has no figures for {asked.profile!r}.")
+def _embedded_only(inputs: SuiteInputs, suite: str) -> None:
+    if inputs.profile != "embedded":
+        raise BenchError(f"The suite {suite} measures the embedded encoder; it has no figures for {inputs.profile!r}.")

@@ -100,16 +100,16 @@ class Bench(ModelVerb):
 
     def run(self) -> None:
         """Measure, write the tables, print them."""
-        from avlmaps.bench.suites import Asked, run_suite
+        from avlmaps.bench.suites import SuiteInputs, run_suite
 
         indexing = self.indexing_settings() if self.suite in ("indexing", "objects") else None
         navigation = self.navigation_settings() if self.suite == "navigation" else None
         scenes = () if indexing or navigation else tuple(map(Path, self.scenes))
         models = self.models_chosen
-        asked = Asked(
+        inputs = SuiteInputs(
             self.sounds, self.clips, scenes, self.nyuv2, self.profile, models, self.seed, indexing, navigation
         )
-        answer = run_suite(self.suite, asked, self.out)
+        answer = run_suite(self.suite, inputs, self.out)
         lines: list[str] = []
         for name, table in answer["tables"].items():
             lines += [name, *["  " + line for line in table_lines(table["columns"], table["rows"])]]

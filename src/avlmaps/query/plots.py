@@ -62,7 +62,7 @@ def draw_heat(
         _draw_heat(ax, view, factor.shown)
         _draw_anchors(ax, factor)
         note = "" if factor.found else f" · not found, at most {factor.shown.max(initial=0.0):.2f}"
-        ax.set_title(f"{plot_text(_asked(factor))} ({factor.part.role}){note}", fontsize=10, color=INK, loc="left")
+        ax.set_title(f"{plot_text(_query_text(factor))} ({factor.part.role}){note}", fontsize=10, color=INK, loc="left")
     if count > 1:
         draw_ground(axes[-1], view, space)
         _draw_heat(axes[-1], view, shown)
@@ -275,7 +275,7 @@ def finish(figure: "Figure", axes: "Sequence[Axes]", with_heat: bool) -> None:
         bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
 
 
-def _asked(factor: Factor) -> str:
+def _query_text(factor: Factor) -> str:
     query = Path(factor.part.query).name if factor.part.is_file else factor.part.query
     return f"{factor.part.modality}: {query}"
 

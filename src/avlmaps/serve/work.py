@@ -212,7 +212,7 @@ def sound_clip(task: Task, query: NoQuery) -> File:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class QueryReply:
     """A query and its answer.
 
     Attributes:
@@ -224,7 +224,7 @@ class Asked:
     json: QueryAnswer
 
 
-def ask_map(task: Task, query: AskQuery) -> Asked:
+def ask_map(task: Task, query: AskQuery) -> QueryReply:
     """Answer a sentence or parts, with the files of the request.
 
     Raises:
@@ -245,9 +245,9 @@ def ask_map(task: Task, query: AskQuery) -> Asked:
     top = min(query.top, task.limits.goals)
     if not words:
         answer = task.map.avlmap.ask(Question.of(parts, primary), top, camera, attachments)
-        return Asked(answer, answer.to_json())
+        return QueryReply(answer, answer.to_json())
     reply = _sentence_answer(task, query, top, primary, attachments, camera)
-    return Asked(reply.answer, reply.to_json())
+    return QueryReply(reply.answer, reply.to_json())
 
 
 def _sentence_answer(
@@ -318,10 +318,10 @@ def picture(task: Task, query: PictureQuery) -> File:
     if not asks:
         content = map_picture(task.map) if query.size == "full" else small_picture(task.map)
         return File(content, "image/png")
-    asked = ask_map(task, AskQuery(**values))
+    reply = ask_map(task, AskQuery(**values))
     task.watch.step("drawing")
     draw = full_picture if query.size == "full" else small_picture
-    return File(draw(task.map, asked.answer), "image/png")
+    return File(draw(task.map, reply.answer), "image/png")
 
 
 def tiles(task: Task, query: NoQuery) -> TilesAnswer:

@@ -119,7 +119,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_POST(self) -> None:
         """Answer what is posted."""
-        self._answered(self._asked)
+        self._answered(self._post)
 
     def _answered(self, answer: Any) -> None:
         try:
@@ -192,7 +192,7 @@ class _Handler(BaseHTTPRequestHandler):
             raise _RefusedError(404, f"There is no map {at}; the page shows {len(maps)}.")
         return maps[at]
 
-    def _asked(self) -> None:
+    def _post(self) -> None:
         session = self.server.session
         parts = [part for part in urlsplit(self.path).path.split("/") if part]
         match parts:

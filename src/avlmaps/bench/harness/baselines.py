@@ -18,35 +18,35 @@ class WeakHearing:
     """The sounds of a map, as a weaker sound encoder scores them.
 
     Args:
-        asked: the map.
+        avlmap: the map.
         seed: of the ear's examples.
     """
 
-    def __init__(self, asked: AVLMap, seed: int) -> None:
-        self._asked, self._seed = asked, seed
+    def __init__(self, avlmap: AVLMap, seed: int) -> None:
+        self._avlmap, self._seed = avlmap, seed
 
     def heat(self, name: str, role: Role) -> Heatmap:
         """Return the heat of a kind of sound."""
-        asked = self._asked
+        avlmap = self._avlmap
         scores = weak_ear(self._seed).scores(self._clips, name)
         part = Part(Modality.SOUND, name, role)
         factor = sound_factor(
-            asked.space, asked.stored.sounds, scores, part, SoundSettings(), asked.settings.heat
+            avlmap.space, avlmap.stored.sounds, scores, part, SoundSettings(), avlmap.settings.heat
         )  # fmt: skip
         return Heatmap.of(factor)
 
     @cached_property
     def _clips(self) -> list[Sound]:
-        stored = self._asked.stored
+        stored = self._avlmap.stored
         return [AudioTrack.open(stored.clip_path(i)).read() for i in range(len(stored.sounds))]
 
 
-def alike_keyframe(asked: AVLMap, rgb: UInt8[np.ndarray, "h w 3"], name: str, role: Role) -> Heatmap:
+def alike_keyframe(avlmap: AVLMap, rgb: UInt8[np.ndarray, "h w 3"], name: str, role: Role) -> Heatmap:
     """Return the heat around the place where the keyframe most like a picture was taken."""
-    stored = asked.stored
+    stored = avlmap.stored
     local = stored.profile.local_encoder().encode(rgb)
     place = stored.profile.place_encoder().encode(rgb, local, stored.place_state)
     best = int(np.argmax(np.asarray(stored.keyframes.place, np.float32) @ place))
     pose = np.asarray(stored.keyframes.world_from_camera[best], np.float64)
     part = Part(Modality.IMAGE, name, role, is_file=True)
-    return Heatmap.of(true_places(asked.space, part, asked.settings.heat.falloff_per_m(role), [pose[None, :3, 3]]))
+    return Heatmap.of(true_places(avlmap.space, part, avlmap.settings.heat.falloff_per_m(role), [pose[None, :3, 3]]))

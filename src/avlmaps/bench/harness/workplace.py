@@ -181,7 +181,7 @@ class Workplace:
         return replace(truth, events=named)
 
     @cached_property
-    def asked(self) -> AVLMap:
+    def avlmap(self) -> AVLMap:
         """The map, built if need be."""
         from avlmaps.maps.build import build_map
 
@@ -196,7 +196,7 @@ class Workplace:
 
     @cached_property
     def _true_voxels(self) -> TrueVoxels:
-        grid = self.asked.stored.grid
+        grid = self.avlmap.stored.grid
         path = self.job.folder / f"true-voxels-{round(grid.voxel_size_m * 1000)}mm.npz"
         if not path.exists():
             made = TrueVoxels.of(self.scene, grid)
@@ -210,12 +210,12 @@ class Workplace:
     def label(self) -> Int[np.ndarray, " n"]:
         """The true thing of each voxel of the map, -1 for none."""
         if self.own is not None:
-            return self.own.label(self.asked.space.centres, self.asked.stored.up_in_world)
-        return self._true_voxels.label(np.asarray(self.asked.stored.voxels.index))
+            return self.own.label(self.avlmap.space.centres, self.avlmap.stored.up_in_world)
+        return self._true_voxels.label(np.asarray(self.avlmap.stored.voxels.index))
 
     def has(self, kinds: Sequence[Kind]) -> bool:
         """Return whether the map's profile has models for all of these."""
-        return all(self.asked.stored.profile.backend_name(kind) for kind in kinds)
+        return all(self.avlmap.stored.profile.backend_name(kind) for kind in kinds)
 
     def photo(self, world_from_camera: Float[np.ndarray, "4 4"]) -> UInt8[np.ndarray, "h w 3"]:
         """Return the photo taken from a pose, drawn if need be."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from avlmaps.bench.indexing.scene_queries import AskedScene
+from avlmaps.bench.indexing.scene_queries import QueriedScene
 from avlmaps.bench.indexing.tasks import Task, TaskKind
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Role
@@ -11,7 +11,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.sim.mesh import Triple
 
-Source = Callable[[AskedScene, Task, Role], Heatmap | None]
+Source = Callable[[QueriedScene, Task, Role], Heatmap | None]
 
 OURS, CEILING = "ours", "true perception"
 
@@ -34,7 +34,7 @@ class Configuration:
     needs: tuple[Kind, ...] = ()
     role: str = "variant"
 
-    def answer(self, scene: AskedScene, task: Task) -> Triple | None:
+    def answer(self, scene: QueriedScene, task: Task) -> Triple | None:
         """Return the first goal's place; None where the map has no answer, or knows nothing of a word."""
         try:
             heat = [
@@ -50,19 +50,19 @@ class Configuration:
 _PIXELS, _SOUNDS = (Kind.PIXELS,), (Kind.PIXELS, Kind.SOUNDS)
 _VIEWS = (Kind.PIXELS, Kind.VIEWS)
 _PHOTOS = (Kind.PIXELS, Kind.LOCAL, Kind.PLACE, Kind.MATCHER)
-_object, _sound, _weak = AskedScene.map_object, AskedScene.map_sound, AskedScene.weak_sound
-_area, _true_object, _true_sound = AskedScene.map_area, AskedScene.true_object, AskedScene.true_sound
+_object, _sound, _weak = QueriedScene.map_object, QueriedScene.map_sound, QueriedScene.weak_sound
+_area, _true_object, _true_sound = QueriedScene.map_area, QueriedScene.true_object, QueriedScene.true_sound
 
 _AREA_ROWS = (
     ("object only", (_object,), _PIXELS, "baseline"),
-    ("+ area by the object encoder", (_object, AskedScene.area_as_object), _PIXELS, "variant"),
-    ("+ whole views in each voxel", (_object, AskedScene.pixel_views), _VIEWS, "variant"),
-    ("+ ConceptFusion: regions and views in each voxel", (_object, AskedScene.region_views), _VIEWS, "variant"),
-    ("+ sparse view map by the paper's rules", (_object, AskedScene.paper_area), _VIEWS, "variant"),
+    ("+ area by the object encoder", (_object, QueriedScene.area_as_object), _PIXELS, "variant"),
+    ("+ whole views in each voxel", (_object, QueriedScene.pixel_views), _VIEWS, "variant"),
+    ("+ ConceptFusion: regions and views in each voxel", (_object, QueriedScene.region_views), _VIEWS, "variant"),
+    ("+ sparse view map by the paper's rules", (_object, QueriedScene.paper_area), _VIEWS, "variant"),
     ("+ sparse view map (ours)", (_object, _area), _VIEWS, OURS),
-    ("+ true region map", (_object, AskedScene.true_area), _PIXELS, "variant"),
+    ("+ true region map", (_object, QueriedScene.true_area), _PIXELS, "variant"),
     ("true objects + sparse view map", (_true_object, _area), (Kind.VIEWS,), "variant"),
-    (CEILING, (_true_object, AskedScene.true_area), (), "ceiling"),
+    (CEILING, (_true_object, QueriedScene.true_area), (), "ceiling"),
 )
 # The primary part stands first: here the sound.
 _SOUND_ROWS = (
@@ -76,12 +76,12 @@ _SOUND_ROWS = (
 )
 _PHOTO_ROWS = (
     ("object only", (_object,), _PIXELS, "baseline"),
-    ("image only", (AskedScene.map_photo,), _PHOTOS[1:], "baseline"),
-    ("object + most alike keyframe, not located", (_object, AskedScene.alike_keyframe), _PHOTOS, "variant"),
-    ("object + image (ours)", (_object, AskedScene.map_photo), _PHOTOS, OURS),
-    ("object + true camera", (_object, AskedScene.true_camera), _PIXELS, "variant"),
-    ("true objects + image", (_true_object, AskedScene.map_photo), _PHOTOS[1:], "variant"),
-    (CEILING, (_true_object, AskedScene.true_camera), (), "ceiling"),
+    ("image only", (QueriedScene.map_photo,), _PHOTOS[1:], "baseline"),
+    ("object + most alike keyframe, not located", (_object, QueriedScene.alike_keyframe), _PHOTOS, "variant"),
+    ("object + image (ours)", (_object, QueriedScene.map_photo), _PHOTOS, OURS),
+    ("object + true camera", (_object, QueriedScene.true_camera), _PIXELS, "variant"),
+    ("true objects + image", (_true_object, QueriedScene.map_photo), _PHOTOS[1:], "variant"),
+    (CEILING, (_true_object, QueriedScene.true_camera), (), "ceiling"),
 )
 _NEAR_SOUND_ROWS = (
     ("object only", (_object,), _PIXELS, "baseline"),

@@ -14,7 +14,7 @@ from avlmaps.bench.harness.workplace import SceneJob, Workplace, scene_jobs
 from avlmaps.bench.indexing.configurations import CONFIGURATIONS
 from avlmaps.bench.indexing.metrics import Answered, judged
 from avlmaps.bench.indexing.rules import area_tasks, near_sound_tasks, photo_tasks, sound_tasks
-from avlmaps.bench.indexing.scene_queries import AskedScene
+from avlmaps.bench.indexing.scene_queries import QueriedScene
 from avlmaps.bench.indexing.tasks import Task, TaskKind, TaskSet, load_tasks, save_tasks
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.version import __version__
@@ -138,7 +138,7 @@ def run(settings: IndexingSettings, work: Path, open_spec: Callable[[str], Scene
         _Todo(job, open_spec, tasks=tuple(task for task in tasks.tasks if task.scene == job.spec))
         for job in scene_jobs(settings, tasks.recorded, tasks.scenes, work)
     ]
-    scenes = side_by_side(_asked, todo, settings.jobs, "indexing", _named)
+    scenes = side_by_side(_run_scene, todo, settings.jobs, "indexing", _named)
     return Outcome(settings, tasks, tuple(scenes), weights)
 
 
@@ -177,7 +177,7 @@ def _in_turn(made: Sequence[Sequence[Task]], kind: TaskKind, sizes: Mapping[Task
 def _made(todo: _Todo) -> list[Task]:
     """Record and map a scene, and make its tasks: the same for a seed, whichever are taken."""
     place = Workplace(todo.job, todo.open_spec)
-    stored, most = place.asked.stored, todo.most
+    stored, most = place.avlmap.stored, todo.most
     path = todo.job.folder / f"tasks-{_key(todo.job, stored.info.build_key, most)}.json"
     if not path.exists():
         evidence, rng = place.evidence, todo.job.rng
@@ -195,11 +195,11 @@ def _made(todo: _Todo) -> list[Task]:
     return list(load_tasks(path).tasks)
 
 
-def _asked(todo: _Todo) -> SceneOutcome:
+def _run_scene(todo: _Todo) -> SceneOutcome:
     """Put a scene's tasks to every configuration that the profile has the models for, unless that is done."""
     begin = perf_counter()
     place = Workplace(todo.job, todo.open_spec)
-    info = place.asked.stored.info
+    info = place.avlmap.stored.info
     fingerprint = sha256(msgspec.json.encode(todo.tasks)).hexdigest()
     path = todo.job.folder / f"answers-{_key(todo.job, info.build_key, fingerprint)}.json"
     if not path.exists():
@@ -214,8 +214,8 @@ def _asked(todo: _Todo) -> SceneOutcome:
 
 def _answers(place: Workplace, tasks: Sequence[Task]) -> list[Answered]:
     recorded = place.job.recorded
-    scene = AskedScene(
-        place.asked, place.recording, place.truth, place.label, recorded.hearing,
+    scene = QueriedScene(
+        place.avlmap, place.recording, place.truth, place.label, recorded.hearing,
         lambda task: place.photo(task.world_from_photo), recorded.seed,
     )  # fmt: skip
     return [

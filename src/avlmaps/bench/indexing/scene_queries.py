@@ -23,11 +23,11 @@ from avlmaps.sim.truth import Truth
 
 
 @dataclass(eq=False)
-class AskedScene:
+class QueriedScene:
     """A map and the truth of its scene; each source of heat is computed once.
 
     Attributes:
-        asked: the map.
+        avlmap: the map.
         recording: what it was made of.
         truth: what is there.
         label: the true thing of each voxel, -1 for none.
@@ -36,7 +36,7 @@ class AskedScene:
         seed: of the weak ear's examples.
     """
 
-    asked: AVLMap
+    avlmap: AVLMap
     recording: Recording
     truth: Truth
     label: Int[np.ndarray, " n"]
@@ -48,7 +48,7 @@ class AskedScene:
     @property
     def space(self) -> Space:
         """The voxels' places."""
-        return self.asked.space
+        return self.avlmap.space
 
     @cached_property
     def largest_m(self) -> float:
@@ -64,37 +64,37 @@ class AskedScene:
 
     def _part(self, modality: Modality, query: str, role: Role) -> tuple[Part, float]:
         is_file = modality is Modality.IMAGE
-        return Part(modality, query, role, is_file), self.asked.settings.heat.falloff_per_m(role)
+        return Part(modality, query, role, is_file), self.avlmap.settings.heat.falloff_per_m(role)
 
     # The map's own answers.
 
     def map_object(self, task: Task, role: Role) -> Heatmap | None:
         """The category, by the map's pixel features; raises ``QueryError`` where they know no such word."""
         primary = role is Role.PRIMARY
-        return self._once(("object", task.object_name, role), lambda: self.asked.object(task.object_name, primary))
+        return self._once(("object", task.object_name, role), lambda: self.avlmap.object(task.object_name, primary))
 
     def map_sound(self, task: Task, role: Role) -> Heatmap | None:
         """The sound, by the map's sound features."""
         primary = role is Role.PRIMARY
-        return self._once(("sound", task.sound_name, role), lambda: self.asked.sound(task.sound_name, primary))
+        return self._once(("sound", task.sound_name, role), lambda: self.avlmap.sound(task.sound_name, primary))
 
     def map_photo(self, task: Task, role: Role) -> Heatmap | None:
         """The photo, located in the map."""
         return self._once(
-            ("photo", task.name, role), lambda: self.asked.image(self.photo_of(task), primary=role is Role.PRIMARY)
+            ("photo", task.name, role), lambda: self.avlmap.image(self.photo_of(task), primary=role is Role.PRIMARY)
         )
 
     def map_area(self, task: Task, role: Role) -> Heatmap | None:
         """The area, by the keyframes' view features and the rules of the map."""
-        return self._once(("area", task.context, role), lambda: self.asked.area(task.context, role is Role.PRIMARY))
+        return self._once(("area", task.context, role), lambda: self.avlmap.area(task.context, role is Role.PRIMARY))
 
     def paper_area(self, task: Task, role: Role) -> Heatmap | None:
         """The area by the paper's rules: from the camera's place, cosines stretched, every view for itself."""
 
         def make() -> Heatmap:
             part, _ = self._part(Modality.AREA, task.context, role)
-            stored = self.asked.stored
-            encoder, heat = stored.profile.view_encoder(), self.asked.settings.heat
+            stored = self.avlmap.stored
+            encoder, heat = stored.profile.view_encoder(), self.avlmap.settings.heat
             return Heatmap.of(area_factor(self.space, stored.keyframes, encoder, part, PAPER_AREAS, heat))
 
         return self._once(("paper area", task.context, role), make)
@@ -107,12 +107,12 @@ class AskedScene:
 
     @cached_property
     def _weak_hearing(self) -> WeakHearing:
-        return WeakHearing(self.asked, self.seed)
+        return WeakHearing(self.avlmap, self.seed)
 
     def alike_keyframe(self, task: Task, role: Role) -> Heatmap | None:
         """The photo, put where the most alike keyframe was taken; its pose is not computed."""
         return self._once(
-            ("alike", task.name, role), lambda: alike_keyframe(self.asked, self.photo_of(task), task.context, role)
+            ("alike", task.name, role), lambda: alike_keyframe(self.avlmap, self.photo_of(task), task.context, role)
         )
 
     def area_as_object(self, task: Task, role: Role) -> Heatmap | None:
@@ -120,7 +120,7 @@ class AskedScene:
 
         def make() -> Heatmap | None:
             try:
-                heat = self.asked.object(task.context, role is Role.PRIMARY)
+                heat = self.avlmap.object(task.context, role is Role.PRIMARY)
             except QueryError:
                 return None
             return heat if heat.peak > 0.0 else None
@@ -140,8 +140,8 @@ class AskedScene:
     ) -> Heatmap | None:
         def make() -> Heatmap:
             part, _ = self._part(Modality.AREA, task.context, role)
-            encoder, rows = self.asked.stored.profile.view_encoder(), features()
-            _, scores = area_scores(rows, encoder, task.context, self.asked.settings.areas)
+            encoder, rows = self.avlmap.stored.profile.view_encoder(), features()
+            _, scores = area_scores(rows, encoder, task.context, self.avlmap.settings.areas)
             heat = np.where(rows.any(axis=1), scores, 0.0).astype(np.float32)
             return Heatmap.of(VoxelHeat(self.space, part, heat, bool((heat >= 0.5).any())))
 
@@ -149,11 +149,11 @@ class AskedScene:
 
     @cached_property
     def _voxel_views(self) -> Float32[np.ndarray, "n d"]:
-        return view_features(self.asked, self.recording)
+        return view_features(self.avlmap, self.recording)
 
     @cached_property
     def _region_views(self) -> Float32[np.ndarray, "n d"]:
-        return region_features(self.asked, self.recording)
+        return region_features(self.avlmap, self.recording)
 
     # The truth.
 

@@ -44,7 +44,7 @@ class KnownScene:
     """The truth of a scene, beside its map.
 
     Attributes:
-        asked: the map.
+        avlmap: the map.
         truth: things, sounds and rooms.
         label: the true thing of each voxel, −1 for none.
         hearing: whether a sound's true place is the robot's (``overlay``) or its source's (``acoustic``).
@@ -52,7 +52,7 @@ class KnownScene:
         weak: the plainer ear, made when it is first needed.
     """
 
-    asked: AVLMap
+    avlmap: AVLMap
     truth: Truth
     label: Int[np.ndarray, " n"]
     hearing: str
@@ -68,8 +68,8 @@ class Perceived(AVLMap):
     """
 
     def __init__(self, scene: KnownScene, senses: Senses) -> None:
-        super().__init__(scene.asked.stored, scene.asked.settings)
-        self.space = scene.asked.space  # so that heat of all senses multiplies
+        super().__init__(scene.avlmap.stored, scene.avlmap.settings)
+        self.space = scene.avlmap.space  # so that heat of all senses multiplies
         self._scene, self._senses = scene, senses
 
     def object(self, word: str, primary: bool = False, vocabulary: Sequence[str] | None = None) -> Heatmap:
@@ -77,14 +77,14 @@ class Perceived(AVLMap):
         if self._senses.objects == "none":
             return self._nothing(Modality.OBJECT, word, primary)
         if self._senses.objects == "ours":
-            return self._once(("object", word, primary), lambda: self._scene.asked.object(word, primary))
+            return self._once(("object", word, primary), lambda: self._scene.avlmap.object(word, primary))
         return self._once(("true object", word, primary), lambda: self._true_object(word, primary))
 
     def sound(self, text: str, primary: bool = False) -> Heatmap:
         """Return the heat of where a sound was heard."""
         sense = self._senses.sounds
         makers: dict[str, Callable[[], Heatmap]] = {
-            "ours": lambda: self._scene.asked.sound(text, primary),
+            "ours": lambda: self._scene.avlmap.sound(text, primary),
             "weak": lambda: self._scene.weak().heat(self._category(text), _role(primary)),
             "true": lambda: self._true_sound(text, primary),
             "none": lambda: self._nothing(Modality.SOUND, text, primary),
@@ -102,8 +102,8 @@ class Perceived(AVLMap):
             raise ValueError("missions name photos by their files")
         name, sense = Path(picture).name, self._senses.images
         makers: dict[str, Callable[[], Heatmap]] = {
-            "ours": lambda: self._scene.asked.image(picture, intrinsics, primary),
-            "weak": lambda: alike_keyframe(self._scene.asked, read_picture(Path(picture)), name, _role(primary)),
+            "ours": lambda: self._scene.avlmap.image(picture, intrinsics, primary),
+            "weak": lambda: alike_keyframe(self._scene.avlmap, read_picture(Path(picture)), name, _role(primary)),
             "true": lambda: self._places(Modality.IMAGE, name, primary, [self._scene.photos[name][None, :3, 3]]),
             "none": lambda: self._nothing(Modality.IMAGE, name, primary),
         }
@@ -113,7 +113,7 @@ class Perceived(AVLMap):
         """Return the heat of a kind of room."""
         sense = self._senses.areas
         makers: dict[str, Callable[[], Heatmap]] = {
-            "ours": lambda: self._scene.asked.area(word, primary),
+            "ours": lambda: self._scene.avlmap.area(word, primary),
             "true": lambda: self._true_area(word, primary),
             "none": lambda: self._nothing(Modality.AREA, word, primary),
         }

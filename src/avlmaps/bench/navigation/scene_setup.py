@@ -62,7 +62,7 @@ class NavigationPlace:
     @cached_property
     def obstacles(self) -> Obstacles:
         """The obstacles that the map shows."""
-        return obstacles_for(self.work.asked, BASE)
+        return obstacles_for(self.work.avlmap, BASE)
 
     @cached_property
     def _known(self) -> Foreknowledge:
@@ -106,8 +106,8 @@ class NavigationPlace:
 
     def pilot(self, missions: list[Mission], translator: Translator | None) -> Pilot:
         """Return the runner of missions."""
-        asked = self.work.asked
-        if not np.allclose(asked.stored.up_in_world, (0.0, 0.0, 1.0), atol=1e-9):
+        avlmap = self.work.avlmap
+        if not np.allclose(avlmap.stored.up_in_world, (0.0, 0.0, 1.0), atol=1e-9):
             raise BackendError(f"The map of {self.job.spec} is not level; its stops cannot be compared with the truth.")
         photos: dict[str, Float[np.ndarray, "4 4"]] = {}
         names: dict[str, tuple[str, ...]] = {}
@@ -116,8 +116,8 @@ class NavigationPlace:
             photos |= dict(zip([file.name for file in files], mission.world_from_photos, strict=True))
             names[mission.name] = tuple(f"./{file.name}" for file in files)
         label, seed = self.work.label, self.job.recorded.seed
-        hearing = _once(lambda: WeakHearing(asked, seed))
-        known = KnownScene(asked, self.work.truth, label, self.job.recorded.hearing, photos, hearing)
+        hearing = _once(lambda: WeakHearing(avlmap, seed))
+        known = KnownScene(avlmap, self.work.truth, label, self.job.recorded.hearing, photos, hearing)
         return Pilot(
             known, self.floor, self._launch, translator, self.job.folder / "photos",
             lambda mission: names[mission.name], self.settings.guess, seed,
