@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tiny.light import SHORT_SIDE, export_light, write_light_sources
 from tiny.tipsv2 import write_tips_tokens
+from training.light.export import revision_of
 from training.light.parity import parity, rank_correlation
 from training.light.quantise import in_blocks
 from training.light.tokenizers import UnknownTokenizerError, list_of, write_tokens
@@ -180,6 +181,20 @@ def roberta_tokenizer(tmp_path_factory: pytest.TempPathFactory):
 def test_a_tokenizer_of_another_kind_is_refused() -> None:
     with pytest.raises(UnknownTokenizerError, match="WordPiece"):
         list_of({"model": {"type": "WordPiece"}})
+
+
+def test_the_revision_is_that_of_the_hubs_cache() -> None:
+    assert revision_of(Path("/cache/models--a--b/snapshots/0123abc")) == "0123abc"
+    assert revision_of(Path("/models/a/b")) == ""
+
+
+def test_without_the_checkpoints_the_export_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("HF_HUB_CACHE", str(tmp_path / "hub"))
+    assert export_light(tmp_path, tmp_path) == 1
+    said = capsys.readouterr().err
+    assert "refused: The model google/tipsv2-b14 is not here" in said and "hf download google/tipsv2-b14" in said
 
 
 def test_a_fused_clap_is_refused(tmp_path: Path) -> None:

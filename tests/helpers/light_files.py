@@ -53,12 +53,12 @@ def write_manifest(out: Path) -> None:
     """Write a manifest of the files as they are."""
     notes = {name: files.FileNote((out / name).stat().st_size, sha256_of_file(out / name)) for name in files.FILES}
     pictures = files.PictureNote(
-        source="made/by-hand", source_sha256="0" * 64, licence="MIT", dim=DIM, patch=PATCH, grid=4, short_side=56,
-        logit_scale=100.0, prompts=("a {}.", "the {}."), view_prompts=("in a {}.",), most_tokens=64,
+        source="made/by-hand", revision="", source_sha256="0" * 64, licence="MIT", dim=DIM, patch=PATCH, grid=4,
+        short_side=56, logit_scale=100.0, prompts=("a {}.", "the {}."), view_prompts=("in a {}.",), most_tokens=64,
     )  # fmt: skip
     mel = files.MelNote(rate_hz=8000, window=16_000, fft=256, hop=160, bands=BANDS, lowest_hz=50.0, highest_hz=3800.0)
     sounds = files.SoundNote(
-        source="made/by-hand", source_sha256="0" * 64, licence="MIT", dim=DIM, logit_scale=20.0,
+        source="made/by-hand", revision="", source_sha256="0" * 64, licence="MIT", dim=DIM, logit_scale=20.0,
         prompts=("the sound of {}",), most_tokens=77, mel=mel,
     )  # fmt: skip
     made = files.Manifest(files.FORMAT, files.MODEL, notes, pictures, sounds)

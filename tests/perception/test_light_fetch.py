@@ -114,6 +114,15 @@ def test_a_page_is_fetched_once_and_then_used(page: Page, models: Path) -> None:
     assert page.asked == [(files.MANIFEST, "")]
 
 
+def test_files_that_were_damaged_since_are_fetched_again(page: Page, models: Path) -> None:
+    folder = fetch_light(page.url).folder
+    content = bytearray((folder / files.SOUNDS).read_bytes())
+    content[50] ^= 4
+    (folder / files.SOUNDS).write_bytes(content)
+    assert fetch_light(page.url).received_bytes > 0
+    assert contents(folder) == contents(page.folder)
+
+
 def test_a_folder_will_do_and_no_folder_of_models_is_the_users_own(page: Page, tmp_path: Path) -> None:
     found = fetch_light(str(page.folder))
     assert found.folder == tmp_path / "home" / "models" / files.MODEL

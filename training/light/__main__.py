@@ -10,6 +10,7 @@ import numpy as np
 import tyro
 from training.light.export import export_pictures, export_sounds, write_manifest, write_words
 
+from avlmaps.core.errors import BackendError
 from avlmaps.perception.light.bundle import MODEL
 from avlmaps.perception.models.settings import ModelSettings, using_models
 
@@ -48,10 +49,14 @@ def main(options: Options) -> int:
     out.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(options.seed)
     pictures = read_pictures(options.photos) if options.photos else [made_up_picture(rng) for _ in range(6)]
-    with using_models(ModelSettings(folder=options.models, device="cpu")):
-        bits, most = options.text_bits, options.most_phrases
-        seen = export_pictures(options.pictures, out, options.short_side, bits, pictures, most)
-        heard = export_sounds(options.sounds, out, bits, [made_up_sound(rng) for _ in range(24)], most)
+    bits, most = options.text_bits, options.most_phrases
+    try:
+        with using_models(ModelSettings(folder=options.models, device="cpu")):
+            seen = export_pictures(options.pictures, out, options.short_side, bits, pictures, most)
+            heard = export_sounds(options.sounds, out, bits, [made_up_sound(rng) for _ in range(24)], most)
+    except (BackendError, ValueError) as fault:
+        print(f"refused: {fault}", file=sys.stderr)
+        return 1
     write_words(out, (seen, heard))
     manifest = write_manifest(out, seen, heard)
     measured = {**seen.measured, **heard.measured}

@@ -90,6 +90,7 @@ def export_pictures(
     }
     note = files.PictureNote(
         source=public_name(model),
+        revision=revision_of(folder),
         source_sha256=checksum_of(weights_in(folder)),
         licence="Apache-2.0",
         dim=int(network.config.vision_config.hidden_size),
@@ -159,6 +160,7 @@ def export_sounds(
     words = {"sounds": (phrases, _vectors(reader, tokens, phrases, (SOUND_PROMPT,)))}
     note = files.SoundNote(
         source=public_name(model),
+        revision=revision_of(folder),
         source_sha256=checksum_of(weights_in(folder)),
         licence="Apache-2.0",
         dim=int(network.config.projection_dim),
@@ -205,6 +207,11 @@ def write_manifest(out: Path, pictures: Made, sounds: Made) -> files.Manifest:
     made = files.Manifest(files.FORMAT, files.MODEL, notes, pictures.note, sounds.note, figures)
     (out / files.MANIFEST).write_bytes(msgspec.json.format(msgspec.json.encode(made), indent=1))
     return made
+
+
+def revision_of(folder: Path) -> str:
+    """Return the revision of a model in the hub's cache, ``""`` for another folder."""
+    return folder.name if folder.parent.name == "snapshots" else ""
 
 
 def phrases_of(kind: Kind) -> list[str]:

@@ -39,6 +39,7 @@ class PictureNote(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         source: the published model that they were made from.
+        revision: of the hub's repository; ``""`` where they were made from a folder that does not say it.
         source_sha256: of its weights.
         licence: of the weights.
         dim: of a feature.
@@ -52,6 +53,7 @@ class PictureNote(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     source: str
+    revision: str
     source_sha256: str
     licence: str
     dim: int
@@ -80,6 +82,7 @@ class SoundNote(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The towers of sounds and their words; attributes as of ``PictureNote``."""
 
     source: str
+    revision: str
     source_sha256: str
     licence: str
     dim: int

@@ -25,6 +25,7 @@ from avlmaps.core.network import is_loopback
 from avlmaps.core.progress import progress
 from avlmaps.core.version import __version__
 from avlmaps.perception.light.bundle import MANIFEST, MODEL, FileNote, Manifest, parse_manifest
+from avlmaps.perception.models.checksums import remembered_sha256
 from avlmaps.perception.models.files import fetched_folder
 from avlmaps.perception.models.settings import model_settings
 
@@ -202,11 +203,11 @@ def _require_safe(url: str) -> None:
 
 
 def _same(target: Path, content: bytes, manifest: Manifest) -> bool:
-    """Return whether these very files are there already, by their sizes; their sums are checked when they are used."""
+    """Return whether these very files are there already, whole."""
     try:
         if (target / MANIFEST).read_bytes() != content:
             return False
-        return all((target / name).stat().st_size == note.bytes for name, note in manifest.files.items())
+        return all(remembered_sha256(target / name) == note.sha256 for name, note in manifest.files.items())
     except OSError:
         return False
 

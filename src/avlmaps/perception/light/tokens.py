@@ -59,7 +59,7 @@ class Tokens:
 
     def __init__(self, known: TokenList, most: int) -> None:
         self._known, self._most = known, most
-        self._number = {token: number for number, token in enumerate(known.vocabulary)}
+        self._number = {token: number for number, token in enumerate(known.vocabulary) if token}
         self._rank = {pair: rank for rank, pair in enumerate(known.merges)}
         self._letters = _letters_of_bytes()
         self._piece = lru_cache(maxsize=4096)(self._of_piece)
