@@ -14,15 +14,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tiny.light import SHORT_SIDE, export_light, write_light_sources
 from tiny.tipsv2 import write_tips_tokens
-from training.light.export import revision_of
+from training.light.export import phrases_of, revision_of
 from training.light.parity import parity, rank_correlation
-from training.light.quantise import in_blocks
+from training.light.quantise import Bits, in_blocks, quantise
 from training.light.tokenizers import UnknownTokenizerError, list_of, write_tokens
 
+from avlmaps.core.lexicon import Kind as Kinds
+from avlmaps.core.lexicon import lexicon
 from avlmaps.core.registry import Kind, forget_loaded, load
 from avlmaps.perception.conformance import check, example_frame, example_sound
 from avlmaps.perception.foundation.clap import ClapSounds
-from avlmaps.perception.foundation.prompts import AREA_PROMPTS, TIPS_PROMPTS
+from avlmaps.perception.foundation.prompts import AREA_PROMPTS, THINGS, TIPS_PROMPTS, clean
+from avlmaps.perception.foundation.sound_scores import OTHERS
 from avlmaps.perception.foundation.tipsv2 import TipsPixels
 from avlmaps.perception.light import bundle as files
 from avlmaps.perception.light.mel import log_mel
@@ -31,6 +34,7 @@ from avlmaps.perception.light.sounds import LightSounds
 from avlmaps.perception.light.tower import interpolation
 from avlmaps.perception.light.views import LightViews
 from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.query.modalities.area import AREA_NAMES
 
 CLAP = "laion/clap-htsat-unfused"
 KEPT = 0.95  # of float's ranking, see training/light/parity.py
@@ -183,6 +187,15 @@ def test_a_tokenizer_of_another_kind_is_refused() -> None:
         list_of({"model": {"type": "WordPiece"}})
 
 
+def test_every_word_that_a_query_compares_with_comes_with_the_files() -> None:
+    wanted = {Kinds.THING: (*THINGS, "other"), Kinds.ROOM: AREA_NAMES, Kinds.SOUND: OTHERS}
+    for kind, words in wanted.items():
+        phrases = phrases_of(kind)
+        assert set(map(clean, words)) <= set(phrases)
+        assert {clean(entry.name) for entry in lexicon().entries(kind)} <= set(phrases)
+        assert len(set(phrases)) == len(phrases)
+
+
 def test_the_revision_is_that_of_the_hubs_cache() -> None:
     assert revision_of(Path("/cache/models--a--b/snapshots/0123abc")) == "0123abc"
     assert revision_of(Path("/models/a/b")) == ""
@@ -217,6 +230,52 @@ def test_what_is_too_large_or_too_coarse_is_no_model(
     assert "refused: patches, sounds: less than 1.0 of float's ranking" in said
     assert "refused: more than 0.1 MB" in said
     assert not (tmp_path / files.MODEL / files.MANIFEST).exists()
+
+
+def small_and_exact(network: torch.nn.Module, given: torch.Tensor, tmp_path: Path, bits: Bits) -> list[np.ndarray]:
+    """Return what a network makes of an input with small weights, and with float ones."""
+    import onnxruntime
+
+    whole, small = tmp_path / "whole.onnx", tmp_path / "small.onnx"
+    with torch.no_grad():
+        torch.onnx.export(
+            network, (given[:1],), str(whole), input_names=["x"], dynamic_axes={"x": {0: "n"}}, opset_version=17,
+            dynamo=False,
+        )  # fmt: skip
+        quantise(whole, small, bits)
+        exact = network(given).numpy()
+    session = onnxruntime.InferenceSession(str(small), providers=["CPUExecutionProvider"])
+    return [session.run(None, {"x": given.numpy()})[0], exact]
+
+
+def test_a_token_of_huge_values_costs_the_others_nothing(tmp_path: Path) -> None:
+    tokens = torch.randn(1, 20, 64)
+    tokens[0, 7] *= 3000.0
+    tokens[0, 9] = 0.0
+    small, exact = small_and_exact(torch.nn.Linear(64, 96), tokens, tmp_path, 8)
+    lost = np.linalg.norm(small - exact, axis=-1) / np.linalg.norm(exact, axis=-1)
+    assert lost.max() < 0.03 and lost[0, 9] < 1e-6
+
+
+def test_a_channel_of_huge_weights_costs_the_others_nothing(tmp_path: Path) -> None:
+    layer = torch.nn.Linear(64, 96)
+    with torch.no_grad():
+        layer.weight[5] *= 3000.0
+    small, exact = small_and_exact(layer, torch.randn(2, 20, 64), tmp_path, 8)
+    lost = np.abs(small - exact).max(axis=(0, 1)) / np.abs(exact).max(axis=(0, 1))
+    assert lost.max() < 0.05
+
+
+@pytest.mark.parametrize(("bits", "most"), [(8, 0.01), (4, 0.12)])
+def test_a_table_is_small_and_near(tmp_path: Path, bits: Bits, most: float) -> None:
+    table = torch.nn.Embedding(200, 64)
+    with torch.no_grad():
+        table.weight[3] *= 100.0
+    small, exact = small_and_exact(table, torch.tensor([[3, 0, 199, 7]]), tmp_path, bits)
+    assert small.shape == exact.shape
+    assert (np.linalg.norm(small - exact, axis=-1) / np.linalg.norm(exact, axis=-1)).max() < most
+    sizes = [path.stat().st_size for path in (tmp_path / "small.onnx", tmp_path / "whole.onnx")]
+    assert sizes[0] < 0.5 * sizes[1]
 
 
 @pytest.mark.parametrize("block", [16, 32, 128])
