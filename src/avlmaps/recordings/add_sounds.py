@@ -187,13 +187,13 @@ def _check(interval_s: float, min_distance_m: float, loudness_db: float, snr_db:
         raise AudioError(f"The signal-to-noise ratio is {snr_db} dB; choose between -30 and 90.")
 
 
-def _rule(walk: Walk, asked: Spacing) -> tuple[Placer, float | None, list[str]]:
+def _rule(walk: Walk, wanted: Spacing) -> tuple[Placer, float | None, list[str]]:
     """Choose how distance is measured and how long a sound may be, so that a small room holds several."""
     notices: list[str] = []
-    spacing = chosen_spacing(walk, asked, _USUAL_LENGTH_S)
-    if spacing.measure != asked.measure:
+    spacing = chosen_spacing(walk, wanted, _USUAL_LENGTH_S)
+    if spacing.measure != wanted.measure:
         notices.append(
-            f"The walk stays within so small a place that few sounds are {asked.distance_m:g} m apart in a straight "
+            f"The walk stays within so small a place that few sounds are {wanted.distance_m:g} m apart in a straight "
             "line; they are that far apart along the walk instead (--min-distance-m 0 allows any distance)."
         )
     lengths_s = np.arange(_USUAL_LENGTH_S, _SHORTEST_CUT_S - 1e-9, -0.5)

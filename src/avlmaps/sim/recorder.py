@@ -95,9 +95,9 @@ class RecordSettings:
             (0 <= self.workers <= 256, f"{self.workers} processes", "0 (every core) to 256"),
             (self.max_frames is None or self.max_frames >= 2, f"{self.max_frames} frames at most", "2 or more"),
         )
-        for right, asked, choice in checks:
+        for right, value, choice in checks:
             if not right:
-                raise RecordingError(f"A scene cannot be recorded with {asked}; choose {choice}.")
+                raise RecordingError(f"A scene cannot be recorded with {value}; choose {choice}.")
 
     @property
     def camera(self) -> Pinhole:

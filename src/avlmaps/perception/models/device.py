@@ -24,17 +24,17 @@ def select_device() -> torch.device:
         BackendError: it is not there.
     """
     _use_cores()
-    asked = model_settings().device
-    if asked == "auto":
+    wanted = model_settings().device
+    if wanted == "auto":
         if torch.cuda.is_available():
             return torch.device("cuda")
         return torch.device("mps" if torch.backends.mps.is_available() else "cpu")
     try:
-        device = torch.device(asked)
+        device = torch.device(wanted)
         torch.zeros(1, device=device)
     except (RuntimeError, AssertionError) as fault:
         here = "cuda" if torch.cuda.is_available() else "mps" if torch.backends.mps.is_available() else "cpu"
-        raise BackendError(f"The device {asked!r} cannot be used here ({fault}); choose --device {here}.") from fault
+        raise BackendError(f"The device {wanted!r} cannot be used here ({fault}); choose --device {here}.") from fault
     return device
 
 
@@ -48,10 +48,10 @@ def _use_cores() -> None:
 
 def select_dtype(device: torch.device) -> torch.dtype:
     """Return the precision of the settings: by default float16 on CUDA, float32 elsewhere."""
-    asked = model_settings().precision
-    if asked == "auto":
+    wanted = model_settings().precision
+    if wanted == "auto":
         return torch.float16 if device.type == "cuda" else torch.float32
-    return _TYPES[asked]
+    return _TYPES[wanted]
 
 
 def select_batch(on_gpu: int) -> int:

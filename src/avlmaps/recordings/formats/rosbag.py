@@ -301,9 +301,9 @@ def _base_height(tree: TransformTree, camera_frame: str, stamp_s: float) -> Base
 def _image_topics(bag: _Bag, topics: RosTopics) -> tuple[str, str]:
     images = bag.topics_of(_IMAGE_TYPES)
     every = ", ".join(images) or "none"
-    for asked in (topics.rgb, topics.depth):
-        if asked and asked not in images:
-            raise RecordingError(f"{bag.path} has no image topic {asked!r}; its image topics are: {every}.")
+    for topic in (topics.rgb, topics.depth):
+        if topic and topic not in images:
+            raise RecordingError(f"{bag.path} has no image topic {topic!r}; its image topics are: {every}.")
     depth = topics.depth or _pick([t for t in images if "depth" in t.lower()], ("align", "registered"))
     rgb = topics.rgb or _pick(
         [t for t in images if t != depth and "depth" not in t.lower()], ("color", "rgb", "colour")

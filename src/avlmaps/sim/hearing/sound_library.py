@@ -86,16 +86,16 @@ class Recorded:
         raise problem or AudioError(f"{self.folder} has no clip of {category!r}.")
 
 
-def chosen_categories(bank: Bank, asked: tuple[str, ...] | None) -> tuple[str, ...]:
+def chosen_categories(bank: Bank, wanted: tuple[str, ...] | None) -> tuple[str, ...]:
     """Return the requested categories, or those of the bank that homes make, sorted.
 
     Raises:
         AudioError: the bank lacks a requested one, or has none of a home.
     """
-    if not asked:
+    if not wanted:
         of_homes = tuple(name for name in bank.categories if kind_of(name).indoors)
         return of_homes or bank.categories
-    plain = tuple(sorted({" ".join(name.replace("_", " ").lower().split()) for name in asked}))
+    plain = tuple(sorted({" ".join(name.replace("_", " ").lower().split()) for name in wanted}))
     if missing := [name for name in plain if name not in bank.categories]:
         raise AudioError(f"There are no sounds of {', '.join(missing)}; there are {', '.join(bank.categories)}.")
     return plain
