@@ -112,12 +112,12 @@ def export_pictures(
     patches = np.concatenate([row[0] for row in exact]), np.concatenate([row[0] for row in small])
     views = np.stack([row[1] for row in exact]), np.stack([row[1] for row in small])
     measured = {
-        "patches": parity(*patches, known),
+        "patches": parity(*patches, known, _as_stored(known)),
         "patches with new words": parity(*patches, known[some], new),
         "new words of pictures": parity(known[some], new, patches[0][:: max(1, len(patches[0]) // 512)]),
     }
     if len(pictures) > 2:
-        measured["views"] = parity(*views, words["views"][1])
+        measured["views"] = parity(*views, words["views"][1], _as_stored(words["views"][1]))
     return Made(note, words, measured)
 
 
@@ -176,7 +176,7 @@ def export_sounds(
     some, known = _some(phrases), words["sounds"][1]
     new = _small_vectors(out / files.SOUND_WORDS, tokens, [phrases[i] for i in some], (SOUND_PROMPT,))
     measured = {
-        "sounds": parity(exact, small, known),
+        "sounds": parity(exact, small, known, _as_stored(known)),
         "sounds with new words": parity(exact, small, known[some], new),
         "new words of sounds": parity(known[some], new, exact),
     }
@@ -189,8 +189,19 @@ def write_words(out: Path, made: Iterable[Made]) -> None:
     for one in made:
         for table, (names, rows) in one.words.items():
             arrays[f"{table}_names"] = np.frombuffer("\n".join(names).encode(), np.uint8)
-            arrays[f"{table}_rows"] = np.round(127.0 * rows / np.abs(rows).max(axis=1, keepdims=True)).astype(np.int8)
+            arrays[f"{table}_rows"] = in_bytes(rows)
     np.savez(out / files.KNOWN_WORDS, **arrays)  # pyright: ignore[reportArgumentType]
+
+
+def in_bytes(rows: np.ndarray) -> np.ndarray:
+    """Return the directions of vectors in bytes."""
+    return np.round(127.0 * rows / np.abs(rows).max(axis=1, keepdims=True)).astype(np.int8)
+
+
+def _as_stored(rows: np.ndarray) -> np.ndarray:
+    """Return unit vectors as they are read back from bytes."""
+    back = in_bytes(rows).astype(np.float32)
+    return back / np.linalg.norm(back, axis=1, keepdims=True)
 
 
 def write_manifest(out: Path, pictures: Made, sounds: Made) -> files.Manifest:
