@@ -48,7 +48,7 @@ def main(options: Options) -> int:
     out = options.out / MODEL
     out.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(options.seed)
-    pictures = read_pictures(options.photos) if options.photos else [made_up_picture(rng) for _ in range(6)]
+    pictures = read_pictures(options.photos) if options.photos else [made_up_picture(rng) for _ in range(12)]
     bits, most = options.text_bits, options.most_phrases
     try:
         with using_models(ModelSettings(folder=options.models, device="cpu")):
