@@ -69,7 +69,7 @@ def test_an_empty_sentence_is_refused(sentence: str) -> None:
         parse_sentence(sentence)
 
 
-@pytest.mark.parametrize("sentence", ["the chair near near the table", "% of", "the chair not in the kitchen"])
+@pytest.mark.parametrize("sentence", ["% of", "the chair not in the kitchen"])
 def test_what_is_not_understood_is_named(sentence: str) -> None:
     with pytest.raises(QueryError, match=r"is not understood; say it like: the chair near the sound of glass breaking"):
         parse_sentence(sentence)

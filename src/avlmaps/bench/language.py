@@ -72,10 +72,17 @@ def judge(row: Row) -> Judged:
     if "question" in row:
         return _judge_question(row)
     got = _intents_of(row)
-    wanted = [row["intents"], *row.get("also", [])]
-    return Judged(
-        str(row["say"]), False, min((_outcome(got, each) for each in wanted), key=OUTCOMES.index), got, wanted[0]
-    )
+    return Judged(str(row["say"]), False, judge_intents(got, row), got, row["intents"])
+
+
+def judge_intents(got: Sequence[Any], row: Row) -> str:
+    """Return the outcome of intents, as JSON, for a row of a command."""
+    return min((_outcome(got, each) for each in (row["intents"], *row.get("also", []))), key=OUTCOMES.index)
+
+
+def judge_question(got: Mapping[str, Any], row: Row) -> str:
+    """Return the outcome of an inquiry, as JSON, for a row of a question."""
+    return min((_answered(got, each) for each in (row["question"], *row.get("also", []))), key=OUTCOMES.index)
 
 
 def _intents_of(row: Row) -> list[Any]:
@@ -99,10 +106,7 @@ def _judge_question(row: Row) -> Judged:
         ).inquiry.to_json()
     except QueryError as fault:
         got = {"ask": "refuse", "said": str(fault)}
-    wanted = [row["question"], *row.get("also", [])]
-    return Judged(
-        str(row["say"]), True, min((_answered(got, each) for each in wanted), key=OUTCOMES.index), got, wanted[0]
-    )
+    return Judged(str(row["say"]), True, judge_question(got, row), got, row["question"])
 
 
 def _answered(got: Mapping[str, Any], wanted: Any) -> str:

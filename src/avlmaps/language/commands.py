@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.discourse import Composed, compose
@@ -14,11 +15,15 @@ from avlmaps.language.intents import (
     Target,
     Wait,
 )  # fmt: skip
-from avlmaps.language.names import near_names
+from avlmaps.language.names import is_known, near_names
 from avlmaps.language.orders import on_targets
 from avlmaps.language.readings import Sentence, readings
 
+if TYPE_CHECKING:
+    from avlmaps.language.learned.agreement import Weighed as LearnedReading
+
 MOST_CHARACTERS = 1000
+_PLAIN_ORDER = 0.35  # an order of the grammar that costs less is read without doubt
 _EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
 _FULLER = 0.2  # a reading with one more wait may cost this much more
 _SAFETY = 0.35
@@ -51,12 +56,16 @@ class Command:
     Attributes:
         intents: in the order of doing; a single `Refuse` or `Clarify` where the robot is to do nothing.
         notes: one sentence each, for the person who gave the command.
-        readings: all readings that were weighed, the best first.
+        readings: all readings of the grammar that were weighed, the best first.
+        learned: the readings of the network, the likeliest first.
+        why: which of the two decided: ``both``, ``grammar``, ``network``, ``danger``, ``stop`` or ``differ``.
     """
 
     intents: tuple[Intent, ...]
     notes: tuple[str, ...]
     readings: tuple[Weighed, ...]
+    learned: "tuple[LearnedReading, ...]" = ()
+    why: str = "grammar"
 
     @property
     def stops(self) -> Refuse | Clarify | None:
@@ -81,14 +90,56 @@ class Given:
 
 
 def read_command(text: str, given: Given | None = None) -> Command:
-    """Return the meaning of a command; the same command always means the same.
+    """Return the meaning of a command, of the grammar and the network; the same command always means the same.
+
+    Raises:
+        LanguageError: the command is empty or too long.
+    """
+    from avlmaps.language.learned.agreement import agreed
+    from avlmaps.language.learned.guard import Guard, weighed
+    from avlmaps.language.learned.reader import learned_reader
+
+    given = given or Given()
+    check_length(text, "command", _EXAMPLE)
+    sentence = Sentence(text, given.knows)
+    grammar = _by_grammar(sentence, given)
+    reader = learned_reader()
+    learned = tuple(
+        weighed(read, Guard(sentence.names, given.image, given.clip)) for read in reader.command(sentence.tokens)
+    )
+    if _in_context(grammar.intents, given):  # the network sees neither the files nor the map's own words
+        learned = tuple(one for one in learned if not isinstance(one.stops, Clarify))
+    answer = agreed(grammar.intents, learned, reader.limits, plain=is_plain(grammar))
+    notes = grammar.notes if answer.why in ("both", "grammar") else answer.notes
+    return Command(answer.intents, notes, grammar.readings, learned, answer.why)
+
+
+def is_plain(read: Command) -> bool:
+    """Return whether the grammar reads each order without doubt."""
+    return read.readings[0].cost <= _PLAIN_ORDER * len(read.intents)
+
+
+def _in_context(intents: tuple[Intent, ...], given: Given) -> bool:
+    """Return whether a reading takes a file that came along, or a name that only the map knows."""
+    targets = [part for intent in intents for one in _targets_of(intent) for part in (one, *one.near)]
+    files = {given.image, given.clip} - {None}
+    return any(
+        one.name in files if one.is_file else one.kind is Kind.OBJECT and not is_known(one.name) for one in targets
+    )
+
+
+def read_by_grammar(text: str, given: Given | None = None) -> Command:
+    """Return the meaning of a command as the grammar alone has it.
 
     Raises:
         LanguageError: the command is empty or too long.
     """
     given = given or Given()
     check_length(text, "command", _EXAMPLE)
-    sentence = Sentence(text, given.knows)
+    return _by_grammar(Sentence(text, given.knows), given)
+
+
+def _by_grammar(sentence: Sentence, given: Given) -> Command:
     weighed: list[Weighed] = []
     for reading in readings(sentence):
         composed = compose(sentence, reading)

@@ -61,16 +61,16 @@ class Names:
             if (
                 len(head) < 2
                 or len(words) > 3
-                or _is_sounding(head)
+                or sounds_like(head)
                 or head in _verbs()
                 or head in _adjectives()
                 or asks
             ):
                 continue
-            mended = self._mend(words)
-            if mended is not None:
-                self.mended[mended[1].name] = " ".join(words)
-                found.append((end, _MENDED, mended[1]))
+            better = _mend(words)
+            if better is not None:
+                self.mended[better[1].name] = " ".join(words)
+                found.append((end, _MENDED, better[1]))
                 continue
             cost = _UNKNOWN + _OPEN_WORD * sum(word not in _adjectives() for word in words[:-1])
             if self._knows is not None and self._knows(" ".join(words)):
@@ -82,7 +82,7 @@ class Names:
         """Return the word at a token where nothing knows it: before "to the kitchen" it is some way to move."""
         word = self.tokens[at].text
         plain = self.tokens[at].kind == "word" and len(word) > 2 and word.isalpha()
-        unknown = plain and word not in _grammar_words() and word not in _never() and not _is_sounding(word)
+        unknown = plain and word not in _grammar_words() and word not in _never() and not sounds_like(word)
         return [(at + 1, 0.0, word)] if unknown and _known((word,)) is None else []
 
     def noises(self, at: int) -> Found:
@@ -93,6 +93,10 @@ class Names:
         """Return whether the head of a target's name is known."""
         return target.kind is not Kind.OBJECT or is_known(target.name) or bool(self._knows and self._knows(target.name))
 
+    def knows(self, name: str) -> bool:
+        """Return whether the map's encoder knows a name."""
+        return bool(self._knows and self._knows(name))
+
     def _spans(self, at: int) -> Iterator[tuple[int, tuple[str, ...]]]:
         for end in range(at + 1, min(at + _MOST_WORDS, len(self.tokens)) + 1):
             token = self.tokens[end - 1]
@@ -100,24 +104,6 @@ class Names:
             if token.kind != "word" and not number:
                 return
             yield end, tuple(t.text for t in self.tokens[at:end])
-
-    def _mend(self, words: tuple[str, ...]) -> tuple[float, Target] | None:
-        if len(words[-1]) < 4 or words[-1] in _grammar_words():
-            return None
-        for tail in range(min(2, len(words)), 0, -1):
-            wrong = " ".join(words[-tail:])
-            near = near_names(wrong)
-            if (
-                near
-                and near[0][0][0] == wrong[0]
-                and not is_other_form(wrong, near[0][0])
-                and near[0][1] >= _ALIKE
-                and (len(near) == 1 or near[0][1] - near[1][1] >= _APART)
-            ):
-                read = _known((*words[:-tail], *near[0][0].split()))
-                if read is not None:
-                    return read
-        return None
 
     def _noises(self, at: int) -> list[tuple[int, float, str]]:
         words = [t.text if t.kind == "word" else "" for t in self.tokens[at : at + 9]]
@@ -222,6 +208,32 @@ def _with_object(subject: str, sounding: str, thing: str) -> str:
     if " " not in thing and subject in _whoever() and sounding in ("flushing", "ringing", "slamming", "breaking"):
         return f"{thing} {sounding}"
     return f"{subject} {sounding} {thing}"
+
+
+def _mend(words: tuple[str, ...]) -> tuple[float, Target] | None:
+    """Return the cost and the target of a name whose head is misspelt; None where no known name is clearly meant."""
+    if len(words[-1]) < 4 or words[-1] in _grammar_words():
+        return None
+    for tail in range(min(2, len(words)), 0, -1):
+        wrong = " ".join(words[-tail:])
+        near = near_names(wrong)
+        if (
+            near
+            and near[0][0][0] == wrong[0]
+            and not is_other_form(wrong, near[0][0])
+            and near[0][1] >= _ALIKE
+            and (len(near) == 1 or near[0][1] - near[1][1] >= _APART)
+        ):
+            read = _known((*words[:-tail], *near[0][0].split()))
+            if read is not None:
+                return read
+    return None
+
+
+def mended(name: str) -> str | None:
+    """Return the name that a misspelt one is taken for; None where none is clearly meant."""
+    found = _mend(tuple(name.lower().split()))
+    return None if found is None else found[1].name
 
 
 def is_known(name: str) -> bool:
@@ -344,10 +356,6 @@ def _sound_phrase(phrase: str) -> bool:
     )
 
 
-def _is_sounding(word: str) -> bool:
-    return word in _noise_words() or (word in _forms() and word.endswith("ing"))
-
-
 @cache
 def _listed(name: str) -> frozenset[str]:
     return frozenset(load_grammar().lists[name].split())
@@ -361,6 +369,16 @@ def _forms() -> dict[str, str]:
         ing = forms_of(verb)[1]
         forms |= dict.fromkeys(forms_of(verb), ing)
     return forms
+
+
+def sounding_forms() -> dict[str, str]:
+    """Return all forms of the verbs that sound, each with its -ing form."""
+    return _forms()
+
+
+def sounds_like(word: str) -> bool:
+    """Return whether a word names a sound by itself: "laughter", "barking", "knock"."""
+    return word in _noise_words() or (word in _forms() and word.endswith("ing"))
 
 
 def sounding_words() -> frozenset[str]:

@@ -95,12 +95,82 @@ def parse_sentence(sentence: str) -> Question:
 
 
 def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
-    """Return the query of a sentence.
+    """Return the query of a sentence, of the grammar and the network.
 
     Raises:
         QueryError: the sentence is empty, too long, or not understood; it says which words.
     """
     given = given or Given()
+    read = _sentence(sentence, given)
+    grammar: AskedSentence | QueryError
+    try:
+        grammar = _by_grammar(read, given)
+    except QueryError as fault:
+        grammar = fault
+    if not isinstance(grammar, QueryError) and _is_name(read, grammar.inquiry):
+        return grammar
+    from avlmaps.language.learned.agreement import agreed_question
+    from avlmaps.language.learned.reader import learned_reader
+
+    reader = learned_reader()
+    reads = reader.question(read.tokens)
+    found = agreed_question(
+        None if isinstance(grammar, QueryError) else grammar.inquiry, reads, read.tokens, reader.limits
+    )
+    if found.why == "network" and found.inquiry is not None:
+        try:
+            return _put_right(found.inquiry, read, given)
+        except QueryError:
+            if not isinstance(grammar, QueryError):
+                return grammar
+            raise
+    if isinstance(grammar, QueryError):
+        raise grammar
+    if found.inquiry is None:
+        raise QueryError(f"A map cannot answer this; ask it like: {_EXAMPLE}.")
+    return grammar
+
+
+def read_question_by_grammar(sentence: str, given: Given | None = None) -> AskedSentence:
+    """Return the query of a sentence as the grammar alone has it.
+
+    Raises:
+        QueryError: the sentence is empty, too long, or not understood; it says which words.
+    """
+    given = given or Given()
+    return _by_grammar(_sentence(sentence, given), given)
+
+
+def _is_name(read: Sentence, inquiry: Inquiry) -> bool:
+    """Return whether a sentence is one name and nothing else: then there is nothing more to read."""
+    words = [token.text for token in read.tokens if token.kind != "punct" and token.text not in ("the", "a", "an")]
+    return len(inquiry.of) == 1 and not inquiry.of[0].near and words == inquiry.of[0].name.split()
+
+
+def _put_right(inquiry: Inquiry, read: Sentence, given: Given) -> AskedSentence:
+    """Return the network's question with names put right.
+
+    Raises:
+        QueryError: it asks for what a map cannot choose, or a name or a file is not known.
+    """
+    from avlmaps.language.learned.guard import Guard
+
+    guard = Guard(read.names, given.image, given.clip)
+    targets = tuple(guard.put_right(target) for target in inquiry.of)
+    if guard.problem is not None:
+        raise QueryError(guard.problem.question)
+    for one in targets:
+        if one.pick in (Pick.FARTHEST, Pick.OTHER):
+            raise QueryError(f"A map cannot choose '{one.pick} {one.name}'; say what it is near.")
+    return AskedSentence(Inquiry(inquiry.ask, targets), tuple(dict.fromkeys(guard.notes)))
+
+
+def _sentence(sentence: str, given: Given) -> Sentence:
+    """Return a question as tokens.
+
+    Raises:
+        QueryError: it is empty or too long.
+    """
     if not any(mark.isalnum() for mark in sentence):
         raise QueryError(f"The sentence is empty; say what is sought, such as: {_EXAMPLE}.")
     if len(sentence) > MOST_CHARACTERS:
@@ -108,7 +178,10 @@ def read_question(sentence: str, given: Given | None = None) -> AskedSentence:
             f"The sentence has {len(sentence)} characters, more than {MOST_CHARACTERS}; say it shorter, like: "
             f"{_EXAMPLE}."
         )
-    read = Sentence(_TAIL.sub("?", sentence), given.knows)
+    return Sentence(_TAIL.sub("?", sentence), given.knows)
+
+
+def _by_grammar(read: Sentence, given: Given) -> AskedSentence:
     starts = tuple(token.text for token in read.tokens[:3] if token.text != "me")[:2]
     of_place = any(token.text in _PLACES for token in read.tokens[2:4])
     if _asks_state(read):

@@ -8,6 +8,11 @@ from avlmaps.language.program.writing import write_program
 from avlmaps.language.translator import Translation, Translator
 from avlmaps.language.verbalise import verbalise
 
+_DECIDED = {
+    "both": "both, they agree", "grammar": "the grammar", "network": "the network", "danger": "a refusal for safety",
+    "stop": "the network, which stops", "differ": "nobody, they differ",
+}  # fmt: skip
+
 
 class UnclearError(LanguageError):
     """A command is refused, or needs an answer before the robot may drive.
@@ -70,10 +75,13 @@ def command_to_program(command: str) -> str:
 
 
 def explanation(translator: Translator, command: str) -> list[str]:
-    """Return the readings of a command, a line each, the best first; the smaller the cost, the likelier.
+    """Return the readings of a command, a line each: the grammar's by cost, the network's by probability, who decided.
 
     A translator that weighs no readings has none.
     """
     if not isinstance(translator, RulesTranslator):
         return ["readings: this translator weighs none"]
-    return [f"reading {one.cost:5.2f}: {verbalise(one.intents)}" for one in translator.read(command).readings]
+    read = translator.read(command)
+    lines = [f"reading {one.cost:5.2f}: {verbalise(one.intents)}" for one in read.readings]
+    lines += [f"network {one.probability:5.2f}: {verbalise(one.intents)}" for one in read.learned]
+    return [*lines, f"decided by: {_DECIDED[read.why]}"]

@@ -36,8 +36,7 @@ def respelt(tokens: list[Token]) -> tuple[list[Token], dict[str, str]]:
 
 def _misheard(tokens: list[Token]) -> list[Token]:
     """Return tokens with words put right that sound like others: "go two the couch", "stop their"."""
-    pairs = [pair.strip().split("=") for pair in load_grammar().lists["misheard"].split(",")]
-    meant = {tuple(wrong.split()): right.split() for wrong, right in pairs}
+    meant = _meant()
     found = list(tokens)
     for at in range(len(found) - 1):
         right = meant.get((found[at].text, found[at + 1].text))
@@ -50,8 +49,14 @@ def _misheard(tokens: list[Token]) -> list[Token]:
 
 
 @cache
+def _meant() -> dict[tuple[str, ...], list[str]]:
+    pairs = [pair.strip().split("=") for pair in load_grammar().lists["misheard"].split(",")]
+    return {tuple(wrong.split()): right.split() for wrong, right in pairs}
+
+
+@cache
 def _better(word: str) -> str | None:
-    heard = dict(pair.split("=") for pair in load_grammar().lists["heard_as"].split())
+    heard = _heard()
     if word in heard:
         return heard[word]
     if not word.isascii() or word in _known() or word.removesuffix("s") in _known():
@@ -64,10 +69,24 @@ def _better(word: str) -> str | None:
         swapped = {other for other in near if len(other) == len(word) and sorted(other) == sorted(word)}
         longer = {other for other in near if len(other) > len(word)} if len(word) == _SHORTEST - 1 else set()
         near = swapped or longer
+    if not near or _is_english(word):
+        return None
     plain = {other for other in near if other.rstrip("s") not in near or other == other.rstrip("s")}
     better = plain.pop() if len(plain) == 1 else None
     begins_alike = better is not None and (better[0] == word[0] or better[1:] == word or sorted(better) == sorted(word))
     return better if begins_alike else None
+
+
+@cache
+def _heard() -> dict[str, str]:
+    return dict(pair.split("=") for pair in load_grammar().lists["heard_as"].split())
+
+
+def _is_english(word: str) -> bool:
+    """Return whether a word is one of its own: "forge" is no misspelt "forget"."""
+    from avlmaps.perception.embedded.words import is_word  # read only where a word is in question
+
+    return is_word(word)
 
 
 def _neighbours(word: str) -> Iterator[str]:

@@ -9,7 +9,7 @@ table; how well it does stands in ``training/words/README.md``.
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from io import BytesIO
 from types import MappingProxyType
@@ -166,6 +166,35 @@ class EmbeddedWords:
         vector = _unit((vectors * weights.roles[roles]).sum(axis=0))
         correction = np.maximum(vector @ weights.inner + weights.inner_bias, 0.0) @ weights.outer + weights.outer_bias
         return _unit(vector + correction)
+
+
+def word_vectors(words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+    """Return a vector of unit length for each single word, without the correction for phrases.
+
+    A word without a row is the sum of its pieces; a word that has neither, and ``""``, is zero.
+    """
+    found = [_word_vector(word) for word in words]
+    return np.stack(found) if found else np.zeros((0, _load()[0].table.shape[1]), np.float32)
+
+
+def is_word(word: str) -> bool:
+    """Return whether the encoder has a row for a whole word: it is no misspelling of another, mostly."""
+    return word in _load()[1].rows
+
+
+def words_checksum() -> str:
+    """Return the hex SHA-256 of the weights and aliases that ship, which `ModelCard` names too."""
+    return _load()[0].checksum
+
+
+@lru_cache(maxsize=_REMEMBERED)
+def _word_vector(word: str) -> Float32[np.ndarray, " d"]:
+    weights, pieces, _ = _load()
+    cleaned = clean_phrase(word) if word else ""
+    rows = [row for each in cleaned.split() for row in pieces.rows_of_word(each)]
+    if not rows:
+        return np.zeros(weights.table.shape[1], np.float32)
+    return _unit((weights.table[rows] * weights.scale[rows, None]).sum(axis=0))
 
 
 def _unit(vector: Float32[np.ndarray, " d"]) -> Float32[np.ndarray, " d"]:

@@ -1,0 +1,187 @@
+"""What the network sees of a sentence.
+
+For each token: a vector of its meaning, its number in the vocabulary, and marks of the lexer, grammar and lexicon.
+
+Numbers and names are seen as kinds of words ("a length begins here", "the lexicon knows this thing"), so that what is
+learnt of one holds for all.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from jaxtyping import Float32, Int64
+
+from avlmaps.core.inflection import singulars_of
+from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.language import lexer
+from avlmaps.language.grammar import load_grammar
+from avlmaps.language.lexer import Token
+from avlmaps.language.names import sounding_words
+from avlmaps.perception.embedded.words import word_vectors
+
+_LISTS = (
+    "motion", "courtesy", "idle", "asking", "functional", "states", "loudness", "never", "sides", "adjectives",
+    "choices", "useless", "noises", "of_noise", "before_noise", "whoever", "rooms", "persons",
+)  # fmt: skip
+_MARKS = (".", ",", "?", "!", ":", ";", "-", ">", "(", ")", "&")
+_KINDS = ("word", "number", "image", "clip", "punct")
+_AMOUNTS = {
+    "length": lexer.length_at, "angle": lexer.angle_at, "duration": lexer.duration_at, "clock": lexer.clock_at,
+    "number": lexer.number_at,
+}  # fmt: skip
+_MOST_WORDS = 4
+BUCKETS = 2048
+MOST_PIECES = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Features:
+    """One sentence as arrays.
+
+    Attributes:
+        meaning: the vector of each word, zero for marks and what has none.
+        words: the number of each word in the reader's vocabulary, 0 for the others.
+        pieces: numbers of the runs of letters of each word, filled up with 0.
+        marks: which classes begin at and hold each token.
+    """
+
+    meaning: Float32[np.ndarray, "n 128"]
+    words: Int64[np.ndarray, " n"]
+    pieces: Int64[np.ndarray, "n p"]
+    marks: Float32[np.ndarray, "n f"]
+
+
+def features(tokens: Sequence[Token], vocabulary: Mapping[str, int]) -> Features:
+    """Return the features of a tokenised sentence."""
+    texts = [token.text for token in tokens]
+    spoken = [text if token.kind == "word" else "" for text, token in zip(texts, tokens, strict=True)]
+    return Features(
+        word_vectors(spoken),
+        np.array([vocabulary.get(text, 0) for text in texts], np.int64).reshape(-1),
+        np.array([_pieces(text) for text in texts], np.int64).reshape(-1, MOST_PIECES),
+        _marked(list(tokens)),
+    )
+
+
+@cache
+def columns() -> tuple[str, ...]:
+    """Return the names of the marks, in their order."""
+    classes = sorted(load_grammar().words)
+    both = [*classes, *(f"~{name}" for name in _AMOUNTS), "~thing", "~room", "~sound"]
+    single = [
+        *(f"={kind}" for kind in _KINDS),
+        *(f"mark {mark}" for mark in _MARKS),
+        *_LISTS,
+        "~sounding",
+        "~described",
+    ]
+    return (*(f"begin {name}" for name in both), *(f"in {name}" for name in both), *single, "first", "last")
+
+
+@cache
+def _column() -> dict[str, int]:
+    return {name: at for at, name in enumerate(columns())}
+
+
+def _marked(tokens: list[Token]) -> Float32[np.ndarray, "n f"]:  # noqa: C901
+    column = _column()
+    found = np.zeros((len(tokens), len(column)), np.float32)
+
+    def span(name: str, start: int, end: int) -> None:
+        found[start, column[f"begin {name}"]] = 1.0
+        found[start:end, column[f"in {name}"]] = 1.0
+
+    for at, token in enumerate(tokens):
+        for name, end in _classes(tokens, at):
+            span(name, at, end)
+        for name, amounts in _AMOUNTS.items():
+            ends = [end for end, _ in amounts(tokens, at)]
+            if ends:
+                span(f"~{name}", at, max(ends))
+        text = ""
+        for end in range(at, min(at + _MOST_WORDS, len(tokens))):
+            if tokens[end].kind != "word":
+                break
+            text = f"{text} {tokens[end].text}".strip()
+            for kind in _entries(text):
+                span(f"~{kind}", at, end + 1)
+        for name in _listed(token.text):
+            found[at, column[name]] = 1.0
+        found[at, column[f"={token.kind}"]] = 1.0
+        if token.text in _MARKS:
+            found[at, column[f"mark {token.text}"]] = 1.0
+    if tokens:
+        found[0, column["first"]] = found[-1, column["last"]] = 1.0
+    return found
+
+
+def _classes(tokens: Sequence[Token], at: int) -> list[tuple[str, int]]:
+    """Return the classes of the grammar that begin at a token, each with where it ends."""
+    found: list[tuple[str, int]] = []
+    node, end = load_grammar().tree, at
+    while end < len(tokens):
+        node = node.after.get(tokens[end].text)
+        if node is None:
+            break
+        end += 1
+        found += [(name, end) for name, _ in node.ends]
+    return found
+
+
+@cache
+def _listed(word: str) -> tuple[str, ...]:
+    found = [name for name, words in _lists().items() if word in words]
+    if word in sounding_words():
+        found.append("~sounding")
+    if word in _described():
+        found.append("~described")
+    return tuple(found)
+
+
+@cache
+def _lists() -> dict[str, frozenset[str]]:
+    lists = load_grammar().lists
+    return {name: frozenset(lists[name].split()) for name in _LISTS}
+
+
+@cache
+def _described() -> frozenset[str]:
+    book = lexicon()
+    return frozenset(word for phrase in (*book.colours, *book.materials) for word in phrase.split())
+
+
+@cache
+def _entries(phrase: str) -> tuple[str, ...]:
+    """Return the kinds of what a phrase names exactly."""
+    book = lexicon()
+    found = [str(kind) for kind in Kind if book.find(phrase, kind) is not None]
+    if "thing" not in found and any(one in _also() for one in (phrase, *singulars_of(phrase))):
+        found.append("thing")
+    return tuple(found)
+
+
+@cache
+def _also() -> frozenset[str]:
+    return frozenset(name.strip() for name in load_grammar().lists["also_things"].split(","))
+
+
+@cache
+def _pieces(word: str) -> tuple[int, ...]:
+    """Return the numbers of a word's runs of three letters, its first and its last four; 0 fills up."""
+    if not any(mark.isalpha() for mark in word):
+        return (0,) * MOST_PIECES
+    whole = f"<{word}>"
+    runs = [whole[at : at + 3] for at in range(len(whole) - 2)]
+    runs = [f"^{whole[:5]}", f"{whole[-5:]}$", *runs][:MOST_PIECES]
+    numbers = [1 + _hashed(run) % (BUCKETS - 1) for run in runs]
+    return (*numbers, *(0 for _ in range(MOST_PIECES - len(numbers))))
+
+
+def _hashed(text: str) -> int:
+    """Return a number of a text that is the same on every machine (FNV-1a, 32 bits)."""
+    value = 2166136261
+    for byte in text.encode():
+        value = (value ^ byte) * 16777619 & 0xFFFFFFFF
+    return value

@@ -1,0 +1,244 @@
+"""The learned reader: the network's few likeliest readings of a sentence, each with its probability.
+
+The network runs in onnxruntime on one thread. A search over a few lines at once lets each symbol be only one that the
+line may go on with (`linear.State`), so every line that ends means something. Probabilities are the network's own,
+before that: where it would rather write nonsense, its readings are unlikely.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float32
+
+from avlmaps.core.errors import BackendError
+from avlmaps.language.intents import Inquiry, Intent
+from avlmaps.language.learned.agreement import Limits
+from avlmaps.language.learned.features import columns, features
+from avlmaps.language.learned.linear import (
+    INDEX,
+    MOST_SYMBOLS,
+    SYMBOLS,
+    MalformedError,
+    Pointable,
+    State,
+    Symbol,
+    inquiry_of,
+    intents_of,
+)  # fmt: skip
+from avlmaps.language.lexer import Token
+from avlmaps.perception.embedded.words import words_checksum
+
+if TYPE_CHECKING:
+    pass
+
+_BEAM = 4
+_MOST_TOKENS = 100
+_LEAST = -12.0  # lines less likely than e to this are not followed
+_NAMED = frozenset({"object", "sound", "area"})
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line that the network wrote.
+
+    Attributes:
+        symbols: what it wrote.
+        log: the logarithm of its probability.
+    """
+
+    symbols: tuple[Symbol, ...]
+    log: float
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """One reading of a sentence.
+
+    Attributes:
+        meaning: intents of a command; of a question the inquiry, or None where it cannot be answered.
+        probability: of all lines that mean this.
+        used: the tokens that it points at.
+        is_purpose: whether the question names no thing but what it is for ("where can I sit?").
+    """
+
+    meaning: "tuple[Intent, ...] | Inquiry | None"
+    probability: float
+    used: frozenset[int]
+    is_purpose: bool = False
+
+
+@dataclass(slots=True)
+class _Open:
+    state: State
+    symbols: tuple[Symbol, ...]
+    log: float
+    first: Float32[np.ndarray, " d"]
+    second: Float32[np.ndarray, " d"]
+
+
+class LearnedReader:
+    """Reads sentences with the network of a folder."""
+
+    def __init__(self, folder: Traversable) -> None:
+        """Load the network.
+
+        Raises:
+            BackendError: a file is missing, or was made for another version of the word table or the grammar.
+        """
+        import onnxruntime
+
+        try:
+            facts = json.loads(folder.joinpath("reader.json").read_text(encoding="utf-8"))
+            graphs = [folder.joinpath(f"{name}.onnx").read_bytes() for name in ("words", "step")]
+        except (OSError, ValueError) as fault:
+            raise BackendError(
+                f"The learned reader lacks its files ({fault}); install the package again, or make them with "
+                "'python -m training.language'."
+            ) from fault
+        _check(facts)
+        self._vocabulary = {word: at for at, word in enumerate(facts["vocabulary"], start=1)}
+        self.limits = Limits(**facts.get("limits", {}))
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.log_severity_level = 3
+        self._words, self._step = (
+            onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"]) for graph in graphs
+        )
+
+    def command(self, tokens: Sequence[Token]) -> list[Read]:
+        """Return the readings of a command, the likeliest first; none where it is empty or too long."""
+        found: dict[Any, Read] = {}
+        for line in self.lines(tokens, is_question=False):
+            try:
+                meaning = intents_of(line.symbols, tokens)
+            except MalformedError:
+                continue
+            _add(found, Read(meaning, float(np.exp(line.log)), _pointed(line)))
+        return _sorted(found)
+
+    def question(self, tokens: Sequence[Token]) -> list[Read]:
+        """Return the readings of a question, the likeliest first; none where it is empty or too long."""
+        found: dict[Any, Read] = {}
+        for line in self.lines(tokens, is_question=True):
+            purpose = line.symbols == ("purpose", "end")
+            try:
+                meaning = None if purpose else inquiry_of(line.symbols, tokens)
+            except MalformedError:
+                continue
+            _add(found, Read(meaning, float(np.exp(line.log)), _pointed(line), purpose))
+        return _sorted(found)
+
+    def lines(self, tokens: Sequence[Token], *, is_question: bool) -> list[Line]:
+        """Return the likeliest lines for a sentence, the likeliest first."""
+        if not 0 < len(tokens) <= _MOST_TOKENS:
+            return []
+        seen = features(tokens, self._vocabulary)
+        numbers = np.array([token.kind == "number" for token in tokens])
+        meaning = np.where(numbers[:, None], np.float32(0.0), seen.meaning)
+        words = np.where(numbers, self._vocabulary.get("#", 0), seen.words)
+        for kind in ("image", "clip"):
+            of_kind = np.array([token.kind == kind for token in tokens])
+            words = np.where(of_kind, self._vocabulary.get(f"<{kind}>", 0), words)
+        pieces = np.where((numbers | np.array([t.kind in ("image", "clip") for t in tokens]))[:, None], 0, seen.pieces)
+        outputs: Any = self._words.run(
+            None, {"meaning": meaning[None], "words": words[None], "pieces": pieces[None], "marks": seen.marks[None]}
+        )
+        states, begin = outputs
+        start = INDEX["start_question" if is_question else "start_command"]
+        return self._search(tokens, states, begin[0, 0], start, is_question=is_question)
+
+    def _search(self, tokens: Sequence[Token], states: Any, begin: Any, start: int, *, is_question: bool) -> list[Line]:
+        can = Pointable(tokens)
+        texts = [token.text for token in tokens]
+        beam = [_Open(State(can, is_question), (), 0.0, begin, begin)]
+        done: list[Line] = []
+        for _ in range(MOST_SYMBOLS):
+            last = np.array([[_number(one.symbols[-1]) if one.symbols else start] for one in beam], np.int64)
+            outputs: Any = self._step.run(
+                None,
+                {"last": last, "states": states, "first": np.stack([one.first for one in beam])[None],
+                 "second": np.stack([one.second for one in beam])[None]},
+            )  # fmt: skip
+            said, first, second = outputs
+            after: list[tuple[float, int, Symbol]] = []
+            for at, one in enumerate(beam):
+                after += [(one.log + log, at, symbol) for symbol, log in _following(one.state, said[at], texts)]
+            after.sort(key=lambda each: (-each[0], each[1], str(each[2])))
+            opened: list[_Open] = []
+            for log, at, symbol in after[: _BEAM * 2]:
+                if log < _LEAST or len(opened) == _BEAM:
+                    break
+                symbols = (*beam[at].symbols, symbol)
+                if symbol == "end":
+                    done.append(Line(symbols, log))
+                else:
+                    opened.append(_Open(beam[at].state.after(symbol), symbols, log, first[0, at], second[0, at]))
+            best = max((line.log for line in done), default=-np.inf)
+            beam = [one for one in opened if one.log > best - 4.0]
+            if not beam or len(done) >= 2 * _BEAM:
+                break
+        return sorted(done, key=lambda line: -line.log)[:_BEAM]
+
+
+def _following(state: State, said: Float32[np.ndarray, " k"], texts: Sequence[str]) -> list[tuple[Symbol, float]]:
+    """Return what may follow, likely enough to matter; a name's word may stand at any of its places."""
+    may = state.open()
+    found: list[tuple[Symbol, float]] = [(symbol, float(said[INDEX[symbol]])) for symbol in may.symbols]
+    base = len(SYMBOLS)
+    if state.expect == "name" and state.kind in _NAMED:
+        by_word: dict[str, list[int]] = {}
+        for at in sorted(may.tokens):
+            by_word.setdefault(texts[at], []).append(at)
+        for places in by_word.values():
+            logs = said[[base + at for at in places]]
+            found.append((places[int(logs.argmax())], float(np.logaddexp.reduce(logs))))
+    else:
+        found += [(at, float(said[base + at])) for at in may.tokens]
+    return [one for one in found if one[1] > _LEAST]
+
+
+def _number(symbol: Symbol) -> int:
+    return INDEX[symbol] if isinstance(symbol, str) else len(SYMBOLS) + symbol
+
+
+def _pointed(line: Line) -> frozenset[int]:
+    return frozenset(symbol for symbol in line.symbols if isinstance(symbol, int))
+
+
+def _add(found: dict[Any, Read], read: Read) -> None:
+    key = (read.meaning, read.is_purpose)
+    before = found.get(key)
+    if before is not None:
+        read = Read(before.meaning, before.probability + read.probability, before.used, before.is_purpose)
+    found[key] = read
+
+
+def _sorted(found: dict[Any, Read]) -> list[Read]:
+    return sorted(found.values(), key=lambda read: -read.probability)
+
+
+def _check(facts: dict[str, Any]) -> None:
+    """Refuse a network that was made for other inputs.
+
+    Raises:
+        BackendError: it was.
+    """
+    wanted = {"symbols": list(SYMBOLS), "columns": list(columns()), "word_table": words_checksum()}
+    for name, value in wanted.items():
+        if facts.get(name) != value:
+            raise BackendError(
+                f"The learned reader was made for another {name.replace('_', ' ')}; make it again with "
+                "'python -m training.language'."
+            )
+
+
+@cache
+def learned_reader() -> LearnedReader:
+    """Return the reader that ships; it is loaded at the first call."""
+    return LearnedReader(files("avlmaps.language.learned").joinpath("weights"))

@@ -1,0 +1,1 @@
+"""How the learned reader of commands and questions is made."""

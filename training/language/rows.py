@@ -1,0 +1,177 @@
+"""Rows of the lists: a sentence with what it means, typed, and the voice that wrote it."""
+
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from avlmaps.language.intents import (
+    Ask,
+    Beside,
+    Between,
+    Circle,
+    Clarify,
+    Face,
+    Go,
+    Inquiry,
+    Intent,
+    Kind,
+    Move,
+    Pick,
+    Reason,
+    Refuse,
+    Repeat,
+    Return,
+    Side,
+    StopAt,
+    Target,
+    Turn,
+    VisitEach,
+    Wait,
+    to_json,
+)  # fmt: skip
+
+ROOT = Path(__file__).parents[2]
+BLIND = ROOT / "src/avlmaps/bench/data/language"
+LISTS = ROOT / "tests/language/commands"
+VOICES = Path(__file__).parent / "data"
+PROGRAMS = ("commands.tsv", "free.tsv", "paraphrases.jsonl", "paraphrases_2.jsonl", "paraphrases_3.jsonl",
+            "paraphrases_4.jsonl")  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Example:
+    """A sentence and one thing that it means.
+
+    Attributes:
+        say: the sentence.
+        meaning: intents of a command, or the inquiry of a question (None: it cannot be answered).
+        is_question: which of the two.
+        voice: the name of the list.
+        image: the file that came along.
+        clip: the file that came along.
+        row: the row of the list, to be judged by.
+        also: other voices whose rows it is made from.
+    """
+
+    say: str
+    meaning: "tuple[Intent, ...] | Inquiry | None"
+    is_question: bool
+    voice: str
+    image: str | None = None
+    clip: str | None = None
+    row: Mapping[str, Any] = field(default_factory=dict)
+    also: tuple[str, ...] = ()
+
+
+def target_of(said: Any) -> Target:
+    """Return a target of its JSON."""
+    if isinstance(said, str):
+        said = {"object": said}
+    kind = next(kind for kind in Kind if str(kind) in said)
+    name = "" if kind is Kind.HERE else str(said[str(kind)])
+    near = tuple(target_of(one) for one in said.get("near", ()))
+    return Target(kind, name, near, Pick(said.get("pick", "")))
+
+
+def intent_of(said: Mapping[str, Any]) -> Intent:  # noqa: C901
+    """Return an intent of its JSON."""
+    do = said["do"]
+    to = said.get("to", said.get("of"))
+    metres = None if said.get("metres") is None else float(said["metres"])
+    match do:
+        case "go":
+            return Go(target_of(to))
+        case "face":
+            return Face(target_of(to), Side(said.get("side", "ahead")))
+        case "turn":
+            return Turn(said.get("degrees"), said.get("heading"))
+        case "move":
+            return Move(float(said["metres"]))
+        case "between":
+            a, b = to
+            return Between((target_of(a), target_of(b)))
+        case "beside":
+            return Beside(target_of(to), Side(said["side"]), metres)
+        case "stop_at":
+            return StopAt(target_of(to), float(said["metres"]))
+        case "circle":
+            return Circle(target_of(to), said.get("views"))
+        case "visit_each":
+            return VisitEach(target_of(to))
+        case "wait":
+            return Wait(said.get("seconds"))
+        case "return":
+            return Return()
+        case "repeat":
+            return Repeat(int(said["times"]), tuple(intent_of(one) for one in said["body"]))
+        case "refuse":
+            return Refuse(Reason(said.get("reason") or "unknown"))
+        case _:
+            return Clarify()
+
+
+def meanings(row: Mapping[str, Any]) -> "list[tuple[Intent, ...] | Inquiry | None]":
+    """Return what a row means, and what else it may mean."""
+    if "question" in row:
+        return [_inquiry(one) for one in (row["question"], *row.get("also", ())) if isinstance(one, dict)]
+    return [tuple(intent_of(one) for one in each) for each in (row["intents"], *row.get("also", ()))]
+
+
+def _inquiry(said: Mapping[str, Any]) -> Inquiry | None:
+    if said["ask"] in ("refuse", "clarify"):
+        return None
+    return Inquiry(Ask(said["ask"]), tuple(target_of(one) for one in said["of"]))
+
+
+def examples_of(path: Path) -> Iterator[Example]:
+    """Yield the rows of a list with all that each may mean; the first is what it means most likely."""
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if not line.strip():
+            continue
+        row = json.loads(line)
+        try:
+            found = meanings(row)
+        except (KeyError, ValueError, TypeError, StopIteration) as fault:
+            print(f"{path.name}: {row.get('say')!r}: {fault!r}", file=sys.stderr)
+            continue
+        for at, meaning in enumerate(found):
+            said = str(row["say"])
+            yield Example(said, meaning, "question" in row, path.stem, row.get("image"), row.get("clip"),
+                          row if at == 0 else {})  # fmt: skip
+
+
+def to_row(example: Example) -> dict[str, Any]:
+    """Return an example as a row of a list."""
+    assert isinstance(example.meaning, tuple)
+    return {"say": example.say, "intents": [to_json(intent) for intent in example.meaning]}
+
+
+def from_programs() -> Iterator[Example]:
+    """Yield commands whose rows hold programs, with the intents that write an equal program."""
+    sys.path.insert(0, str(ROOT / "tests" / "language"))
+    from development import done_by, rows
+
+    from avlmaps.core.errors import LanguageError
+    from avlmaps.language.commands import read_command
+    from avlmaps.language.program.writing import write_program
+
+    for name in PROGRAMS:
+        for command, programs in rows(name):
+            try:
+                read = read_command(command)
+            except LanguageError:
+                continue
+            if read.stops is None and any(done_by(write_program(read.intents)) == done_by(one) for one in programs):
+                yield Example(command, read.intents, False, name.split(".")[0])
+
+
+def lists() -> dict[str, list[Path]]:
+    """Return the files of rows: the blind lists, the lists of speakers, and the voices written for training."""
+    return {
+        "blind": sorted(BLIND.glob("*.jsonl")),
+        "speakers": [*sorted(LISTS.glob("speakers_*.jsonl")), LISTS / "intents.jsonl"],
+        "voices": sorted(VOICES.glob("*.jsonl")),
+    }  # fmt: skip
