@@ -144,7 +144,8 @@ def agreed(  # noqa: C901
     best = theirs[0]
     if ours_stop is not None:
         if best.stops is not None:
-            firm = isinstance(best.stops, Refuse) and not isinstance(ours_stop, Refuse)
+            firm = isinstance(best.stops, Refuse) and best.stops.reason in (*DANGERS, Reason.MANIPULATION)
+            firm = firm and not isinstance(ours_stop, Refuse) and best.probability >= limits.alone
             return Agreed(best.intents, "network") if firm else Agreed(ours, "both")
         least = limits.doubtful if best.doubtful else limits.alone
         return Agreed(best.intents, "network", best.notes) if best.probability >= least else Agreed(ours, "grammar")
