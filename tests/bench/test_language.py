@@ -7,6 +7,7 @@ from avlmaps.bench.language import OUTCOMES, counts, judge, sealed, shipped
 # At least so many of the sentences of each list are right, and at most so many misread; all are development lists.
 REACHED = {
     "child": (112, 5), "nurse": (115, 5), "newcomer": (113, 5), "roboticist": (118, 4),
+    "engineer": (90, 3), "grandmother": (68, 4), "plumber": (78, 9), "tourist": (76, 5),
     "abroad": (63, 20), "dictation": (64, 19), "guests": (51, 7), "warehouse": (69, 15),
 }  # fmt: skip
 

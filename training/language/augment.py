@@ -49,7 +49,7 @@ _REMARKS = (
     "the visitors arrive soon", "I can't find my keys", "it's been a long day", "dinner is nearly ready",
     "the boss is watching", "my mother is coming", "that's where everybody is", "I heard something",
     "I have a delivery",
-    "it's urgent", "I'm not sure where it is", "he needs help", "the floor is wet", "they close at six",
+    "it's urgent", "I can't see it from here", "he needs help", "the floor is wet", "they close at six",
     "I forgot mine",
 )  # fmt: skip
 _JOINTS = (

@@ -25,7 +25,7 @@ def fitted(
         vocabulary: words with a number of their own.
         minutes: processor time.
         seed: of weights and order.
-        start: a network to go on from, more gently.
+        start: a network to continue from, more gently.
         note: printed with the progress.
     """
     peak = _PEAK if start is None else _GENTLE

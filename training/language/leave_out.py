@@ -85,7 +85,7 @@ def both(row: Mapping[str, Any], voice: str, reader: LearnedReader) -> Both:
 
 
 def outcome(one: Both, limits: Limits | None, *, who: str = "both") -> str:
-    """Return what became of a row: right, harmless, asked back or misread.
+    """Return what became of a row: right, harmless, a question back or misread.
 
     Args:
         one: the row.

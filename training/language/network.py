@@ -49,7 +49,7 @@ class Encoder(nn.Module):
 
 
 class Decoder(nn.Module):
-    """From the line so far to the next symbol or pointer."""
+    """From the beginning of the line to the next symbol or pointer."""
 
     def __init__(self, size: Size) -> None:
         super().__init__()

@@ -243,7 +243,7 @@ def _rounded(intent: Intent) -> Intent:
 
 
 def _plain(target: Target) -> Target:
-    """Return a target that is the same for all ways to write it."""
+    """Return a target that is the same however it is written."""
     near = tuple(sorted({_plain(one) for one in _flat_near(target)}, key=str))
     words = target.name.lower().replace("-", " ").split()
     if target.kind is Kind.SOUND:

@@ -51,7 +51,7 @@ class Guard:
     problem: Clarify | None = None
 
     def put_right(self, target: Target) -> Target:
-        """Return a target with the name that is meant; what is not known is kept as a question."""
+        """Return a target with the name that is meant; what is not known becomes a question."""
         near = tuple(self.put_right(one) for one in target.near)
         match target.kind:
             case Kind.IMAGE | Kind.CLIP if not target.name:

@@ -1,7 +1,7 @@
 """The learned reader: the network's few likeliest readings of a sentence, each with its probability.
 
 The network runs in onnxruntime on one thread. A search over a few lines at once lets each symbol be only one that the
-line may go on with (`linear.State`), so every line that ends means something. Probabilities are the network's own,
+line may continue with (`linear.State`), so every line that ends means something. Probabilities are the network's own,
 before that: where it would rather write nonsense, its readings are unlikely.
 """
 
