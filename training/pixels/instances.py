@@ -29,7 +29,7 @@ from avlmaps.maps.store.reader import StoredMap
 from avlmaps.perception.embedded.pixels import LARGEST_LOG_AREA, SMALLEST_LOG_AREA, EmbeddedPixels
 from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS, InstanceNotes, Notes
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.modalities.object import Asked, ObjectSettings, Rivals, object_pieces
+from avlmaps.query.modalities.object import EncodedWord, ObjectSettings, Rivals, object_pieces
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
 from avlmaps.sim.recorder import RecordSettings, record_scene
@@ -93,7 +93,7 @@ def pieces_of(options: Options, number: int) -> Iterator[Pieces]:
     for name in encoder.vocabulary:
         if name in STRUCTURE:
             continue
-        pieces = object_pieces(space, feature, encoder, rivals, Asked.of(encoder, name), settings)
+        pieces = object_pieces(space, feature, encoder, rivals, EncodedWord.of(encoder, name), settings)
         count = np.bincount(pieces.instance, minlength=len(pieces.mean_probability))
         held = np.zeros(len(space.centres), bool)
         for thing in things:
