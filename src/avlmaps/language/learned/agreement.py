@@ -28,6 +28,7 @@ from avlmaps.language.intents import (
     Wait,
 )
 from avlmaps.language.intents import Move as MoveIntent
+from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.orders import on_targets
 from avlmaps.language.verbalise import verbalise
@@ -57,33 +58,6 @@ _NO_NAMES = frozenset({
 })  # fmt: skip
 _WHO = frozenset({"someone", "somebody", "anyone", "anybody", "person", "people", "a", "the", "of", "on", "sound"})
 _ENDINGS = ("ing", "ed", "es", "s", "er", "y", "e")
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """How likely a reading of the network must be; chosen on voices that it was not fitted to.
-
-    Attributes:
-        alone: to drive where the grammar asks back.
-        doubtful: the same, where a number or a word such as "not" is not part of the reading.
-        over: to drive where the grammar reads another place.
-        stop: to stop where the grammar drives.
-        danger: a refusal for danger, to stop.
-        trusted: below this the network says nothing against the grammar.
-        question_stop: to refuse a question that the grammar reads.
-        question_alone: to answer a question that the grammar does not read.
-        question_over: to answer a question that the grammar reads otherwise.
-    """
-
-    alone: float = 0.6
-    doubtful: float = 0.85
-    over: float = 0.95
-    stop: float = 0.6
-    danger: float = 0.5
-    trusted: float = 0.0
-    question_stop: float = 0.6
-    question_alone: float = 0.5
-    question_over: float = 0.8
 
 
 @dataclass(frozen=True, slots=True)

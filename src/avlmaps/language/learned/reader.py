@@ -18,8 +18,8 @@ from jaxtyping import Float32
 
 from avlmaps.core.errors import BackendError
 from avlmaps.language.intents import Inquiry, Intent
-from avlmaps.language.learned.agreement import Limits
 from avlmaps.language.learned.features import columns, features
+from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.linear import (
     INDEX,
     MOST_SYMBOLS,
