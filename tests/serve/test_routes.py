@@ -300,7 +300,7 @@ ERRORS: tuple[tuple[str, Callable[[TestClient], Any], int, str, str], ...] = (
     ("a cut clip", lambda c: c.post("/maps/room/ask", files={"clip": b"RIFF\x00\x00\x00\x00WAVE"}), 415,
      "clip", "clip"),
     ("a photo that the words lack", lambda c: c.get("/maps/room/ask?sentence=where+was+this+photo+taken"), 422, "query",
-     "attach a photo"),
+     "Attach it"),
     ("a photo that the words do not mean", lambda c: c.post("/maps/room/ask", data={"sentence": "the red photo"},
      files={"photo": b"x"}), 415, "photo", "PNG"),
     ("a place without y", lambda c: c.get("/maps/room/place?x=1"), 400, "usage", "y"),

@@ -40,6 +40,11 @@ Every verb takes --json (one JSON object on standard output) and --help. Progres
 Exit status: 0 done, 1 a known error (one sentence says which), 2 a wrong command line.
 With --json an error is {"error": {"kind": ..., "message": ...}} on standard output."""
 
+# The language asks for files in words that fit every program; here an option names them.
+_ATTACHED = {
+    "Which picture? Attach it": "Which picture? Give it with --image FILE",
+    "Which recording? Attach it": "Which recording? Give it with --sound-clip FILE",
+}
 VERBS: dict[str, type[Verb]] = {
     "demo": Demo,
     "record": Record,
@@ -165,6 +170,8 @@ def _compiling(verb: Verb) -> AbstractContextManager[None]:
 
 def _fail(verb: Verb, error: BaseException, message: str, status: int) -> int:
     """Print an error in one sentence on standard error, and as JSON on standard output with --json."""
+    for said, option in _ATTACHED.items():
+        message = message.replace(said, option)
     if verb.json:
         _emit_error(kind_of(error), message)
     return _complain(message, status)

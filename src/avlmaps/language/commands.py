@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from avlmaps.core.errors import LanguageError
+from avlmaps.language.asking_back import missing_file, unknown
 from avlmaps.language.discourse import Composed, compose
 from avlmaps.language.intents import (
     Clarify,
@@ -15,7 +16,7 @@ from avlmaps.language.intents import (
     Target,
     Wait,
 )  # fmt: skip
-from avlmaps.language.names import is_known, near_names
+from avlmaps.language.names import is_known
 from avlmaps.language.orders import on_targets
 from avlmaps.language.readings import Sentence, readings
 
@@ -253,8 +254,7 @@ def _guarded(composed: Composed, sentence: Sentence, given: Given) -> tuple[tupl
         if target.is_file and not target.name:
             path = given.image if target.kind is Kind.IMAGE else given.clip
             if path is None:
-                option, what = ("--image", "picture") if target.kind is Kind.IMAGE else ("--sound-clip", "recording")
-                problem.append(Clarify(f"Which {what}? Give the file with {option} FILE, or name it in the sentence."))
+                problem.append(missing_file(target.kind))
             else:
                 target = replace(target, name=path)
         elif not sentence.names.known(target):
@@ -267,10 +267,3 @@ def _guarded(composed: Composed, sentence: Sentence, given: Given) -> tuple[tupl
     if problem:
         return (problem[0],), tuple(notes)
     return intents, tuple(dict.fromkeys(notes))
-
-
-def unknown(name: str) -> Clarify:
-    """Return the question for a name whose head is not known."""
-    near = tuple(word for word, _ in near_names(name.split()[-1]))[:3]
-    hint = f" Did you mean {' or '.join(near)}?" if near else " Say it in another word."
-    return Clarify(f"I do not know '{name}'.{hint}", near)

@@ -9,7 +9,8 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
 from avlmaps.language.asking import framed
 from avlmaps.language.chart import Tree
-from avlmaps.language.commands import Given, unknown
+from avlmaps.language.asking_back import missing_file, unknown
+from avlmaps.language.commands import Given
 from avlmaps.language.grammar import load_grammar
 from avlmaps.language.intents import Ask, Clarify, Inquiry, Kind, Pick, Target
 from avlmaps.language.readings import Sentence
@@ -295,8 +296,7 @@ def _checked(target: Target, read: Sentence, given: Given, notes: list[str]) -> 
     if target.is_file and not target.name:
         path: str | None = given.image if target.kind is Kind.IMAGE else given.clip
         if path is None:
-            option = "--image" if target.kind is Kind.IMAGE else "--sound-clip"
-            raise QueryError(f"The sentence speaks of a file that is not given; add {option} FILE.")
+            raise QueryError(missing_file(target.kind).question)
         target = replace(target, name=path)
     elif not read.names.known(target):
         raise QueryError(unknown(target.name).question)

@@ -268,12 +268,6 @@ def _sentence_answer(
         raise RequestError(
             "The sentence does not speak of the file; say 'this photo' or 'this recording' in it."
         ) from None
-    except QueryError as error:
-        # The language speaks of the command line's options; clients attach files.
-        sentence = (
-            str(error).replace("add --image FILE", "attach a photo").replace("add --sound-clip FILE", "attach a clip")
-        )
-        raise QueryError(sentence) from None
 
 
 def ask(task: Task, query: AskQuery) -> QueryAnswer:

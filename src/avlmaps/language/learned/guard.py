@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 from avlmaps.core.lexicon import Kind as Entries
 from avlmaps.core.lexicon import lexicon
+from avlmaps.language.asking_back import missing_file, unknown
 from avlmaps.language.intents import (
     Beside,
     Clarify,
@@ -21,7 +22,7 @@ from avlmaps.language.intents import (
 )  # fmt: skip
 from avlmaps.language.learned.agreement import Weighed, is_doubtful
 from avlmaps.language.learned.reader import Read
-from avlmaps.language.names import Names, is_known, mended, near_names, sounding_forms, sounds_like
+from avlmaps.language.names import Names, is_known, mended, sounding_forms, sounds_like
 from avlmaps.language.orders import on_targets
 
 _SAID = {
@@ -57,10 +58,7 @@ class Guard:
             case Kind.IMAGE | Kind.CLIP if not target.name:
                 path = self.image if target.kind is Kind.IMAGE else self.clip
                 if path is None:
-                    option, what = (
-                        ("--image", "picture") if target.kind is Kind.IMAGE else ("--sound-clip", "recording")
-                    )
-                    self._ask(Clarify(f"Which {what}? Give the file with {option} FILE, or name it in the sentence."))
+                    self._ask(missing_file(target.kind))
                 return replace(target, name=path or "", near=near)
             case Kind.OBJECT | Kind.AREA:
                 return replace(self._thing(target), near=near)
@@ -74,9 +72,7 @@ class Guard:
         if not is_known(name) and not self.names.knows(name):
             better = mended(name)
             if better is None and not (target.kind is Kind.AREA and set(name.split()) & _ROOM_WORDS):
-                near = tuple(word for word, _ in near_names(name.split()[-1]))[:3]
-                hint = f" Did you mean {' or '.join(near)}?" if near else " Say it in another word."
-                self._ask(Clarify(f"I do not know '{name}'.{hint}", near))
+                self._ask(unknown(name))
                 return target
             if better is not None:
                 self.notes.append(f"'{name}' is read as '{better}'.")
