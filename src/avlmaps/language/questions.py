@@ -8,8 +8,8 @@ from itertools import pairwise
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
 from avlmaps.language.asking import framed
-from avlmaps.language.chart import Tree
 from avlmaps.language.asking_back import missing_file, unknown
+from avlmaps.language.chart import Tree
 from avlmaps.language.commands import Given
 from avlmaps.language.grammar import load_grammar
 from avlmaps.language.intents import Ask, Clarify, Inquiry, Kind, Pick, Target
