@@ -2,8 +2,8 @@
 
 import random
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from typing import Any
 
@@ -77,19 +77,23 @@ _FREE_ROOMS = (
 _TURNS = {"left": "right", "right": "left", "clockwise": "anticlockwise", "anticlockwise": "clockwise",
           "counterclockwise": "clockwise"}  # fmt: skip
 _ORDERED = re.compile(r"\b(first|before|finally|lastly|in that order|last of all|twice|times|same)\b", re.IGNORECASE)
+_SWAPPED = (Kind.OBJECT, Kind.AREA, Kind.SOUND)
 _COMPASS = ("north", "east", "south", "west")
 
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Names to put in the place of others."""
+    """Names to put in the place of others; ``said`` are those of the rows, by their kinds."""
 
     things: tuple[str, ...]
     rooms: tuple[str, ...]
     sounds: tuple[str, ...]
+    said: Mapping[Kind, tuple[str, ...]] = field(default_factory=dict)
 
     def draw(self, kind: Kind, draw: random.Random) -> str:
         """Return a name of a kind."""
+        if self.said.get(kind) and draw.random() < 0.5:
+            return draw.choice(self.said[kind])
         if kind is Kind.SOUND:
             return draw.choice(self.sounds)
         if kind is Kind.AREA:
@@ -115,6 +119,16 @@ def lexicon_names() -> Names:
     )
 
 
+def names_of(rows: Sequence[Example]) -> Names:
+    """Return the names of the lexicon and those that the speakers of some rows use."""
+    said: dict[Kind, set[str]] = {}
+    for row in rows:
+        for target in targets_of(row.meaning):
+            if target.kind in _SWAPPED and 0 < len(target.name.split()) <= 4:
+                said.setdefault(target.kind, set()).add(target.name.lower())
+    return replace(lexicon_names(), said={kind: tuple(sorted(names)) for kind, names in said.items()})
+
+
 def variant(example: Example, others: Sequence[Example], names: Names, draw: random.Random) -> Example:
     """Return another example made of one; ``others`` are commands that may be joined to it."""
     made = example
@@ -133,7 +147,8 @@ def variant(example: Example, others: Sequence[Example], names: Names, draw: ran
     return slipped(made, draw)
 
 
-def _targets(meaning: Any) -> list[Target]:
+def targets_of(meaning: Any) -> list[Target]:
+    """Return the targets that a meaning speaks of, and what each is near."""
     found: list[Target] = []
 
     def note(target: Target) -> Target:
@@ -161,7 +176,7 @@ def _changed(meaning: Any, change: Any) -> Any:
 
 def swapped(example: Example, names: Names, draw: random.Random) -> Example:
     """Return an example with other names of things, rooms and sounds."""
-    said = {(t.kind, t.name) for t in _targets(example.meaning) if t.kind in (Kind.OBJECT, Kind.AREA, Kind.SOUND)}
+    said = {(t.kind, t.name) for t in targets_of(example.meaning) if t.kind in _SWAPPED}
     every = [name.lower() for _, name in said]
     for kind, name in sorted(said):
         if draw.random() < 0.25 or sum(name.lower() in other for other in every) > 1:
@@ -257,7 +272,7 @@ def joinable(example: Example) -> bool:
         return False
     if isinstance(meaning[0], Refuse):
         return meaning[0].reason in (Reason.MANIPULATION, Reason.HARM, Reason.FLYING)
-    if any(target.pick is Pick.OTHER or target.is_file for target in _targets(meaning)):
+    if any(target.pick is Pick.OTHER or target.is_file for target in targets_of(meaning)):
         return False
     return "\n" not in example.say
 

@@ -1,7 +1,9 @@
-"""Write the network as two ONNX graphs, words and next symbol, weights in half precision."""
+"""Write networks as two ONNX graphs, words and next symbol, weights in half precision."""
 
 import json
+import math
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,40 +22,53 @@ OPSET = 17
 
 
 class _Step(nn.Module):
-    """One step of the decoder for some lines at once."""
+    """One step of several decoders for some lines at once; their probabilities are averaged."""
 
-    def __init__(self, network: Network) -> None:
+    def __init__(self, networks: Sequence[Network]) -> None:
         super().__init__()
-        self.decoder = network.decoder
+        self.decoders = nn.ModuleList(network.decoder for network in networks)
 
     def forward(self, last: Tensor, states: Tensor, first: Tensor, second: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        count = len(self.decoders)
         wide = states.expand(last.shape[0], -1, -1)
         mask = torch.ones_like(wide[..., 0])
-        said, first, second = self.decoder(last, wide, mask, (first, second))
-        return said[:, 0], first, second
+        said, firsts, seconds = zip(
+            *(
+                decoder(last, its, mask, (one, two))
+                for decoder, its, one, two in zip(
+                    self.decoders, wide.chunk(count, -1), first.chunk(count, -1), second.chunk(count, -1), strict=True
+                )
+            ),
+            strict=True,
+        )
+        mean = torch.logsumexp(torch.stack(said), 0) - math.log(count)
+        return mean[:, 0], torch.cat(firsts, -1), torch.cat(seconds, -1)
 
 
 class _Begin(nn.Module):
-    """The states of the words, and the first state of the decoder."""
+    """The states of the words, and the first states of the decoders, side by side."""
 
-    def __init__(self, network: Network) -> None:
+    def __init__(self, networks: Sequence[Network]) -> None:
         super().__init__()
-        self.encoder, self.start = network.encoder, network.decoder.start
+        self.encoders = nn.ModuleList(network.encoder for network in networks)
+        self.starts = nn.ModuleList(network.decoder.start for network in networks)
 
     def forward(self, meaning: Tensor, words: Tensor, pieces: Tensor, marks: Tensor) -> tuple[Tensor, Tensor]:
-        states = self.encoder(meaning, words, pieces, marks)
-        return states, torch.tanh(self.start(states.mean(1)))[None]
+        states = [encoder(meaning, words, pieces, marks) for encoder in self.encoders]
+        begins = [torch.tanh(start(one.mean(1)))[None] for start, one in zip(self.starts, states, strict=True)]
+        return torch.cat(states, -1), torch.cat(begins, -1)
 
 
-def write(network: Network, vocabulary: dict[str, int], folder: Path, facts: dict[str, Any]) -> None:
-    """Write ``words.onnx``, ``step.onnx`` and ``reader.json``."""
+def write(networks: Sequence[Network], vocabulary: dict[str, int], folder: Path, facts: dict[str, Any]) -> None:
+    """Write ``words.onnx``, ``step.onnx`` and ``reader.json``: networks of one size that read together."""
     folder.mkdir(parents=True, exist_ok=True)
-    network.eval()
-    wide, deep = 2 * network.size.state, network.size.decoder
+    size = networks[0].size
+    wide, deep = 2 * size.state * len(networks), size.decoder * len(networks)
     n = 7
     inputs = (torch.zeros(1, n, 128), torch.zeros(1, n, dtype=torch.long),
               torch.zeros(1, n, MOST_PIECES, dtype=torch.long), torch.zeros(1, n, len(columns())))  # fmt: skip
-    _graph(_Begin(network), inputs, folder / "words.onnx", ["meaning", "words", "pieces", "marks"], ["states", "begin"],
+    _graph(_Begin(networks), inputs, folder / "words.onnx", ["meaning", "words", "pieces", "marks"],
+           ["states", "begin"],
            {name: {1: "n"} for name in ("meaning", "words", "pieces", "marks", "states")})  # fmt: skip
     step = (
         torch.zeros(3, 1, dtype=torch.long),
@@ -61,7 +76,7 @@ def write(network: Network, vocabulary: dict[str, int], folder: Path, facts: dic
         torch.zeros(1, 3, deep),
         torch.zeros(1, 3, deep),
     )
-    _graph(_Step(network), step, folder / "step.onnx", ["last", "states", "first", "second"],
+    _graph(_Step(networks), step, folder / "step.onnx", ["last", "states", "first", "second"],
            ["said", "first_out", "second_out"],
            {"last": {0: "b"}, "states": {1: "n"}, "first": {1: "b"}, "second": {1: "b"}, "said": {0: "b", 1: "k"},
             "first_out": {1: "b"}, "second_out": {1: "b"}})  # fmt: skip

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
+from training.language.pool import HELD_OUT
 from training.language.rows import lists
 
 from avlmaps.bench.language import OUTCOMES, judge_intents, judge_question, read_list
@@ -23,7 +24,7 @@ from avlmaps.language.questions import read_question_by_grammar
 from avlmaps.language.readings import Sentence
 
 FOLDS = (
-    frozenset({"abroad", "guests", "v01", "v03", "v08", "v11"}),
+    HELD_OUT,
     frozenset({"dictation", "warehouse", "v02", "v05", "v07", "v10"}),
     frozenset({"child", "nurse", "newcomer", "roboticist", "v04", "v06", "v09", "v12"}),
 )

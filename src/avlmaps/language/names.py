@@ -6,6 +6,7 @@ much where its head is unknown; a misspelt head is corrected where one word is c
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
+from importlib.resources import files
 
 from avlmaps.core.inflection import forms_of, singulars_of
 from avlmaps.core.lexicon import Kind as Entries
@@ -13,6 +14,7 @@ from avlmaps.core.lexicon import lexicon
 from avlmaps.language.grammar import load_grammar
 from avlmaps.language.intents import Kind, Target
 from avlmaps.language.lexer import Token, is_unit
+from avlmaps.perception.embedded.words import is_word
 
 _MOST_WORDS = 5
 _ADJECTIVE, _OPEN_WORD, _SIDE, _MENDED, _UNKNOWN = 0.02, 0.45, 0.25, 0.9, 1.6
@@ -20,6 +22,7 @@ _VERB_ALONE = 0.5
 _ENCODED = 0.8  # only the map's encoder knows it
 _NOUN = 0.1  # a noun before a noun; a second one costs four times as much
 _ALIKE, _APART = 0.78, 0.08  # least likeness of a misspelt word to its neighbour, and its lead over the next
+_SHORTEST_NOUN, _SHORTEST_PART = 3, 4  # letters of an English word, and of each half of "footstool"
 _ONLY_ROOMS = frozenset({"room", "area", "zone", "hall", "corner"})
 Found = list[tuple[int, float, Target]]
 
@@ -239,6 +242,31 @@ def mended(name: str) -> str | None:
 def is_known(name: str) -> bool:
     """Return whether the lexicon knows the head of a name."""
     return _known(tuple(name.lower().split())) is not None
+
+
+@cache
+def may_name(name: str) -> bool:
+    """Return whether the head of a name is an English word that can name a thing, whether or not a map can find it.
+
+    "Hedge" and "footstool" are; "tabel" and "frobnicator" are misspelt or no words.
+    """
+    head = name.lower().split()[-1:]
+    if not head or len(head[0]) < _SHORTEST_NOUN or head[0] in _never() or head[0] in _verbs():
+        return False
+    if head[0] in _adjectives() or head[0].endswith("ly"):
+        return False
+    return any(is_word(one) or one in _nouns() or _is_compound(one) for one in (head[0], *singulars_of(head[0])))
+
+
+@cache
+def _nouns() -> frozenset[str]:
+    """Return nouns that people have used as names and that the word table lacks (`training.language.nouns`)."""
+    return frozenset(files("avlmaps.language").joinpath("nouns.txt").read_text(encoding="utf-8").split())
+
+
+def _is_compound(word: str) -> bool:
+    cuts = range(_SHORTEST_PART, len(word) - _SHORTEST_PART + 1)
+    return any(is_word(word[:at]) and is_word(word[at:]) for at in cuts)
 
 
 @cache

@@ -22,8 +22,9 @@ from avlmaps.language.intents import (
 )  # fmt: skip
 from avlmaps.language.learned.agreement import Weighed, is_doubtful
 from avlmaps.language.learned.reader import Read
-from avlmaps.language.names import Names, is_known, mended, sounding_forms, sounds_like
+from avlmaps.language.names import Names, is_known, may_name, mended, sounding_forms, sounds_like
 from avlmaps.language.orders import on_targets
+from avlmaps.perception.embedded.words import is_word
 
 _SAID = {
     Reason.MANIPULATION: "The robot has no hands and no voice; it can only drive, turn and look.",
@@ -70,8 +71,9 @@ class Guard:
     def _thing(self, target: Target) -> Target:
         name = target.name
         if not is_known(name) and not self.names.knows(name):
-            better = mended(name)
-            if better is None and not (target.kind is Kind.AREA and set(name.split()) & _ROOM_WORDS):
+            better = None if is_word(name.split()[-1]) else mended(name)
+            is_room = target.kind is Kind.AREA and set(name.split()) & _ROOM_WORDS
+            if better is None and not is_room and not may_name(name):
                 self._ask(unknown(name))
                 return target
             if better is not None:
