@@ -65,6 +65,10 @@ _ANGLES = {"degree": 1.0, "deg": 1.0, "°": 1.0, "radian": degrees(1.0), "rad": 
 _TIMES = {"second": 1.0, "sec": 1.0, "s": 1.0, "minute": 60.0, "min": 60.0, "moment": 2.0, "hour": 3600.0}
 _SIZES = frozenset(
     {
+        "whole",
+        "full",
+        "good",
+        "solid",
         "giant",
         "baby",
         "large",
@@ -73,14 +77,12 @@ _SIZES = frozenset(
         "slow",
         "more",
         "further",
-        "full",
         "big",
         "small",
         "little",
         "long",
         "short",
         "tiny",
-        "good",
         "another",
     }
 )
@@ -201,7 +203,9 @@ def _with_part(tokens: list[Token], end: int, value: float) -> list[tuple[int, f
         found.insert(0, (end + 3, value + _PARTS[words[2]]))
     elif words[:1] == ["and"] and words[1:2] and words[1] in _PARTS:
         found.insert(0, (end + 2, value + _PARTS[words[1]]))
-    elif words[:1] == ["point"] and words[1:2] and words[1] in _SMALL:
+    elif words[:1] == ["and"] and words[1:2] and words[1] in _SMALL and words[2:] == ["quarters"]:
+        found.insert(0, (end + 3, value + _SMALL[words[1]] * 0.25))
+    elif words[:1] in (["point"], ["decimal"]) and words[1:2] and words[1] in _SMALL:
         found.insert(0, (end + 2, value + _SMALL[words[1]] / 10))
     return found
 
@@ -233,6 +237,8 @@ def amounts_at(tokens: list[Token], i: int, units: dict[str, float]) -> list[tup
     if i < len(tokens) and tokens[i].text in ("a", "an", "another", "one"):
         numbers = [*numbers, (i + 1, 1.0)]
     for end, value in numbers:
+        part_of = end < len(tokens) and end > i and tokens[end - 1].text == "of" and tokens[end].text in ("a", "an")
+        end += part_of  # "three quarters of an hour"
         while end < len(tokens) and tokens[end].text in _SIZES:
             end += 1
         if end < len(tokens):
@@ -246,9 +252,14 @@ def amounts_at(tokens: list[Token], i: int, units: dict[str, float]) -> list[tup
 def _and_smaller(
     tokens: list[Token], at: int, amount: float, unit: float, units: dict[str, float]
 ) -> list[tuple[int, float]]:
-    """Return an amount with a second one in a smaller unit: "four feet six inches", "1 min 30 s"."""
-    at += at < len(tokens) and tokens[at].text == "and"
+    """Return an amount with a second one in a smaller unit: "four feet six inches", "1 min 30", "one metre twenty"."""
+    joined = at < len(tokens) and tokens[at].text == "and"
+    at += joined
     for end, value in number_at(tokens, at):
+        bare = end >= len(tokens) or not (is_unit(tokens, end) or tokens[end].text in _COUNTED)
+        parts = 100 if units is LENGTHS and unit == 1.0 else 60 if units is _TIMES and unit == 60.0 else 0
+        if bare and not joined and 10 <= value < parts and value == int(value):
+            return [(end, round(amount + value * unit / parts, 4))]
         smaller = _unit(tokens, end, units) if end < len(tokens) else None
         if smaller is not None and smaller < unit:
             return [(end + 1, round(amount + value * smaller, 4))]
@@ -269,6 +280,7 @@ def _unit(tokens: list[Token], at: int, units: dict[str, float]) -> float | None
     return units.get(word) or (units.get(word.removesuffix("s")) if len(word) > 2 else None)
 
 
+_COUNTED = frozenset({"times", "x", "laps", "rounds", "o'clock", ".", ")"})
 _AFTER_IN = frozenset({"the", "a", "front", "between", "total", "my", "your", "this", "that", "here", "there", "from"})
 
 
