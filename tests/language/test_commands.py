@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 
 from avlmaps.bench.language import counts, judge, read_list
 from avlmaps.core.errors import AvlmapsError, LanguageError
-from avlmaps.language.commands import Given, read_command
+from avlmaps.language.commands import read_command
 from avlmaps.language.intents import Clarify, Go, Kind, Refuse, Target
 from avlmaps.language.program import parse_program
 from avlmaps.language.program.writing import write_program
 from avlmaps.language.questions import read_question
 from avlmaps.language.rules import RulesTranslator, UnclearError, command_to_program
+from avlmaps.language.sentence import Given
 from avlmaps.language.translator import Translator
 from avlmaps.language.verbalise import verbalise
 

@@ -20,7 +20,6 @@ UNDERSTOOD = {
     "the chair where you heard the dog bark": [("object", "chair"), ("sound", "dog bark")],
     "the chair where I heard the sound of rain": [("object", "chair"), ("sound", "rain")],
     "the chair near the sound of typing on a keyboard": [("object", "chair"), ("sound", "typing on keyboard")],
-    "where someone was heard knocking on the door": [("sound", "knocking on door")],
     "the cup on the table": [("object", "cup"), ("object", "table")],
     "where a baby was heard crying": [("sound", "baby crying")],
     "go to the barking of a dog": [("sound", "dog barking")],
@@ -70,8 +69,10 @@ def test_an_empty_sentence_is_refused(sentence: str) -> None:
 
 
 @pytest.mark.parametrize("sentence", ["% of", "the chair not in the kitchen"])
-def test_what_is_not_understood_is_named(sentence: str) -> None:
-    with pytest.raises(QueryError, match=r"is not understood; say it like: the chair near the sound of glass breaking"):
+def test_what_a_map_cannot_answer_is_refused(sentence: str) -> None:
+    with pytest.raises(
+        QueryError, match=r"A map cannot answer this, .*; ask it like: the chair near the sound of glass breaking"
+    ):
         parse_sentence(sentence)
 
 

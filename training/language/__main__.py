@@ -1,7 +1,7 @@
 """`python -m training.language`: fit the learned reader, measure it on voices left out, write it into the package.
 
 A few networks that differ in their first weights are fitted without the voices of the first fold; those voices are then
-read with the mean of the networks. That is what is measured, and what the limits of the agreement are chosen on. With
+read with the mean of the networks. That is what is measured, and what the limits of the decision are chosen on. With
 `--more` each network is then fitted a little more, with all voices.
 """
 
@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 
 from training.language.export import write
 from training.language.fit import fitted
-from training.language.leave_out import FOLDS, Both, chosen, halves, read_voices, table
+from training.language.leave_out import FOLDS, Heard, chosen, halves, read_voices, table
 from training.language.network import Network
 from training.language.pool import Pool, build, vocabulary, without
 
@@ -34,7 +34,7 @@ def main() -> None:
     parser.add_argument("--networks", type=int, default=3, help="networks that read together (default: %(default)s)")
     parser.add_argument("--processes", type=int, default=2, help="fitted at once (default: %(default)s)")
     parser.add_argument("--variants", type=int, default=5, help="variants of each row (default: %(default)s)")
-    parser.add_argument("--made", type=int, default=0, help="sentences that the grammar makes (default: %(default)s)")
+    parser.add_argument("--made", type=int, default=8000, help="plain sentences besides (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=1, help="of every choice (default: %(default)s)")
     parser.add_argument(
         "--folds", type=int, default=1, help="measure on this many folds of voices (default: %(default)s)"
@@ -61,7 +61,7 @@ def main() -> None:
 
 def _left_out(
     pool: Pool, voices: frozenset[str], minutes: float, seeds: Sequence[int], processes: int
-) -> tuple[list[Network], dict[str, int], list[Both]]:
+) -> tuple[list[Network], dict[str, int], list[Heard]]:
     """Return networks fitted without some voices, their vocabulary, and what they read in those voices."""
     rest = without(pool, voices)
     words = vocabulary(rest)

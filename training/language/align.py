@@ -21,7 +21,9 @@ from avlmaps.language.learned.linear import (
     line_of_question,
 )  # fmt: skip
 from avlmaps.language.lexer import Token
-from avlmaps.language.spelling import respelt
+from avlmaps.language.names import sounding_forms
+from avlmaps.language.questions import use_in
+from avlmaps.language.sentence import Given, Sentence
 
 _ALIKE = 0.75
 _ENDINGS = ("ings", "ing", "ers", "ies", "ed", "es", "s", "er", "y", "e")
@@ -46,7 +48,7 @@ class Aligned:
 
 def aligned(example: Example) -> Aligned | None:
     """Return an example with its line; None where its words or numbers do not stand in the sentence."""
-    tokens = respelt(lexer.tokenise(example.say))[0]
+    tokens = Sentence(example.say, Given(example.image, example.clip)).tokens
     if not tokens:
         return None
     found = _Found(tokens, example)
@@ -55,6 +57,8 @@ def aligned(example: Example) -> Aligned | None:
         line = write(example.meaning, found)  # pyright: ignore[reportArgumentType]
     except MalformedError:
         if not (example.is_question and isinstance(example.meaning, Inquiry) and example.meaning.ask is Ask.WHERE):
+            return None
+        if use_in(example.say) is None:
             return None
         line = ["purpose", "end"]
     if not is_written_well(line, Pointable(tokens), is_question=example.is_question):
@@ -114,6 +118,9 @@ class _Found(Pointers):
         number = [i for i in usable if forms & {self.tokens[i].text, *singulars_of(self.tokens[i].text)}]
         if number:
             return number
+        heard = [i for i in usable if sounding_forms().get(self.tokens[i].text) == word]  # "rang" of "ringing"
+        if heard:
+            return heard
         stem = [i for i in usable if self._stems[i] == _stem(word)]
         if stem:
             return stem

@@ -27,8 +27,8 @@ from avlmaps.language.intents import (
     Side,
     Target,
     Turn,
+    on_targets,
 )  # fmt: skip
-from avlmaps.language.orders import on_targets
 
 _BEFORE = (
     "please", "hey robot", "robot", "ok robot", "okay", "ok so", "could you", "can you please", "would you kindly",

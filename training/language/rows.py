@@ -30,15 +30,12 @@ from avlmaps.language.intents import (
     Turn,
     VisitEach,
     Wait,
-    to_json,
 )  # fmt: skip
 
 ROOT = Path(__file__).parents[2]
 BLIND = ROOT / "src/avlmaps/bench/data/language"
 LISTS = ROOT / "tests/language/commands"
 VOICES = Path(__file__).parent / "data"
-PROGRAMS = ("commands.tsv", "free.tsv", "paraphrases.jsonl", "paraphrases_2.jsonl", "paraphrases_3.jsonl",
-            "paraphrases_4.jsonl")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,31 +138,6 @@ def examples_of(path: Path) -> Iterator[Example]:
             said = str(row["say"])
             yield Example(said, meaning, "question" in row, path.stem, row.get("image"), row.get("clip"),
                           row if at == 0 else {})  # fmt: skip
-
-
-def to_row(example: Example) -> dict[str, Any]:
-    """Return an example as a row of a list."""
-    assert isinstance(example.meaning, tuple)
-    return {"say": example.say, "intents": [to_json(intent) for intent in example.meaning]}
-
-
-def from_programs() -> Iterator[Example]:
-    """Yield commands whose rows hold programs, with the intents that write an equal program."""
-    sys.path.insert(0, str(ROOT / "tests" / "language"))
-    from development import done_by, rows
-
-    from avlmaps.core.errors import LanguageError
-    from avlmaps.language.commands import read_command
-    from avlmaps.language.program.writing import write_program
-
-    for name in PROGRAMS:
-        for command, programs in rows(name):
-            try:
-                read = read_command(command)
-            except LanguageError:
-                continue
-            if read.stops is None and any(done_by(write_program(read.intents)) == done_by(one) for one in programs):
-                yield Example(command, read.intents, False, name.split(".")[0])
 
 
 def lists() -> dict[str, list[Path]]:

@@ -86,8 +86,9 @@ def judge_question(got: Mapping[str, Any], row: Row) -> str:
 
 
 def _intents_of(row: Row) -> list[Any]:
-    from avlmaps.language.commands import Given, read_command
+    from avlmaps.language.commands import read_command
     from avlmaps.language.intents import to_json
+    from avlmaps.language.sentence import Given
 
     try:
         read = read_command(str(row["say"]), Given(row.get("image"), row.get("clip")))
@@ -97,8 +98,8 @@ def _intents_of(row: Row) -> list[Any]:
 
 
 def _judge_question(row: Row) -> Judged:
-    from avlmaps.language.commands import Given
     from avlmaps.language.questions import read_question
+    from avlmaps.language.sentence import Given
 
     try:
         got: Any = read_question(

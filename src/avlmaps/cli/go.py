@@ -56,7 +56,7 @@ class Go(ModelVerb):
     scene: Annotated[str | None, arg(metavar="SCENE")] = None
     """Scene in which the simulated body drives: house:SEED, office:SEED or a file, as for `avlmaps record`."""
     language: Literal["rules", "chat"] = "rules"
-    """Translator of the sentence: a grammar that needs nothing, or a chat model (pip install 'avlmaps[chat]')."""
+    """Translator of the sentence: the reader that ships, or a chat model (pip install 'avlmaps[chat]')."""
     chat: Annotated[Chat, OmitArgPrefixes] = field(default_factory=Chat)
     """Chat model."""
     body: Literal["base", "drone"] = "base"
@@ -212,7 +212,7 @@ def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":
         verb: the command; it names the translator.
         avlmap: the map, whose encoder may know words that the lexicon does not.
     """
-    from avlmaps.language.commands import Given
+    from avlmaps.language.sentence import Given
 
     came = Given(
         None if verb.image is None else str(verb.image), None if verb.sound_clip is None else str(verb.sound_clip),

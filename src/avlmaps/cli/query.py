@@ -93,7 +93,7 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
 
 
 def _thing_alone(verb: "Query", avlmap: "AVLMap", parts: "list[Part]") -> "Question | None":
-    """Return the question for one thing and nothing else: the grammar need not be read for a name that is known."""
+    """Return the question for one thing and nothing else: no sentence need be read for a name that is known."""
     from avlmaps.core.lexicon import Kind, lexicon
     from avlmaps.core.question import Modality, Part, Question
     from avlmaps.perception.protocols import NamedPixelEncoder
@@ -106,7 +106,7 @@ def _thing_alone(verb: "Query", avlmap: "AVLMap", parts: "list[Part]") -> "Quest
         return None
     encoder = avlmap.stored.profile.pixel_encoder()
     is_name = isinstance(encoder, NamedPixelEncoder) and verb.sentence in encoder.vocabulary
-    # Stairs are a thing and an area; which is meant is for the grammar to say.
+    # Stairs are a thing and an area; which is meant is for the reader to say.
     is_name = is_name and {entry.kind for entry in lexicon().senses(verb.sentence)} == {Kind.THING}
     return Question.of([Part(Modality.OBJECT, verb.sentence)]) if is_name else None
 

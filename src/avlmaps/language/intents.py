@@ -4,6 +4,7 @@
 clockwise (positive is to the right); distances are in metres.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, ClassVar
@@ -246,6 +247,21 @@ def _inner(value: Any) -> Any:
     if isinstance(value, Target):
         return value.to_json()
     return value if isinstance(value, str) else to_json(value)
+
+
+def on_targets(intent: Intent, change: Callable[[Target], Target]) -> Intent:
+    """Return an intent with each of its targets changed."""
+    match intent:
+        case Go(to=target) | Face(to=target):
+            return replace(intent, to=change(target))
+        case Beside(of=target) | StopAt(of=target) | Circle(of=target) | VisitEach(of=target):
+            return replace(intent, of=change(target))
+        case Between(of=(a, b)):
+            return Between((change(a), change(b)))
+        case Repeat(body=body):
+            return replace(intent, body=tuple(on_targets(one, change) for one in body))
+        case _:
+            return intent
 
 
 class Ask(StrEnum):

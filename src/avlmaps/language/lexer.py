@@ -1,6 +1,6 @@
 """From a sentence to tokens: words, figures, file names, punctuation; and amounts with their units.
 
-What is spelled by rule and not by a grammar stands here: numbers in figures and words, units, clock directions, names
+What is read by rule and not learnt stands here: numbers in figures and words, units, clock directions, names
 of picture and sound files, and media in curly braces as the paper writes them.
 """
 
@@ -269,6 +269,12 @@ def _and_smaller(
 def is_unit(tokens: Sequence[Token], at: int) -> bool:
     """Return whether a unit stands at a token."""
     return at < len(tokens) and any(_unit(list(tokens), at, units) for units in (LENGTHS, _ANGLES, _TIMES))
+
+
+def is_amount(tokens: Sequence[Token], at: int) -> bool:
+    """Return whether a distance, an angle, a time or a clock direction begins at a token."""
+    words = list(tokens)
+    return any(read(words, at) for read in (length_at, angle_at, duration_at, clock_at))
 
 
 def _unit(tokens: list[Token], at: int, units: dict[str, float]) -> float | None:

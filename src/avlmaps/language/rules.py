@@ -3,14 +3,16 @@
 from collections.abc import Sequence
 
 from avlmaps.core.errors import LanguageError
-from avlmaps.language.commands import Command, Given, read_command
+from avlmaps.language.commands import Command, read_command
 from avlmaps.language.program.writing import write_program
+from avlmaps.language.sentence import Given
 from avlmaps.language.translator import Translation, Translator
 from avlmaps.language.verbalise import verbalise
 
-_DECIDED = {
-    "both": "both, they agree", "grammar": "the grammar", "network": "the network", "danger": "a refusal for safety",
-    "stop": "the network, which stops", "differ": "nobody, they differ",
+_WHY = {
+    "read": "a reading that is likely enough", "danger": "a refusal for safety",
+    "stop": "the likeliest reading, which stops",
+    "unsure": "nobody: no reading is likely enough",
 }  # fmt: skip
 
 
@@ -28,7 +30,7 @@ class UnclearError(LanguageError):
 
 
 class RulesTranslator:
-    """Translates by the grammar: no model, no network, the same program for the same command.
+    """Translates with the reader that ships: no download, no connection, the same program for the same command.
 
     Attributes:
         given: files and words that came along.
@@ -58,7 +60,7 @@ class RulesTranslator:
         return Translation(write_program(read.intents), read.notes, said)
 
     def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:
-        """Return None: the grammar knows no second way to say the same."""
+        """Return None: the reader knows no second way to say the same."""
         return None
 
 
@@ -75,13 +77,12 @@ def command_to_program(command: str) -> str:
 
 
 def explanation(translator: Translator, command: str) -> list[str]:
-    """Return the readings of a command, a line each: the grammar's by cost, the network's by probability, who decided.
+    """Return the readings of a command with their probabilities, a line each, and what decided.
 
     A translator that weighs no readings has none.
     """
     if not isinstance(translator, RulesTranslator):
         return ["readings: this translator weighs none"]
     read = translator.read(command)
-    lines = [f"reading {one.cost:5.2f}: {verbalise(one.intents)}" for one in read.readings]
-    lines += [f"network {one.probability:5.2f}: {verbalise(one.intents)}" for one in read.learned]
-    return [*lines, f"decided by: {_DECIDED[read.why]}"]
+    lines = [f"reading {one.probability:5.2f}: {verbalise(one.intents)}" for one in read.readings]
+    return [*lines, f"decided by: {_WHY[read.why]}"]

@@ -1,6 +1,6 @@
 """Misspelt words of a sentence: letters that are drawn out, words written as they sound, single wrong letters.
 
-A word that neither the grammar nor the lexicon has becomes the one known word that is a single letter away; where
+A word that neither the word classes nor the lexicon have becomes the one known word that is a single letter away; where
 several are, it stays as it is, and its name leads to a question back later.
 """
 
@@ -11,9 +11,9 @@ from functools import cache
 from string import ascii_lowercase
 
 from avlmaps.core.lexicon import lexicon
-from avlmaps.language.grammar import load_grammar
 from avlmaps.language.lexer import WORDS, Token
 from avlmaps.language.names import is_other_form, sounding_words
+from avlmaps.language.word_classes import load_word_classes
 
 _TWICE = frozenset({"the", "a", "an", "to", "go", "and", "in", "at", "of", "on", "is", "my"})
 _SHORTEST = 5  # shorter words have too many neighbours
@@ -50,7 +50,7 @@ def _misheard(tokens: list[Token]) -> list[Token]:
 
 @cache
 def _meant() -> dict[tuple[str, ...], list[str]]:
-    pairs = [pair.strip().split("=") for pair in load_grammar().lists["misheard"].split(",")]
+    pairs = [pair.strip().split("=") for pair in load_word_classes().lists["misheard"].split(",")]
     return {tuple(wrong.split()): right.split() for wrong, right in pairs}
 
 
@@ -79,7 +79,7 @@ def _better(word: str) -> str | None:
 
 @cache
 def _heard() -> dict[str, str]:
-    return dict(pair.split("=") for pair in load_grammar().lists["heard_as"].split())
+    return dict(pair.split("=") for pair in load_word_classes().lists["heard_as"].split())
 
 
 def _is_english(word: str) -> bool:
@@ -105,9 +105,9 @@ def _neighbours(word: str) -> Iterator[str]:
 
 @cache
 def _known() -> frozenset[str]:
-    """Return all words that the grammar and the lexicon have."""
-    grammar = load_grammar()
-    texts = (text for text in grammar.lists.values() if isinstance(text, str))
+    """Return all words that the classes and the lexicon have."""
+    classes = load_word_classes()
+    texts = (text for text in classes.lists.values() if isinstance(text, str))
     listed = (word.strip(",") for text in texts for word in text.split())
-    classes = (word for phrases in grammar.words.values() for phrase in phrases for word in phrase.split())
-    return frozenset({*listed, *classes, *lexicon().words(), *grammar.literals, *WORDS, *sounding_words()})
+    phrases = (word for each in classes.words.values() for phrase in each for word in phrase.split())
+    return frozenset({*listed, *phrases, *lexicon().words(), *WORDS, *sounding_words()})

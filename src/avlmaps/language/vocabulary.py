@@ -1,7 +1,7 @@
 """The robot's vocabulary: every skill that a program may call, in one table.
 
 `Vocabulary` is that table: each method with its typed signature and docstring is a skill. The interpreter calls
-nothing else, the chat prompt is made from it, the grammar writes programs in it, and `avlmaps.navigate` implements it.
+nothing else, the chat prompt is made from it, plans are written in it, and `avlmaps.navigate` implements it.
 Names are those of the paper and of VLMaps; angles in degrees and metres, since people write programs in them.
 """
 

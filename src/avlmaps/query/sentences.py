@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Question
-from avlmaps.language.commands import Given
 from avlmaps.language.intents import Ask
 from avlmaps.language.questions import AskedSentence, read_question
+from avlmaps.language.sentence import Given
 from avlmaps.query.answer import Answer
 
 if TYPE_CHECKING:

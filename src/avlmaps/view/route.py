@@ -10,8 +10,8 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved
-from avlmaps.language.commands import Given
 from avlmaps.language.rules import RulesTranslator, explanation
+from avlmaps.language.sentence import Given
 from avlmaps.navigate.bodies import BASE, BodyShape
 from avlmaps.navigate.costmap import costmap_of, obstacles_for
 from avlmaps.navigate.driver import MapDriver

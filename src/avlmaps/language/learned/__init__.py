@@ -1,1 +1,1 @@
-"""The learned reader: a small network that points at the words of a sentence, beside the grammar."""
+"""The learned reader: small networks that point at the words of a sentence, and what is decided of their readings."""

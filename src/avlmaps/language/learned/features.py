@@ -1,6 +1,6 @@
 """What the network sees of a sentence.
 
-For each token: a vector of its meaning, its number in the vocabulary, and marks of the lexer, grammar and lexicon.
+For each token: a vector of its meaning, its number in the vocabulary, and marks of the lexer, word classes and lexicon.
 
 Numbers and names are seen as kinds of words ("a length begins here", "the lexicon knows this thing"), so that what is
 learnt of one holds for all.
@@ -16,9 +16,9 @@ from jaxtyping import Float32, Int64
 from avlmaps.core.inflection import singulars_of
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.language import lexer
-from avlmaps.language.grammar import load_grammar
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import sounding_words
+from avlmaps.language.word_classes import load_word_classes
 from avlmaps.perception.embedded.words import word_vectors
 
 _LISTS = (
@@ -68,7 +68,7 @@ def features(tokens: Sequence[Token], vocabulary: Mapping[str, int]) -> Features
 @cache
 def columns() -> tuple[str, ...]:
     """Return the names of the marks, in their order."""
-    classes = sorted(load_grammar().words)
+    classes = sorted(load_word_classes().words)
     both = [*classes, *(f"~{name}" for name in _AMOUNTS), "~thing", "~room", "~sound"]
     single = [
         *(f"={kind}" for kind in _KINDS),
@@ -118,15 +118,15 @@ def _marked(tokens: list[Token]) -> Float32[np.ndarray, "n f"]:  # noqa: C901
 
 
 def _classes(tokens: Sequence[Token], at: int) -> list[tuple[str, int]]:
-    """Return the classes of the grammar that begin at a token, each with where it ends."""
+    """Return the classes of words that begin at a token, each with where it ends."""
     found: list[tuple[str, int]] = []
-    node, end = load_grammar().tree, at
+    node, end = load_word_classes().tree, at
     while end < len(tokens):
         node = node.after.get(tokens[end].text)
         if node is None:
             break
         end += 1
-        found += [(name, end) for name, _ in node.ends]
+        found += [(name, end) for name in node.ends]
     return found
 
 
@@ -142,7 +142,7 @@ def _listed(word: str) -> tuple[str, ...]:
 
 @cache
 def _lists() -> dict[str, frozenset[str]]:
-    lists = load_grammar().lists
+    lists = load_word_classes().lists
     return {name: frozenset(lists[name].split()) for name in _LISTS}
 
 
@@ -164,7 +164,7 @@ def _entries(phrase: str) -> tuple[str, ...]:
 
 @cache
 def _also() -> frozenset[str]:
-    return frozenset(name.strip() for name in load_grammar().lists["also_things"].split(","))
+    return frozenset(name.strip() for name in load_word_classes().lists["also_things"].split(","))
 
 
 @cache

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float32
@@ -33,9 +33,6 @@ from avlmaps.language.learned.linear import (
 )  # fmt: skip
 from avlmaps.language.lexer import Token
 from avlmaps.perception.embedded.words import words_checksum
-
-if TYPE_CHECKING:
-    pass
 
 _BEAM = 4
 _MOST_TOKENS = 100
@@ -83,13 +80,13 @@ class _Open:
 
 
 class LearnedReader:
-    """Reads sentences with the network of a folder."""
+    """Reads sentences with the networks of a folder."""
 
     def __init__(self, folder: Traversable) -> None:
-        """Load the network.
+        """Load the networks.
 
         Raises:
-            BackendError: a file is missing, or was made for another version of the word table or the grammar.
+            BackendError: a file is missing, or was made for another version of the word table or the word classes.
         """
         import onnxruntime
 

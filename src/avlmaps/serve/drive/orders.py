@@ -20,9 +20,9 @@ from avlmaps.core.errors import AvlmapsError, NavigationError
 from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import printable
-from avlmaps.language.commands import Given
 from avlmaps.language.program import Budget, parse_program
 from avlmaps.language.rules import RulesTranslator, UnclearError
+from avlmaps.language.sentence import Given
 from avlmaps.language.translator import Translation
 from avlmaps.navigate.instruct import Outcome, instruct
 from avlmaps.navigate.rehearsal import NO_FILES, path_in_world, rehearse

@@ -1,8 +1,7 @@
-"""One answer of two readers: the grammar's and the network's.
+"""What to do of the readings of a command: drive, stop, or ask a person.
 
-The robot drives where both read the same. It drives on the network's reading alone only where that is likely, names
-known things, and leaves no number and no word such as "not" unread. Where the two would drive to different places, a
-person decides. A refusal for danger, by either, stands.
+The robot drives where a reading is likely enough, names known things, and leaves no number and no word such as "not"
+unread; for the others it must be likelier. Where no reading is, a person decides. A danger that is likely at all stops.
 """
 
 from collections.abc import Sequence
@@ -16,7 +15,6 @@ from avlmaps.language import lexer
 from avlmaps.language.intents import (
     Clarify,
     Face,
-    Inquiry,
     Intent,
     Kind,
     Pick,
@@ -26,15 +24,14 @@ from avlmaps.language.intents import (
     Target,
     Turn,
     Wait,
-)
+    on_targets,
+)  # fmt: skip
 from avlmaps.language.intents import Move as MoveIntent
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.linear import amount_end
-from avlmaps.language.orders import on_targets
 from avlmaps.language.verbalise import verbalise
 
 if TYPE_CHECKING:
-    from avlmaps.language.learned.reader import Read
     from avlmaps.language.lexer import Token
 
 DANGERS = (Reason.HARM, Reason.FLYING, Reason.ENDLESS, Reason.CONDITION, Reason.NEGATION)
@@ -57,6 +54,7 @@ _NO_NAMES = frozenset({
     "view", "pass", "block", "range", "board", "trip", "round", "lap", "drive", "corner", "hand", "foot",
 })  # fmt: skip
 _WHO = frozenset({"someone", "somebody", "anyone", "anybody", "person", "people", "a", "the", "of", "on", "sound"})
+_WORTH_ASKING = 0.1
 _ENDINGS = ("ing", "ed", "es", "s", "er", "y", "e")
 
 
@@ -84,13 +82,13 @@ class Weighed:
 
 
 @dataclass(frozen=True, slots=True)
-class Agreed:
-    """The answer, and why.
+class Decision:
+    """What to do, and why.
 
     Attributes:
-        intents: what to do.
-        why: ``both``, ``grammar``, ``network``, ``danger``, ``differ`` or ``stop``.
-        notes: of the network's reading where that counts.
+        intents: what to do; one refusal or question where the robot may not drive.
+        why: ``read``, ``danger``, ``stop`` or ``unsure``.
+        notes: of the reading that counts.
     """
 
     intents: tuple[Intent, ...]
@@ -98,97 +96,34 @@ class Agreed:
     notes: tuple[str, ...] = ()
 
 
-def agreed(  # noqa: C901
-    ours: tuple[Intent, ...], theirs: Sequence[Weighed], limits: Limits, *, plain: bool = False
-) -> Agreed:
-    """Return one answer.
+def decided(readings: Sequence[Weighed], limits: Limits) -> Decision:
+    """Return what to do of some readings.
 
     Args:
-        ours: the grammar's.
-        theirs: the network's, the likeliest first; none where it reads nothing.
-        limits: how likely these must be.
-        plain: whether the grammar reads each order without doubt; then only a danger speaks against it.
+        readings: the likeliest first; at least one.
+        limits: how likely a reading must be.
     """
-    ours_stop = ours[0] if isinstance(ours[0], Refuse | Clarify) else None
-    if (isinstance(ours_stop, Refuse) and ours_stop.reason in DANGERS) or not theirs:
-        return Agreed(ours, "danger" if theirs else "grammar")
-    dangers = [one for one in theirs if isinstance(one.stops, Refuse) and one.stops.reason in DANGERS]
+    best = readings[0]
+    dangers = [one for one in readings if isinstance(one.stops, Refuse) and one.stops.reason in DANGERS]
     if dangers and sum(one.probability for one in dangers) >= limits.danger:
-        return Agreed(dangers[0].intents, "danger")
-    best = theirs[0]
-    if ours_stop is not None:
-        if best.stops is not None:
-            firm = isinstance(best.stops, Refuse) and best.stops.reason in (*DANGERS, Reason.MANIPULATION)
-            firm = firm and not isinstance(ours_stop, Refuse) and best.probability >= limits.alone
-            return Agreed(best.intents, "network") if firm else Agreed(ours, "both")
-        least = limits.doubtful if best.doubtful else limits.alone
-        return Agreed(best.intents, "network", best.notes) if best.probability >= least else Agreed(ours, "grammar")
-    if is_same(ours, best.intents):
-        return Agreed(ours, "both")
-    if plain:
-        return Agreed(ours, "grammar")
+        return Decision(dangers[0].intents, "danger")
     if best.stops is not None:
-        if best.probability >= limits.stop:
-            return Agreed(best.intents, "stop")
-        return Agreed(ours, "grammar") if best.probability < limits.trusted else _which(ours, best.intents)
-    if best.probability >= limits.over and not best.doubtful:
-        return Agreed(best.intents, "network", best.notes)
-    if best.probability < limits.trusted:
-        return Agreed(ours, "grammar")
-    return _which(ours, best.intents)
+        return Decision(best.intents, "stop")
+    alike = sum(one.probability for one in readings if one.stops is None and is_same(one.intents, best.intents))
+    if alike >= (limits.doubtful if best.doubtful else limits.command):
+        return Decision(best.intents, "read", best.notes)
+    return Decision((_which(readings),), "unsure")
 
 
-def _which(a: tuple[Intent, ...], b: tuple[Intent, ...]) -> Agreed:
-    """Return the question which of two readings is meant."""
-    choices = tuple(verbalise(one) for one in (a, b) if not isinstance(one[0], Refuse | Clarify))
-    if len(set(choices)) < 2:
-        return Agreed((Clarify(f"Is this what you mean? {choices[0]}", choices[:1]),), "differ")
-    question = f"This can mean two things. 1: {choices[0]} 2: {choices[1]} Which one?"
-    return Agreed((Clarify(question, choices),), "differ")
-
-
-@dataclass(frozen=True, slots=True)
-class AgreedQuestion:
-    """The question that is answered, and whose reading it is.
-
-    Attributes:
-        inquiry: the question; None where none can be answered.
-        why: ``both``, ``grammar`` or ``network``.
-    """
-
-    inquiry: Inquiry | None
-    why: str
-
-
-def agreed_question(
-    ours: Inquiry | None, theirs: "Sequence[Read]", tokens: "Sequence[Token]", limits: Limits
-) -> AgreedQuestion:
-    """Return one question of two readings.
-
-    Args:
-        ours: the grammar's; None where it reads none.
-        theirs: the network's, the likeliest first.
-        tokens: the sentence.
-        limits: how likely these must be.
-    """
-    if not theirs or theirs[0].is_purpose:
-        return AgreedQuestion(ours, "grammar")
-    best = theirs[0]
-    if best.meaning is None:
-        stops = best.probability >= limits.question_stop or ours is None
-        return AgreedQuestion(None, "network") if stops else AgreedQuestion(ours, "grammar")
-    assert isinstance(best.meaning, Inquiry)
-    if ours is not None and is_same_question(ours, best.meaning):
-        return AgreedQuestion(ours, "both")
-    least = limits.question_alone if ours is None else limits.question_over
-    if is_doubtful(tokens, best.used):
-        least = max(least, limits.doubtful)
-    return AgreedQuestion(best.meaning, "network") if best.probability >= least else AgreedQuestion(ours, "grammar")
-
-
-def is_same_question(a: Inquiry, b: Inquiry) -> bool:
-    """Return whether two questions want to know the same of the same."""
-    return a.ask is b.ask and {_plain(one) for one in a.of} == {_plain(one) for one in b.of}
+def _which(readings: Sequence[Weighed]) -> Clarify:
+    """Return the question which reading is meant."""
+    said = (verbalise(one.intents) for one in readings if one.stops is None and one.probability >= _WORTH_ASKING)
+    choices = tuple(dict.fromkeys(said))[:2]
+    if len(choices) == 2:
+        return Clarify(f"This can mean two things. 1: {choices[0]} 2: {choices[1]} Which one?", choices)
+    if choices:
+        return Clarify(f"Is this what you mean? {choices[0]}", choices)
+    return Clarify("I am not sure what this means. Can you say it in other words?")
 
 
 def is_same(a: Sequence[Intent], b: Sequence[Intent]) -> bool:

@@ -1,0 +1,56 @@
+"""A sentence as tokens, misspelt words put right, and what besides the lexicon knows its names."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from avlmaps.language import lexer
+from avlmaps.language.lexer import Token
+from avlmaps.language.spelling import respelt
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """The files and names that came along with a sentence.
+
+    Attributes:
+        image: the file that "this photo" means.
+        clip: the file that "this recording" means.
+        knows: says whether the map's encoder knows a word that the lexicon does not; None: only the lexicon counts.
+    """
+
+    image: str | None = None
+    clip: str | None = None
+    knows: Callable[[str], bool] | None = None
+
+    def tokens(self, at: int) -> list[Token]:
+        """Return the files as tokens behind a sentence, so that "this photo" can point to one."""
+        files = (("image", self.image), ("clip", self.clip))
+        return [Token(name, name, kind, at, at) for kind, name in files if name]
+
+
+class Sentence:
+    """A tokenised sentence, with the files that came along behind it.
+
+    Attributes:
+        text: as it was written.
+        tokens: its words, numbers, files and marks.
+        given: the files and names that came along.
+        respelt: misspelt words, with what they are taken for.
+    """
+
+    def __init__(self, text: str, given: "Given | None" = None) -> None:
+        """Take a sentence, and the files and names that came along with it."""
+        given = given or Given()
+        self.text = text
+        self.tokens, self.respelt = respelt(lexer.tokenise(text))
+        self.tokens += given.tokens(len(text))
+        self.given = given
+
+    def knows(self, name: str) -> bool:
+        """Return whether the map's encoder knows a name."""
+        return bool(self.given.knows and self.given.knows(name))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """One sentence for each misspelt word."""
+        return tuple(f"'{said}' is read as '{meant}'." for said, meant in self.respelt.items())

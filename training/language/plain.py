@@ -1,0 +1,231 @@
+"""Plain commands and questions, made by a program: the words that everybody uses first, in every combination.
+
+Writers seldom write what is plain. A reader that has seen few plain lists of goals, figures and files leaves one out.
+"""
+
+import random
+from collections.abc import Callable
+
+from training.language.augment import Names
+from training.language.rows import Example
+
+from avlmaps.core.inflection import plural_of
+from avlmaps.language.intents import (
+    Ask,
+    Beside,
+    Between,
+    Circle,
+    Clarify,
+    Face,
+    Go,
+    Inquiry,
+    Intent,
+    Kind,
+    Move,
+    Return,
+    Side,
+    StopAt,
+    Target,
+    Turn,
+    VisitEach,
+    Wait,
+)  # fmt: skip
+
+VOICE = "plain"
+_GO = ("go to", "drive to", "move to", "head to", "navigate to", "go over to", "find", "go and find", "proceed to",
+       "drive over to", "head for", "approach")  # fmt: skip
+_NEAR = ("near", "next to", "by", "beside", "close to")
+_SIDES = {Side.LEFT: ("to the left of", "left of", "to the left side of"), Side.RIGHT: ("to the right of", "right of"),
+          Side.FRONT: ("in front of",), Side.BEHIND: ("behind",), Side.NORTH: ("to the north of", "north of"),
+          Side.SOUTH: ("to the south of", "south of"), Side.EAST: ("to the east of", "east of"),
+          Side.WEST: ("to the west of", "west of")}  # fmt: skip
+_THEN = (", then ", " then ", " and then ", ". ", ". Then ", "; ", ", and after that ", ", next ", ", and ", " and ",
+         ", after that ", ". After that ", ", and finally ", ". Finally, ")  # fmt: skip
+_FILES = ("view", "photo", "img_0231", "./a", "shots/hall", "/tmp/p 1".replace(" ", "_"), "kitchen2", "DSC0042")
+_COLOURS = ("red", "green", "blue", "yellow", "white", "black", "grey", "brown", "orange", "purple", "pink")
+_PARTS = ("leg", "door", "handle", "top", "corner", "edge", "drawer", "end", "foot", "back")
+_SALAD = 0.05
+
+
+def plain(count: int, names: Names, draw: random.Random) -> list[Example]:
+    """Return plain sentences with what they mean; two thirds are commands."""
+    made = _Maker(names, draw)
+    return [made.command() if draw.random() < 0.67 else made.question() for _ in range(count)]
+
+
+class _Maker:
+    def __init__(self, names: Names, draw: random.Random) -> None:
+        self.names, self.draw = names, draw
+
+    def command(self) -> Example:
+        if self.draw.random() < _SALAD:
+            return self._salad()
+        count = self.draw.choices((1, 2, 3, 4, 5, 6), (3, 4, 4, 3, 2, 1))[0]
+        if self.draw.random() < 0.3:
+            return self._list(max(2, count))
+        said, meant = zip(*(self._order() for _ in range(count)), strict=True)
+        joint = self.draw.choice(_THEN) if self.draw.random() < 0.5 else None
+        text = said[0]
+        for each in said[1:]:
+            text += (joint or self.draw.choice(_THEN)) + each
+        if self.draw.random() < 0.2 and count > 1:
+            text = f"first {text}"
+        return self._example(text, tuple(meant))
+
+    def question(self) -> Example:
+        said, target = self._place()
+        one = said.removeprefix("the ")
+        plural = target.kind is Kind.OBJECT
+        many = one.replace(target.name, plural_of(target.name), 1) if plural else one
+        article = "an" if one[:1] in "aeiou" else "a"
+        asks: list[tuple[str, Ask]] = [
+            (said, Ask.WHERE), (one, Ask.WHERE), (f"where is {said}", Ask.WHERE), (f"find {said}", Ask.WHERE),
+            (f"show me {said}", Ask.WHERE), (f"where can I find {said}", Ask.WHERE), (f"which {one}", Ask.WHERE),
+        ]  # fmt: skip
+        if plural:
+            asks += [
+                (f"how many {many} are there", Ask.HOW_MANY), (f"how many {many}", Ask.HOW_MANY),
+                (f"is there {article} {one}", Ask.EXISTS), (f"are there any {many}", Ask.EXISTS),
+                (f"do you see {article} {one}", Ask.EXISTS),
+            ]  # fmt: skip
+        if target.kind is Kind.SOUND:
+            asks += [(f"where did you hear {said}", Ask.WHERE), (f"did you hear {said}", Ask.EXISTS)]
+        text, ask = self.draw.choice([one for one in asks if not one[0].startswith("which") or target.near])
+        text += self.draw.choice(("", "", "?", " ?", "."))
+        return Example(text[0].upper() + text[1:] if self.draw.random() < 0.4 else text, Inquiry(ask, (target,)), True,
+                       VOICE)  # fmt: skip
+
+    def _list(self, count: int) -> Example:
+        """Return goals of one kind, one behind the other."""
+        kind = self.draw.choice((Kind.OBJECT, Kind.OBJECT, Kind.SOUND, Kind.AREA, Kind.IMAGE))
+        parts = [self._of(kind) for _ in range(count)]
+        verb, joint = self.draw.choice(_GO), self.draw.choice((*_THEN, ", "))
+        repeated = self.draw.random() < 0.5
+        text = f"{verb} {parts[0][0]}"
+        for at, (said, _) in enumerate(parts[1:]):
+            last = at == count - 2 and self.draw.random() < 0.6
+            text += self.draw.choice((" and ", ", and then ", ", and finally ", " and then ")) if last else joint
+            text += f"{verb} {said}" if repeated else said
+        if self.draw.random() < 0.3:
+            text = self.draw.choice(("first ", "First ", "please ")) + text
+        return self._example(text, tuple(Go(target) for _, target in parts))
+
+    def _order(self) -> tuple[str, Intent]:
+        orders: tuple[Callable[[], tuple[str, Intent]], ...] = (
+            self._go, self._go, self._go, self._turn, self._move, self._face, self._between, self._beside, self._stop,
+            self._circle, self._wait,
+        )  # fmt: skip
+        return self.draw.choice(orders)()
+
+    def _go(self) -> tuple[str, Intent]:
+        said, target = self._place()
+        if self.draw.random() < 0.08:
+            return self.draw.choice((("come back", Return()), ("return to the start", Return())))
+        if self.draw.random() < 0.06 and target.kind is Kind.OBJECT and not target.near:
+            return f"visit each of the {plural_of(target.name)}", VisitEach(target)
+        return f"{self.draw.choice(_GO)} {said}", Go(target)
+
+    def _turn(self) -> tuple[str, Intent]:
+        side = self.draw.choice((-1, 1))
+        word = "left" if side < 0 else "right"
+        degrees = self.draw.choice((30, 45, 60, 90, self.draw.randint(1, 179)))
+        unit = self.draw.choice((" degrees", " degrees", " deg", "°"))
+        return self.draw.choice((
+            (f"turn {word}", Turn(90.0 * side)), (f"turn {word} {degrees}{unit}", Turn(float(degrees * side))),
+            (f"turn {degrees}{unit} {word}", Turn(float(degrees * side))),
+            (f"turn to the {word} by {degrees}{unit}", Turn(float(degrees * side))),
+            ("turn around", Turn(180.0)), (f"rotate {degrees}{unit} to the {word}", Turn(float(degrees * side))),
+        ))  # fmt: skip
+
+    def _metres(self) -> tuple[str, float]:
+        metres = self.draw.choice(
+            (1.0, 2.0, 3.0, 0.5, round(self.draw.uniform(0.1, 99.9), self.draw.choice((0, 1, 2))))
+        )
+        metres = max(0.1, metres)
+        unit = self.draw.choice((" metres", " meters", " m", "m"))
+        return (f"{metres:g}{unit}", metres)
+
+    def _move(self) -> tuple[str, Intent]:
+        said, metres = self._metres()
+        forward = self.draw.random() < 0.65
+        verb = self.draw.choice(("move", "go", "drive"))
+        where = self.draw.choice(("forward", "forwards", "ahead") if forward else ("back", "backwards", "backward"))
+        text = f"{verb} {where} {said}" if self.draw.random() < 0.7 else f"{verb} {said} {where}"
+        return text, Move(metres if forward else -metres)
+
+    def _face(self) -> tuple[str, Intent]:
+        said, target = self._place()
+        return f"{self.draw.choice(('face', 'look at', 'turn to', 'turn towards'))} {said}", Face(target)
+
+    def _between(self) -> tuple[str, Intent]:
+        (a, one), (b, other) = self._place(), self._place()
+        if one == other:
+            return self._go()
+        verb = self.draw.choice(("move in between", "go between", "stand between", "stop between", "move between"))
+        return f"{verb} {a} and {b}", Between((one, other))
+
+    def _beside(self) -> tuple[str, Intent]:
+        said, target = self._of(Kind.OBJECT)
+        side = self.draw.choice(list(_SIDES))
+        words = self.draw.choice(_SIDES[side])
+        if self.draw.random() < 0.4:
+            amount, metres = self._metres()
+            return f"{self.draw.choice(('stop', 'stand', 'go'))} {amount} {words} {said}", Beside(target, side, metres)
+        return f"{self.draw.choice(('go', 'move', 'stand', 'stop', 'drive'))} {words} {said}", Beside(target, side)
+
+    def _stop(self) -> tuple[str, Intent]:
+        (said, target), (amount, metres) = self._of(Kind.OBJECT), self._metres()
+        return f"{self.draw.choice(('stop', 'stand', 'stay'))} {amount} from {said}", StopAt(target, metres)
+
+    def _circle(self) -> tuple[str, Intent]:
+        said, target = self._of(Kind.OBJECT)
+        return f"{self.draw.choice(('circle', 'drive around', 'go around', 'go round'))} {said}", Circle(target)
+
+    def _wait(self) -> tuple[str, Intent]:
+        seconds = self.draw.choice((2, 5, 10, 20, 30, self.draw.randint(1, 59)))
+        return f"wait {self.draw.choice(('', 'for '))}{seconds} seconds", Wait(float(seconds))
+
+    def _place(self) -> tuple[str, Target]:
+        """Return a target in words, with or without what it is near."""
+        kind = self.draw.choices((Kind.OBJECT, Kind.SOUND, Kind.AREA, Kind.IMAGE, Kind.CLIP), (8, 3, 2, 1.5, 0.5))[0]
+        said, target = self._of(kind)
+        if kind in (Kind.AREA, Kind.CLIP) or self.draw.random() < 0.5:
+            return said, target
+        if self.draw.random() < 0.06 and kind is Kind.OBJECT:
+            part = self.draw.choice(_PARTS)
+            return f"the {part} of {said}", Target(Kind.OBJECT, part, (target,))
+        near: list[Target] = []
+        for at in range(self.draw.choices((1, 2, 3), (7, 2, 1))[0]):
+            other = self.draw.choice((Kind.OBJECT, Kind.SOUND, Kind.AREA, Kind.IMAGE))
+            where, each = self._of(other)
+            joint = "in" if other is Kind.AREA else self.draw.choice(("and", *_NEAR)) if at else self.draw.choice(_NEAR)
+            if other is Kind.AREA or near[-1:] == [] or near[-1].kind is not Kind.AREA:
+                said += f" {joint} {where}"
+                near.append(each)
+        return said, target.with_near(*near)
+
+    def _of(self, kind: Kind) -> tuple[str, Target]:
+        if kind in (Kind.IMAGE, Kind.CLIP):
+            ending = self.draw.choice((".png", ".jpg", ".jpeg") if kind is Kind.IMAGE else (".wav", ".ogg", ".flac"))
+            name = self.draw.choice(_FILES) + ending
+            words = ("the image", "the picture", "the photo") if kind is Kind.IMAGE else ("the sound", "the recording")
+            return f"{self.draw.choice(words)} {name}", Target(kind, name)
+        name = self.names.draw(kind, self.draw)
+        if kind is Kind.OBJECT and self.draw.random() < 0.05:
+            name = f"{self.draw.choice(_COLOURS)} {self.draw.choice(('thing', 'object', 'box', 'one'))}"
+        if kind is Kind.SOUND:
+            return self.draw.choice((f"the sound of {name}", f"the sound of {name}", f"the {name} sound")), Target(
+                kind, name
+            )
+        return f"{self.draw.choice(('the', 'the', 'the', 'a', 'my'))} {name}", Target(kind, name)
+
+    def _salad(self) -> Example:
+        """Return words in no order, which mean nothing."""
+        words = " ".join(self._order()[0] for _ in range(3)).split()
+        self.draw.shuffle(words)
+        return self._example(" ".join(words[: self.draw.randint(4, 12)]), (Clarify(),))
+
+    def _example(self, text: str, meant: tuple[Intent, ...]) -> Example:
+        if self.draw.random() < 0.4:
+            text = text[0].upper() + text[1:] + self.draw.choice((".", ".", "!", ""))
+        return Example(text, meant, False, VOICE)
