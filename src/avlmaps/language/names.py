@@ -20,6 +20,14 @@ def is_known(name: str) -> bool:
     return _is_known(tuple(word for word in name.lower().split() if word != "'s"))
 
 
+def is_entry(name: str) -> bool:
+    """Return whether a name is one of the lexicon, perhaps with colours and usual adjectives before it."""
+    words = name.lower().split()
+    while len(words) > 1 and words[0] in _adjectives() and not _is_name(" ".join(words)):
+        words = words[1:]
+    return bool(words) and _is_name(" ".join(words)) and not (len(words) == 1 and words[0] in listed("never"))
+
+
 def mended(name: str) -> str | None:
     """Return the name that a misspelt one is taken for; None where none is clearly meant."""
     words = tuple(name.lower().split())
@@ -94,7 +102,7 @@ def _is_known(words: tuple[str, ...]) -> bool:
         return False
     never, sides = listed("never"), listed("sides")
     if _is_name(" ".join(words)):
-        return len(words) > 1 or words[0] not in never | sides
+        return any(word not in never | sides for word in words[:1]) or len(words) > 1
     if "of" in words[1:-1]:
         at = words.index("of", 1)
         thing = _is_name(words[at - 1]) or _is_known(words[:at])

@@ -14,7 +14,7 @@ from avlmaps.language.learned.decision import is_doubtful
 from avlmaps.language.learned.guard import Guard, kind_of
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.reader import Read, learned_reader
-from avlmaps.language.names import is_known, sounds_like
+from avlmaps.language.names import is_entry, sounds_like
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.word_classes import load_word_classes
 
@@ -131,7 +131,7 @@ def _bare_name(sentence: Sentence) -> str | None:
     words = [token.text for token in sentence.tokens if token.kind != "punct" and token.text not in _ARTICLES]
     name = " ".join(words)
     plain = all(token.kind in ("word", "punct") for token in sentence.tokens)
-    return name if plain and words and is_known(name) and not any(sounds_like(word) for word in words) else None
+    return name if plain and words and is_entry(name) and not any(sounds_like(word) for word in words) else None
 
 
 def _likely(reads: Sequence[Read], sentence: Sentence, limits: Limits) -> Inquiry:

@@ -86,14 +86,16 @@ class Guard:
 
 
 def kind_of(name: str, kind: Kind) -> Kind:
-    """Return whether a name is of a thing or of a room, where only one is possible."""
+    """Return whether a name is of a thing or of a room, where only one is possible; else what it was read as."""
     words = name.split()
     for start in range(len(words)):
         tail = " ".join(words[start:])
         thing, room = (lexicon().find(tail, each) is not None for each in (Entries.THING, Entries.ROOM))
-        if thing != room:
-            return Kind.OBJECT if thing else Kind.AREA
-        if thing:
+        if thing and not room and not start:
+            return Kind.OBJECT
+        if room and not thing:
+            return Kind.AREA
+        if thing or room:
             return kind
     return Kind.AREA if is_place(name) else kind
 

@@ -48,7 +48,6 @@ HEADINGS = {f"h{at}": float(at) for at in range(0, 360, 45)}
 TIMES = {"twice": 2, "thrice": 3}
 VIEWS = {"views_2": 2, "views_3": 3, "views_4": 4}
 BIT_M = 0.5
-_TARGETED = ("go", *_FACES, *_BESIDES, "stop_at", "circle", "views", "each")
 _STARTS = (
     "go", *_FACES, "turn", "turn_to", "forward", "back", "between", *_BESIDES, "stop_at", "circle", "views", "each",
     "wait", "return", "repeat",
