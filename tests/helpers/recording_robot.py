@@ -6,7 +6,7 @@ from zlib import crc32
 
 from avlmaps.core.errors import GoalNotFoundError
 from avlmaps.language.program import SKILLS, Skill
-from avlmaps.language.vocabulary import Clip, Picture, Place
+from avlmaps.language.program.vocabulary import Clip, Picture, Place
 
 ABSENT = "unicorn"
 

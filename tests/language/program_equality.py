@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from inspect import signature
 from typing import Any
 
-from avlmaps.language.vocabulary import Vocabulary
+from avlmaps.language.program.vocabulary import Vocabulary
 
 _PURE = {
     "load_image",

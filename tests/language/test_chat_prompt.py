@@ -22,7 +22,7 @@ from avlmaps.language.chat.prompt import (
 )
 from avlmaps.language.chat.translator import check_files
 from avlmaps.language.program import SKILLS, parse_program, run_program
-from avlmaps.language.vocabulary import Clip, Picture, Place
+from avlmaps.language.program.vocabulary import Clip, Picture, Place
 
 PROGRAMS = [each for each in EXAMPLES if not each.program.startswith("# cannot:")]
 

@@ -17,7 +17,7 @@ from avlmaps.language.program import Budget, Program, parse_program, run_program
 from avlmaps.language.program import syntax as own
 from avlmaps.language.program.interpreter import _Run
 from avlmaps.language.program.values import Made
-from avlmaps.language.vocabulary import Place
+from avlmaps.language.program.vocabulary import Place
 from helpers.hostile_programs import VALID, hostile_programs
 from helpers.program_text import program_text
 from helpers.python_programs import python_run, python_tree

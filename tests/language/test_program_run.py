@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import AvlmapsError, GoalNotFoundError, NavigationError, ProgramError, QueryError
 from avlmaps.language.program import SKILLS, Budget, Step, Trace, parse_program, run_program
-from avlmaps.language.vocabulary import Picture, Place, Vocabulary
+from avlmaps.language.program.vocabulary import Picture, Place, Vocabulary
 from helpers.recording_robot import RecordedHeat, RecordingRobot
 
 

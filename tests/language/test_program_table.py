@@ -13,7 +13,7 @@ from avlmaps.language.program import SKILLS, parse_program, run_program, skill_l
 from avlmaps.language.program.calls import BUILTINS
 from avlmaps.language.program.kinds import Kind
 from avlmaps.language.program.table import skills_of
-from avlmaps.language.vocabulary import Vocabulary
+from avlmaps.language.program.vocabulary import Vocabulary
 from helpers.recording_robot import RecordingRobot
 
 PAGE = Path(__file__).parents[2] / "docs" / "programs.md"

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import NavigationError, ProgramError
 from avlmaps.core.motion import Action, GroundPose, wrap_angle
 from avlmaps.language.program import SKILLS
-from avlmaps.language.vocabulary import Vocabulary
+from avlmaps.language.program.vocabulary import Vocabulary
 from avlmaps.navigate.skills import Robot, RobotSettings
 from helpers.kinematic import KinematicDriver, box, robot_among
 

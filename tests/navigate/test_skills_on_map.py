@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import GoalNotFoundError, ProgramError, QueryError
 from avlmaps.core.motion import GroundPose
-from avlmaps.language.vocabulary import Picture, Place
+from avlmaps.language.program.vocabulary import Picture, Place
 from avlmaps.maps.grid import GridSpec
 from avlmaps.navigate.file_access import Readable, named_files, offered_by
 from avlmaps.navigate.footprint import Outline, middle_between

@@ -63,29 +63,10 @@ LENGTHS = {
 }  # fmt: skip
 _ANGLES = {"degree": 1.0, "deg": 1.0, "°": 1.0, "radian": degrees(1.0), "rad": degrees(1.0)}
 _TIMES = {"second": 1.0, "sec": 1.0, "s": 1.0, "minute": 60.0, "min": 60.0, "moment": 2.0, "hour": 3600.0}
-_SIZES = frozenset(
-    {
-        "whole",
-        "full",
-        "good",
-        "solid",
-        "giant",
-        "baby",
-        "large",
-        "huge",
-        "quick",
-        "slow",
-        "more",
-        "further",
-        "big",
-        "small",
-        "little",
-        "long",
-        "short",
-        "tiny",
-        "another",
-    }
-)
+_SIZES = frozenset({
+    "whole", "full", "good", "solid", "giant", "baby", "large", "huge", "quick", "slow", "more", "further", "big",
+    "small", "little", "long", "short", "tiny", "another",
+})  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import GoalNotFoundError, ProgramError
-from avlmaps.language.vocabulary import Clip, Picture, Place, Target
+from avlmaps.language.program.vocabulary import Clip, Picture, Place, Target
 from avlmaps.navigate.arguments import kind_of, text_of
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline

@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import NavigationError, ProgramError
 from avlmaps.core.motion import Action, wrap_angle
-from avlmaps.language.vocabulary import Clip, Heat, Picture, Place, Target
+from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place, Target
 from avlmaps.navigate.arguments import kind_of, number_of, text_of
 from avlmaps.navigate.driver import Arrival, Driver
 from avlmaps.navigate.file_access import Readable
@@ -49,7 +49,7 @@ def _silent(_: str) -> None:
 
 
 class Robot:
-    """A robot that knows a map and can drive; it implements `avlmaps.language.vocabulary.Vocabulary`.
+    """A robot that knows a map and can drive; it implements `avlmaps.language.program.vocabulary.Vocabulary`.
 
     Where a phrase alone says what is meant, skills that stand in relation to the robot (`face`, `move_to_left`,
     `move_to_object` ...) take the nearest thing of that name with a confidence of 0.5 or more; `move_to`, `get_pos` and

@@ -37,7 +37,7 @@ from avlmaps.language.program.values import (
     size_of,
     size_of_shown,
 )
-from avlmaps.language.vocabulary import Vocabulary
+from avlmaps.language.program.vocabulary import Vocabulary
 
 # Between two skills the clock is read once in this many steps.
 _STEPS_BETWEEN_LOOKS = 256

@@ -8,7 +8,7 @@ from types import MappingProxyType, NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from avlmaps.language.program.kinds import Kind
-from avlmaps.language.vocabulary import Clip, Heat, Picture, Place, Vocabulary
+from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place, Vocabulary
 
 ROBOT = "robot"
 

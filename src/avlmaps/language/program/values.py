@@ -8,7 +8,7 @@ from avlmaps.language.program.budget import refused
 from avlmaps.language.program.kinds import Kind, check_sign, kind_of_result
 from avlmaps.language.program.literals import bounded
 from avlmaps.language.program.table import Skill
-from avlmaps.language.vocabulary import Clip, Heat, Picture, Place
+from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place
 
 DEEPEST_VALUE = 20
 """How deep lists and tuples nest in each other."""
