@@ -39,6 +39,7 @@ from avlmaps.language.intents import (
     to_json,
 )  # fmt: skip
 from avlmaps.language.learned.decision import DANGERS, Weighed, decided, is_doubtful, is_same
+from avlmaps.language.learned.features import columns, features
 from avlmaps.language.learned.guard import Guard, weighed
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.linear import (
@@ -54,6 +55,7 @@ from avlmaps.language.learned.linear import (
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.rules import RulesTranslator, explanation
 from avlmaps.language.sentence import Given, Sentence
+from avlmaps.language.word_classes import load_word_classes
 
 HELD_OUT = Path(__file__).parent / "commands" / "learned_held_out.jsonl"
 # Of the held-out rows as many are right at least, and misread at most; both are a little wide of what was measured.
@@ -159,6 +161,16 @@ def test_what_may_follow_ends_in_something_that_can_be_read(data: st.DataObject)
         inquiry_of(line, tokens)
     else:
         intents_of(line, tokens)
+
+
+def test_each_phrase_of_a_class_is_marked_where_it_begins() -> None:
+    book = load_word_classes()
+    draw = np.random.default_rng(0)
+    for name, phrases in book.words.items():
+        for phrase in draw.permutation(sorted(phrases))[:3]:
+            tokens = lexer.tokenise("well " + str(phrase))
+            if [token.text for token in tokens[1:]] == str(phrase).split():
+                assert features(tokens, {}).marks[1, columns().index(f"begin {name}")] == 1.0, (name, phrase)
 
 
 @pytest.mark.parametrize("line", [[], ["end"], ["go", "end"], ["turn", "end"], ["near"], ["repeat", "twice", "end"]])

@@ -1,12 +1,12 @@
-"""The words that the reader knows before it learns, read once: classes of phrases as a tree of words, and lists.
+"""The words that the reader knows before it learns, read once: classes of phrases, and lists.
 
 `word_classes.toml` is data for people. A class is a list of phrases with ``[optional]`` and ``(one|another)`` parts.
 """
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -14,26 +14,20 @@ from typing import Any
 from avlmaps.core.inflection import forms_of
 
 
-@dataclass(slots=True)
-class Node:
-    """A node of the tree of words: what follows, and which classes end here."""
-
-    after: "dict[str, Node]" = field(default_factory=dict)
-    ends: list[str] = field(default_factory=list)
-
-
 @dataclass(frozen=True, slots=True)
 class WordClasses:
     """Classes and lists of words.
 
     Attributes:
-        tree: the phrases of all classes.
         words: the phrases of each class.
+        classes: the classes of each phrase.
+        longest: how many words the longest phrase has that begins with a word.
         lists: words by the name of their list, separated by blanks or commas; ``uses`` is a table.
     """
 
-    tree: Node
     words: Mapping[str, frozenset[str]]
+    classes: Mapping[str, list[str]]
+    longest: Mapping[str, int]
     lists: Mapping[str, Any]
 
 
@@ -45,28 +39,24 @@ def load_word_classes() -> WordClasses:
         ValueError: a list is malformed.
     """
     data = tomllib.loads(files("avlmaps.language").joinpath("word_classes.toml").read_text(encoding="utf-8"))
-    tree, words = Node(), {}
     data["words"]["GO"] += " | " + " | ".join(f for verb in data["lists"]["motion"].split() for f in forms_of(verb))
-    for key, told in data["words"].items():
+    words: dict[str, frozenset[str]] = {}
+    classes: dict[str, list[str]] = {}
+    longest: dict[str, int] = {}
+    for name, told in data["words"].items():
         texts = told.values() if isinstance(told, dict) else (told,)
-        words[key] = frozenset(phrase for text in texts for phrase in _grow(tree, key, text))
-    return WordClasses(tree, words, data["lists"])
+        words[name] = frozenset(phrase for text in texts for phrase in expanded(text))
+        for phrase in words[name]:
+            classes.setdefault(phrase, []).append(name)
+            first = phrase.partition(" ")[0]
+            longest[first] = max(longest.get(first, 0), phrase.count(" ") + 1)
+    return WordClasses(words, classes, longest, data["lists"])
 
 
 @cache
 def listed(name: str) -> frozenset[str]:
     """Return the words of a list."""
     return frozenset(load_word_classes().lists[name].split())
-
-
-def _grow(tree: Node, key: str, text: str) -> Iterator[str]:
-    """Add phrases of a class to the tree, and yield them."""
-    for phrase in expanded(text):
-        node = tree
-        for word in phrase.split():
-            node = node.after.setdefault(word, Node())
-        node.ends.append(key)
-        yield phrase
 
 
 def expanded(text: str) -> list[str]:

@@ -119,14 +119,12 @@ def _marked(tokens: list[Token]) -> Float32[np.ndarray, "n f"]:  # noqa: C901
 
 def _classes(tokens: Sequence[Token], at: int) -> list[tuple[str, int]]:
     """Return the classes of words that begin at a token, each with where it ends."""
+    book = load_word_classes()
     found: list[tuple[str, int]] = []
-    node, end = load_word_classes().tree, at
-    while end < len(tokens):
-        node = node.after.get(tokens[end].text)
-        if node is None:
-            break
-        end += 1
-        found += [(name, end) for name in node.ends]
+    phrase = ""
+    for end in range(at, min(at + book.longest.get(tokens[at].text, 0), len(tokens))):
+        phrase = f"{phrase} {tokens[end].text}" if phrase else tokens[end].text
+        found += [(name, end + 1) for name in book.classes.get(phrase, ())]
     return found
 
 
