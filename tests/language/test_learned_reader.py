@@ -188,7 +188,7 @@ drives = st.lists(driving, min_size=1, max_size=3).map(tuple)
 dangers = st.sampled_from(DANGERS).map(lambda reason: (Refuse(reason, "no"),))
 stops = st.one_of(st.sampled_from(list(Reason)).map(lambda reason: (Refuse(reason, "no"),)), st.just((Clarify("?"),)))
 probabilities = st.floats(0.0, 1.0)
-limits = st.builds(Limits, *(st.floats(0.0, 1.0) for _ in range(4)))
+limits = st.builds(Limits, *(st.floats(0.0, 1.0) for _ in range(5)))
 
 
 def stopped(intents: tuple[Intent, ...]) -> bool:

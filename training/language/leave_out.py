@@ -15,7 +15,7 @@ from training.language.rows import lists
 
 from avlmaps.bench.language import OUTCOMES, judge_intents, judge_question, read_list
 from avlmaps.core.errors import QueryError
-from avlmaps.language.commands import weighed_readings
+from avlmaps.language.commands import answered, weighed_readings
 from avlmaps.language.intents import Clarify, Intent, to_json
 from avlmaps.language.learned.decision import Weighed, decided, is_same
 from avlmaps.language.learned.limits import Limits
@@ -40,6 +40,7 @@ class Heard:
     Attributes:
         row: the row.
         voice: its list.
+        reader: the networks.
         sentence: its tokens.
         command: the readings of a command.
         question: the readings of a question.
@@ -47,6 +48,7 @@ class Heard:
 
     row: Mapping[str, Any]
     voice: str
+    reader: LearnedReader
     sentence: Sentence
     command: tuple[Weighed, ...] = ()
     question: tuple[Read, ...] = ()
@@ -63,9 +65,9 @@ def heard(row: Mapping[str, Any], voice: str, reader: LearnedReader) -> Heard:
     given = Given(row.get("image"), row.get("clip"))
     if "question" in row:
         sentence = Sentence(row["say"], replace(given, knows=lambda _: True))
-        return Heard(row, voice, sentence, question=tuple(reader.question(sentence.tokens)))
+        return Heard(row, voice, reader, sentence, question=tuple(reader.question(sentence.tokens)))
     sentence = Sentence(row["say"], given)
-    return Heard(row, voice, sentence, weighed_readings(sentence, reader))
+    return Heard(row, voice, reader, sentence, weighed_readings(sentence, reader))
 
 
 def outcome(one: Heard, limits: Limits) -> str:
@@ -76,8 +78,9 @@ def outcome(one: Heard, limits: Limits) -> str:
         except QueryError:
             got = _REFUSED
         return judge_question(got, one.row)
-    intents = decided(one.command, limits).intents if one.command else (Clarify(),)
-    return _judged(one, intents)
+    if not one.command:
+        return _judged(one, (Clarify(),))
+    return _judged(one, answered(one.sentence, one.command, one.reader, limits).intents)
 
 
 _JUDGED: dict[tuple[int, Any], str] = {}
@@ -110,10 +113,12 @@ def chosen(rows: Sequence[Heard]) -> Limits:
                 if worth > best:
                     best, kept = worth, Limits(command=command, doubtful=doubtful, danger=danger)
     scored: list[tuple[float, Limits]] = []
-    for question in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9):
-        limits = replace(kept, question=question)
-        found = counted(rows, limits, questions=True)
-        scored.append((found["right"] - 1.0 * found["misread"], limits))
+    levels = (0.1, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+    for question, doubtful in product(levels, levels):
+        if doubtful >= question:
+            limits = replace(kept, question=question, question_doubtful=doubtful)
+            found = counted(rows, limits, questions=True)
+            scored.append((found["right"] - 1.0 * found["misread"], limits))
     return max(scored, key=lambda pair: pair[0])[1]
 
 
@@ -138,7 +143,7 @@ def table(rows: Sequence[Heard], limits: Limits) -> list[str]:
     """Return lines: counts of some rows, acting on any reading and with limits."""
     lines: list[str] = []
     for questions in (False, True):
-        for name, given in (("any reading", Limits(0.0, 0.0, 1.1, 0.0)), ("with limits", limits)):
+        for name, given in (("any reading", Limits(0.0, 0.0, 1.1, 0.0, 0.0)), ("with limits", limits)):
             found = counted(rows, given, questions=questions)
             total = max(1, sum(found.values()))
             shares = ", ".join(f"{name} {found[name]} ({100 * found[name] / total:.1f} %)" for name in OUTCOMES)

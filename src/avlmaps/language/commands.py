@@ -1,12 +1,16 @@
 """From a command to intents: what the networks read, checked against the words, or a question back."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.intents import Clarify, Intent, Refuse
-from avlmaps.language.learned.decision import Weighed, decided
+from avlmaps.language.learned.decision import Decision, Weighed, decided
 from avlmaps.language.learned.guard import Guard, weighed
+from avlmaps.language.learned.limits import Limits
+from avlmaps.language.learned.parts import by_parts
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
+from avlmaps.language.lexer import Token
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.word_classes import load_word_classes
 
@@ -22,7 +26,7 @@ class Command:
         intents: what to do; one refusal or question where the robot may not drive.
         notes: one sentence each: how words were taken, and what has no effect.
         readings: all readings that were weighed, the likeliest first.
-        why: ``read``, ``danger``, ``stop`` or ``unsure``.
+        why: ``read``, ``parts``, ``danger``, ``stop`` or ``unsure``.
     """
 
     intents: tuple[Intent, ...]
@@ -50,7 +54,7 @@ def read_command(text: str, given: Given | None = None) -> Command:
     if not readings:
         question = Clarify(f"I do not understand this. Say it like: {_EXAMPLE}.")
         return Command((question,), (), (), "unsure")
-    answer = decided(readings, reader.limits)
+    answer = answered(sentence, readings, reader, reader.limits)
     notes = (*sentence.notes, *_without_effect(sentence), *answer.notes)
     return Command(answer.intents, tuple(dict.fromkeys(notes)), readings, answer.why)
 
@@ -58,6 +62,19 @@ def read_command(text: str, given: Given | None = None) -> Command:
 def weighed_readings(sentence: Sentence, reader: LearnedReader) -> tuple[Weighed, ...]:
     """Return the readings of a command, checked, the likeliest first; none where it has no word or too many."""
     return tuple(weighed(read, Guard(sentence)) for read in reader.command(sentence.tokens))
+
+
+def answered(sentence: Sentence, readings: Sequence[Weighed], reader: LearnedReader, limits: Limits) -> Decision:
+    """Return what to do of the readings of a command; where none is sure enough, its sentences are read one by one."""
+    answer = decided(readings, limits)
+    if answer.why != "unsure":
+        return answer
+
+    def read(part: list[Token]) -> list[Weighed]:
+        return [weighed(each, Guard(sentence, part)) for each in reader.command(part)]
+
+    same = by_parts(sentence.tokens, readings, read)
+    return answer if same is None else Decision(same.intents, "parts", same.notes)
 
 
 def _without_effect(sentence: Sentence) -> list[str]:

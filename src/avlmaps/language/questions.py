@@ -143,7 +143,7 @@ def _likely(reads: Sequence[Read], sentence: Sentence, limits: Limits) -> Inquir
     best = reads[0].meaning
     assert isinstance(best, Inquiry)
     alike = sum(one.probability for one in reads if isinstance(one.meaning, Inquiry) and one.meaning.of == best.of)
-    if alike < (limits.doubtful if is_doubtful(sentence.tokens, reads[0].used) else limits.question):
+    if alike < (limits.question_doubtful if is_doubtful(sentence.tokens, reads[0].used) else limits.question):
         raise QueryError(f"{sentence.text.strip()[:80]!r} is not understood; say it like: {_EXAMPLE}.")
     return best
 

@@ -10,7 +10,8 @@ from avlmaps.language.translator import Translation, Translator
 from avlmaps.language.verbalise import verbalise
 
 _WHY = {
-    "read": "a reading that is likely enough", "danger": "a refusal for safety",
+    "read": "a reading that is likely enough", "parts": "its sentences, each certain alone",
+    "danger": "a refusal for safety",
     "stop": "the likeliest reading, which stops",
     "unsure": "nobody: no reading is likely enough",
 }  # fmt: skip

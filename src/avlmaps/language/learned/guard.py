@@ -24,6 +24,7 @@ from avlmaps.language.intents import (
 )  # fmt: skip
 from avlmaps.language.learned.decision import Weighed, is_doubtful
 from avlmaps.language.learned.reader import Read
+from avlmaps.language.lexer import Token
 from avlmaps.language.names import is_known, is_place, may_name, mended, past_forms, sounding_forms
 from avlmaps.language.sentence import Sentence
 
@@ -45,11 +46,17 @@ _ROOM_WORDS = frozenset({"room", "area", "zone", "hall", "corner", "wing", "bay"
 
 @dataclass(slots=True)
 class Guard:
-    """A sentence, and the files that came along."""
+    """A sentence, the files that came along, and the tokens that are read; None: all of them."""
 
     sentence: Sentence
+    part: Sequence[Token] | None = None
     notes: list[str] = field(default_factory=list)
     problem: Clarify | None = None
+
+    @property
+    def tokens(self) -> Sequence[Token]:
+        """The tokens that are read."""
+        return self.sentence.tokens if self.part is None else self.part
 
     def put_right(self, target: Target) -> Target:
         """Return a target with the name that is meant; what is not known becomes a question."""
@@ -118,17 +125,17 @@ def weighed(read: Read, guard: Guard) -> Weighed:
     """
     assert isinstance(read.meaning, tuple)
     first = read.meaning[0]
-    if isinstance(first, Refuse) and first.reason is Reason.UNKNOWN and strange_word(guard.sentence.tokens):
-        return Weighed((unclear(guard.sentence.tokens),), read.probability)
+    if isinstance(first, Refuse) and first.reason is Reason.UNKNOWN and strange_word(guard.tokens):
+        return Weighed((unclear(guard.tokens),), read.probability)
     if isinstance(first, Refuse):
         return Weighed((Refuse(first.reason, REFUSALS[first.reason]),), read.probability)
     if isinstance(first, Clarify) or any(isinstance(one, Refuse | Clarify) for one in read.meaning):
-        return Weighed((unclear(guard.sentence.tokens),), read.probability)
+        return Weighed((unclear(guard.tokens),), read.probability)
     intents = tuple(on_targets(intent, guard.put_right) for intent in read.meaning)
     problem = guard.problem or _too_much(intents)
     if problem is not None:
         return Weighed((problem,), read.probability)
-    doubtful = is_doubtful(guard.sentence.tokens, read.used, waits=any(isinstance(one, Wait) for one in intents))
+    doubtful = is_doubtful(guard.tokens, read.used, waits=any(isinstance(one, Wait) for one in intents))
     return Weighed(intents, read.probability, doubtful, tuple(dict.fromkeys(guard.notes)))
 
 

@@ -1,0 +1,62 @@
+"""A command of several sentences, read sentence by sentence: a second opinion where the whole is not sure enough.
+
+The networks are less sure of long commands. Where each of its sentences alone is all but certain, and what they say
+together is one of the readings of the whole, the command means that.
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+from avlmaps.language.intents import Intent
+from avlmaps.language.learned.decision import MEANING, Weighed, is_same
+from avlmaps.language.lexer import Token
+
+_CERTAIN, _LEAST = 0.9, 0.1  # of each part alone, and of the same reading of the whole
+_ENDS = frozenset({".", ";", "!", "then"})
+_LEADS = frozenset({",", "and", "then", ".", ";", "!"})
+# Words that refer to another sentence, or put its orders in another order.
+_REFERS = frozenset({
+    "it", "there", "that", "them", "this", "its", "they", "those", "one", "ones", "each", "first", "last", "finally",
+    "before", "after", "once", "when", "while", "twice", "times", "repeat", "return", "back", "round", "also", "too",
+}) | MEANING  # fmt: skip
+
+
+def parts_of(tokens: Sequence[Token]) -> list[list[Token]]:
+    """Return the sentences of a command; none where it has one, or where one refers to another."""
+    if not _REFERS.isdisjoint(token.text for token in tokens):
+        return []
+    ends = [at for at, token in enumerate(tokens) if token.text in _ENDS]
+    cuts = [0, *(at for at in ends), len(tokens)]
+    parts = [_trimmed(tokens[start:end]) for start, end in pairwise(cuts)]
+    parts = [part for part in parts if part]
+    return parts if len(parts) > 1 else []
+
+
+def by_parts(
+    tokens: Sequence[Token], readings: Sequence[Weighed], read: Callable[[list[Token]], Sequence[Weighed]]
+) -> Weighed | None:
+    """Return the reading of the whole that its sentences say together, each of them certain; None where none is.
+
+    Args:
+        tokens: the command.
+        readings: of the whole, the likeliest first.
+        read: reads one sentence.
+    """
+    parts = parts_of(tokens)
+    together: list[Intent] = []
+    for part in parts:
+        best = next(iter(read(part)), None)
+        if best is None or best.stops is not None or best.doubtful or best.probability < _CERTAIN:
+            return None
+        together += best.intents
+    same = (one for one in readings if one.stops is None and one.probability >= _LEAST and parts)
+    return next((one for one in same if is_same(one.intents, together)), None)
+
+
+def _trimmed(part: Sequence[Token]) -> list[Token]:
+    kept = list(part)
+    while kept and kept[0].text in _LEADS:
+        kept = kept[1:]
+    while kept and kept[-1].text in _LEADS:
+        kept = kept[:-1]
+    return kept
