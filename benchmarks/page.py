@@ -127,7 +127,7 @@ README_FIGURES = (
         "household | dry | right name first among 50 names", "{hits} of {of}, {%} % ({95 %})",
     ),
     Figure(
-        "commands that strangers wrote, read at first use", "language", "blind, at first use", "third four, commands",
+        "commands that strangers wrote, read at first use", "language", "blind, at first use", "fourth four, commands",
         "right {right}; misread {misread}",
     ),
     Figure("Table III, an object in an area", "indexing", "Table III", "+ sparse view map (ours)", _RECALL),

@@ -8,6 +8,7 @@ from avlmaps.bench.language import OUTCOMES, counts, judge, sealed, shipped
 REACHED = {
     "child": (112, 5), "nurse": (115, 5), "newcomer": (113, 5), "roboticist": (118, 4),
     "engineer": (90, 3), "grandmother": (68, 4), "plumber": (78, 9), "tourist": (76, 5),
+    "coach": (112, 4), "overseas": (110, 5), "vet": (120, 2), "wedding": (108, 4),
     "abroad": (63, 20), "dictation": (64, 19), "guests": (51, 7), "warehouse": (69, 15),
 }  # fmt: skip
 
