@@ -42,6 +42,7 @@ _SIDES = {Side.LEFT: ("to the left of", "left of", "to the left side of"), Side.
 _THEN = (", then ", " then ", " and then ", ". ", ". Then ", "; ", ", and after that ", ", next ", ", and ", " and ",
          ", after that ", ". After that ", ", and finally ", ". Finally, ")  # fmt: skip
 _FILES = ("view", "photo", "img_0231", "./a", "shots/hall", "/tmp/p 1".replace(" ", "_"), "kitchen2", "DSC0042")
+_THESE = ("this", "this", "the attached", "that")
 _COLOURS = ("red", "green", "blue", "yellow", "white", "black", "grey", "brown", "orange", "purple", "pink")
 _PARTS = ("leg", "door", "handle", "top", "corner", "edge", "drawer", "end", "foot", "back")
 _SALAD = 0.05
@@ -50,7 +51,8 @@ _SALAD = 0.05
 def plain(count: int, names: Names, draw: random.Random) -> list[Example]:
     """Return plain sentences with what they mean; two thirds are commands."""
     made = _Maker(names, draw)
-    return [made.command() if draw.random() < 0.67 else made.question() for _ in range(count)]
+    kinds = draw.choices((made.command, made.question, made.with_files), (60, 30, 10), k=count)
+    return [make() for make in kinds]
 
 
 class _Maker:
@@ -94,6 +96,44 @@ class _Maker:
         text += self.draw.choice(("", "", "?", " ?", "."))
         return Example(text[0].upper() + text[1:] if self.draw.random() < 0.4 else text, Inquiry(ask, (target,)), True,
                        VOICE)  # fmt: skip
+
+    def with_files(self) -> Example:
+        """Return a sentence that speaks of files that came along, or that did not."""
+        image, clip = self.draw.choice((("photo", None), (None, "clip"), ("photo", "clip"), (None, None)))
+        image = image and self.draw.choice((image, self.draw.choice(_FILES) + ".png", "view.jpg"))
+        clip = clip and self.draw.choice((clip, "bark.wav", self.draw.choice(_FILES) + ".ogg"))
+        this_photo = f"{self.draw.choice(_THESE)} {self.draw.choice(('photo', 'picture', 'image'))}"
+        this_clip = f"{self.draw.choice(_THESE)} {self.draw.choice(('recording', 'clip', 'sound', 'sound clip'))}"
+        said, target = self._of(Kind.OBJECT)
+        near = self.draw.choice(_NEAR)
+        photo, sound = Target(Kind.IMAGE, image or ""), Target(Kind.CLIP, clip or "")
+        if image and clip:
+            joint = self.draw.choice((f"and {near}", "and", near))
+            first, second, meant = f"{near} {this_photo}", this_clip, target.with_near(photo, sound)
+            if self.draw.random() < 0.5:
+                first, second = f"{near} {this_clip}", this_photo
+            return self._of_files(f"{said} {first} {joint} {second}", meant, image, clip)
+        lacks = not image and not clip
+        place, meant = self.draw.choice((
+            (f"where {this_photo} was taken", photo), (f"the place in {this_photo}", photo),
+            (f"{said} {near} {this_photo}", target.with_near(photo)),
+        ) if image or (lacks and self.draw.random() < 0.5) else (
+            (f"{said} {near} {this_clip}", target.with_near(sound)), (f"the sound in {this_clip}", sound),
+            (f"where {this_clip} was made", sound), (this_clip, sound),
+        ))  # fmt: skip
+        return self._of_files(place, None if lacks else meant, image, clip)
+
+    def _of_files(self, place: str, meant: Target | None, image: str | None, clip: str | None) -> Example:
+        if self.draw.random() < 0.5:
+            text = self.draw.choice(("", "where is ", "find ", "show me ")) if not place.startswith("where") else ""
+            asked = None if meant is None else Inquiry(Ask.WHERE, (meant,))
+            return Example(text + place + self.draw.choice(("", "?")), asked, True, VOICE, image, clip)
+        said, other = self._of(Kind.OBJECT)
+        between = self.draw.random() < 0.15 and not place.startswith("where")
+        text = f"stop between {place} and {said}" if between else f"{self.draw.choice(_GO)} {place}"
+        if meant is None:
+            return Example(text, (Clarify(),), False, VOICE, image, clip)
+        return Example(text, (Between((meant, other)) if between else Go(meant),), False, VOICE, image, clip)
 
     def _list(self, count: int) -> Example:
         """Return goals of one kind, one behind the other."""

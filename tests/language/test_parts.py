@@ -1,0 +1,46 @@
+"""A command of several sentences, read one by one: when that counts, and when it may not."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from avlmaps.language.intents import Go, Intent, Kind, Target, Turn
+from avlmaps.language.learned.decision import Weighed
+from avlmaps.language.learned.parts import by_parts, parts_of
+from avlmaps.language.lexer import Token, tokenise
+
+SOFA, DOOR = (Go(Target(Kind.OBJECT, name)) for name in ("sofa", "door"))
+ORDERS: dict[str, Intent] = {"go to the sofa": SOFA, "go to the door": DOOR, "turn left": Turn(-90.0)}
+
+
+def said(tokens: list[Token]) -> str:
+    return " ".join(token.text for token in tokens)
+
+
+@pytest.mark.parametrize(
+    ("command", "parts"),
+    [
+        ("Go to the sofa. Turn left!", ["go to the sofa", "turn left"]),
+        ("go to the sofa, then turn left; go to the door", ["go to the sofa", "turn left", "go to the door"]),
+        ("go to the sofa", []),
+        ("go to the sofa. turn it round", []),
+        ("go to the sofa. not the door", []),
+        ("go to the sofa. before that the door", []),
+    ],
+)
+def test_sentences_are_read_apart_where_none_refers_to_another(command: str, parts: list[str]) -> None:
+    assert [said(part) for part in parts_of(tokenise(command))] == parts
+
+
+@given(st.lists(st.sampled_from(sorted(ORDERS)), min_size=2, max_size=4), st.floats(0.1, 0.5), st.floats(0.5, 1.0))
+def test_only_a_reading_of_the_whole_that_its_certain_sentences_say(
+    orders: list[str], whole: float, each: float
+) -> None:
+    tokens = tokenise(". ".join(orders))
+    right, wrong = tuple(ORDERS[one] for one in orders), (SOFA, SOFA, SOFA, SOFA, SOFA)
+    found = by_parts(
+        tokens, [Weighed(wrong, 0.5), Weighed(right, whole)], lambda part: [Weighed((ORDERS[said(part)],), each)]
+    )
+    assert (found is None) == (each < 0.9)
+    assert found is None or found.intents == right
+    assert by_parts(tokens, [Weighed(wrong, 1.0)], lambda part: [Weighed((ORDERS[said(part)],), 1.0)]) is None
