@@ -57,7 +57,11 @@ def injected_server(folder: Path, service: Service | None = None) -> Iterator[tu
     ):
         view = render(Room().scene, CAMERA, Room().walk()[100])
         photo = cv2.imencode(".png", cv2.cvtColor(view.rgb, cv2.COLOR_RGB2BGR))[1].tobytes()
-        yield Campaign(client, name, photo, rename), driving
+        try:
+            yield Campaign(client, name, photo, rename), driving
+        finally:  # other tests ask the same service
+            names.clear()
+            opened.shelf.get(name)._answers.clear()  # pyright: ignore[reportPrivateUsage]
 
 
 def _kind(event: Any, names: list[str]) -> Any:

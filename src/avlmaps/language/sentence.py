@@ -1,11 +1,19 @@
 """A sentence as tokens, misspelt words put right, and what besides the lexicon knows its names."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
 from avlmaps.language.spelling import respelt
+
+# Words that may mean a file that came along.
+_PICTURE = frozenset({
+    "photo", "photos", "photograph", "photographed", "picture", "pictured", "image", "pic", "snapshot", "shot", "view",
+    "selfie", "screenshot", "polaroid",
+})  # fmt: skip
+_SOUND = frozenset({"recording", "recorded", "clip", "sound", "audio", "noise", "tape", "recordings", "memo"})
+_POINTS = frozenset({"this", "these", "attached", "attachment", "here", "file", "sent", "enclosed", "uploaded"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,10 +30,11 @@ class Given:
     clip: str | None = None
     knows: Callable[[str], bool] | None = None
 
-    def tokens(self, at: int) -> list[Token]:
-        """Return the files as tokens behind a sentence, so that "this photo" can point to one."""
-        files = (("image", self.image), ("clip", self.clip))
-        return [Token(name, name, kind, at, at) for kind, name in files if name]
+    def tokens(self, words: Iterable[str], at: int) -> list[Token]:
+        """Return the files that a sentence may speak of as tokens behind it, so that "this photo" can point to one."""
+        said = frozenset(words)
+        files = (("image", self.image, _PICTURE), ("clip", self.clip, _SOUND))
+        return [Token(name, name, kind, at, at) for kind, name, means in files if name and said & (means | _POINTS)]
 
 
 class Sentence:
@@ -43,7 +52,7 @@ class Sentence:
         given = given or Given()
         self.text = text
         self.tokens, self.respelt = respelt(lexer.tokenise(text))
-        self.tokens += given.tokens(len(text))
+        self.tokens += given.tokens((token.text for token in self.tokens), len(text))
         self.given = given
 
     def knows(self, name: str) -> bool:
