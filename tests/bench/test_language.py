@@ -6,10 +6,10 @@ from avlmaps.bench.language import OUTCOMES, counts, judge, sealed, shipped
 
 # At least so many of the sentences of each list are right, and at most so many misread; all are development lists.
 REACHED = {
-    "child": (112, 5), "nurse": (115, 5), "newcomer": (113, 5), "roboticist": (118, 4),
-    "engineer": (90, 3), "grandmother": (68, 4), "plumber": (78, 9), "tourist": (76, 5),
-    "coach": (112, 4), "overseas": (110, 5), "vet": (120, 2), "wedding": (108, 4),
-    "abroad": (63, 20), "dictation": (64, 19), "guests": (51, 7), "warehouse": (69, 15),
+    "child": (119, 4), "nurse": (118, 4), "newcomer": (121, 3), "roboticist": (121, 3),
+    "engineer": (115, 4), "grandmother": (115, 5), "plumber": (113, 7), "tourist": (114, 4),
+    "coach": (112, 5), "overseas": (110, 6), "vet": (120, 3), "wedding": (108, 4),
+    "abroad": (114, 4), "dictation": (114, 6), "guests": (111, 4), "warehouse": (116, 4),
 }  # fmt: skip
 
 

@@ -25,23 +25,23 @@ from avlmaps.language.verbalise import verbalise
 LISTS = Path(__file__).parent / "commands"
 # How many commands of each development list are right at least, and how many may be read as something else at most.
 REACHED = {
-    "commands.tsv": (350, 10), "free.tsv": (645, 38), "paraphrases.jsonl": (58, 2), "paraphrases_2.jsonl": (72, 4),
-    "paraphrases_3.jsonl": (69, 4), "paraphrases_4.jsonl": (63, 6),
+    "commands.tsv": (350, 7), "free.tsv": (695, 16), "paraphrases.jsonl": (58, 2), "paraphrases_2.jsonl": (73, 4),
+    "paraphrases_3.jsonl": (76, 3), "paraphrases_4.jsonl": (74, 4),
 }  # fmt: skip
 
 
 # Of the lists of many speakers: as many are right at least, and misread at most.
 SPEAKERS = {
-    "speakers_commands.jsonl": (511, 12),
-    "speakers_commands_2.jsonl": (108, 4),
-    "speakers_commands_3.jsonl": (64, 5),
-    "speakers_commands_4.jsonl": (60, 3),
-    "speakers_commands_5.jsonl": (56, 4),
-    "speakers_questions.jsonl": (214, 8),
-    "speakers_questions_2.jsonl": (58, 4),
-    "speakers_questions_3.jsonl": (36, 4),
-    "speakers_questions_4.jsonl": (29, 3),
-    "speakers_questions_5.jsonl": (32, 4),
+    "speakers_commands.jsonl": (530, 8),
+    "speakers_commands_2.jsonl": (109, 3),
+    "speakers_commands_3.jsonl": (66, 3),
+    "speakers_commands_4.jsonl": (61, 3),
+    "speakers_commands_5.jsonl": (61, 3),
+    "speakers_questions.jsonl": (219, 5),
+    "speakers_questions_2.jsonl": (57, 3),
+    "speakers_questions_3.jsonl": (37, 3),
+    "speakers_questions_4.jsonl": (31, 3),
+    "speakers_questions_5.jsonl": (34, 3),
 }
 
 
@@ -60,8 +60,8 @@ def test_the_development_lists_stay_understood(name: str) -> None:
     assert len(found["other"]) <= other, found["other"]
 
 
-# Here the grammar and the network read different places, so a person may be asked.
-ASKED_BACK = {"go to the sofa near the window. sorry, the other sofa", "make a round: sofa, table, door, sofa"}
+# Here the networks are not sure, so a person may be asked.
+ASKED_BACK = {"make a round: sofa, table, door, sofa"}
 
 
 @pytest.mark.parametrize("row", read_list(LISTS / "intents.jsonl"), ids=lambda row: row["say"])

@@ -1,4 +1,4 @@
-"""Questions back: what is not clear in a sentence, asked as exactly as its words allow."""
+"""Questions back: what is not clear in a sentence, named as exactly as its words allow."""
 
 from collections.abc import Sequence
 from itertools import pairwise

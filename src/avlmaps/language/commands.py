@@ -65,7 +65,7 @@ def weighed_readings(sentence: Sentence, reader: LearnedReader) -> tuple[Weighed
 
 
 def answered(sentence: Sentence, readings: Sequence[Weighed], reader: LearnedReader, limits: Limits) -> Decision:
-    """Return what to do of the readings of a command; where none is sure enough, its sentences are read one by one."""
+    """Return what to do of the readings of a command; where none is likely enough, its sentences are read apart."""
     answer = decided(readings, limits)
     if answer.why != "unsure":
         return answer

@@ -123,7 +123,7 @@ def _which(readings: Sequence[Weighed]) -> Clarify:
         return Clarify(f"This can mean two things. 1: {choices[0]} 2: {choices[1]} Which one?", choices)
     if choices:
         return Clarify(f"Is this what you mean? {choices[0]}", choices)
-    return Clarify("I am not sure what this means. Can you say it in other words?")
+    return Clarify("This is not clear. Can you say it in other words?")
 
 
 def is_same(a: Sequence[Intent], b: Sequence[Intent]) -> bool:

@@ -1,7 +1,7 @@
-"""A command of several sentences, read sentence by sentence: a second opinion where the whole is not sure enough.
+"""A command of several sentences, read one by one: a second opinion where the whole is not likely enough.
 
-The networks are less sure of long commands. Where each of its sentences alone is all but certain, and what they say
-together is one of the readings of the whole, the command means that.
+The networks are less confident of long commands. Where each of its sentences alone is all but certain, and what
+they say together is one of the readings of the whole, the command means that.
 """
 
 from collections.abc import Callable, Sequence
