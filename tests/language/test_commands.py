@@ -60,15 +60,10 @@ def test_the_development_lists_stay_understood(name: str) -> None:
     assert len(found["other"]) <= other, found["other"]
 
 
-# Here the networks are not sure, so a person may be asked.
-ASKED_BACK = {"make a round: sofa, table, door, sofa"}
-
-
 @pytest.mark.parametrize("row", read_list(LISTS / "intents.jsonl"), ids=lambda row: row["say"])
 def test_a_sentence_has_its_intents(row: dict[str, object]) -> None:
     judged = judge(row)
-    wanted = ("right", "asked back") if row["say"] in ASKED_BACK else ("right",)
-    assert judged.outcome in wanted, json.dumps(judged.got)
+    assert judged.outcome == "right", json.dumps(judged.got)
 
 
 def test_every_program_that_is_written_can_run() -> None:

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from training.language.rows import Example
 
-from avlmaps.core.inflection import singulars_of
+from avlmaps.core.inflection import singulars_of, stem_of
 from avlmaps.language import lexer
 from avlmaps.language.intents import Ask, Inquiry, Kind
 from avlmaps.language.learned.linear import (
@@ -72,7 +72,7 @@ class _Found(Pointers):
     def __init__(self, tokens: Sequence[Token], example: Example) -> None:
         self.tokens, self.example = list(tokens), example
         self._used: list[int] = []
-        self._stems = [_stem(token.text) for token in tokens]
+        self._stems = [stem_of(token.text, _ENDINGS) for token in tokens]
 
     def amount(self, value: float, of: str) -> int | None:
         found = [
@@ -121,7 +121,7 @@ class _Found(Pointers):
         heard = [i for i in usable if sounding_forms().get(self.tokens[i].text) == word]  # "rang" of "ringing"
         if heard:
             return heard
-        stem = [i for i in usable if self._stems[i] == _stem(word)]
+        stem = [i for i in usable if self._stems[i] == stem_of(word, _ENDINGS)]
         if stem:
             return stem
         alike = [(SequenceMatcher(None, word, self.tokens[i].text).ratio(), i) for i in usable]
@@ -146,11 +146,3 @@ def _closest(places: list[list[int]]) -> list[int]:
     if best is None:
         raise MalformedError("a word of a name is said less often than it is needed")
     return best[1]
-
-
-def _stem(word: str) -> str:
-    for ending in _ENDINGS:
-        if word.endswith(ending) and len(word) - len(ending) >= 3:
-            word = word[: -len(ending)]
-            break
-    return word[:-1] if len(word) > 3 and word[-1] == word[-2] else word[:5]

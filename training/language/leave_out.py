@@ -20,7 +20,7 @@ from avlmaps.language.intents import Clarify, Intent, to_json
 from avlmaps.language.learned.decision import Weighed, decided, is_same
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.reader import LearnedReader, Read
-from avlmaps.language.questions import asked
+from avlmaps.language.questions import asked, by_name
 from avlmaps.language.sentence import Given, Sentence
 
 FOLDS = (
@@ -74,7 +74,8 @@ def outcome(one: Heard, limits: Limits) -> str:
     """Return what became of a row: right, harmless, a question back or misread."""
     if "question" in one.row:
         try:
-            got: Any = asked(one.sentence, one.question, limits).inquiry.to_json()
+            found = by_name(one.sentence) or asked(one.sentence, one.question, limits)
+            got: Any = found.inquiry.to_json()
         except QueryError:
             got = _REFUSED
         return judge_question(got, one.row)

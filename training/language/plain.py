@@ -41,7 +41,7 @@ _SIDES = {Side.LEFT: ("to the left of", "left of", "to the left side of"), Side.
           Side.WEST: ("to the west of", "west of")}  # fmt: skip
 _THEN = (", then ", " then ", " and then ", ". ", ". Then ", "; ", ", and after that ", ", next ", ", and ", " and ",
          ", after that ", ". After that ", ", and finally ", ". Finally, ")  # fmt: skip
-_FILES = ("view", "photo", "img_0231", "./a", "shots/hall", "/tmp/p 1".replace(" ", "_"), "kitchen2", "DSC0042")
+_FILES = ("view", "photo", "img_0231", "./a", "shots/hall", "/tmp/p_1", "kitchen2", "DSC0042")
 _THESE = ("this", "this", "the attached", "that")
 _COLOURS = ("red", "green", "blue", "yellow", "white", "black", "grey", "brown", "orange", "purple", "pink")
 _PARTS = ("leg", "door", "handle", "top", "corner", "edge", "drawer", "end", "foot", "back")

@@ -12,7 +12,7 @@ from training.language.augment import joinable, names_of, variant, with_manners
 from training.language.plain import plain
 from training.language.rows import Example, examples_of, lists
 
-from avlmaps.language.asking_back import is_strange
+from avlmaps.language.asking_back import strange_word
 from avlmaps.language.intents import Clarify
 from avlmaps.language.learned.features import features
 from avlmaps.language.learned.linear import INDEX, SYMBOLS
@@ -112,7 +112,7 @@ def _names_nonsense(example: Example) -> bool:
     """Return whether a command is unclear for a word that is none: then the guard asks, not the network."""
     if example.is_question or not isinstance(example.meaning, tuple) or not isinstance(example.meaning[0], Clarify):
         return False
-    return any(is_strange(token.text) for token in Sentence(example.say).tokens if token.kind == "word")
+    return strange_word(Sentence(example.say).tokens) is not None
 
 
 def build(variants: int, made: int, seed: int, rows: Sequence[Example] | None = None) -> Pool:

@@ -15,7 +15,7 @@ from typing import Any
 
 from avlmaps.bench.harness.intervals import wilson
 from avlmaps.core.errors import LanguageError, QueryError
-from avlmaps.core.inflection import singulars_of
+from avlmaps.core.inflection import singulars_of, stem_of
 from avlmaps.core.lexicon import Kind, lexicon
 
 OUTCOMES = ("right", "harmless", "asked back", "misread")
@@ -39,7 +39,6 @@ _WHO = frozenset(
         "sounds",
     }
 )
-_ENDINGS = ("ing", "ed", "es", "s", "er", "y", "e")
 Row = Mapping[str, Any]
 
 
@@ -187,7 +186,7 @@ def _name(kind: str, name: Any) -> Any:
         return name
     if kind == "sound":
         joined = str(name).lower().replace("door bell", "doorbell")
-        return frozenset(_stem(word) for word in joined.split() if word not in _WHO)
+        return frozenset(stem_of(word) for word in joined.split() if word not in _WHO)
     words = [word for word in str(name).lower().replace("-", " ").split() if word not in ("the", "a", "an", "my")]
     wanted = Kind.ROOM if kind == "area" else Kind.THING
     for start in range(len(words)):
@@ -195,14 +194,6 @@ def _name(kind: str, name: Any) -> Any:
         if entry is not None:
             return (*words[:start], entry.name)
     return (*words[:-1], next(iter(singulars_of(words[-1])), words[-1])) if words else ()
-
-
-def _stem(word: str) -> str:
-    for ending in _ENDINGS:
-        if word.endswith(ending) and len(word) - len(ending) >= 3:
-            word = word[: -len(ending)]
-            break
-    return word[:-1] if len(word) > 3 and word[-1] == word[-2] else word[:5]
 
 
 def counts(judged: Sequence[Judged]) -> dict[str, int]:

@@ -1,5 +1,7 @@
 """English plurals of nouns and noun phrases."""
 
+from collections.abc import Sequence
+
 _IRREGULAR = {
     "child": "children", "person": "people", "man": "men", "woman": "women", "foot": "feet", "tooth": "teeth",
     "goose": "geese", "mouse": "mice", "louse": "lice", "ox": "oxen", "shelf": "shelves", "bookshelf": "bookshelves",
@@ -85,3 +87,17 @@ def _singular_words(word: str) -> tuple[str, ...]:
     if word.endswith("es"):
         out.append(word[:-2])
     return tuple(dict.fromkeys(single for single in out if single))
+
+
+def stem_of(word: str, endings: Sequence[str] = ("ing", "ed", "es", "s", "er", "y", "e")) -> str:
+    """Return the first letters of a word without its ending, so that "barked", "barking" and "barks" are alike.
+
+    Args:
+        word: in lower case.
+        endings: the first that fits, and leaves three letters, is cut off.
+    """
+    for ending in endings:
+        if word.endswith(ending) and len(word) - len(ending) >= 3:
+            word = word[: -len(ending)]
+            break
+    return word[:-1] if len(word) > 3 and word[-1] == word[-2] else word[:5]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.intents import Clarify, Intent, Refuse
 from avlmaps.language.learned.decision import Decision, Weighed, decided
-from avlmaps.language.learned.guard import Guard, weighed
+from avlmaps.language.learned.guard import EXAMPLE, Guard, weighed
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.parts import by_parts
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
@@ -15,7 +15,6 @@ from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.word_classes import load_word_classes
 
 MOST_CHARACTERS = 1000
-_EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +46,12 @@ def read_command(text: str, given: Given | None = None) -> Command:
     Raises:
         LanguageError: the command is empty or too long.
     """
-    check_length(text, "command", _EXAMPLE)
+    _check_length(text)
     sentence = Sentence(text, given)
     reader = learned_reader()
     readings = weighed_readings(sentence, reader)
     if not readings:
-        question = Clarify(f"I do not understand this. Say it like: {_EXAMPLE}.")
+        question = Clarify(f"I do not understand this. Say it like: {EXAMPLE}.")
         return Command((question,), (), (), "unsure")
     answer = answered(sentence, readings, reader, reader.limits)
     notes = (*sentence.notes, *_without_effect(sentence), *answer.notes)
@@ -84,15 +83,15 @@ def _without_effect(sentence: Sentence) -> list[str]:
     return [f"'{word}' has no effect: the robot has one speed." for word in words if word in slow]
 
 
-def check_length(text: str, what: str, example: str) -> None:
-    """Refuse a text without a word, or one that is too long.
+def _check_length(text: str) -> None:
+    """Refuse a command without a word, or one that is too long.
 
     Raises:
         LanguageError: it is.
     """
     if not any(mark.isalnum() for mark in text):
-        raise LanguageError(f"The {what} is empty; say it like: {example}.")
+        raise LanguageError(f"The command is empty; say it like: {EXAMPLE}.")
     if len(text) > MOST_CHARACTERS:
         raise LanguageError(
-            f"The {what} has {len(text)} characters, more than {MOST_CHARACTERS}; give it in several {what}s."
+            f"The command has {len(text)} characters, more than {MOST_CHARACTERS}; give it in several commands."
         )

@@ -127,11 +127,11 @@ def _is_name(phrase: str) -> bool:
     described = words[0] in book.words() or words[0] in _adjectives()
     if words[-1] in _ONLY_ROOMS and len(words) == 2 and words[0] not in listed("never") and described:
         return True
-    return any(name in _also_things() for name in (phrase, *singulars_of(phrase)))
+    return any(name in also_things() for name in (phrase, *singulars_of(phrase)))
 
 
 @cache
-def _also_things() -> frozenset[str]:
+def also_things() -> frozenset[str]:
     """Return the names of things that only a map's encoder knows."""
     return frozenset(name.strip() for name in load_word_classes().lists["also_things"].split(","))
 
@@ -184,9 +184,14 @@ def _verbs() -> frozenset[str]:
 
 @cache
 def _adjectives() -> frozenset[str]:
+    return listed("adjectives") | describing_words()
+
+
+@cache
+def describing_words() -> frozenset[str]:
+    """Return the words of the lexicon's colours and materials."""
     book = lexicon()
-    more = [*book.colours, *book.materials]
-    return listed("adjectives") | {word for phrase in more for word in phrase.split()}
+    return frozenset(word for phrase in (*book.colours, *book.materials) for word in phrase.split())
 
 
 @cache

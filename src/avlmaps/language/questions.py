@@ -23,26 +23,10 @@ _MODALITIES = {
     Kind.OBJECT: Modality.OBJECT, Kind.SOUND: Modality.SOUND, Kind.CLIP: Modality.SOUND, Kind.AREA: Modality.AREA,
     Kind.IMAGE: Modality.IMAGE,
 }  # fmt: skip
-_ACTORS = frozenset(
-    {
-        "i",
-        "we",
-        "one",
-        "you",
-        "he",
-        "she",
-        "they",
-        "to",
-        "us",
-        "someone",
-        "somebody",
-        "can",
-        "could",
-        "may",
-        "might",
-        "should",
-    }
-)
+_ACTORS = frozenset({
+    "i", "we", "one", "you", "he", "she", "they", "to", "us", "someone",
+    "somebody", "can", "could", "may", "might", "should",
+})  # fmt: skip
 _ARTICLES = frozenset({"the", "a", "an"})
 
 
@@ -92,24 +76,34 @@ def read_question(text: str, given: Given | None = None) -> AskedSentence:
             f"The sentence has {len(text)} characters, more than {MOST_CHARACTERS}; say it shorter, like: {_EXAMPLE}."
         )
     sentence = Sentence(text, given)
+    named = by_name(sentence)
+    if named is not None:
+        return named
     reader = learned_reader()
-    return asked(sentence, () if _bare_name(sentence) else reader.question(sentence.tokens), reader.limits)
+    return asked(sentence, reader.question(sentence.tokens), reader.limits)
+
+
+def by_name(sentence: Sentence) -> AskedSentence | None:
+    """Return the query of a sentence that is one name and nothing else, which needs no reading; None for others."""
+    words = [token.text for token in sentence.tokens if token.kind != "punct" and token.text not in _ARTICLES]
+    name = " ".join(words)
+    plain = all(token.kind in ("word", "punct") for token in sentence.tokens)
+    if not (plain and words and is_entry(name)) or any(sounds_like(word) for word in words):
+        return None
+    return AskedSentence(Inquiry(Ask.WHERE, (Target(kind_of(name, Kind.OBJECT), name),)), sentence.notes)
 
 
 def asked(sentence: Sentence, reads: Sequence[Read], limits: Limits) -> AskedSentence:
     """Return the query of a sentence that was read.
 
     Args:
-        sentence: the sentence; a name alone needs no reading.
+        sentence: the sentence.
         reads: its readings, the likeliest first.
         limits: how likely a reading must be.
 
     Raises:
         QueryError: it is not understood; a name or a file is not known.
     """
-    name = _bare_name(sentence)
-    if name is not None:
-        return AskedSentence(Inquiry(Ask.WHERE, (Target(kind_of(name, Kind.OBJECT), name),)), sentence.notes)
     if not reads or (reads[0].meaning is None and not reads[0].is_purpose):
         file = lacks_file(sentence.tokens)
         if file is not None:
@@ -124,14 +118,6 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: Limits) -> AskedSen
     if not plain:
         raise QueryError(f"What serves that purpose is not known; name the thing, like: {_EXAMPLE}.")
     return _put_right(_likely(plain, sentence, limits), sentence)
-
-
-def _bare_name(sentence: Sentence) -> str | None:
-    """Return the name that a sentence consists of; None where it says more."""
-    words = [token.text for token in sentence.tokens if token.kind != "punct" and token.text not in _ARTICLES]
-    name = " ".join(words)
-    plain = all(token.kind in ("word", "punct") for token in sentence.tokens)
-    return name if plain and words and is_entry(name) and not any(sounds_like(word) for word in words) else None
 
 
 def _likely(reads: Sequence[Read], sentence: Sentence, limits: Limits) -> Inquiry:

@@ -14,6 +14,7 @@ from avlmaps.core.lexicon import lexicon
 from avlmaps.language.lexer import WORDS, Token
 from avlmaps.language.names import is_other_form, sounding_words
 from avlmaps.language.word_classes import load_word_classes
+from avlmaps.perception.embedded.words import is_word
 
 _TWICE = frozenset({"the", "a", "an", "to", "go", "and", "in", "at", "of", "on", "is", "my"})
 _SHORTEST = 5  # shorter words have too many neighbours
@@ -69,7 +70,7 @@ def _better(word: str) -> str | None:
         swapped = {other for other in near if len(other) == len(word) and sorted(other) == sorted(word)}
         longer = {other for other in near if len(other) > len(word)} if len(word) == _SHORTEST - 1 else set()
         near = swapped or longer
-    if not near or _is_english(word):
+    if not near or is_word(word):  # "forge" is no misspelt "forget"
         return None
     plain = {other for other in near if other.rstrip("s") not in near or other == other.rstrip("s")}
     better = plain.pop() if len(plain) == 1 else None
@@ -80,13 +81,6 @@ def _better(word: str) -> str | None:
 @cache
 def _heard() -> dict[str, str]:
     return dict(pair.split("=") for pair in load_word_classes().lists["heard_as"].split())
-
-
-def _is_english(word: str) -> bool:
-    """Return whether a word is one of its own: "forge" is no misspelt "forget"."""
-    from avlmaps.perception.embedded.words import is_word  # read only where a word is in question
-
-    return is_word(word)
 
 
 def _neighbours(word: str) -> Iterator[str]:

@@ -6,9 +6,8 @@ unread; for the others it must be likelier. Where no reading is, a person decide
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
-from avlmaps.core.inflection import singulars_of
+from avlmaps.core.inflection import singulars_of, stem_of
 from avlmaps.core.lexicon import Kind as Entries
 from avlmaps.core.lexicon import lexicon
 from avlmaps.language import lexer
@@ -29,10 +28,8 @@ from avlmaps.language.intents import (
 from avlmaps.language.intents import Move as MoveIntent
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.linear import amount_end
+from avlmaps.language.lexer import Token
 from avlmaps.language.verbalise import verbalise
-
-if TYPE_CHECKING:
-    from avlmaps.language.lexer import Token
 
 DANGERS = (Reason.HARM, Reason.FLYING, Reason.ENDLESS, Reason.CONDITION, Reason.NEGATION)
 # Words that can turn a command round.
@@ -55,7 +52,6 @@ _NO_NAMES = frozenset({
 })  # fmt: skip
 _WHO = frozenset({"someone", "somebody", "anyone", "anybody", "person", "people", "a", "the", "of", "on", "sound"})
 _WORTH_ASKING = 0.1
-_ENDINGS = ("ing", "ed", "es", "s", "er", "y", "e")
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +152,7 @@ def _plain(target: Target) -> Target:
     near = tuple(sorted({_plain(one) for one in _flat_near(target)}, key=str))
     words = target.name.lower().replace("-", " ").split()
     if target.kind is Kind.SOUND:
-        name = " ".join(sorted(_stem(word) for word in words if word not in _WHO))
+        name = " ".join(sorted(stem_of(word) for word in words if word not in _WHO))
     elif target.is_file:
         name = target.name
     else:
@@ -169,15 +165,7 @@ def _flat_near(target: Target) -> list[Target]:
     return [part for one in target.near for part in (replace(one, near=()), *_flat_near(one))]
 
 
-def _stem(word: str) -> str:
-    for ending in _ENDINGS:
-        if word.endswith(ending) and len(word) - len(ending) >= 3:
-            word = word[: -len(ending)]
-            break
-    return word[:-1] if len(word) > 3 and word[-1] == word[-2] else word[:5]
-
-
-def is_doubtful(tokens: "Sequence[Token]", used: frozenset[int], *, waits: bool = False) -> bool:
+def is_doubtful(tokens: Sequence[Token], used: frozenset[int], *, waits: bool = False) -> bool:
     """Return whether a reading leaves a number or a name unread, or a word that can turn a command round is said.
 
     Args:
@@ -194,14 +182,14 @@ def is_doubtful(tokens: "Sequence[Token]", used: frozenset[int], *, waits: bool 
     )
 
 
-def _is_name(token: "Token", said: set[str]) -> bool:
+def _is_name(token: Token, said: set[str]) -> bool:
     """Return whether a word is the name of a thing or a room that no reading has."""
     if token.kind != "word" or token.text in said or token.text in _NO_NAMES or len(token.text) < 3:
         return False
     return any(lexicon().find(token.text, kind) is not None for kind in (Entries.THING, Entries.ROOM))
 
 
-def _is_number(tokens: "Sequence[Token]", at: int) -> bool:
+def _is_number(tokens: Sequence[Token], at: int) -> bool:
     token = tokens[at]
     if token.kind == "number":
         listed = (

@@ -17,8 +17,8 @@ from avlmaps.core.inflection import singulars_of
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
-from avlmaps.language.names import sounding_words
-from avlmaps.language.word_classes import load_word_classes
+from avlmaps.language.names import also_things, describing_words, sounding_words
+from avlmaps.language.word_classes import listed, load_word_classes
 from avlmaps.perception.embedded.words import word_vectors
 
 _LISTS = (
@@ -133,21 +133,14 @@ def _listed(word: str) -> tuple[str, ...]:
     found = [name for name, words in _lists().items() if word in words]
     if word in sounding_words():
         found.append("~sounding")
-    if word in _described():
+    if word in describing_words():
         found.append("~described")
     return tuple(found)
 
 
 @cache
 def _lists() -> dict[str, frozenset[str]]:
-    lists = load_word_classes().lists
-    return {name: frozenset(lists[name].split()) for name in _LISTS}
-
-
-@cache
-def _described() -> frozenset[str]:
-    book = lexicon()
-    return frozenset(word for phrase in (*book.colours, *book.materials) for word in phrase.split())
+    return {name: listed(name) for name in _LISTS}
 
 
 @cache
@@ -155,14 +148,9 @@ def _entries(phrase: str) -> tuple[str, ...]:
     """Return the kinds of what a phrase names exactly."""
     book = lexicon()
     found = [str(kind) for kind in Kind if book.find(phrase, kind) is not None]
-    if "thing" not in found and any(one in _also() for one in (phrase, *singulars_of(phrase))):
+    if "thing" not in found and any(one in also_things() for one in (phrase, *singulars_of(phrase))):
         found.append("thing")
     return tuple(found)
-
-
-@cache
-def _also() -> frozenset[str]:
-    return frozenset(name.strip() for name in load_word_classes().lists["also_things"].split(","))
 
 
 @cache

@@ -28,7 +28,7 @@ from avlmaps.language.lexer import Token
 from avlmaps.language.names import is_known, is_place, may_name, mended, past_forms, sounding_forms
 from avlmaps.language.sentence import Sentence
 
-_EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
+EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
 REFUSALS = {
     Reason.MANIPULATION: "The robot has no hands and no voice; it can only drive, turn and look.",
     Reason.ENDLESS: "The robot does not drive without an end; say how often.",
@@ -38,7 +38,7 @@ REFUSALS = {
     Reason.NEGATION: "Say only what to do, not what to avoid.",
     Reason.CHAT: "The robot does not talk; say where it should go.",
     Reason.QUESTION: 'This is a question; ask the map: avlmaps query MAP "QUESTION".',
-    Reason.UNKNOWN: f"This is not understood; say it like: {_EXAMPLE}.",
+    Reason.UNKNOWN: f"This is not understood; say it like: {EXAMPLE}.",
 }
 _FAR_M, _LONG_TIMES = 100.0, 50
 _ROOM_WORDS = frozenset({"room", "area", "zone", "hall", "corner", "wing", "bay", "ward", "lab", "office", "aisle"})

@@ -25,8 +25,7 @@ def parts_of(tokens: Sequence[Token]) -> list[list[Token]]:
     """Return the sentences of a command; none where it has one, or where one refers to another."""
     if not _REFERS.isdisjoint(token.text for token in tokens):
         return []
-    ends = [at for at, token in enumerate(tokens) if token.text in _ENDS]
-    cuts = [0, *(at for at in ends), len(tokens)]
+    cuts = [0, *(at for at, token in enumerate(tokens) if token.text in _ENDS), len(tokens)]
     parts = [_trimmed(tokens[start:end]) for start, end in pairwise(cuts)]
     parts = [part for part in parts if part]
     return parts if len(parts) > 1 else []
@@ -42,15 +41,14 @@ def by_parts(
         readings: of the whole, the likeliest first.
         read: reads one sentence.
     """
-    parts = parts_of(tokens)
     together: list[Intent] = []
-    for part in parts:
+    for part in parts_of(tokens):
         best = next(iter(read(part)), None)
         if best is None or best.stops is not None or best.doubtful or best.probability < _CERTAIN:
             return None
         together += best.intents
-    same = (one for one in readings if one.stops is None and one.probability >= _LEAST and parts)
-    return next((one for one in same if is_same(one.intents, together)), None)
+    likely = (one for one in readings if one.stops is None and one.probability >= _LEAST)
+    return next((one for one in likely if together and is_same(one.intents, together)), None)
 
 
 def _trimmed(part: Sequence[Token]) -> list[Token]:
