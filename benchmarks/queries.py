@@ -92,7 +92,7 @@ def heat_rows(voxels: int, rng: np.random.Generator) -> list[tuple[str, float, f
     for role, falloff in (("primary", 2.0), ("context", 0.2)):
         ours = best_ms(lambda e=falloff: object_heat(space, mask, e))
         brute, expected = once_ms(lambda e=falloff: brute_force_object(space, mask, e, some))
-        fault = float(np.abs(object_heat(space, mask, falloff)[some] - expected).max())
+        fault = float(np.abs(object_heat(space, mask, falloff)[0][some] - expected).max())
         what = f"object heat, {role}, {len(space):,} voxels, {int(mask.sum()):,} of the object"
         rows.append((what, ours, brute * len(space) / len(some), fault))
         ours = best_ms(lambda e=falloff: anchor_heat(space, anchors, scores, e))
@@ -120,11 +120,11 @@ def text_rows(count: int, dim: int, rng: np.random.Generator) -> list[tuple[str,
         part = rng.standard_normal((min(50_000, count - k), dim), np.float32)
         feature[k : k + len(part)] = part / np.linalg.norm(part, axis=1, keepdims=True)
     encoder = _Words(dim, rng)
-    asked = encoder.table[3]
+    asked = encoder.table[3:4]
     ours = best_ms(lambda: feature_scores(feature, asked))
     some = slice(0, min(count, 100_000))
-    plain, expected = once_ms(lambda: feature[some] @ asked.astype(np.float16))
-    wide = feature[some].astype(np.float32) @ asked
+    plain, expected = once_ms(lambda: feature[some] @ asked[0].astype(np.float16))
+    wide = feature[some].astype(np.float32) @ asked[0]
     fault = float(np.abs(feature_scores(feature[some], asked) - wide).max())
     rows = [(f"one word over {count:,} x {dim} float16", ours, plain * count / len(expected), fault)]
     words = [str(k) for k in range(100)]

@@ -56,9 +56,26 @@ def brute_force_anchors(
 def test_object_heat_is_the_equation_at_every_voxel(index, seed, share, falloff) -> None:
     space = Space(GridSpec(SIZE_M), index, np.array([0.0, 0.0, 1.0]))
     mask = np.random.default_rng(seed).uniform(0, 1, len(index)) < share
-    heat = object_heat(space, mask, falloff)
+    heat, nearest = object_heat(space, mask, falloff)
     np.testing.assert_allclose(heat, brute_force_object(space, mask, falloff), atol=1e-6)
     assert np.all(heat[mask] == 1.0)
+    warm = heat > 0.0
+    assert np.all(nearest[warm] >= 0)
+    apart = np.linalg.norm(space.centres[warm] - space.centres[mask][nearest[warm]], axis=1)
+    np.testing.assert_allclose(heat[warm], 1.0 - falloff * apart, atol=1e-6)
+
+
+@given(voxel_sets(), st.integers(0, 2**32 - 1), anchor_sets(), FALLOFFS, st.floats(0, 1))
+def test_heat_among_some_voxels_is_the_heat_of_all_there(index, seed, anchors_and_scores, falloff, share) -> None:
+    space = Space(GridSpec(SIZE_M), index, np.array([0.0, 0.0, 1.0]))
+    rng = np.random.default_rng(seed)
+    mask, among = rng.uniform(0, 1, len(index)) < 0.3, rng.uniform(0, 1, len(index)) < share
+    for some, all_ in (
+        (object_heat(space, mask, falloff, among), object_heat(space, mask, falloff)),
+        (anchor_heat(space, *anchors_and_scores, falloff, among), anchor_heat(space, *anchors_and_scores, falloff)),
+    ):
+        np.testing.assert_allclose(some[0], np.where(among, all_[0], 0.0), atol=1e-6)
+        assert np.array_equal(some[1] >= 0, (all_[1] >= 0) & among)
 
 
 @given(voxel_sets(), ups(), anchor_sets(), FALLOFFS)
@@ -81,7 +98,7 @@ def test_object_heat_never_rises_with_distance(index, seed, falloff) -> None:
     mask = np.zeros(len(index), bool)
     mask[np.random.default_rng(seed).integers(len(index))] = True
     distance = np.linalg.norm(space.centres - space.centres[mask], axis=1)
-    heat = object_heat(space, mask, falloff)
+    heat, _ = object_heat(space, mask, falloff)
     assert np.all(np.diff(heat[np.argsort(distance)]) <= 1e-6)
 
 
@@ -89,8 +106,8 @@ def test_primary_reaches_half_a_metre_and_context_five() -> None:
     line = np.stack([np.arange(120), np.zeros(120), np.zeros(120)], axis=1).astype(np.int32)
     space, settings = Space(GridSpec(SIZE_M), line, np.array([0.0, 0.0, 1.0])), HeatSettings()
     first = np.arange(120) == 0
-    primary = object_heat(space, first, settings.falloff_per_m(Role.PRIMARY))
-    context = object_heat(space, first, settings.falloff_per_m(Role.CONTEXT))
+    primary, _ = object_heat(space, first, settings.falloff_per_m(Role.PRIMARY))
+    context, _ = object_heat(space, first, settings.falloff_per_m(Role.CONTEXT))
     assert np.flatnonzero(primary > 1e-6).max() == 9  # 0.45 m; at 0.50 m it is nothing
     assert np.flatnonzero(context > 1e-6).max() == 99
     assert context[20] == pytest.approx(0.8)

@@ -28,11 +28,15 @@ def test_the_two_closest_words_are_the_same(voxels: int, words: int, seed: int) 
 
 
 @settings(max_examples=40, deadline=None)
-@given(st.integers(0, 60), st.integers(0, 2**32 - 1))
-def test_scores_are_the_same_within_rounding(voxels: int, seed: int) -> None:
+@given(st.integers(0, 60), st.integers(1, 4), st.integers(0, 2**32 - 1))
+def test_scores_are_the_same_within_rounding(voxels: int, count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    feature, word = rng.normal(size=(voxels, 9)).astype(np.float16), rng.normal(size=9).astype(np.float32)
-    np.testing.assert_allclose(*both(feature_scores, feature, word), atol=1e-5)
+    feature, words = rng.normal(size=(voxels, 9)).astype(np.float16), rng.normal(size=(count, 9)).astype(np.float32)
+    plain, compiled = both(feature_scores, feature, words)
+    np.testing.assert_allclose(plain, compiled, atol=1e-4)
+    product = feature.astype(np.float64) @ words.astype(np.float64).T
+    expected = product[:, 0] if count == 1 else np.sqrt(np.square(product).sum(axis=1))
+    np.testing.assert_allclose(plain, expected, atol=1e-4)
 
 
 @settings(max_examples=40, deadline=None)

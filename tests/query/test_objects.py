@@ -57,8 +57,8 @@ def test_the_margin_is_that_over_the_best_rival(seed, words, other, few) -> None
 
 def test_float16_features_score_as_in_float32() -> None:
     rng = np.random.default_rng(0)
-    feature, word = unit_rows(rng, 1000, 37).astype(np.float16), unit_rows(rng, 1, 37)[0]
-    np.testing.assert_allclose(feature_scores(feature, word), feature.astype(np.float32) @ word, atol=1e-6)
+    feature, word = unit_rows(rng, 1000, 37).astype(np.float16), unit_rows(rng, 1, 37)
+    np.testing.assert_allclose(feature_scores(feature, word), feature.astype(np.float32) @ word[0], atol=1e-6)
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([4, 12]), st.integers(1, 3))

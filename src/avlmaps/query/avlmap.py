@@ -381,11 +381,10 @@ class AVLMap:
 
 
 def _peak(factor: Factor) -> float:
-    """Return the highest heat: 1 on an object; that of places may lie where the robot stood, far from any voxel."""
+    """Return the highest heat: 1 on an object, the best score at a place, which may be far from any voxel."""
     if isinstance(factor, NearThings):
         return float(factor.mask.any())
-    at_places = factor.scores.max(initial=0.0) if isinstance(factor, NearAnchors) else 0.0
-    return float(max(factor.values.max(initial=0.0), at_places))
+    return float(factor.scores.max(initial=0.0)) if isinstance(factor, NearAnchors) else 0.0
 
 
 def _role(primary: bool) -> Role:

@@ -76,6 +76,10 @@ class Factor(ABC):
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat at any points."""
 
+    @abstractmethod
+    def among(self, voxels: Bool[np.ndarray, " n"]) -> Float32[np.ndarray, " n"]:
+        """Return the heat of some voxels, 0 for others: what a product needs where another factor leaves little."""
+
     def for_product(self) -> "Factor":
         """Return this factor as it counts in a product with others."""
         return self
@@ -142,13 +146,17 @@ class NearThings(Factor):
         return self.space.centres[self.mask]
 
     @cached_property
-    def _heat(self) -> Float32[np.ndarray, " n"]:
+    def _heat_and_nearest(self) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
         return object_heat(self.space, self.mask, self.falloff_per_m)
 
     @property
     def values(self) -> Float32[np.ndarray, " n"]:
         """Heat of every voxel."""
-        return self._heat
+        return self._heat_and_nearest[0]
+
+    def among(self, voxels: Bool[np.ndarray, " n"]) -> Float32[np.ndarray, " n"]:
+        """Return the heat of some voxels, 0 for others."""
+        return object_heat(self.space, self.mask, self.falloff_per_m, voxels)[0]
 
     @cached_property
     def _tree(self):
@@ -168,21 +176,8 @@ class NearThings(Factor):
         return np.maximum(1.0 - self.falloff_per_m * distance, 0.0)
 
     def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
-        """Return the nearest voxel of the object; each voxel of the map is looked up once."""
-        nearest = self._nearest
-        unknown = voxels[nearest[voxels] < 0]
-        if len(unknown):
-            bound = 1.0 / self.falloff_per_m + self.space.grid.voxel_size_m
-            nearest[unknown] = self._tree.query(self.space.centres[unknown], distance_upper_bound=bound)[1]
-        return nearest[voxels].astype(np.int64)
-
-    @cached_property
-    def _nearest(self) -> Int[np.ndarray, " n"]:
-        """The nearest voxel of the object for each voxel of the map, -1 where it is not known yet.
-
-        Threads may fill it at one time: they write the same numbers.
-        """
-        return np.full(len(self.space), -1, np.int32)
+        """Return the nearest voxel of the object."""
+        return self._heat_and_nearest[1][voxels]
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,6 +223,10 @@ class NearAnchors(Factor):
         """Heat of every voxel."""
         return self._heat_and_winner[0]
 
+    def among(self, voxels: Bool[np.ndarray, " n"]) -> Float32[np.ndarray, " n"]:
+        """Return the heat of some voxels, 0 for others."""
+        return anchor_heat(self.space, self.anchors, self.scores, self.falloff_per_m, voxels)[0]
+
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat at any points."""
         heat = np.zeros(len(points_world))
@@ -267,40 +266,63 @@ def stretch_scores(scores: Float[np.ndarray, " a"]) -> Float[np.ndarray, " a"]:
     return np.clip((scores - low) / (high - low), 0.0, 1.0)
 
 
-def object_heat(space: Space, mask: Bool[np.ndarray, " n"], falloff_per_m: float) -> Float32[np.ndarray, " n"]:
-    """Return max(1 − ε·d, 0) for every voxel, d the 3D distance in metres to the nearest voxel of the mask.
+def object_heat(
+    space: Space, mask: Bool[np.ndarray, " n"], falloff_per_m: float, among: Bool[np.ndarray, " n"] | None = None
+) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+    """Return max(1 − ε·d, 0) for every voxel, d the 3D distance in metres to the nearest voxel of the mask, and which.
 
     Works on squared distances between voxel indices, which are whole numbers, so nothing is approximated.
+
+    Args:
+        space: of the map.
+        mask: the object.
+        falloff_per_m: ε.
+        among: the voxels that are asked for; others have no heat. None: all.
+
+    Returns:
+        The heat, and the number of the nearest voxel among those of the mask (−1 where there is no heat).
     """
     from avlmaps.query.kernels import nearest_squared, share
 
     voxel_size_m = space.grid.voxel_size_m
-    blocks = space.blocks
-    things = blocks.chosen(mask)
+    blocks = space.blocks if among is None else space.blocks.chosen(among)
+    things = space.blocks.chosen(mask)
     reach = min(1.0 / (falloff_per_m * voxel_size_m), 40_000.0)
     limit = np.int32(int(np.ceil(reach)) ** 2)
-    squared = np.full(len(space), limit, np.int32)
+    squared, nearest = np.full(len(blocks.order), limit, np.int32), np.full(len(blocks.order), -1, np.int32)
     if len(things):
         share(
             lambda a, b: nearest_squared(
                 blocks.index, blocks.starts, blocks.low, blocks.high,
-                things.index, things.starts, things.low, things.high, limit, squared, a, b,
+                things.index, things.starts, things.low, things.high, limit, squared, nearest, a, b,
             ),
             len(blocks),
             least=64,
         )  # fmt: skip
-    heat = np.empty(len(space), np.float32)
     near = 1.0 - falloff_per_m * voxel_size_m * np.sqrt(squared, dtype=np.float32)
+    heat, anchor = np.zeros(len(space), np.float32), np.full(len(space), -1, np.int64)
     heat[blocks.order] = np.where(squared < limit, np.maximum(near, 0.0), 0.0)
-    return heat
+    anchor[blocks.order] = np.append(np.searchsorted(np.flatnonzero(mask), things.order), -1)[nearest]
+    return heat, anchor
 
 
 def anchor_heat(
-    space: Space, anchors: Float[np.ndarray, "a 3"], scores: Float[np.ndarray, " a"], falloff_per_m: float
+    space: Space,
+    anchors: Float[np.ndarray, "a 3"],
+    scores: Float[np.ndarray, " a"],
+    falloff_per_m: float,
+    among: Bool[np.ndarray, " n"] | None = None,
 ) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
     """Return max over anchors of s − ε·d_xy, floored at 0, for every voxel, and which anchor was highest (−1: none).
 
     Cones that lie under another everywhere are left out first; that changes nothing.
+
+    Args:
+        space: of the map.
+        anchors: metres, world.
+        scores: s, in [0, 1].
+        falloff_per_m: ε.
+        among: the voxels that are asked for; others have no heat. None: all.
     """
     from avlmaps.query.kernels import cone_heat, share, undominated
 
@@ -309,17 +331,20 @@ def anchor_heat(
     sorted_scores = np.asarray(scores, np.float64)[order]
     keep = undominated(ground, sorted_scores, float(falloff_per_m))
     ground, sorted_scores = ground[keep], sorted_scores[keep]
-    heat, winner = np.zeros(len(space), np.float64), np.full(len(space), -1, np.int64)
-    blocks = space.blocks
+    blocks, horizontal = space.blocks, space.horizontal
+    if among is not None:
+        horizontal = horizontal[among[blocks.order]]
+        blocks = blocks.chosen(among)
+    heat, winner = np.zeros(len(horizontal), np.float64), np.full(len(horizontal), -1, np.int64)
     if len(ground):
         share(
             lambda a, b: cone_heat(
-                space.horizontal, blocks.starts, ground, sorted_scores, float(falloff_per_m), heat, winner, a, b
+                horizontal, blocks.starts, ground, sorted_scores, float(falloff_per_m), heat, winner, a, b
             ),
             len(blocks),
             least=64,
         )
-    values, anchor = np.empty(len(space), np.float32), np.empty(len(space), np.int64)
+    values, anchor = np.zeros(len(space), np.float32), np.full(len(space), -1, np.int64)
     values[blocks.order] = heat
     anchor[blocks.order] = np.where(winner >= 0, np.append(order[keep], -1)[winner], -1)
     return values, anchor

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
@@ -37,8 +37,16 @@ class Heatmap:
 
     @cached_property
     def values(self) -> Float32[np.ndarray, " n"]:
-        """The product of the factors' heat, computed when it is first used."""
-        return reduce(np.multiply, (factor.values for factor in self.factors))
+        """The product of the factors' heat, computed when it is first used.
+
+        The lead comes first, as it falls fastest: other factors are computed where it leaves heat.
+        """
+        lead = self.lead
+        heat = lead.values
+        for factor in self.factors:
+            if factor is not lead:
+                heat = heat * factor.among(heat > 0.0)
+        return heat
 
     def __mul__(self, other: "Heatmap") -> "Heatmap":
         if not isinstance(other, Heatmap):  # pyright: ignore[reportUnnecessaryIsInstance] - Python passes anything

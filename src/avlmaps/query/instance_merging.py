@@ -32,15 +32,19 @@ def merge_instances(
     other too, with nothing else between them and at most ``join_m`` in height.
     """
     count = int(instance.max(initial=-1)) + 1
-    cell = np.unique(np.floor(points_level[:, :2] / cell_m), axis=0, return_inverse=True)[1].reshape(-1)
-    columns = np.bincount(np.unique(np.stack([instance, cell]), axis=1)[0], minlength=count)
+    column = np.floor(points_level[:, :2] / cell_m).astype(np.int64)
+    column -= column.min(axis=0, initial=0)
+    cell = column[:, 0] * (column[:, 1].max(initial=0) + 1) + column[:, 1]
+    cells = int(cell.max(initial=0)) + 1
+    columns = np.bincount(np.unique(instance * cells + cell) // cells, minlength=count)
     order = np.lexsort((points_level[:, 2], cell))
     below, above = order[:-1], order[1:]
     near = (cell[below] == cell[above]) & (points_level[above, 2] - points_level[below, 2] <= join_m)
     meeting = near & (instance[below] != instance[above])
     a, b = np.sort(np.stack([instance[below], instance[above]])[:, meeting], axis=0)
-    meetings = np.unique(np.stack([a, b, cell[below][meeting]]), axis=1)[:2]
-    (a, b), times = np.unique(meetings, axis=1, return_counts=True)
+    pairs, pair = np.unique(a * count + b, return_inverse=True)
+    times = np.bincount(np.unique(pair * cells + cell[below][meeting]) // cells, minlength=len(pairs))  # in columns
+    a, b = np.divmod(pairs, max(count, 1))
     same = 2 * times >= np.minimum(columns[a], columns[b])
     return connected(count, a[same], b[same])
 

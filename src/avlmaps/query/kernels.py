@@ -96,6 +96,25 @@ def half_dot(
         out[i] = total
 
 
+@njit(cache=True, nogil=True, fastmath=True)
+def half_length(
+    bits: UInt16[np.ndarray, "n d"],
+    words: Float32[np.ndarray, "m d"],
+    out: Float32[np.ndarray, " n"],
+    start: Whole,
+    stop: Whole,
+):
+    """Write the length of each float16 row's products with some words; each row is read from memory once."""
+    for i in range(start, stop):
+        length = np.float32(0.0)
+        for m in range(words.shape[0]):
+            total = np.float32(0.0)
+            for k in range(words.shape[1]):
+                total += _half_to_float(bits[i, k]) * words[m, k]  # pyright: ignore[reportCallIssue]
+            length += total * total
+        out[i] = np.sqrt(length)
+
+
 @njit(cache=True, nogil=True)
 def widen(bits: UInt16[np.ndarray, "n d"], out: Float32[np.ndarray, "n d"]):
     """Copy float16 rows (given as uint16 bits) to float32."""
@@ -304,24 +323,48 @@ def _nearest_in(
 
 
 @njit(cache=True, nogil=True)
+def _first_at(
+    x: Whole,
+    y: Whole,
+    z: Whole,
+    xs: Int32[np.ndarray, " k"],
+    ys: Int32[np.ndarray, " k"],
+    zs: Int32[np.ndarray, " k"],
+    squared: Whole,
+):
+    """Return the first of some voxels at a squared distance; one is there."""
+    k = 0
+    while (xs[k] - x) ** 2 + (ys[k] - y) ** 2 + (zs[k] - z) ** 2 != squared:
+        k += 1
+    return k
+
+
+@njit(cache=True, nogil=True)
 def _things_near(
     box_low: Int64[np.ndarray, "3"],
     box_high: Int64[np.ndarray, "3"],
     low: Int64[np.ndarray, "t 3"],
     high: Int64[np.ndarray, "t 3"],
+    high_before: Int64[np.ndarray, " t"],
+    low_after: Int64[np.ndarray, " t"],
     limit: Whole,
     near: Int64[np.ndarray, " t"],
     gaps: Int64[np.ndarray, " t"],
 ):
     """Write which blocks of things can hold the nearest to some voxel of a box, nearest block first.
 
-    Those are the blocks whose least distance from the box is within the smallest of all largest distances.
+    Those are the blocks whose least distance from the box is within the smallest of all largest distances. Only those
+    within reach along x are looked at, between two places in ``high_before``, the highest x up to each block, and
+    ``low_after``, the lowest x from each block on.
     """
     bound, count = np.int64(limit), 0
-    for t in range(len(gaps)):
+    reach = np.int64(np.ceil(np.sqrt(limit)))
+    first = np.searchsorted(high_before, box_low[0] - reach)
+    last = np.searchsorted(low_after, box_high[0] + reach + 1)
+    for t in range(first, last):
         gaps[t], most = _box_gap(box_low, box_high, low[t], high[t])
         bound = min(bound, most)
-    for t in range(len(gaps)):
+    for t in range(first, last):
         if gaps[t] <= bound:
             k = count
             while k > 0 and gaps[near[k - 1]] > gaps[t]:
@@ -344,10 +387,13 @@ def nearest_squared(
     thing_high: Int64[np.ndarray, "t 3"],
     limit: Whole,
     out: Int[np.ndarray, " n"],
+    nearest: Int[np.ndarray, " n"],
     first: Whole,
     last: Whole,
 ):
-    """Write each voxel's squared distance, in voxels, to the nearest thing, or ``limit`` where that is farther.
+    """Write each voxel's squared distance, in voxels, to the nearest thing, and which it is.
+
+    Where that is ``limit`` or farther, ``limit`` and -1 are written.
 
     Voxels and things come in blocks: places ``starts[b]:starts[b + 1]`` of (3, n) int32 indices (one row an axis,
     so that the inner loop is vectorised), in boxes from ``low`` to ``high`` (b, 3) int64. ``first`` and ``last``
@@ -355,11 +401,15 @@ def nearest_squared(
     """
     near = np.empty(len(thing_low), np.int64)
     gaps = np.empty(len(thing_low), np.int64)
+    high_before, low_after = thing_high[:, 0].copy(), thing_low[:, 0].copy()
+    for t in range(1, len(high_before)):
+        high_before[t] = max(high_before[t], high_before[t - 1])
+        low_after[-t - 1] = min(low_after[-t - 1], low_after[-t])
     for b in range(first, last):
-        count = _things_near(low[b], high[b], thing_low, thing_high, limit, near, gaps)
+        count = _things_near(low[b], high[b], thing_low, thing_high, high_before, low_after, limit, near, gaps)
         for i in range(starts[b], starts[b + 1]):
             x, y, z = voxels[0, i], voxels[1, i], voxels[2, i]
-            best = limit
+            best, block = limit, -1
             for k in range(count):
                 t = near[k]
                 gap_x = max(thing_low[t, 0] - x, x - thing_high[t, 0], 0)
@@ -367,8 +417,13 @@ def nearest_squared(
                 gap_z = max(thing_low[t, 2] - z, z - thing_high[t, 2], 0)
                 if gap_x * gap_x + gap_y * gap_y + gap_z * gap_z < best:
                     a, c = thing_starts[t], thing_starts[t + 1]
-                    best = _nearest_in(x, y, z, things[0, a:c], things[1, a:c], things[2, a:c], best)
-            out[i] = best
+                    nearer = _nearest_in(x, y, z, things[0, a:c], things[1, a:c], things[2, a:c], best)
+                    if nearer < best:
+                        best, block = nearer, t
+            out[i], nearest[i] = best, -1
+            if block >= 0:  # looked for only now: a search for the smallest alone is vectorised
+                a, c = thing_starts[block], thing_starts[block + 1]
+                nearest[i] = a + _first_at(x, y, z, things[0, a:c], things[1, a:c], things[2, a:c], best)
 
 
 @njit(cache=True)
@@ -423,16 +478,21 @@ def linked(index: Int64[np.ndarray, "n 3"], reach: Whole):
 
 
 def feature_scores(
-    feature: Float32[np.ndarray, "n d"] | UInt16[np.ndarray, "n d"], word: Float32[np.ndarray, " d"]
+    feature: Float32[np.ndarray, "n d"] | UInt16[np.ndarray, "n d"], words: Float32[np.ndarray, "m d"]
 ) -> Float32[np.ndarray, " n"]:
-    """Return the dot product of every float16 feature with one word, as fast as memory gives them.
+    """Return the length of every float16 feature's products with some words, with the sign of the product with one.
+
+    As fast as memory gives them.
 
     Args:
         feature: float16, memory-mapped or not, rows contiguous.
-        word: float32.
+        words: float32, one or more.
     """
     out = np.empty(len(feature), np.float32)
     bits = np.asarray(feature, np.float16).view(np.uint16)
-    column = np.ascontiguousarray(word, np.float32)
-    share(lambda a, b: half_dot(bits, column, out, a, b), len(out), least=20_000)
+    rows = np.ascontiguousarray(words, np.float32)
+    if len(rows) == 1:
+        share(lambda a, b: half_dot(bits, rows[0], out, a, b), len(out), least=20_000)
+    else:
+        share(lambda a, b: half_length(bits, rows, out, a, b), len(out), least=20_000)
     return out

@@ -26,15 +26,16 @@ def plain_loops(wanted: bool = True) -> Generator[None]:
         _PLAIN.reset(before)
 
 
-def feature_scores(feature: Float16[np.ndarray, "n d"], word: Float32[np.ndarray, " d"]) -> Float32[np.ndarray, " n"]:
-    """Return the dot product of every feature with one word."""
+def feature_scores(feature: Float16[np.ndarray, "n d"], words: Float32[np.ndarray, "m d"]) -> Float32[np.ndarray, " n"]:
+    """Return the product of every feature with one word; of several words, the length of the products with them."""
     if not _PLAIN.get():
         from avlmaps.query.kernels import feature_scores as compiled
 
-        return compiled(feature, word)
+        return compiled(feature, words)
     out = np.empty(len(feature), np.float32)
     for a in range(0, len(feature), _CHUNK):
-        out[a : a + _CHUNK] = np.asarray(feature[a : a + _CHUNK], np.float32) @ np.asarray(word, np.float32)
+        products = np.asarray(feature[a : a + _CHUNK], np.float32) @ np.asarray(words, np.float32).T
+        out[a : a + _CHUNK] = products[:, 0] if len(words) == 1 else np.linalg.norm(products, axis=1)
     return out
 
 

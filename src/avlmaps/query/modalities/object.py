@@ -106,6 +106,7 @@ class Rivals:
     Attributes:
         words: the vocabulary and, if the encoder has a feature for it, ``other`` as the last.
         word_feature: unit vectors.
+        understood: what of each word the encoder acts on.
         has_other: whether ``other`` is among them.
         best: highest score; −inf where there is no word at all.
         best_word: whose that is, −1 for nobody.
@@ -115,6 +116,7 @@ class Rivals:
 
     words: tuple[str, ...]
     word_feature: Float32[np.ndarray, "v d"]
+    understood: tuple[str, ...]
     has_other: bool
     best: Float32[np.ndarray, " n"]
     best_word: Int[np.ndarray, " n"]
@@ -128,12 +130,13 @@ class Rivals:
         encoded = np.asarray(encoder.encode_words(names), np.float32)
         known = np.any(encoded != 0.0, axis=1)
         words = tuple(word for word, is_known in zip(names, known, strict=True) if is_known)
-        return cls(words, encoded[known], bool(known[-1]), *loops.two_closest(feature, encoded[known]))
+        understood = tuple(encoder.understood(word) for word in words)
+        return cls(words, encoded[known], understood, bool(known[-1]), *loops.two_closest(feature, encoded[known]))
 
     def silent_for(self, encoder: PixelEncoder, encoded: "EncodedWord", cosine: float) -> Bool[np.ndarray, " v"]:
         """Return which words do not compete because they name the queried thing; ``other`` always competes."""
         close = np.linalg.norm(self.word_feature @ encoded.span.T, axis=1) >= cosine
-        same = [bool(encoded.understood) and encoder.understood(word) == encoded.understood for word in self.words]
+        same = [bool(encoded.understood) and understood == encoded.understood for understood in self.understood]
         silent = close | np.array(same, bool)
         if is_open(encoder):
             silent |= np.array([is_a(word, encoded.understood) for word in self.words], bool)
@@ -160,12 +163,7 @@ def object_margins(
         silent: which of the rivals' words do not compete.
         least_score: what the word must beat besides where ``other`` has no feature.
     """
-    score = loops.feature_scores(feature, word_rows[0])
-    if len(word_rows) > 1:
-        total = np.square(score)
-        for row in word_rows[1:]:
-            total += np.square(loops.feature_scores(feature, row))
-        score = np.sqrt(total)
+    score = loops.feature_scores(feature, word_rows)
     floor = float(np.float32(-np.inf if rivals.has_other else least_score))
     closest = rivals.best, rivals.best_word, rivals.second, rivals.second_word
     out, unsure = loops.margins(score, closest, silent, floor)
