@@ -25,6 +25,7 @@ from avlmaps.cli.query import Query
 from avlmaps.cli.record import Record
 from avlmaps.cli.serve import Serve
 from avlmaps.cli.shell import Shell
+from avlmaps.cli.shortened_files import end_at_shortened_files
 from avlmaps.cli.teach_sound import TeachSound
 from avlmaps.cli.things import Things
 from avlmaps.cli.usage import CONFIG, usage_sentence
@@ -134,6 +135,7 @@ def _any_verb(shortly: bool) -> Any:
 
 
 def _run(verb: Verb) -> int:
+    end_at_shortened_files(as_json=verb.json)
     try:
         with models_in_force(verb), _compiling(verb):
             verb.run()

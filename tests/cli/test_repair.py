@@ -1,0 +1,68 @@
+"""`info --verify` and `info --repair`, and a build that is given the camera's height, by the command line."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+Run = Callable[..., tuple[int, str, str]]
+Answer = Callable[..., dict[str, Any]]
+
+
+def damaged(built: Path, copy: Path) -> tuple[Path, str]:
+    """Copy a map and flip a bit in the middle of one of its arrays; return the map and the file's name."""
+    shutil.copytree(built, copy)
+    file = max(copy.rglob("*.npy"), key=lambda path: path.stat().st_size)
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 16
+    file.write_bytes(content)
+    return copy, file.name
+
+
+def test_a_damaged_map_is_repaired_from_its_recording(
+    built: Path, walk: Path, tmp_path: Path, run: Run, answer: Answer
+) -> None:
+    copy, name = damaged(built, tmp_path / "copy.avlmap")
+    status, _, said = run("info", copy, "--verify")
+    assert status == 1
+    assert name in said
+    status, _, said = run("info", copy, "--repair")
+    assert status == 1
+    assert "--recording" in said or "recording" in said
+    assert len(answer("info", copy, "--repair", "--recording", walk)["repaired"]) == 1
+    mended, whole = answer("info", copy, "--verify"), answer("info", built)
+    assert [mended[key] for key in ("frames", "voxels", "sounds")] == [
+        whole[key] for key in ("frames", "voxels", "sounds")
+    ]
+    status, _, said = run("info", copy, "--repair")
+    assert status == 0
+    assert "nothing to repair" in said
+
+
+def test_another_recording_repairs_nothing(built: Path, walk: Path, tmp_path: Path, run: Run) -> None:
+    copy, _ = damaged(built, tmp_path / "copy.avlmap")
+    other = tmp_path / "other"
+    shutil.copytree(walk, other)
+    depth = sorted(other.rglob("*.png"))[0]
+    depth.unlink()
+    files = {path: path.read_bytes() for path in copy.rglob("*.npy")}
+    status, _, said = run("info", copy, "--repair", "--recording", other)
+    assert status == 1
+    assert "is not the recording" in said or "built from" in said
+    assert all(path.read_bytes() == content for path, content in files.items()), "nothing was touched"
+
+
+def test_the_cameras_height_puts_the_floor_where_it_says(walk: Path, tmp_path: Path, answer: Answer) -> None:
+    made = answer(
+        "build", walk, "--out", tmp_path / "told.avlmap", "--voxel-size-m", "0.1", "--profile", "colours",
+        "--camera-height-m", "1.1",
+    )  # fmt: skip
+    assert made["ground"]["camera_height_m"] == 1.1
+    assert answer("info", tmp_path / "told.avlmap")["ground"]["camera_height_m"] == 1.1
+
+
+def test_a_height_that_is_none_is_refused(walk: Path, tmp_path: Path, run: Run) -> None:
+    status, _, said = run("build", walk, "--out", tmp_path / "m.avlmap", "--profile", "colours", "--floor-height", "-2")
+    assert status in (1, 2)
+    assert "camera" in said
+    assert not (tmp_path / "m.avlmap" / "map.json").exists()
