@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.bench.objects import auroc, measure, table_of
+from avlmaps.bench.objects import ObjectFigures, auroc, measure, missed, table_of
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.factors import NearThings
@@ -106,3 +106,10 @@ def test_the_area_under_the_curve_is_the_share_of_pairs_in_order(there: list[flo
 
 def test_one_side_alone_has_no_curve() -> None:
     assert np.isnan(auroc(np.ones(3), np.ones(3, bool)))
+
+
+def test_what_was_missed_is_listed_by_distance_in_one_scene_and_counted_in_several() -> None:
+    one = ObjectFigures("one", {"bed": 0.5, "chair": 1.234, "lamp": np.inf}, [], 0, 0)
+    other = ObjectFigures("other", {"bed": 0.1, "chair": 0.2, "lamp": 3.0}, [], 0, 0)
+    assert missed([one])["rows"] == [["chair", "1.23"], ["lamp", "none"]]
+    assert missed([one, other])["rows"] == [["lamp", "2", "0"], ["chair", "2", "1"]]

@@ -160,8 +160,10 @@ def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, Any
     for job in progress(jobs, "measuring", unit="scene"):
         place = Workplace(job, open_scene)
         figures.append(measure(place.avlmap, place.truth.objects, _same(place.truth.objects), shown_scene(job.spec)))
-    missed = {"columns": ["scene", "category", "first goal, m from a true one"], "rows": _missed(figures)}
-    named = {"objects found by their names": table_of(figures), "categories whose first goal is elsewhere": missed}
+    named = {
+        "objects found by their names": table_of(figures),
+        "categories whose first goal is elsewhere": missed(figures),
+    }
     chosen = chosen_on(settings.scenes)
     tables = {name: {**table, "chosen on": chosen} if chosen else table for name, table in named.items()}
     answer = {"suite": "objects", **provenance(settings, settings.recorded, settings.scenes, weights), "tables": tables}
@@ -176,13 +178,24 @@ def _same(things: Sequence[SceneObject]) -> dict[str, str]:
     return {word: entry.name for word, entry in entries.items() if entry is not None}
 
 
-def _missed(scenes: Sequence[ObjectFigures]) -> list[list[str]]:
-    return [
-        [scene.scene, category, f"{distance:.2f}" if np.isfinite(distance) else "none"]
-        for scene in scenes
-        for category, distance in sorted(scene.reached.items())
-        if distance > REACH_M
-    ]
+def missed(scenes: Sequence[ObjectFigures]) -> dict[str, Any]:
+    """Return a table of the categories that were missed: of one scene how far off, of several how often."""
+    if len(scenes) == 1:
+        rows = [
+            [category, f"{distance:.2f}" if np.isfinite(distance) else "none"]
+            for category, distance in sorted(scenes[0].reached.items())
+            if distance > REACH_M
+        ]
+        return {"columns": ["category", "first goal, m from a true one"], "rows": rows}
+    distances: dict[str, list[float]] = {}
+    for scene in scenes:
+        for category, distance in scene.reached.items():
+            distances.setdefault(category, []).append(distance)
+    found = {category: sum(one <= REACH_M for one in many) for category, many in distances.items()}
+    lost = {category: len(many) - found[category] for category, many in distances.items()}
+    worst = sorted((category for category, count in lost.items() if count), key=lambda name: (-lost[name], name))
+    rows = [[category, str(len(distances[category])), str(found[category])] for category in worst]
+    return {"columns": ["category", "scenes that hold it", f"first goal within {REACH_M:g} m"], "rows": rows}
 
 
 def auroc(score: Float[np.ndarray, " n"], is_there: Bool[np.ndarray, " n"]) -> float:
