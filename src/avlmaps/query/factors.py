@@ -76,9 +76,9 @@ class Factor(ABC):
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat at any points."""
 
-    @abstractmethod
     def among(self, voxels: Bool[np.ndarray, " n"]) -> Float32[np.ndarray, " n"]:
         """Return the heat of some voxels, 0 for others: what a product needs where another factor leaves little."""
+        return np.where(voxels, self.values, np.float32(0.0))
 
     def for_product(self) -> "Factor":
         """Return this factor as it counts in a product with others."""

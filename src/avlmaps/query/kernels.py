@@ -5,6 +5,7 @@ compiles in a fraction of the time of numba's own parallel mode.
 """
 
 import itertools
+import math
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -111,8 +112,8 @@ def half_length(
             total = np.float32(0.0)
             for k in range(words.shape[1]):
                 total += _half_to_float(bits[i, k]) * words[m, k]  # pyright: ignore[reportCallIssue]
-            length += total * total
-        out[i] = np.sqrt(length)
+            length += total * total  # pyright: ignore[reportUnknownVariableType]
+        out[i] = math.sqrt(length)  # pyright: ignore[reportUnknownArgumentType]
 
 
 @njit(cache=True, nogil=True)
@@ -340,6 +341,19 @@ def _first_at(
 
 
 @njit(cache=True, nogil=True)
+def _before(rising: Int64[np.ndarray, " n"], value: Whole):
+    """Return how many numbers of a rising sequence are below a value."""
+    low, high = 0, len(rising)
+    while low < high:
+        middle = (low + high) // 2
+        if rising[middle] < value:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True, nogil=True)
 def _things_near(
     box_low: Int64[np.ndarray, "3"],
     box_high: Int64[np.ndarray, "3"],
@@ -359,8 +373,8 @@ def _things_near(
     """
     bound, count = np.int64(limit), 0
     reach = np.int64(np.ceil(np.sqrt(limit)))
-    first = np.searchsorted(high_before, box_low[0] - reach)
-    last = np.searchsorted(low_after, box_high[0] + reach + 1)
+    first = _before(high_before, box_low[0] - reach)
+    last = _before(low_after, box_high[0] + reach + 1)
     for t in range(first, last):
         gaps[t], most = _box_gap(box_low, box_high, low[t], high[t])
         bound = min(bound, most)
