@@ -80,6 +80,15 @@ class Factor(ABC):
         """Return the heat of some voxels, 0 for others: what a product needs where another factor leaves little."""
         return np.where(voxels, self.values, np.float32(0.0))
 
+    def _is_kept(self) -> bool:
+        """Return whether a map that answers many queries keeps this factor: from the second time that it is used on.
+
+        Then the heat of all voxels is computed once, and is at hand for every query with this part.
+        """
+        kept = "_used" in vars(self)
+        vars(self)["_used"] = True  # as functools.cached_property does in a frozen class
+        return kept
+
     def for_product(self) -> "Factor":
         """Return this factor as it counts in a product with others."""
         return self
@@ -156,6 +165,8 @@ class NearThings(Factor):
 
     def among(self, voxels: Bool[np.ndarray, " n"]) -> Float32[np.ndarray, " n"]:
         """Return the heat of some voxels, 0 for others."""
+        if self._is_kept():
+            return super().among(voxels)
         return object_heat(self.space, self.mask, self.falloff_per_m, voxels)[0]
 
     @cached_property
@@ -225,6 +236,8 @@ class NearAnchors(Factor):
 
     def among(self, voxels: Bool[np.ndarray, " n"]) -> Float32[np.ndarray, " n"]:
         """Return the heat of some voxels, 0 for others."""
+        if self._is_kept():
+            return super().among(voxels)
         return anchor_heat(self.space, self.anchors, self.scores, self.falloff_per_m, voxels)[0]
 
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
@@ -300,7 +313,7 @@ def object_heat(
             least=64,
         )  # fmt: skip
     near = 1.0 - falloff_per_m * voxel_size_m * np.sqrt(squared, dtype=np.float32)
-    heat, anchor = np.zeros(len(space), np.float32), np.full(len(space), -1, np.int64)
+    heat, anchor = np.zeros(len(space), np.float32), np.full(len(space), -1, np.int32)
     heat[blocks.order] = np.where(squared < limit, np.maximum(near, 0.0), 0.0)
     anchor[blocks.order] = np.append(np.searchsorted(np.flatnonzero(mask), things.order), -1)[nearest]
     return heat, anchor

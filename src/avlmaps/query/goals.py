@@ -61,18 +61,28 @@ class Shares:
     """Heated voxels and anchors, each with the instance whose share it lies in.
 
     Attributes:
-        points: metres, world; voxels first.
-        rows: the map's rows of those that are voxels.
+        lead: whose instances share.
+        rows: the map's rows of those that are voxels; they come first.
         heat: the product there.
         instance: whose share.
         peak: (instances,) highest heat in each share.
     """
 
-    points: Float[np.ndarray, "m 3"]
+    lead: Factor
     rows: Int[np.ndarray, " v"]
     heat: Float[np.ndarray, " m"]
     instance: Int[np.ndarray, " m"]
     peak: Float[np.ndarray, " i"]
+
+    def places(self, which: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k 3"]:
+        """Return where some of them are, metres, world."""
+        if len(self.instance) == len(self.rows):
+            return self.lead.space.centres[self.rows[which]]
+        voxels = which < len(self.rows)
+        places = np.empty((len(which), 3))
+        places[voxels] = self.lead.space.centres[self.rows[which[voxels]]]
+        places[~voxels] = self.lead.anchors[which[~voxels] - len(self.rows)]
+        return places
 
 
 def share_voxels(factors: Sequence[Factor], values: Callable[[], Float32[np.ndarray, " n"]]) -> Shares:
@@ -90,16 +100,14 @@ def share_voxels(factors: Sequence[Factor], values: Callable[[], Float32[np.ndar
         rows = np.flatnonzero(values() > 0.0) if len(lead.anchors) else np.zeros(0, np.int64)
         instance = lead.instance[lead.anchor_of(rows)] if len(rows) else np.zeros(0, np.int64)
         heat = values()[rows].astype(np.float64)
-    points = lead.space.centres[rows]
     if lead.flat:
         at_anchors = np.ones(len(lead.anchors))
         for factor in factors:
             at_anchors *= factor.at(lead.anchors)
-        points = np.concatenate([points, lead.anchors])
         heat, instance = np.append(heat, at_anchors), np.append(instance, lead.instance)
     peak = np.zeros(len(lead.confidence))
     np.maximum.at(peak, instance, heat)
-    return Shares(points, rows, heat, instance, peak)
+    return Shares(lead, rows, heat, instance, peak)
 
 
 def is_found(factors: Sequence[Factor], shares_of: Callable[[], Shares]) -> bool:
@@ -143,7 +151,7 @@ def _position(factors: Sequence[Factor], lead: Factor, shares: Shares, instance:
         return _place_on_thing(lead, shares, instance)
     rows = np.flatnonzero((shares.instance == instance) & (shares.heat >= shares.peak[instance] - _SAME))
     at_anchors = rows[rows >= len(shares.rows)]
-    plateau = shares.points[at_anchors if len(at_anchors) else rows]
+    plateau = shares.places(at_anchors if len(at_anchors) else rows)
     middle = plateau[np.argmin(np.linalg.norm(plateau - plateau.mean(axis=0), axis=1))]
     if len(at_anchors) or not all(factor.flat for factor in factors):
         return middle
@@ -162,7 +170,7 @@ def _place_on_thing(lead: NearThings, shares: Shares, instance: int) -> Float[np
         hottest = shares.rows[share[[np.argmax(shares.heat[share])]]]
         return lead.anchors[lead.anchor_of(hottest)[0]]
     heat = shares.heat[on_it]
-    hot = shares.points[on_it[heat >= _NEARLY * heat.max()]]
+    hot = shares.places(on_it[heat >= _NEARLY * heat.max()])
     return hot[np.argmin(np.linalg.norm(hot - hot.mean(axis=0), axis=1))]
 
 
