@@ -1,8 +1,8 @@
 """One sentence instead of a crash where a map's file is cut short while it is read.
 
 Large arrays are memory-mapped. Where another program shortens such a file, the next access to the lost part raises
-SIGBUS, for which Python has no exception: the access cannot go on. All that can be done is to say so and end. A robot
-that is driving is stopped by its guard process, as after any sudden end.
+SIGBUS, for which Python has no exception: the access cannot be completed. All that can be done is to say so and end.
+A robot that is driving is stopped by its guard process, as after any sudden end.
 """
 
 import ctypes

@@ -81,7 +81,7 @@ class Factor(ABC):
         return np.where(voxels, self.values, np.float32(0.0))
 
     def _is_kept(self) -> bool:
-        """Return whether a map that answers many queries keeps this factor: from the second time that it is used on.
+        """Return whether a map that answers many queries stores this factor: from the second time that it is used on.
 
         Then the heat of all voxels is computed once, and is at hand for every query with this part.
         """
@@ -290,7 +290,7 @@ def object_heat(
         space: of the map.
         mask: the object.
         falloff_per_m: ε.
-        among: the voxels that are asked for; others have no heat. None: all.
+        among: the voxels that are wanted; others have no heat. None: all.
 
     Returns:
         The heat, and the number of the nearest voxel among those of the mask (−1 where there is no heat).
@@ -335,7 +335,7 @@ def anchor_heat(
         anchors: metres, world.
         scores: s, in [0, 1].
         falloff_per_m: ε.
-        among: the voxels that are asked for; others have no heat. None: all.
+        among: the voxels that are wanted; others have no heat. None: all.
     """
     from avlmaps.query.kernels import cone_heat, share, undominated
 
