@@ -28,7 +28,7 @@ def test_a_damaged_map_is_repaired_from_its_recording(
     assert name in said
     status, _, said = run("info", copy, "--repair")
     assert status == 1
-    assert "--recording" in said or "recording" in said
+    assert "recording" in said
     assert len(answer("info", copy, "--repair", "--recording", walk)["repaired"]) == 1
     mended, whole = answer("info", copy, "--verify"), answer("info", built)
     assert [mended[key] for key in ("frames", "voxels", "sounds")] == [
@@ -48,7 +48,7 @@ def test_another_recording_repairs_nothing(built: Path, walk: Path, tmp_path: Pa
     files = {path: path.read_bytes() for path in copy.rglob("*.npy")}
     status, _, said = run("info", copy, "--repair", "--recording", other)
     assert status == 1
-    assert "is not the recording" in said or "built from" in said
+    assert "changed since" in said
     assert all(path.read_bytes() == content for path, content in files.items()), "nothing was touched"
 
 

@@ -33,10 +33,10 @@ def test_scores_are_the_same_within_rounding(voxels: int, count: int, seed: int)
     rng = np.random.default_rng(seed)
     feature, words = rng.normal(size=(voxels, 9)).astype(np.float16), rng.normal(size=(count, 9)).astype(np.float32)
     plain, compiled = both(feature_scores, feature, words)
-    np.testing.assert_allclose(plain, compiled, atol=1e-4)
+    np.testing.assert_allclose(plain, compiled, atol=1e-5)
     product = feature.astype(np.float64) @ words.astype(np.float64).T
     expected = product[:, 0] if count == 1 else np.sqrt(np.square(product).sum(axis=1))
-    np.testing.assert_allclose(plain, expected, atol=1e-4)
+    np.testing.assert_allclose(plain, expected, atol=1e-5)
 
 
 @settings(max_examples=40, deadline=None)

@@ -8,6 +8,7 @@ of a narrower kind is true for a wider name: a dining table answers "table", a t
 A true thing counts as found by its own name alone.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -187,14 +188,11 @@ def missed(scenes: Sequence[ObjectFigures]) -> dict[str, Any]:
             if distance > REACH_M
         ]
         return {"columns": ["category", "first goal, m from a true one"], "rows": rows}
-    distances: dict[str, list[float]] = {}
-    for scene in scenes:
-        for category, distance in scene.reached.items():
-            distances.setdefault(category, []).append(distance)
-    found = {category: sum(one <= REACH_M for one in many) for category, many in distances.items()}
-    lost = {category: len(many) - found[category] for category, many in distances.items()}
-    worst = sorted((category for category, count in lost.items() if count), key=lambda name: (-lost[name], name))
-    rows = [[category, str(len(distances[category])), str(found[category])] for category in worst]
+    reached = [pair for scene in scenes for pair in scene.reached.items()]
+    held = Counter(category for category, _ in reached)
+    found = Counter(category for category, distance in reached if distance <= REACH_M)
+    worst = sorted((one for one in held if found[one] < held[one]), key=lambda one: (found[one] - held[one], one))
+    rows = [[category, str(held[category]), str(found[category])] for category in worst]
     return {"columns": ["category", "scenes that hold it", f"first goal within {REACH_M:g} m"], "rows": rows}
 
 

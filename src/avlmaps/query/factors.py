@@ -67,27 +67,34 @@ class Factor(ABC):
     note: str
     flat: bool
 
-    @property
     @abstractmethod
+    def heat_and_anchors(
+        self, among: Bool[np.ndarray, " n"] | None = None
+    ) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+        """Return heat in [0, 1] of every voxel, or of some and 0 for others, and the anchor that each has it from."""
+
+    @cached_property
+    def _of_all(self) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+        return self.heat_and_anchors()
+
+    @property
     def values(self) -> Float32[np.ndarray, " n"]:
-        """Heat in [0, 1] of every voxel."""
+        """Heat in [0, 1] of every voxel, computed when it is first used."""
+        return self._of_all[0]
+
+    def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+        """Return the anchor that each of these voxels has its heat from; they must have some."""
+        return self._of_all[1][voxels]
+
+    def among(self, voxels: Bool[np.ndarray, " n"]) -> Float32[np.ndarray, " n"]:
+        """Return the heat of some voxels, 0 for others: what a product needs where another factor leaves little."""
+        if "_of_all" in vars(self):  # computed before
+            return np.where(voxels, self.values, np.float32(0.0))
+        return self.heat_and_anchors(voxels)[0]
 
     @abstractmethod
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat at any points."""
-
-    def among(self, voxels: Bool[np.ndarray, " n"]) -> Float32[np.ndarray, " n"]:
-        """Return the heat of some voxels, 0 for others: what a product needs where another factor leaves little."""
-        return np.where(voxels, self.values, np.float32(0.0))
-
-    def _is_kept(self) -> bool:
-        """Return whether a map that answers many queries stores this factor: from the second time that it is used on.
-
-        Then the heat of all voxels is computed once, and is at hand for every query with this part.
-        """
-        kept = "_used" in vars(self)
-        vars(self)["_used"] = True  # as functools.cached_property does in a frozen class
-        return kept
 
     def for_product(self) -> "Factor":
         """Return this factor as it counts in a product with others."""
@@ -109,10 +116,6 @@ class Factor(ABC):
         if len(hot):
             shown[hot] = heat[hot] * self.confidence[self.instance[self.anchor_of(hot)]]
         return shown
-
-    @abstractmethod
-    def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
-        """Return the anchor that each of these voxels has its heat from; they must have some."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,20 +157,11 @@ class NearThings(Factor):
         """The middles of the object's voxels."""
         return self.space.centres[self.mask]
 
-    @cached_property
-    def _heat_and_nearest(self) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
-        return object_heat(self.space, self.mask, self.falloff_per_m)
-
-    @property
-    def values(self) -> Float32[np.ndarray, " n"]:
-        """Heat of every voxel."""
-        return self._heat_and_nearest[0]
-
-    def among(self, voxels: Bool[np.ndarray, " n"]) -> Float32[np.ndarray, " n"]:
-        """Return the heat of some voxels, 0 for others."""
-        if self._is_kept():
-            return super().among(voxels)
-        return object_heat(self.space, self.mask, self.falloff_per_m, voxels)[0]
+    def heat_and_anchors(
+        self, among: Bool[np.ndarray, " n"] | None = None
+    ) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+        """Return the heat, and the nearest voxel of the object."""
+        return object_heat(self.space, self.mask, self.falloff_per_m, among)
 
     @cached_property
     def _tree(self):
@@ -185,10 +179,6 @@ class NearThings(Factor):
         else:
             distance = self._tree.query(points_world)[0]
         return np.maximum(1.0 - self.falloff_per_m * distance, 0.0)
-
-    def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
-        """Return the nearest voxel of the object."""
-        return self._heat_and_nearest[1][voxels]
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,20 +215,11 @@ class NearAnchors(Factor):
         """The certainty, for each instance."""
         return np.full(int(self.instance.max(initial=-1)) + 1, self.certainty)
 
-    @cached_property
-    def _heat_and_winner(self) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
-        return anchor_heat(self.space, self.anchors, self.scores, self.falloff_per_m)
-
-    @property
-    def values(self) -> Float32[np.ndarray, " n"]:
-        """Heat of every voxel."""
-        return self._heat_and_winner[0]
-
-    def among(self, voxels: Bool[np.ndarray, " n"]) -> Float32[np.ndarray, " n"]:
-        """Return the heat of some voxels, 0 for others."""
-        if self._is_kept():
-            return super().among(voxels)
-        return anchor_heat(self.space, self.anchors, self.scores, self.falloff_per_m, voxels)[0]
+    def heat_and_anchors(
+        self, among: Bool[np.ndarray, " n"] | None = None
+    ) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+        """Return the heat, and the anchor whose cone is highest there."""
+        return anchor_heat(self.space, self.anchors, self.scores, self.falloff_per_m, among)
 
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat at any points."""
@@ -250,10 +231,6 @@ class NearAnchors(Factor):
             cones = self.scores - self.falloff_per_m * np.hypot(away[..., 0], away[..., 1])
             heat[a : a + several] = np.maximum(cones.max(axis=1), 0.0)
         return heat
-
-    def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
-        """Return the anchor whose cone is highest there."""
-        return self._heat_and_winner[1][voxels]
 
 
 def lead_of(factors: Sequence[Factor]) -> Factor:

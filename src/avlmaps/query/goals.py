@@ -76,8 +76,6 @@ class Shares:
 
     def places(self, which: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k 3"]:
         """Return where some of them are, metres, world."""
-        if len(self.instance) == len(self.rows):
-            return self.lead.space.centres[self.rows[which]]
         voxels = which < len(self.rows)
         places = np.empty((len(which), 3))
         places[voxels] = self.lead.space.centres[self.rows[which[voxels]]]

@@ -82,6 +82,14 @@ def _moved_bits(builder: Any, half: Any) -> Any:
 
 
 @njit(cache=True, nogil=True, fastmath=True)
+def _dot(bits: UInt16[np.ndarray, " d"], word: Float32[np.ndarray, " d"]) -> np.float32:
+    total = np.float32(0.0)
+    for k in range(len(word)):
+        total += _half_to_float(bits[k]) * word[k]  # pyright: ignore[reportCallIssue]
+    return total  # pyright: ignore[reportUnknownVariableType]
+
+
+@njit(cache=True, nogil=True, fastmath=True)
 def half_dot(
     bits: UInt16[np.ndarray, "n d"],
     word: Float32[np.ndarray, " d"],
@@ -91,10 +99,7 @@ def half_dot(
 ):
     """Write the dot product of each float16 row (given as uint16 bits) with a float32 word."""
     for i in range(start, stop):
-        total = np.float32(0.0)
-        for k in range(word.shape[0]):
-            total += _half_to_float(bits[i, k]) * word[k]  # pyright: ignore[reportCallIssue]
-        out[i] = total
+        out[i] = _dot(bits[i], word)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
@@ -107,13 +112,10 @@ def half_length(
 ):
     """Write the length of each float16 row's products with some words; each row is read from memory once."""
     for i in range(start, stop):
-        length = np.float32(0.0)
-        for m in range(words.shape[0]):
-            total = np.float32(0.0)
-            for k in range(words.shape[1]):
-                total += _half_to_float(bits[i, k]) * words[m, k]  # pyright: ignore[reportCallIssue]
-            length += total * total  # pyright: ignore[reportUnknownVariableType]
-        out[i] = math.sqrt(length)  # pyright: ignore[reportUnknownArgumentType]
+        squared = 0.0
+        for m in range(len(words)):
+            squared += _dot(bits[i], words[m]) ** 2
+        out[i] = math.sqrt(squared)
 
 
 @njit(cache=True, nogil=True)
@@ -494,9 +496,7 @@ def linked(index: Int64[np.ndarray, "n 3"], reach: Whole):
 def feature_scores(
     feature: Float32[np.ndarray, "n d"] | UInt16[np.ndarray, "n d"], words: Float32[np.ndarray, "m d"]
 ) -> Float32[np.ndarray, " n"]:
-    """Return the length of every float16 feature's products with some words, with the sign of the product with one.
-
-    As fast as memory gives them.
+    """Return the product of every feature with one word; of several words, the length of the products with them.
 
     Args:
         feature: float16, memory-mapped or not, rows contiguous.

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, TypeVar, cast
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AvlmapsError, BackendError, QueryError
-from avlmaps.core.question import Modality, Part
+from avlmaps.core.question import Modality, Part, Role
 from avlmaps.language.questions import parse_sentence
 from avlmaps.maps.integrity import stamp
 from avlmaps.maps.store.manifest import MANIFEST
@@ -60,9 +60,14 @@ class CachedMap(AVLMap):
         if part.is_file:
             return super().heat(part, intrinsics, attachments or {})
         with self._lock:
-            if part in self._kept:
+            kept = self._kept.get(part)
+            if kept is not None:
                 self._kept.move_to_end(part)
-                return self._kept[part][0]
+        if kept is not None:
+            heat = kept[0]
+            if part.role is Role.CONTEXT:  # queried again: its heat everywhere serves every further query
+                _ = heat.values
+            return heat
         heat = super().heat(part, intrinsics)
         self._keep(part, heat)
         return heat

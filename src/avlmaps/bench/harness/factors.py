@@ -36,10 +36,12 @@ class VoxelHeat(Factor):
     instance = np.zeros(0, np.int64)
     confidence = np.zeros(0)
 
-    @property
-    def values(self) -> Float32[np.ndarray, " n"]:
-        """Heat of every voxel."""
-        return self.voxel
+    def heat_and_anchors(
+        self, among: Bool[np.ndarray, " n"] | None = None
+    ) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+        """Return the heat; heat by voxel has no anchors."""
+        heat = self.voxel if among is None else np.where(among, self.voxel, np.float32(0.0))
+        return heat, np.full(len(heat), -1, np.int64)
 
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat of the nearest voxel to each point."""
