@@ -24,6 +24,7 @@ from avlmaps.language.program.table import SKILLS
 from avlmaps.language.program.trace import Step, Trace, told
 from avlmaps.language.program.values import (
     Made,
+    Sizes,
     Value,
     adopted,
     call_function,
@@ -34,7 +35,6 @@ from avlmaps.language.program.values import (
     kind_of,
     shown,
     signed,
-    size_of,
     size_of_shown,
 )
 from avlmaps.language.program.vocabulary import Vocabulary
@@ -113,6 +113,7 @@ class _Run:
         self.steps: list[Step] = []
         self.worked_out = 0
         self.made = 0
+        self.sizes = Sizes()
 
     # ---- the budget
 
@@ -139,7 +140,7 @@ class _Run:
 
     def keep_value(self, line: int, value: Value) -> None:
         """Count the elements of a value that was made."""
-        self.keep(line, size_of(line, value, self.budget.elements - self.made))
+        self.keep(line, self.sizes.of(line, value))
 
     def look_at_clock(self, line: int) -> None:
         """Stop the program whose time is over."""
@@ -261,7 +262,7 @@ class _Run:
             right = self.value(operand)
             check_comparison(part.line, operator, kind_of(left), kind_of(right))
             for value in (left, right):
-                self.step(part.line, size_of(part.line, value, self.budget.steps - self.worked_out))
+                self.step(part.line, self.sizes.of(part.line, value))
             if not _COMPARE[operator](left, right):
                 return False
             left = right

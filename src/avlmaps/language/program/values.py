@@ -52,33 +52,47 @@ def kind_of(value: Value) -> Kind:
     return _KINDS[type(value)]
 
 
-def size_of(line: int, value: Value, most: int) -> int:
-    """Return how many elements and characters a value has, counted as often as they appear in it.
+class Sizes:
+    """The sizes of the lists and tuples of one run: values never change, so each is counted once."""
 
-    A list that holds another many times over is small in memory and large by this count, so the count ends once it is
-    past ``most``: the work is bounded by what the program may still use, not by what it wrote.
+    def __init__(self) -> None:
+        self._known: dict[int, tuple[Value, int, int]] = {}  # with the value itself: nothing else gets its hash so
 
-    Args:
-        line: of the program, for the error.
-        value: what to count.
-        most: where to stop; what is returned is then larger.
+    def of(self, line: int, value: Value) -> int:
+        """Return how many elements and characters a value has, counted as often as they appear in it.
 
-    Raises:
-        ProgramError: it nests too deep.
-    """
-    size, waiting = 1, [(value, 0)]
-    while waiting:
-        part, depth = waiting.pop()
-        if isinstance(part, (list, tuple)):
-            if depth == DEEPEST_VALUE:
-                raise refused(line, f"lists and tuples nest more than {DEEPEST_VALUE} deep; keep them flat")
-            size += len(part)
-            if size > most:
-                return size
-            waiting += [(each, depth + 1) for each in part if isinstance(each, (str, list, tuple))]
-        elif isinstance(part, str):
-            size += len(part)
-    return size
+        A list that holds another many times over is small in memory and large by this count.
+
+        Args:
+            line: of the program, for the error.
+            value: what to count.
+
+        Raises:
+            ProgramError: it nests too deep.
+        """
+        if isinstance(value, str):
+            return 1 + len(value)
+        return 1 + self._inside(line, value)[0] if isinstance(value, (list, tuple)) else 1
+
+    def _inside(self, line: int, value: list[Any] | tuple[Any, ...]) -> tuple[int, int]:
+        """Return how many elements and characters are in a list or tuple, and how deep such nest in it."""
+        key = object.__hash__(value)  # by identity, as id(), which raises an audit event
+        known = self._known.get(key)
+        if known is not None and known[0] is value:
+            return known[1:]
+        size, depth = len(value), 0
+        for each in value:
+            kind = type(each)
+            if kind is str:
+                size += len(each)
+            elif kind is list or kind is tuple:
+                inside, levels = self._inside(line, each)
+                size += inside
+                depth = max(depth, levels)
+        if depth == DEEPEST_VALUE:
+            raise refused(line, f"lists and tuples nest more than {DEEPEST_VALUE} deep; keep them flat")
+        self._known[key] = value, size, depth + 1
+        return size, depth + 1
 
 
 def combined(line: int, operator: str, left: Any, right: Any, factors: int) -> Value:
