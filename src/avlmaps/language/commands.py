@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from avlmaps.core.errors import LanguageError
-from avlmaps.language.intents import Clarify, Intent, Refuse
+from avlmaps.language.intents import Beside, Clarify, Face, Intent, Refuse, Repeat, StopAt, targets_of
 from avlmaps.language.learned.decision import Decision, Weighed, decided
 from avlmaps.language.learned.guard import EXAMPLE, Guard, weighed
 from avlmaps.language.learned.limits import Limits
@@ -54,7 +54,7 @@ def read_command(text: str, given: Given | None = None) -> Command:
         question = Clarify(f"I do not understand this. Say it like: {EXAMPLE}.")
         return Command((question,), (), (), "unsure")
     answer = answered(sentence, readings, reader, reader.limits)
-    notes = (*sentence.notes, *_without_effect(sentence), *answer.notes)
+    notes = (*sentence.notes, *_without_effect(sentence), *answer.notes, *_lost_sides(answer.intents, sentence))
     return Command(answer.intents, tuple(dict.fromkeys(notes)), readings, answer.why)
 
 
@@ -81,6 +81,14 @@ def _without_effect(sentence: Sentence) -> list[str]:
     slow = load_word_classes().words["SLOW"]
     words = [token.text for token in sentence.tokens]
     return [f"'{word}' has no effect: the robot has one speed." for word in words if word in slow]
+
+
+def _lost_sides(intents: Sequence[Intent], sentence: Sentence) -> tuple[str, ...]:
+    """Return a note for each side ("the chair left of the table") that only says which thing is meant."""
+    steps = [step for intent in intents for step in (intent.body if isinstance(intent, Repeat) else (intent,))]
+    if any(isinstance(step, Beside | Face | StopAt) for step in steps):  # the side is where it drives or looks
+        return ()
+    return sentence.side_notes if any(target.near for intent in intents for target in targets_of(intent)) else ()
 
 
 def _check_length(text: str) -> None:

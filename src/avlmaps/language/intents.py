@@ -264,6 +264,21 @@ def on_targets(intent: Intent, change: Callable[[Target], Target]) -> Intent:
             return intent
 
 
+def targets_of(intent: Intent) -> tuple[Target, ...]:
+    """Return the targets of an intent, in the order of the words; of a repeated one, those of its body."""
+    match intent:
+        case Go(to=target) | Face(to=target):
+            return (target,)
+        case Beside(of=target) | StopAt(of=target) | Circle(of=target) | VisitEach(of=target):
+            return (target,)
+        case Between(of=pair):
+            return pair
+        case Repeat(body=body):
+            return tuple(target for one in body for target in targets_of(one))
+        case _:
+            return ()
+
+
 class Ask(StrEnum):
     """The kind of a question about a target."""
 

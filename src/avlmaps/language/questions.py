@@ -163,4 +163,5 @@ def _put_right(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:
     for one in targets:
         if one.pick in (Pick.FARTHEST, Pick.OTHER):
             raise QueryError(f"A map cannot choose '{one.pick} {one.name}'; say what it is near.")
-    return AskedSentence(Inquiry(inquiry.ask, targets), tuple(dict.fromkeys((*sentence.notes, *guard.notes))))
+    sides = sentence.side_notes if any(target.near for target in targets) else ()
+    return AskedSentence(Inquiry(inquiry.ask, targets), tuple(dict.fromkeys((*sentence.notes, *guard.notes, *sides))))

@@ -1,5 +1,6 @@
 """A sentence as tokens, misspelt words put right, and what besides the lexicon knows its names."""
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ _PICTURE = frozenset({
     "selfie", "screenshot", "polaroid",
 })  # fmt: skip
 _SOUND = frozenset({"recording", "recorded", "clip", "sound", "audio", "noise", "tape", "recordings", "memo"})
+_SIDE = re.compile(r"\b((?:left|right|north|south|east|west|in front) of|behind|opposite)\b")
 _POINTS = frozenset({"this", "these", "attached", "attachment", "here", "file", "sent", "enclosed", "uploaded"})
 
 
@@ -63,3 +65,11 @@ class Sentence:
     def notes(self) -> tuple[str, ...]:
         """One sentence for each misspelt word."""
         return tuple(f"'{said}' is read as '{meant}'." for said, meant in self.respelt.items())
+
+    @property
+    def side_notes(self) -> tuple[str, ...]:
+        """One sentence for each side of a thing that it speaks of: what is near has none."""
+        sides = _SIDE.findall(" ".join(token.text for token in self.tokens))
+        return tuple(
+            f"'{side}' is read as 'near': distance counts, the side does not." for side in dict.fromkeys(sides)
+        )

@@ -264,7 +264,7 @@ def object_factor(
             pieces = replace(pieces, confidence=pieces.confidence * share)
         best = float(pieces.confidence.max(initial=0.0)) if tint else pieces.best
         note = "" if best >= FOUND_AT else _absence(part.query, len(pieces.mask), pieces.won, best)
-        if understood and squeezed(understood) != squeezed(part.query):
+        if encoded.understood and not _is_whole(encoded.understood, tint.thing if tint else part.query):
             note = f"understood only {understood!r} of {part.query!r}" + ("; " + note if note else "")
         falloff, alone = heat.falloff_per_m(part.role), None if with_uncertain else lambda: things(True)
         found = best >= FOUND_AT
@@ -280,6 +280,16 @@ def object_factor(
         weaker = likeliest(things(True, settings.for_guess()))
         return weaker if len(weaker.confidence) else guess
     return guess
+
+
+def _is_whole(understood: str, name: str) -> bool:
+    """Return whether what an encoder understands of a name is all of it: itself, a synonym, or its narrower kinds."""
+    if squeezed(understood) == squeezed(name):
+        return True
+    entry = lexicon().find(name, Kind.THING)
+    if entry is None or squeezed(name) in map(squeezed, entry.compounds):  # a wooden chair is more than a chair
+        return False
+    return all(lexicon().is_a(kind, entry.name, Kind.THING) for kind in understood.split(" or "))
 
 
 def colour_factor(

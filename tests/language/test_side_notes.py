@@ -1,0 +1,37 @@
+"""A side that only says which thing is meant does not count, and a note says so."""
+
+import pytest
+
+from avlmaps.language.commands import read_command
+from avlmaps.language.questions import read_question
+
+
+@pytest.mark.parametrize(
+    ("sentence", "side"),
+    [
+        ("the cabinet left of the window", "left of"),
+        ("the chair behind the table", "behind"),
+        ("where is the lamp in front of the sofa?", "in front of"),
+    ],
+)
+def test_a_question_with_a_side_says_that_near_is_meant(sentence: str, side: str) -> None:
+    assert f"'{side}' is read as 'near': distance counts, the side does not." in read_question(sentence).notes
+
+
+@pytest.mark.parametrize(
+    "sentence", ["the cabinet near the window", "where is the left sofa?", "the table in the kitchen"]
+)
+def test_a_question_without_one_has_no_such_note(sentence: str) -> None:
+    assert not any("side" in note for note in read_question(sentence).notes)
+
+
+def test_a_command_to_drive_to_a_side_uses_it() -> None:
+    assert read_command("go to the left of the chair near the table").notes == ()
+    assert read_command("stop behind the sofa").notes == ()
+
+
+def test_a_command_whose_side_only_names_the_thing_says_so() -> None:
+    assert (
+        "'behind' is read as 'near': distance counts, the side does not."
+        in read_command("go to the chair behind the table").notes
+    )
