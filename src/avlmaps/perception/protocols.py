@@ -10,6 +10,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, Float32, Int, UInt8
 
+from avlmaps.perception.room_contents import RoomContents
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
 
@@ -118,6 +119,19 @@ class NamedPixelEncoder(PixelEncoder, Protocol):
             mean_probability: of the name, over the voxels of each instance.
             area_m2: surface of each instance: a voxel's face for each of its voxels.
         """
+        ...
+
+
+@runtime_checkable
+class SurveyedEncoder(Protocol):
+    """A pixel encoder whose answers were counted in furnished rooms of known kinds.
+
+    What it names in a kitchen says more about kitchens than what stands there: it also says what it takes things for.
+    """
+
+    @property
+    def room_contents(self) -> RoomContents:
+        """The mean surface of what it names so in a room of each kind."""
         ...
 
 

@@ -11,14 +11,16 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.core.errors import QueryError
+from avlmaps.core.errors import BackendError, MapError, QueryError
 from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
-from avlmaps.perception.protocols import PixelEncoder
+from avlmaps.perception.protocols import PixelEncoder, SurveyedEncoder
+from avlmaps.perception.room_contents import read_room_contents
 from avlmaps.query.answer import Answer, PartAnswer
 from avlmaps.query.factors import Factor, HeatSettings, NearAnchors, NearThings
+from avlmaps.query.floor_plan import FloorPlan, storeys
 from avlmaps.query.heatmap import Heatmap, product
-from avlmaps.query.modalities.area import AreaSettings, area_factor
+from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
 from avlmaps.query.modalities.object import EncodedWord, ObjectSettings, Pieces, Rivals, object_factor, object_pieces
 from avlmaps.query.modalities.sound import (
@@ -28,6 +30,7 @@ from avlmaps.query.modalities.sound import (
     sound_factor,
     sound_features,
 )
+from avlmaps.query.rooms import NamedVoxels, Rooms, voting_rows
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import Sound
 
@@ -174,7 +177,7 @@ class AVLMap:
         """Return the rooms of the map, those with most views first; see ``contents.find_rooms``."""
         from avlmaps.query.contents import find_rooms
 
-        return find_rooms(self.stored, self.space, self.settings.areas, least_confidence)
+        return find_rooms(self.stored, self.space, self.settings.areas, least_confidence, self.room_votes)
 
     @property
     def points(self) -> Float[np.ndarray, "n 3"]:
@@ -262,7 +265,45 @@ class AVLMap:
         encoder = self.stored.profile.view_encoder()
         self.stored.require_model(Kind.VIEWS)
         settings = self.settings
-        return Heatmap.of(area_factor(self.space, self.stored.keyframes, encoder, part, settings.areas, settings.heat))
+        return Heatmap.of(
+            area_factor(
+                self.space, self.stored.keyframes, encoder, part, settings.areas, settings.heat, self.room_votes
+            )
+        )
+
+    @cached_property
+    def room_votes(self) -> Rooms | None:
+        """The votes on the kind of room of each place; None where the settings score keyframes instead.
+
+        A map that has no floor plan (no voxels, no keyframes, kilometres of extent) has none either.
+        """
+        settings, stored = self.settings.areas, self.stored
+        if not settings.by_room or not len(stored.keyframes):
+            return None
+        cameras = self.space.level(np.asarray(stored.keyframes.world_from_camera, np.float64)[:, :3, 3])[:, 2]
+        ground = stored.info.ground
+        known = [(floor.best.height_m, floor.cameras) for floor in ground.floors] if ground is not None else []
+        places = area_anchors(stored.keyframes, settings)
+        plan = FloorPlan.of(self.space, storeys(known, cameras), places)
+        return None if plan is None else Rooms(plan, places, self._voting_voxels, settings.rooms)
+
+    def _voting_voxels(self) -> NamedVoxels | None:
+        """Return the voxels whose names vote on kinds of room; None where the map holds no probabilities of names."""
+        from avlmaps.query.naming import VoxelNamer
+
+        try:
+            namer = VoxelNamer(self)
+        except (BackendError, MapError):  # no features of things, or those of another encoder: views vote alone
+            return None
+        if not namer.calibrated or not namer.names:
+            return None
+        feature = self.stored.voxels.feature
+        rows, every = voting_rows(np.asarray(self.stored.voxels.index), len(namer.names) * feature.shape[1])
+        area_m2 = every * self.space.grid.voxel_size_m**2
+        encoder = self.stored.profile.pixel_encoder()
+        surveyed = encoder.room_contents if isinstance(encoder, SurveyedEncoder) else None
+        contents = surveyed or read_room_contents("avlmaps.perception")
+        return NamedVoxels(rows, namer.names, namer.confidences(rows), area_m2, contents)
 
     def image(
         self,

@@ -16,13 +16,14 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedViewEncoder
-from avlmaps.query.modalities.area import AREA_NAMES, AreaSettings, area_distribution, modes
+from avlmaps.query.modalities.area import AREA_NAMES, AreaSettings, area_distribution, modes, room_field
 from avlmaps.query.modalities.object import Pieces
 from avlmaps.query.modalities.sound import sound_features
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.rooms import Rooms
     from avlmaps.query.schema import ContentsAnswer, RoomAnswer, SoundAnswer, ThingAnswer
 
 Watch = Callable[[str, int, int], object]
@@ -106,11 +107,11 @@ class SoundEvent:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
-    """One room: keyframes side by side whose views have the same likeliest name.
+    """One room: a region of the floor that has one likeliest name, and the keyframes that looked into it.
 
     Attributes:
         name: kind of room.
-        confidence: mean posterior of the name over its views, in [0, 1].
+        confidence: mean posterior of the name over its views' places, in [0, 1].
         position: its view's place nearest to their middle, metres, recording frame.
         views: number of keyframes.
         places: middle of what each of its keyframes saw, metres, recording frame.
@@ -251,16 +252,25 @@ def find_sounds(stored: "StoredMap", most_names: int = 3) -> list[SoundEvent]:
     return events
 
 
-def find_rooms(stored: "StoredMap", space: Space, settings: AreaSettings, least_confidence: float = 0.0) -> list[Room]:
+def find_rooms(
+    stored: "StoredMap",
+    space: Space,
+    settings: AreaSettings,
+    least_confidence: float = 0.0,
+    votes: "Rooms | None" = None,
+) -> list[Room]:
     """Return the rooms of a map, those with most views first.
 
-    A room is a group of keyframes with the same likeliest name, whose views' places lie close to one another.
+    A room is a region of the floor with one likeliest name that walls and other rooms bound, and the keyframes that
+    looked into it. Without votes it is a group of keyframes with one likeliest name whose views' places lie close to
+    one another.
 
     Args:
         stored: the map.
         space: its voxels' places.
         settings: how views are scored and grouped.
         least_confidence: rooms below it are left out, in [0, 1].
+        votes: on the kind of room of each place; without them only the views vote.
 
     Raises:
         BackendError: the map's profile has no view encoder.
@@ -271,21 +281,40 @@ def find_rooms(stored: "StoredMap", space: Space, settings: AreaSettings, least_
     stored.require_model(Kind.VIEWS)
     names = encoder.names if isinstance(encoder, NamedViewEncoder) else AREA_NAMES
     places = np.asarray(stored.keyframes.centre, np.float64).reshape(-1, 3)
-    share = area_distribution(np.asarray(stored.keyframes.view), encoder, names, settings, places)
-    likeliest = share.argmax(axis=1)
+    view = np.asarray(stored.keyframes.view)
+    if votes is None:
+        share = area_distribution(view, encoder, names, settings, places)
+        likeliest = share.argmax(axis=1)
+        group = _groups_of_views(space.level(places)[:, :2], share, settings.link_m)
+    else:
+        field = room_field(view, encoder, names, settings, votes)
+        cells = field.plan.cells_of(places)
+        share, likeliest = field.share[cells], field.share[cells].argmax(axis=1)
+        group = field.regions()[cells]
     rooms: list[Room] = []
+    for number in np.unique(group):
+        members = np.flatnonzero(group == number)
+        kind = int(likeliest[members[0]])
+        mean = float(share[members, kind].mean())
+        if len(members) >= _FEWEST_VIEWS and mean >= least_confidence:
+            seen_from = places[members]
+            rooms.append(Room(names[kind], round(mean, 3), _middle(seen_from), len(members), seen_from))
+    return sorted(rooms, key=lambda room: (-room.views, room.name))
+
+
+def _groups_of_views(
+    points: Float[np.ndarray, "k 2"], share: Float[np.ndarray, "k n"], link_m: float
+) -> Int[np.ndarray, " k"]:
+    """Return the number of the group of each view: those of one likeliest name side by side."""
+    likeliest = share.argmax(axis=1)
+    out = np.zeros(len(points), np.int64)
+    count = 0
     for number in np.unique(likeliest):
         of_name = np.flatnonzero(likeliest == number)
-        confidence = share[of_name, number]
-        group = modes(space.level(places[of_name])[:, :2], confidence, settings.link_m)
-        for k in range(int(group.max(initial=-1)) + 1):
-            members = of_name[group == k]
-            mean = float(share[members, number].mean())
-            if len(members) < _FEWEST_VIEWS or mean < least_confidence:
-                continue
-            name, seen_from = names[int(number)], places[members]
-            rooms.append(Room(name, round(mean, 3), _middle(seen_from), len(members), seen_from))
-    return sorted(rooms, key=lambda room: (-room.views, room.name))
+        group = modes(points[of_name], share[of_name, number], link_m)
+        out[of_name] = count + group
+        count += int(group.max(initial=-1)) + 1
+    return out
 
 
 def _middle(points: Float[np.ndarray, "m 3"]) -> tuple[float, float, float]:

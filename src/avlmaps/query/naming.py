@@ -1,7 +1,7 @@
 """What a voxel is taken for: the likeliest names, and which keyframes saw it."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from jaxtyping import Float, Float32, Int
@@ -10,11 +10,31 @@ from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, ScaledEncoder
 
 if TYPE_CHECKING:
-    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.voxel_space import Space
 
 _CHUNK = 1 << 14
 _NEAR_M, _FAR_M = 0.1, 8.0  # from how far a keyframe counts as having seen a voxel
 _OWN_VOXELS = 1.5  # a ray ends this far before the voxel itself, in voxels
+
+
+class NamedMap(Protocol):
+    """What naming needs of a map: ``AVLMap`` is one."""
+
+    @property
+    def stored(self) -> "StoredMap":
+        """The map as it lies on the disk."""
+        ...
+
+    @property
+    def space(self) -> "Space":
+        """The voxels' places."""
+        ...
+
+    @property
+    def points(self) -> Float[np.ndarray, "n 3"]:
+        """The middles of the voxels, metres, recording frame."""
+        ...
 
 
 class VoxelNamer:
@@ -26,7 +46,7 @@ class VoxelNamer:
         calibrated: whether confidences are probabilities; else they are cosines.
     """
 
-    def __init__(self, avlmap: "AVLMap", vocabulary: Sequence[str] | None = None) -> None:
+    def __init__(self, avlmap: NamedMap, vocabulary: Sequence[str] | None = None) -> None:
         """Take the encoder's names, or a vocabulary for one that has none of its own.
 
         Raises:
@@ -83,7 +103,7 @@ class VoxelNamer:
         return number, confidence
 
 
-def keyframes_that_saw(avlmap: "AVLMap", row: int) -> Int[np.ndarray, " k"]:
+def keyframes_that_saw(avlmap: NamedMap, row: int) -> Int[np.ndarray, " k"]:
     """Return the keyframes that had a voxel in view with nothing of the map in between, the nearest first.
 
     Args:
@@ -109,7 +129,7 @@ def keyframes_that_saw(avlmap: "AVLMap", row: int) -> Int[np.ndarray, " k"]:
     return np.array(sorted(seen, key=lambda k: float(distance_m[k])), np.int64)
 
 
-def _is_free(avlmap: "AVLMap", start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"], step_m: float) -> bool:
+def _is_free(avlmap: NamedMap, start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"], step_m: float) -> bool:
     """Return whether no voxel of the map lies on the line between a camera and a voxel."""
     length_m = float(np.linalg.norm(end - start)) - _OWN_VOXELS * avlmap.space.grid.voxel_size_m
     if length_m <= 0.0:

@@ -11,7 +11,7 @@ from avlmaps.core.poses import FRAME
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.perception.protocols import NamedViewEncoder
 from avlmaps.query.factors import NearThings
-from avlmaps.query.modalities.area import AREA_NAMES, area_distribution
+from avlmaps.query.modalities.area import AREA_NAMES, area_distribution, room_field
 from avlmaps.query.naming import VoxelNamer, keyframes_that_saw
 from avlmaps.query.schema import Frame, Position
 
@@ -49,7 +49,7 @@ class PlaceAnswer(TypedDict):
     color: Annotated[list[int] | None, Meta(description="mean RGB of the voxels, 0 to 255")]
     last_seen_s: Annotated[float | None, Meta(description="seconds from the start of the recording")]
     hits: Annotated[int, Meta(description="number of pixels that fell into the voxels")]
-    rooms: Annotated[list[NameScore], Meta(description="kinds of room that the nearest views show, best first")]
+    rooms: Annotated[list[NameScore], Meta(description="kinds of room that the place is, best first")]
     views: Annotated[list[ViewOfPlace], Meta(description="keyframes that saw the voxel nearest to it, nearest first")]
     frame: Frame
 
@@ -141,9 +141,11 @@ def _rooms(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[NameScore]:
     near = np.argsort(away, kind="stable")[:_MOST_VIEWS]
     if away[near[0]] > _FAR_M:
         return []
-    share = area_distribution(
-        np.asarray(stored.keyframes.view), encoder, names, avlmap.settings.areas, places
-    )[near].mean(axis=0)  # fmt: skip
+    view, settings, votes = np.asarray(stored.keyframes.view), avlmap.settings.areas, avlmap.room_votes
+    if votes is None:
+        share = area_distribution(view, encoder, names, settings, places)[near].mean(axis=0)
+    else:
+        share = room_field(view, encoder, names, settings, votes).at(point[None])[0].astype(np.float64)
     order = np.argsort(-share, kind="stable")[:3]
     return [{"name": names[i], "confidence": round(float(np.clip(share[i], 0.0, 1.0)), 3)} for i in order]
 

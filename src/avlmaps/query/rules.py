@@ -28,8 +28,9 @@ PAPER_HEARING = HearingSettings(
     noise_reduction_db=0.0,
     cut="energy",
 )
-# Heat falls from the camera's place; cosines are stretched over the keyframes; each view speaks for itself.
-PAPER_AREAS = AreaSettings(anchor="camera", score="min-max", pool_m=0.0)
+# Heat falls from the camera's place, through walls; cosines are stretched over the keyframes; each view speaks for
+# itself, and things do not.
+PAPER_AREAS = AreaSettings(anchor="camera", extent="cones", score="min-max", pool_m=0.0)
 # Scores are stretched over the sounds of the map.
 PAPER_SOUNDS = SoundSettings(normalise="min-max")
 # A voxel is the object where its word is the closest of all; no instance is left out for its confidence.

@@ -30,7 +30,7 @@ PAPER_SIZES: Mapping[TaskKind, int] = {
     TaskKind.NEAR_SOUND: 119,
 }
 _PHOTOS_A_TASK = 12  # tried for each that is wanted
-_RECIPE = 2  # raised when tasks are made, or queried, by other rules
+_RECIPE = 3  # raised when tasks are made, or queried, by other rules
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -28,7 +28,7 @@ from avlmaps.navigate.bodies import BASE
 from avlmaps.sim.scene import Scene
 from avlmaps.sim.scenes import open_scene
 
-_RECIPE = 2  # raised when missions are made, or robots sent, in another way
+_RECIPE = 3  # raised when missions are made, or robots sent, in another way
 OpenSpec = Callable[[str], Scene]
 
 

@@ -10,6 +10,7 @@ from avlmaps.perception.embedded.codes import features_of
 from avlmaps.perception.embedded.paired_networks import PairedNetworks, load_pair
 from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, SceneNetwork, Seen, load_network
 from avlmaps.perception.protocols import ModelCard, WordEncoder
+from avlmaps.perception.room_contents import RoomContents, read_room_contents
 from avlmaps.recordings.types import Frame
 
 # Beyond these an instance's size says no more for or against it.
@@ -35,6 +36,11 @@ class EmbeddedPixels(NamedEncoder):
     def vocabulary(self) -> tuple[str, ...]:
         """The categories that compete for a voxel, without ``other``."""
         return tuple(name for name in self.names if name != "other")
+
+    @property
+    def room_contents(self) -> RoomContents:
+        """What it names in rooms of each kind: furnished homes and its mistakes together (``training/rooms``)."""
+        return read_room_contents("avlmaps.perception.embedded")
 
     def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
         """Return features on a grid of half the size that the network looks at; zero where there is no depth."""

@@ -1,17 +1,18 @@
-"""Where a kind of area is: keyframes whose view is closer to its name than to those of other areas."""
+"""Where a kind of area is: keyframes whose view is closer to its name than to those of other areas, and their rooms."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from avlmaps.core.lexicon import Kind, lexicon
-from avlmaps.core.question import Part
+from avlmaps.core.question import Part, Role
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.protocols import NamedViewEncoder, ScaledEncoder, ViewEncoder
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, stretch_scores
+from avlmaps.query.rooms import InRooms, RoomField, Rooms, RoomSettings
 from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.voxel_space import Space
 
@@ -33,6 +34,9 @@ class AreaSettings:
     anchor: Literal["camera", "centre"] = "centre"
     """Where a keyframe's heat falls from: the camera (the paper), or the middle of what the camera saw (things are
     found in the right place for 45 % of 191 tasks, with the camera's place for 35 %; docs/experiments.md)."""
+    extent: Literal["rooms", "cones"] = "rooms"
+    """How far an area's heat reaches. ``rooms``: views and things vote on the kind of room of every place, up to the
+    walls (``rooms.py``). ``cones`` (the paper): heat falls off round every keyframe, through walls."""
     score: Literal["posterior", "min-max"] = "posterior"
     """``posterior`` asks how likely the name is among all area names; ``min-max`` stretches the cosines (the paper)."""
     temperature: float | None = None
@@ -42,10 +46,34 @@ class AreaSettings:
     """Another name at least this close to the queried one names the same and does not compete with it. For an encoder
     with a scale it is measured from the middle of all names: its phrases lie in a cone, kitchen beside garage."""
     pool_m: float = 0.8
-    """Views whose anchors are within this distance vote together (``pool_posteriors``): an odd one is outvoted. 0 takes
-    each by itself, as the paper does."""
+    """Of ``cones``: views whose anchors are within this distance vote together (``pool_posteriors``): an odd one is
+    outvoted. 0 takes each by itself, as the paper does."""
     link_m: float = 1.0
     """Keyframes closer than this to a better one belong to its area."""
+    rooms: RoomSettings = field(default_factory=RoomSettings)
+    """Of ``rooms``: the weights of views and things, and how far they reach."""
+
+    @property
+    def by_room(self) -> bool:
+        """Whether places rather than keyframes are scored; stretched cosines are no probabilities to vote with."""
+        return self.extent == "rooms" and self.score == "posterior"
+
+
+@dataclass(frozen=True, slots=True)
+class ViewShares:
+    """How a queried name competes with others over some views.
+
+    Attributes:
+        kinds: names that compete, the queried one among them unless the encoder has names of its own.
+        share: how likely each view shows each of them; rows add up to 1.
+        weights: how much the query means each of them.
+        raw: score of the query by itself: its probability, or its cosine.
+    """
+
+    kinds: tuple[str, ...]
+    share: Float[np.ndarray, "k n"]
+    weights: Float[np.ndarray, " n"]
+    raw: Float[np.ndarray, " k"]
 
 
 def area_scores(
@@ -70,29 +98,41 @@ def area_scores(
         settings: how.
         places: what each looked at, metres; None leaves every view for itself.
     """
+    shares = view_shares(view, encoder, name, settings)
+    posterior = np.clip(shares.share @ shares.weights, 0.0, 1.0)
+    if settings.score == "min-max":
+        return posterior, stretch_scores(shares.raw)
+    if places is None or not settings.pool_m > 0.0 or not len(shares.share):
+        return posterior, posterior
+    pooled = pool_posteriors(shares.share, places, settings.pool_m)
+    return posterior, np.clip(pooled @ shares.weights, 0.0, 1.0)
+
+
+def view_shares(
+    view: Float32[np.ndarray, "k d"], encoder: ViewEncoder, name: str, settings: AreaSettings
+) -> ViewShares:
+    """Return how likely each view shows the queried area and each name that competes with it.
+
+    Args:
+        view: features.
+        encoder: that made them.
+        name: of the area.
+        settings: how.
+    """
     if isinstance(encoder, NamedViewEncoder):
         share = np.square(np.asarray(view, np.float64).reshape(-1, encoder.codes.shape[1]) @ encoder.codes.T)
-        name_weights = np.asarray(encoder.name_weights(name), np.float64)
-        raw = np.clip(share @ name_weights, 0.0, 1.0)
-    else:
-        others = [area for area in AREA_NAMES if not same_place(area, name)]
-        words = np.asarray(encoder.encode_words([name, *others]), np.float64)
-        apart = words - words.mean(axis=0) if isinstance(encoder, ScaledEncoder) else words
-        competes = np.r_[True, _cosine(apart[1:], apart[0]) < settings.same_word_cosine]
-        cosine = np.asarray(view, np.float64).reshape(-1, words.shape[1]) @ words[competes].T
-        logits = cosine / _temperature(encoder, settings)
-        weight = np.exp(logits - logits.max(axis=1, keepdims=True, initial=-np.inf))
-        share, name_weights, raw = (
-            weight / weight.sum(axis=1, keepdims=True),
-            np.eye(1, weight.shape[1])[0],
-            cosine[:, 0],
-        )
-    posterior = np.clip(share @ name_weights, 0.0, 1.0)
-    if settings.score == "min-max":
-        return posterior, stretch_scores(raw)
-    if places is None or not settings.pool_m > 0.0 or not len(share):
-        return posterior, posterior
-    return posterior, np.clip(pool_posteriors(share, places, settings.pool_m) @ name_weights, 0.0, 1.0)
+        weights = np.asarray(encoder.name_weights(name), np.float64)
+        return ViewShares(encoder.names, share, weights, np.clip(share @ weights, 0.0, 1.0))
+    others = [area for area in AREA_NAMES if not same_place(area, name)]
+    words = np.asarray(encoder.encode_words([name, *others]), np.float64)
+    apart = words - words.mean(axis=0) if isinstance(encoder, ScaledEncoder) else words
+    competes = np.r_[True, _cosine(apart[1:], apart[0]) < settings.same_word_cosine]
+    cosine = np.asarray(view, np.float64).reshape(-1, words.shape[1]) @ words[competes].T
+    logits = cosine / _temperature(encoder, settings)
+    weight = np.exp(logits - logits.max(axis=1, keepdims=True, initial=-np.inf))
+    kinds = tuple(kind for kind, does in zip([name, *others], competes, strict=True) if does)
+    share = weight / weight.sum(axis=1, keepdims=True)
+    return ViewShares(kinds, share, np.eye(1, weight.shape[1])[0], cosine[:, 0])
 
 
 def area_distribution(
@@ -111,15 +151,37 @@ def area_distribution(
         settings: temperature and pooling.
         places: middle of what each keyframe saw, metres.
     """
-    view = np.asarray(view, np.float64)
+    share = _shares_of(view, encoder, names, settings)
+    return pool_posteriors(share, places, settings.pool_m) if settings.pool_m > 0.0 and len(share) else share
+
+
+def room_field(
+    view: Float32[np.ndarray, "k d"], encoder: ViewEncoder, names: Sequence[str], settings: AreaSettings, rooms: Rooms
+) -> RoomField:
+    """Return how likely each place of a map is each kind of area.
+
+    Args:
+        view: features of the keyframes.
+        encoder: that made them.
+        names: kinds of area; those of the encoder, where it has names of its own.
+        settings: temperature.
+        rooms: of the map.
+    """
+    return rooms.field(names, _shares_of(view, encoder, names, settings))
+
+
+def _shares_of(
+    view: Float32[np.ndarray, "k d"], encoder: ViewEncoder, names: Sequence[str], settings: AreaSettings
+) -> Float[np.ndarray, "k n"]:
+    """Return how likely each view shows each of some names; rows add up to 1."""
+    rows = np.asarray(view, np.float64)
     if isinstance(encoder, NamedViewEncoder):
-        share = np.square(view.reshape(-1, encoder.codes.shape[1]) @ encoder.codes.T)
+        share = np.square(rows.reshape(-1, encoder.codes.shape[1]) @ encoder.codes.T)
     else:
         words = np.asarray(encoder.encode_words(list(names)), np.float64)
-        logits = view.reshape(-1, words.shape[1]) @ words.T / _temperature(encoder, settings)
+        logits = rows.reshape(-1, words.shape[1]) @ words.T / _temperature(encoder, settings)
         share = np.exp(logits - logits.max(axis=1, keepdims=True, initial=-np.inf))
-    share = share / np.maximum(share.sum(axis=1, keepdims=True), 1e-12)
-    return pool_posteriors(share, places, settings.pool_m) if settings.pool_m > 0.0 and len(share) else share
+    return share / np.maximum(share.sum(axis=1, keepdims=True), 1e-12)
 
 
 def pool_posteriors(
@@ -208,12 +270,38 @@ def modes(points: Float[np.ndarray, "a 2"], score: Float[np.ndarray, " a"], link
 
 
 def area_factor(
-    space: Space, keyframes: Keyframes, encoder: ViewEncoder, part: Part, settings: AreaSettings, heat: HeatSettings
+    space: Space,
+    keyframes: Keyframes,
+    encoder: ViewEncoder,
+    part: Part,
+    settings: AreaSettings,
+    heat: HeatSettings,
+    rooms: Rooms | None = None,
 ) -> NearAnchors:
-    """Return the heat of an area: one anchor a keyframe."""
-    places = keyframes.world_from_camera[:, :3, 3] if settings.anchor == "camera" else keyframes.centre
-    anchors = np.asarray(places, np.float64).reshape(-1, 3)
-    posterior, scores = area_scores(np.asarray(keyframes.view), encoder, part.query, settings, anchors)
+    """Return the heat of an area: one anchor a keyframe.
+
+    As context it is how likely each place is in such an area; where the area itself is sought it falls from the places
+    that look most like it.
+
+    Args:
+        space: of the map.
+        keyframes: its views.
+        encoder: of the views.
+        part: the area's name.
+        settings: how views are scored.
+        heat: how fast heat falls.
+        rooms: of the map; without them heat falls off round every keyframe.
+    """
+    anchors = area_anchors(keyframes, settings)
+    view = np.asarray(keyframes.view)
+    kinds: RoomField | None = None
+    if rooms is None or not settings.by_room or not len(keyframes):
+        posterior, scores = area_scores(view, encoder, part.query, settings, anchors)
+        weights = np.zeros(0)
+    else:
+        shares = view_shares(view, encoder, part.query, settings)
+        kinds, weights = rooms.field(shares.kinds, shares.share), shares.weights
+        posterior = scores = np.clip(kinds.at(anchors) @ weights, 0.0, 1.0).astype(np.float64)
     best = float(posterior.max(initial=0.0))
     missed = f"no view is like {part.query!r}; the best score is {best:.2f}, below {FOUND_AT:.2f}"
     note = "" if best >= FOUND_AT else missed
@@ -222,5 +310,15 @@ def area_factor(
     if not len(keyframes):
         note = "the map holds no keyframes"
     group = modes(space.level(anchors)[:, :2], scores, settings.link_m)
-    falloff = heat.falloff_per_m(part.role)
-    return NearAnchors(space, part, falloff, anchors, scores, group, best >= FOUND_AT, part.query, note)
+    falloff, found = heat.falloff_per_m(part.role), best >= FOUND_AT
+    if kinds is None or part.role is Role.PRIMARY:
+        return NearAnchors(space, part, falloff, anchors, scores, group, found, part.query, note)
+    return InRooms(
+        space, part, falloff, anchors, scores, group, found, part.query, note, kinds=kinds, weights=weights
+    )  # fmt: skip
+
+
+def area_anchors(keyframes: Keyframes, settings: AreaSettings) -> Float[np.ndarray, "k 3"]:
+    """Return the place that each keyframe speaks for, metres, world: of the camera, or the middle of what it saw."""
+    places = keyframes.world_from_camera[:, :3, 3] if settings.anchor == "camera" else keyframes.centre
+    return np.asarray(places, np.float64).reshape(-1, 3)

@@ -1,0 +1,222 @@
+"""The map top-down, storey by storey: which cells are walls, and how evidence spreads over a floor that they bound.
+
+Evidence spreads as a random walk does: a wall reflects it, a doorway lets little of it through, and where no wall was
+seen it spreads as a Gaussian. So nothing has to decide where the rooms of an open plan end.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int
+
+from avlmaps.query.voxel_space import Space
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+CELL_M = 0.2
+# Heights over the floor between which a wall is seen: over tables and sofas, below the heads of doors.
+WALL_M = (1.0, 2.0)
+_WALL_SHARE = 0.5  # of the layers of voxels between them
+# Two floors closer than this are one storey with a step, a landing or stairs.
+_STOREY_M = 1.8
+_GAP_M = 1.2  # unseen floor up to this width lies between seen floor
+_BELOW_M = 0.3  # a voxel belongs to the storey whose floor lies at most this far above it
+# Height of a camera over a floor that nobody measured.
+_CAMERA_M = 1.3
+# Share of a cell's mass that one step of the walk moves to each neighbour; it adds 2 x 0.24 cells² of variance an axis.
+_TO_NEIGHBOUR = 0.24
+_MOST_CELLS = 4_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class FloorPlan:
+    """A grid for each storey; cell (s, i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · CELL_M`` of the level frame.
+
+    Attributes:
+        space: the map's voxels.
+        floors_m: (s,) level z of each storey's floor, rising.
+        origin_m: level x and y of the corner of cell (0, 0).
+        wall: which cells are walls.
+        open: which cells are no walls, and seen or between seen ones; evidence spreads over these.
+        voxel_cell: number of the cell that each voxel of the map lies in, wall or not.
+    """
+
+    space: Space
+    floors_m: Float[np.ndarray, " s"]
+    origin_m: Float[np.ndarray, "2"]
+    wall: Bool[np.ndarray, "s nx ny"]
+    open: Bool[np.ndarray, "s nx ny"]
+    voxel_cell: Int[np.ndarray, " n"]
+
+    @classmethod
+    def of(
+        cls, space: Space, floors_m: Sequence[float], places: Float[np.ndarray, "k 3"] | None = None
+    ) -> "FloorPlan | None":
+        """Find the walls of a map; None for a map without voxels, or one that is too large for a grid of it.
+
+        Args:
+            space: its voxels.
+            floors_m: level z of each storey's floor; see ``storeys``. At least one.
+            places: other points that the grid must cover, metres, world.
+        """
+        if not len(space):
+            return None
+        floors = np.sort(np.asarray(floors_m, np.float64))
+        level = space.level(space.centres)
+        cell = np.floor(level[:, :2] / CELL_M).astype(np.int64)
+        ends = cell if places is None else np.r_[cell, np.floor(space.level(places)[:, :2] / CELL_M).astype(np.int64)]
+        low = ends.min(axis=0) - 1
+        size = ends.max(axis=0) - low + 2
+        if len(floors) * int(size[0]) * int(size[1]) > _MOST_CELLS:
+            return None
+        storey = _storey_of(level[:, 2], floors)
+        height_m = level[:, 2] - floors[storey]
+        thickness = space.grid.voxel_size_m
+        shape = (len(floors), int(size[0]), int(size[1]))
+        own = ((storey * size[0] + cell[:, 0] - low[0]) * size[1] + cell[:, 1] - low[1]).astype(np.int64)
+        layers = max(1, int(np.ceil((WALL_M[1] - WALL_M[0]) / thickness)))
+        at = np.flatnonzero((height_m >= WALL_M[0]) & (height_m < WALL_M[1]))
+        layer = np.minimum(((height_m[at] - WALL_M[0]) / thickness).astype(np.int64), layers - 1)
+        held = np.zeros((int(np.prod(shape)), layers), bool)
+        held[own[at], layer] = True
+        wall = (held.sum(axis=1) >= _WALL_SHARE * layers).reshape(shape)
+        seen = np.zeros(shape, bool)
+        seen.reshape(-1)[own] = True
+        if places is not None:
+            beyond = space.level(places)
+            seen[_storey_of(beyond[:, 2], floors), *(ends[len(cell) :] - low).T] = True
+        return cls(space, floors, low * CELL_M, wall, _without_gaps(seen) & ~wall, own)
+
+    def __len__(self) -> int:
+        """Return the number of cells of all storeys."""
+        return self.wall.size
+
+    def cells_of(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
+        """Return the number of the open cell nearest to each point on its storey: a picture hangs in the wall itself.
+
+        Where a storey has no open cell at all it is the cell that the point lies in, or the nearest one of the grid.
+        """
+        level = self.space.level(points_world)
+        storey = _storey_of(level[:, 2], self.floors_m)
+        cell = np.floor((level[:, :2] - self.origin_m) / CELL_M)
+        i, j = (np.clip(cell, 0, np.array(self.wall.shape[1:]) - 1)).astype(np.int64).T
+        return self._open[np.ravel_multi_index((storey, i, j), self.wall.shape)]
+
+    @cached_property
+    def voxel_cells(self) -> Int[np.ndarray, " n"]:
+        """The open cell nearest to each voxel of the map; see ``cells_of``."""
+        return self._open[self.voxel_cell]
+
+    def nearest(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " c"]:
+        """Return for each cell the point nearest to it, those of its own storey first; −1 where there are none."""
+        from scipy.spatial import KDTree
+
+        if not len(points_world):
+            return np.full(len(self), -1, np.int64)
+        far = 10.0 * CELL_M * sum(self.wall.shape)  # a storey away is farther than any place of the same one
+        level = self.space.level(points_world)
+        points = np.c_[level[:, :2], far * _storey_of(level[:, 2], self.floors_m)]
+        storey, i, j = np.indices(self.wall.shape).reshape(3, -1)
+        centres = np.c_[self.origin_m + (np.stack([i, j], axis=1) + 0.5) * CELL_M, far * storey]
+        return np.asarray(KDTree(points).query(centres)[1], np.int64)
+
+    @cached_property
+    def _open(self) -> Int[np.ndarray, " c"]:
+        """The cell itself, or the open one nearest to it on its storey; itself again where there is none."""
+        from scipy.ndimage import distance_transform_edt
+
+        cells = np.arange(len(self)).reshape(self.wall.shape)
+        out = cells.copy()
+        for storey, free in enumerate(self.open):
+            if free.any():
+                nearest = distance_transform_edt(~free, return_distances=False, return_indices=True)
+                out[storey] = cells[storey][tuple(np.asarray(nearest))]
+        return out.reshape(-1)
+
+    @cached_property
+    def _neighbours(self) -> Int[np.ndarray, "2 e"]:
+        """Pairs of open cells side by side on a storey, each pair once."""
+        cells = np.arange(len(self)).reshape(self.wall.shape)
+        free = self.open
+        pairs: list[Int[np.ndarray, "2 e"]] = []
+        for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[:, :, 1:], np.s_[:, :, :-1])):
+            both = free[one] & free[other]
+            pairs.append(np.stack([cells[one][both], cells[other][both]]))
+        return np.concatenate(pairs, axis=1)
+
+    @cached_property
+    def _step(self) -> "csr_array":
+        """One step of the random walk: symmetric, so that an even floor stays even; its rows add up to 1."""
+        from scipy.sparse import csr_array
+
+        a, b = self._neighbours
+        row, column, own = np.r_[a, b], np.r_[b, a], np.arange(len(self))
+        stays = 1.0 - _TO_NEIGHBOUR * np.bincount(row, minlength=len(self))
+        share = np.r_[np.full(len(row), _TO_NEIGHBOUR), stays].astype(np.float32)
+        return csr_array((share, (np.r_[row, own], np.r_[column, own])), shape=(len(self), len(self)))
+
+    def regions(self, label: Int[np.ndarray, " c"]) -> Int[np.ndarray, " c"]:
+        """Return the number of the region of each cell: open cells of one label, each beside another of them.
+
+        Every cell of a wall is a region by itself.
+        """
+        from avlmaps.query.loops import connected
+
+        a, b = self._neighbours
+        same = label[a] == label[b]
+        return connected(len(self), a[same], b[same])
+
+    def spread(self, mass: Float[np.ndarray, "c k"], sigma_m: float) -> Float32[np.ndarray, "c k"]:
+        """Return what lies in each cell once all mass has walked about its floor for a while; none is lost.
+
+        On a floor without walls that is a Gaussian.
+
+        Args:
+            mass: in each cell, any number of kinds.
+            sigma_m: standard deviation along each axis, metres.
+        """
+        spread = np.ascontiguousarray(mass, np.float32)
+        for _ in range(round((sigma_m / CELL_M) ** 2 / (2.0 * _TO_NEIGHBOUR))):
+            spread = self._step @ spread
+        return np.asarray(spread, np.float32)
+
+
+def _without_gaps(seen: Bool[np.ndarray, "s nx ny"]) -> Bool[np.ndarray, "s nx ny"]:
+    """Fill what was not seen between seen cells, up to ``_GAP_M`` wide: under tables, and behind what stands there."""
+    from scipy.ndimage import distance_transform_edt
+
+    reach = _GAP_M / 2 / CELL_M
+    edge = int(np.ceil(reach)) + 1
+    out = seen.copy()
+    for storey, cells in enumerate(seen):
+        if cells.any():
+            wide = np.asarray(distance_transform_edt(~np.pad(cells, edge))) <= reach
+            out[storey] |= (np.asarray(distance_transform_edt(wide)) > reach)[edge:-edge, edge:-edge]
+    return out
+
+
+def storeys(floors_m: Sequence[tuple[float, float]], cameras_m: Float[np.ndarray, " k"]) -> list[float]:
+    """Return the heights of the storeys' floors, rising.
+
+    Args:
+        floors_m: height and weight of every floor, step and landing that is known; may be empty.
+        cameras_m: level z of the cameras, from which floors are guessed where none is known.
+    """
+    if not floors_m:
+        rising = np.sort(np.asarray(cameras_m, np.float64))
+        groups = np.split(rising, np.flatnonzero(np.diff(rising) > _STOREY_M / 2) + 1) if len(rising) else []
+        floors_m = [(float(np.median(group)) - _CAMERA_M, float(len(group))) for group in groups] or [(0.0, 1.0)]
+    chosen: list[float] = []
+    for height_m, _ in sorted(floors_m, key=lambda floor: (-floor[1], floor[0])):
+        if all(abs(height_m - other) >= _STOREY_M for other in chosen):
+            chosen.append(height_m)
+    return sorted(chosen)
+
+
+def _storey_of(z_m: Float[np.ndarray, " m"], floors_m: Float[np.ndarray, " s"]) -> Int[np.ndarray, " m"]:
+    """Return the storey of each height; what lies below all floors belongs to the lowest."""
+    return np.maximum(np.searchsorted(floors_m - _BELOW_M, z_m, side="right") - 1, 0)

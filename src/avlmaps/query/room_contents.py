@@ -1,0 +1,52 @@
+"""The votes of the things of a map on what kind of room a place is."""
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+
+import numpy as np
+from jaxtyping import Float, Float64
+
+from avlmaps.core.lexicon import Entry, Kind, lexicon
+from avlmaps.perception.room_contents import RoomContents
+
+# A kind of room in which a thing was never counted holds it as often as this share of the mean of all kinds.
+_ELSEWHERE = 0.1
+
+
+@cache
+def _log_ratios(contents: RoomContents) -> Float64[np.ndarray, "t r"]:
+    """Return by how much, in nats, a thing of the table speaks for each kind of room rather than for any."""
+    share = contents.surface_m2 / np.maximum(contents.surface_m2.sum(axis=0), 1e-9)
+    usual = share.mean(axis=1, keepdims=True)
+    return np.log((share + _ELSEWHERE * usual + 1e-9) / ((1.0 + _ELSEWHERE) * usual + 1e-9))
+
+
+def votes(things: Sequence[str], kinds: Sequence[str], contents: RoomContents) -> Float[np.ndarray, "t n"]:
+    """Return by how much, in nats, a square metre of each thing speaks for each kind of room.
+
+    Args:
+        things: names, as an encoder has them; one that the table does not hold speaks for none.
+        kinds: kinds of room. One that the table does not hold gets the mean vote of those that it holds, which for
+            most things is against it; one that belongs to a kind of the table (a kitchenette) gets that kind's.
+        contents: the table.
+    """
+    ratios, known = _log_ratios(contents), lexicon()
+    row_of = {known.find(name, Kind.THING): number for number, name in enumerate(contents.things)}
+    column_of = {known.find(name, Kind.ROOM): number for number, name in enumerate(contents.kinds)}
+    which = [_column(kind, column_of) for kind in kinds]
+    out = np.zeros((len(things), len(kinds)))
+    for number, thing in enumerate(things):
+        entry = known.find(thing, Kind.THING)
+        row = row_of.get(entry) if entry is not None else None
+        if row is not None:
+            out[number] = [ratios[row].mean() if column is None else ratios[row, column] for column in which]
+    return out
+
+
+def _column(kind: str, column_of: Mapping[Entry | None, int]) -> int | None:
+    known = lexicon()
+    entry = known.find(kind, Kind.ROOM) or known.head(kind, Kind.ROOM)
+    if entry is None:
+        return None
+    family = (entry, *known.wider(entry.name, Kind.ROOM))
+    return next((column_of[each] for each in family if each in column_of), None)

@@ -1,0 +1,202 @@
+"""What kind of room each place of a map is: views and things vote, and walls bound how far a vote reaches."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int
+
+from avlmaps.perception.room_contents import RoomContents
+from avlmaps.query.factors import NearAnchors
+from avlmaps.query.floor_plan import CELL_M, FloorPlan
+from avlmaps.query.room_contents import votes
+
+# Voxels whose names vote: one of q, so that their features' products with the names cost some tens of milliseconds.
+_MOST_PRODUCTS = 200_000_000
+# Far from all views a place is any kind of room: each kind has this number of views everywhere, divided among them.
+_PRIOR_VIEWS = 0.01
+_SEEN_VIEWS = 0.1  # a cell with fewer views near belongs to no room that is listed
+_LEAST_SHARE = 0.003  # no view rules a kind of room out by more than this
+
+
+@dataclass(frozen=True, slots=True)
+class RoomSettings:
+    """From views and things to kinds of room. Chosen on six development homes (docs/experiments.md)."""
+
+    views_m: float = 0.8
+    """Standard deviation of how far a view's vote spreads from the middle of what it saw, metres."""
+    view_weight: float = 1.5
+    """Exponent of the views' mean where two or more of them vote; an average is less confident than views that agree
+    should be. A lone view counts once."""
+    things_m: float = 1.6
+    """Standard deviation of how far the vote of a thing spreads from it, metres."""
+    thing_weight: float = 2.0
+    """Weight of the things' votes, in nats a square metre of their surface; 0 lets views vote alone."""
+    most_nats: float = 6.0
+    """The votes of all things at a place never amount to more than this, since voxels side by side are one thing."""
+
+
+@dataclass(frozen=True, slots=True)
+class NamedVoxels:
+    """Some voxels of the map, and how likely each is each thing.
+
+    Attributes:
+        rows: their numbers in the map.
+        names: the things.
+        confidence: of each name.
+        area_m2: surface of the map that each voxel stands for.
+        contents: what the encoder that named them names in rooms of each kind, or what stands there.
+    """
+
+    rows: Int[np.ndarray, " m"]
+    names: tuple[str, ...]
+    confidence: Float32[np.ndarray, "m t"]
+    area_m2: float
+    contents: RoomContents
+
+
+@dataclass(frozen=True, eq=False)
+class RoomField:
+    """How likely each cell of the floor plan is each kind of room.
+
+    Attributes:
+        plan: the cells.
+        kinds: kinds of room.
+        share: of each cell; rows add up to 1.
+        views: number of views that vote there, each by its nearness in [0, 1]; more between walls that reflect it.
+    """
+
+    plan: FloorPlan
+    kinds: tuple[str, ...]
+    share: Float32[np.ndarray, "c n"]
+    views: Float32[np.ndarray, " c"]
+
+    def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float32[np.ndarray, "m n"]:
+        """Return how likely each point is in each kind of room."""
+        return self.share[self.plan.cells_of(points_world)]
+
+    def of_voxels(self, weights: Float[np.ndarray, " n"]) -> Float32[np.ndarray, " v"]:
+        """Return for every voxel of the map how likely it is in a room of some kinds, in [0, 1].
+
+        Args:
+            weights: how much each kind is meant, in [0, 1].
+        """
+        return np.clip(self.share @ weights, 0.0, 1.0).astype(np.float32)[self.plan.voxel_cells]
+
+    def regions(self) -> Int[np.ndarray, " c"]:
+        """Return the number of the room of each cell: a region that views saw, with one likeliest kind, up to walls."""
+        seen = self.views >= _SEEN_VIEWS
+        return self.plan.regions(np.where(seen, self.share.argmax(axis=1), -1))
+
+
+class Rooms:
+    """The kinds of room of one map; what depends on the map alone is computed once.
+
+    Args:
+        plan: the map's floors and walls.
+        places: middle of what each keyframe saw, metres, world.
+        named: returns the voxels whose names vote; None where the map's things have no names.
+        settings: weights and distances.
+    """
+
+    def __init__(
+        self,
+        plan: FloorPlan,
+        places: Float[np.ndarray, "k 3"],
+        named: Callable[[], NamedVoxels | None],
+        settings: RoomSettings,
+    ) -> None:
+        self.plan = plan
+        self.settings = settings
+        self._places = np.asarray(places, np.float64).reshape(-1, 3)
+        self._named = named
+        self._votes: dict[tuple[str, ...], Float32[np.ndarray, "c n"]] = {}
+
+    def field(self, kinds: Sequence[str], share: Float[np.ndarray, "k n"]) -> RoomField:
+        """Return how likely each place is each kind of room.
+
+        Args:
+            kinds: kinds of room that compete.
+            share: how likely each keyframe's view shows each of them; rows add up to 1.
+        """
+        settings = self.settings
+        mass = np.zeros((len(self.plan), len(kinds) + 1))
+        np.add.at(mass, self._place_cells, np.c_[share, np.ones(len(share))])
+        per_view = 2.0 * np.pi * (settings.views_m / CELL_M) ** 2  # a view in the open has this weight at its place: 1
+        spread = self.plan.spread(mass, settings.views_m) * np.float32(per_view)
+        views = spread[:, -1:]
+        mean = (spread[:, :-1] + _PRIOR_VIEWS / len(kinds)) / (views + _PRIOR_VIEWS)
+        logits = np.clip(views, 1.0, settings.view_weight) * np.log(mean + _LEAST_SHARE) + self.thing_votes(kinds)
+        raised = np.exp(logits - logits.max(axis=1, keepdims=True))
+        likely = (raised / raised.sum(axis=1, keepdims=True)).astype(np.float32)
+        return RoomField(self.plan, tuple(kinds), likely, views[:, 0])
+
+    def thing_votes(self, kinds: Sequence[str]) -> Float32[np.ndarray, "c n"]:
+        """Return by how much, in nats, the things near each cell speak for each kind of room."""
+        key = tuple(kinds)
+        if key not in self._votes:
+            self._votes[key] = self._count_votes(key)
+        return self._votes[key]
+
+    @cached_property
+    def _place_cells(self) -> Int[np.ndarray, " k"]:
+        return self.plan.cells_of(self._places)
+
+    @cached_property
+    def _named_voxels(self) -> NamedVoxels | None:
+        return self._named()
+
+    def _count_votes(self, kinds: tuple[str, ...]) -> Float32[np.ndarray, "c n"]:
+        settings, counted = self.settings, np.zeros((len(self.plan), len(kinds)))
+        named = self._named_voxels if settings.thing_weight > 0.0 else None
+        if named is None or not len(named.rows):
+            return counted.astype(np.float32)
+        nats = named.confidence @ votes(named.names, kinds, named.contents) * named.area_m2
+        np.add.at(counted, self.plan.voxel_cells[named.rows], nats)
+        per_cell = 2.0 * np.pi * (settings.things_m / CELL_M) ** 2
+        near = self.plan.spread(counted, settings.things_m) * np.float32(settings.thing_weight * per_cell)
+        strongest = np.abs(near).max(axis=1, keepdims=True)
+        return (near / (1.0 + strongest / settings.most_nats)).astype(np.float32)
+
+
+def voting_rows(index: Int[np.ndarray, "n 3"], products: int) -> tuple[Int[np.ndarray, " m"], int]:
+    """Return the voxels whose names vote, one of q planes across the diagonal, and q: the voxels that each stands for.
+
+    Which voxels they are depends on their places alone, so that a map in another order gives the same.
+
+    Args:
+        index: of the voxels.
+        products: multiplications that one voxel costs: names times length of a feature.
+    """
+    every = max(1, int(np.ceil(len(index) * products / _MOST_PRODUCTS)))
+    chosen = np.flatnonzero(np.asarray(index, np.int64).sum(axis=1) % every == 0)
+    return chosen, every
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class InRooms(NearAnchors):
+    """Heat of an area as context: how likely each place is in a room of that kind, the same at every height.
+
+    Attributes:
+        kinds: how likely each place is each kind of room.
+        weights: how much the query means each of them.
+    """
+
+    kinds: RoomField
+    weights: Float[np.ndarray, " n"]
+
+    def heat_and_anchors(
+        self, among: Bool[np.ndarray, " n"] | None = None
+    ) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+        """Return the heat, and the anchor nearest to each voxel on its storey."""
+        heat = self.kinds.of_voxels(self.weights)
+        if among is not None:
+            heat = np.where(among, heat, np.float32(0.0))
+        plan = self.kinds.plan
+        nearest = plan.nearest(self.anchors)[plan.voxel_cells]
+        return heat, np.where(heat > 0.0, nearest, -1)
+
+    def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
+        """Return the heat at any points."""
+        return np.clip(self.kinds.at(points_world) @ self.weights, 0.0, 1.0).astype(np.float64)

@@ -1,0 +1,142 @@
+"""The floor plan: walls are found, storeys kept apart, and what spreads over a floor stays on its side of a wall."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from walled_rooms import UP, two_rooms
+
+from avlmaps.maps.grid import GridSpec
+from avlmaps.query.floor_plan import CELL_M, FloorPlan, storeys
+from avlmaps.query.voxel_space import Space
+
+LEFT, RIGHT = np.array([[1.0, 1.5, 1.2]]), np.array([[5.0, 1.5, 1.2]])
+
+
+def plan_of(door_m: float = 0.0, wall: bool = True, floors: tuple[float, ...] = (0.0,)) -> FloorPlan:
+    plan = FloorPlan.of(two_rooms(door_m, wall), floors)
+    assert plan is not None
+    return plan
+
+
+def deposit(plan: FloorPlan, point: np.ndarray) -> np.ndarray:
+    mass = np.zeros((len(plan), 1))
+    mass[plan.cells_of(point)] = 1.0
+    return mass
+
+
+def on_the_right(plan: FloorPlan, mass: np.ndarray) -> float:
+    _, i, _ = np.unravel_index(np.arange(len(plan)), plan.wall.shape)
+    beyond = plan.origin_m[0] + (i + 0.5) * CELL_M > 3.2
+    return float(mass[beyond, 0].sum())
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.2, 5.8), st.floats(0.2, 2.8), st.floats(0.2, 2.0), st.sampled_from([0.0, 0.8, 3.0]))
+def test_no_mass_is_lost_and_none_is_negative(x: float, y: float, sigma_m: float, door_m: float) -> None:
+    plan = plan_of(door_m)
+    spread = plan.spread(deposit(plan, np.array([[x, y, 1.2]])), sigma_m)
+    assert spread.sum() == pytest.approx(1.0, rel=1e-4)
+    assert spread.min() >= 0.0
+
+
+def test_a_wall_lets_nothing_through_and_a_doorway_little() -> None:
+    shares = {}
+    for name, plan in {"wall": plan_of(0.0), "door": plan_of(0.8), "open": plan_of(wall=False)}.items():
+        mass = deposit(plan, np.array([[2.4, y, 1.2] for y in np.arange(0.3, 2.8, 0.2)]))
+        shares[name] = on_the_right(plan, plan.spread(mass, 0.8))
+    assert shares["wall"] == 0.0
+    assert 0.0 < shares["door"] < 0.5 * shares["open"]
+
+
+def test_without_walls_it_spreads_as_a_gaussian() -> None:
+    index = np.argwhere(np.ones((240, 240, 1), bool))
+    plan = FloorPlan.of(Space(GridSpec(0.05), index, UP), (0.0,))
+    assert plan is not None and not plan.wall.any()
+    middle = np.array([[6.1, 6.1, 0.0]])
+    spread = plan.spread(deposit(plan, middle), 0.8)[:, 0]
+    _, i, j = np.unravel_index(np.arange(len(plan)), plan.wall.shape)
+    away = plan.origin_m + (np.stack([i, j], axis=1) + 0.5) * CELL_M - middle[0, :2]
+    np.testing.assert_allclose((np.square(away) * spread[:, None]).sum(axis=0), 0.8**2, rtol=0.03)
+    near = np.linalg.norm(away, axis=1) < 1.6
+    gauss = np.exp(-np.square(away).sum(axis=1) / (2 * 0.8**2)) * CELL_M**2 / (2 * np.pi * 0.8**2)
+    np.testing.assert_allclose(spread[near], gauss[near], rtol=0.15)
+
+
+def test_a_room_is_one_region_and_a_wall_makes_two_of_it() -> None:
+    for plan, same in ((plan_of(0.0), False), (plan_of(0.8), True), (plan_of(wall=False), True)):
+        region = plan.regions(np.zeros(len(plan), np.int64))
+        left, right = plan.cells_of(np.r_[LEFT, RIGHT])
+        assert (region[left] == region[right]) == same
+        inside = plan.cells_of(np.array([[x, y, 1.2] for x in (0.4, 1.0, 2.4) for y in (0.4, 1.5, 2.6)]))
+        assert len(np.unique(region[inside])) == 1
+
+
+def test_cells_of_one_label_that_do_not_touch_are_two_regions() -> None:
+    plan = plan_of(wall=False)
+    label = np.zeros(len(plan), np.int64)
+    label[plan.cells_of(np.array([[3.0, y, 1.2] for y in np.arange(-1.0, 4.0, 0.1)]))] = 1
+    region = plan.regions(label)
+    left, right = plan.cells_of(np.r_[LEFT, RIGHT])
+    assert label[left] == label[right] and region[left] != region[right]
+
+
+def test_furniture_and_a_rail_are_no_walls() -> None:
+    plan = plan_of(wall=False)
+    assert not plan.wall.reshape(-1)[plan.cells_of(LEFT)].any()
+    low = np.argwhere(np.ones((60, 4, 18), bool))  # 0.9 m high, as a counter is
+    counter = FloorPlan.of(Space(GridSpec(0.05), low, UP), (0.0,))
+    assert counter is not None and not counter.wall.any()
+
+
+def test_a_picture_on_a_wall_belongs_to_the_room_it_hangs_in() -> None:
+    plan = plan_of(0.0)
+    region = plan.regions(np.zeros(len(plan), np.int64))
+    at = np.array([[2.92, 1.5, 1.5], [3.08, 1.5, 1.5]])
+    cells = plan.cells_of(at)
+    left, right = plan.cells_of(np.r_[LEFT, RIGHT])
+    assert [region[cell] for cell in cells] == [region[left], region[right]]
+
+
+def test_a_storey_knows_nothing_of_the_one_above() -> None:
+    lower = np.argwhere(np.ones((40, 40, 1), bool))
+    upper = lower + np.array([0, 0, 56])
+    space = Space(GridSpec(0.05), np.concatenate([lower, upper]), UP)
+    plan = FloorPlan.of(space, (0.0, 2.8))
+    assert plan is not None and plan.wall.shape[0] == 2
+    mass = deposit(plan, np.array([[1.0, 1.0, 1.2]]))
+    spread = plan.spread(mass, 1.0).reshape(plan.wall.shape)
+    assert spread[0].sum() == pytest.approx(1.0, rel=1e-4)
+    assert spread[1].sum() == 0.0
+    nearest = plan.nearest(np.array([[1.0, 1.0, 1.2], [0.2, 0.2, 4.0]])).reshape(plan.wall.shape)
+    assert (nearest[0] == 0).all() and (nearest[1] == 1).all()
+
+
+def test_a_turned_world_gives_the_same_plan() -> None:
+    space = two_rooms(0.8)
+    turn = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # z up becomes y down ... up is -y
+    points = space.centres @ turn.T
+    grid = GridSpec(0.05)
+    index = np.unique(np.floor(points / 0.05 + 1e-6).astype(np.int64), axis=0)
+    turned = FloorPlan.of(Space(grid, index, turn @ UP), (0.0,))
+    plan = FloorPlan.of(space, (0.0,))
+    assert plan is not None and turned is not None
+    assert abs(int(turned.wall.sum()) - int(plan.wall.sum())) <= 0.25 * plan.wall.sum()
+
+
+def test_landings_and_steps_are_no_storeys() -> None:
+    cameras = np.zeros(0)
+    assert storeys([(0.0, 0.6), (1.2, 0.1), (2.8, 0.3)], cameras) == [0.0, 2.8]
+    assert storeys([(2.8, 0.3), (0.0, 0.6)], cameras) == [0.0, 2.8]
+
+
+def test_without_a_known_floor_the_cameras_say_where_it_is() -> None:
+    assert storeys([], np.array([1.2, 1.3, 1.4])) == pytest.approx([0.0])
+    assert storeys([], np.array([1.3, 1.3, 4.1, 4.1, 4.1])) == pytest.approx([0.0, 2.8])
+    assert len(storeys([], np.zeros(0))) == 1
+
+
+def test_a_map_without_voxels_or_kilometres_wide_has_no_plan() -> None:
+    assert FloorPlan.of(Space(GridSpec(0.05), np.zeros((0, 3), np.int64), UP), (0.0,)) is None
+    wide = np.array([[0, 0, 0], [200_000, 200_000, 0]])
+    assert FloorPlan.of(Space(GridSpec(0.05), wide, UP), (0.0,)) is None

@@ -1,0 +1,278 @@
+"""Kinds of room: views and things vote, walls bound them, and neither order nor absent things matter."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from query_fakes import FakePixels, FakeSounds, fake_map, fake_profile, keyframes_at, voxels_of
+from walled_rooms import two_rooms, two_rooms_index
+
+from avlmaps.perception.protocols import ModelCard
+from avlmaps.perception.room_contents import RoomContents, read_room_contents
+from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.query.factors import NearAnchors
+from avlmaps.query.floor_plan import FloorPlan
+from avlmaps.query.modalities.area import AreaSettings
+from avlmaps.query.rooms import InRooms, NamedVoxels, RoomField, Rooms, RoomSettings, voting_rows
+from avlmaps.query.rules import query_settings
+
+KINDS = ("kitchen", "bedroom", "bathroom")
+LEFT, RIGHT = np.array([[1.0, 1.5, 1.2]]), np.array([[5.0, 1.5, 1.2]])
+KITCHEN, BEDROOM = np.array([[0.8, 0.1, 0.1]]), np.array([[0.1, 0.8, 0.1]])
+FURNISHED = read_room_contents("avlmaps.perception")
+VIEWS_ALONE = RoomSettings(thing_weight=0.0)
+
+
+def rooms_of(
+    places: np.ndarray,
+    door_m: float = 0.0,
+    wall: bool = True,
+    settings: RoomSettings = VIEWS_ALONE,
+    named: NamedVoxels | None = None,
+) -> Rooms:
+    plan = FloorPlan.of(two_rooms(door_m, wall), (0.0,))
+    assert plan is not None
+    return Rooms(plan, places, lambda: named, settings)
+
+
+def things_at(rooms: FloorPlan, point: np.ndarray, name: str, count: int = 400) -> NamedVoxels:
+    """Return voxels about a point that are surely a thing."""
+    away = np.linalg.norm(rooms.space.centres - point, axis=1)
+    rows = np.argsort(away, kind="stable")[:count]
+    return NamedVoxels(rows, (name,), np.ones((count, 1), np.float32), 0.0025, FURNISHED)
+
+
+def views(seed: int, count: int = 9) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return rng.dirichlet(np.ones(3), count), rng.uniform([0.3, 0.3, 0.3], [5.7, 2.7, 2.0], (count, 3))
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000), st.sampled_from([0.0, 0.8]))
+def test_every_place_has_a_distribution_and_views_have_no_order(seed: int, door_m: float) -> None:
+    share, places = views(seed)
+    field = rooms_of(places, door_m).field(KINDS, share)
+    np.testing.assert_allclose(field.share.sum(axis=1), 1.0, rtol=1e-5)
+    assert field.share.min() >= 0.0
+    order = np.random.default_rng(seed + 1).permutation(len(share))
+    again = rooms_of(places[order], door_m).field(KINDS, share[order])
+    np.testing.assert_allclose(again.share, field.share, atol=1e-4)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000))
+def test_kinds_have_no_order_either(seed: int) -> None:
+    share, places = views(seed)
+    rooms = rooms_of(places)
+    turned = rooms.field(KINDS[::-1], share[:, ::-1])
+    np.testing.assert_allclose(turned.share[:, ::-1], rooms.field(KINDS, share).share, atol=1e-5)
+
+
+def test_a_wall_keeps_a_view_in_its_room_and_an_open_plan_does_not() -> None:
+    places, share = np.r_[LEFT, RIGHT], np.r_[KITCHEN, BEDROOM]
+    beside = np.array([[2.8, 1.5, 1.2], [3.2, 1.5, 1.2]])
+    walled = rooms_of(places).field(KINDS, share).at(beside)
+    np.testing.assert_allclose(walled[0], KITCHEN[0], atol=0.05)
+    np.testing.assert_allclose(walled[1], BEDROOM[0], atol=0.05)
+    mixed = rooms_of(places, wall=False).field(KINDS, share).at(beside)
+    assert abs(mixed[0, 0] - mixed[1, 0]) < 0.4 < walled[0, 0] - walled[1, 0]
+
+
+def test_a_lone_view_counts_once_and_views_that_agree_count_more() -> None:
+    alone = rooms_of(LEFT).field(KINDS, KITCHEN).at(LEFT)[0]
+    np.testing.assert_allclose(alone, KITCHEN[0], atol=0.06)  # walls reflect it
+    several = rooms_of(np.repeat(LEFT, 4, axis=0)).field(KINDS, np.repeat(KITCHEN, 4, axis=0)).at(LEFT)[0]
+    assert several[0] > alone[0] + 0.05
+
+
+def test_one_odd_view_is_outvoted() -> None:
+    places = np.repeat(LEFT, 5, axis=0)
+    share = np.r_[BEDROOM, np.repeat(KITCHEN, 4, axis=0)]
+    assert rooms_of(places).field(KINDS, share).at(LEFT)[0].argmax() == 0
+
+
+def test_far_from_all_views_any_kind_is_as_likely() -> None:
+    field = rooms_of(LEFT).field(KINDS, KITCHEN)
+    np.testing.assert_allclose(field.at(RIGHT)[0], 1 / 3, atol=1e-3)
+    assert field.views[field.plan.cells_of(RIGHT)[0]] == 0.0
+
+
+@pytest.mark.parametrize(("thing", "kind"), [("bed", "bedroom"), ("stove", "kitchen"), ("toilet", "bathroom")])
+def test_a_thing_decides_where_views_do_not(thing: str, kind: str) -> None:
+    unsure = np.full((2, 3), 1 / 3)
+    places = np.r_[LEFT, RIGHT]
+    plan = rooms_of(places).plan
+    rooms = rooms_of(places, settings=RoomSettings(), named=things_at(plan, LEFT[0], thing))
+    field = rooms.field(KINDS, unsure)
+    assert KINDS[int(field.at(LEFT)[0].argmax())] == kind
+    assert field.at(LEFT)[0].max() > 0.6
+    np.testing.assert_allclose(field.at(RIGHT)[0], 1 / 3, atol=1e-3)
+
+
+def test_all_the_things_of_a_place_say_no_more_than_the_limit() -> None:
+    plan = rooms_of(LEFT).plan
+    few, many = (things_at(plan, LEFT[0], "bed", count) for count in (40, 4000))
+    limit = RoomSettings().most_nats
+    votes = [
+        rooms_of(LEFT, settings=RoomSettings(), named=named).thing_votes(KINDS)[plan.cells_of(LEFT)[0]]
+        for named in (few, many)
+    ]
+    assert 0.0 < votes[0].max() < votes[1].max() <= limit
+    assert (rooms_of(LEFT, named=many).thing_votes(KINDS) == 0.0).all(), "their weight is 0"
+
+
+def test_walls_and_floors_say_nothing() -> None:
+    plan = rooms_of(LEFT).plan
+    rooms = rooms_of(LEFT, settings=RoomSettings(), named=things_at(plan, LEFT[0], "wall"))
+    assert (rooms.thing_votes(KINDS) == 0.0).all()
+
+
+def test_a_map_without_names_lets_views_vote() -> None:
+    share, places = views(3)
+    with_none = rooms_of(places, settings=RoomSettings(), named=None).field(KINDS, share)
+    np.testing.assert_array_equal(with_none.share, rooms_of(places).field(KINDS, share).share)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(1, 400_000), st.integers(1, 200_000))
+def test_voters_are_few_enough_and_stand_for_all(count: int, products: int) -> None:
+    index = np.stack([np.arange(count) % 97, np.arange(count) % 89, np.arange(count) // 97], axis=1)
+    rows, every = voting_rows(index, products)
+    assert len(rows) * products <= 1.3 * 200_000_000 + 2 * products * np.ptp(index.sum(axis=1))
+    assert (index[rows].sum(axis=1) % every == 0).all()
+    if every == 1:
+        assert len(rows) == count
+
+
+class NamedPixels(FakePixels):
+    """Knows its scale, so that its scores are probabilities."""
+
+    logit_scale = 20.0
+
+
+class OpenViews:
+    """Any of four names is an axis."""
+
+    card = ModelCard("fake/open", 5, "MIT", "0")
+    logit_scale = 6.0
+    known = ("kitchen", "bedroom", "bathroom", "office")
+
+    def encode(self, frames: Sequence[object]) -> np.ndarray:
+        return np.zeros((len(frames), 5), np.float32)
+
+    def encode_words(self, words: Sequence[str]) -> np.ndarray:
+        rows = np.zeros((len(words), 5), np.float32)
+        for row, word in zip(rows, words, strict=True):
+            row[self.known.index(word) if word in self.known else 4] = 1.0
+        return rows
+
+
+def home(settings: QuerySettings | None = None, door_m: float = 0.8, things: bool = True) -> AVLMap:
+    """A kitchen on the left and a bedroom with a bed on the right, which views hardly tell apart."""
+    index = two_rooms_index(door_m)
+    bed = np.argwhere(np.ones((30, 24, 8), bool)) + np.array([80, 18, 1])
+    encoder = NamedPixels(("wall", "bed", "stove"))
+    words = ["wall"] * len(index) + ["bed" if things else "wall"] * len(bed)
+    places = np.array([[x, y, 1.2] for x in (0.2, 0.8, 3.6, 4.2) for y in (0.8, 2.2)])
+    view = OpenViews().encode_words(["kitchen"] * 4 + ["office"] * 4)
+    view[:4] += 0.3 * OpenViews().encode_words(["bedroom"])
+    view[4:] += 0.7 * OpenViews().encode_words(["bedroom"])
+    view /= np.linalg.norm(view, axis=1, keepdims=True)
+    voxels = voxels_of(np.concatenate([index, bed]), encoder.encode_words(words))
+    profile = fake_profile(encoder, FakeSounds(), OpenViews())
+    return AVLMap(fake_map(voxels, keyframes=keyframes_at(places, view), profile=profile), settings)
+
+
+def test_a_bed_makes_the_bedroom() -> None:
+    with_bed, without = home(), home(things=False)
+    right, left = np.array([[4.5, 1.5, 0.4]]), np.array([[1.0, 1.5, 0.4]])
+    assert with_bed.area("bedroom").factors[0].at(right)[0] > without.area("bedroom").factors[0].at(right)[0] + 0.2
+    assert with_bed.area("bedroom").found and not without.area("bedroom").found
+    assert with_bed.area("bedroom").factors[0].at(left)[0] < 0.2
+    goal = with_bed.area("bedroom", primary=True).goals(1)[0]
+    assert goal.position[0] > 3.0
+
+
+def test_context_heat_is_even_in_its_room_and_ends_at_the_wall() -> None:
+    m = home(door_m=0.0)
+    factor = m.area("kitchen").factors[0]
+    assert isinstance(factor, InRooms)
+    heat = m.area("kitchen").values
+    x, y = m.points[:, 0], m.points[:, 1]
+    inside = (y > 0.3) & (y < 2.7)
+    assert heat[inside & (x > 0.3) & (x < 2.8)].min() > 3.0 * heat[inside & (x > 3.3) & (x < 5.6)].max()
+    np.testing.assert_allclose(factor.at(m.points), heat, atol=1e-6)
+    anchors = factor.anchor_of(np.flatnonzero(inside & (x < 2.8)))
+    assert (factor.anchors[anchors, 0] < 3.0).all()
+
+
+def test_a_query_for_a_thing_in_a_room_takes_the_one_behind_the_right_wall() -> None:
+    m = home(door_m=0.0)
+    product = m.object("bed", primary=True) * m.area("bedroom")
+    elsewhere = m.object("bed", primary=True) * m.area("kitchen")
+    assert product.peak > 2.0 * elsewhere.peak
+
+
+def test_the_rooms_of_the_map_are_listed_by_walls() -> None:
+    rooms = home(door_m=0.0).rooms()
+    assert sorted(room.name for room in rooms) == ["bedroom", "kitchen"]
+    assert {room.name: room.views for room in rooms} == {"kitchen": 4, "bedroom": 4}
+
+
+def test_the_papers_rules_know_no_walls_and_no_things() -> None:
+    one, other = home(query_settings("paper")), home(query_settings("paper"), door_m=0.0, things=False)
+    assert one.room_votes is None
+    for m in (one, other):
+        factor = m.area("bedroom").factors[0]
+        assert type(factor) is NearAnchors
+    np.testing.assert_array_equal(one.area("bedroom").factors[0].scores, other.area("bedroom").factors[0].scores)
+
+
+def test_cones_are_there_for_who_wants_them() -> None:
+    m = home(QuerySettings(areas=AreaSettings(extent="cones")))
+    assert m.room_votes is None and type(m.area("kitchen").factors[0]) is NearAnchors
+
+
+def test_votes_of_things_are_counted_once_a_map() -> None:
+    m = home()
+    rooms = m.room_votes
+    assert rooms is not None and m.room_votes is rooms
+    m.area("kitchen")
+    first = rooms.thing_votes(KINDS)
+    assert rooms.thing_votes(KINDS) is first
+
+
+def test_an_encoder_that_was_tried_out_in_rooms_says_what_its_names_mean() -> None:
+    """What this one calls a bed stands in kitchens."""
+
+    class Surveyed(NamedPixels):
+        room_contents = RoomContents(("bed",), ("kitchen", "bedroom"), np.array([[3.0, 0.1]]))
+
+    m = home()
+    surveyed = Surveyed(("wall", "bed", "stove"))
+    m.stored.profile.pixel_encoder = lambda: surveyed
+    right = np.array([[4.5, 1.5, 0.4]])
+    assert m.area("bedroom").factors[0].at(right)[0] < home().area("bedroom").factors[0].at(right)[0]
+
+
+def test_a_map_of_another_pixel_encoder_lets_views_vote() -> None:
+    from avlmaps.core.errors import MapError
+    from avlmaps.core.registry import Kind
+
+    m, bare = home(), home(things=False)
+
+    def require(kind: Kind) -> None:
+        if kind is Kind.PIXELS:
+            raise MapError("built with other pixels")
+
+    m.stored.require_model = require
+    right = np.array([[4.5, 1.5, 0.4]])
+    assert m.area("bedroom").factors[0].at(right) == pytest.approx(bare.area("bedroom").factors[0].at(right), abs=0.02)
+
+
+def test_a_field_is_named_by_its_kinds() -> None:
+    field = rooms_of(LEFT).field(KINDS, KITCHEN)
+    assert isinstance(field, RoomField) and field.kinds == KINDS
+    assert field.of_voxels(np.array([1.0, 1.0, 1.0])) == pytest.approx(1.0, abs=1e-5)
