@@ -99,6 +99,7 @@ train: $(VENV)-training/.ready  ## Train the embedded encoders again (CPU, a nig
 	$(VENV)-training/bin/python -m training.words
 	$(VENV)-training/bin/python -m training.sounds --sounds $(or $(SOUNDS),../shared/data/sounds)
 	$(VENV)-training/bin/python -m training.pixels --minutes $(or $(MINUTES),600)
+	$(VENV)-training/bin/python -m training.rooms
 
 $(VENV)-training/.ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)-training
