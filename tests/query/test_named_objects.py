@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
@@ -12,7 +14,15 @@ from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
 from avlmaps.query.colour_filter import tint_of
 from avlmaps.query.factors import HeatSettings, NearAnchors
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.modalities.object import EncodedWord, ObjectSettings, Rivals, object_factor
+from avlmaps.query.loops import plain_loops
+from avlmaps.query.modalities.object import (
+    EncodedWord,
+    ObjectSettings,
+    Rivals,
+    Vocabulary,
+    least_score_to_count,
+    object_factor,
+)
 from avlmaps.query.voxel_space import Space
 
 NAMES = ("chair", "dining table", "coffee table", "floor", "other")
@@ -202,3 +212,40 @@ def test_a_guess_among_weaker_voxels_can_be_turned_off() -> None:
     part = Part(Modality.OBJECT, "floor", Role.PRIMARY)
     settings = ObjectSettings(guess_below=0.0)
     assert not object_factor(SPACE, feature, ENCODER, rivals, part, settings, HeatSettings()).mask.any()
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.sampled_from(sorted(MEANT)),
+    st.sampled_from([0.02, 0.1, 0.5, 5.0]),
+    st.floats(0.0, 1.0),
+    st.booleans(),
+    st.integers(0, 2**32 - 1),
+)
+def test_voxels_with_little_of_the_word_need_no_comparison(
+    word: str, evenness: float, share: float, rules_of_the_paper: bool, seed: int
+) -> None:
+    probability = np.random.default_rng(seed).dirichlet(np.full(len(NAMES), evenness), len(INDEX))
+    feature = features_of(probability, ENCODER.codes).astype(np.float16)
+    feature[::11] = 0.0  # voxels that no encoder has looked at
+    none = dict.fromkeys(("least_confidence", "least_in_company", "guess_below"), 0.0) if rules_of_the_paper else {}
+    chosen, part = ObjectSettings(score_in_company=share, **none), Part(Modality.OBJECT, word, Role.PRIMARY)
+    with plain_loops():
+        rivals = [Rivals.of(feature, ENCODER, NAMES), Vocabulary.encoded(ENCODER, NAMES)]
+        full, short = (object_factor(SPACE, feature, ENCODER, each, part, chosen, HeatSettings()) for each in rivals)
+        for one, other in ((full, short), (full.include_uncertain(), short.include_uncertain())):
+            np.testing.assert_array_equal(one.mask, other.mask)
+            np.testing.assert_array_equal(one.instance, other.instance)
+            np.testing.assert_allclose(one.confidence, other.confidence, atol=1e-6)
+            assert (one.found, one.note, one.understood) == (other.found, other.note, other.understood)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.integers(2, 200), st.floats(0.01, 1.0), st.sampled_from([0.003, 0.03, 0.3, 30.0]), st.integers(0, 2**32 - 1))
+def test_what_reaches_a_share_of_its_best_rival_is_above_the_least_score(
+    names: int, share: float, evenness: float, seed: int
+) -> None:
+    probability = np.random.default_rng(seed).dirichlet(np.full(names, evenness), 50)
+    score = np.sqrt(probability).astype(np.float16)
+    counts = score[:, 0] >= share * score[:, 1:].max(axis=1)
+    assert (score[counts, 0] > least_score_to_count(names, share)).all()

@@ -14,15 +14,24 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError, QueryError
 from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
-from avlmaps.perception.protocols import PixelEncoder, SurveyedEncoder
+from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder
 from avlmaps.perception.room_contents import read_room_contents
+from avlmaps.query import loops
 from avlmaps.query.answer import Answer, PartAnswer
 from avlmaps.query.factors import Factor, HeatSettings, NearAnchors, NearThings
 from avlmaps.query.floor_plan import FloorPlan, storeys
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
-from avlmaps.query.modalities.object import EncodedWord, ObjectSettings, Pieces, Rivals, object_factor, object_pieces
+from avlmaps.query.modalities.object import (
+    EncodedWord,
+    ObjectSettings,
+    Pieces,
+    Rivals,
+    Vocabulary,
+    object_factor,
+    object_pieces,
+)
 from avlmaps.query.modalities.sound import (
     SoundSettings,
     read_clip,
@@ -110,7 +119,12 @@ class AVLMap:
         """
         part = Part(Modality.OBJECT, word, _role(primary))
         encoder = self.stored.profile.pixel_encoder()
-        rivals = self._rivals_of(encoder, vocabulary)
+        if vocabulary is None and self._rivals is None and loops.is_plain() and isinstance(encoder, NamedPixelEncoder):
+            # One question: most voxels have too little of the word to be compared with all others.
+            self.stored.require_model(Kind.PIXELS)
+            rivals = Vocabulary.encoded(encoder, encoder.vocabulary)
+        else:
+            rivals = self._rivals_of(encoder, vocabulary)
         settings, voxels = self.settings, self.stored.voxels
         return Heatmap.of(
             object_factor(

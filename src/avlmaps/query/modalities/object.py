@@ -4,8 +4,10 @@ As in the paper, the queried word competes with a vocabulary and with "other" fo
 is the closest. The map stores the margin by which it wins: it ranks instances and decides absence.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from jaxtyping import Bool, Float, Float16, Float32, Int, UInt8
@@ -62,6 +64,10 @@ class ObjectSettings:
     join_m: float = 0.3
     """Pieces over one another with no larger gap in height are one thing (the legs and the back of a chair)."""
 
+    def share_of_rival(self, with_uncertain: bool) -> float:
+        """Return the part of its best rival's score from which a voxel may count; 1 where it must win."""
+        return min(1.0, self.score_in_company) if with_uncertain else 1.0
+
     def for_guess(self) -> "ObjectSettings":
         """Return the settings under which weaker voxels count."""
         return replace(self, score_in_company=self.score_for_guess, least_score_in_company=self.least_for_guess)
@@ -98,40 +104,30 @@ class EncodedWord:
 
 
 @dataclass(frozen=True, slots=True)
-class Rivals:
-    """The two words of a vocabulary closest to each voxel, computed once a map and vocabulary.
-
-    With the best two stored, a query is one pass over the features even if the queried word is in the vocabulary.
+class Vocabulary:
+    """The words that compete for voxels with a queried one.
 
     Attributes:
         words: the vocabulary and, if the encoder has a feature for it, ``other`` as the last.
         word_feature: unit vectors.
         understood: what of each word the encoder acts on.
         has_other: whether ``other`` is among them.
-        best: highest score; −inf where there is no word at all.
-        best_word: whose that is, −1 for nobody.
-        second: next highest score.
-        second_word: whose that is.
     """
 
     words: tuple[str, ...]
     word_feature: Float32[np.ndarray, "v d"]
     understood: tuple[str, ...]
     has_other: bool
-    best: Float32[np.ndarray, " n"]
-    best_word: Int[np.ndarray, " n"]
-    second: Float32[np.ndarray, " n"]
-    second_word: Int[np.ndarray, " n"]
 
     @classmethod
-    def of(cls, feature: Float16[np.ndarray, "n d"], encoder: PixelEncoder, vocabulary: Sequence[str]) -> "Rivals":
-        """Score every voxel against a vocabulary; words of which the encoder understands nothing are left out."""
+    def encoded(cls, encoder: PixelEncoder, vocabulary: Sequence[str]) -> "Vocabulary":
+        """Encode a vocabulary and ``other``; words of which the encoder understands nothing are left out."""
         names = [*dict.fromkeys(word for word in vocabulary if word != "other"), "other"]
         encoded = np.asarray(encoder.encode_words(names), np.float32)
         known = np.any(encoded != 0.0, axis=1)
         words = tuple(word for word, is_known in zip(names, known, strict=True) if is_known)
         understood = tuple(encoder.understood(word) for word in words)
-        return cls(words, encoded[known], understood, bool(known[-1]), *loops.two_closest(feature, encoded[known]))
+        return Vocabulary(words, encoded[known], understood, bool(known[-1]))
 
     def silent_for(self, encoder: PixelEncoder, encoded: "EncodedWord", cosine: float) -> Bool[np.ndarray, " v"]:
         """Return which words do not compete because they name the queried thing; ``other`` always competes."""
@@ -143,6 +139,36 @@ class Rivals:
         if self.has_other:
             silent[-1] = False
         return silent
+
+
+@dataclass(frozen=True, slots=True)
+class Rivals(Vocabulary):
+    """A vocabulary, and its two words closest to each voxel, computed once a map and vocabulary.
+
+    With the best two stored, a query is one pass over the features even if the queried word is in the vocabulary.
+
+    Attributes:
+        best: highest score; −inf where there is no word at all.
+        best_word: whose that is, −1 for nobody.
+        second: next highest score.
+        second_word: whose that is.
+    """
+
+    best: Float32[np.ndarray, " n"]
+    best_word: Int[np.ndarray, " n"]
+    second: Float32[np.ndarray, " n"]
+    second_word: Int[np.ndarray, " n"]
+
+    @classmethod
+    def of(cls, feature: Float16[np.ndarray, "n d"], encoder: PixelEncoder, vocabulary: Sequence[str]) -> "Rivals":
+        """Score every voxel against a vocabulary; words of which the encoder understands nothing are left out."""
+        return cls.among(feature, Vocabulary.encoded(encoder, vocabulary))
+
+    @classmethod
+    def among(cls, feature: Float16[np.ndarray, "n d"], rivals: Vocabulary) -> "Rivals":
+        """Score voxels against an encoded vocabulary."""
+        closest = loops.two_closest(feature, rivals.word_feature)
+        return cls(rivals.words, rivals.word_feature, rivals.understood, rivals.has_other, *closest)
 
 
 def object_margins(
@@ -226,7 +252,7 @@ def object_factor(
     space: Space,
     feature: Float16[np.ndarray, "n d"],
     encoder: PixelEncoder,
-    rivals: Rivals,
+    rivals: Vocabulary,
     part: Part,
     settings: ObjectSettings,
     heat: HeatSettings,
@@ -235,6 +261,17 @@ def object_factor(
     """Return the heat of the object that a word names; if no confidence suffices, of the best guesses, not ``found``.
 
     With the voxels' colours, an encoder that knows things but no colours is helped out with those.
+
+    Args:
+        space: the map's voxels.
+        feature: theirs.
+        encoder: that made them.
+        rivals: what competes. Without the two words closest to each voxel (a ``Vocabulary`` only), the encoder is one
+            of names and these are all its names: then voxels with little of the word are not compared with the rivals.
+        part: of the query.
+        settings: from the word to instances.
+        heat: how fast it falls.
+        rgb: colours of the voxels.
 
     Raises:
         QueryError: the encoder understands nothing of the word.
@@ -255,10 +292,12 @@ def object_factor(
             f"The pixel encoder {encoder.card.id} understands nothing of {part.query!r}; it knows: {known}."
             + (f" ({encoder.card.note})" if encoder.card.note else "")
         )
-    scored = object_scores(feature, encoder, rivals, encoded, settings)
+    scored = _scored_once(feature, encoder, rivals, encoded, settings)
 
     def things(with_uncertain: bool, chosen: ObjectSettings = settings) -> NearThings:
-        pieces = pieces_of(space, encoder, encoded, scored, chosen, with_uncertain)
+        pieces = pieces_of(
+            space, encoder, encoded, scored(chosen.share_of_rival(with_uncertain)), chosen, with_uncertain
+        )
         if tint is not None and rgb is not None:
             share = tinted_share(rgb, pieces.mask, pieces.instance, tint)
             pieces = replace(pieces, confidence=pieces.confidence * share)
@@ -354,6 +393,47 @@ def object_scores(
     """Return ``object_margins`` of a word."""
     silent = rivals.silent_for(encoder, encoded, settings.same_word_cosine)
     return object_margins(feature, rivals, encoded.rows, silent, settings.least_score)
+
+
+def _scored_once(
+    feature: Float16[np.ndarray, "n d"],
+    encoder: PixelEncoder,
+    rivals: Vocabulary,
+    encoded: EncodedWord,
+    settings: ObjectSettings,
+) -> Callable[[float], tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]]]:
+    """Return what gives ``object_margins`` of a word for voxels that score at least a share of their best rival."""
+    if isinstance(rivals, Rivals):
+        scored = object_scores(feature, encoder, rivals, encoded, settings)
+        return lambda share: scored
+    score = loops.feature_scores(feature, encoded.rows)
+    silent = rivals.silent_for(encoder, encoded, settings.same_word_cosine)
+
+    @cache
+    def margins(share: float) -> tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
+        margin = np.full(len(score), np.finfo(np.float32).min)
+        rows = np.flatnonzero(score > least_score_to_count(len(rivals.words), share))
+        some = np.ascontiguousarray(feature[rows])
+        margin[rows], _ = object_margins(
+            some, Rivals.among(some, rivals), encoded.rows, silent, settings.least_score
+        )  # fmt: skip
+        return margin, score
+
+    return margins
+
+
+def least_score_to_count(names: int, share: float) -> float:
+    """Return a score that every voxel exceeds which scores at least a share of its best rival, for a closed set.
+
+    The squared scores of all names are probabilities. What is left by the word, p, and by the names that do not compete
+    because it clearly means them, at most p / ``CLEARLY_MEANT``, is divided among the rivals: the best of them has at
+    least (1 − p / ``CLEARLY_MEANT``) / names. Features are rounded to float16; a tenth is ample for that.
+
+    Args:
+        names: how many compete, the queried one counted.
+        share: of the best rival's score, at most 1.
+    """
+    return 0.9 * share / math.sqrt(names + 1.0 / CLEARLY_MEANT)
 
 
 def pieces_of(
