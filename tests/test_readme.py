@@ -32,7 +32,7 @@ def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_the_readmes_commands_are_verbs() -> None:
-    from avlmaps.cli.main import VERBS
+    from avlmaps.cli.verbs import VERBS
 
     used = set(re.findall(r"^\s+avlmaps ([a-z-]+)", README, re.MULTILINE))
     assert used and used <= VERBS.keys()

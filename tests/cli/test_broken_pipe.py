@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps.cli.main import VERBS
+from avlmaps.cli.verbs import VERBS
 
 READER_GONE = 141
 

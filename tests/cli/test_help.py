@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps.cli.main import VERBS
+from avlmaps.cli.verbs import VERBS
 
 SNAPSHOTS = Path(__file__).parent / "snapshots"
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps.cli.main import VERBS
 from avlmaps.cli.verb import Verb
+from avlmaps.cli.verbs import VERBS
 from avlmaps.core import errors
 
 ERRORS = (

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from avlmaps.cli.model_options import models_in_force
 from avlmaps.cli.query import Query
-from avlmaps.cli.verb import models_in_force
 from avlmaps.core.registry import Backend, Kind, find, forget_loaded
 from avlmaps.perception.models.availability import availability, how_to_get, is_here
 from avlmaps.perception.models.published_models import PUBLISHED

@@ -13,8 +13,8 @@ from avlmaps.bench.indexing import IndexingSettings
 from avlmaps.bench.navigation import NavigationSettings
 from avlmaps.cli.bench import Indexing, Navigation
 from avlmaps.cli.go import Chat
-from avlmaps.cli.main import VERBS
 from avlmaps.cli.verb import ModelVerb, Verb
+from avlmaps.cli.verbs import VERBS
 from avlmaps.demo.run import run_demo
 from avlmaps.language.chat.settings import ChatSettings
 from avlmaps.maps.fusion.sensor import SensorName

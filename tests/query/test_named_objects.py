@@ -214,7 +214,7 @@ def test_a_guess_among_weaker_voxels_can_be_turned_off() -> None:
     assert not object_factor(SPACE, feature, ENCODER, rivals, part, settings, HeatSettings()).mask.any()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     st.sampled_from(sorted(MEANT)),
     st.sampled_from([0.02, 0.1, 0.5, 5.0]),
@@ -240,7 +240,7 @@ def test_voxels_with_little_of_the_word_need_no_comparison(
             assert (one.found, one.note, one.understood) == (other.found, other.note, other.understood)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.integers(2, 200), st.floats(0.01, 1.0), st.sampled_from([0.003, 0.03, 0.3, 30.0]), st.integers(0, 2**32 - 1))
 def test_what_reaches_a_share_of_its_best_rival_is_above_the_least_score(
     names: int, share: float, evenness: float, seed: int

@@ -5,65 +5,24 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stderr
-from typing import Annotated, Any, Union
+from typing import TYPE_CHECKING
 
-import tyro
-
-from avlmaps.cli.add_sounds import AddSounds
-from avlmaps.cli.bench import Bench
-from avlmaps.cli.build import Build
-from avlmaps.cli.demo import Demo
-from avlmaps.cli.export import Export
-from avlmaps.cli.go import Go
-from avlmaps.cli.import_map import ImportMap
-from avlmaps.cli.info import Info
-from avlmaps.cli.locate import Locate
+from avlmaps.cli.model_options import models_in_force
 from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_of, system_sentence
 from avlmaps.cli.pipes import READER_GONE, drop, reader_gone
-from avlmaps.cli.profiles import Profiles
-from avlmaps.cli.query import Query
-from avlmaps.cli.record import Record
-from avlmaps.cli.serve import Serve
-from avlmaps.cli.shell import Shell
+from avlmaps.cli.plain_query import PlainQuery, read_plain_query
 from avlmaps.cli.shortened_files import end_at_shortened_files
-from avlmaps.cli.teach_sound import TeachSound
-from avlmaps.cli.things import Things
-from avlmaps.cli.usage import CONFIG, usage_sentence
-from avlmaps.cli.verb import Verb, models_in_force
-from avlmaps.cli.view import View
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars
 
-_DESCRIPTION = """Audio-Visual-Language Maps: one 3D map of what a robot saw and recorded, which you query with words.
-
-Every verb takes --json (one JSON object on standard output) and --help. Progress goes to standard error.
-Exit status: 0 done, 1 a known error (one sentence says which), 2 a wrong command line.
-With --json an error is {"error": {"kind": ..., "message": ...}} on standard output."""
+if TYPE_CHECKING:
+    from avlmaps.cli.verb import Verb
 
 # The language asks for files in words that fit every program; here an option names them.
 _ATTACHED = {
     "Which picture? Attach it": "Which picture? Give it with --image FILE",
     "Which recording? Attach it": "Which recording? Give it with --sound-clip FILE",
-}
-VERBS: dict[str, type[Verb]] = {
-    "demo": Demo,
-    "record": Record,
-    "add-sounds": AddSounds,
-    "build": Build,
-    "import-map": ImportMap,
-    "info": Info,
-    "query": Query,
-    "things": Things,
-    "shell": Shell,
-    "view": View,
-    "export": Export,
-    "locate": Locate,
-    "go": Go,
-    "serve": Serve,
-    "teach-sound": TeachSound,
-    "profiles": Profiles,
-    "bench": Bench,
 }
 
 
@@ -99,9 +58,12 @@ def _main(words: list[str]) -> None:
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # avlmaps reports a truncated picture in its own words
-    shortly = not words or words[0].startswith("-")
-    with _usage_in_json() if _wants_json(words) else nullcontext():
-        verb = tyro.cli(_any_verb(shortly), prog="avlmaps", description=_DESCRIPTION, args=words, config=CONFIG)
+    verb = read_plain_query(words)
+    if verb is None:
+        with _usage_in_json() if _wants_json(words) else nullcontext():
+            from avlmaps.cli.verbs import read_command
+
+            verb = read_command(words)
     sys.exit(_run(verb))
 
 
@@ -120,21 +82,13 @@ def _usage_in_json() -> Iterator[None]:
     except SystemExit as stop:
         sys.stderr.write(complaints.getvalue())
         if stop.code not in (0, None):
+            from avlmaps.cli.usage import usage_sentence
+
             _emit_error("usage", usage_sentence(complaints.getvalue()))
         raise
 
 
-def _any_verb(shortly: bool) -> Any:
-    """Return the union of the verbs; the list of them all shows one line of each."""
-
-    def described(name: str, verb: type[Verb]) -> Any:
-        first_line = (verb.__doc__ or "").partition("\n")[0]
-        return Annotated[verb, tyro.conf.subcommand(name, description=first_line if shortly else None)]
-
-    return Union[tuple(described(name, verb) for name, verb in VERBS.items())]  # noqa: UP007 - made at run time
-
-
-def _run(verb: Verb) -> int:
+def _run(verb: "Verb | PlainQuery") -> int:
     end_at_shortened_files(as_json=verb.json)
     try:
         with models_in_force(verb), _compiling(verb):
@@ -162,7 +116,7 @@ def _run(verb: Verb) -> int:
     return 0
 
 
-def _compiling(verb: Verb) -> AbstractContextManager[None]:
+def _compiling(verb: "Verb | PlainQuery") -> AbstractContextManager[None]:
     if not verb.compiles:
         return nullcontext()
     from avlmaps.core.compiling import announce_compiling
@@ -170,7 +124,7 @@ def _compiling(verb: Verb) -> AbstractContextManager[None]:
     return announce_compiling()
 
 
-def _fail(verb: Verb, error: BaseException, message: str, status: int) -> int:
+def _fail(verb: "Verb | PlainQuery", error: BaseException, message: str, status: int) -> int:
     """Print an error in one sentence on standard error, and as JSON on standard output with --json."""
     for said, option in _ATTACHED.items():
         message = message.replace(said, option)

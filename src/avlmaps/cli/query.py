@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.locate import camera_of
-from avlmaps.cli.output import UsageError, emit, place, table_lines
+from avlmaps.cli.one_thing import answer_thing, is_small, named_thing
+from avlmaps.cli.output import UsageError, emit, query_lines
 from avlmaps.cli.verb import ModelVerb
 
 if TYPE_CHECKING:
@@ -66,8 +67,7 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
         verb: the query.
         opened: the map, where it is open already.
     """
-    from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.rules import query_settings
+    from avlmaps.query.avlmap import AVLMap, QuerySettings
 
     parts = _parts(verb)
     only_files = all(part.is_file for part in parts)
@@ -78,14 +78,15 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
         )
     if verb.top < 1:
         raise UsageError(f"--top is {verb.top}; it must be 1 or more.")
-    settings = query_settings(verb.rules)
+    settings = QuerySettings()
+    if verb.rules != "ours":
+        from avlmaps.query.rules import query_settings
+
+        settings = query_settings(verb.rules)
     avlmap = AVLMap.open(verb.map, settings) if opened is None else _by_rules(opened, settings)
     thing = _thing_alone(verb, avlmap, parts)
-    if thing is not None and opened is None and verb.plot is None and len(avlmap.stored.voxels) <= _SMALL_MAP:
-        from avlmaps.query.loops import plain_loops
-
-        with plain_loops():  # loading the compiled loops would take longer than the question
-            return {**avlmap.ask(thing, top=verb.top).to_json()}
+    if thing is not None and opened is None and verb.plot is None and is_small(avlmap):
+        return answer_thing(thing, avlmap, verb.top)
     from avlmaps.core.compiling import announce_compiling
 
     with announce_compiling():
@@ -94,21 +95,13 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
 
 def _thing_alone(verb: "Query", avlmap: "AVLMap", parts: "list[Part]") -> "Question | None":
     """Return the question for one thing and nothing else: no sentence need be read for a name that is known."""
-    from avlmaps.core.lexicon import Kind, lexicon
-    from avlmaps.core.question import Modality, Part, Question
-    from avlmaps.perception.protocols import NamedPixelEncoder
+    from avlmaps.core.question import Modality, Question
 
     if verb.intrinsics is not None or verb.primary not in (None, "object"):
         return None
     if not verb.sentence:
         return Question.of(parts) if [part.modality for part in parts] == [Modality.OBJECT] else None
-    if parts or "pixels" not in avlmap.stored.info.models:
-        return None
-    encoder = avlmap.stored.profile.pixel_encoder()
-    is_name = isinstance(encoder, NamedPixelEncoder) and verb.sentence in encoder.vocabulary
-    # Stairs are a thing and an area; which is meant is for the reader to say.
-    is_name = is_name and {entry.kind for entry in lexicon().senses(verb.sentence)} == {Kind.THING}
-    return Question.of([Part(Modality.OBJECT, verb.sentence)]) if is_name else None
+    return None if parts else named_thing(verb.sentence, avlmap)
 
 
 def _answer(verb: "Query", avlmap: "AVLMap", parts: "list[Part]", thing: "Question | None") -> dict[str, Any]:
@@ -127,9 +120,6 @@ def _by_rules(opened: "AVLMap", settings: "QuerySettings") -> "AVLMap":
     from avlmaps.query.avlmap import AVLMap
 
     return opened if opened.settings == settings else AVLMap(opened.stored, settings)
-
-
-_SMALL_MAP = 400_000  # voxels; plain NumPy takes 0.1 s for them
 
 
 def _asked_in_words(verb: "Query", avlmap: "AVLMap") -> dict[str, Any]:
@@ -188,19 +178,3 @@ def _camera_for(picture: Path | None, intrinsics: str | None) -> "Pinhole | None
 
     height, width = read_picture(picture).shape[:2]
     return camera_of(intrinsics, width, height)
-
-
-def query_lines(answer: dict[str, Any]) -> list[str]:
-    """Lay out the answer of `query`."""
-    parts = ", ".join(f"{part['modality']} {part['query']!r} ({part['role']})" for part in answer["parts"])
-    lines = [f"query: {parts}"]
-    lines += [f"note: {part['note']}" for part in answer["parts"] if part.get("note")]
-    rows = [
-        (i, place(goal["position"]), f"{goal['score']:.2f}", " x ".join(f"{side:.2f}" for side in goal["size"]))
-        for i, goal in enumerate(answer["goals"], start=1)
-    ]
-    lines += [f"note: {note}" for note in answer.get("notes", [])]
-    lines += [f"count: {answer['count']}"] if "count" in answer else []
-    lines.append("found" if answer["found"] else "not found here" + (": the best guesses are" if rows else ""))
-    lines += table_lines(("", f"place ({answer['frame']} frame)", "score", "size in m"), rows) if rows else []
-    return [*lines, f"wrote {answer['plot']}"] if "plot" in answer else lines

@@ -15,7 +15,7 @@ from avlmaps.cli import locate as locating
 from avlmaps.cli import query as querying
 from avlmaps.cli import things as listing
 from avlmaps.cli.info import Info, describe_path, info_lines, plot_named
-from avlmaps.cli.output import UsageError
+from avlmaps.cli.output import UsageError, query_lines
 from avlmaps.cli.usage import read_verb
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.printable import printable
@@ -162,7 +162,7 @@ class Session:
     def _ask(self, query: querying.Query) -> Reply:
         answer = querying.ask(query, self.opened)
         self._last = query
-        return Reply(answer, querying.query_lines(answer))
+        return Reply(answer, query_lines(answer))
 
     def query(self, rest: str) -> Reply:
         """Query in parts, or by a sentence."""

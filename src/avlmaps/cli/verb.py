@@ -1,9 +1,6 @@
 """The options of every verb, and of every verb that runs models."""
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
@@ -37,35 +34,3 @@ class ModelVerb(Verb):
         Literal["auto", "float32", "float16", "bfloat16"] | None, arg(metavar="auto|float32|float16|bfloat16")
     ] = None
     """Precision of large models. Default: AVLMAPS_PRECISION, or float16 on CUDA and float32 elsewhere."""
-
-
-@contextmanager
-def models_in_force(verb: Verb) -> Iterator[None]:
-    """Load models as a verb's words say while it runs, here and in processes that it starts."""
-    given = {
-        "folder": getattr(verb, "models", None),
-        "device": getattr(verb, "device", None),
-        "precision": getattr(verb, "precision", None),
-        "batch": getattr(verb, "batch", None),
-    }
-    given = {name: value for name, value in given.items() if value is not None}
-    if not given:
-        yield
-        return
-    from avlmaps.perception.models.settings import environment_of, model_settings, using_models
-
-    if "folder" in given:
-        given["folder"] = given["folder"].expanduser().absolute()
-    settings = replace(model_settings(), **given)
-    variables = environment_of(settings)
-    before = {name: os.environ.get(name) for name in variables}
-    with using_models(settings):
-        os.environ.update(variables)
-        try:
-            yield
-        finally:
-            for name, value in before.items():
-                if value is None:
-                    del os.environ[name]
-                else:
-                    os.environ[name] = value

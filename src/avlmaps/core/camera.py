@@ -3,7 +3,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
+
+from avlmaps.core.arrays import Float
 
 # Focal lengths and principal points beyond this many image sizes are mistakes, and would overflow further on.
 _MOST_SIZES = 1e6

@@ -6,8 +6,8 @@ Quaternions are x y z w. Batches are leading axes.
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
 
+from avlmaps.core.arrays import Float
 from avlmaps.core.errors import RecordingError
 
 # A rotation read from a file may be this far from orthonormal (largest entry of RᵀR − I) and still be

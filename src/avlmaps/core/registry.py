@@ -10,11 +10,13 @@ import importlib
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache, partial
-from importlib.metadata import entry_points
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from avlmaps.core.errors import BackendError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoints
 
 ENTRY_POINT_GROUP = "avlmaps.backends"
 
@@ -176,6 +178,13 @@ _OF_TORCH = (
 _registered: dict[tuple[Kind, str], Backend] = {(b.kind, b.name): b for b in (*_BUILT_IN, *_LIGHT, *_OF_TORCH)}
 
 
+def entry_points(group: str) -> "EntryPoints":
+    """Return the entry points of a group; the module that finds them is loaded when a name is not built in."""
+    from importlib import metadata
+
+    return metadata.entry_points(group=group)
+
+
 def register(backend: Backend) -> None:
     """Add a backend for this process (a notebook's, a test's); packages use the entry point."""
     _registered[backend.kind, backend.name] = backend
@@ -213,6 +222,8 @@ def forget_loaded() -> None:
 
 def find(kind: Kind, name: str) -> Backend:
     """Return the registry's entry of that kind and name (without ``@model``), or raise ``BackendError``."""
+    if (kind, name) in _registered:  # installed packages need not be searched
+        return _registered[kind, name]
     known = {b.name: b for b in backends() if b.kind == kind}
     if name not in known:
         raise BackendError(

@@ -3,7 +3,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float16, Float32, Float64, Int32, Int64, UInt8
+
+from avlmaps.core.arrays import Float16, Float32, Float64, Int32, Int64, UInt8
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Float32, Int, UInt8
 
+from avlmaps.core.arrays import Float, Float32, Int, UInt8
 from avlmaps.perception.room_contents import RoomContents
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
@@ -265,7 +265,7 @@ class PlaceEncoder(Protocol):
 
     card: ModelCard
 
-    def fit(self, local: Sequence[LocalFeatures], rng: np.random.Generator) -> dict[str, np.ndarray]:
+    def fit(self, local: Sequence[LocalFeatures], rng: "np.random.Generator") -> dict[str, np.ndarray]:
         """Learn from the map's own keyframes (VLAD: the visual words); the map stores the returned arrays.
 
         What has learnt from others' pictures before returns none.

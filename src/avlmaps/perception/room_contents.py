@@ -6,7 +6,8 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
-from jaxtyping import Float64
+
+from avlmaps.core.arrays import Float64
 
 TABLE = "room_contents.csv"
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from jaxtyping import Bool, Float32, Int, UInt8
 
+from avlmaps.core.arrays import Bool, Float32, Int, UInt8
 from avlmaps.perception.embedded.colours import COLOURS, ColourWords
 
 # An instance is of a colour where this share of its voxels is; handles, shade and edges are of others.

@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
 
+from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Float, Float32, Int
 
+from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.query.factors import FOUND_AT, Factor, NearThings, lead_of
 
 if TYPE_CHECKING:

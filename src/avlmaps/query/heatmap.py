@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
 import numpy as np
-from jaxtyping import Float32
 
+from avlmaps.core.arrays import Float32
 from avlmaps.core.question import Modality
 from avlmaps.query.factors import Factor, lead_of
 from avlmaps.query.goals import Goal, Shares, find_goals, is_found, share_voxels

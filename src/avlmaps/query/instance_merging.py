@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
 
+from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.query.factors import NearThings
-from avlmaps.query.loops import connected
+from avlmaps.query.loops import connected, distinct
 
 _SPECK_M2 = 0.0199  # a guess shows at least as much surface as a mug
 
@@ -36,14 +36,14 @@ def merge_instances(
     column -= column.min(axis=0, initial=0)
     cell = column[:, 0] * (column[:, 1].max(initial=0) + 1) + column[:, 1]
     cells = int(cell.max(initial=0)) + 1
-    columns = np.bincount(np.unique(instance * cells + cell) // cells, minlength=count)
+    columns = np.bincount(distinct(instance * cells + cell) // cells, minlength=count)
     order = np.lexsort((points_level[:, 2], cell))
     below, above = order[:-1], order[1:]
     near = (cell[below] == cell[above]) & (points_level[above, 2] - points_level[below, 2] <= join_m)
     meeting = near & (instance[below] != instance[above])
     a, b = np.sort(np.stack([instance[below], instance[above]])[:, meeting], axis=0)
     pairs, pair = np.unique(a * count + b, return_inverse=True)
-    times = np.bincount(np.unique(pair * cells + cell[below][meeting]) // cells, minlength=len(pairs))  # in columns
+    times = np.bincount(distinct(pair * cells + cell[below][meeting]) // cells, minlength=len(pairs))  # in columns
     a, b = np.divmod(pairs, max(count, 1))
     same = 2 * times >= np.minimum(columns[a], columns[b])
     return connected(count, a[same], b[same])

@@ -10,7 +10,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 
 import numpy as np
-from jaxtyping import Bool, Float16, Float32, Int, Int64
+
+from avlmaps.core.arrays import Bool, Float16, Float32, Int, Int64
 
 _CHUNK = 16_384
 # Rows that are widened at once in plain NumPy: they stay in the processor's cache.
@@ -177,3 +178,9 @@ def connected(count: int, a: Int[np.ndarray, " e"], b: Int[np.ndarray, " e"]) ->
         np.minimum.at(root, np.maximum(one, other)[apart], np.minimum(one, other)[apart])
         while (root[root] != root).any():
             root = root[root]
+
+
+def distinct(values: Int[np.ndarray, " n"]) -> Int[np.ndarray, " d"]:
+    """Return the distinct values, ascending, as ``np.unique`` does; that loads ``numpy.ma`` to compare with."""
+    ordered = np.sort(values)
+    return ordered[np.append(True, ordered[1:] != ordered[:-1])] if len(ordered) else ordered

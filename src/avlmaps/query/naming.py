@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from jaxtyping import Float, Float32, Int
 
+from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, ScaledEncoder
 

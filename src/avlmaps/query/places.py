@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import numpy as np
-from jaxtyping import Float, Int
 from msgspec import Meta
 
+from avlmaps.core.arrays import Float, Int
 from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME
 from avlmaps.core.question import Modality, Part, Role

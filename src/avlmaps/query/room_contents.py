@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 
 import numpy as np
-from jaxtyping import Float, Float64
 
+from avlmaps.core.arrays import Float, Float64
 from avlmaps.core.lexicon import Entry, Kind, lexicon
 from avlmaps.perception.room_contents import RoomContents
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
 
+from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.perception.room_contents import RoomContents
 from avlmaps.query.factors import NearAnchors
 from avlmaps.query.floor_plan import CELL_M, FloorPlan

@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.maps.grid import GridSpec
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from avlmaps.core.arrays import Float
 from avlmaps.core.errors import AudioError
 
 LOWEST_RATE_HZ = 1000

@@ -1,8 +1,8 @@
 """Seeing the depth camera's picture through the colour camera."""
 
 import numpy as np
-from jaxtyping import Float32
 
+from avlmaps.core.arrays import Float32
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.poses import apply
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
 
+from avlmaps.core.arrays import Bool, Float, UInt8
 from avlmaps.core.camera import Rig
 from avlmaps.recordings.audio import AudioTrack
 

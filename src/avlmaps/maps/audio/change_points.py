@@ -13,8 +13,8 @@ place half a window away.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float32, Int
 
+from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.progress import progress
 from avlmaps.perception.protocols import FrameSoundEncoder

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Complex64, Float32
 
+from avlmaps.core.arrays import Complex64, Float32
 from avlmaps.recordings.audio import Sound
 
 _WINDOW_S = 0.032

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float32
 
+from avlmaps.core.arrays import Float32
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.progress import progress, say
 from avlmaps.maps.audio.change_points import ChangeSettings, frames_of_track, split_at_changes

@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from jaxtyping import Float32, Int64
 
+from avlmaps.core.arrays import Float32, Int64
 from avlmaps.recordings.audio import Sound
 
 HOP_S = 0.01

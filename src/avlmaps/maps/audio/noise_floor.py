@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float32
 
+from avlmaps.core.arrays import Float32
 from avlmaps.maps.audio.filterbank import HOP_S, band_lines
 
 _BLOCK_FRAMES = 50

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float32
 
+from avlmaps.core.arrays import Float32
 from avlmaps.core.errors import AudioError
 from avlmaps.maps.audio.filterbank import band_powers, hop_samples
 from avlmaps.maps.audio.noise_floor import NoiseFloor, find_noise_floor

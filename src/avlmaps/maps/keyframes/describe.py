@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float16, Float32, Int, Int64, UInt8
 
+from avlmaps.core.arrays import Float, Float16, Float32, Int, Int64, UInt8
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.progress import progress
 from avlmaps.maps.keyframes.keypoint_depth import lift_keypoints, middle_of_view
@@ -117,7 +117,7 @@ def perceive_keyframes(
     recording: Recording,
     indices: Sequence[int] | Int[np.ndarray, " k"],
     profile: Profile,
-    rng: np.random.Generator,
+    rng: "np.random.Generator",
     progress: Callable[..., Iterable[int]] = progress,
     settings: KeyframeSettings = KeyframeSettings(),
 ) -> tuple[Keyframes, dict[str, np.ndarray]]:
@@ -146,7 +146,7 @@ def learn_places(
     recording: Recording,
     indices: Sequence[int] | Int[np.ndarray, " k"],
     profile: Profile,
-    rng: np.random.Generator,
+    rng: "np.random.Generator",
 ) -> tuple[dict[str, np.ndarray], dict[int, LocalFeatures]]:
     """Let the place encoder learn from keyframes spread over the walk.
 

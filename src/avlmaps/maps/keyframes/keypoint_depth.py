@@ -1,9 +1,9 @@
 """Giving keypoints of the colour picture their 3D points, from the depth camera."""
 
 import numpy as np
-from jaxtyping import Float, Float32
 from numpy.lib.stride_tricks import sliding_window_view
 
+from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.poses import apply, inverse
 from avlmaps.recordings.registration import depth_in_colour
 from avlmaps.recordings.types import Frame

@@ -5,8 +5,8 @@ from typing import Literal
 
 import msgspec
 import numpy as np
-from jaxtyping import Float
 
+from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import MANIFEST_BYTES, decode_json, read_regular, write_bytes_atomically

@@ -7,8 +7,8 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from jaxtyping import Float
 
+from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.poses import FRAME, rotation_to_level

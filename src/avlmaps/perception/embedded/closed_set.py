@@ -4,9 +4,9 @@ from functools import cached_property
 from typing import cast
 
 import numpy as np
-from jaxtyping import Float32
 
 from avlmaps.core import lexicon as words_known
+from avlmaps.core.arrays import Float32
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.embedded.codes import word_codes
 from avlmaps.perception.embedded.meanings import Meanings

@@ -9,8 +9,8 @@ as fusion makes it, is still one from which the probabilities can be read back.
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float, Float32
 
+from avlmaps.core.arrays import Float, Float32
 from avlmaps.perception.protocols import WordEncoder
 
 

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Float32, UInt8
 
+from avlmaps.core.arrays import Float, Float32, UInt8
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.types import Frame
 

@@ -5,8 +5,8 @@ heights are heights, however the camera was held.
 """
 
 import numpy as np
-from jaxtyping import Float, Float32
 
+from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.camera import Pinhole
 
 CHANNELS = 8

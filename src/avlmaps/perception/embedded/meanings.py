@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float32
 
+from avlmaps.core.arrays import Float32
 from avlmaps.core.lexicon import Entry, Kind, lexicon, noun_of
 from avlmaps.perception.protocols import WordEncoder
 
@@ -56,9 +56,8 @@ class Meanings:
     def name_weights(self, phrase: str) -> Float32[np.ndarray, " k"]:
         """Return for each name how much the phrase means it, 1 for the most meant; all zero where it means none."""
         clean = _clean(phrase)
-        exact = np.array([clean in called for called in self.called], np.float32)
-        if exact.any():
-            return exact
+        if clean in self._exactly:
+            return self._all_of(self._exactly[clean])
         if clean in self.kinds:
             return self._all_of(self.kinds[clean])
         known = lexicon()
@@ -122,6 +121,15 @@ class Meanings:
             return np.zeros(len(self.names), np.float32)
         share = np.exp((cosine - best) / self.temperature)
         return np.where(share >= self.least_share, share, 0.0).astype(np.float32)
+
+    @cached_property
+    def _exactly(self) -> dict[str, list[str]]:
+        """The names that each phrase stands for."""
+        out: dict[str, list[str]] = {}
+        for name, called in zip(self.names, self.called, strict=True):
+            for phrase in called:
+                out.setdefault(phrase, []).append(name)
+        return out
 
     @cached_property
     def _flat(self) -> list[str]:

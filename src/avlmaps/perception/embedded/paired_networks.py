@@ -11,8 +11,8 @@ from functools import cache
 from hashlib import sha256
 
 import numpy as np
-from jaxtyping import Float32
 
+from avlmaps.core.arrays import Float32
 from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, Notes, SceneNetwork, Seen, load_network
 from avlmaps.recordings.types import Frame
 

@@ -15,8 +15,8 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from jaxtyping import Float, Float32, UInt8
 
+from avlmaps.core.arrays import Float, Float32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.embedded.geometry import channels

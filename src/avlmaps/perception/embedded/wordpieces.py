@@ -3,6 +3,7 @@
 import re
 import unicodedata
 from collections.abc import Mapping
+from operator import methodcaller
 
 # Said around what is meant: "please find a picture of the ..."; taken off the front, again and again.
 _FILLER = re.compile(
@@ -56,8 +57,8 @@ class WordPieces:
     """
 
     def __init__(self, entries: list[str]) -> None:
-        self.rows = {entry: row for row, entry in enumerate(entries)}
-        self.longest_run = max((entry.count(" ") + 1 for entry in entries), default=1)
+        self.rows = dict(zip(entries, range(len(entries)), strict=True))
+        self.longest_run = max(map(methodcaller("count", " "), entries), default=0) + 1
 
     def rows_of_word(self, word: str) -> list[int]:
         """Return the rows of one word, greedily the longest piece first; none if a part of it is not known.

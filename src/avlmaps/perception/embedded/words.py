@@ -15,8 +15,8 @@ from io import BytesIO
 from types import MappingProxyType
 
 import numpy as np
-from jaxtyping import Float32, Int8
 
+from avlmaps.core.arrays import Float32, Int8
 from avlmaps.core.errors import BackendError, QueryError
 from avlmaps.perception.embedded.wordpieces import WordPieces, clean_phrase, replace_aliases
 from avlmaps.perception.protocols import ModelCard

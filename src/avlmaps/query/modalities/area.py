@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Float32, Int
 
+from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Part, Role
 from avlmaps.maps.types import Keyframes

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from jaxtyping import Bool, Float, Float16, Float32, Int, UInt8
 
+from avlmaps.core.arrays import Bool, Float, Float16, Float32, Int, UInt8
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Part

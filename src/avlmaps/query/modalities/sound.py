@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Float32
 
+from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.errors import AudioError, QueryError
 from avlmaps.core.question import Part
 from avlmaps.maps.types import HeardSounds

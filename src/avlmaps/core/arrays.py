@@ -1,0 +1,64 @@
+"""Array types with shapes, as jaxtyping declares them: ``Float32[np.ndarray, "n 3"]``.
+
+Nothing checks shapes at run time but tests, which load jaxtyping first and get its own types here. Elsewhere its import
+would take as long as NumPy's own, so stand-ins take their place: they hold the declaration, which
+``maps.store.array_validation`` compares files with. Modules that a query of one word needs import the types from here.
+"""
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING or "jaxtyping" in sys.modules:
+    from jaxtyping import Bool as Bool
+    from jaxtyping import Complex64 as Complex64
+    from jaxtyping import Float as Float
+    from jaxtyping import Float16 as Float16
+    from jaxtyping import Float32 as Float32
+    from jaxtyping import Float64 as Float64
+    from jaxtyping import Int as Int
+    from jaxtyping import Int8 as Int8
+    from jaxtyping import Int32 as Int32
+    from jaxtyping import Int64 as Int64
+    from jaxtyping import UInt8 as UInt8
+else:
+
+    class Declared:
+        """An array type of a shape.
+
+        Attributes:
+            dtypes: names of the types of number that fit.
+            dim_str: the shape, a letter or a number an axis.
+        """
+
+        __slots__ = ("dim_str", "dtypes")
+
+        def __init__(self, dtypes: tuple[str, ...], dim_str: str) -> None:
+            self.dtypes = dtypes
+            self.dim_str = dim_str.strip()
+
+        def __call__(self) -> None:
+            """Make nothing: ``typing`` accepts as a type what can be called."""
+            raise TypeError("an array type declares; make arrays with NumPy")
+
+        def __or__(self, other: object) -> object:
+            """Return a type that allows another one, too, and declares no shape."""
+            return Any
+
+        __ror__ = __or__
+
+    class _Numbers:
+        """What ``Float32`` and the like are: given an array's class and a shape, a type."""
+
+        __slots__ = ("dtypes",)
+
+        def __init__(self, *dtypes: str) -> None:
+            self.dtypes = dtypes
+
+        def __getitem__(self, declared: tuple[type, str]) -> Declared:
+            return Declared(self.dtypes, declared[1])
+
+    Bool, Complex64 = _Numbers("bool"), _Numbers("complex64")
+    Float16, Float32, Float64 = _Numbers("float16"), _Numbers("float32"), _Numbers("float64")
+    Int8, Int32, Int64, UInt8 = _Numbers("int8"), _Numbers("int32"), _Numbers("int64"), _Numbers("uint8")
+    Float = _Numbers("float16", "float32", "float64")
+    Int = _Numbers("int8", "int16", "int32", "int64")
