@@ -100,9 +100,13 @@ class AVLMap:
 
         return cls(open_stored(Path(path)), settings)
 
-    @cached_property
+    @property
     def space(self) -> Space:
         """The voxels' places, shared by all heatmaps of this map."""
+        return self._space
+
+    @cached_property
+    def _space(self) -> Space:
         return Space(self.stored.grid, self.stored.voxels.index, self.stored.up_in_world, self.stored)
 
     def object(self, word: str, primary: bool = False, vocabulary: Sequence[str] | None = None) -> Heatmap:
