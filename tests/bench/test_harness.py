@@ -148,7 +148,7 @@ def test_every_row_of_the_papers_tables_is_there():
 
 
 def test_choices_made_on_a_scene_are_named_beside_it():
-    assert "AreaSettings.pool_m" in chosen_on(["house:1000001:held-out", "house:1000011:held-out"])
+    assert "RoomSettings.views_m" in chosen_on(["house:1000001:held-out", "house:1000011:held-out"])
     assert "(on 1 of the 2 scenes)" in chosen_on(["house:1000001:held-out", "house:1000011:held-out"])
     assert chosen_on(["house:1000011:held-out"]) == ""
 

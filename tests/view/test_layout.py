@@ -81,7 +81,7 @@ def test_palettes_have_256_colours_each(labels: Labels) -> None:
 
 
 def test_the_likeliest_name_of_a_voxel_is_that_of_all_voxels(room: AVLMap) -> None:
-    namer = VoxelNamer(room)
+    namer = VoxelNamer(room.stored)
     number, confidence = namer.best()
     for row in range(0, len(number), 997):
         named = namer.likeliest(row)
@@ -101,10 +101,10 @@ def test_a_keyframe_saw_what_stood_open_before_it_and_nothing_behind_a_wall(room
     cells = np.floor(along / room.space.grid.voxel_size_m).astype(int)
     first = cells[np.flatnonzero(room.space.holds(cells))[0]]
     row = int(np.flatnonzero((np.asarray(room.space.index) == first).all(axis=1))[0])
-    assert number in keyframes_that_saw(room, row)
+    assert number in keyframes_that_saw(room.stored, room.space, row)
     behind = int(np.argmin((room.points - start) @ ahead))
     assert ((room.points[behind] - start) @ ahead) < 0
-    assert number not in keyframes_that_saw(room, behind)
+    assert number not in keyframes_that_saw(room.stored, room.space, behind)
 
 
 def test_a_space_holds_its_own_cells_and_no_others(room: AVLMap) -> None:

@@ -21,7 +21,7 @@ from avlmaps.query.answer import Answer, PartAnswer
 from avlmaps.query.factors import Factor, HeatSettings, NearAnchors, NearThings
 from avlmaps.query.floor_plan import FloorPlan, storeys
 from avlmaps.query.heatmap import Heatmap, product
-from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor
+from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor, area_names, name_shares
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
 from avlmaps.query.modalities.object import (
     EncodedWord,
@@ -39,7 +39,7 @@ from avlmaps.query.modalities.sound import (
     sound_factor,
     sound_features,
 )
-from avlmaps.query.rooms import NamedVoxels, Rooms, voting_rows
+from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, voting_rows
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import Sound
 
@@ -100,13 +100,9 @@ class AVLMap:
 
         return cls(open_stored(Path(path)), settings)
 
-    @property
+    @cached_property
     def space(self) -> Space:
         """The voxels' places, shared by all heatmaps of this map."""
-        return self._space
-
-    @cached_property
-    def _space(self) -> Space:
         return Space(self.stored.grid, self.stored.voxels.index, self.stored.up_in_world, self.stored)
 
     def object(self, word: str, primary: bool = False, vocabulary: Sequence[str] | None = None) -> Heatmap:
@@ -195,7 +191,7 @@ class AVLMap:
         """Return the rooms of the map, those with most views first; see ``contents.find_rooms``."""
         from avlmaps.query.contents import find_rooms
 
-        return find_rooms(self.stored, self.space, self.settings.areas, least_confidence, self.room_votes)
+        return find_rooms(self.stored, self.space, self.settings.areas, least_confidence, self.room_field)
 
     @property
     def points(self) -> Float[np.ndarray, "n 3"]:
@@ -305,12 +301,28 @@ class AVLMap:
         plan = FloorPlan.of(self.space, storeys(known, cameras), places)
         return None if plan is None else Rooms(plan, places, self._voting_voxels, settings.rooms)
 
+    @cached_property
+    def room_field(self) -> RoomField | None:
+        """How likely each place is each kind of room that the view encoder knows; None where there are no votes.
+
+        Raises:
+            BackendError: the map's profile has no view encoder.
+            MapError: the map was built with another encoder than is installed.
+        """
+        votes = self.room_votes
+        if votes is None:
+            return None
+        encoder = self.stored.profile.view_encoder()
+        self.stored.require_model(Kind.VIEWS)
+        view = np.asarray(self.stored.keyframes.view)
+        return votes.field(area_names(encoder), name_shares(view, encoder, self.settings.areas))
+
     def _voting_voxels(self) -> NamedVoxels | None:
         """Return the voxels whose names vote on kinds of room; None where the map holds no probabilities of names."""
         from avlmaps.query.naming import VoxelNamer
 
         try:
-            namer = VoxelNamer(self)
+            namer = VoxelNamer(self.stored)
         except (BackendError, MapError):  # no features of things, or those of another encoder: views vote alone
             return None
         if not namer.calibrated or not namer.names:

@@ -15,15 +15,14 @@ from avlmaps.core.arrays import Float, Int, UInt8
 from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME
 from avlmaps.core.registry import Kind
-from avlmaps.perception.protocols import NamedViewEncoder
-from avlmaps.query.modalities.area import AREA_NAMES, AreaSettings, area_distribution, modes, room_field
+from avlmaps.query.modalities.area import AreaSettings, area_names, modes, pooled_name_shares
 from avlmaps.query.modalities.object import Pieces
 from avlmaps.query.modalities.sound import sound_features
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
-    from avlmaps.query.rooms import Rooms
+    from avlmaps.query.rooms import RoomField
     from avlmaps.query.schema import ContentsAnswer, RoomAnswer, SoundAnswer, ThingAnswer
 
 Watch = Callable[[str, int, int], object]
@@ -257,12 +256,12 @@ def find_rooms(
     space: Space,
     settings: AreaSettings,
     least_confidence: float = 0.0,
-    votes: "Rooms | None" = None,
+    field: "RoomField | None" = None,
 ) -> list[Room]:
     """Return the rooms of a map, those with most views first.
 
     A room is a region of the floor with one likeliest name that walls and other rooms bound, and the keyframes that
-    looked into it. Without votes it is a group of keyframes with one likeliest name whose views' places lie close to
+    looked into it. Without a field it is a group of keyframes with one likeliest name whose views' places lie close to
     one another.
 
     Args:
@@ -270,7 +269,7 @@ def find_rooms(
         space: its voxels' places.
         settings: how views are scored and grouped.
         least_confidence: rooms below it are left out, in [0, 1].
-        votes: on the kind of room of each place; without them only the views vote.
+        field: how likely each place is each kind of room; without it only the views vote.
 
     Raises:
         BackendError: the map's profile has no view encoder.
@@ -279,18 +278,15 @@ def find_rooms(
         return []
     encoder = stored.profile.view_encoder()
     stored.require_model(Kind.VIEWS)
-    names = encoder.names if isinstance(encoder, NamedViewEncoder) else AREA_NAMES
+    names = area_names(encoder)
     places = np.asarray(stored.keyframes.centre, np.float64).reshape(-1, 3)
-    view = np.asarray(stored.keyframes.view)
-    if votes is None:
-        share = area_distribution(view, encoder, names, settings, places)
-        likeliest = share.argmax(axis=1)
+    if field is None:
+        share = pooled_name_shares(np.asarray(stored.keyframes.view), encoder, settings, places)
         group = _groups_of_views(space.level(places)[:, :2], share, settings.link_m)
     else:
-        field = room_field(view, encoder, names, settings, votes)
         cells = field.plan.cells_of(places)
-        share, likeliest = field.share[cells], field.share[cells].argmax(axis=1)
-        group = field.regions()[cells]
+        share, group = field.share[cells], field.regions()[cells]
+    likeliest = share.argmax(axis=1)
     rooms: list[Room] = []
     for number in np.unique(group):
         members = np.flatnonzero(group == number)

@@ -1,7 +1,7 @@
 """What a voxel is taken for: the likeliest names, and which keyframes saw it."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,44 +18,24 @@ _NEAR_M, _FAR_M = 0.1, 8.0  # from how far a keyframe counts as having seen a vo
 _OWN_VOXELS = 1.5  # a ray ends this far before the voxel itself, in voxels
 
 
-class NamedMap(Protocol):
-    """What naming needs of a map: ``AVLMap`` is one."""
-
-    @property
-    def stored(self) -> "StoredMap":
-        """The map as it lies on the disk."""
-        ...
-
-    @property
-    def space(self) -> "Space":
-        """The voxels' places."""
-        ...
-
-    @property
-    def points(self) -> Float[np.ndarray, "n 3"]:
-        """The middles of the voxels, metres, recording frame."""
-        ...
-
-
 class VoxelNamer:
     """Names voxels by the pixel encoder's vocabulary.
 
     Attributes:
-        avlmap: the map.
         names: what it distinguishes.
         calibrated: whether confidences are probabilities; else they are cosines.
     """
 
-    def __init__(self, avlmap: NamedMap, vocabulary: Sequence[str] | None = None) -> None:
+    def __init__(self, stored: "StoredMap", vocabulary: Sequence[str] | None = None) -> None:
         """Take the encoder's names, or a vocabulary for one that has none of its own.
 
         Raises:
             BackendError: the map's profile has no pixel encoder.
             MapError: the map was built with another encoder than is installed.
         """
-        self.avlmap = avlmap
-        encoder = avlmap.stored.profile.pixel_encoder()
-        avlmap.stored.require_model(Kind.PIXELS)
+        self._voxels = stored.voxels
+        encoder = stored.profile.pixel_encoder()
+        stored.require_model(Kind.PIXELS)
         self._named = isinstance(encoder, NamedPixelEncoder)
         self._scale = float(encoder.logit_scale) if isinstance(encoder, ScaledEncoder) and not self._named else None
         if isinstance(encoder, NamedPixelEncoder):
@@ -74,7 +54,7 @@ class VoxelNamer:
         Args:
             rows: numbers of the voxels in the map.
         """
-        feature = np.asarray(self.avlmap.stored.voxels.feature[rows], np.float32)
+        feature = np.asarray(self._voxels.feature[rows], np.float32)
         score = feature @ self._columns if len(self.names) else np.zeros((len(rows), 0), np.float32)
         if self._named:
             return np.square(np.clip(score, 0.0, 1.0))
@@ -93,7 +73,7 @@ class VoxelNamer:
 
     def best(self) -> tuple[Int[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
         """Return for every voxel the number of its likeliest name (-1 for none) and its confidence."""
-        n = len(self.avlmap.space)
+        n = len(self._voxels)
         number, confidence = np.full(n, -1, np.int64), np.zeros(n, np.float32)
         for start in range(0, n if self.names else 0, _CHUNK):
             rows = np.arange(start, min(start + _CHUNK, n))
@@ -103,18 +83,18 @@ class VoxelNamer:
         return number, confidence
 
 
-def keyframes_that_saw(avlmap: NamedMap, row: int) -> Int[np.ndarray, " k"]:
+def keyframes_that_saw(stored: "StoredMap", space: "Space", row: int) -> Int[np.ndarray, " k"]:
     """Return the keyframes that had a voxel in view with nothing of the map in between, the nearest first.
 
     Args:
-        avlmap: the map.
+        stored: the map.
+        space: its voxels' places.
         row: number of the voxel in the map.
     """
-    stored, grid = avlmap.stored, avlmap.space.grid
     poses = np.asarray(stored.keyframes.world_from_camera, np.float64)
     if not len(poses):
         return np.zeros(0, np.int64)
-    point = avlmap.points[row]
+    point = space.centres[row]
     away = point - poses[:, :3, 3]
     at = np.einsum("kji,kj->ki", poses[:, :3, :3], away)
     distance_m = np.linalg.norm(away, axis=1)
@@ -124,16 +104,15 @@ def keyframes_that_saw(avlmap: NamedMap, row: int) -> Int[np.ndarray, " k"]:
     inside = (at[:, 2] > _NEAR_M) & (distance_m < _FAR_M)
     inside &= np.all((pixel >= 0) & (pixel <= [camera.width, camera.height]), axis=1)
     candidates = np.flatnonzero(inside)
-    step_m = 0.5 * grid.voxel_size_m
-    seen = [k for k in candidates if _is_free(avlmap, poses[k, :3, 3], point, step_m)]
+    seen = [k for k in candidates if _is_free(space, poses[k, :3, 3], point)]
     return np.array(sorted(seen, key=lambda k: float(distance_m[k])), np.int64)
 
 
-def _is_free(avlmap: NamedMap, start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"], step_m: float) -> bool:
+def _is_free(space: "Space", start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"]) -> bool:
     """Return whether no voxel of the map lies on the line between a camera and a voxel."""
-    length_m = float(np.linalg.norm(end - start)) - _OWN_VOXELS * avlmap.space.grid.voxel_size_m
-    if length_m <= 0.0:
+    voxel_m = space.grid.voxel_size_m
+    whole_m = float(np.linalg.norm(end - start))
+    if whole_m <= _OWN_VOXELS * voxel_m:
         return True
-    along = np.arange(step_m, length_m, step_m)[:, None] / float(np.linalg.norm(end - start))
-    cells = np.floor((start + along * (end - start)) / avlmap.space.grid.voxel_size_m).astype(np.int64)
-    return not avlmap.space.holds(cells).any()
+    along = np.arange(0.5 * voxel_m, whole_m - _OWN_VOXELS * voxel_m, 0.5 * voxel_m)[:, None] / whole_m
+    return not space.holds(np.floor((start + along * (end - start)) / voxel_m).astype(np.int64)).any()

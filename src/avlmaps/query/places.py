@@ -9,9 +9,8 @@ from avlmaps.core.arrays import Float, Int
 from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME
 from avlmaps.core.question import Modality, Part, Role
-from avlmaps.perception.protocols import NamedViewEncoder
 from avlmaps.query.factors import NearThings
-from avlmaps.query.modalities.area import AREA_NAMES, area_distribution, room_field
+from avlmaps.query.modalities.area import area_names, pooled_name_shares
 from avlmaps.query.naming import VoxelNamer, keyframes_that_saw
 from avlmaps.query.schema import Frame, Position
 
@@ -119,7 +118,7 @@ def _names(avlmap: "AVLMap", rows: Int[np.ndarray, " m"]) -> list[NameScore]:
     """Return the names with the highest mean confidence over some voxels."""
     if not len(rows) or "pixels" not in avlmap.stored.info.models:
         return []
-    namer = VoxelNamer(avlmap)
+    namer = VoxelNamer(avlmap.stored)
     confidence = namer.confidences(rows)
     some = confidence[confidence.any(axis=1)]
     if not len(some):
@@ -134,18 +133,18 @@ def _rooms(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[NameScore]:
     if "views" not in stored.info.models or not len(stored.keyframes):
         return []
     encoder = stored.profile.view_encoder()
-    names = encoder.names if isinstance(encoder, NamedViewEncoder) else AREA_NAMES
+    names, field = area_names(encoder), avlmap.room_field
     places = np.asarray(stored.keyframes.centre, np.float64).reshape(-1, 3)
     space = avlmap.space
     away = np.linalg.norm(space.level(places)[:, :2] - space.level(point)[:2], axis=1)
     near = np.argsort(away, kind="stable")[:_MOST_VIEWS]
     if away[near[0]] > _FAR_M:
         return []
-    view, settings, votes = np.asarray(stored.keyframes.view), avlmap.settings.areas, avlmap.room_votes
-    if votes is None:
-        share = area_distribution(view, encoder, names, settings, places)[near].mean(axis=0)
+    if field is not None:
+        share = field.at(point[None])[0].astype(np.float64)
     else:
-        share = room_field(view, encoder, names, settings, votes).at(point[None])[0].astype(np.float64)
+        view = np.asarray(stored.keyframes.view)
+        share = pooled_name_shares(view, encoder, avlmap.settings.areas, places)[near].mean(axis=0)
     order = np.argsort(-share, kind="stable")[:3]
     return [{"name": names[i], "confidence": round(float(np.clip(share[i], 0.0, 1.0)), 3)} for i in order]
 
@@ -161,7 +160,7 @@ def _views(avlmap: "AVLMap", row: int) -> list[ViewOfPlace]:
             "camera": [float(value) for value in cameras[k]],
             "distance_m": float(np.linalg.norm(point - cameras[k])),
         }
-        for k in keyframes_that_saw(avlmap, row)[:_MOST_VIEWS]
+        for k in keyframes_that_saw(avlmap.stored, avlmap.space, row)[:_MOST_VIEWS]
     ]
 
 

@@ -159,7 +159,7 @@ def _name_labels(
     """Give every voxel its likeliest name; where there are more than 255, the rarest are left out."""
     n = len(avlmap.space)
     try:
-        namer = VoxelNamer(avlmap)
+        namer = VoxelNamer(avlmap.stored)
         number, confidence = namer.best()
     except AvlmapsError as fault:
         notes.append(str(fault))

@@ -66,11 +66,11 @@ class MapOnPage:
         names: list[tuple[str, float]] = []
         note, calibrated = "", True
         try:
-            self._namer = self._namer or VoxelNamer(avlmap)
+            self._namer = self._namer or VoxelNamer(avlmap.stored)
             names, calibrated = self._namer.likeliest(row), self._namer.calibrated
         except AvlmapsError as fault:
             note = str(fault)
-        views = keyframes_that_saw(avlmap, row)
+        views = keyframes_that_saw(avlmap.stored, avlmap.space, row)
         voxels = avlmap.stored.voxels
         thing = self._thing_at(row)
         return {

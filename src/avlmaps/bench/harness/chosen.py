@@ -6,8 +6,8 @@ from collections.abc import Sequence
 _CHOICES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("the weight by distance in fusion", ("house:1000000:held-out",)),
     (
-        "how views are pooled (AreaSettings.pool_m), the limits of unsure instances (ObjectSettings.least_in_company, "
-        "score_in_company) and the settings of photos by colour (PhotometricSettings)",
+        "how far a view's vote spreads (RoomSettings.views_m), the limits of unsure instances (ObjectSettings."
+        "least_in_company, score_in_company) and the settings of photos by colour (PhotometricSettings)",
         tuple(f"house:{seed}:held-out" for seed in range(1_000_000, 1_000_005)),
     ),
     (

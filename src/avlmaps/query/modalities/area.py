@@ -120,68 +120,53 @@ def view_shares(
         settings: how.
     """
     if isinstance(encoder, NamedViewEncoder):
-        share = np.square(np.asarray(view, np.float64).reshape(-1, encoder.codes.shape[1]) @ encoder.codes.T)
+        share = _named_shares(view, encoder)
         weights = np.asarray(encoder.name_weights(name), np.float64)
         return ViewShares(encoder.names, share, weights, np.clip(share @ weights, 0.0, 1.0))
     others = [area for area in AREA_NAMES if not same_place(area, name)]
     words = np.asarray(encoder.encode_words([name, *others]), np.float64)
     apart = words - words.mean(axis=0) if isinstance(encoder, ScaledEncoder) else words
     competes = np.r_[True, _cosine(apart[1:], apart[0]) < settings.same_word_cosine]
-    cosine = np.asarray(view, np.float64).reshape(-1, words.shape[1]) @ words[competes].T
-    logits = cosine / _temperature(encoder, settings)
-    weight = np.exp(logits - logits.max(axis=1, keepdims=True, initial=-np.inf))
+    cosine = _cosines(view, words[competes])
     kinds = tuple(kind for kind, does in zip([name, *others], competes, strict=True) if does)
-    share = weight / weight.sum(axis=1, keepdims=True)
-    return ViewShares(kinds, share, np.eye(1, weight.shape[1])[0], cosine[:, 0])
+    return ViewShares(kinds, _softmax(cosine, encoder, settings), np.eye(1, len(kinds))[0], cosine[:, 0])
 
 
-def area_distribution(
-    view: Float32[np.ndarray, "k d"],
-    encoder: ViewEncoder,
-    names: Sequence[str],
-    settings: AreaSettings,
-    places: Float[np.ndarray, "k 3"],
+def area_names(encoder: ViewEncoder) -> tuple[str, ...]:
+    """Return the kinds of area that compete where none is queried: the encoder's own, or ``AREA_NAMES``."""
+    return encoder.names if isinstance(encoder, NamedViewEncoder) else AREA_NAMES
+
+
+def name_shares(
+    view: Float32[np.ndarray, "k d"], encoder: ViewEncoder, settings: AreaSettings
 ) -> Float[np.ndarray, "k n"]:
-    """Return for each keyframe how likely each kind of area is; rows add up to 1.
+    """Return how likely each view shows each of ``area_names``; rows add up to 1.
 
     Args:
         view: features.
         encoder: that made them.
-        names: kinds of area; those of the encoder, where it has names of its own.
+        settings: temperature.
+    """
+    if isinstance(encoder, NamedViewEncoder):
+        share = _named_shares(view, encoder)
+        return share / np.maximum(share.sum(axis=1, keepdims=True), 1e-12)
+    words = np.asarray(encoder.encode_words(list(AREA_NAMES)), np.float64)
+    return _softmax(_cosines(view, words), encoder, settings)
+
+
+def pooled_name_shares(
+    view: Float32[np.ndarray, "k d"], encoder: ViewEncoder, settings: AreaSettings, places: Float[np.ndarray, "k 3"]
+) -> Float[np.ndarray, "k n"]:
+    """Return ``name_shares``, pooled over views that looked at about the same place where the settings say so.
+
+    Args:
+        view: features.
+        encoder: that made them.
         settings: temperature and pooling.
         places: middle of what each keyframe saw, metres.
     """
-    share = _shares_of(view, encoder, names, settings)
+    share = name_shares(view, encoder, settings)
     return pool_posteriors(share, places, settings.pool_m) if settings.pool_m > 0.0 and len(share) else share
-
-
-def room_field(
-    view: Float32[np.ndarray, "k d"], encoder: ViewEncoder, names: Sequence[str], settings: AreaSettings, rooms: Rooms
-) -> RoomField:
-    """Return how likely each place of a map is each kind of area.
-
-    Args:
-        view: features of the keyframes.
-        encoder: that made them.
-        names: kinds of area; those of the encoder, where it has names of its own.
-        settings: temperature.
-        rooms: of the map.
-    """
-    return rooms.field(names, _shares_of(view, encoder, names, settings))
-
-
-def _shares_of(
-    view: Float32[np.ndarray, "k d"], encoder: ViewEncoder, names: Sequence[str], settings: AreaSettings
-) -> Float[np.ndarray, "k n"]:
-    """Return how likely each view shows each of some names; rows add up to 1."""
-    rows = np.asarray(view, np.float64)
-    if isinstance(encoder, NamedViewEncoder):
-        share = np.square(rows.reshape(-1, encoder.codes.shape[1]) @ encoder.codes.T)
-    else:
-        words = np.asarray(encoder.encode_words(list(names)), np.float64)
-        logits = rows.reshape(-1, words.shape[1]) @ words.T / _temperature(encoder, settings)
-        share = np.exp(logits - logits.max(axis=1, keepdims=True, initial=-np.inf))
-    return share / np.maximum(share.sum(axis=1, keepdims=True), 1e-12)
 
 
 def pool_posteriors(
@@ -232,6 +217,23 @@ def same_place(area: str, asked: str) -> bool:
 def _cosine(rows: Float[np.ndarray, "n d"], row: Float[np.ndarray, " d"]) -> Float[np.ndarray, " n"]:
     """Return the cosine of each row with one; 0 where either is zero."""
     return rows @ row / np.maximum(np.linalg.norm(rows, axis=1) * np.linalg.norm(row), 1e-12)
+
+
+def _named_shares(view: Float32[np.ndarray, "k d"], encoder: NamedViewEncoder) -> Float[np.ndarray, "k n"]:
+    """Return the probability of each of the encoder's names for each view."""
+    return np.square(np.asarray(view, np.float64).reshape(-1, encoder.codes.shape[1]) @ encoder.codes.T)
+
+
+def _cosines(view: Float32[np.ndarray, "k d"], words: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "k n"]:
+    return np.asarray(view, np.float64).reshape(-1, words.shape[1]) @ words.T
+
+
+def _softmax(
+    cosine: Float[np.ndarray, "k n"], encoder: ViewEncoder, settings: AreaSettings
+) -> Float[np.ndarray, "k n"]:
+    logits = cosine / _temperature(encoder, settings)
+    weight = np.exp(logits - logits.max(axis=1, keepdims=True, initial=-np.inf))
+    return weight / weight.sum(axis=1, keepdims=True)
 
 
 def _temperature(encoder: ViewEncoder, settings: AreaSettings) -> float:
