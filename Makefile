@@ -39,7 +39,7 @@ demo: $(READY)  ## Make a home, walk it, hear it, map it, ask it; pictures land 
 	@echo "For the command avlmaps in this shell: source $(VENV)/bin/activate"
 
 test: $(READY)  ## Run every test (offline, two cores, no GPU).
-	$(RUN)/python -m pytest -n 3 --dist loadfile
+	$(RUN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder
 
 test-fast: $(READY)  ## Run the quick tests: core, imports, laws of the query, planner, help (under a minute).
 	$(RUN)/python -m pytest -q -n 2 --dist loadfile -m "not slow and not shared" $(FAST)

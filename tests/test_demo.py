@@ -111,6 +111,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> DemoReport:
     return run_demo(out, seed=0, scene=small_flat(), settings=settings)
 
 
+@pytest.mark.slow
 def test_the_whole_demonstration_runs_on_a_small_flat(small: DemoReport) -> None:
     told = small.to_json()
     assert list(told) == [

@@ -29,6 +29,7 @@ def test_photos_of_other_places_can_be_given() -> None:
     assert table["rows"][1][2:5] == [3, "no", 0.0]
 
 
+@pytest.mark.slow
 @pytest.mark.shared
 def test_half_of_the_red_kitchen_locates_the_other_half(shared_data: Path) -> None:
     """The issue's figures, in the first half of the walk; `avlmaps bench locate` asks everywhere."""

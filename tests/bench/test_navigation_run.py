@@ -218,6 +218,7 @@ def shown(episodes: list[Episode]) -> list[tuple[object, ...]]:
     return [(e.mission, e.configuration, e.commands, e.legs) for e in episodes]
 
 
+@pytest.mark.slow
 def test_a_run_that_was_broken_off_goes_on_and_ends_with_the_same_tables(tmp_path: Path):
     first = run(small_settings(), tmp_path, opener([]))  # pyright: ignore[reportArgumentType]
     true = [leg for e in first.episodes if e.configuration == CEILING for leg in e.legs if leg.reachable]

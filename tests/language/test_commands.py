@@ -45,6 +45,7 @@ SPEAKERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SPEAKERS)
 def test_many_speakers_stay_understood(name: str) -> None:
     found = counts([judge(row) for row in read_list(LISTS / name)])

@@ -244,6 +244,7 @@ def test_spans_cover_every_wanted_frame_once(frames: int, step: int, per_part: i
     assert all(len(range(*span)) <= per_part for span in spans)
 
 
+@pytest.mark.slow
 def test_parts_of_several_machines_make_the_whole(tmp_path: Path) -> None:
     walk = Walk(20, bad=(5,))
     folders = [tmp_path / name for name in ("late", "early", "middle")]

@@ -15,6 +15,7 @@ def measured(*arguments: object) -> dict[str, float]:
     return json.loads(ran.stdout)["rows"][0]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="measures the resident set as Linux counts it")
 def test_peak_memory_follows_the_voxels_and_not_the_frames():
     once, often = measured(), measured("--rounds", 5)

@@ -122,6 +122,7 @@ class SlowCorners(Corners):
         return super().encode(rgb)
 
 
+@pytest.mark.slow
 def test_keyframes_are_read_looked_at_and_described_side_by_side(tmp_path: Path) -> None:
     register(Backend(Kind.VIEWS, "slow", f"{__name__}:SlowViews"))
     register(Backend(Kind.LOCAL, "slow", f"{__name__}:SlowCorners"))

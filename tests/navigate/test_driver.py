@@ -49,6 +49,7 @@ def test_it_is_a_driver():
 @given(
     goals=st.lists(PLACES, min_size=1, max_size=4), smooth=st.booleans(), on_contact=st.sampled_from(["stop", "slide"])
 )
+@pytest.mark.slow
 def test_by_a_true_map_it_touches_nothing_and_arrival_means_being_there(goals, smooth, on_contact):
     driver = driver_in(BUILDING, VELOCITY if smooth else None, on_contact=on_contact)
     for goal in goals:

@@ -322,6 +322,7 @@ def beats(robot: FakeRobot, namespace: str = "") -> list[str]:
     return [message["data"] for message in robot.published(f"{namespace}/avlmaps/heartbeat")]
 
 
+@pytest.mark.slow
 def test_heartbeats_name_the_active_goal_and_end_with_it(robot):
     robot.does[""] = "drive on"
     clock = Clock()

@@ -123,6 +123,7 @@ def test_the_pose_is_that_of_the_camera_that_took_the_photo() -> None:
     assert_at(found, frame.world_from_camera @ inverse(APART), cm=1.0)
 
 
+@pytest.mark.slow
 def test_two_hundred_pictures_of_other_places_are_refused(stored: MapOfPictures) -> None:
     other = RoomWalk(frames=40, seed=99)
     pictures = [other.frame(i).rgb for i in range(40)]

@@ -107,6 +107,7 @@ def test_every_end_of_the_server_leaves_no_goal(serve: Started, number: signal.S
             assert process.wait(60) == 0
 
 
+@pytest.mark.slow
 def test_a_robot_that_cannot_be_reached_starts_no_server(room: Path, tmp_path: Path) -> None:
     file = tmp_path / "robot.json"
     file.write_text('{"robot": "nav2", "ros": "ws://127.0.0.1:9"}')
