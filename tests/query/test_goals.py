@@ -4,10 +4,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from query_fakes import UP, furnished_map, keyframes_at, sounds_of
 
+from avlmaps.bench.harness.factors import VoxelHeat
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.factors import NearAnchors, NearThings
+from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.area import AreaSettings, modes
 from avlmaps.query.voxel_space import Space
@@ -101,6 +103,43 @@ def test_a_goal_is_on_the_thing_where_the_context_ends_beside_it(reach_m) -> Non
     heat = Heatmap.of(chair) * Heatmap.of(sound)
     for goal in heat.goals():
         assert goal.position[0] == pytest.approx(0.175)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_thing_is_as_far_in_a_region_as_its_voxels_are(seed) -> None:
+    """Heat beside it, behind a wall for example, changes nothing."""
+    rng = np.random.default_rng(seed)
+    voxels = np.unique(rng.integers(0, 20, (300, 3)), axis=0).astype(np.int32)
+    space = Space(GridSpec(0.05), voxels, np.array([0.0, 0.0, 1.0]))
+    mask, region = rng.random(len(voxels)) < 0.3, rng.random(len(voxels)).astype(np.float32)
+    mask[:3] = True
+    instance = rng.integers(0, 3, mask.sum())
+    instance[:3] = 0, 1, 2
+    confidence = rng.uniform(0.5, 1.0, 3)
+    thing = NearThings(space, Part(Modality.OBJECT, "x", Role.PRIMARY), 2.0, mask, instance, confidence, True)
+
+    def goals(inside: np.ndarray) -> list[Goal]:
+        area = VoxelHeat(space, Part(Modality.AREA, "y"), inside, regional=True)
+        return (Heatmap.of(thing) * Heatmap.of(area)).goals(top=3)
+
+    wanted = [confidence[k] * region[mask][instance == k].mean() for k in range(3)]
+    assert sorted(goal.score for goal in goals(region)) == pytest.approx(sorted(wanted), abs=0.001)
+    beside = np.where(mask, region, np.float32(1.0))
+    assert [(goal.position, goal.score) for goal in goals(beside)] == [
+        (goal.position, goal.score) for goal in goals(region)
+    ]
+
+
+def test_of_two_regions_both_count_and_a_sound_as_before() -> None:
+    m = AVLMap(furnished_map(sounds=sounds_of([track(0.3, 0.6, length_m=0.2)], [0.9])))
+    thing = m.object("chair", primary=True)
+    even = [Heatmap.of(VoxelHeat(m.space, Part(Modality.AREA, "y"), np.full(len(m.space), share, np.float32),
+                                 regional=True)) for share in (0.5, 0.8)]  # fmt: skip
+    plain, with_regions = thing * m.sound("dog"), thing * m.sound("dog") * even[0] * even[1]
+    assert [goal.position for goal in with_regions.goals()] == [goal.position for goal in plain.goals()]
+    assert [goal.score for goal in with_regions.goals()] == pytest.approx(
+        [0.4 * goal.score for goal in plain.goals()], abs=0.002
+    )
 
 
 def test_a_sound_alone_is_put_where_it_was_heard_not_at_any_height() -> None:

@@ -54,6 +54,8 @@ class Factor(ABC):
         understood: what the encoder could act on.
         note: one sentence on why it was not found, or ``""``.
         flat: whether the heat is the same at every height.
+        regional: whether the heat says in which region a place lies, not how near it is: a thing lies in one region,
+            so the mean over its voxels counts (``goals.share_voxels``).
     """
 
     space: Space
@@ -66,6 +68,7 @@ class Factor(ABC):
     understood: str
     note: str
     flat: bool
+    regional: bool = False
 
     @abstractmethod
     def heat_and_anchors(
@@ -231,6 +234,19 @@ class NearAnchors(Factor):
             cones = self.scores - self.falloff_per_m * np.hypot(away[..., 0], away[..., 1])
             heat[a : a + several] = np.maximum(cones.max(axis=1), 0.0)
         return heat
+
+
+def product_of(factors: Sequence[Factor]) -> Float32[np.ndarray, " n"]:
+    """Return the product of the heat of one or more factors at every voxel.
+
+    The lead comes first, as it falls fastest: other factors are computed where it leaves heat.
+    """
+    lead = lead_of(factors)
+    heat = lead.values
+    for factor in factors:
+        if factor is not lead:
+            heat = heat * factor.among(heat > 0.0)
+    return heat
 
 
 def lead_of(factors: Sequence[Factor]) -> Factor:

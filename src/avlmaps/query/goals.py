@@ -4,6 +4,9 @@ The lead factor is the primary one. Its instances divide the heated voxels among
 to the instance that its lead heat comes from. A goal lies where the product is highest in an instance's share. On a
 thing it is the middle of the part that is nearly as hot, so that one stray voxel at its edge does not decide where
 the robot goes.
+
+Where a region is part of the query ("the chair in the kitchen"), an instance is as far in it as its voxels are on
+average: its highest heat would be that of a voxel beside it, at the other side of a wall.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Int
-from avlmaps.query.factors import FOUND_AT, Factor, NearThings, lead_of
+from avlmaps.query.factors import FOUND_AT, Factor, NearThings, lead_of, product_of
 
 if TYPE_CHECKING:
     from avlmaps.query.schema import GoalAnswer
@@ -35,7 +38,8 @@ class Goal:
 
     Attributes:
         position: metres, world: on the object if the primary part is one, else the sound position or the camera's.
-        score: in [0, 1]: the heat there times the confidence that the primary thing matches the query.
+        score: in [0, 1]: the heat there times the confidence that the primary thing matches the query. Of the heat of
+            a region ("in the kitchen") it is the mean over the thing.
         size: extent of the instance along the axes of the level frame (x and y horizontal, z up), metres. For an
             object its voxels' box; for a sound or an area the box of the places it was heard or seen from.
         parts: heat of each modality there; a second part of a modality is called ``object_2`` and so on.
@@ -65,7 +69,7 @@ class Shares:
         rows: the map's rows of those that are voxels; they come first.
         heat: the product there.
         instance: whose share.
-        peak: (instances,) highest heat in each share.
+        peak: (instances,) highest heat in each share; that of a region is averaged over the instance's voxels.
     """
 
     lead: Factor
@@ -103,9 +107,29 @@ def share_voxels(factors: Sequence[Factor], values: Callable[[], Float32[np.ndar
         for factor in factors:
             at_anchors *= factor.at(lead.anchors)
         heat, instance = np.append(heat, at_anchors), np.append(instance, lead.instance)
-    peak = np.zeros(len(lead.confidence))
+    regions = [factor for factor in factors if factor.regional]
+    if regions and isinstance(lead, NearThings):
+        return Shares(lead, rows, heat, instance, _peak_in_regions(lead, factors, regions))
+    return Shares(lead, rows, heat, instance, _highest(instance, heat, len(lead.confidence)))
+
+
+def _peak_in_regions(lead: NearThings, factors: Sequence[Factor], regions: Sequence[Factor]) -> Float[np.ndarray, " i"]:
+    """Return the highest heat that each instance has without the regions', times the mean of theirs over its voxels."""
+    count = len(lead.confidence)
+    others = product_of([factor for factor in factors if not factor.regional])
+    near = np.flatnonzero(others > 0.0)
+    peak = _highest(lead.instance[lead.anchor_of(near)], others[near].astype(np.float64), count)
+    own = np.bincount(lead.instance, minlength=count)
+    for region in regions:
+        heat = region.among(lead.mask)[lead.mask].astype(np.float64)
+        peak *= np.bincount(lead.instance, heat, minlength=count) / np.maximum(own, 1)
+    return peak
+
+
+def _highest(instance: Int[np.ndarray, " m"], heat: Float[np.ndarray, " m"], count: int) -> Float[np.ndarray, " i"]:
+    peak = np.zeros(count)
     np.maximum.at(peak, instance, heat)
-    return Shares(lead, rows, heat, instance, peak)
+    return peak
 
 
 def is_found(factors: Sequence[Factor], shares_of: Callable[[], Shares]) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float32
 from avlmaps.core.question import Modality
-from avlmaps.query.factors import Factor, lead_of
+from avlmaps.query.factors import Factor, lead_of, product_of
 from avlmaps.query.goals import Goal, Shares, find_goals, is_found, share_voxels
 from avlmaps.query.voxel_space import Space
 
@@ -37,16 +37,8 @@ class Heatmap:
 
     @cached_property
     def values(self) -> Float32[np.ndarray, " n"]:
-        """The product of the factors' heat, computed when it is first used.
-
-        The lead comes first, as it falls fastest: other factors are computed where it leaves heat.
-        """
-        lead = self.lead
-        heat = lead.values
-        for factor in self.factors:
-            if factor is not lead:
-                heat = heat * factor.among(heat > 0.0)
-        return heat
+        """The product of the factors' heat, computed when it is first used."""
+        return product_of(self.factors)
 
     def __mul__(self, other: "Heatmap") -> "Heatmap":
         if not isinstance(other, Heatmap):  # pyright: ignore[reportUnnecessaryIsInstance] - Python passes anything

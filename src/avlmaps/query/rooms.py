@@ -1,7 +1,7 @@
 """What kind of room each place of a map is: views and things vote, and walls bound how far a vote reaches."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -185,6 +185,7 @@ class InRooms(NearAnchors):
 
     kinds: RoomField
     weights: Float[np.ndarray, " n"]
+    regional: bool = field(default=True, init=False)
 
     def heat_and_anchors(
         self, among: Bool[np.ndarray, " n"] | None = None

@@ -21,6 +21,7 @@ class VoxelHeat(Factor):
 
     Attributes:
         voxel: heat of every voxel, in [0, 1].
+        regional: whether it says in which region a voxel lies.
     """
 
     space: Space
@@ -31,6 +32,7 @@ class VoxelHeat(Factor):
     understood: str = ""
     note: str = ""
     flat: bool = field(default=False, init=False)
+    regional: bool = False
 
     anchors = np.zeros((0, 3))
     instance = np.zeros(0, np.int64)
@@ -95,7 +97,7 @@ def true_regions(space: Space, part: Part, areas: Sequence[Area]) -> VoxelHeat:
         z = space.centres[:, 2]
         within = (z > area.floor_m - _STOREY_M) & (z < area.ceiling_m + _STOREY_M)
         inside |= within & near_polygon(area, space.centres[:, :2], _WALL_M)
-    return VoxelHeat(space, part, inside.astype(np.float32), bool(inside.any()))
+    return VoxelHeat(space, part, inside.astype(np.float32), bool(inside.any()), regional=True)
 
 
 def near_polygon(area: Area, xy: Float[np.ndarray, "n 2"], margin_m: float) -> Bool[np.ndarray, " n"]:

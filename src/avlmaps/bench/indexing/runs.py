@@ -30,7 +30,8 @@ PAPER_SIZES: Mapping[TaskKind, int] = {
     TaskKind.NEAR_SOUND: 119,
 }
 _PHOTOS_A_TASK = 12  # tried for each that is wanted
-_RECIPE = 3  # raised when tasks are made, or queried, by other rules
+_MAKING = 3  # raised when tasks are made by other rules
+_QUERYING = 4  # raised when they are queried by other rules
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,7 +179,7 @@ def _made(todo: _Todo) -> list[Task]:
     """Record and map a scene, and make its tasks: the same for a seed, whichever are taken."""
     place = Workplace(todo.job, todo.open_spec)
     stored, most = place.avlmap.stored, todo.most
-    path = todo.job.folder / f"tasks-{_key(todo.job, stored.info.build_key, most)}.json"
+    path = todo.job.folder / f"tasks-{_key(todo.job, _MAKING, stored.info.build_key, most)}.json"
     if not path.exists():
         evidence, rng = place.evidence, todo.job.rng
         photos = place.photos(_PHOTOS_A_TASK * most)
@@ -201,7 +202,7 @@ def _run_scene(todo: _Todo) -> SceneOutcome:
     place = Workplace(todo.job, todo.open_spec)
     info = place.avlmap.stored.info
     fingerprint = sha256(msgspec.json.encode(todo.tasks)).hexdigest()
-    path = todo.job.folder / f"answers-{_key(todo.job, info.build_key, fingerprint)}.json"
+    path = todo.job.folder / f"answers-{_key(todo.job, _QUERYING, info.build_key, fingerprint)}.json"
     if not path.exists():
         write_bytes_atomically(path, msgspec.json.encode(_answers(place, todo.tasks)))
     answers = msgspec.json.decode(path.read_bytes(), type=tuple[Answered, ...])
@@ -226,6 +227,6 @@ def _answers(place: Workplace, tasks: Sequence[Task]) -> list[Answered]:
     ]
 
 
-def _key(job: SceneJob, *facts: object) -> str:
+def _key(job: SceneJob, recipe: int, *facts: object) -> str:
     """Return a short name of everything that tasks or answers depend on beside the scene's folder."""
-    return sha256(repr((job.map_name, __version__, _RECIPE, *facts)).encode()).hexdigest()[:12]
+    return sha256(repr((job.map_name, __version__, recipe, *facts)).encode()).hexdigest()[:12]

@@ -28,7 +28,8 @@ from avlmaps.navigate.bodies import BASE
 from avlmaps.sim.scene import Scene
 from avlmaps.sim.scenes import open_scene
 
-_RECIPE = 3  # raised when missions are made, or robots sent, in another way
+_MAKING = 3  # raised when missions are made in another way
+_SENDING = 4  # raised when robots are sent in another way
 OpenSpec = Callable[[str], Scene]
 
 
@@ -109,7 +110,9 @@ def run(settings: NavigationSettings, out: Path, open_spec: OpenSpec = open_scen
     if settings.save is not None:
         save_missions(missions, settings.save)
     todo = [
-        _Todo(job, settings, tuple(one for one in kept if one.scene == job.spec), _journal(out, job), open_spec)
+        _Todo(
+            job, settings, tuple(one for one in kept if one.scene == job.spec), _journal(settings, out, job), open_spec
+        )
         for job in _jobs(settings, missions, out)
     ]
     total = sum(len(_pairs(one.missions)) for one in todo)
@@ -125,8 +128,9 @@ def _named(todo: _Todo) -> str:
     return todo.job.spec
 
 
-def _journal(out: Path, job: SceneJob) -> Path:
-    return out / "episodes" / f"{job.folder.name}.jsonl"
+def _journal(settings: NavigationSettings, out: Path, job: SceneJob) -> Path:
+    """Return the file of a scene's episodes: one for each way of sending robots, so that its lines can be counted."""
+    return out / "episodes" / f"{job.folder.name}-{_key(settings)[:8]}.jsonl"
 
 
 def _pairs(missions: Sequence[Mission]) -> list[tuple[Mission, Configuration]]:
@@ -147,7 +151,7 @@ def _missions(settings: NavigationSettings, out: Path, open_spec: OpenSpec) -> M
         return given
     asked = asked_for(
         settings.recorded, settings.scenes, settings.series, settings.sequences, settings.profile, settings.models,
-        settings.rules, BASE, __version__, _RECIPE,
+        settings.rules, BASE, __version__, _MAKING,
     )  # fmt: skip
     path = out / "navigation_missions.json"
     if path.exists():
@@ -155,7 +159,7 @@ def _missions(settings: NavigationSettings, out: Path, open_spec: OpenSpec) -> M
         if before.asked == asked:
             return before
     empty = MissionSet(settings.recorded, settings.scenes, BASE.radius_m, (), asked)
-    todo = [_Todo(job, settings, (), _journal(out, job), open_spec) for job in _jobs(settings, empty, out)]
+    todo = [_Todo(job, settings, (), _journal(settings, out, job), open_spec) for job in _jobs(settings, empty, out)]
     made = side_by_side(_made, todo, settings.jobs, "mapping", _named)
     own = [mission for series in settings.series for mission in _shared_out(settings, series, made)]
     missions = replace(empty, missions=tuple(own))
@@ -181,7 +185,7 @@ def _sent(todo: _Todo) -> SceneFacts:
     place = NavigationPlace(todo.job, settings, todo.open_spec)
     pairs = [(mission, one) for mission, one in _pairs(todo.missions) if place.work.has(one.needs)]
     built = place.work.avlmap.stored.info.build_key
-    keyed = [(_key(settings, built, mission, one), mission, one) for mission, one in pairs]
+    keyed = [(_key(settings, built, mission.fingerprint, one), mission, one) for mission, one in pairs]
     if any(key not in done for key, _, _ in keyed):
         pilot = place.pilot(list(todo.missions), translator_named(settings.language))
         for key, mission, one in keyed:
@@ -195,10 +199,10 @@ def _sent(todo: _Todo) -> SceneFacts:
     return SceneFacts(todo.job.spec, info.frames, info.voxels, sounds, episodes, clips)
 
 
-def _key(settings: NavigationSettings, built: str, mission: Mission, one: Configuration) -> str:
-    """Return the name of an episode: of all that it depends on, the map's build among it."""
-    facts = (mission.fingerprint, repr(one), built, settings.rules, settings.language, settings.guess, repr(BASE))
-    return sha256("\n".join(map(str, (*facts, settings.recorded, __version__, _RECIPE))).encode()).hexdigest()[:24]
+def _key(settings: NavigationSettings, *facts: object) -> str:
+    """Return a short name of the way of sending robots and of all else that an episode depends on."""
+    how = (settings.rules, settings.language, settings.guess, BASE, settings.recorded, __version__, _SENDING)
+    return sha256("\n".join(map(repr, (*how, *facts))).encode()).hexdigest()[:24]
 
 
 def translator_named(language: str) -> Translator | None:
