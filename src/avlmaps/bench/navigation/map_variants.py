@@ -69,7 +69,7 @@ class Perceived(AVLMap):
 
     def __init__(self, scene: KnownScene, senses: Senses) -> None:
         super().__init__(scene.avlmap.stored, scene.avlmap.settings)
-        self._space = scene.avlmap.space  # so that heat of all senses multiplies
+        self.space = scene.avlmap.space  # so that heat of all senses multiplies
         self._scene, self._senses = scene, senses
 
     def object(self, word: str, primary: bool = False, vocabulary: Sequence[str] | None = None) -> Heatmap:
