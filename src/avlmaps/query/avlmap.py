@@ -40,6 +40,7 @@ from avlmaps.query.modalities.sound import (
     sound_features,
 )
 from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, voting_rows
+from avlmaps.query.things_in_rooms import ThingsInRooms
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import Sound
 
@@ -128,7 +129,15 @@ class AVLMap:
         settings, voxels = self.settings, self.stored.voxels
         return Heatmap.of(
             object_factor(
-                self.space, voxels.feature, encoder, rivals, part, settings.objects, settings.heat, voxels.rgb
+                self.space,
+                voxels.feature,
+                encoder,
+                rivals,
+                part,
+                settings.objects,
+                settings.heat,
+                voxels.rgb,
+                lambda: self.things_in_rooms,
             )
         )
 
@@ -137,7 +146,10 @@ class AVLMap:
         encoder = self.stored.profile.pixel_encoder()
         rivals = self._rivals_of(encoder, None)
         encoded = EncodedWord.of(encoder, word)
-        return object_pieces(self.space, self.stored.voxels.feature, encoder, rivals, encoded, self.settings.objects)
+        return object_pieces(
+            self.space, self.stored.voxels.feature, encoder, rivals, encoded, self.settings.objects,
+            lambda: self.things_in_rooms,
+        )  # fmt: skip
 
     def rivals(self) -> Rivals:
         """Return the two words of the encoder's vocabulary closest to each voxel; the first query works them out."""
@@ -316,6 +328,15 @@ class AVLMap:
         self.stored.require_model(Kind.VIEWS)
         view = np.asarray(self.stored.keyframes.view)
         return votes.field(area_names(encoder), name_shares(view, encoder, self.settings.areas))
+
+    @cached_property
+    def things_in_rooms(self) -> ThingsInRooms | None:
+        """The evidence of rooms on the things in them; None for a map whose rooms are not known."""
+        try:
+            field = self.room_field
+        except (BackendError, MapError):  # no features of views, or those of another encoder
+            return None
+        return None if field is None else ThingsInRooms(field, read_room_contents("avlmaps.perception"))
 
     def _voting_voxels(self) -> NamedVoxels | None:
         """Return the voxels whose names vote on kinds of room; None where the map holds no probabilities of names."""

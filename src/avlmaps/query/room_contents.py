@@ -16,7 +16,11 @@ _ELSEWHERE = 0.1
 @cache
 def _log_ratios(contents: RoomContents) -> Float64[np.ndarray, "t r"]:
     """Return by how much, in nats, a thing of the table speaks for each kind of room rather than for any."""
-    share = contents.surface_m2 / np.maximum(contents.surface_m2.sum(axis=0), 1e-9)
+    return _nats_of(contents, contents.surface_m2)
+
+
+def _nats_of(contents: RoomContents, surface_m2: Float64[np.ndarray, "t r"]) -> Float64[np.ndarray, "t r"]:
+    share = surface_m2 / np.maximum(contents.surface_m2.sum(axis=0), 1e-9)
     usual = share.mean(axis=1, keepdims=True)
     return np.log((share + _ELSEWHERE * usual + 1e-9) / ((1.0 + _ELSEWHERE) * usual + 1e-9))
 
@@ -32,15 +36,45 @@ def votes(things: Sequence[str], kinds: Sequence[str], contents: RoomContents) -
     """
     ratios, known = _log_ratios(contents), lexicon()
     row_of = {known.find(name, Kind.THING): number for number, name in enumerate(contents.things)}
-    column_of = {known.find(name, Kind.ROOM): number for number, name in enumerate(contents.kinds)}
-    which = [_column(kind, column_of) for kind in kinds]
     out = np.zeros((len(things), len(kinds)))
     for number, thing in enumerate(things):
         entry = known.find(thing, Kind.THING)
         row = row_of.get(entry) if entry is not None else None
         if row is not None:
-            out[number] = [ratios[row].mean() if column is None else ratios[row, column] for column in which]
+            out[number] = _for_kinds(ratios[row], kinds, contents)
     return out
+
+
+def commonness(things: Sequence[str], kinds: Sequence[str], contents: RoomContents) -> Float[np.ndarray, " n"] | None:
+    """Return ln of how many times as common things of some names are in rooms of each kind as in rooms on average.
+
+    Their narrower kinds count as well: a kitchen cabinet is a cabinet.
+
+    Args:
+        things: names, all of which are meant.
+        kinds: kinds of room; see ``votes``.
+        contents: the table.
+
+    Returns:
+        Nats; None where the table holds none of them.
+    """
+    is_a = lexicon().is_a
+    rows = [
+        number
+        for number, name in enumerate(contents.things)
+        if any(name == thing or is_a(name, thing, Kind.THING) for thing in things)
+    ]
+    surface_m2 = contents.surface_m2[rows].sum(axis=0, keepdims=True)
+    return _for_kinds(_nats_of(contents, surface_m2)[0], kinds, contents) if surface_m2.any() else None
+
+
+def _for_kinds(
+    nats: Float64[np.ndarray, " r"], kinds: Sequence[str], contents: RoomContents
+) -> Float[np.ndarray, " n"]:
+    """Return what a table says for each of some kinds of room; see ``votes``."""
+    column_of = {lexicon().find(name, Kind.ROOM): number for number, name in enumerate(contents.kinds)}
+    columns = [_column(kind, column_of) for kind in kinds]
+    return np.array([nats.mean() if column is None else nats[column] for column in columns])
 
 
 def _column(kind: str, column_of: Mapping[Entry | None, int]) -> int | None:

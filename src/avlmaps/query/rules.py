@@ -33,8 +33,11 @@ PAPER_HEARING = HearingSettings(
 PAPER_AREAS = AreaSettings(anchor="camera", extent="cones", score="min-max", pool_m=0.0)
 # Scores are stretched over the sounds of the map.
 PAPER_SOUNDS = SoundSettings(normalise="min-max")
-# A voxel is the object where its word is the closest of all; no instance is left out for its confidence.
-PAPER_OBJECTS = ObjectSettings(least_confidence=0.0, least_in_company=0.0, score_in_company=1.0, guess_below=0.0)
+# A voxel is the object where its word is the closest of all; no instance is left out for its confidence, and its room
+# has no say.
+PAPER_OBJECTS = ObjectSettings(
+    least_confidence=0.0, least_in_company=0.0, score_in_company=1.0, guess_below=0.0, room_weight=0.0
+)
 
 
 def build_settings(rules: Rules, settings: BuildSettings = DEFAULTS) -> BuildSettings:

@@ -200,7 +200,7 @@ def _sent(todo: _Todo) -> SceneFacts:
 
 
 def _key(settings: NavigationSettings, *facts: object) -> str:
-    """Return a short name of the way of sending robots and of all else that an episode depends on."""
+    """Return a short name of how robots are sent and of all else that an episode depends on."""
     how = (settings.rules, settings.language, settings.guess, BASE, settings.recorded, __version__, _SENDING)
     return sha256("\n".join(map(repr, (*how, *facts))).encode()).hexdigest()[:24]
 
