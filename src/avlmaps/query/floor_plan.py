@@ -7,15 +7,11 @@ seen it spreads as a Gaussian. So nothing has to decide where the rooms of an op
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.query.voxel_space import Space
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 CELL_M = 0.2
 # Heights over the floor between which a wall is seen: over tables and sofas, below the heads of doors.
@@ -126,15 +122,19 @@ class FloorPlan:
 
     @cached_property
     def _open(self) -> Int[np.ndarray, " c"]:
-        """The cell itself, or the open one nearest to it on its storey; itself again where there is none."""
-        from scipy.ndimage import distance_transform_edt
+        """The cell itself, or the open one nearest to it on its storey (within 2 %); itself where there is none."""
+        import cv2
 
         cells = np.arange(len(self)).reshape(self.wall.shape)
         out = cells.copy()
         for storey, free in enumerate(self.open):
             if free.any():
-                nearest = distance_transform_edt(~free, return_distances=False, return_indices=True)
-                out[storey] = cells[storey][tuple(np.asarray(nearest))]
+                closed = np.ascontiguousarray(~free, np.uint8)
+                found = cv2.distanceTransformWithLabels(closed, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+                label = np.asarray(found[1], np.int64)
+                of_label = np.zeros(int(label.max()) + 1, np.int64)
+                of_label[label[free]] = cells[storey][free]
+                out[storey] = of_label[label]
         return out.reshape(-1)
 
     @cached_property
@@ -147,17 +147,6 @@ class FloorPlan:
             both = free[one] & free[other]
             pairs.append(np.stack([cells[one][both], cells[other][both]]))
         return np.concatenate(pairs, axis=1)
-
-    @cached_property
-    def _step(self) -> "csr_array":
-        """One step of the random walk: symmetric, so that an even floor stays even; its rows add up to 1."""
-        from scipy.sparse import csr_array
-
-        a, b = self._neighbours
-        row, column, own = np.r_[a, b], np.r_[b, a], np.arange(len(self))
-        stays = 1.0 - _TO_NEIGHBOUR * np.bincount(row, minlength=len(self))
-        share = np.r_[np.full(len(row), _TO_NEIGHBOUR), stays].astype(np.float32)
-        return csr_array((share, (np.r_[row, own], np.r_[column, own])), shape=(len(self), len(self)))
 
     def regions(self, label: Int[np.ndarray, " c"]) -> Int[np.ndarray, " c"]:
         """Return the number of the region of each cell: open cells of one label, each beside another of them.
@@ -179,23 +168,38 @@ class FloorPlan:
             mass: in each cell, any number of kinds.
             sigma_m: standard deviation along each axis, metres.
         """
-        spread = np.ascontiguousarray(mass, np.float32)
+        spread = np.array(mass, np.float32).reshape(*self.wall.shape, -1)
         for _ in range(round((sigma_m / CELL_M) ** 2 / (2.0 * _TO_NEIGHBOUR))):
-            spread = self._step @ spread
-        return np.asarray(spread, np.float32)
+            flow = [across * (spread[one] - spread[other]) for one, other, across in self._doors]
+            for (one, other, _), moved in zip(self._doors, flow, strict=True):
+                spread[one] -= moved
+                spread[other] += moved
+        return spread.reshape(len(self), -1)
+
+    @cached_property
+    def _doors(self) -> "list[tuple[tuple[slice, ...], tuple[slice, ...], Float32[np.ndarray, 's nx ny 1']]]":
+        """For both axes: each cell, its neighbour, and the share of its mass that one step of the walk moves there."""
+        sides = [(np.s_[:, 1:], np.s_[:, :-1]), (np.s_[:, :, 1:], np.s_[:, :, :-1])]
+        return [
+            (one, other, (_TO_NEIGHBOUR * (self.open[one] & self.open[other])[..., None]).astype(np.float32))
+            for one, other in sides
+        ]
 
 
 def _without_gaps(seen: Bool[np.ndarray, "s nx ny"]) -> Bool[np.ndarray, "s nx ny"]:
     """Fill what was not seen between seen cells, up to ``_GAP_M`` wide: under tables, and behind what stands there."""
-    from scipy.ndimage import distance_transform_edt
+    import cv2
 
-    reach = _GAP_M / 2 / CELL_M
+    def far(cells: Bool[np.ndarray, "nx ny"]) -> Bool[np.ndarray, "nx ny"]:
+        """Return which cells lie farther than ``reach`` from every cell that is not held."""
+        return cv2.distanceTransform(cells.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) > reach
+
+    reach = _GAP_M / 2 / CELL_M + 1e-3
     edge = int(np.ceil(reach)) + 1
     out = seen.copy()
     for storey, cells in enumerate(seen):
         if cells.any():
-            wide = np.asarray(distance_transform_edt(~np.pad(cells, edge))) <= reach
-            out[storey] |= (np.asarray(distance_transform_edt(wide)) > reach)[edge:-edge, edge:-edge]
+            out[storey] |= far(~far(~np.pad(cells, edge)))[edge:-edge, edge:-edge]
     return out
 
 

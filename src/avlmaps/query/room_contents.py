@@ -72,9 +72,14 @@ def _for_kinds(
     nats: Float64[np.ndarray, " r"], kinds: Sequence[str], contents: RoomContents
 ) -> Float[np.ndarray, " n"]:
     """Return what a table says for each of some kinds of room; see ``votes``."""
-    column_of = {lexicon().find(name, Kind.ROOM): number for number, name in enumerate(contents.kinds)}
-    columns = [_column(kind, column_of) for kind in kinds]
+    columns = _columns(tuple(kinds), contents)
     return np.array([nats.mean() if column is None else nats[column] for column in columns])
+
+
+@cache
+def _columns(kinds: tuple[str, ...], contents: RoomContents) -> tuple[int | None, ...]:
+    column_of = {lexicon().find(name, Kind.ROOM): number for number, name in enumerate(contents.kinds)}
+    return tuple(_column(kind, column_of) for kind in kinds)
 
 
 def _column(kind: str, column_of: Mapping[Entry | None, int]) -> int | None:

@@ -17,6 +17,7 @@ from jaxtyping import Float, UInt8
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.processes import end_with_parent
 from avlmaps.core.progress import progress, say
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.layout import DESCRIPTION
@@ -306,6 +307,7 @@ def _take_up(name: str, size: int) -> None:
     """Begin a process: take over what the frames are drawn with."""
     import cv2
 
+    end_with_parent()
     cv2.setNumThreads(1)
     shared = SharedMemory(name)
     assert shared.buf is not None

@@ -6,6 +6,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from multiprocessing import get_context
 from typing import TypeVar
 
+from avlmaps.core.processes import end_with_parent
 from avlmaps.core.progress import progress, say, silence
 
 S = TypeVar("S")
@@ -41,11 +42,17 @@ def side_by_side(
             results.append(do(one))
             say(f"{label}: {name(one)} is done, {len(results)} of {len(todo)}")
         return results
-    with ProcessPoolExecutor(workers, get_context("spawn"), silence) as pool:
+    with ProcessPoolExecutor(workers, get_context("spawn"), _begin) as pool:
         futures = [pool.submit(do, one) for one in todo]
         for _ in progress(_ticks(futures, done), label, total=total or len(todo), unit=unit):
             pass
         return [future.result() for future in futures]
+
+
+def _begin() -> None:
+    """Begin a process of the pool."""
+    end_with_parent()
+    silence()
 
 
 def _ticks(futures: Sequence[Future[T]], done: Callable[[], int] | None) -> Iterator[None]:

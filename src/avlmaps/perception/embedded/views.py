@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float32
 
+from avlmaps.core.arrays import Float32
 from avlmaps.perception.embedded.closed_set import NamedEncoder
 from avlmaps.perception.embedded.codes import features_of
 from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, SceneNetwork, load_network
