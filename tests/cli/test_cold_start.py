@@ -20,7 +20,7 @@ from avlmaps.core.registry import Kind, load
 from avlmaps.language.questions import parse_sentence
 
 HEAVY = {
-    "numba", "llvmlite", "scipy", "onnxruntime", "cv2", "av", "matplotlib", "trimesh", "soundfile", "PIL",
+    "numba", "llvmlite", "scipy", "onnxruntime", "av", "matplotlib", "trimesh", "soundfile", "PIL",
     "avlmaps.language", "avlmaps.sim", "tyro", "typeguard", "jaxtyping", "asyncio", "importlib.metadata",
     "numpy.ma", "numpy.random",
 }  # fmt: skip
