@@ -46,6 +46,7 @@ ENTRIES = (
     Entry("fusion", "Fusion", "python benchmarks/fusion.py"),
     Entry("memory", "Memory of fusion", "python benchmarks/fusion_memory.py"),
     Entry("queries", "Queries", "python benchmarks/queries.py"),
+    Entry("cold-start", "A query from the shell", "python benchmarks/cold_start.py"),
     Entry("locating", "Time to locate a photo", "python benchmarks/locate.py"),
     Entry("store", "Writing and opening a map", "python benchmarks/store.py"),
     Entry("render", "Rendering views", "python benchmarks/render.py"),
