@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 
 from avlmaps.core.arrays import Float32
-from avlmaps.core.question import Modality
 from avlmaps.query.factors import Factor, lead_of, product_of
 from avlmaps.query.goals import Goal, Shares, find_goals, is_found, share_voxels
 from avlmaps.query.voxel_space import Space
@@ -73,11 +72,6 @@ class Heatmap:
     def lead(self) -> Factor:
         """The factor whose instances are the goals."""
         return lead_of(self.factors)
-
-    @property
-    def modalities(self) -> tuple[Modality, ...]:
-        """The modalities of the query's parts."""
-        return tuple(factor.part.modality for factor in self.factors)
 
     @cached_property
     def _shares(self) -> Shares:

@@ -82,11 +82,6 @@ class CachedMap(AVLMap):
             while self._kept_bytes > self._cache_bytes:
                 self._kept_bytes -= self._kept.popitem(last=False)[1][1]
 
-    @property
-    def kept_bytes(self) -> int:
-        """Memory of the remembered heat, about."""
-        return self._kept_bytes
-
 
 def _bytes_of(voxels: int, factor: object) -> int:
     """Return about how much a factor holds once it was used: heat, mask or winner, and its twin with unsure things."""
