@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 from training.sounds import calibrate
+from training.sounds.augmentation import Augmentation
 from training.sounds.clips import Corpus, read_corpus
 from training.sounds.crossvalidate import Answers, Networks, example_bank, hear_held_out
 from training.sounds.export import write_onnx
@@ -24,7 +25,11 @@ from avlmaps.perception.embedded.words import EmbeddedWords
 ROOT = Path(__file__).resolve().parents[2]
 WEIGHTS = Path("src/avlmaps/perception/embedded/weights")
 FIGURES = Path("src/avlmaps/bench/data/sounds_crossvalidation.json")
-ONWARDS = Settings(steps=600, rate=2e-3, averaging=0.985)
+_ROUND = Settings(recorded=44, synthetic=20, rate=2e-3, averaging=0.99, evenness=0.75)
+ONWARDS = (
+    replace(_ROUND, steps=1400, augmentation=Augmentation(segmented=0.0)),
+    replace(_ROUND, steps=1200, falling=0.9, seed=1),
+)
 SCRATCH = Settings(steps=600, averaging=0.99)
 NOTE = (
     "A small closed-set encoder: ten kinds learnt from about 32 recordings each, forty from one to eight, the others "
@@ -39,13 +44,13 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "sounds", help="folder of the networks")
     parser.add_argument("--out", type=Path, default=ROOT, help="the checkout to write weights and figures into")
     parser.add_argument("--start", type=Path, default=ROOT / WEIGHTS / "sounds.onnx", help="weights to continue from")
-    parser.add_argument("--steps", type=int, default=ONWARDS.steps)
+    parser.add_argument("--steps", type=int, help="of each round, instead of its own")
     parser.add_argument("--each", type=int, default=16, help="synthetic sounds of a kind")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
     corpus = read_corpus(arguments.sounds, arguments.work, arguments.each)
     words = EmbeddedWords()
-    onwards = replace(ONWARDS, steps=arguments.steps)
+    onwards = tuple(replace(each, steps=arguments.steps or each.steps) for each in ONWARDS)
     networks = Networks(corpus, words.encode, onwards, SCRATCH, arguments.start, arguments.work)
 
     answers = hear_held_out(corpus, networks, calibrate.prototypes(words.encode))
@@ -61,7 +66,7 @@ def main() -> None:
     np.save(weights / "sounds.npy", bank.astype(np.float16))
     per_kind = np.bincount(kinds, minlength=len(NAMES)).tolist()
     write_json(weights / "sounds.json", notes(corpus, words, constants, arguments.each, per_kind))
-    about = {"onwards": asdict(onwards), "scratch": asdict(SCRATCH), "words": words.card.checksum}
+    about = {"onwards": [asdict(each) for each in onwards], "scratch": asdict(SCRATCH), "words": words.card.checksum}
     write_json(arguments.out / FIGURES, {"about": about, "tables": tables})
     say(json.dumps(tables, indent=1))
 

@@ -14,6 +14,8 @@ from torch import Tensor
 from avlmaps.perception.embedded import logmel
 
 FRAMES, BANDS, FLOOR = logmel.WINDOW_FRAMES, logmel.BANDS, logmel.FLOOR
+# of the segmentation's settings: 2.5 dB; 0.05 s and 0.02 s in frames of 12 ms
+RELEASE, SMOOTHED, PADDED = 10.0**0.25, 5, 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +32,9 @@ class Augmentation:
         narrow: share of sounds that lose everything above some band, as codecs and cheap microphones do.
         noisy: share of sounds that get background noise, at snr_db.
         snr_db: range of signal-to-noise ratios.
+        segmented: share of sounds that end where they sink into that background, as a segmented track cuts them.
         trimmed: share of sounds that are cut to a loud piece.
+        pieces: shortest and longest of these in frames, drawn evenly in the logarithm.
         mixed: share of sounds to which another of the batch is added, at most as loud.
         masks: widths of the masks over bands and frames (SpecAugment; Park et al. 2019).
     """
@@ -44,7 +48,9 @@ class Augmentation:
     narrow: float = 0.15
     noisy: float = 0.6
     snr_db: tuple[float, float] = (-3.0, 30.0)
-    trimmed: float = 0.3
+    segmented: float = 0.5
+    trimmed: float = 0.35
+    pieces: tuple[int, int] = (12, 220)
     mixed: float = 0.4
     masks: tuple[int, int] = (8, 50)
 
@@ -82,7 +88,8 @@ def trimmed(power: Tensor, how: Augmentation, generator: torch.Generator) -> Ten
     chosen = torch.rand(n, generator=generator) < how.trimmed
     loud = power.sum(dim=2).sqrt()
     centre = torch.multinomial(loud, 1, generator=generator)[:, 0]
-    half = torch.exp(torch.empty(n).uniform_(3.0, 5.4, generator=generator)) / 2.0  # 20 to 220 frames
+    low, high = (float(torch.tensor(frames).log()) for frames in how.pieces)
+    half = torch.empty(n).uniform_(low, high, generator=generator).exp() / 2.0
     distance = (torch.arange(FRAMES)[None, :] - centre[:, None]).abs()
     keep = (distance <= half[:, None]) | ~chosen[:, None]
     return torch.where(keep[:, :, None], power, torch.full_like(power, FLOOR))
@@ -137,8 +144,12 @@ def in_rooms(power: Tensor, how: Augmentation, generator: torch.Generator) -> Te
     return power
 
 
-def in_noise(power: Tensor, noise: Tensor, how: Augmentation, generator: torch.Generator) -> Tensor:
-    """Add background at a random signal-to-noise ratio, measured where the sound is active."""
+def in_noise(power: Tensor, noise: Tensor, how: Augmentation, generator: torch.Generator) -> tuple[Tensor, Tensor]:
+    """Add background at a random signal-to-noise ratio, measured where the sound is active.
+
+    Returns:
+        the sum, and the mean power of the background in every band (n, bands), zero where there is none.
+    """
     n = len(power)
     level = power.sum(dim=2)
     active = level > 0.01 * level.amax(dim=1, keepdim=True)
@@ -147,7 +158,31 @@ def in_noise(power: Tensor, noise: Tensor, how: Augmentation, generator: torch.G
     snr_db = torch.empty(n).uniform_(low, high, generator=generator)
     chosen = (torch.rand(n, generator=generator) < how.noisy).float()
     gain = chosen * signal / noise.sum(dim=2).mean(dim=1) * 10.0 ** (-snr_db / 10.0)
-    return power + gain[:, None, None] * noise
+    return power + gain[:, None, None] * noise, gain[:, None] * noise.mean(dim=1)
+
+
+def segmented(power: Tensor, background: Tensor, how: Augmentation, generator: torch.Generator) -> Tensor:
+    """Cut some sounds to where they stand out from their background, and leave silence around them.
+
+    A map holds segments: the background ends a little after the sound does. The rule is that of
+    ``avlmaps.maps.audio.segmentation``, without the joining of close runs: the first to the last frame whose mean
+    excess over the bands passes ``release_db``, and ``padding_s`` on either side.
+
+    Args:
+        power: sounds in their background (n, frames, bands).
+        background: its mean power in every band (n, bands); sounds without any stay whole.
+        how: how many.
+        generator: draws which.
+    """
+    chosen = (torch.rand(len(power), generator=generator) < how.segmented) & (background.sum(dim=1) > 0.0)
+    excess = (power / background[:, None].clamp_min(1e-12)).mean(dim=2)
+    smooth = functional.avg_pool1d(excess[:, None], SMOOTHED, stride=1, padding=SMOOTHED // 2)[:, 0]
+    stands_out = (smooth > RELEASE).float()
+    after_first = stands_out.cummax(dim=1).values
+    before_last = stands_out.flip(1).cummax(dim=1).values.flip(1)
+    within = functional.max_pool1d((after_first * before_last)[:, None], 2 * PADDED + 1, stride=1, padding=PADDED)[:, 0]
+    whole = ~chosen | (within.amax(dim=1) == 0.0)
+    return torch.where((whole[:, None] | (within > 0.0))[:, :, None], power, torch.zeros_like(power))
 
 
 def heard(power: Tensor, coarse: bool = False) -> Tensor:
@@ -190,14 +225,11 @@ def mixed(power: Tensor, how: Augmentation, generator: torch.Generator) -> tuple
 
 
 def augmented(
-    power: Tensor, noise: Tensor, how: Augmentation, generator: torch.Generator
+    power: Tensor, noise: Tensor, how: Augmentation, generator: torch.Generator, coarse: bool = False
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Return the network's input for a batch, each sound in new circumstances, and what ``mixed`` added."""
     power = trimmed(moved(power, how, generator), how, generator)
     power, other, share = mixed(coloured(power, how, generator), how, generator)
-    power = in_rooms(power, how, generator)
-    return (
-        masked(heard(peak_normalised(in_noise(power, noise, how, generator)), coarse=True), how, generator),
-        other,
-        share,
-    )
+    power, background = in_noise(in_rooms(power, how, generator), noise, how, generator)
+    power = peak_normalised(segmented(power, background, how, generator))
+    return masked(heard(power, coarse), how, generator), other, share

@@ -119,10 +119,19 @@ def synthetic_mels(each: int, seed: int, cache: Path) -> tuple[Float32[np.ndarra
 
 @dataclass(frozen=True, slots=True)
 class Examples:
-    """Training data: mel power (n, frames, bands) and the index of each one's kind in ``NAMES``."""
+    """Training data: mel power (n, frames, bands) and the index of each one's kind in ``NAMES``.
+
+    Attributes:
+        recorded: mel power of the recorded clips.
+        recorded_kinds: of each.
+        recorded_folds: of each.
+        synthetic: mel power of the synthetic clips.
+        synthetic_kinds: of each.
+    """
 
     recorded: np.ndarray
     recorded_kinds: np.ndarray
+    recorded_folds: np.ndarray
     synthetic: np.ndarray
     synthetic_kinds: np.ndarray
 
@@ -159,7 +168,8 @@ class Corpus:
         """Return the recorded clips of other folds that may ship and all synthetic ones, without some kinds."""
         may = np.array([clip.may_ship and clip.kind not in without and clip.fold != fold for clip in self.clips])
         made = ~np.isin(self.synthetic_kinds, without)
-        return Examples(self.mels[may], self.kinds[may], self.synthetic[made], self.synthetic_kinds[made])
+        recorded = (self.mels[may], self.kinds[may], self.folds[may])
+        return Examples(*recorded, self.synthetic[made], self.synthetic_kinds[made])
 
 
 def read_corpus(folder: Path, cache: Path, each: int = 16, seed: int = 0) -> Corpus:

@@ -10,7 +10,7 @@ from training.sounds.augmentation import augmented, fluctuations
 from training.sounds.calibrate import Evidence, Lesson, evidence_of, joined, lessons
 from training.sounds.clips import FOLDS, Corpus, Examples, mels_of, read_samples
 from training.sounds.export import opened_norms, read_onnx
-from training.sounds.fit import EncodeWords, Settings, encode, fit, targets, turned
+from training.sounds.fit import EncodeWords, Settings, encode, fit, fit_folds, targets, turned
 from training.sounds.kinds import ESC10, NAMES
 from training.sounds.network import SoundNet
 
@@ -35,7 +35,7 @@ class Networks:
     Attributes:
         corpus: what they learn from.
         encode_words: the word encoder.
-        settings: of networks that continue from ``start``.
+        rounds: of networks that continue from ``start``; each round continues where the one before it ended.
         scratch: of the network that starts from scratch.
         start: weights that were shipped before, trained on ESC-10 (every fold) and synthetic sounds alone.
         work: folder of the networks.
@@ -43,34 +43,47 @@ class Networks:
 
     corpus: Corpus
     encode_words: EncodeWords
-    settings: Settings
+    rounds: tuple[Settings, ...]
     scratch: Settings
     start: Path
     work: Path
 
     def of_fold(self, fold: int) -> SoundNet:
         """Return the network that was not trained on the household clips of a fold (0: one that was trained on all)."""
-        return self._network(f"fold{fold}" if fold else "all", fold, self.settings, self._opened())
+        missing = [f for f in (*FOLDS, 0) if not self._file(f).exists()]
+        if missing:  # all at once: they share the lower half of the network
+            words = targets(self.encode_words)
+            nets = dict.fromkeys(missing, self._opened())
+            for settings in self.rounds:
+                nets = fit_folds(self.corpus.examples(), words, settings, nets)
+            for f, net in nets.items():
+                self._store(self._file(f), net, words)
+        return self._read(self._file(fold))
 
     def stranger(self) -> SoundNet:
         """Return the network that starts from scratch, without one fold of anything and without some kinds at all."""
-        return self._network("stranger", LEFT_OUT_FOLD, self.scratch, None, tuple(map(NAMES.index, LEFT_OUT)))
+        file = self.work / "stranger.pt"
+        if not file.exists():
+            words = targets(self.encode_words)
+            examples = self.corpus.examples(LEFT_OUT_FOLD, tuple(map(NAMES.index, LEFT_OUT)))
+            self._store(file, fit(examples, words, replace(self.scratch, seed=LEFT_OUT_FOLD), "stranger"), words)
+        return self._read(file)
+
+    def _file(self, fold: int) -> Path:
+        return self.work / (f"fold{fold}.pt" if fold else "all.pt")
 
     def _opened(self) -> SoundNet:
         generator = torch.Generator().manual_seed(1)
         power = torch.from_numpy(self.corpus.mels[::8])
         noise = fluctuations(len(power), generator)
-        return opened_norms(read_onnx(self.start), augmented(power, noise, self.settings.augmentation, generator)[0])
+        return opened_norms(read_onnx(self.start), augmented(power, noise, self.rounds[0].augmentation, generator)[0])
 
-    def _network(
-        self, name: str, fold: int, settings: Settings, start: SoundNet | None, without: Sequence[int] = ()
-    ) -> SoundNet:
+    def _store(self, file: Path, net: SoundNet, words: torch.Tensor) -> None:
+        self.work.mkdir(parents=True, exist_ok=True)
+        torch.save({"targets": words, "state": net.state_dict()}, file)
+
+    def _read(self, file: Path) -> SoundNet:
         words = targets(self.encode_words)
-        file = self.work / f"{name}.pt"
-        if not file.exists():
-            net = fit(self.corpus.examples(fold, without), words, replace(settings, seed=fold), name, start)
-            self.work.mkdir(parents=True, exist_ok=True)
-            torch.save({"targets": words, "state": net.state_dict()}, file)
         kept = torch.load(file, weights_only=True)
         state = kept["state"]
         net = SoundNet(state["head.weight"].shape[0], state["stem.weight"].shape[0])

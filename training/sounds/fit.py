@@ -1,7 +1,8 @@
 """Fit one network to clips and words."""
 
 import copy
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,6 +18,7 @@ from avlmaps.core.progress import say
 from avlmaps.perception.embedded import logmel
 
 EncodeWords = Callable[[Sequence[str]], np.ndarray]
+REPORTED = 50  # steps between two lines of progress
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +32,10 @@ class Settings:
         synthetic: synthetic clips in a batch.
         temperature: of the softmax over kinds.
         smoothing: share of the target that is spread over all kinds.
-        rate: highest learning rate; it rises for a tenth of the steps and then falls.
+        rate: highest learning rate; it rises for a tenth of the steps and stays.
+        falling: share of the steps over which it falls to zero, the last ones.
+        evenness: 0 draws a kind as often as it has clips, 1 every kind as often.
+        spliced: share of recorded clips of which a part is replaced by another clip of the same kind.
         decay: weight decay.
         averaging: half-life-like constant of the moving average of weights, which is the result.
         seed: of everything.
@@ -43,6 +48,9 @@ class Settings:
     temperature: float = 0.07
     smoothing: float = 0.1
     rate: float = 3e-3
+    falling: float = 0.4
+    evenness: float = 0.5
+    spliced: float = 0.3
     decay: float = 2e-2
     averaging: float = 0.995
     seed: int = 0
@@ -61,25 +69,116 @@ def steady_noise(count: int, generator: torch.Generator) -> Tensor:
     return power * 10.0 ** (tilt_db * torch.linspace(0.0, 1.0, logmel.BANDS) / 10.0)
 
 
-class _Batches:
-    """Draws batches: recorded clips by the root of how many a kind has, synthetic ones at random."""
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """What one step learns from.
 
-    def __init__(self, examples: Examples, settings: Settings) -> None:
+    Attributes:
+        heard: the network's input (n, 2, bands, frames).
+        aim: the share of every kind in each sound (n, kinds).
+        words: the kinds' unit vectors in one template (kinds, dim).
+        folds: the folds of the clips that each sound is made of (n, 4); 0 for a synthetic sound, or none.
+    """
+
+    heard: Tensor
+    aim: Tensor
+    words: Tensor
+    folds: Tensor
+
+
+class Batches:
+    """Draws batches without end: recorded clips by a power of how many a kind has, synthetic ones at random."""
+
+    def __init__(self, examples: Examples, words: Tensor, settings: Settings) -> None:
         self._rng = np.random.default_rng(settings.seed)
-        self._examples, self._settings = examples, settings
+        self._generator = torch.Generator().manual_seed(settings.seed)
+        self._examples, self._words, self._settings = examples, words, settings
+        self._coarse = half_precision_is_fast()
         kinds, counts = np.unique(examples.recorded_kinds, return_counts=True)
-        self._share = np.sqrt(counts) / np.sqrt(counts).sum()
+        share = counts ** (1.0 - settings.evenness)
+        self._share = share / share.sum()
         self._of_kind = [np.flatnonzero(examples.recorded_kinds == kind) for kind in kinds]
 
-    def draw(self) -> tuple[Tensor, Tensor]:
-        e, rng = self._examples, self._rng
-        kinds = rng.choice(len(self._of_kind), size=self._settings.recorded, p=self._share)
-        rows = np.array([rng.choice(self._of_kind[kind]) for kind in kinds])
-        made = rng.integers(len(e.synthetic), size=self._settings.synthetic)
-        power = np.concatenate([e.recorded[rows], e.synthetic[made]])
-        return torch.from_numpy(power), torch.from_numpy(
-            np.concatenate([e.recorded_kinds[rows], e.synthetic_kinds[made]])
-        )
+    @torch.no_grad()
+    def draw(self) -> Batch:
+        """Return the next batch, every sound in new circumstances."""
+        e, rng, s, generator = self._examples, self._rng, self._settings, self._generator
+        chosen = rng.choice(len(self._of_kind), size=s.recorded, p=self._share)
+        rows = np.array([rng.choice(self._of_kind[kind]) for kind in chosen])
+        others = np.array([rng.choice(self._of_kind[kind]) for kind in chosen])
+        others = np.where(rng.random(s.recorded) < s.spliced, others, rows)
+        made = rng.integers(len(e.synthetic), size=s.synthetic)
+        power = torch.from_numpy(np.concatenate([self._spliced(rows, others), e.synthetic[made]]))
+        kinds = torch.from_numpy(np.concatenate([e.recorded_kinds[rows], e.synthetic_kinds[made]]))
+        of_recorded = np.stack([e.recorded_folds[rows], e.recorded_folds[others]], axis=1)
+        folds = torch.from_numpy(np.concatenate([of_recorded, np.zeros((s.synthetic, 2), of_recorded.dtype)]))
+
+        noise = steady_noise(len(power), generator)
+        heard, second, share = augmented(power, noise, s.augmentation, generator, self._coarse)
+        template = self._words[int(torch.randint(len(self._words), (1,), generator=generator))]
+        classes = len(template)
+        aim = functional.one_hot(kinds, classes) * (1.0 - share[:, None])
+        aim = aim + functional.one_hot(kinds[second], classes) * share[:, None]
+        folds = torch.cat([folds, folds[second] * (share[:, None] > 0.0)], dim=1)
+        return Batch(heard.to(memory_format=torch.channels_last), aim, template, folds)
+
+    def _spliced(self, rows: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """Replace a part of some clips by the same part of another of their kind: few clips, many sequences."""
+        power = self._examples.recorded[rows]
+        frames = power.shape[1]
+        for i in np.flatnonzero(rows != others):
+            first, last = np.sort(self._rng.integers(frames + 1, size=2))
+            power[i, first:last] = self._examples.recorded[others[i], first:last]
+        return power
+
+
+def share_of_rate(step: int, steps: int, falling: float) -> float:
+    """Return the share of the highest learning rate at a step: a tenth rising, some flat, half a cosine to zero."""
+    rising = (step + 1) / max(0.1 * steps, 1.0)
+    left = min(1.0, (steps - step) / max(falling * steps, 1.0))
+    return min(1.0, rising, 0.5 - 0.5 * math.cos(math.pi * left))
+
+
+def half_precision_is_fast() -> bool:
+    """Return whether this CPU multiplies in bfloat16; where it does not, torch's steps take eight times as long."""
+    return torch.cpu._is_avx512_bf16_supported() or torch.cpu._is_amx_tile_supported()
+
+
+class Learner:
+    """A network that is fitted, and the moving average of its weights."""
+
+    def __init__(self, net: SoundNet, settings: Settings) -> None:
+        self.net = net.train().to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+        self.average = copy.deepcopy(net).eval()
+        self._settings = settings
+        learnt = [weight for weight in net.parameters() if weight.requires_grad]
+        self._optimiser = torch.optim.AdamW(learnt, lr=settings.rate, weight_decay=settings.decay)
+        self._step, self._total = 0, 0.0
+
+    def learn(self, output: Tensor, aim: Tensor, words: Tensor) -> None:
+        """Make a step.
+
+        Args:
+            output: what the network makes of some sounds (n, dim).
+            aim: the share of every kind in them (n, kinds).
+            words: the kinds' unit vectors (kinds, dim).
+        """
+        s = self._settings
+        for group in self._optimiser.param_groups:
+            group["lr"] = s.rate * share_of_rate(self._step, s.steps, s.falling)
+        logits = output.float() @ words.T / s.temperature
+        loss = functional.cross_entropy(logits, aim, label_smoothing=s.smoothing)
+        self._optimiser.zero_grad()
+        loss.backward()
+        self._optimiser.step()
+        _blend(self.average, self.net, min(s.averaging, (1 + self._step) / (10 + self._step)))
+        self._step += 1
+        self._total += loss.item()
+
+    def loss_since(self, steps: int) -> float:
+        """Return the mean loss of the last steps, and begin to count again."""
+        mean, self._total = self._total / steps, 0.0
+        return mean
 
 
 def fit(
@@ -95,36 +194,58 @@ def fit(
         start: the network to continue from; a new one if None.
     """
     torch.manual_seed(settings.seed)
-    generator = torch.Generator().manual_seed(settings.seed)
-    batches = _Batches(examples, settings)
-    fresh = SoundNet(words.shape[2], settings.width) if start is None else copy.deepcopy(start).train()
-    net = fresh.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
-    average = copy.deepcopy(net).eval()
-    optimiser = torch.optim.AdamW(net.parameters(), lr=settings.rate, weight_decay=settings.decay)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, settings.rate, settings.steps, pct_start=0.1)
-    total = 0.0
-    for step in range(settings.steps):
-        power, kinds = batches.draw()
-        noise = steady_noise(len(power), generator)
-        x, other, share = augmented(power, noise, settings.augmentation, generator)
-        with torch.autocast("cpu", torch.bfloat16):
-            y = net(x.to(memory_format=torch.channels_last))
-        template = words[int(torch.randint(len(words), (1,), generator=generator))]
-        logits = y.float() @ template.T / settings.temperature
-        classes = logits.shape[1]
-        aim = functional.one_hot(kinds, classes) * (1.0 - share[:, None])
-        aim = aim + functional.one_hot(kinds[other], classes) * share[:, None]
-        loss = functional.cross_entropy(logits, aim, label_smoothing=settings.smoothing)
-        optimiser.zero_grad()
-        loss.backward()
-        optimiser.step()
-        schedule.step()
-        _blend(average, net, min(settings.averaging, (1 + step) / (10 + step)))
-        total += loss.item()
-        if (step + 1) % 50 == 0:
-            say(f"{label} step {step + 1}/{settings.steps} loss {total / 50:.3f}")
-            total = 0.0
-    return average
+    batches = Batches(examples, words, settings)
+    learner = Learner(SoundNet(words.shape[2], settings.width) if start is None else copy.deepcopy(start), settings)
+    for step in range(1, settings.steps + 1):
+        batch = batches.draw()
+        with torch.autocast("cpu", torch.bfloat16, enabled=half_precision_is_fast()):
+            output = learner.net(batch.heard)
+        learner.learn(output, batch.aim, batch.words)
+        if step % REPORTED == 0:
+            say(f"{label} step {step}/{settings.steps} loss {learner.loss_since(REPORTED):.3f}")
+    return learner.average
+
+
+def fit_folds(
+    examples: Examples, words: Tensor, settings: Settings, starts: Mapping[int, SoundNet]
+) -> dict[int, SoundNet]:
+    """Continue networks that differ in the fold they know nothing of, on one stream of batches.
+
+    The first layer and the first block are the same in all and stay as they are, so their maps are computed once. A
+    sound that holds any of a fold's clips, whole, spliced or mixed in, is left out of that fold's batch.
+
+    Args:
+        examples: training clips of all folds.
+        words: targets (templates, kinds, dim).
+        settings: how; a batch of each fold is what is left of the stream's.
+        starts: the network to continue from for each fold that it is fitted without; 0 for none.
+
+    Returns:
+        the averaged network of each fold.
+    """
+    torch.manual_seed(settings.seed)
+    batches = Batches(examples, words, settings)
+    learners = {fold: Learner(_with_fixed_first_layers(start), settings) for fold, start in starts.items()}
+    first = copy.deepcopy(next(iter(starts.values()))).eval()
+    first = first.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+    for step in range(1, settings.steps + 1):
+        batch = batches.draw()
+        with torch.no_grad():
+            maps = first.lower(batch.heard)
+        for fold, learner in learners.items():
+            rows = (batch.folds != fold).all(dim=1) if fold else torch.ones(len(maps), dtype=torch.bool)
+            learner.learn(learner.net.upper(maps[rows]), batch.aim[rows], batch.words)
+        if step % REPORTED == 0:
+            losses = ", ".join(f"{learner.loss_since(REPORTED):.3f}" for learner in learners.values())
+            say(f"folds {', '.join(map(str, learners))} step {step}/{settings.steps} losses {losses}")
+    return {fold: learner.average for fold, learner in learners.items()}
+
+
+def _with_fixed_first_layers(net: SoundNet) -> SoundNet:
+    net = copy.deepcopy(net)
+    for part in (net.stem, net.stem_norm, net.blocks[0]):
+        part.requires_grad_(requires_grad=False)
+    return net
 
 
 @torch.no_grad()

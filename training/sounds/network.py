@@ -35,12 +35,16 @@ class SoundNet(nn.Module):
         self.dropout = nn.Dropout(dropout)
         self.head = nn.Linear(12 * width, dim)
 
-    def pooled(self, x: Tensor) -> Tensor:
-        """Return the mean and the highest over time of the mean over bands (n, 12 width)."""
-        y = self.blocks(functional.relu(self.stem_norm(self.stem(x))))
-        y = y.float().mean(dim=2)
-        return torch.cat([y.mean(dim=2), y.amax(dim=2)], dim=1)
+    def lower(self, x: Tensor) -> Tensor:
+        """Return the maps (n, 2 width, 16, 56) of the first layer and the first block."""
+        return self.blocks[0](functional.relu(self.stem_norm(self.stem(x))))
+
+    def upper(self, maps: Tensor) -> Tensor:
+        """Return unit vectors from those maps: the mean and the highest over time of the mean over bands."""
+        y = self.blocks[1:](maps).float().mean(dim=2)
+        pooled = torch.cat([y.mean(dim=2), y.amax(dim=2)], dim=1)
+        return functional.normalize(self.head(self.dropout(pooled)), dim=1)
 
     def forward(self, x: Tensor) -> Tensor:
         """Return unit vectors."""
-        return functional.normalize(self.head(self.dropout(self.pooled(x))), dim=1)
+        return self.upper(self.lower(x))
