@@ -30,7 +30,10 @@ ONWARDS = (
     replace(_ROUND, steps=1400, augmentation=Augmentation(segmented=0.0)),
     replace(_ROUND, steps=1200, falling=0.9, seed=1),
 )
-SCRATCH = Settings(steps=600, averaging=0.99)
+SCRATCH = (
+    Settings(steps=600, averaging=0.99, seed=5, augmentation=Augmentation(segmented=0.0)),
+    Settings(steps=500, rate=2e-3, averaging=0.99, falling=0.9, seed=6),
+)
 NOTE = (
     "A small closed-set encoder: ten kinds learnt from about 32 recordings each, forty from one to eight, the others "
     "from synthetic sounds alone, which carry less well; other sounds can be taught."
@@ -66,7 +69,8 @@ def main() -> None:
     np.save(weights / "sounds.npy", bank.astype(np.float16))
     per_kind = np.bincount(kinds, minlength=len(NAMES)).tolist()
     write_json(weights / "sounds.json", notes(corpus, words, constants, arguments.each, per_kind))
-    about = {"onwards": [asdict(each) for each in onwards], "scratch": asdict(SCRATCH), "words": words.card.checksum}
+    settings = {"onwards": [asdict(each) for each in onwards], "scratch": [asdict(each) for each in SCRATCH]}
+    about = {**settings, "words": words.card.checksum}
     write_json(arguments.out / FIGURES, {"about": about, "tables": tables})
     say(json.dumps(tables, indent=1))
 
@@ -105,7 +109,7 @@ def notes(
         for k, (name, called) in enumerate(KINDS.items())
     ]
     return {
-        "id": "avlmaps/sounds-2",
+        "id": "avlmaps/sounds-3",
         "dim": words.card.dim,
         "words": words.card.checksum,
         "templates": list(TEMPLATES),

@@ -1,7 +1,7 @@
 """Train on three folds, listen to the fourth: what the encoder makes of recordings it never learnt from."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +36,7 @@ class Networks:
         corpus: what they learn from.
         encode_words: the word encoder.
         rounds: of networks that continue from ``start``; each round continues where the one before it ended.
-        scratch: of the network that starts from scratch.
+        scratch: rounds of the network that starts from scratch.
         start: weights that were shipped before, trained on ESC-10 (every fold) and synthetic sounds alone.
         work: folder of the networks.
     """
@@ -44,7 +44,7 @@ class Networks:
     corpus: Corpus
     encode_words: EncodeWords
     rounds: tuple[Settings, ...]
-    scratch: Settings
+    scratch: tuple[Settings, ...]
     start: Path
     work: Path
 
@@ -66,7 +66,11 @@ class Networks:
         if not file.exists():
             words = targets(self.encode_words)
             examples = self.corpus.examples(LEFT_OUT_FOLD, tuple(map(NAMES.index, LEFT_OUT)))
-            self._store(file, fit(examples, words, replace(self.scratch, seed=LEFT_OUT_FOLD), "stranger"), words)
+            first, *others = self.scratch
+            net = fit(examples, words, first, "stranger")
+            for settings in others:
+                net = fit(examples, words, settings, "stranger", net)
+            self._store(file, net, words)
         return self._read(file)
 
     def _file(self, fold: int) -> Path:
