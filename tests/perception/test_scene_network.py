@@ -1,12 +1,25 @@
 """The network behind the embedded pixel and view encoders: how large it looks, and what it gives back."""
 
+import shutil
+from importlib.resources import files
+from pathlib import Path
+
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.perception.embedded.scene_network import at_working_size, load_network
+from avlmaps.core.errors import BackendError
+from avlmaps.perception.embedded import scene_network
+from avlmaps.perception.embedded.scene_network import (
+    DEFAULT_WEIGHTS,
+    SYNTHETIC_WEIGHTS,
+    at_working_size,
+    checksum_of,
+    load_network,
+)
 from avlmaps.recordings.types import Frame
 
 
@@ -42,3 +55,28 @@ def test_each_cell_is_a_distribution_on_a_grid_of_half_the_size(size: tuple[int,
     np.testing.assert_allclose(seen.category.sum(axis=-1), 1.0, atol=1e-4)
     assert seen.room.sum() == pytest.approx(1.0, abs=1e-4)
     assert seen.known.all()
+
+
+@pytest.mark.parametrize("weights", [DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS])
+def test_the_checksum_beside_the_weights_is_theirs(weights: str) -> None:
+    notes = load_network(weights).notes
+    content = (files("avlmaps.perception.embedded") / "weights" / f"{weights}.onnx").read_bytes()
+    assert notes.checksum == checksum_of(content, notes)
+    assert checksum_of(content, msgspec.structs.replace(notes, called={}, note="said otherwise")) == notes.checksum
+    assert checksum_of(content + b" ", notes) != notes.checksum
+    assert checksum_of(content, msgspec.structs.replace(notes, temperature=notes.temperature + 0.1)) != notes.checksum
+
+
+def test_weights_of_another_description_are_refused_at_the_first_frame(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frame, folder = frame_of(160, 120, 150.0), tmp_path / "weights"
+    shutil.copytree(Path(str(files("avlmaps.perception.embedded") / "weights")), folder)
+    (folder / f"{DEFAULT_WEIGHTS}.onnx").write_bytes((folder / f"{SYNTHETIC_WEIGHTS}.onnx").read_bytes())
+    monkeypatch.setattr(scene_network, "files", lambda _: tmp_path)
+    network = load_network.__wrapped__(DEFAULT_WEIGHTS)  # past the cache
+    with pytest.raises(BackendError, match=r"scene_encoder\.onnx and scene_encoder\.json do not belong together"):
+        network.see(frame)
+    (folder / f"{DEFAULT_WEIGHTS}.onnx").unlink()
+    with pytest.raises(BackendError, match="install the package again"):
+        load_network.__wrapped__(DEFAULT_WEIGHTS).see(frame)

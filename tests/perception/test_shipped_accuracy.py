@@ -68,7 +68,7 @@ def untrained(network: SceneNetwork) -> SceneNetwork:
     """Return the network with its weights shuffled."""
     (name,) = [f"{stem}.onnx" for stem in ("scene_encoder", "rooms") if (WEIGHTS / f"{stem}.onnx").is_file()]
     content = shuffled_weights((WEIGHTS / name).read_bytes(), np.random.default_rng(0))
-    return SceneNetwork(content, network.notes, "shuffled")
+    return SceneNetwork(lambda: content, network.notes)
 
 
 @pytest.mark.slow

@@ -180,7 +180,9 @@ def calibrate(options: Options) -> None:
         multiple=MULTIPLE,
     )
     options.out.mkdir(parents=True, exist_ok=True)
-    write_onnx(network, options.out / f"{options.name}.onnx")
+    weights = options.out / f"{options.name}.onnx"
+    write_onnx(network, weights)
+    notes = msgspec.structs.replace(notes, checksum=checksum_of(weights.read_bytes(), notes))
     if options.start is not None:
         write_start(network, options.start)
     path = options.out / f"{options.name}.json"

@@ -1,6 +1,7 @@
 """English plurals of nouns and noun phrases."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 _IRREGULAR = {
     "child": "children", "person": "people", "man": "men", "woman": "women", "foot": "feet", "tooth": "teeth",
@@ -46,6 +47,7 @@ def plural_of(phrase: str) -> str:
     return " ".join(words)
 
 
+@lru_cache(maxsize=4096)
 def singulars_of(phrase: str) -> tuple[str, ...]:
     """Return the possible singulars of a phrase, the likeliest first; not all of them are words."""
     out: dict[str, None] = {}

@@ -5,8 +5,8 @@ a small size (``Notes.width_px``), for every recording; ``training/pixels`` make
 that learnt from rendered worlds and real frames, and one that saw rendered worlds alone (the profile ``synthetic``).
 """
 
-import json
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 from hashlib import sha256
@@ -66,6 +66,7 @@ class Notes(msgspec.Struct, frozen=True):
             either, since it was trained on none longer.
         instances: how instances are distinguished from noise.
         multiple: pictures are padded to a multiple of this.
+        checksum: of the weights and of what else makes the features; see ``checksum_of``.
     """
 
     id: str
@@ -80,6 +81,7 @@ class Notes(msgspec.Struct, frozen=True):
     width_px: int = 240
     instances: InstanceNotes = InstanceNotes()
     multiple: int = 16
+    checksum: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,24 +103,32 @@ class Seen:
 
 
 class SceneNetwork:
-    """The network, loaded."""
+    """The network. Its weights are read for the first frame: a query in words needs its notes alone.
 
-    def __init__(self, weights: bytes, notes: Notes, checksum: str) -> None:
-        """Keep the weights until the first frame comes."""
-        self._weights = weights
+    Args:
+        read_weights: returns the content of the ONNX file.
+        notes: their description.
+
+    Attributes:
+        notes: as given.
+        checksum: of the notes.
+    """
+
+    def __init__(self, read_weights: Callable[[], bytes], notes: Notes) -> None:
+        self._read_weights = read_weights
         self.notes = notes
-        self.checksum = checksum
+        self.checksum = notes.checksum
         self._bias = np.array(notes.bias, np.float32)
 
     @cached_property
     def _session(self) -> Any:
-        """The network, ready to run: made for the first frame, since a query of words needs its notes alone."""
+        """The network, ready to run."""
         import onnxruntime
 
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = min(4, _cores())
         options.inter_op_num_threads = 1
-        return onnxruntime.InferenceSession(self._weights, options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(self._read_weights(), options, providers=["CPUExecutionProvider"])
 
     def see(self, frame: Frame) -> Seen:
         """Encode a frame; its ``ground`` gives the up direction, where it is known."""
@@ -155,17 +165,45 @@ def load_network(weights: str = DEFAULT_WEIGHTS) -> SceneNetwork:
         BackendError: its files are missing or damaged.
     """
     folder = files("avlmaps.perception.embedded") / "weights"
+
+    def read(end: str) -> bytes:
+        try:
+            return (folder / f"{weights}.{end}").read_bytes()
+        except OSError as fault:
+            raise _unusable(str(fault)) from fault
+
+    def read_weights() -> bytes:
+        content = read("onnx")
+        if checksum_of(content, notes) != notes.checksum:
+            raise _unusable(f"{weights}.onnx and {weights}.json do not belong together")
+        return content
+
     try:
-        arrays, about = ((folder / f"{weights}.{end}").read_bytes() for end in ("onnx", "json"))
-        notes = msgspec.json.decode(about, type=Notes)
-    except (FileNotFoundError, msgspec.MsgspecError, json.JSONDecodeError) as fault:
-        raise BackendError(
-            f"The embedded pixel encoder's weights cannot be read ({fault}); install the package again, or make them "
-            "with 'python -m training.pixels'."
-        ) from fault
-    # The checksum covers everything that makes the features; how they are read may change, and old maps stay usable.
-    made_by = msgspec.structs.replace(notes, called={}, kinds={}, instances=InstanceNotes(), note="")
-    return SceneNetwork(arrays, notes, sha256(arrays + msgspec.json.encode(made_by)).hexdigest())
+        notes = msgspec.json.decode(read("json"), type=Notes)
+    except msgspec.MsgspecError as fault:
+        raise _unusable(str(fault)) from fault
+    return SceneNetwork(read_weights, notes)
+
+
+def checksum_of(weights: bytes, notes: Notes) -> str:
+    """Return the SHA-256 of all that makes the features, as hexadecimal digits.
+
+    How features are read may change, and old maps stay usable: names, instances and the note do not count.
+
+    Args:
+        weights: content of the ONNX file.
+        notes: their description.
+    """
+    said = msgspec.structs.replace(notes, called={}, kinds={}, instances=InstanceNotes(), note="")
+    makes = {name: value for name, value in msgspec.structs.asdict(said).items() if name != "checksum"}
+    return sha256(weights + msgspec.json.encode(makes)).hexdigest()
+
+
+def _unusable(fault: str) -> BackendError:
+    return BackendError(
+        f"The embedded pixel encoder's weights cannot be read ({fault}); install the package again, or make them "
+        "with 'python -m training.pixels'."
+    )
 
 
 def at_working_size(
