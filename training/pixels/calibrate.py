@@ -18,7 +18,7 @@ from training.pixels.network import MULTIPLE
 from training.pixels.whole import WIDTH, whole_frame
 
 from avlmaps.bench.nyu import SCORED
-from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, Notes
+from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, Notes, checksum_of
 
 PIXELS_PER_FRAME = 400
 # Of the biases that make single pixels likeliest only this share is applied: they favour walls, which fill most of a
