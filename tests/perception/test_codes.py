@@ -43,6 +43,18 @@ def test_a_name_means_itself_and_a_wider_word_all_that_it_takes_in() -> None:
     np.testing.assert_array_equal(MEANINGS.name_weights("table"), [0, 1, 1, 0])
 
 
+def test_a_name_takes_in_its_narrower_ones_a_little_less_and_its_compounds_do_not() -> None:
+    names = ("chair", "armchair", "office chair", "stool")
+    seats = Meanings(names, tuple((name,) for name in names), {"chair": names[:3], "seat": names}, EmbeddedWords())
+    share = seats.narrower_share
+    for phrase in ("chair", "chairs", "the chair", "broken chair"):
+        np.testing.assert_allclose(seats.name_weights(phrase), [1, share, share, 0], err_msg=phrase)
+        np.testing.assert_array_equal(seats.own_weights(phrase), [1, 0, 0, 0], err_msg=phrase)
+    np.testing.assert_array_equal(seats.name_weights("dining chair"), [1, 0, 0, 0])  # which no armchair is
+    np.testing.assert_array_equal(seats.name_weights("arm chair"), [0, 1, 0, 0])
+    np.testing.assert_array_equal(seats.name_weights("seat"), [1, 1, 1, 1])
+
+
 def test_a_word_that_is_in_no_list_finds_its_thing_by_the_words_own_nearness() -> None:
     assert MEANINGS.name_weights("davenport sofa").argmax() == 0
     assert MEANINGS.name_weights("flush toilet").argmax() == 3

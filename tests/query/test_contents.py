@@ -16,6 +16,8 @@ from query_fakes import (
 )
 
 from avlmaps.core.errors import QueryError
+from avlmaps.perception.embedded.codes import features_of
+from avlmaps.perception.embedded.pixels import EmbeddedPixels
 from avlmaps.query.avlmap import AVLMap
 
 
@@ -55,6 +57,23 @@ def test_two_names_of_one_thing_are_one_thing() -> None:
         ["chair", "chair seat", "seat"], least_confidence=0.0
     )
     assert len(things) == 1
+
+
+def test_a_narrower_thing_answers_to_the_wider_name_and_is_listed_by_its_own() -> None:
+    encoder = EmbeddedPixels()
+    index = np.r_[box((0, 0, 0), (10, 10, 16)), box((40, 0, 0), (50, 10, 16))]
+    likely = np.zeros((len(index), len(encoder.names)))
+    for rows, name in ((np.s_[:1600], "office chair"), (np.s_[1600:], "sofa")):
+        likely[rows, encoder.names.index(name)] = 0.9
+        likely[rows, encoder.names.index("other")] = 0.1
+    stored = fake_map(voxels_of(index, features_of(likely, encoder.codes)), profile=fake_profile(encoder))
+    avlmap = AVLMap(stored)
+    chair, exact = (avlmap.object(word, primary=True) for word in ("chair", "office chair"))
+    assert chair.found and exact.found
+    assert chair.goals(1)[0].position == exact.goals(1)[0].position
+    assert [thing.name for thing in avlmap.things()].count("office chair") == 1
+    assert {thing.name for thing in avlmap.things()} == {"office chair", "sofa"}
+    assert not avlmap.object("armchair", primary=True).found, "an office chair is no armchair"
 
 
 def test_names_choose_what_is_listed(furnished: AVLMap) -> None:

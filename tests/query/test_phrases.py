@@ -21,6 +21,15 @@ def names(phrase: str) -> list[str]:
     return [ENCODER.names[i] for i in np.argsort(-weights, kind="stable") if weights[i] > 0.0]
 
 
+def test_a_category_takes_in_those_that_the_lexicon_calls_narrower_and_competes_with_them_alone() -> None:
+    assert names("chair") == ["chair", "armchair", "office chair"]
+    assert set(names("cabinet")) == {"cabinet", "kitchen cabinet", "tv cabinet", "filing cabinet"}
+    assert names("kitchen cabinet") == ["kitchen cabinet"]
+    assert ENCODER.understood("chair") == "chair"
+    code = ENCODER.codes[ENCODER.names.index("chair")]
+    np.testing.assert_allclose(ENCODER.encode_words(["chair"])[0], code, atol=1e-6)
+
+
 def test_phrases_of_strangers_mean_the_right_name_first() -> None:
     with PHRASES.open(encoding="utf-8") as file:
         rows = [(row["query"], row["label"]) for row in csv.DictReader(file)]

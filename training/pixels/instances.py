@@ -93,7 +93,7 @@ def pieces_of(options: Options, number: int) -> Iterator[Pieces]:
     for name in encoder.vocabulary:
         if name in STRUCTURE:
             continue
-        pieces = object_pieces(space, feature, encoder, rivals, EncodedWord.of(encoder, name), settings)
+        pieces = object_pieces(space, feature, encoder, rivals, EncodedWord.of_name(encoder, name), settings)
         count = np.bincount(pieces.instance, minlength=len(pieces.mean_probability))
         held = np.zeros(len(space.centres), bool)
         for thing in things:

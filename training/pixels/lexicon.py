@@ -4,7 +4,8 @@ from training.pixels.labels import CATEGORIES, ROOMS
 
 from avlmaps.core.lexicon import Kind, lexicon
 
-# The wider words that notes carry; everything else is left to the nearness of words.
+# The wider words that notes carry besides the categories that have narrower ones; everything else is left to the
+# nearness of words.
 _WIDE = {
     Kind.THING: ("table", "seat", "place to sit", "place to sleep", "cupboard", "light", "screen", "shelf", "counter",
                  "furniture"),
@@ -19,12 +20,14 @@ def _called() -> dict[str, tuple[str, ...]]:
 
 
 def _kinds() -> dict[str, tuple[str, ...]]:
-    members = {word: {entry.name for entry in lexicon().members(word)} for words in _WIDE.values() for word in words}
-    return {
-        word: tuple(name for name in _NAMES[kind] if name in members[word])
-        for kind, words in _WIDE.items()
-        for word in words
-    }
+    out: dict[str, tuple[str, ...]] = {}
+    for kind, words in _WIDE.items():
+        for word in (*words, *(CATEGORIES if kind is Kind.THING else ())):
+            members = {word, *(entry.name for entry in lexicon().members(word))}
+            names = tuple(name for name in _NAMES[kind] if name in members)
+            if word in words or (len(names) > 1 and word != "other"):
+                out[word] = names
+    return out
 
 
 CALLED: dict[str, tuple[str, ...]] = _called()

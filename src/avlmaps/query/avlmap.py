@@ -142,10 +142,16 @@ class AVLMap:
         )
 
     def pieces(self, word: str) -> Pieces:
-        """Return the voxels that a word wins against the vocabulary, and the instances that they make up."""
+        """Return the voxels that a word wins against the vocabulary, and the instances that they make up.
+
+        One of an encoder's names is taken for itself alone: an armchair is no piece of "chair", but a thing of its own.
+        """
         encoder = self.stored.profile.pixel_encoder()
         rivals = self._rivals_of(encoder, None)
-        encoded = EncodedWord.of(encoder, word)
+        if isinstance(encoder, NamedPixelEncoder) and word in encoder.names:
+            encoded = EncodedWord.of_name(encoder, word)
+        else:
+            encoded = EncodedWord.of(encoder, word)
         return object_pieces(
             self.space, self.stored.voxels.feature, encoder, rivals, encoded, self.settings.objects,
             lambda: self.things_in_rooms,

@@ -39,5 +39,8 @@ class NamedEncoder:
         return Meanings(self.names, called, notes.kinds, self._words, kind)
 
     def name_weights(self, word: str) -> Float32[np.ndarray, " k"]:
-        """Return for each of ``names`` how much a phrase means it, 1 for the most meant; zero where it means none."""
+        """Return for each of ``names`` how much a phrase means it, 1 for the most meant; zero where it means none.
+
+        A name takes in its narrower ones: an armchair answers to "chair".
+        """
         return self.meanings.name_weights(word)

@@ -13,6 +13,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float32
 from avlmaps.core.lexicon import Entry, Kind, lexicon, noun_of
+from avlmaps.core.spelling import squeezed
 from avlmaps.perception.protocols import WordEncoder
 
 # A phrase that starts with one of these describes, without a noun of its own.
@@ -30,7 +31,8 @@ class Meanings:
     Attributes:
         names: what can be meant.
         called: for each name the phrases that stand for it, itself among them.
-        kinds: what a wider word takes in: ``table`` is a dining table, a coffee table ...
+        kinds: what a wider word takes in: ``table`` is a dining table, a coffee table ...; and a name its narrower
+            names: an armchair is a ``chair``.
         words: vectors of phrases.
         kind: of entry that the names are.
         temperature: a cosine lower by this than the best makes a name e times less meant.
@@ -39,6 +41,7 @@ class Meanings:
         sure_cosine: of a noun that the lexicon lacks; below, it means none of the names.
         least_share: names meant less than this beside the best one are left out.
         narrower: a narrower name must be nearer by this cosine than the noun's own.
+        narrower_share: a name means its narrower ones by this much: the chair is rather a chair than an armchair.
     """
 
     names: tuple[str, ...]
@@ -52,9 +55,21 @@ class Meanings:
     sure_cosine: float = 0.8
     least_share: float = 0.2
     narrower: float = 0.15
+    narrower_share: float = 0.8
 
     def name_weights(self, phrase: str) -> Float32[np.ndarray, " k"]:
         """Return for each name how much the phrase means it, 1 for the most meant; all zero where it means none."""
+        weights = self.own_weights(phrase)
+        wider = [name for name in self.kinds if name in self.names and weights[self.names.index(name)] > 0.0]
+        if not wider or self._is_compound(_clean(phrase)):  # an armchair is a chair, and no dining chair
+            return weights
+        narrower = [
+            self.narrower_share * weights[self.names.index(name)] * self._all_of(self.kinds[name]) for name in wider
+        ]
+        return np.maximum.reduce([weights, *narrower]).astype(np.float32)
+
+    def own_weights(self, phrase: str) -> Float32[np.ndarray, " k"]:
+        """Return the same without what is narrower than the names: an armchair is a name of its own."""
         clean = _clean(phrase)
         if clean in self._exactly:
             return self._all_of(self._exactly[clean])
@@ -89,6 +104,11 @@ class Meanings:
             if wide in self.names:
                 return (wide,)
         return ()
+
+    def _is_compound(self, phrase: str) -> bool:
+        """Return whether a phrase names a special kind of something, that no name stands for."""
+        entry = lexicon().find(phrase, self.kind)
+        return entry is not None and squeezed(phrase) in map(squeezed, entry.compounds)
 
     def _general(self, phrase: str, head: Entry) -> Float32[np.ndarray, " k"]:
         """Return the meaning of a phrase about an appliance, a piece of furniture ...: the nearest name."""

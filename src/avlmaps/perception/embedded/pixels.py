@@ -52,17 +52,20 @@ class EmbeddedPixels(NamedEncoder):
         return self._network.see(frame)
 
     def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each phrase; zero for one that means none of the categories."""
+        """Return a unit vector for each phrase; zero for one that means none of the categories.
+
+        That of a category is its code alone: its narrower ones are vectors of their own.
+        """
         vectors = np.zeros((len(words), self.card.dim), np.float32)
         for row, word in enumerate(words):
-            weights = self.name_weights(word)
+            weights = self.meanings.own_weights(word)
             if weights.any():
                 vectors[row] = features_of(weights / weights.sum(), self.codes)
         return vectors
 
     def understood(self, word: str) -> str:
         """Return the categories that a phrase is taken for, the most meant first, or ``""``."""
-        weights = self.name_weights(word)
+        weights = self.meanings.own_weights(word)
         best = [self.names[i] for i in np.argsort(-weights, kind="stable") if weights[i] > 0.0]
         clean = " ".join(word.lower().split())
         return clean if clean in best else " or ".join(best[:4])

@@ -109,6 +109,13 @@ class EncodedWord:
         row = row[np.any(row != 0.0, axis=1)]
         return cls(row, row, encoder.understood(word), np.zeros(0, np.float32))
 
+    @classmethod
+    def of_name(cls, encoder: NamedPixelEncoder, name: str) -> "EncodedWord":
+        """Take one of an encoder's names for itself alone, without its narrower ones."""
+        weights = np.array([name == each for each in encoder.names], np.float32)
+        code = np.ascontiguousarray(encoder.codes[weights > 0.0])
+        return cls(code, code, name, weights)
+
     def meant(self, encoder: NamedPixelEncoder) -> tuple[str, ...]:
         """Return the names of the encoder that the word clearly means."""
         return tuple(encoder.names[index] for index in np.flatnonzero(self.name_weights >= CLEARLY_MEANT))
