@@ -76,6 +76,22 @@ def test_a_narrower_thing_answers_to_the_wider_name_and_is_listed_by_its_own() -
     assert not avlmap.object("armchair", primary=True).found, "an office chair is no armchair"
 
 
+def test_what_is_surely_a_chair_but_of_no_sure_kind_is_listed_as_a_chair() -> None:
+    encoder = EmbeddedPixels()
+    index = box((0, 0, 0), (5, 5, 10))
+    likely = np.zeros((len(index), len(encoder.names)))
+    for name, share in (("chair", 0.3), ("office chair", 0.3), ("armchair", 0.3), ("other", 0.1)):
+        likely[:, encoder.names.index(name)] = share
+    avlmap = AVLMap(fake_map(voxels_of(index, features_of(likely, encoder.codes)), profile=fake_profile(encoder)))
+    assert (
+        avlmap.pieces("chair", alone=True).confidence.max(initial=0.0) < 0.5 < avlmap.pieces("chair").confidence.max()
+    )
+    for least in (0.0, 0.5):
+        (chair,) = avlmap.things(least_confidence=least)
+        assert (chair.name, len(chair.rows)) == ("chair", len(index))
+        assert chair.confidence == pytest.approx(float(avlmap.pieces("chair").confidence.max()), abs=1e-3)
+
+
 def test_names_choose_what_is_listed(furnished: AVLMap) -> None:
     assert {thing.name for thing in furnished.things(["table"], least_confidence=0.0)} == {"table"}
 

@@ -141,14 +141,17 @@ class AVLMap:
             )
         )
 
-    def pieces(self, word: str) -> Pieces:
+    def pieces(self, word: str, alone: bool = False) -> Pieces:
         """Return the voxels that a word wins against the vocabulary, and the instances that they make up.
 
-        One of an encoder's names is taken for itself alone: an armchair is no piece of "chair", but a thing of its own.
+        Args:
+            word: what it is called.
+            alone: take one of the encoder's names for itself, without the narrower ones that it takes in: then an
+                armchair is no piece of "chair".
         """
         encoder = self.stored.profile.pixel_encoder()
         rivals = self._rivals_of(encoder, None)
-        if isinstance(encoder, NamedPixelEncoder) and word in encoder.names:
+        if alone and isinstance(encoder, NamedPixelEncoder) and word in encoder.names:
             encoded = EncodedWord.of_name(encoder, word)
         else:
             encoded = EncodedWord.of(encoder, word)

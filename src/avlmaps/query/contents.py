@@ -1,7 +1,8 @@
 """The content of a map without a question: its things, sounds and rooms, each named with a confidence.
 
 A thing is a connected group of voxels that a word of the vocabulary wins (``modalities.object``). Several words may
-claim the same voxels ("chair", "office chair"); the most confident claim stands, and what overlaps it is left out.
+claim the same voxels ("desk", "dining table"); the most confident claim stands, and what overlaps it is left out. What
+is surely a chair, and perhaps an armchair, is listed as a chair.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -15,6 +16,8 @@ from avlmaps.core.arrays import Float, Int, UInt8
 from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME
 from avlmaps.core.registry import Kind
+from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
+from avlmaps.query.factors import FOUND_AT
 from avlmaps.query.modalities.area import AreaSettings, area_names, modes, pooled_name_shares
 from avlmaps.query.modalities.object import Pieces
 from avlmaps.query.modalities.sound import sound_features
@@ -160,7 +163,7 @@ class Contents:
 def find_things(
     stored: "StoredMap",
     space: Space,
-    pieces_of: Callable[[str], Pieces],
+    pieces_of: Callable[[str, bool], Pieces],
     names: Sequence[str] | None = None,
     least_confidence: float = 0.5,
     structure: bool = False,
@@ -171,7 +174,7 @@ def find_things(
     Args:
         stored: the map.
         space: its voxels' places.
-        pieces_of: returns the voxels and instances of a word (``AVLMap.pieces``).
+        pieces_of: returns the voxels and instances of a word, with its narrower names or alone (``AVLMap.pieces``).
         names: what to list; by default the pixel encoder's vocabulary.
         least_confidence: things below it are left out, in [0, 1].
         structure: list walls, floors and the like as well.
@@ -183,29 +186,39 @@ def find_things(
     """
     if not 0.0 <= least_confidence <= 1.0:
         raise QueryError(f"The least confidence is {least_confidence:g}; it must lie between 0 and 1.")
-    vocabulary = stored.profile.pixel_encoder().vocabulary if names is None else names
-    wanted = [name for name in vocabulary if structure or name not in STRUCTURE]
-    claims: list[tuple[str, float, Int[np.ndarray, " m"]]] = []
-    for number, name in enumerate(wanted):
-        watch("things", number, len(wanted))
-        claims += _claims(name, pieces_of(name), least_confidence)
-    claims.sort(key=lambda claim: (-claim[1], -len(claim[2]), claim[0]))
+    encoder = stored.profile.pixel_encoder()
+    wanted = [name for name in (encoder.vocabulary if names is None else names) if structure or name not in STRUCTURE]
+    searches = [*((name, True) for name in wanted), *((name, False) for name in wanted if _is_wide(name, encoder))]
+    claims: list[tuple[bool, float, int, str, Int[np.ndarray, " m"]]] = []
+    for number, (name, alone) in enumerate(searches):
+        watch("things", number, len(searches))
+        for confidence, rows in _confident(pieces_of(name, alone), least_confidence):
+            claims.append((not alone or confidence < FOUND_AT, -confidence, -len(rows), name, rows))
     owned = np.zeros(len(space), bool)
     things: list[Thing] = []
-    for name, confidence, rows in claims:
+    # What is probably an armchair is one, however much surer it is that it is a chair.
+    for _, doubt, _, name, rows in sorted(claims, key=lambda claim: claim[:4]):
         if owned[rows].mean() >= _SAME_SHARE:
             continue
         owned[rows] = True
-        things.append(_thing(stored, space, name, confidence, rows))
-    return things
+        things.append(_thing(stored, space, name, -doubt, rows))
+    return sorted(things, key=lambda thing: -thing.confidence)
 
 
-def _claims(name: str, pieces: Pieces, least: float) -> Iterator[tuple[str, float, Int[np.ndarray, " m"]]]:
+def _is_wide(name: str, encoder: PixelEncoder) -> bool:
+    """Return whether a name of an encoder takes in others."""
+    if not isinstance(encoder, NamedPixelEncoder) or name not in encoder.names:
+        return False
+    return bool(np.count_nonzero(encoder.name_weights(name)) > 1)
+
+
+def _confident(pieces: Pieces, least: float) -> Iterator[tuple[float, Int[np.ndarray, " m"]]]:
+    """Yield the confidence and the voxels of each instance that is sure enough."""
     rows = np.flatnonzero(pieces.mask)
     order = np.argsort(pieces.instance, kind="stable")
     bounds = np.searchsorted(pieces.instance[order], np.arange(len(pieces.confidence) + 1))
     for number in np.flatnonzero(pieces.confidence >= least):
-        yield name, float(pieces.confidence[number]), rows[order[bounds[number] : bounds[number + 1]]]
+        yield float(pieces.confidence[number]), rows[order[bounds[number] : bounds[number + 1]]]
 
 
 def _thing(stored: "StoredMap", space: Space, name: str, confidence: float, rows: Int[np.ndarray, " m"]) -> Thing:
