@@ -2,7 +2,7 @@
 
 A thing is a connected group of voxels that a word of the vocabulary wins (``modalities.object``). Several words may
 claim the same voxels ("desk", "dining table"); the most confident claim stands, and what overlaps it is left out. What
-is surely a chair, and perhaps an armchair, is listed as a chair.
+is certainly a chair, and perhaps an armchair, is listed as a chair.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -196,7 +196,7 @@ def find_things(
             claims.append((not alone or confidence < FOUND_AT, -confidence, -len(rows), name, rows))
     owned = np.zeros(len(space), bool)
     things: list[Thing] = []
-    # What is probably an armchair is one, however much surer it is that it is a chair.
+    # A confident "armchair" stays one, though "chair" takes it in and is more confident still.
     for _, doubt, _, name, rows in sorted(claims, key=lambda claim: claim[:4]):
         if owned[rows].mean() >= _SAME_SHARE:
             continue
@@ -213,7 +213,7 @@ def _is_wide(name: str, encoder: PixelEncoder) -> bool:
 
 
 def _confident(pieces: Pieces, least: float) -> Iterator[tuple[float, Int[np.ndarray, " m"]]]:
-    """Yield the confidence and the voxels of each instance that is sure enough."""
+    """Yield the confidence and the voxels of each instance of at least some confidence."""
     rows = np.flatnonzero(pieces.mask)
     order = np.argsort(pieces.instance, kind="stable")
     bounds = np.searchsorted(pieces.instance[order], np.arange(len(pieces.confidence) + 1))
