@@ -11,6 +11,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.poses import MAX_ROTATION_FAULT
 from avlmaps.maps.fusion.measure_kernels import GREATEST_EXPONENT
 from avlmaps.maps.fusion.settings import PAPERS_VARIANCE_M2
+from avlmaps.perception.embedded.meanings import Meanings
 from avlmaps.perception.profiles import profile
 from avlmaps.query.factors import FOUND_AT, ROUNDING, HeatSettings
 from avlmaps.query.goals import LEAST_TOGETHER
@@ -40,6 +41,8 @@ def _claims() -> list[str]:
         f"instances of confidence {things.least_in_company} or more count as well",
         f"counts from {things.least_confidence} as before",
         f"a confidence below {FOUND_AT}",
+        f"({Meanings.narrower_share} of their probability counts)",
+        f"narrowest name that has a confidence of {FOUND_AT}",
         f"differ by less than {ROUNDING:.0e} are equal",
     ]
 
