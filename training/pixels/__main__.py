@@ -101,15 +101,12 @@ def train(options: Options) -> None:
 
 
 def finish(options: Options) -> None:
-    """Fit the room head on whole pictures, calibrate, and write the files that ship."""
+    """Calibrate, and write the files that ship."""
     from training.pixels.calibrate import Options as CalibrateOptions
     from training.pixels.calibrate import calibrate
     from training.pixels.instances import Options as InstanceOptions
     from training.pixels.instances import calibrate_instances
-    from training.pixels.rooms import Options as RoomOptions
-    from training.pixels.rooms import fit_rooms
 
-    fit_rooms(RoomOptions(network=options.network, frames=options.work / "training"))
     real_frames = options.work / "real" / "development" if options.nyuv2 else None
     name = DEFAULT_WEIGHTS if options.nyuv2 else SYNTHETIC_WEIGHTS
     start = Path("training/pixels/start.npz") if options.nyuv2 else None
