@@ -12,6 +12,7 @@ from avlmaps.perception.embedded.pixels import EmbeddedPixels
 from avlmaps.perception.embedded.views import EmbeddedViews
 from avlmaps.perception.protocols import SurveyedEncoder
 from avlmaps.perception.room_contents import RoomContents, read_room_contents
+from avlmaps.query.room_contents import commonness
 from avlmaps.query.room_contents import votes as votes_of
 
 FURNISHED = read_room_contents("avlmaps.perception")
@@ -76,3 +77,17 @@ def test_a_kind_that_the_table_does_not_hold_gets_the_mean() -> None:
     mean = votes(["bed"], KINDS).mean()
     assert votes(["bed"], ["cathedral of light"])[0, 0] == pytest.approx(mean)
     assert mean < 0.0, "a bed speaks against most kinds of room"
+
+
+@pytest.mark.parametrize("table", [FURNISHED, read_room_contents("avlmaps.perception.embedded")])
+def test_nothing_speaks_against_a_room_that_the_lexicon_places_it_in(table: RoomContents) -> None:
+    """The homes that are counted have no table to dine at in a kitchen; real ones do."""
+    kinds = table.kinds
+    for thing in table.things:
+        entry = lexicon().named(thing, Kind.THING)
+        usual = np.array([kind in entry.rooms for kind in kinds])
+        common = commonness([thing], kinds, table)
+        assert (votes([thing], kinds, table)[0][usual] >= 0.0).all(), thing
+        assert common is None or (common[usual] >= 0.0).all(), thing
+    assert votes(["dining table"], ["kitchen"], table)[0, 0] == 0.0
+    assert votes(["dining table"], ["bathroom"], table)[0, 0] < 0.0

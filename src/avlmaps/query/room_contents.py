@@ -29,7 +29,8 @@ def votes(things: Sequence[str], kinds: Sequence[str], contents: RoomContents) -
     """Return by how much, in nats, a square metre of each thing speaks for each kind of room.
 
     Args:
-        things: names, as an encoder has them; one that the table does not hold speaks for none.
+        things: names, as an encoder has them; one that the table does not hold speaks for none. A thing speaks against
+            no kind of room that its entry of the lexicon lists.
         kinds: kinds of room. One that the table does not hold gets the mean vote of those that it holds, which for
             most things is against it; one that belongs to a kind of the table (a kitchenette) gets that kind's.
         contents: the table.
@@ -41,7 +42,7 @@ def votes(things: Sequence[str], kinds: Sequence[str], contents: RoomContents) -
         entry = known.find(thing, Kind.THING)
         row = row_of.get(entry) if entry is not None else None
         if row is not None:
-            out[number] = _for_kinds(ratios[row], kinds, contents)
+            out[number] = _not_against(_for_kinds(ratios[row], kinds, contents), kinds, (entry,))
     return out
 
 
@@ -65,7 +66,21 @@ def commonness(things: Sequence[str], kinds: Sequence[str], contents: RoomConten
         if any(name == thing or is_a(name, thing, Kind.THING) for thing in things)
     ]
     surface_m2 = contents.surface_m2[rows].sum(axis=0, keepdims=True)
-    return _for_kinds(_nats_of(contents, surface_m2)[0], kinds, contents) if surface_m2.any() else None
+    if not surface_m2.any():
+        return None
+    entries = [entry for thing in things if (entry := lexicon().find(thing, Kind.THING)) is not None]
+    return _not_against(_for_kinds(_nats_of(contents, surface_m2)[0], kinds, contents), kinds, entries)
+
+
+def _not_against(
+    nats: Float[np.ndarray, " n"], kinds: Sequence[str], entries: Sequence[Entry | None]
+) -> Float[np.ndarray, " n"]:
+    """Return nats that speak against no kind of room in which the lexicon says that such things stand.
+
+    The homes that are counted have tables to dine at in dining rooms alone; many a kitchen has one.
+    """
+    usual = {room for entry in entries if entry is not None for room in entry.rooms}
+    return np.where([kind in usual for kind in kinds], np.maximum(nats, 0.0), nats)
 
 
 def _for_kinds(
