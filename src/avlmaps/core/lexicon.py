@@ -88,6 +88,10 @@ class Entry:
         """The name, its synonyms and its compounds."""
         return (self.name, *self.synonyms, *self.compounds)
 
+    def is_compound(self, phrase: str) -> bool:
+        """Return whether a phrase names a special one: a dining chair is more than a chair, and no armchair is one."""
+        return squeezed(phrase) in map(squeezed, self.compounds)
+
     def __repr__(self) -> str:
         return f"Entry({self.name!r}, {self.kind.value})"
 
@@ -201,7 +205,7 @@ class Lexicon:
         for want in self.senses(wanted, kind):
             named = self.senses(other, want.kind) or tuple(filter(None, (self.head(other, want.kind),)))
             # A dining chair is a chair; an armchair is a chair too, and no dining chair.
-            wide = squeezed(wanted) not in map(squeezed, want.compounds)
+            wide = not want.is_compound(wanted)
             if any(want is entry or (wide and want in self.wider(entry.name, want.kind)) for entry in named):
                 return True
         return _ends_with(other, wanted)

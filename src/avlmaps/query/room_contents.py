@@ -1,6 +1,6 @@
 """The votes of the things of a map on what kind of room a place is."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 
 import numpy as np
@@ -40,8 +40,8 @@ def votes(things: Sequence[str], kinds: Sequence[str], contents: RoomContents) -
     out = np.zeros((len(things), len(kinds)))
     for number, thing in enumerate(things):
         entry = known.find(thing, Kind.THING)
-        row = row_of.get(entry) if entry is not None else None
-        if row is not None:
+        row = row_of.get(entry)
+        if entry is not None and row is not None:
             out[number] = _not_against(_for_kinds(ratios[row], kinds, contents), kinds, (entry,))
     return out
 
@@ -68,18 +68,18 @@ def commonness(things: Sequence[str], kinds: Sequence[str], contents: RoomConten
     surface_m2 = contents.surface_m2[rows].sum(axis=0, keepdims=True)
     if not surface_m2.any():
         return None
-    entries = [entry for thing in things if (entry := lexicon().find(thing, Kind.THING)) is not None]
+    entries = filter(None, (lexicon().find(thing, Kind.THING) for thing in things))
     return _not_against(_for_kinds(_nats_of(contents, surface_m2)[0], kinds, contents), kinds, entries)
 
 
 def _not_against(
-    nats: Float[np.ndarray, " n"], kinds: Sequence[str], entries: Sequence[Entry | None]
+    nats: Float[np.ndarray, " n"], kinds: Sequence[str], entries: Iterable[Entry]
 ) -> Float[np.ndarray, " n"]:
     """Return nats that speak against no kind of room in which the lexicon says that such things stand.
 
     The homes that are counted have tables to dine at in dining rooms alone; many a kitchen has one.
     """
-    usual = {room for entry in entries if entry is not None for room in entry.rooms}
+    usual = {room for entry in entries for room in entry.rooms}
     return np.where([kind in usual for kind in kinds], np.maximum(nats, 0.0), nats)
 
 

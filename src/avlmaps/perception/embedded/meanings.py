@@ -13,7 +13,6 @@ import numpy as np
 
 from avlmaps.core.arrays import Float32
 from avlmaps.core.lexicon import Entry, Kind, lexicon, noun_of
-from avlmaps.core.spelling import squeezed
 from avlmaps.perception.protocols import WordEncoder
 
 # A phrase that starts with one of these describes, without a noun of its own.
@@ -59,14 +58,14 @@ class Meanings:
 
     def name_weights(self, phrase: str) -> Float32[np.ndarray, " k"]:
         """Return for each name how much the phrase means it, 1 for the most meant; all zero where it means none."""
-        weights = self.own_weights(phrase)
-        wider = [name for name in self.kinds if name in self.names and weights[self.names.index(name)] > 0.0]
-        if not wider or self._is_compound(_clean(phrase)):  # an armchair is a chair, and no dining chair
+        weights = out = self.own_weights(phrase)
+        entry = lexicon().find(_clean(phrase), self.kind)
+        if entry is not None and entry.is_compound(_clean(phrase)):
             return weights
-        narrower = [
-            self.narrower_share * weights[self.names.index(name)] * self._all_of(self.kinds[name]) for name in wider
-        ]
-        return np.maximum.reduce([weights, *narrower]).astype(np.float32)
+        for name, weight in zip(self.names, weights, strict=True):
+            if weight > 0.0 and name in self.kinds:
+                out = np.maximum(out, self.narrower_share * weight * self._all_of(self.kinds[name]))
+        return out
 
     def own_weights(self, phrase: str) -> Float32[np.ndarray, " k"]:
         """Return the same without what is narrower than the names: an armchair is a name of its own."""
@@ -104,11 +103,6 @@ class Meanings:
             if wide in self.names:
                 return (wide,)
         return ()
-
-    def _is_compound(self, phrase: str) -> bool:
-        """Return whether a phrase names a special kind of something, that no name stands for."""
-        entry = lexicon().find(phrase, self.kind)
-        return entry is not None and squeezed(phrase) in map(squeezed, entry.compounds)
 
     def _general(self, phrase: str, head: Entry) -> Float32[np.ndarray, " k"]:
         """Return the meaning of a phrase about an appliance, a piece of furniture ...: the nearest name."""

@@ -346,7 +346,7 @@ def _is_whole(understood: str, name: str) -> bool:
     if squeezed(understood) == squeezed(name):
         return True
     entry = lexicon().find(name, Kind.THING)
-    if entry is None or squeezed(name) in map(squeezed, entry.compounds):  # a wooden chair is more than a chair
+    if entry is None or entry.is_compound(name):
         return False
     return all(lexicon().is_a(kind, entry.name, Kind.THING) for kind in understood.split(" or "))
 
