@@ -57,6 +57,7 @@ def main() -> None:
             "python -c pass": [sys.executable, "-c", "pass"],
             "import numpy": [sys.executable, "-c", "import numpy"],
             "import numpy, scipy.spatial, numba": [sys.executable, "-c", "import numpy, scipy.spatial, numba"],
+            "avlmaps --help": [sys.executable, "-m", "avlmaps", "--help"],
             f"avlmaps query MAP {THING}": [*query, THING, "--json"],
             f'avlmaps query MAP "{SENTENCE}"': [*query, SENTENCE, "--json"],
         }

@@ -13,7 +13,6 @@ import sys
 from collections import Counter
 from collections.abc import Callable
 from random import Random
-from time import process_time
 from typing import Any
 
 VALID = (
@@ -247,8 +246,6 @@ def hostile_programs(count: int, seed: int) -> "list[str]":
     return programs[:count]
 
 
-# The clock of the process is asked once for so many programs: it costs more than most of them.
-_BATCH = 100
 # Time of the processor after which a program is taken never to end; the alarm ends the process, for in the middle of
 # what Python does in one go nothing else would.
 _MOST_SECONDS = 10.0
@@ -286,12 +283,10 @@ def main(count: int, seed: int, where: int, parse: Callable[[str], Any], most_s:
 
     budget = Budget(steps=1500, skill_calls=20, elements=3000, seconds=20.0)
     watch, told, said, faults = _Watch(), Counter[str](), set[str](), []
-    slowest_s, largest, calls, began, programs = 0.0, 0, 0, process_time(), hostile_programs(count, seed)
+    largest, calls, programs = 0, 0, hostile_programs(count, seed)
     run_program(parse_program(VALID[1]), RecordingRobot(), budget)
     memory_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for index, text in enumerate(programs):
-        if index % _BATCH == 0:
-            slowest_s, began = max(slowest_s, process_time() - began), process_time()
         robot, trace, error = RecordingRobot(), None, None
         os.pwrite(where, f"{index:9}".encode(), 0)
         signal.setitimer(signal.ITIMER_PROF, most_s)
@@ -319,7 +314,7 @@ def main(count: int, seed: int, where: int, parse: Callable[[str], Any], most_s:
     grown_mb = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - memory_kb) / 1024
     return {
         "programs": count, **told, "calls": calls, "sentences": len(said), "events": watch.seen[:5], "faults": faults[:5],
-        "slowest_batch_s": slowest_s, "largest_trace": largest, "grown_mb": grown_mb,
+        "largest_trace": largest, "grown_mb": grown_mb,
     }  # fmt: skip
 
 

@@ -1,7 +1,6 @@
 """Which program is read out of a model's answer, and which answers hold none."""
 
 from contextlib import suppress
-from time import process_time
 
 import pytest
 from hypothesis import given
@@ -129,23 +128,22 @@ def test_a_block_is_read_back_as_it_was_written() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "(" * 200_000,
-        "`" * 200_000,
-        "`" * 100_000 + "a" * 100_000,
-        "~" * 200_000 + "`",
-        "```" + "a" * 200_000 + "`",
-        "# cannot:" + " " * 200_000 + "\x00",
-        "<think>" * 100_000,
-        "</think>" * 100_000,
-        "```\n" * 10_000,
-        "\n" * 200_000,
-        " " * 200_000 + "x",
-        "#!" * 100_000 + "i am",
+        "(" * 2_000_000,
+        "`" * 2_000_000,
+        "`" * 1_000_000 + "a" * 1_000_000,
+        "~" * 2_000_000 + "`",
+        "```" + "a" * 2_000_000 + "`",
+        "# cannot:" + " " * 2_000_000 + "\x00",
+        "<think>" * 1_000_000,
+        "</think>" * 1_000_000,
+        "```\n" * 100_000,
+        "\n" * 2_000_000,
+        " " * 2_000_000 + "x",
+        "#!" * 1_000_000 + "i am",
     ],
     ids=range(12),
 )
 def test_reading_an_answer_takes_no_longer_than_it_is_long(text: str) -> None:
-    began = process_time()
+    # What grows with the square of the length would take hours here, and the limit of a test end it.
     with suppress(LanguageError):
         program_text(Answer(text))
-    assert process_time() - began < 3

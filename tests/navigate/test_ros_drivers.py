@@ -3,7 +3,7 @@
 import _thread
 import signal
 from math import pi
-from time import monotonic, sleep
+from time import sleep
 
 import numpy as np
 import pytest
@@ -150,11 +150,9 @@ def test_an_action_server_that_is_not_there_is_told_at_once():
 def test_silence_is_no_answer(robot):
     robot.does[""] = "silent"
     with opened(robot, settings=quick(answer_timeout_s=0.5, cancel_timeout_s=1.0)) as driver:
-        begun_s = monotonic()
         arrival = driver.go_to(PLACE)
-        assert monotonic() - begun_s < 10.0
         assert not arrival.reached
-        assert "Nothing answers" in arrival.note
+        assert "Nothing answers" in arrival.note and "within 0.5 s" in arrival.note
         assert robot.soon(lambda: cancels(robot) > 0)
 
 

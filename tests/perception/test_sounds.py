@@ -3,7 +3,6 @@
 import json
 from importlib.resources import files
 from pathlib import Path
-from time import process_time
 
 import numpy as np
 import pytest
@@ -162,17 +161,6 @@ def test_every_kind_says_what_it_was_learnt_from(encoder: EmbeddedSounds) -> Non
     assert origins["doorbell"] == "synthesised"
     assert len(encoder.sources) > 250
     assert len(origins) == len(encoder.kinds) >= 60
-
-
-def test_encodes_a_hundred_times_faster_than_real_time(encoder: EmbeddedSounds) -> None:
-    sound = noise(30.0)
-    encoder.encode(sound)
-    best_s = np.inf
-    for _ in range(3):
-        start = process_time()
-        encoder.encode(sound)
-        best_s = min(best_s, process_time() - start)
-    assert 30.0 / best_s >= 100.0
 
 
 def test_recordings_are_recognised(encoder: EmbeddedSounds, shared_data: Path) -> None:
