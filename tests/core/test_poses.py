@@ -145,3 +145,8 @@ def test_levelling_takes_up_to_plus_z_by_the_smallest_turn(up: np.ndarray):
 @pytest.mark.parametrize("up", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0)])
 def test_levelling_works_at_the_poles(up: tuple[float, float, float]):
     assert np.allclose(poses.rotation_to_level(np.array(up)) @ up, [0.0, 0.0, 1.0])
+
+
+def test_a_plain_point_is_printed_without_what_arithmetic_leaves() -> None:
+    assert str(poses.plain_point(np.array([0.1 + 0.2, 7.0, -3.1750000000000003]))) == "(0.3, 7.0, -3.175)"
+    assert str(poses.plain_point(np.array([1.1, 2.2, 3.3], np.float32))) == "(1.1, 2.2, 3.3)"

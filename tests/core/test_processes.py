@@ -11,18 +11,29 @@ import pytest
 
 SCRIPT = """
 import os, sys, time
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
-from avlmaps.core.processes import end_with_parent
+from avlmaps.core.processes import end_with_parent, fresh_processes
 
 def work(folder):
     (Path(folder) / str(os.getpid())).touch()
     time.sleep(300)
 
 if __name__ == "__main__":
-    with ProcessPoolExecutor(2, get_context("spawn"), end_with_parent) as pool:
+    with fresh_processes(2, end_with_parent, import_script=True) as pool:
         list(pool.map(work, [sys.argv[1]] * 2))
+"""
+# As a student writes it: no guard. What the processes do is a module's, and the script stays as it was.
+UNGUARDED = """
+import math, os
+from pathlib import Path
+from avlmaps.core.processes import end_with_parent, fresh_processes
+
+with (Path(__file__).parent / "runs").open("a") as runs:
+    runs.write("run ")
+name = __file__
+with fresh_processes(2, end_with_parent) as pool:
+    assert list(pool.map(math.sqrt, [4, 9])) == [2, 3]
+assert __file__ == name and __name__ == "__main__"
 """
 
 
@@ -59,3 +70,13 @@ def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
         for mark in marks.iterdir():
             if _lives(int(mark.name)):
                 os.kill(int(mark.name), signal.SIGKILL)
+
+
+@pytest.mark.parametrize("words", [["{}"], ["-m", "student"]], ids=["script", "module"])
+def test_a_script_without_a_guard_runs_once(tmp_path: Path, words: list[str]) -> None:
+    script = tmp_path / "student.py"
+    script.write_text(UNGUARDED)
+    command = [sys.executable, *(word.format(script) for word in words)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "runs").read_text() == "run "

@@ -123,19 +123,32 @@ from helpers.hearing_scenes import flat
 from avlmaps.sim import recorder
 recorder._FEWEST_FOR_PROCESSES = 2
 few = recorder.RecordSettings(size=(48, 32), max_frames=4, hearing="none", workers=2)
-recorder.record_scene(flat(), Path("rec"), few)
+recorder.record_scene({scene}, Path("rec"), few)
+"""
+_OF_ITS_OWN = """
+from avlmaps.sim.scene import Scene
+class Own(Scene): pass
 """
 
 
+def ran(script: str, folder: Path) -> "subprocess.CompletedProcess[str]":
+    (folder / "script.py").write_text(script)
+    path = {**os.environ, "PYTHONPATH": str(Path(__file__).parent.parent)}
+    command = [sys.executable, "script.py"]
+    return subprocess.run(command, cwd=folder, env=path, timeout=240, capture_output=True, text=True, check=False)
+
+
+def test_a_script_needs_no_guard(tmp_path: Path) -> None:
+    done = ran(_UNGUARDED.format(scene="flat()"), tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert len(open_folder(tmp_path / "rec")) == 4
+
+
 def test_processes_that_die_are_told_and_never_waited_for(tmp_path: Path) -> None:
-    (tmp_path / "script.py").write_text(_UNGUARDED)
-    tests = str(Path(__file__).parent.parent)
-    done = subprocess.run(
-        [sys.executable, "script.py"], cwd=tmp_path, env={**os.environ, "PYTHONPATH": tests}, timeout=240,
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    own = "Own(**{name: getattr(flat(), name) for name in Scene.__dataclass_fields__})"
+    done = ran(_OF_ITS_OWN + _UNGUARDED.format(scene=own), tmp_path)
     assert done.returncode == 1
-    assert "keep a script's own work under if __name__ == '__main__'" in done.stderr
+    assert "keep the script's own work under if __name__ == '__main__'" in done.stderr
 
 
 def test_another_seed_drives_and_hears_otherwise(recorded: Path, tmp_path: Path) -> None:

@@ -148,3 +148,9 @@ def rotation_angle_rad(a: Float[np.ndarray, "*n 4 4"], b: Float[np.ndarray, "*n 
     """Return the angle between the rotations of two poses, in [0, π]."""
     trace = np.einsum("...ij,...ij->...", a[..., :3, :3], b[..., :3, :3])
     return np.asarray(np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0)))
+
+
+def plain_point(vector: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
+    """Return a position or a size, metres, as plain numbers to a tenth of a millimetre: no 0.17500000000000002."""
+    x, y, z = (round(float(value), 4) for value in vector)
+    return x, y, z

@@ -14,7 +14,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Int, UInt8
 from avlmaps.core.errors import QueryError
-from avlmaps.core.poses import FRAME
+from avlmaps.core.poses import FRAME, plain_point
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.factors import FOUND_AT
@@ -226,7 +226,7 @@ def _thing(stored: "StoredMap", space: Space, name: str, confidence: float, rows
     extent = np.ptp(space.level(points), axis=0) + space.grid.voxel_size_m
     colors: UInt8[np.ndarray, "m 3"] = np.asarray(stored.voxels.rgb)[rows]
     r, g, b = (int(value) for value in colors.mean(axis=0).round())
-    return Thing(name, round(confidence, 3), _middle(points), _triple(extent), (r, g, b), rows, points)
+    return Thing(name, round(confidence, 3), _middle(points), plain_point(extent), (r, g, b), rows, points)
 
 
 def find_sounds(stored: "StoredMap", most_names: int = 3) -> list[SoundEvent]:
@@ -256,7 +256,7 @@ def find_sounds(stored: "StoredMap", most_names: int = 3) -> list[SoundEvent]:
                 confidences=tuple(round(float(scores[k, i]), 3) for i in best),
                 onset_s=float(heard.onset_s[k]),
                 offset_s=float(heard.offset_s[k]),
-                position=_triple(track.mean(axis=0)),
+                position=plain_point(track.mean(axis=0)),
                 track=track,
                 clip=stored.clip_path(k),
             )
@@ -328,9 +328,4 @@ def _groups_of_views(
 
 def _middle(points: Float[np.ndarray, "m 3"]) -> tuple[float, float, float]:
     """Return the point nearest to the mean: a place that exists, also for a ring of points."""
-    return _triple(points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))])
-
-
-def _triple(vector: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in vector)
-    return x, y, z
+    return plain_point(points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))])

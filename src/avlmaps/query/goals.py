@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Int
+from avlmaps.core.poses import plain_point
 from avlmaps.query.factors import FOUND_AT, Factor, NearThings, lead_of, product_of
 
 if TYPE_CHECKING:
@@ -206,9 +207,4 @@ def _goal(
         name = str(factor.part.modality)
         again = sum(key.split("_")[0] == name for key in parts)
         parts[f"{name}_{again + 1}" if again else name] = float(factor.at(position[None])[0])
-    return Goal(_triple(position), min(max(score, 0.0), 1.0), _triple(size), parts)
-
-
-def _triple(vector: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in vector)
-    return x, y, z
+    return Goal(plain_point(position), min(max(score, 0.0), 1.0), plain_point(size), parts)

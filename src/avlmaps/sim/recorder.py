@@ -2,10 +2,8 @@
 
 import os
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, field, replace
-from multiprocessing import get_context
 from multiprocessing.reduction import ForkingPickler
 from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
@@ -17,7 +15,7 @@ from jaxtyping import Float, UInt8
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.processes import end_with_parent
+from avlmaps.core.processes import end_with_parent, fresh_processes
 from avlmaps.core.progress import progress, say
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.layout import DESCRIPTION
@@ -324,19 +322,19 @@ def _drawn(artist: _Artist, jobs: list[_Job], workers: int) -> Iterator[int]:
     if workers < 2 or len(jobs) < _FEWEST_FOR_PROCESSES:
         yield from map(artist.draw, jobs)
         return
-    # Started afresh rather than forked: compiled kernels and OpenCV's threads do not survive a fork. The building goes
-    # by shared memory: sent as an argument it would block for good when a process dies while it starts.
+    # The building goes by shared memory: sent as an argument it would block for good when a process dies as it starts.
     packed = bytes(ForkingPickler.dumps(artist))
     shared = SharedMemory(create=True, size=len(packed))
     assert shared.buf is not None
     shared.buf[: len(packed)] = packed
+    own = b"__main__" in packed  # a building of a class of the script's own
     try:
-        with ProcessPoolExecutor(workers, get_context("spawn"), _take_up, (shared.name, len(packed))) as pool:
+        with fresh_processes(workers, _take_up, shared.name, len(packed), import_script=own) as pool:
             yield from pool.map(_draw, jobs, chunksize=4)
     except BrokenProcessPool:
+        guard = "keep the script's own work under if __name__ == '__main__', " if own else ""
         raise RecordingError(
-            "A process that was drawing has died; keep a script's own work under if __name__ == '__main__', free some "
-            "memory, or draw with one process (--workers 1)."
+            f"A process that was drawing has died; {guard}free some memory, or draw with one process (workers: 1)."
         ) from None
     finally:
         shared.close()

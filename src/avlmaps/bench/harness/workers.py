@@ -2,11 +2,10 @@
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from multiprocessing import get_context
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import TypeVar
 
-from avlmaps.core.processes import end_with_parent
+from avlmaps.core.processes import end_with_parent, fresh_processes
 from avlmaps.core.progress import progress, say, silence
 
 S = TypeVar("S")
@@ -42,7 +41,7 @@ def side_by_side(
             results.append(do(one))
             say(f"{label}: {name(one)} is done, {len(results)} of {len(todo)}")
         return results
-    with ProcessPoolExecutor(workers, get_context("spawn"), _begin) as pool:
+    with fresh_processes(workers, _begin) as pool:
         futures = [pool.submit(do, one) for one in todo]
         for _ in progress(_ticks(futures, done), label, total=total or len(todo), unit=unit):
             pass
