@@ -35,7 +35,7 @@ def fresh_processes(
         workers: how many.
         begin: what each does first; a function of a module.
         arguments: what it is given.
-        import_script: run the script all the same, because the work needs what it defines.
+        import_script: run the script again, because the work needs what it defines.
     """
     context = get_context("spawn") if import_script else _WithoutScript()
     return ProcessPoolExecutor(workers, context, begin, arguments)

@@ -33,10 +33,10 @@ PAPER_HEARING = HearingSettings(
 PAPER_AREAS = AreaSettings(anchor="camera", extent="cones", score="min-max", pool_m=0.0)
 # Scores are stretched over the sounds of the map.
 PAPER_SOUNDS = SoundSettings(normalise="min-max")
-# A voxel is the object where its word is the closest of all; no instance is left out for its confidence, and its room
-# has no say.
+# A voxel is the object where its word is the closest of all; no instance is left out for its confidence; its room
+# and its size have no say.
 PAPER_OBJECTS = ObjectSettings(
-    least_confidence=0.0, least_in_company=0.0, score_in_company=1.0, guess_below=0.0, room_weight=0.0
+    least_confidence=0.0, least_in_company=0.0, score_in_company=1.0, guess_below=0.0, room_weight=0.0, too_long=0.0
 )
 
 

@@ -17,7 +17,7 @@ from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Part
 from avlmaps.core.spelling import squeezed
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, ScaledEncoder
-from avlmaps.query import loops
+from avlmaps.query import loops, oversize
 from avlmaps.query.colour_filter import Tint, is_tinted, tint_of, tinted_share
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearThings
 from avlmaps.query.instance_merging import likeliest, merge_instances, without_specks
@@ -66,6 +66,9 @@ class ObjectSettings:
     development homes (docs/experiments.md)."""
     room_cost: float = 0.4
     """Nats that the log-odds lose with that: most things stand where things of their name do."""
+    too_long: float = 1.5
+    """An instance this many times as long as the largest thing of its name is cut where its voxels score least, and
+    is less likely to be what it is called, for an encoder of names; 0: never."""
     link_m: float = 0.1
     """Voxels of an object no farther apart than this along every axis belong to one instance."""
     join_m: float = 0.3
@@ -470,10 +473,14 @@ def pieces_of(
     """Return the things that voxels with these margins and scores make up, uncertain ones too if ``with_uncertain``."""
     margin, score = scored
     least = settings.least_in_company if with_uncertain else settings.least_confidence
+    longest = _longest_m(encoder, encoded, settings)
 
     def confidence_of(mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"]) -> Float32[np.ndarray, " i"]:
         if isinstance(encoder, NamedPixelEncoder):
             by_looks = named_confidence(encoder, encoded, score[mask], instance, space.grid.voxel_size_m)
+            if math.isfinite(longest):
+                lengths = oversize.lengths_m(space.level(space.centres[mask]), instance, len(by_looks))
+                by_looks = oversize.less_likely(by_looks, lengths, longest)
             return _in_rooms(by_looks, rooms, encoded.meant(encoder), settings, mask, instance)
         return instance_confidence(margin[mask], instance, space.grid.voxel_size_m, fitting(settings, encoder))
 
@@ -489,10 +496,27 @@ def pieces_of(
     if len(confidence) > joined.max(initial=-1) + 1:
         instance = joined[instance]
         confidence = confidence_of(mask, instance)
+    if math.isfinite(longest) and len(instance):
+        points, reach = space.level(space.centres[mask]), max(1, round(settings.link_m / space.grid.voxel_size_m))
+        pieces = oversize.cut(np.asarray(space.index[mask]), points, score[mask], instance, longest, reach)
+        if not np.array_equal(pieces, instance):
+            mask = mask.copy()
+            mask[np.flatnonzero(mask)[pieces < 0]] = False
+            instance = pieces[pieces >= 0]
+            confidence = confidence_of(mask, instance)
+            mask, instance, confidence = without_specks(mask, instance, confidence, least)
     mean = np.bincount(instance, weights=np.square(score[mask]), minlength=len(confidence)).astype(np.float64)
     mean /= np.maximum(np.bincount(instance, minlength=len(confidence)), 1)
     best = max(best, float(confidence.max(initial=0.0)))
     return Pieces(mask, instance, mean.astype(np.float32), confidence, won, best)
+
+
+def _longest_m(encoder: PixelEncoder, encoded: EncodedWord, settings: ObjectSettings) -> float:
+    """Return the length from which an instance is too long for what is most meant, metres."""
+    if not isinstance(encoder, NamedPixelEncoder) or settings.too_long <= 0.0 or not encoded.name_weights.any():
+        return math.inf
+    most = encoded.name_weights >= 0.99 * encoded.name_weights.max()
+    return settings.too_long * oversize.longest_m([encoder.names[index] for index in np.flatnonzero(most)])
 
 
 def _in_rooms(
