@@ -12,7 +12,10 @@ VOXEL_M = 0.05
 
 def cut(index: np.ndarray, score: np.ndarray, longest: float, instance: np.ndarray | None = None) -> np.ndarray:
     instance = np.zeros(len(index), np.int64) if instance is None else instance
-    return oversize.cut(index, index * VOXEL_M, score.astype(np.float32), instance, longest, 1)
+    found, piece_of = oversize.cut(index, index * VOXEL_M, score.astype(np.float32), instance, longest, 1)
+    assert len(piece_of) == found.max(initial=-1) + 1
+    assert (piece_of[found[found >= 0]] == instance[found >= 0]).all(), "each piece knows what it is of"
+    return found
 
 
 def row_of(*stretches: tuple[int, float], width: int = 4) -> tuple[np.ndarray, np.ndarray]:

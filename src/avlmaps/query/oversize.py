@@ -59,7 +59,7 @@ def cut(
     instance: Int[np.ndarray, " a"],
     longest: float,
     reach: int,
-) -> Int[np.ndarray, " a"]:
+) -> tuple[Int[np.ndarray, " a"], Int[np.ndarray, " j"]]:
     """Cut instances that are too long where their voxels score least.
 
     Args:
@@ -71,7 +71,8 @@ def cut(
         reach: voxels this near along every axis are connected.
 
     Returns:
-        Which instance each belongs to now, again without gaps; −1 for a voxel that only linked others.
+        Which instance each belongs to now, again without gaps, −1 for a voxel that only linked others; and of which
+        instance each is a piece: what was part of something too long is as doubtful as that.
     """
     count = int(instance.max(initial=-1)) + 1
     out = np.array(instance, np.int64)
@@ -82,8 +83,8 @@ def cut(
         out[rows] = np.where(near < len(pieces), count + near, -1)
         count += len(pieces)
     kept = out >= 0
-    out[kept] = np.unique(out[kept], return_inverse=True)[1]
-    return out
+    _, first, out[kept] = np.unique(out[kept], return_index=True, return_inverse=True)
+    return out, np.asarray(instance)[kept][first]
 
 
 def _pieces(

@@ -475,12 +475,18 @@ def pieces_of(
     least = settings.least_in_company if with_uncertain else settings.least_confidence
     longest = _longest_m(encoder, encoded, settings)
 
-    def confidence_of(mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"]) -> Float32[np.ndarray, " i"]:
+    def lengths_of(mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"]) -> Float[np.ndarray, " i"]:
+        points = space.level(space.centres[mask])
+        return oversize.lengths_m(points, instance, int(instance.max(initial=-1)) + 1)
+
+    def confidence_of(
+        mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"], length_m: Float[np.ndarray, " i"] | None = None
+    ) -> Float32[np.ndarray, " i"]:
         if isinstance(encoder, NamedPixelEncoder):
             by_looks = named_confidence(encoder, encoded, score[mask], instance, space.grid.voxel_size_m)
             if math.isfinite(longest):
-                lengths = oversize.lengths_m(space.level(space.centres[mask]), instance, len(by_looks))
-                by_looks = oversize.less_likely(by_looks, lengths, longest)
+                length_m = lengths_of(mask, instance) if length_m is None else length_m
+                by_looks = oversize.less_likely(by_looks, length_m, longest)
             return _in_rooms(by_looks, rooms, encoded.meant(encoder), settings, mask, instance)
         return instance_confidence(margin[mask], instance, space.grid.voxel_size_m, fitting(settings, encoder))
 
@@ -498,12 +504,12 @@ def pieces_of(
         confidence = confidence_of(mask, instance)
     if math.isfinite(longest) and len(instance):
         points, reach = space.level(space.centres[mask]), max(1, round(settings.link_m / space.grid.voxel_size_m))
-        pieces = oversize.cut(np.asarray(space.index[mask]), points, score[mask], instance, longest, reach)
+        pieces, piece_of = oversize.cut(np.asarray(space.index[mask]), points, score[mask], instance, longest, reach)
         if not np.array_equal(pieces, instance):
-            mask = mask.copy()
+            length_m, mask = lengths_of(mask, instance)[piece_of], mask.copy()
             mask[np.flatnonzero(mask)[pieces < 0]] = False
             instance = pieces[pieces >= 0]
-            confidence = confidence_of(mask, instance)
+            confidence = confidence_of(mask, instance, length_m)
             mask, instance, confidence = without_specks(mask, instance, confidence, least)
     mean = np.bincount(instance, weights=np.square(score[mask]), minlength=len(confidence)).astype(np.float64)
     mean /= np.maximum(np.bincount(instance, minlength=len(confidence)), 1)
