@@ -249,3 +249,28 @@ def test_what_reaches_a_share_of_its_best_rival_is_above_the_least_score(
     score = np.sqrt(probability).astype(np.float16)
     counts = score[:, 0] >= share * score[:, 1:].max(axis=1)
     assert (score[counts, 0] > least_score_to_count(names, share)).all()
+
+
+def row_of_chairs(too_long: float):
+    """Two chairs 0.5 m long, and 1.5 m between them that look like chair a little."""
+    index = np.argwhere(np.ones((50, 8, 8)))
+    chair = np.where((index[:, 0] < 10) | (index[:, 0] >= 40), 0.8, 0.4)
+    p = np.stack([chair, 0 * chair, 0 * chair, 0.35 * (1 - chair), 0.65 * (1 - chair)], axis=1)
+    feature = features_of(p, ENCODER.codes).astype(np.float16)
+    space = Space(GridSpec(0.05), index, np.array([0.0, 0.0, 1.0]))
+    rivals = Rivals.of(feature, ENCODER, ENCODER.vocabulary)
+    part = Part(Modality.OBJECT, "chair", Role.PRIMARY)
+    found = object_factor(
+        space, feature, ENCODER, rivals, part, ObjectSettings(too_long=too_long), HeatSettings()
+    )  # fmt: skip
+    return found, index[found.mask, 0]
+
+
+def test_chairs_that_weak_voxels_link_are_two_and_less_likely() -> None:
+    whole, _ = row_of_chairs(too_long=0.0)
+    assert len(whole.confidence) == 1
+    pieces, x = row_of_chairs(too_long=1.5)
+    assert len(pieces.confidence) == 2
+    assert set(x) <= {*range(13), *range(37, 50)}, "the voxels between are neither's"
+    assert len(set(pieces.instance[x < 25])) == len(set(pieces.instance[x > 25])) == 1
+    assert (pieces.confidence < 0.8).all(), "what was part of something too long is as doubtful as it"
