@@ -240,6 +240,11 @@ def test_voxels_with_little_of_the_word_need_no_comparison(
             assert (one.found, one.note, one.understood) == (other.found, other.note, other.understood)
 
 
+def test_other_does_not_compete_with_itself() -> None:
+    encoded, rivals = EncodedWord.of(ENCODER, "other"), Vocabulary.encoded(ENCODER, NAMES)
+    assert rivals.silent_for(ENCODER, encoded, 0.95).tolist() == [False] * 4 + [True]
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.integers(2, 200), st.floats(0.01, 1.0), st.sampled_from([0.003, 0.03, 0.3, 30.0]), st.integers(0, 2**32 - 1))
 def test_what_reaches_a_share_of_its_best_rival_is_above_the_least_score(

@@ -151,14 +151,14 @@ class Vocabulary:
         return Vocabulary(words, encoded[known], understood, bool(known[-1]))
 
     def silent_for(self, encoder: PixelEncoder, encoded: "EncodedWord", cosine: float) -> Bool[np.ndarray, " v"]:
-        """Return which words do not compete because they name the queried thing; ``other`` always competes."""
+        """Return which words do not compete because they name the queried thing: of ``other`` that one word."""
         close = np.linalg.norm(self.word_feature @ encoded.span.T, axis=1) >= cosine
         same = [bool(encoded.understood) and understood == encoded.understood for understood in self.understood]
         silent = close | np.array(same, bool)
         if is_open(encoder):
             silent |= np.array([is_a(word, encoded.understood) for word in self.words], bool)
         if self.has_other:
-            silent[-1] = False
+            silent[-1] = same[-1]
         return silent
 
 
