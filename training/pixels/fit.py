@@ -1,9 +1,9 @@
 """Training: ``python -m training.pixels.fit --shards build/pixels/training --minutes 80``.
 
-Runs on a GPU where there is one, else on the CPU, in bfloat16 where the processor multiplies that (where it does not,
-bfloat16 is three times slower than float32). The learning rate follows the clock, so that a run of any length ends
-well. A checkpoint of less than 20 MB is written every few minutes; ``--resume`` continues from it and along the same
-schedule, so that one training may take several sittings (``--sitting 9`` stops after nine minutes).
+Runs on a GPU where there is one, else on the CPU, in bfloat16 where that is quicker than float32
+(``has_bfloat16``). The learning rate follows the clock, so that a run of any length ends well. A checkpoint of less
+than 20 MB is written every few minutes; ``--resume`` continues from it and along the same schedule, so that one
+training may take several sittings (``--sitting 9`` stops after nine minutes).
 """
 
 import json

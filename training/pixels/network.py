@@ -114,8 +114,11 @@ def _doubled(x: Tensor) -> Tensor:
 
 
 def has_bfloat16(device: torch.device) -> bool:
-    """Return whether the device multiplies bfloat16 rather than imitates it (three times slower than float32)."""
-    return device.type != "cpu" or torch.cpu._is_avx512_bf16_supported()
+    """Return whether bfloat16 is quicker than float32: on a CPU with tiles (AMX) alone.
+
+    Without AVX512-BF16 it is imitated, three times slower; with it but no tiles a step takes 1.14 s instead of 0.89 s.
+    """
+    return device.type != "cpu" or torch.cpu._is_amx_tile_supported()
 
 
 def begin_with(network: RoomNetwork, state: dict[str, Tensor]) -> list[str]:
