@@ -1,5 +1,6 @@
 """Two networks together: the second counts where they agree, and not where they do not."""
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,13 +8,24 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.perception.embedded.paired_networks import NO_SAY, SAME_SAY, PairedNetworks, load_pair, mixed
+from avlmaps.perception.embedded.paired_networks import (
+    NO_SAY,
+    SAME_SAY,
+    PairedNetworks,
+    load_pair,
+    mixed,
+    share_of_second,
+)
 from avlmaps.perception.embedded.pixels import EmbeddedPixels, synthetic_pixels
-from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, load_network
+from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, SceneNetwork, load_network
 from avlmaps.recordings.types import Frame
 
 ALL = np.ones((2, 3), bool)
 CAMERA = Pinhole(260.0, 260.0, 160.0, 120.0, 320, 240)
+
+
+def paired(first: np.ndarray, second: np.ndarray, known: np.ndarray = ALL) -> np.ndarray:
+    return mixed(first, second, share_of_second(first, second, known))
 
 
 def distributions() -> st.SearchStrategy[np.ndarray]:
@@ -23,7 +35,7 @@ def distributions() -> st.SearchStrategy[np.ndarray]:
 
 @given(first=distributions(), second=distributions())
 def test_what_comes_out_is_a_distribution_between_the_two(first: np.ndarray, second: np.ndarray):
-    both = mixed(first, second, ALL)
+    both = paired(first, second)
     np.testing.assert_allclose(both.sum(axis=-1), 1.0, atol=1e-5)
     assert (both >= np.minimum(first, second) - 1e-6).all()
     assert (both <= np.maximum(first, second) + 1e-6).all()
@@ -31,13 +43,13 @@ def test_what_comes_out_is_a_distribution_between_the_two(first: np.ndarray, sec
 
 @given(first=distributions(), second=distributions())
 def test_the_second_never_has_more_say_than_the_first(first: np.ndarray, second: np.ndarray):
-    both = mixed(first, second, ALL)
+    both = paired(first, second)
     assert (np.abs(both - first) <= np.abs(both - second) + 1e-6).all()
 
 
 @given(one=distributions())
 def test_two_of_one_mind_are_that_mind(one: np.ndarray):
-    np.testing.assert_allclose(mixed(one, one, ALL), one, atol=1e-6)
+    np.testing.assert_allclose(paired(one, one), one, atol=1e-6)
 
 
 def agreeing(by: float) -> tuple[np.ndarray, np.ndarray]:
@@ -49,12 +61,12 @@ def agreeing(by: float) -> tuple[np.ndarray, np.ndarray]:
 
 def test_the_first_decides_where_they_differ_much():
     first, second = agreeing(NO_SAY - 0.01)
-    np.testing.assert_array_equal(mixed(first, second, ALL), first)
+    np.testing.assert_array_equal(paired(first, second), first)
 
 
 def test_both_count_the_same_where_they_agree():
     first, second = agreeing(SAME_SAY + 0.01)
-    np.testing.assert_allclose(mixed(first, second, ALL), (first + second) / 2, atol=1e-6)
+    np.testing.assert_allclose(paired(first, second), (first + second) / 2, atol=1e-6)
 
 
 def test_cells_without_depth_do_not_decide_who_is_heard():
@@ -62,12 +74,12 @@ def test_cells_without_depth_do_not_decide_who_is_heard():
     second[0] = (0.0, 1.0)
     known = ALL.copy()
     known[0] = False
-    np.testing.assert_allclose(mixed(first, second, known), (first + second) / 2, atol=1e-6)
+    np.testing.assert_allclose(paired(first, second, known), (first + second) / 2, atol=1e-6)
 
 
 def test_a_frame_without_any_depth_is_the_firsts():
     first, second = agreeing(0.99)
-    np.testing.assert_array_equal(mixed(first, second, ~ALL), first)
+    np.testing.assert_array_equal(paired(first, second, ~ALL), first)
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +96,7 @@ def test_the_pixel_encoder_that_ships_looks_with_both(frame: Frame):
     second = np.zeros_like(alone.category)
     second[..., column] = other.category
     np.testing.assert_allclose(
-        EmbeddedPixels().see(frame).category, mixed(alone.category, second, alone.known), atol=1e-6
+        EmbeddedPixels().see(frame).category, paired(alone.category, second, alone.known), atol=1e-6
     )
 
 
@@ -93,10 +105,23 @@ def test_maps_of_one_network_are_not_those_of_the_pair(alone: EmbeddedPixels):
     assert EmbeddedPixels().card.checksum != alone.card.checksum
 
 
-def test_the_rooms_are_the_firsts(frame: Frame):
-    np.testing.assert_array_equal(load_pair().see(frame).room, load_network().see(frame).room)
+def test_rooms_are_mixed_by_the_same_share(frame: Frame):
+    first, second = load_network().see(frame), load_network(SYNTHETIC_WEIGHTS).see(frame)
+    share = share_of_second(first.category, second.category, first.known)
+    np.testing.assert_allclose(load_pair().see(frame).room, mixed(first.room, second.room, share), atol=1e-6)
 
 
-def test_a_second_network_that_knows_more_kinds_is_refused():
-    with pytest.raises(ValueError, match="clothing"):
-        PairedNetworks(load_network(SYNTHETIC_WEIGHTS), load_network())
+def without_weights(**changes: tuple[str, ...]) -> SceneNetwork:
+    """Return a network that knows other names and never looks."""
+    return SceneNetwork(lambda: b"", msgspec.structs.replace(load_network().notes, **changes))
+
+
+def test_a_second_network_that_knows_more_categories_is_refused():
+    names = load_network().notes.categories
+    with pytest.raises(ValueError, match=names[-1]):
+        PairedNetworks(without_weights(categories=names[:-1]), load_network())
+
+
+def test_a_second_network_that_knows_other_rooms_is_refused():
+    with pytest.raises(ValueError, match="kinds of room"):
+        PairedNetworks(load_network(), without_weights(rooms=load_network().notes.rooms[1:]))

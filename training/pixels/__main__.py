@@ -37,8 +37,9 @@ class Options:
     """How long to train now."""
     resume: bool = False
     """Continue from the checkpoint in the folder ``work``."""
-    start: Path | None = Path("training/pixels/start.npz")
-    """Weights to begin with; by default those that ship."""
+    start: Path | Literal["shipped"] | None = "shipped"
+    """A checkpoint to begin with. ``shipped``: the weights that ship; they saw real frames, so random ones without
+    ``--nyuv2``."""
     batch: int = 16
     """Pictures in a step; a GPU takes 128."""
     threads: int = 2
@@ -51,6 +52,13 @@ class Options:
     """Shards of about 500 frames (240 MB) that are stored; the oldest is replaced."""
     first_seed: int = 10_000
     """Seed of the first home; another one for each sitting shows new homes."""
+
+    @property
+    def begins_with(self) -> Path | None:
+        """The weights to begin with; None for random ones."""
+        if self.start == "shipped":
+            return Path("training/pixels/start.npz") if self.nyuv2 else None
+        return self.start
 
     @property
     def network(self) -> Path:
@@ -91,7 +99,7 @@ def train(options: Options) -> None:
             fit.Options(
                 shards=options.work / "training", real=options.work / "real" if options.nyuv2 else None,
                 held_out=options.work / "held-out", out=options.network, minutes=options.minutes,
-                sitting=options.sitting, resume=options.resume, start=options.start, batch=options.batch,
+                sitting=options.sitting, resume=options.resume, start=options.begins_with, batch=options.batch,
                 threads=options.threads, readers=options.readers,
             )
         )  # fmt: skip

@@ -11,7 +11,7 @@ from avlmaps.core.registry import Kind, load
 from avlmaps.perception.embedded.codes import word_codes
 from avlmaps.perception.embedded.meanings import Meanings
 from avlmaps.perception.embedded.paired_networks import PairedNetworks
-from avlmaps.perception.embedded.scene_network import SceneNetwork, load_network
+from avlmaps.perception.embedded.scene_network import SceneNetwork
 from avlmaps.perception.protocols import WordEncoder
 
 
@@ -20,12 +20,12 @@ class NamedEncoder:
 
     Args:
         names: the names that it distinguishes; ``categories`` or ``rooms`` of the network's notes.
-        network: which; the one that ships if None.
+        network: which.
         words: the word encoder whose space the features live in; the embedded one if None.
     """
 
-    def __init__(self, names: str, network: SceneNetwork | PairedNetworks | None, words: WordEncoder | None) -> None:
-        self._network = load_network() if network is None else network
+    def __init__(self, names: str, network: SceneNetwork | PairedNetworks, words: WordEncoder | None) -> None:
+        self._network = network
         self._words = cast(WordEncoder, load(Kind.WORDS, "embedded")) if words is None else words
         self.names: tuple[str, ...] = getattr(self._network.notes, names)
         self.codes = word_codes(self.names, self._words)

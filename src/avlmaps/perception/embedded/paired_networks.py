@@ -12,14 +12,14 @@ from hashlib import sha256
 
 import numpy as np
 
-from avlmaps.core.arrays import Float32
+from avlmaps.core.arrays import Bool, Float32
 from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, Notes, SceneNetwork, Seen, load_network
 from avlmaps.recordings.types import Frame
 
 # Agreement at which the second network begins to count, and from which on both count the same; in between its share
 # grows evenly. Chosen on real frames of the development split and on frames of simulated homes with artists' furniture
 # (training/pixels/README.md).
-NO_SAY, SAME_SAY = 0.60, 0.90
+NO_SAY, SAME_SAY = 0.75, 0.95
 
 
 class PairedNetworks:
@@ -34,7 +34,7 @@ class PairedNetworks:
         checksum: of both and of how they are mixed.
 
     Raises:
-        ValueError: the second network has categories that the first lacks.
+        ValueError: the second network has categories that the first lacks, or other kinds of room.
     """
 
     def __init__(self, first: SceneNetwork, second: SceneNetwork) -> None:
@@ -42,31 +42,42 @@ class PairedNetworks:
         self.notes: Notes = first.notes
         if more := sorted(set(second.notes.categories) - set(first.notes.categories)):
             raise ValueError(f"The second network has {', '.join(more)}, which the first lacks; swap them.")
+        if second.notes.rooms != first.notes.rooms:
+            raise ValueError("The two networks know different kinds of room; train them with one list.")
         self._column = np.array([first.notes.categories.index(name) for name in second.notes.categories])
         both = f"{first.checksum} {second.checksum} {NO_SAY} {SAME_SAY}"
         self.checksum = sha256(both.encode()).hexdigest()
 
     def see(self, frame: Frame) -> Seen:
         """Encode a frame with both networks."""
-        seen = self._first.see(frame)
+        seen, second = self._first.see(frame), self._second.see(frame)
         other = np.zeros_like(seen.category)
-        other[..., self._column] = self._second.see(frame).category
-        return replace(seen, category=mixed(seen.category, other, seen.known))
+        other[..., self._column] = second.category
+        share = share_of_second(seen.category, other, seen.known)
+        return replace(
+            seen, category=mixed(seen.category, other, share), room=mixed(seen.room, second.room, share)
+        )  # fmt: skip
 
 
-def mixed(
-    first: Float32[np.ndarray, "h w c"], second: Float32[np.ndarray, "h w c"], known: np.ndarray
-) -> Float32[np.ndarray, "h w c"]:
-    """Return the mean of two networks' probabilities, weighted by how far they agree.
+def share_of_second(
+    first: Float32[np.ndarray, "h w c"], second: Float32[np.ndarray, "h w c"], known: Bool[np.ndarray, "h w"]
+) -> float:
+    """Return the say that a second network has in a frame, from 0 to a half.
 
     Args:
-        first: of the network that decides where they do not.
+        first: probabilities of the network that decides where they differ.
         second: of the other.
-        known: (h, w) which cells have a depth; only these are compared.
+        known: which cells have a depth; only these are compared.
     """
     agreement = np.sqrt(first * second).sum(axis=-1)
     mean = float(agreement[known].mean()) if known.any() else 0.0
-    share = 0.5 * float(np.clip((mean - NO_SAY) / (SAME_SAY - NO_SAY), 0.0, 1.0))
+    return 0.5 * float(np.clip((mean - NO_SAY) / (SAME_SAY - NO_SAY), 0.0, 1.0))
+
+
+def mixed(
+    first: Float32[np.ndarray, "*n c"], second: Float32[np.ndarray, "*n c"], share: float
+) -> Float32[np.ndarray, "*n c"]:
+    """Return the mean of two networks' probabilities, the second's with a weight of ``share``."""
     return (1.0 - share) * first + share * second if share else first
 
 

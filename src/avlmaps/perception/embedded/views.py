@@ -7,6 +7,7 @@ import numpy as np
 from avlmaps.core.arrays import Float32
 from avlmaps.perception.embedded.closed_set import NamedEncoder
 from avlmaps.perception.embedded.codes import features_of
+from avlmaps.perception.embedded.paired_networks import PairedNetworks, load_pair
 from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, SceneNetwork, load_network
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.types import Frame
@@ -16,12 +17,12 @@ class EmbeddedViews(NamedEncoder):
     """Distinguishes kinds of room by the things in them.
 
     Args:
-        network: which; the one that ships if None.
+        network: which; the two that ship, together, if None.
         words: the word encoder whose space the features live in; the embedded one if None.
     """
 
-    def __init__(self, network: SceneNetwork | None = None, words: WordEncoder | None = None) -> None:
-        super().__init__("rooms", network, words)
+    def __init__(self, network: SceneNetwork | PairedNetworks | None = None, words: WordEncoder | None = None) -> None:
+        super().__init__("rooms", load_pair() if network is None else network, words)
         notes = self._network.notes
         self.card = ModelCard(
             id=notes.id.replace("pixels", "views"),
