@@ -1,6 +1,6 @@
 """Geometry of a map beside the true surface: accuracy and completeness, with and without the sensor model.
 
-    python benchmarks/geometry.py [--scenes house:4] [--sensors kinect realsense clean] [--frames 250] [--json]
+    python benchmarks/geometry.py [--scenes house:4 house:5] [--sensors kinect realsense clean] [--frames 250] [--json]
 
 A scene is recorded with the faults of each sensor and fused twice in the same run: every depth as it is (before) and
 with the sensor model that the build chooses by itself (after). Accuracy is the share of voxels whose middle lies within
@@ -116,13 +116,15 @@ def rows_of(spec: str, sensors: list[str], frames: int) -> list[dict[str, object
             info = find_sensor(recording, BuildSettings())
             made(recording, info.model)  # compiles
             for name, model in (("before", NONE), (f"after ({info.name})", info.model)):
-                out.append(row(f"{spec} {sensor} {name}", made(recording, model), surface, seen, len(recording)))
+                out.append(
+                    row(f"{Path(spec).name} {sensor} {name}", made(recording, model), surface, seen, len(recording))
+                )
     return out
 
 
 def main() -> int:
     arguments = parser(__doc__.splitlines()[0])
-    arguments.add_argument("--scenes", nargs="+", default=["house:4"])
+    arguments.add_argument("--scenes", nargs="+", default=["house:4", "house:5"])
     arguments.add_argument("--sensors", nargs="+", default=["kinect", "realsense", "clean"])
     arguments.add_argument("--frames", type=int, default=250)
     chosen = arguments.parse_args()

@@ -45,6 +45,10 @@ _NAVIGATION = "[How missions are made and judged](navigation-benchmark.md)."
 ENTRIES = (
     Entry("fusion", "Fusion", "python benchmarks/fusion.py"),
     Entry("memory", "Memory of fusion", "python benchmarks/fusion_memory.py"),
+    Entry(
+        "geometry", "Geometry with a sensor's faults", "python benchmarks/geometry.py --scenes house:4 house:5 HOUSE",
+        0.1, "The limits of the sensor models were chosen on `house:4`.",
+    ),
     Entry("queries", "Queries", "python benchmarks/queries.py"),
     Entry("cold-start", "A query from the shell", "python benchmarks/cold_start.py"),
     Entry("locating", "Time to locate a photo", "python benchmarks/locate.py"),
