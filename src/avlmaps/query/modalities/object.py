@@ -317,10 +317,13 @@ def object_factor(
         )
     scored = _scored_once(feature, encoder, rivals, encoded, settings)
 
+    confident = pieces_of(space, encoder, encoded, scored(settings.share_of_rival(False)), settings, rooms)
+
     def things(with_uncertain: bool, chosen: ObjectSettings = settings) -> NearThings:
-        pieces = pieces_of(
-            space, encoder, encoded, scored(chosen.share_of_rival(with_uncertain)), chosen, with_uncertain, rooms
-        )
+        pieces = confident
+        if with_uncertain:
+            among = scored(chosen.share_of_rival(True))
+            pieces = pieces_of(space, encoder, encoded, among, chosen, rooms, beside=confident)
         if tint is not None and rgb is not None:
             share = tinted_share(rgb, pieces.mask, pieces.instance, tint)
             pieces = replace(pieces, confidence=pieces.confidence * share)
@@ -393,6 +396,16 @@ class Pieces:
     won: int
     best: float
 
+    def beside(self, others: "Pieces") -> "Pieces":
+        """Return these things and others, which have none of their voxels."""
+        instance = np.full(len(self.mask), -1, np.int64)
+        instance[others.mask] = others.instance
+        instance[self.mask] = self.instance + len(others.confidence)
+        mask = self.mask | others.mask
+        mean = np.concatenate([others.mean_probability, self.mean_probability])
+        confidence = np.concatenate([others.confidence, self.confidence])
+        return Pieces(mask, instance[mask], mean, confidence, max(self.won, others.won), max(self.best, others.best))
+
 
 def object_pieces(
     space: Space,
@@ -405,7 +418,7 @@ def object_pieces(
 ) -> Pieces:
     """Return the things that a word names: connected voxels that it wins, specks left out, thin parts joined."""
     scored = object_scores(feature, encoder, rivals, encoded, settings)
-    return pieces_of(space, encoder, encoded, scored, settings, rooms=rooms)
+    return pieces_of(space, encoder, encoded, scored, settings, rooms)
 
 
 def object_scores(
@@ -467,12 +480,16 @@ def pieces_of(
     encoded: EncodedWord,
     scored: tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]],
     settings: ObjectSettings,
-    with_uncertain: bool = False,
     rooms: Callable[[], ThingsInRooms | None] = lambda: None,
+    beside: Pieces | None = None,
 ) -> Pieces:
-    """Return the things that voxels with these margins and scores make up, uncertain ones too if ``with_uncertain``."""
+    """Return the things that voxels with these margins and scores make up.
+
+    With ``beside``, those stay as they are, and uncertain ones of the other voxels come after them: weak voxels round a
+    confident thing make it neither larger nor less likely.
+    """
     margin, score = scored
-    least = settings.least_in_company if with_uncertain else settings.least_confidence
+    least = settings.least_confidence if beside is None else settings.least_in_company
     longest = _longest_m(encoder, encoded, settings)
 
     def lengths_of(mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"]) -> Float[np.ndarray, " i"]:
@@ -492,8 +509,10 @@ def pieces_of(
 
     mask = margin > 0.0
     won = int(mask.sum())
-    if with_uncertain and isinstance(encoder, NamedPixelEncoder):
-        mask |= score > np.maximum(settings.score_in_company * (score - margin), settings.least_score_in_company)
+    if beside is not None:
+        if isinstance(encoder, NamedPixelEncoder):
+            mask |= score > np.maximum(settings.score_in_company * (score - margin), settings.least_score_in_company)
+        mask &= ~beside.mask
     instance = instances_of(space, mask, settings.link_m)
     confidence = confidence_of(mask, instance)
     best = float(confidence.max(initial=0.0))
@@ -514,7 +533,8 @@ def pieces_of(
     mean = np.bincount(instance, weights=np.square(score[mask]), minlength=len(confidence)).astype(np.float64)
     mean /= np.maximum(np.bincount(instance, minlength=len(confidence)), 1)
     best = max(best, float(confidence.max(initial=0.0)))
-    return Pieces(mask, instance, mean.astype(np.float32), confidence, won, best)
+    pieces = Pieces(mask, instance, mean.astype(np.float32), confidence, won, best)
+    return pieces if beside is None else pieces.beside(beside)
 
 
 def _longest_m(encoder: PixelEncoder, encoded: EncodedWord, settings: ObjectSettings) -> float:
