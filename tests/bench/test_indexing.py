@@ -309,8 +309,8 @@ def test_true_perception_answers_every_task_within_a_voxel(swap: bool):
     assert {task.kind for task in tasks} == set(TaskKind)
     for task in tasks:
         (ceiling,) = [one for one in configurations(task.kind) if one.role == "ceiling"]
-        position = ceiling.answer(made.asked, task)
-        assert position is not None
+        position, found = ceiling.answer(made.asked, task)
+        assert position is not None and found
         assert task.off_m(position) <= 0.05
 
 
@@ -319,7 +319,7 @@ def test_without_context_the_larger_or_equal_thing_wins_whatever_was_heard(kitch
     tasks = area_tasks(kitchen_and_bedroom.evidence, np.random.default_rng(0), 10)
     (ceiling,) = [one for one in configurations(TaskKind.AREA) if one.role == "ceiling"]
     alone = replace(ceiling, sources=ceiling.sources[:1])
-    offs = [task.off_m(alone.answer(kitchen_and_bedroom.asked, task) or (99.0, 0.0, 0.0)) for task in tasks]
+    offs = [task.off_m(alone.answer(kitchen_and_bedroom.asked, task)[0] or (99.0, 0.0, 0.0)) for task in tasks]
     assert sum(off < 0.5 for off in offs) == len(tasks) / 2
 
 
@@ -416,3 +416,10 @@ def test_a_whole_run_makes_tables_and_a_second_one_makes_nothing_again(tmp_path:
     assert asked > 0
     assert by_name["true perception"][1:3] == [asked, 100.0]
     assert any("paper" in name for name in by_name)
+    answers = [replace(one, off_m=off, found=off < 0.5) for one in first.scenes[0].answers for off in (0.1, 0.2, 0.9)]
+    told = tables(replace(first, scenes=(replace(first.scenes[0], answers=tuple(answers)),)))["Ours reported as found"]
+    counted = {kind: sum(task.kind is kind for task in first.tasks.tasks) for kind in TaskKind}
+    photo = list(TaskKind).index(TaskKind.PHOTO)  # "colours" has no models for the areas of the first row
+    wanted = [2 * counted[TaskKind.PHOTO], 100.0, counted[TaskKind.PHOTO], 0.0]
+    assert counted[TaskKind.PHOTO] > 0
+    assert [told["rows"][photo][column] for column in (1, 2, 4, 5)] == wanted

@@ -34,17 +34,21 @@ class Configuration:
     needs: tuple[Kind, ...] = ()
     role: str = "variant"
 
-    def answer(self, scene: QueriedScene, task: Task) -> Triple | None:
-        """Return the first goal's place; None where the map has no answer, or knows nothing of a word."""
+    def answer(self, scene: QueriedScene, task: Task) -> tuple[Triple | None, bool]:
+        """Return the first goal's place and whether the whole was reported as found.
+
+        The place is None where the map has no answer, or knows nothing of a word.
+        """
         try:
             heat = [
                 source(scene, task, Role.CONTEXT if number else Role.PRIMARY)
                 for number, source in enumerate(self.sources)
             ]
         except QueryError:
-            return None
-        goals = product([one for one in heat if one is not None]).goals(1)
-        return goals[0].position if goals else None
+            return None, False
+        whole = product([one for one in heat if one is not None])
+        goals = whole.goals(1)
+        return (goals[0].position, whole.found) if goals else (None, False)
 
 
 _PIXELS, _SOUNDS = (Kind.PIXELS,), (Kind.PIXELS, Kind.SOUNDS)

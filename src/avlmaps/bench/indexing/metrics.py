@@ -25,6 +25,7 @@ class Answered:
         off_m: horizontal distance to the nearest point of the nearest target's box; for no answer the scene's largest
             distance.
         centre_m: the same to the middle of that box.
+        found: whether the map reported all that was queried as found.
     """
 
     task: str
@@ -32,13 +33,14 @@ class Answered:
     position: Triple | None
     off_m: float
     centre_m: float
+    found: bool = False
 
 
-def judged(task: Task, configuration: str, position: Triple | None, largest_m: float) -> Answered:
+def judged(task: Task, configuration: str, position: Triple | None, largest_m: float, found: bool = False) -> Answered:
     """Compare an answer with the truth; none at all is as wrong as the scene is large."""
     if position is None:
         return Answered(task.name, configuration, None, largest_m, largest_m)
-    return Answered(task.name, configuration, position, task.off_m(position), task.centre_off_m(position))
+    return Answered(task.name, configuration, position, task.off_m(position), task.centre_off_m(position), found)
 
 
 @dataclass(frozen=True, slots=True)

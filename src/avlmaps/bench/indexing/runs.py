@@ -31,7 +31,7 @@ PAPER_SIZES: Mapping[TaskKind, int] = {
 }
 _PHOTOS_A_TASK = 12  # tried for each that is wanted
 _MAKING = 3  # raised when tasks are made by other rules
-_QUERYING = 5  # raised when they are queried by other rules
+_QUERYING = 6  # raised when they are queried by other rules
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -220,10 +220,11 @@ def _answers(place: Workplace, tasks: Sequence[Task]) -> list[Answered]:
         lambda task: place.photo(task.world_from_photo), recorded.seed,
     )  # fmt: skip
     return [
-        judged(task, one.name, one.answer(scene, task), scene.largest_m)
+        judged(task, one.name, position, scene.largest_m, found)
         for task in tasks
         for one in CONFIGURATIONS
         if one.kind is task.kind and place.has(one.needs)
+        for position, found in [one.answer(scene, task)]
     ]
 
 

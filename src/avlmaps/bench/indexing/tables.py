@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from avlmaps.bench.harness.chosen import chosen_on
+from avlmaps.bench.harness.intervals import wilson
 from avlmaps.bench.harness.paper import paper_figures
 from avlmaps.bench.harness.provenance import clip_table, shown_scene
 from avlmaps.bench.indexing.configurations import OURS, configurations
@@ -29,7 +30,8 @@ def columns() -> list[str]:
 def tables(outcome: Outcome) -> dict[str, dict[str, Any]]:
     """Return every table, ``{name: {"columns", "rows"}}``."""
     made = {TITLE[kind]: _table(outcome, kind) for kind in TaskKind}
-    made = {**made, "Ours beside one modality and the ceiling": _figures(outcome), "Scenes": _scenes(outcome)}
+    made = {**made, "Ours beside one modality and the ceiling": _figures(outcome)}
+    made = {**made, "Ours reported as found": _found(outcome), "Scenes": _scenes(outcome)}
     if outcome.tasks.recorded.sounds:
         made["Clips that were heard"] = clip_table(clip for one in outcome.scenes for clip in one.clips)
     return made
@@ -82,6 +84,28 @@ def _figures(outcome: Outcome) -> dict[str, Any]:
         rows.append([TITLE[kind], *[_shown(v) for v in (ours, best, lead, ceiling, share)]])
     titles = ["table", "ours %", "best single modality %", "lead, points", "ceiling %", "of it %"]
     return {"columns": titles, "rows": rows}
+
+
+def _found(outcome: Outcome) -> dict[str, Any]:
+    """Return how often ours was reported as found where its first goal was within 0.5 m, and where it was not."""
+    rows: list[list[Any]] = []
+    for kind in TaskKind:
+        for one in configurations(kind):
+            if one.role != OURS:
+                continue
+            cells: list[object] = []
+            answers = outcome.answers(kind, one.name)
+            for group in (
+                [a for a in answers if a.off_m < LIMITS_M[0]],
+                [a for a in answers if a.off_m >= LIMITS_M[0]],
+            ):
+                found = sum(answer.found for answer in group)
+                low, high = wilson(found, len(group))
+                share = _percent(found / len(group)) if group else ""
+                cells += [len(group), share, f"{100 * low:.1f} to {100 * high:.1f}" if group else ""]
+            rows.append([TITLE[kind], *cells])
+    group = ("of them found %", "95 %")
+    return {"columns": ["table", "first goal within 0.5 m", *group, "farther", *group], "rows": rows}
 
 
 def _scenes(outcome: Outcome) -> dict[str, Any]:
