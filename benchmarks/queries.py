@@ -14,8 +14,8 @@ import numpy as np
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.factors import anchor_heat, object_heat
 from avlmaps.query.kernels import feature_scores, margins, share
-from avlmaps.query.modalities.object import Rivals
 from avlmaps.query.voxel_space import Space
+from avlmaps.query.words import Rivals
 
 UP = np.array([0.0, 0.0, 1.0])
 VOXEL_SIZE_M = 0.05

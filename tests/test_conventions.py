@@ -15,7 +15,7 @@ from avlmaps.perception.embedded.meanings import Meanings
 from avlmaps.perception.profiles import profile
 from avlmaps.query.factors import FOUND_AT, ROUNDING, HeatSettings
 from avlmaps.query.goals import LEAST_TOGETHER
-from avlmaps.query.modalities.object import ObjectSettings
+from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.recordings.layout import Description
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs" / "conventions.md").read_text(encoding="utf-8")

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from avlmaps.query.heatmap import Heatmap
     from avlmaps.query.locate import Located
     from avlmaps.query.modalities.area import AreaSettings
-    from avlmaps.query.modalities.object import ObjectSettings
     from avlmaps.query.modalities.sound import SoundSettings
+    from avlmaps.query.object_settings import ObjectSettings
     from avlmaps.recordings.audio import Sound
     from avlmaps.recordings.open import open_recording
     from avlmaps.recordings.types import Frame, Recording
@@ -64,7 +64,7 @@ _HOMES = {
     "MapError": "avlmaps.core.errors",
     "Modality": "avlmaps.core.question",
     "NavigationError": "avlmaps.core.errors",
-    "ObjectSettings": "avlmaps.query.modalities.object",
+    "ObjectSettings": "avlmaps.query.object_settings",
     "Part": "avlmaps.core.question",
     "Pinhole": "avlmaps.core.camera",
     "Profile": "avlmaps.perception.profiles",

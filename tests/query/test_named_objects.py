@@ -15,15 +15,10 @@ from avlmaps.query.colour_filter import tint_of
 from avlmaps.query.factors import HeatSettings, NearAnchors
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.loops import plain_loops
-from avlmaps.query.modalities.object import (
-    EncodedWord,
-    ObjectSettings,
-    Rivals,
-    Vocabulary,
-    least_score_to_count,
-    object_factor,
-)
+from avlmaps.query.modalities.object import object_factor
+from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.voxel_space import Space
+from avlmaps.query.words import EncodedWord, Rivals, Vocabulary, least_score_to_count
 
 NAMES = ("chair", "dining table", "coffee table", "floor", "other")
 MEANT = {

@@ -10,8 +10,11 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.query.factors import HeatSettings
 from avlmaps.query.kernels import feature_scores, linked
-from avlmaps.query.modalities.object import ObjectSettings, Rivals, instance_confidence, object_factor, object_margins
+from avlmaps.query.modalities.object import object_factor
+from avlmaps.query.object_settings import ObjectSettings
+from avlmaps.query.pieces import instance_confidence
 from avlmaps.query.voxel_space import Space
+from avlmaps.query.words import Rivals, object_margins
 
 
 def unit_rows(rng: np.random.Generator, n: int, d: int) -> np.ndarray:

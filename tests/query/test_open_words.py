@@ -10,9 +10,12 @@ from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.query.factors import HeatSettings
-from avlmaps.query.modalities.object import ObjectSettings, Rivals, fitting, instance_confidence, object_factor
+from avlmaps.query.modalities.object import object_factor
+from avlmaps.query.object_settings import ObjectSettings
+from avlmaps.query.pieces import fitting, instance_confidence
 from avlmaps.query.synonyms import is_a, is_open
 from avlmaps.query.voxel_space import Space
+from avlmaps.query.words import Rivals
 
 WORDS = ("chair", "office chair", "dining table", "sofa", "bed", "lamp", "door", "floor", "other", "couch", "table")
 DIM = len(WORDS) + 8

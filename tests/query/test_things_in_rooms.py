@@ -9,7 +9,7 @@ from walled_rooms import two_rooms
 from avlmaps.core.arrays import Float
 from avlmaps.perception.room_contents import RoomContents, read_room_contents
 from avlmaps.query.floor_plan import FloorPlan
-from avlmaps.query.modalities.object import ObjectSettings
+from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.room_contents import commonness
 from avlmaps.query.rooms import RoomField
 from avlmaps.query.rules import query_settings

@@ -29,7 +29,9 @@ from avlmaps.maps.store.reader import StoredMap
 from avlmaps.perception.embedded.pixels import LARGEST_LOG_AREA, SMALLEST_LOG_AREA, EmbeddedPixels
 from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS, InstanceNotes, Notes
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.modalities.object import EncodedWord, ObjectSettings, Rivals, object_pieces
+from avlmaps.query.object_settings import ObjectSettings
+from avlmaps.query.pieces import object_pieces
+from avlmaps.query.words import EncodedWord, Rivals
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
 from avlmaps.sim.recorder import RecordSettings, record_scene

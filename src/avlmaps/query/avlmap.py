@@ -23,15 +23,7 @@ from avlmaps.query.floor_plan import FloorPlan, storeys
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor, area_names, name_shares
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
-from avlmaps.query.modalities.object import (
-    EncodedWord,
-    ObjectSettings,
-    Pieces,
-    Rivals,
-    Vocabulary,
-    object_factor,
-    object_pieces,
-)
+from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.modalities.sound import (
     SoundSettings,
     read_clip,
@@ -39,9 +31,12 @@ from avlmaps.query.modalities.sound import (
     sound_factor,
     sound_features,
 )
+from avlmaps.query.object_settings import ObjectSettings
+from avlmaps.query.pieces import Pieces, object_pieces
 from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, voting_rows
 from avlmaps.query.things_in_rooms import ThingsInRooms
 from avlmaps.query.voxel_space import Space
+from avlmaps.query.words import EncodedWord, Rivals, Vocabulary
 from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:

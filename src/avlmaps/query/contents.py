@@ -1,6 +1,6 @@
 """The content of a map without a question: its things, sounds and rooms, each named with a confidence.
 
-A thing is a connected group of voxels that a word of the vocabulary wins (``modalities.object``). Several words may
+A thing is a connected group of voxels that a word of the vocabulary wins (``query.pieces``). Several words may
 claim the same voxels ("desk", "dining table"); the most confident claim stands, and what overlaps it is left out. What
 is certainly a chair, and perhaps an armchair, is listed as a chair.
 """
@@ -19,8 +19,8 @@ from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.factors import FOUND_AT
 from avlmaps.query.modalities.area import AreaSettings, area_names, modes, pooled_name_shares
-from avlmaps.query.modalities.object import Pieces
 from avlmaps.query.modalities.sound import sound_features
+from avlmaps.query.pieces import Pieces
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:

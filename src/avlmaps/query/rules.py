@@ -13,8 +13,8 @@ from avlmaps.maps.fusion.settings import PAPERS_VARIANCE_M2
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.query.avlmap import QuerySettings
 from avlmaps.query.modalities.area import AreaSettings
-from avlmaps.query.modalities.object import ObjectSettings
 from avlmaps.query.modalities.sound import SoundSettings
+from avlmaps.query.object_settings import ObjectSettings
 
 Rules = Literal["ours", "paper"]
 
