@@ -44,7 +44,7 @@ def broken(number: int, seeds: dict[str, Path], folder: Path) -> tuple[str, str,
         mutator = MUTATORS[int(rng.integers(len(MUTATORS)))]
         try:
             done.append(mutator(rng, case))
-        except (OSError, ValueError, IndexError, KeyError, TypeError):  # broken beyond that before
+        except (OSError, ValueError, IndexError, KeyError, TypeError, RecursionError):  # broken beyond that before
             done.append(f"({mutator.__name__} cannot)")
     return name, ", ".join(done), case
 

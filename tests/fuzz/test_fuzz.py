@@ -31,3 +31,11 @@ def test_broken_inputs_end_in_a_plausible_map_or_in_one_sentence(
     lines = [run_case(number, seeds, tmp_path) for number in range(block * each, (block + 1) * each)]
     assert not [line for line in lines if line["verdict"] == "finding"], report(lines)
     assert {"map", "sentence"} <= {str(line["verdict"]) for line in lines}
+
+
+def test_a_change_that_cannot_read_what_another_left_does_not_end_the_campaign(
+    seeds: dict[str, Path], tmp_path: Path
+) -> None:
+    line = run_case(1088, seeds, tmp_path)  # JSON nested too deep to be read, and then to be signed again
+    assert "(resigned cannot)" in str(line["done"])
+    assert line["verdict"] == "sentence"
