@@ -230,6 +230,16 @@ def test_a_truncated_bag_says_how_to_mend_it(tmp_path: Path) -> None:
         open_rosbag(path)
 
 
+def test_a_topic_that_yaml_reads_as_a_number_is_a_sentence(tmp_path: Path) -> None:
+    path = write_bag(tmp_path, "ros2")
+    metadata = path / "metadata.yaml"
+    text = metadata.read_text()
+    assert "/camera/depth/camera_info" in text
+    metadata.write_text(text.replace("/camera/depth/camera_info", "12"))
+    with pytest.raises(RecordingError, match="lists a topic called 12, which is no text"):
+        open_rosbag(path)
+
+
 def test_compressed_depth_is_undone() -> None:
     millimetres = np.arange(12, dtype=np.uint16).reshape(3, 4) * 500
     png = cv2.imencode(".png", millimetres)[1].tobytes()
