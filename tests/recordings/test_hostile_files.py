@@ -14,7 +14,7 @@ from recording_scenes import CAMERA, save_depth, shots, write_folder, write_seve
 
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.recordings import images
-from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.open import open_recording
 
 
@@ -207,3 +207,12 @@ def test_a_sentence_does_not_quote_a_whole_file(tmp_path: Path) -> None:
     with pytest.raises(RecordingError) as fault:
         open_recording(path)
     assert len(str(fault.value)) < 500 and "does not hold numbers only" in str(fault.value)
+
+
+def test_a_flac_with_far_more_bytes_than_its_samples_take_is_a_sentence(tmp_path: Path) -> None:
+    """A seek in it kept a processor busy for ever: libsndfile looked for samples in 20 GB of zeros."""
+    path = tmp_path / "audio.flac"
+    write_flac(path, Sound(np.zeros(16_000, np.float32), 16_000))
+    os.truncate(path, 100 << 20)
+    with pytest.raises(AudioError, match=r"104,857,600 bytes for 1\.00 s of sound, which take 67,188,864 at most"):
+        AudioTrack.open(path, 0.0)

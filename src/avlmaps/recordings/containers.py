@@ -21,6 +21,7 @@ _SELF_CONTAINED = (
 )  # fmt: skip
 _PIECE_SAMPLES = 1 << 16
 _UNKNOWN = 1 << 48  # a FLAC that was written to a pipe may say that it has this many samples or more
+_SAMPLE_BYTES, _PICTURES_BYTES = 5, 64 << 20  # no FLAC takes more for a sample, and for the pictures and tags beside
 _PREROLL_S = 1.0  # a decoder that starts in the middle needs a while until its output is right
 _RESYNC_S = 0.05  # stamps are rounded (to 1 ms in mkv); only a larger jump is a gap
 _LOOKS, _LOOK_S = 20, 0.25  # of a file, to find out whether its channels cancel
@@ -177,6 +178,13 @@ def _examine_plain(path: Path) -> tuple[int, int]:
         promised = _promised_wav_samples(path, file.channels)
         if promised is not None and count < promised:
             raise truncation_error(path, count / rate_hz, promised / rate_hz)
+        most = count * file.channels * _SAMPLE_BYTES + _PICTURES_BYTES
+        if file.format == "FLAC" and 0 < count < _UNKNOWN and (size := path.stat().st_size) > most:
+            # libsndfile would look for the samples in all of what follows
+            raise AudioError(
+                f"{path} has {size:,} bytes for {count / rate_hz:.2f} s of sound, which take {most:,} at most; it is "
+                "damaged: copy or convert it again."
+            )
         if file.format == "FLAC" and not _ends_at(file, count):
             found = sum(len(piece) for piece in _readable(path))
             if 0 < count < _UNKNOWN and found < count:
