@@ -210,9 +210,52 @@ def test_a_sentence_does_not_quote_a_whole_file(tmp_path: Path) -> None:
 
 
 def test_a_flac_with_far_more_bytes_than_its_samples_take_is_a_sentence(tmp_path: Path) -> None:
-    """A seek in it kept a processor busy for ever: libsndfile looked for samples in 20 GB of zeros."""
+    """A seek in it kept a processor busy for ever: libsndfile looked for samples in all that followed."""
     path = tmp_path / "audio.flac"
     write_flac(path, Sound(np.zeros(16_000, np.float32), 16_000))
-    os.truncate(path, 100 << 20)
+    os.truncate(path, (100 << 20) - 1)
+    with path.open("ab") as stream:
+        stream.write(b"x")
     with pytest.raises(AudioError, match=r"104,857,600 bytes for 1\.00 s of sound, which take 67,188,864 at most"):
         AudioTrack.open(path, 0.0)
+
+
+@pytest.mark.parametrize("suffix", ["flac", "ogg", "mp3", "mka", "webm"])
+def test_a_sound_that_ends_in_zeros_is_a_sentence(tmp_path: Path, suffix: str) -> None:
+    """Their decoders look for the next packet in whatever follows, in 20 GB for minutes."""
+    path = compressed(tmp_path / f"a.{suffix}")
+    assert AudioTrack.open(path).duration_s == pytest.approx(1.0, abs=0.1)
+    os.truncate(path, 20_000_000_000)
+    with pytest.raises(AudioError, match=r"the last 67,108,864 of its 20,000,000,000 bytes are zeros"):
+        AudioTrack.open(path)
+
+
+@pytest.mark.parametrize("suffix", ["wav", "aiff", "caf", "m4a"])
+def test_a_sound_that_says_where_its_samples_lie_may_end_in_zeros(tmp_path: Path, suffix: str) -> None:
+    path = stereo(tmp_path / f"a.{suffix}", 1.0)
+    os.truncate(path, 100 << 20)
+    assert AudioTrack.open(path).duration_s == pytest.approx(2.0, abs=0.1)
+
+
+def test_a_sound_that_ends_in_a_few_zeros_is_read(tmp_path: Path) -> None:
+    path = compressed(tmp_path / "a.mp3")
+    os.truncate(path, 8 << 20)
+    assert AudioTrack.open(path).duration_s == pytest.approx(1.0, abs=0.1)
+
+
+def compressed(path: Path) -> Path:
+    """Write a tone of one second in a container without an index of its samples."""
+    import av
+    import soundfile
+
+    tone = (0.3 * np.sin(2 * np.pi * 500.0 * np.arange(48_000) / 48_000)).astype(np.float32)
+    if path.suffix not in (".mka", ".webm"):
+        soundfile.write(path, tone, 48_000)
+        return path
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libopus", rate=48_000, layout="mono")
+        frame = av.AudioFrame.from_ndarray(tone[None], format="fltp", layout="mono")
+        frame.sample_rate = 48_000
+        container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    return path

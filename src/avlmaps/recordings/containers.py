@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from avlmaps.core.errors import AudioError, NoAudioStreamError
-from avlmaps.core.files import SOUND_BYTES, checked_size
+from avlmaps.recordings.media_files import checked_media
 
 if TYPE_CHECKING:
     import soundfile
@@ -53,7 +53,7 @@ def examine(path: Path) -> tuple[int, int]:
         AudioError: there is no such file, it cannot be read, has no audio stream or no samples, or is truncated.
     """
     try:
-        checked_size(path, SOUND_BYTES)
+        checked_media(path)
     except OSError as error:
         what = "does not exist"
         if path.is_dir():
@@ -178,18 +178,8 @@ def _examine_plain(path: Path) -> tuple[int, int]:
         promised = _promised_wav_samples(path, file.channels)
         if promised is not None and count < promised:
             raise truncation_error(path, count / rate_hz, promised / rate_hz)
-        most = count * file.channels * _SAMPLE_BYTES + _PICTURES_BYTES
-        if file.format == "FLAC" and 0 < count < _UNKNOWN and (size := path.stat().st_size) > most:
-            # libsndfile would look for the samples in all of what follows
-            raise AudioError(
-                f"{path} has {size:,} bytes for {count / rate_hz:.2f} s of sound, which take {most:,} at most; it is "
-                "damaged: copy or convert it again."
-            )
-        if file.format == "FLAC" and not _ends_at(file, count):
-            found = sum(len(piece) for piece in _readable(path))
-            if 0 < count < _UNKNOWN and found < count:
-                raise truncation_error(path, found / rate_hz, count / rate_hz)
-            count = found
+        if file.format == "FLAC":
+            count = _flac_samples(path, file, rate_hz, count)
     return rate_hz, count
 
 
@@ -211,6 +201,23 @@ def _promised_wav_samples(path: Path, channels: int) -> int | None:
             else:
                 stream_.seek(size + size % 2, 1)
     return None
+
+
+def _flac_samples(path: Path, file: "soundfile.SoundFile", rate_hz: int, promised: int) -> int:
+    """Return how many samples a FLAC has; its header may promise none, or more than there are."""
+    known = 0 < promised < _UNKNOWN
+    most = promised * file.channels * _SAMPLE_BYTES + _PICTURES_BYTES
+    if known and (size := path.stat().st_size) > most:  # libsndfile would look for samples in all of what follows
+        raise AudioError(
+            f"{path} has {size:,} bytes for {promised / rate_hz:.2f} s of sound, which take {most:,} at most; it is "
+            "damaged: copy or convert it again."
+        )
+    if _ends_at(file, promised):
+        return promised
+    found = sum(len(piece) for piece in _readable(path))
+    if known and found < promised:
+        raise truncation_error(path, found / rate_hz, promised / rate_hz)
+    return found
 
 
 def _ends_at(file: "soundfile.SoundFile", count: int) -> bool:

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float64, UInt8
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.files import SOUND_BYTES, checked_size
 from avlmaps.recordings.images import MOST_PIXELS
+from avlmaps.recordings.media_files import checked_media
 
 
 class VideoFrames:
@@ -76,7 +76,7 @@ class VideoFrames:
         from av.error import FFmpegError
 
         try:
-            checked_size(self.path, SOUND_BYTES)
+            checked_media(self.path)
         except FileNotFoundError:
             raise RecordingError(f"There is no video {self.path}.") from None
         except OSError as error:
