@@ -15,13 +15,13 @@ _INDEXED = (
 def checked_media(path: Path) -> int:
     """Return the size of a file of sound or video that a decoder may open.
 
-    The decoders of the other formats (Ogg, MP3, Matroska, WebM, AVI) look for the next packet in whatever follows: 20 GB
-    of zeros, as a full disk or a broken copy leaves them, keep a processor busy for minutes.
+    The decoders of the other formats (Ogg, MP3, Matroska, WebM, AVI) look for the next packet in all that follows:
+    20 GB of zeros, as a full disk or a broken copy leaves them, keep a processor busy for minutes.
 
     Raises:
         FileNotFoundError: there is no such file.
-        OSError: it is no regular file, is too large, or ends in 64 MB of zeros and its format has no index; ``strerror``
-            is the reason in words.
+        OSError: it is no regular file, is too large, or ends in 64 MB of zeros and its format has no index;
+            ``strerror`` is the reason in words.
     """
     size = checked_size(path, SOUND_BYTES)
     if size >= _MOST_ZEROS_BYTES and not _is_indexed(path) and _ends_in_zeros(path, size):
