@@ -46,9 +46,10 @@ class ObjectSettings:
     join_m: float = 0.3
     """Pieces over one another with no larger gap in height are one thing (the legs and the back of a chair)."""
 
-    def share_of_rival(self, with_uncertain: bool) -> float:
-        """Return the part of its best rival's score from which a voxel may count; 1 where it must win."""
-        return min(1.0, self.score_in_company) if with_uncertain else 1.0
+    @property
+    def share_in_company(self) -> float:
+        """The part of its best rival's score from which a voxel counts where the query has context; 1: it must win."""
+        return min(1.0, self.score_in_company)
 
     def for_guess(self) -> "ObjectSettings":
         """Return the settings under which weaker voxels count."""

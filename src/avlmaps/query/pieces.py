@@ -42,7 +42,7 @@ class Pieces:
         instance = np.full(len(self.mask), -1, np.int64)
         instance[others.mask] = others.instance
         instance[self.mask] = self.instance + len(others.confidence)
-        mask = self.mask | others.mask
+        mask = instance >= 0
         mean = np.concatenate([others.mean_probability, self.mean_probability])
         confidence = np.concatenate([others.confidence, self.confidence])
         return Pieces(mask, instance[mask], mean, confidence, max(self.won, others.won), max(self.best, others.best))
@@ -110,7 +110,7 @@ def pieces_of(
         instance = joined[instance]
         confidence = confidence_of(mask, instance)
     if math.isfinite(longest) and len(instance):
-        points, reach = space.level(space.centres[mask]), max(1, round(settings.link_m / space.grid.voxel_size_m))
+        points, reach = space.level(space.centres[mask]), _reach(space, settings.link_m)
         pieces, piece_of = oversize.cut(np.asarray(space.index[mask]), points, score[mask], instance, longest, reach)
         if not np.array_equal(pieces, instance):
             length_m, mask = lengths_of(mask, instance)[piece_of], mask.copy()
@@ -127,8 +127,12 @@ def pieces_of(
 
 def instances_of(space: Space, mask: Bool[np.ndarray, " n"], link_m: float) -> Int[np.ndarray, " a"]:
     """Return for each voxel of the mask the number of the instance that it belongs to."""
-    reach = max(1, round(link_m / space.grid.voxel_size_m))
-    return loops.linked(np.asarray(space.index[mask]), reach)
+    return loops.linked(np.asarray(space.index[mask]), _reach(space, link_m))
+
+
+def _reach(space: Space, link_m: float) -> int:
+    """Return how many voxels apart, along each axis, two of one instance may be."""
+    return max(1, round(link_m / space.grid.voxel_size_m))
 
 
 def instance_confidence(

@@ -70,12 +70,12 @@ def object_factor(
         )
     scored = scored_once(feature, encoder, rivals, encoded, settings)
 
-    confident = pieces_of(space, encoder, encoded, scored(settings.share_of_rival(False)), settings, rooms)
+    confident = pieces_of(space, encoder, encoded, scored(1.0), settings, rooms)
 
     def things(with_uncertain: bool, chosen: ObjectSettings = settings) -> NearThings:
         pieces = confident
         if with_uncertain:
-            among = scored(chosen.share_of_rival(True))
+            among = scored(chosen.share_in_company)
             pieces = pieces_of(space, encoder, encoded, among, chosen, rooms, beside=confident)
         if tint is not None and rgb is not None:
             share = tinted_share(rgb, pieces.mask, pieces.instance, tint)
