@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from avlmaps.bench.harness.intervals import wilson
+from avlmaps.bench.harness.intervals import in_percent, wilson
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.core.progress import progress
@@ -175,11 +175,11 @@ def _figures(errors: Errors) -> list[object]:
     has_truth = located.any() and not np.isnan(errors.cm[located]).any()
     middle = [_percentile(values, q) if has_truth else "" for q in (50, 95) for values in (errors.cm, errors.deg)]
     within: list[object] = (
-        [_percent(int(near.sum()), count), _interval(int(near.sum()), count)] if has_truth else ["", ""]
+        [_percent(int(near.sum()), count), in_percent(wilson(int(near.sum()), count))] if has_truth else ["", ""]
     )
     return [
         _percent(int(located.sum()), count),
-        _interval(int(located.sum()), count),
+        in_percent(wilson(int(located.sum()), count)),
         *middle,
         *within,
         round(float(np.median(errors.elapsed_ms)), 1) if count else "",
@@ -195,11 +195,6 @@ def _percentile(values: Float[np.ndarray, " n"], q: float) -> object:
 
 def _percent(hits: int, count: int) -> float:
     return round(100.0 * hits / count, 1) if count else 0.0
-
-
-def _interval(hits: int, count: int) -> str:
-    low, high = wilson(hits, count)
-    return f"{100 * low:.1f} to {100 * high:.1f}"
 
 
 def _spread(indices: Int[np.ndarray, " n"], count: int) -> Int[np.ndarray, " k"]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32
 
-from avlmaps.bench.harness.intervals import poisson, wilson
+from avlmaps.bench.harness.intervals import in_percent, poisson, wilson
 from avlmaps.core.progress import progress
 from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings, segment
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
@@ -99,7 +99,7 @@ class Tally:
             "clean" if snr_db is None else snr_db,
             self.sounds,
             round(100.0 * self.found / max(self.sounds, 1), 1),
-            "{:.1f} to {:.1f}".format(*(100.0 * bound for bound in wilson(self.found, self.sounds))),
+            in_percent(wilson(self.found, self.sounds)),
             round(self.false_alarms / minutes, 2),
             "{:.2f} to {:.2f}".format(*(bound / minutes for bound in poisson(self.false_alarms))),
             round(self.pieces / max(self.found, 1), 2),

@@ -15,6 +15,12 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
+def in_percent(interval: tuple[float, float]) -> str:
+    """Return an interval of a share as tables show it: "48.7 to 67.0"."""
+    low, high = interval
+    return f"{100 * low:.1f} to {100 * high:.1f}"
+
+
 def poisson(count: int) -> tuple[float, float]:
     """Return the exact 95 % interval of the mean of a Poisson count."""
     from scipy.special import gammaincinv

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from avlmaps.bench.harness.chosen import chosen_on
-from avlmaps.bench.harness.intervals import wilson
+from avlmaps.bench.harness.intervals import in_percent, wilson
 from avlmaps.bench.harness.paper import paper_figures
 from avlmaps.bench.harness.provenance import clip_table, shown_scene
 from avlmaps.bench.indexing.configurations import OURS, configurations
@@ -53,8 +53,7 @@ def _table(outcome: Outcome, kind: TaskKind) -> dict[str, Any]:
 def _row(name: str, score: Score) -> list[Any]:
     recalls: list[Any] = []
     for limit in LIMITS_M:
-        low, high = score.recall_interval(limit)
-        recalls += [_percent(score.recall(limit)), f"{100 * low:.1f} to {100 * high:.1f}"]
+        recalls += [_percent(score.recall(limit)), in_percent(score.recall_interval(limit))]
     mean = [round(score.mean_m, 2), "{:.2f} to {:.2f}".format(*score.mean_interval_m)]
     return [name, score.count, *recalls, *mean, _percent(score.answered / score.count)]
 
@@ -90,20 +89,14 @@ def _found(outcome: Outcome) -> dict[str, Any]:
     """Return how often ours was reported as found where its first goal was within 0.5 m, and where it was not."""
     rows: list[list[Any]] = []
     for kind in TaskKind:
-        for one in configurations(kind):
-            if one.role != OURS:
-                continue
-            cells: list[object] = []
-            answers = outcome.answers(kind, one.name)
-            for group in (
-                [a for a in answers if a.off_m < LIMITS_M[0]],
-                [a for a in answers if a.off_m >= LIMITS_M[0]],
-            ):
-                found = sum(answer.found for answer in group)
-                low, high = wilson(found, len(group))
-                share = _percent(found / len(group)) if group else ""
-                cells += [len(group), share, f"{100 * low:.1f} to {100 * high:.1f}" if group else ""]
-            rows.append([TITLE[kind], *cells])
+        ours = next(one for one in configurations(kind) if one.role == OURS)
+        answers = outcome.answers(kind, ours.name)
+        cells: list[object] = []
+        for right in (True, False):
+            found = [answer.found for answer in answers if (answer.off_m < LIMITS_M[0]) == right]
+            count, hits = len(found), sum(found)
+            cells += [count, _percent(hits / count), in_percent(wilson(hits, count))] if count else [0, "", ""]
+        rows.append([TITLE[kind], *cells])
     group = ("of them found %", "95 %")
     return {"columns": ["table", "first goal within 0.5 m", *group, "farther", *group], "rows": rows}
 

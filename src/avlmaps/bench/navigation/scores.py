@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from avlmaps.bench.harness.intervals import wilson
+from avlmaps.bench.harness.intervals import in_percent, wilson
 from avlmaps.bench.navigation.episodes import Episode, Leg
 from avlmaps.bench.navigation.goals import GoalKind
 from avlmaps.bench.navigation.metrics import grouped_interval, in_a_row, independent
@@ -31,8 +31,7 @@ class Share:
     @property
     def bounds(self) -> str:
         """The interval in percent."""
-        low, high = self.interval
-        return f"{100 * low:.1f} to {100 * high:.1f}"
+        return in_percent(self.interval)
 
 
 @dataclass(frozen=True, slots=True)
