@@ -72,8 +72,8 @@ def test_an_encoder_that_is_right_is_right_in_every_figure(folder: Path) -> None
     figures = measure(encoder_of(kinds, said), NyuFolder(folder))  # pyright: ignore[reportArgumentType]
     assert (figures.accuracy, figures.class_accuracy, figures.mean_iou) == (1.0, 1.0, 1.0)
     assert figures.confusion.sum() == 35 * 300 + 100 * 100
-    row = summary_table(figures)["rows"][0]
-    assert row[0] == 2 and row[-1] == 2
+    (row,) = summary_table({"once": figures})["rows"]
+    assert row[0] == 2 and row[-2:] == [2, "once"]
 
 
 def test_a_chair_taken_for_floor_costs_what_it_covers(folder: Path) -> None:
@@ -152,9 +152,11 @@ def test_the_suite_needs_a_folder_and_an_encoder_of_kinds(tmp_path: Path, folder
 
 def test_the_suite_writes_its_tables_in_every_form(tmp_path: Path, folder: Path) -> None:
     answer = run_suite("frames", SuiteInputs(nyuv2=folder, profile="synthetic"), tmp_path / "out")
-    assert set(answer["tables"]) == {"labelled frames", "by class"}
+    assert set(answer["tables"]) == {"labelled frames", "by class", "by class at several scales"}
+    assert [row[-1] for row in answer["tables"]["labelled frames"]["rows"]] == ["once, as in maps", "at several scales"]
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"frames.json", "frames.md", "frames.png", "frames-labelled-frames.csv", "frames-by-class.csv"}
+    assert names == {"frames.json", "frames.md", "frames.png", "frames-labelled-frames.csv", "frames-by-class.csv",
+                     "frames-by-class-at-several-scales.csv"}  # fmt: skip
     assert (tmp_path / "out" / "frames-by-class.csv").read_text().startswith("class,pixels,recall,IoU,taken for\n")
 
 

@@ -4,6 +4,9 @@ Each of our kinds belongs to one of the classes (``avlmaps.bench.nyu``); the lik
 sum of its kinds' probabilities, is the answer for a pixel. Every second pixel is scored where it has one of the 37.
 Up is the data set's. The floor is the median height of the labelled floor where that has 800 pixels or more, else the
 one that ``find_ground`` estimates from the frame alone, as a build does from all frames.
+
+Frames are measured twice: seen once, as maps see each of their many frames, and at several scales and mirrored
+(``perception.embedded.multi_scale``), as single frames are best seen.
 """
 
 from collections.abc import Mapping
@@ -20,6 +23,7 @@ from avlmaps.core.progress import progress
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
 
 STEP = 2
+MODES = {False: "once, as in maps", True: "at several scales"}
 Table = Mapping[str, Any]
 
 
@@ -79,13 +83,13 @@ def class_probabilities(
     return np.asarray(cv2.resize(summed, (CAMERA.width, CAMERA.height), interpolation=cv2.INTER_LINEAR), np.float32)
 
 
-def measure(encoder: EmbeddedPixels, folder: NyuFolder) -> FrameFigures:
-    """Score every frame of a folder."""
+def measure(encoder: EmbeddedPixels, folder: NyuFolder, multi_scale: bool = False) -> FrameFigures:
+    """Score every frame of a folder, seen once or at several scales."""
+    see = encoder.see_multi_scale if multi_scale else encoder.see
     confusion, labelled, shares = np.zeros((SCORED, SCORED), np.int64), 0, []
-    for number in progress(range(len(folder)), "frames"):
+    for number in progress(range(len(folder)), "frames at several scales" if multi_scale else "frames"):
         one = folder.read(number)
-        seen = encoder.see(one.frame)
-        said = class_probabilities(seen.category, encoder.names)[::STEP, ::STEP].argmax(axis=2)
+        said = class_probabilities(see(one.frame).category, encoder.names)[::STEP, ::STEP].argmax(axis=2)
         truth = one.label[::STEP, ::STEP].astype(np.int64) - 1
         scored = (truth >= 0) & (truth < SCORED)
         counts = np.bincount(truth[scored] * SCORED + said[scored], minlength=SCORED**2).reshape(SCORED, SCORED)
@@ -102,23 +106,28 @@ def run_frames(encoder: EmbeddedPixels, folder: Path) -> dict[str, Table]:
     Raises:
         RecordingError: the folder has no index, or a frame cannot be read.
     """
-    figures = measure(encoder, NyuFolder(folder))
-    return {"labelled frames": summary_table(figures), "by class": class_table(figures)}
+    frames = NyuFolder(folder)
+    figures = {MODES[multi_scale]: measure(encoder, frames, multi_scale) for multi_scale in (False, True)}
+    once, often = (class_table(one) for one in figures.values())
+    return {"labelled frames": summary_table(figures), "by class": once, "by class at several scales": often}
 
 
-def summary_table(figures: FrameFigures) -> Table:
-    """Return one row: frames, pixels and the three means, with an interval over frames for the first."""
-    low, high = interval_over_frames(figures.right_by_frame)
-    row = [
-        figures.frames, figures.floors_labelled, int(figures.confusion.sum()),
-        f"{figures.accuracy:.3f}", f"{low:.3f}-{high:.3f}", f"{figures.class_accuracy:.3f}", f"{figures.mean_iou:.3f}",
-        int((figures.confusion.sum(axis=1) > 0).sum()),
-    ]  # fmt: skip
+def summary_table(figures: Mapping[str, FrameFigures]) -> Table:
+    """Return a row for each way of seeing: frames, pixels and the three means, the first with its interval."""
     columns = [
         "frames", "floor labelled", "pixels scored", "pixel accuracy", "mean over frames, 95 %", "class accuracy",
-        "mean IoU", "classes",
+        "mean IoU", "classes", "seen",
     ]  # fmt: skip
-    return {"columns": columns, "rows": [row]}
+    return {"columns": columns, "rows": [_summary(mode, one) for mode, one in figures.items()]}
+
+
+def _summary(mode: str, figures: FrameFigures) -> list[Any]:
+    low, high = interval_over_frames(figures.right_by_frame)
+    return [
+        figures.frames, figures.floors_labelled, int(figures.confusion.sum()),
+        f"{figures.accuracy:.3f}", f"{low:.3f}-{high:.3f}", f"{figures.class_accuracy:.3f}", f"{figures.mean_iou:.3f}",
+        int((figures.confusion.sum(axis=1) > 0).sum()), mode,
+    ]  # fmt: skip
 
 
 def interval_over_frames(shares: Float32[np.ndarray, " n"]) -> tuple[float, float]:

@@ -13,7 +13,15 @@ from hashlib import sha256
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float32
-from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, Notes, SceneNetwork, Seen, load_network
+from avlmaps.perception.embedded.scene_network import (
+    PLAIN,
+    SYNTHETIC_WEIGHTS,
+    Look,
+    Notes,
+    SceneNetwork,
+    Seen,
+    load_network,
+)
 from avlmaps.recordings.types import Frame
 
 # Agreement at which the second network begins to count, and from which on both count the same; in between its share
@@ -48,9 +56,9 @@ class PairedNetworks:
         both = f"{first.checksum} {second.checksum} {NO_SAY} {SAME_SAY}"
         self.checksum = sha256(both.encode()).hexdigest()
 
-    def see(self, frame: Frame) -> Seen:
+    def see(self, frame: Frame, look: Look = PLAIN) -> Seen:
         """Encode a frame with both networks."""
-        seen, second = self._first.see(frame), self._second.see(frame)
+        seen, second = self._first.see(frame, look), self._second.see(frame, look)
         other = np.zeros_like(seen.category)
         other[..., self._column] = second.category
         share = share_of_second(seen.category, other, seen.known)

@@ -51,6 +51,12 @@ class EmbeddedPixels(NamedEncoder):
         """Return the probabilities themselves, of ``names`` on the grid of ``encode``."""
         return self._network.see(frame)
 
+    def see_multi_scale(self, frame: Frame) -> Seen:
+        """Return better probabilities of a frame by itself, ten times slower; a map gains nothing from them."""
+        from avlmaps.perception.embedded.multi_scale import see_multi_scale
+
+        return see_multi_scale(self._network, frame)
+
     def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
         """Return a unit vector for each phrase; zero for one that means none of the categories.
 

@@ -29,6 +29,24 @@ _USUAL_HEIGHT_M = 1.3
 DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS = "scene_encoder", "scene_encoder_synthetic"
 
 
+@dataclass(frozen=True, slots=True)
+class Look:
+    """A way to look at a frame.
+
+    Attributes:
+        scale: how wide the picture is, times ``Notes.width_px``.
+        mirrored: left is right, as in a mirror.
+    """
+
+    scale: float = 1.0
+    mirrored: bool = False
+
+
+# As maps look at each of their many frames.
+PLAIN = Look()
+_ACROSS = 4  # the channel of geometry that changes its sign in a mirror: the normal along right
+
+
 class InstanceNotes(msgspec.Struct, frozen=True):
     """How instances are distinguished from noise, fitted on maps of held-out homes (``training/pixels/instances.py``).
 
@@ -132,21 +150,27 @@ class SceneNetwork:
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         return onnxruntime.InferenceSession(self._read_weights(), options, providers=["CPUExecutionProvider"])
 
-    def see(self, frame: Frame) -> Seen:
+    def see(self, frame: Frame, look: Look = PLAIN) -> Seen:
         """Encode a frame; its ``ground`` gives the up direction, where it is known."""
         import cv2
 
-        camera, depth_m, rgb = at_working_size(frame, self.notes.width_px)
+        camera, depth_m, rgb = at_working_size(frame, round(look.scale * self.notes.width_px))
         up, height_m = _ground_of(frame)
         multiple = self.notes.multiple
-        geometry = _padded(channels(depth_m, camera, up, height_m), multiple)
-        colour = _padded(rgb.astype(np.float32).transpose(2, 0, 1) / 127.5 - 1.0, multiple)
+        geometry = channels(depth_m, camera, up, height_m)
+        colour = rgb.astype(np.float32).transpose(2, 0, 1) / 127.5 - 1.0
+        if look.mirrored:
+            geometry, colour = geometry[:, :, ::-1].copy(), colour[:, :, ::-1]
+            geometry[_ACROSS] *= -1.0
+        geometry, colour = _padded(geometry, multiple), _padded(colour, multiple)
         score, room, *floor = (
             np.asarray(output)
             for output in self._session.run(None, {"geometry": geometry[None], "colour": colour[None]})
         )
         h, w = (depth_m.shape[0] + 1) // 2, (depth_m.shape[1] + 1) // 2
         category = score[0, :, :h, :w].transpose(1, 2, 0) + self._bias
+        if look.mirrored:
+            category = category[:, ::-1]
         known = cv2.resize((depth_m > 0.0).astype(np.uint8), (w, h), interpolation=cv2.INTER_AREA) > 0
         return Seen(
             _softmax(category / self.notes.temperature),

@@ -1,0 +1,43 @@
+"""One frame by itself, looked at in several sizes and in the mirror, and smoothed up to the edges of things.
+
+A network errs on other pixels of each, so that the mean is right more often than any of them (multi-scale testing;
+Chen et al., "DeepLab", IEEE TPAMI 2018). A map does the same with its many views of each voxel: there it gains nothing
+(training/pixels/README.md).
+"""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from avlmaps.perception.embedded.edge_aware import smoothed
+from avlmaps.perception.embedded.paired_networks import PairedNetworks
+from avlmaps.perception.embedded.scene_network import PLAIN, Look, SceneNetwork, Seen, at_working_size
+from avlmaps.recordings.types import Frame
+
+# The first is as maps look, and gives the grid. Larger pictures are worse by themselves.
+LOOKS = tuple(Look(scale, mirrored) for scale, mirrored in product((PLAIN.scale, 1.2, 1.4), (PLAIN.mirrored, True)))
+
+
+def see_multi_scale(network: SceneNetwork | PairedNetworks, frame: Frame) -> Seen:
+    """Encode a frame in every look.
+
+    Returns:
+        the mean, on the grid of the plain look.
+    """
+    import cv2
+
+    first, *others = (network.see(frame, look) for look in LOOKS)
+    rows, columns = first.known.shape
+    resized = [cv2.resize(seen.category, (columns, rows), interpolation=cv2.INTER_LINEAR) for seen in others]
+    category = np.mean([first.category, *resized], axis=0, dtype=np.float32)
+    camera, depth_m, rgb = at_working_size(frame, network.notes.width_px)
+    cells = np.asarray(cv2.resize(rgb, (columns, rows), interpolation=cv2.INTER_AREA), np.uint8)
+    # The pixel right below the middle of each cell.
+    depth_m = depth_m[1::2, 1::2] if min(depth_m.shape) > 1 else depth_m
+    depth_m = np.pad(depth_m, ((0, rows - depth_m.shape[0]), (0, columns - depth_m.shape[1])), mode="edge")
+    return replace(
+        first,
+        category=smoothed(category, depth_m, cells, camera.resized(columns, rows)),
+        room=np.mean([seen.room for seen in (first, *others)], axis=0),
+    )
