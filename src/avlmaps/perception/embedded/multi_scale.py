@@ -30,7 +30,7 @@ def see_multi_scale(network: SceneNetwork | PairedNetworks, frame: Frame) -> See
     first, *others = (network.see(frame, look) for look in LOOKS)
     rows, columns = first.known.shape
     resized = [cv2.resize(seen.category, (columns, rows), interpolation=cv2.INTER_LINEAR) for seen in others]
-    category = np.mean([first.category, *resized], axis=0, dtype=np.float32)
+    category = np.stack([first.category, *resized]).mean(axis=0)
     camera, depth_m, rgb = at_working_size(frame, network.notes.width_px)
     cells = np.asarray(cv2.resize(rgb, (columns, rows), interpolation=cv2.INTER_AREA), np.uint8)
     # The pixel right below the middle of each cell.
