@@ -96,13 +96,13 @@ def test_features_hold_a_direction_and_scores_and_give_them_back(seed: int) -> N
     np.testing.assert_allclose(again, scores, atol=1e-4)
 
 
-@given(seed=st.integers(0, 2**32 - 1), surer=st.floats(0.1, 10.0))
-def test_the_product_of_comparable_features_weighs_both_parts_however_sure_the_scores_are(
-    seed: int, surer: float
+@given(seed=st.integers(0, 2**32 - 1), scale=st.floats(0.1, 10.0))
+def test_the_product_of_comparable_features_weighs_both_parts_whatever_the_size_of_the_scores(
+    seed: int, scale: float
 ) -> None:
     rng = np.random.default_rng(seed)
     network, scores = rng.normal(size=(3, 8)), rng.normal(size=(3, 4))
-    alike = comparable_features(joined_features(network, surer * scores), 8)
+    alike = comparable_features(joined_features(network, scale * scores), 8)
     network /= np.linalg.norm(network, axis=1, keepdims=True)
     scores /= np.linalg.norm(scores, axis=1, keepdims=True)
     expected = (1.0 - SCORES_SHARE) * network @ network.T + SCORES_SHARE * scores @ scores.T

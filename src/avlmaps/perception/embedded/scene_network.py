@@ -31,7 +31,7 @@ DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS = "scene_encoder", "scene_encoder_synthetic"
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """A way to look at a frame.
+    """How a frame is looked at.
 
     Attributes:
         scale: how wide the picture is, times ``Notes.width_px``.

@@ -35,7 +35,7 @@ def split_features(
 
 
 def comparable_features(features: Float[np.ndarray, "windows d_s"], words_dim: int) -> Float[np.ndarray, "windows d_s"]:
-    """Return unit vectors whose product says how much two sounds are alike to both, however sure the scores are."""
+    """Return unit vectors whose product says how alike two sounds are to both, by the direction of the scores alone."""
     network, scores = split_features(features, words_dim)
     joined = np.hstack([np.sqrt(1.0 - SCORES_SHARE) * network, np.sqrt(SCORES_SHARE) * _unit(scores)])
     return _unit(joined).astype(np.float32)
