@@ -16,9 +16,10 @@ from training.sounds.crossvalidate import Answers, Networks, example_bank, hear_
 from training.sounds.export import write_onnx
 from training.sounds.figures import all_tables
 from training.sounds.fit import EncodeWords, Settings
-from training.sounds.kinds import KINDS, NAMES, RECORDED, TEMPLATES
+from training.sounds.kinds import KINDS, NAMES, TEMPLATES
 
 from avlmaps.core.progress import say
+from avlmaps.perception.embedded.sound_calibration import evidence_for
 from avlmaps.perception.embedded.words import EmbeddedWords
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -64,8 +65,7 @@ def main() -> None:
     weights = arguments.out / WEIGHTS
     weights.mkdir(parents=True, exist_ok=True)
     (arguments.out / FIGURES).parent.mkdir(parents=True, exist_ok=True)
-    write_onnx([final.net], weights / "sounds.onnx")
-    final.linear.write(weights / "sounds.npz")
+    write_onnx([final], weights / "sounds.onnx")
     np.save(weights / "sounds.npy", bank.astype(np.float16))
     per_kind = np.bincount(kinds, minlength=len(NAMES)).tolist()
     write_json(weights / "sounds.json", notes(corpus, words, constants, arguments.each, per_kind))
@@ -80,7 +80,8 @@ def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.Calibra
     known, strangers = answers.known, answers.strangers
     heard = calibrate.joined([known.dry, known.wet])
     kinds, nets = np.tile(known.kinds, 2), np.concatenate([known.nets, known.nets + 10])
-    c = replace(calibrate.START, temperature=calibrate.fit_temperature(heard.evidence, kinds))
+    evidence = evidence_for(heard.cosines, heard.typical)
+    c = replace(calibrate.START, temperature=calibrate.fit_temperature(evidence, kinds))
     c = calibrate.fit_phrases(encode, c)
     unknown = calibrate.joined([strangers.dry, strangers.wet])
     peers = calibrate.joined([answers.peers.dry, answers.peers.wet])  # of the same network
@@ -108,8 +109,8 @@ def notes(
         for k, (name, called) in enumerate(KINDS.items())
     ]
     return {
-        "id": "avlmaps/sounds-4",
-        "dim": words.card.dim + len(RECORDED),
+        "id": "avlmaps/sounds-3",
+        "dim": words.card.dim,
         "words": words.card.checksum,
         "templates": list(TEMPLATES),
         "note": NOTE,

@@ -19,7 +19,6 @@ from avlmaps.perception.embedded.sound_calibration import (
     taught_lead,
     typical_examples,
 )
-from avlmaps.perception.embedded.sound_features import comparable_features, split_features
 
 START = Calibration(0.07, (0.0, 0.0, 0.0), 0.05, (0.0, 0.0), (0.0, 1.0), (0.0, 0.0, 0.0), (-4.0, 8.0))
 
@@ -72,13 +71,15 @@ class Evidence:
     """The evidence for every kind in sounds of one window.
 
     Attributes:
-        features: (n, dim), comparable.
-        evidence: (n, kinds), low for kinds that the network was fitted without.
+        features: (n, dim).
+        cosines: (n, kinds), to the words of every kind; -1 for kinds that the network was fitted without.
+        typical: (n, kinds), to the typical example that the network was fitted to; likewise.
         near: (n, kinds), to the nearest example that the network was fitted to; likewise.
     """
 
     features: np.ndarray
-    evidence: np.ndarray
+    cosines: np.ndarray
+    typical: np.ndarray
     near: np.ndarray
 
     def __len__(self) -> int:
@@ -86,10 +87,10 @@ class Evidence:
 
     def at(self, chosen: np.ndarray) -> "Evidence":
         """Return some of the sounds."""
-        return Evidence(self.features[chosen], self.evidence[chosen], self.near[chosen])
+        return Evidence(self.features[chosen], self.cosines[chosen], self.typical[chosen], self.near[chosen])
 
 
-FIELDS = ("features", "evidence", "near")
+FIELDS = ("features", "cosines", "typical", "near")
 
 
 def joined(parts: Sequence[Evidence]) -> Evidence:
@@ -101,24 +102,21 @@ def evidence_of(
     features: np.ndarray, aims: np.ndarray, examples: np.ndarray, kinds: np.ndarray, without: Sequence[int] = ()
 ) -> Evidence:
     """Compare features with the words and with the examples (of the given kinds, sorted)."""
-    words_dim = aims.shape[1]
-    comparable, bank = comparable_features(features, words_dim), comparable_features(examples, words_dim)
-    network, scores = split_features(features, words_dim)
     present, starts = np.unique(kinds, return_index=True)
-    cosines = (network @ aims.T).astype(np.float64)
+    cosines = (features @ aims.T).astype(np.float64)
     cosines[:, list(without)] = -1.0
     # a kind whose only recording is held out has no example: its words stand in
     near, typical = cosines.copy(), cosines.copy()
-    near[:, present] = nearness(comparable, bank, starts)
-    typical[:, present] = network @ typical_examples(split_features(examples, words_dim)[0], starts).T
-    return Evidence(comparable, evidence_for(cosines, typical, scores), near)
+    near[:, present] = nearness(features, examples, starts)
+    typical[:, present] = features @ typical_examples(examples, starts).T
+    return Evidence(features, cosines, typical, near)
 
 
-def fit_temperature(evidence: np.ndarray, kinds: np.ndarray) -> float:
+def fit_temperature(cosines: np.ndarray, kinds: np.ndarray) -> float:
     """Return the temperature at which held-out kinds are the most likely."""
 
     def surprise(log_t: float) -> float:
-        p = softmax(evidence / np.exp(log_t))
+        p = softmax(cosines / np.exp(log_t))
         return float(-np.log(p[np.arange(len(kinds)), kinds] + 1e-9).mean())
 
     return float(np.exp(minimize_scalar(surprise, bounds=(np.log(0.01), np.log(0.3)), method="bounded").x))
@@ -140,7 +138,7 @@ def fit_phrases(encode_words: EncodeWords, c: Calibration) -> Calibration:
 
 def heard_kinds(heard: Evidence, c: Calibration) -> np.ndarray:
     """Return how likely each sound is of each kind, as ``EmbeddedSounds`` finds it."""
-    posterior, known = kinds_of_windows(heard.evidence, heard.near, c)
+    posterior, known = kinds_of_windows(heard.cosines, heard.typical, heard.near, c)
     return posterior * known[:, None]
 
 
@@ -148,7 +146,7 @@ def fit_known(known: Evidence, unknown: Evidence, c: Calibration) -> Calibration
     """Fit the refusal of unknown sounds, both sides weighing the same."""
 
     def clues(heard: Evidence) -> np.ndarray:
-        best = np.sort(heard.evidence, axis=1)
+        best = np.sort(evidence_for(heard.cosines, heard.typical), axis=1)
         return np.stack([heard.near.max(axis=1), best[:, -1] - best[:, -2]], axis=1)
 
     x = np.concatenate([clues(known), clues(unknown)])

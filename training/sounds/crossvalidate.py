@@ -12,14 +12,11 @@ from training.sounds.clips import FOLDS, Corpus, Examples, mels_of, read_samples
 from training.sounds.export import opened_norms, read_onnx
 from training.sounds.fit import EncodeWords, Settings, encode, fit, fit_folds, targets, turned
 from training.sounds.kinds import ESC10, NAMES
-from training.sounds.linear import fit_statistics
 from training.sounds.network import SoundNet
 
 from avlmaps.bench.sound_clips import room_response
 from avlmaps.core.progress import progress, say
 from avlmaps.perception.embedded import logmel
-from avlmaps.perception.embedded.sound_features import joined_features
-from avlmaps.perception.embedded.sound_statistics import StatisticsModel
 
 # Kinds that one network is fitted without, neither recorded nor synthetic: strangers, and what teaching is tried on.
 LEFT_OUT = (
@@ -29,23 +26,6 @@ LEFT_OUT = (
 LEFT_OUT_FOLD = 5
 BANK_EACH = 4  # synthetic examples of a kind without recordings
 ROOM_S = 0.6
-
-
-@dataclass(frozen=True, slots=True)
-class Ear:
-    """A network, and the linear model on statistics of the same clips.
-
-    Attributes:
-        net: the network.
-        linear: the model.
-    """
-
-    net: SoundNet
-    linear: StatisticsModel
-
-    def encode(self, mels: np.ndarray) -> np.ndarray:
-        """Return features of windows of mel power (n, frames, bands), as ``EmbeddedSounds`` makes them."""
-        return joined_features(encode(self.net, mels), self.linear.scores(mels.astype(np.float32)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +48,8 @@ class Networks:
     start: Path
     work: Path
 
-    def of_fold(self, fold: int) -> Ear:
-        """Return the ear that was not trained on the household clips of a fold (0: one that was trained on all)."""
+    def of_fold(self, fold: int) -> SoundNet:
+        """Return the network that was not trained on the household clips of a fold (0: one that was trained on all)."""
         missing = [f for f in (*FOLDS, 0) if not self._file(f).exists()]
         if missing:  # all at once: they share the lower half of the network
             words = targets(self.encode_words)
@@ -78,20 +58,20 @@ class Networks:
                 nets = fit_folds(self.corpus.examples(), words, settings, nets)
             for f, net in nets.items():
                 self._store(self._file(f), net, words)
-        return Ear(self._read(self._file(fold)), fit_statistics(self.corpus.examples(fold)))
+        return self._read(self._file(fold))
 
-    def stranger(self) -> Ear:
-        """Return the ear that starts from scratch, without one fold of anything and without some kinds at all."""
+    def stranger(self) -> SoundNet:
+        """Return the network that starts from scratch, without one fold of anything and without some kinds at all."""
         file = self.work / "stranger.pt"
-        examples = self.corpus.examples(LEFT_OUT_FOLD, tuple(map(NAMES.index, LEFT_OUT)))
         if not file.exists():
             words = targets(self.encode_words)
+            examples = self.corpus.examples(LEFT_OUT_FOLD, tuple(map(NAMES.index, LEFT_OUT)))
             first, *others = self.scratch
             net = fit(examples, words, first, "stranger")
             for settings in others:
                 net = fit(examples, words, settings, "stranger", net)
             self._store(file, net, words)
-        return Ear(self._read(file), fit_statistics(examples))
+        return self._read(file)
 
     def _file(self, fold: int) -> Path:
         return self.work / (f"fold{fold}.pt" if fold else "all.pt")
@@ -181,12 +161,12 @@ def held_together(parts: Sequence[Held]) -> Held:
     return Held(dry, wet, *(np.concatenate([getattr(p, name) for p in parts]) for name in ("kinds", "nets", "sources")))
 
 
-def example_bank(ear: Ear, examples: Examples) -> tuple[np.ndarray, np.ndarray]:
+def example_bank(net: SoundNet, examples: Examples) -> tuple[np.ndarray, np.ndarray]:
     """Return features of the recorded examples, and of a few synthetic ones of kinds without any, sorted by kind."""
     made = examples.synthetic_kinds
     bare = [kind for kind in np.unique(made) if kind not in examples.recorded_kinds]
     few = np.concatenate([np.flatnonzero(made == kind)[:BANK_EACH] for kind in bare])
-    features = np.concatenate([ear.encode(examples.recorded), ear.encode(examples.synthetic[few])])
+    features = np.concatenate([encode(net, examples.recorded), encode(net, examples.synthetic[few])])
     kinds = np.concatenate([examples.recorded_kinds, made[few]])
     order = np.argsort(kinds, kind="stable")
     return features[order], kinds[order]
@@ -199,21 +179,22 @@ def hear_held_out(corpus: Corpus, networks: Networks, aims: np.ndarray) -> Answe
     sources = np.array([clip.source for clip in corpus.clips])
 
     def held(
-        chosen: np.ndarray, ear: Ear, bank: tuple[np.ndarray, np.ndarray], number: int, without: Sequence[int] = ()
+        chosen: np.ndarray, net: SoundNet, bank: tuple[np.ndarray, np.ndarray], number: int, without: Sequence[int] = ()
     ) -> Held:
-        dry, echoing = (evidence_of(ear.encode(m[chosen]), aims, *bank, without) for m in (corpus.mels, wet))
+        dry, echoing = (evidence_of(encode(net, m[chosen]), aims, *bank, without) for m in (corpus.mels, wet))
         count = int(chosen.sum())
         return Held(dry, echoing, corpus.kinds[chosen], np.full(count, number), sources[chosen])
 
     parts = []
     for fold in FOLDS:
-        ear, examples = networks.of_fold(fold), corpus.examples(fold)
-        parts.append(held(household & (corpus.folds == fold), ear, example_bank(ear, examples), fold))
-    ear, without = networks.stranger(), tuple(map(NAMES.index, LEFT_OUT))
-    bank = example_bank(ear, corpus.examples(LEFT_OUT_FOLD, without))
+        net = networks.of_fold(fold)
+        bank = example_bank(net, corpus.examples(fold))
+        parts.append(held(household & (corpus.folds == fold), net, bank, fold))
+    net, without = networks.stranger(), tuple(map(NAMES.index, LEFT_OUT))
+    bank = example_bank(net, corpus.examples(LEFT_OUT_FOLD, without))
     strange = np.isin(corpus.kinds, without)
-    peers = held(~strange & (corpus.folds == LEFT_OUT_FOLD), ear, bank, 0, without)
-    strangers = held(strange, ear, bank, 0, without)
+    peers = held(~strange & (corpus.folds == LEFT_OUT_FOLD), net, bank, 0, without)
+    strangers = held(strange, net, bank, 0, without)
     return Answers(held_together(parts), peers, strangers, without)
 
 

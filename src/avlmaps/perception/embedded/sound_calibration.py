@@ -11,9 +11,6 @@ from jaxtyping import Float
 
 Array = Float[np.ndarray, "..."]
 
-SCORES_WEIGHT = 1.5
-"""Of the linear model's score in the evidence for a kind, beside the mean of the two cosines."""
-
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
@@ -70,36 +67,32 @@ def typical_examples(examples: Float[np.ndarray, "n d"], starts: np.ndarray) -> 
 
 
 def evidence_for(
-    cosines: Float[np.ndarray, "windows kinds"],
-    typical: Float[np.ndarray, "windows kinds"],
-    scores: Float[np.ndarray, "windows recorded"],
+    cosines: Float[np.ndarray, "windows kinds"], typical: Float[np.ndarray, "windows kinds"]
 ) -> Float[np.ndarray, "windows kinds"]:
-    """Return the evidence for every kind: the mean of two cosines, and for a recorded kind its score as well.
+    """Return the evidence for every kind: the cosine to its words and that to its typical example, both alike.
 
     Where a kind has few examples, their mean names new clips better than the nearest of them does.
-
-    Args:
-        cosines: of the network's features to the words of every kind.
-        typical: of the network's features to the typical example of every kind.
-        scores: of the linear model; the recorded kinds come first.
     """
-    evidence = (np.asarray(cosines, np.float64) + typical) / 2.0
-    evidence[:, : scores.shape[1]] += SCORES_WEIGHT * scores
-    return evidence
+    return (np.asarray(cosines, np.float64) + typical) / 2.0
 
 
 def kinds_of_windows(
-    evidence: Float[np.ndarray, "windows kinds"], near: Float[np.ndarray, "windows kinds"], c: Calibration
+    cosines: Float[np.ndarray, "windows kinds"],
+    typical: Float[np.ndarray, "windows kinds"],
+    near: Float[np.ndarray, "windows kinds"],
+    c: Calibration,
 ) -> tuple[Float[np.ndarray, "windows kinds"], Float[np.ndarray, " windows"]]:
     """Return each window's posterior over the known kinds, and how likely it is of any of them.
 
     The cosine to the nearest example separates unknown sounds (such a sound lies between the kinds).
 
     Args:
-        evidence: for every kind.
-        near: cosines to the nearest example of every kind.
+        cosines: to the words of every kind.
+        typical: to the typical example of every kind.
+        near: to the nearest example of every kind.
         c: the constants.
     """
+    evidence = evidence_for(cosines, typical)
     best = np.sort(evidence, axis=1)
     bias, by_nearness, by_lead = c.known
     known = sigmoid(bias + by_nearness * near.max(axis=1) + by_lead * (best[:, -1] - best[:, -2]))

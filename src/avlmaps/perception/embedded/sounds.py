@@ -1,7 +1,5 @@
 """The embedded sound encoder: a small network into the space of the embedded words, and what it makes of questions.
 
-Beside the network stands a linear model on statistics of the spectrum; a feature is what both make of a window.
-
 It knows a closed set of kinds (``vocabulary``) and what the user taught it; what it does not know it refuses, by a
 low score. Kinds of origin ``recorded`` were learnt from recordings, ``synthesised`` ones from sounds made by rule:
 they carry less well to recordings. ``training/sounds`` makes the weights.
@@ -26,7 +24,6 @@ from avlmaps.core.registry import Kind, load
 from avlmaps.perception.embedded import logmel
 from avlmaps.perception.embedded.sound_calibration import (
     Calibration,
-    evidence_for,
     kinds_of_phrases,
     kinds_of_windows,
     matched,
@@ -36,8 +33,6 @@ from avlmaps.perception.embedded.sound_calibration import (
     taught_lead,
     typical_examples,
 )
-from avlmaps.perception.embedded.sound_features import comparable_features, joined_features, split_features
-from avlmaps.perception.embedded.sound_statistics import StatisticsModel
 from avlmaps.perception.enrolment import TaughtSound, enrolled_sounds, sounds_folder
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.audio import Sound
@@ -87,8 +82,7 @@ class EmbeddedSounds:
 
     def __init__(self, words: WordEncoder | None = None, folder: Path | None = None) -> None:
         weights = files("avlmaps.perception.embedded") / "weights"
-        ends = ("onnx", "json", "npy", "npz")
-        network, notes, examples, linear = ((weights / f"sounds.{end}").read_bytes() for end in ends)
+        network, notes, examples = ((weights / f"sounds.{end}").read_bytes() for end in ("onnx", "json", "npy"))
         self._network = network
         self._folder = folder
         about = json.loads(notes)
@@ -96,18 +90,15 @@ class EmbeddedSounds:
         self.kinds = tuple(KnownKind(k["name"], tuple(k["called"]), k["origin"], k["clips"]) for k in about["kinds"])
         self.sources = frozenset[int](about.get("sources", ()))  # freesound's numbers of the recordings it learnt from
         # features of some of the clips that the network learnt from, sorted by kind
-        bank = np.load(BytesIO(examples), allow_pickle=False).astype(np.float32)
-        self._statistics = StatisticsModel.read(linear)
-        self._words_dim = about["dim"] - self._statistics.kinds
+        self._examples = np.load(BytesIO(examples), allow_pickle=False).astype(np.float32)
         self._starts = np.cumsum([0, *(k["examples"] for k in about["kinds"][:-1])])
-        self._examples = comparable_features(bank, self._words_dim)
-        self._typical = typical_examples(split_features(bank, self._words_dim)[0], self._starts)
+        self._typical = typical_examples(self._examples, self._starts)
         self.calibration = msgspec.convert(about["calibration"], Calibration)
         self.card = ModelCard(
             id=about["id"],
             dim=about["dim"],
             licence="MIT",
-            checksum=sha256(network + notes + examples + linear).hexdigest(),
+            checksum=sha256(network + notes + examples).hexdigest(),
             prompts=tuple(about["templates"]),
             note=about["note"],
         )
@@ -136,12 +127,12 @@ class EmbeddedSounds:
             cast(np.ndarray, self._session.run(None, {"heard": logmel.heard(windows[at : at + _BATCH])})[0])
             for at in range(0, len(windows), _BATCH)
         ]
-        return joined_features(np.concatenate(parts), self._statistics.scores(windows))
+        features = np.concatenate(parts).astype(np.float32)
+        return features / np.linalg.norm(features, axis=1, keepdims=True)
 
     def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each phrase, zero where a sound's features hold the scores of statistics."""
-        vectors = self._words.encode(words)
-        return np.pad(vectors, ((0, 0), (0, self._statistics.kinds)))
+        """Return a unit vector for each phrase."""
+        return self._words.encode(words)
 
     def score_words(
         self, sounds: Sequence[Float32[np.ndarray, "windows d"]], words: Sequence[str]
@@ -172,8 +163,7 @@ class EmbeddedSounds:
         """
         taught = self.taught
         ours = _direction(self._hear(asked, taught).kinds)
-        looked_for = self._comparable(asked)
-        cosines = np.array([float((self._comparable(features) @ looked_for.T).max()) for features in sounds])
+        cosines = np.array([float((features @ asked.T).max()) for features in sounds])
         agreement = np.array([float(_direction(self._hear(features, taught).kinds) @ ours) for features in sounds])
         return np.asarray(same_kind(cosines, agreement, self.calibration), np.float32).reshape(len(sounds))
 
@@ -197,9 +187,9 @@ class EmbeddedSounds:
         total = np.sum(
             [self._words.encode([prompt.format(word) for word in firsts]) for prompt in self.card.prompts], axis=0
         )
-        if total.shape[1] != self._words_dim:
+        if total.shape[1] != self.card.dim:
             raise BackendError(
-                f"The sound encoder {self.card.id} needs words of {self._words_dim} numbers, the word encoder "
+                f"The sound encoder {self.card.id} needs words of {self.card.dim} numbers, the word encoder "
                 f"{self._words.card.id} gives {total.shape[1]}; use the two of one release."
             )
         return (total / np.linalg.norm(total, axis=1, keepdims=True)).astype(np.float32)
@@ -220,20 +210,15 @@ class EmbeddedSounds:
             cosines = np.hstack([cosines, asked @ self._words.encode([t.name for t in taught]).T])
         return kinds_of_phrases(cosines, self.calibration)
 
-    def _comparable(self, features: Float32[np.ndarray, "windows d"]) -> Float32[np.ndarray, "windows d"]:
-        return comparable_features(features, self._words_dim)
-
     def _hear(self, features: Float32[np.ndarray, "windows d"], taught: Sequence[TaughtSound]) -> Heard:
         """Return the kinds in a sound: for each the most likely window."""
-        comparable = self._comparable(features)
-        near = nearness(comparable, self._examples, self._starts)
-        network, scores = split_features(features, self._words_dim)
-        evidence = evidence_for(network @ self._prototypes.T, network @ self._typical.T, scores)
-        posterior, known = kinds_of_windows(evidence, near, self.calibration)
+        near = nearness(features, self._examples, self._starts)
+        typical = features @ self._typical.T
+        posterior, known = kinds_of_windows(features @ self._prototypes.T, typical, near, self.calibration)
         likely = posterior * known[:, None]
         if taught:
             bias, slope = self.calibration.taught
-            leads = np.stack([taught_lead(comparable, self._comparable(t.features), near) for t in taught], axis=1)
+            leads = np.stack([taught_lead(features, t.features, near) for t in taught], axis=1)
             own = sigmoid(bias + slope * leads)
             # the user's own sounds go before the network's scores for a sound that it was not trained on
             likely = np.hstack([likely * (1.0 - own.max(axis=1, keepdims=True)), own])
