@@ -12,7 +12,7 @@ import numpy as np
 
 from avlmaps.perception.embedded.edge_aware import smoothed
 from avlmaps.perception.embedded.paired_networks import PairedNetworks
-from avlmaps.perception.embedded.scene_network import PLAIN, Look, SceneNetwork, Seen, at_working_size
+from avlmaps.perception.embedded.scene_network import PLAIN, Look, SceneNetwork, Seen, at_working_size, subsampled
 from avlmaps.recordings.types import Frame
 
 # The first is as maps look, and gives the grid. Larger pictures are worse by themselves.
@@ -33,11 +33,8 @@ def see_multi_scale(network: SceneNetwork | PairedNetworks, frame: Frame) -> See
     category = np.stack([first.category, *resized]).mean(axis=0)
     camera, depth_m, rgb = at_working_size(frame, network.notes.width_px)
     cells = np.asarray(cv2.resize(rgb, (columns, rows), interpolation=cv2.INTER_AREA), np.uint8)
-    # The pixel right below the middle of each cell.
-    depth_m = depth_m[1::2, 1::2] if min(depth_m.shape) > 1 else depth_m
-    depth_m = np.pad(depth_m, ((0, rows - depth_m.shape[0]), (0, columns - depth_m.shape[1])), mode="edge")
     return replace(
         first,
-        category=smoothed(category, depth_m, cells, camera.resized(columns, rows)),
+        category=smoothed(category, subsampled(depth_m, columns, rows), cells, camera.resized(columns, rows)),
         room=np.mean([seen.room for seen in (first, *others)], axis=0),
     )

@@ -242,11 +242,15 @@ def at_working_size(
     width = min(width_px, round(width_px / camera.fx * camera.width))
     height = max(1, round(width * camera.height / camera.width))
     small = camera.resized(width, height)
-    # Nearest: a mean over an edge would be a place where nothing is.
+    rgb = cv2.resize(frame.rgb, (width, height), interpolation=cv2.INTER_AREA)
+    return small, subsampled(depth_m, width, height), np.asarray(rgb, np.uint8)
+
+
+def subsampled(depth_m: Float32[np.ndarray, "h w"], width: int, height: int) -> Float32[np.ndarray, "hs ws"]:
+    """Return the nearest depths: a mean over an edge would be a place where nothing is."""
     row = ((np.arange(height) + 0.5) * depth_m.shape[0] / height).astype(int)
     column = ((np.arange(width) + 0.5) * depth_m.shape[1] / width).astype(int)
-    rgb = cv2.resize(frame.rgb, (width, height), interpolation=cv2.INTER_AREA)
-    return small, np.ascontiguousarray(depth_m[row[:, None], column], np.float32), np.asarray(rgb, np.uint8)
+    return np.ascontiguousarray(depth_m[row[:, None], column], np.float32)
 
 
 def _ground_of(frame: Frame) -> tuple[Float[np.ndarray, "3"], float]:
