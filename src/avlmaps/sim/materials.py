@@ -188,5 +188,5 @@ def material(kind: str, rng: np.random.Generator, colour: Triple | None = None) 
     red, green, blue = (float(c) for c in tint)
     return Material(
         (red, green, blue), texture.image, (texture.size_m[0] * scale, texture.size_m[1] * scale), texture.emission,
-        min(1.0, look.gloss * float(rng.uniform(0.8, 1.2))), look.opacity,
+        min(1.0, look.gloss * float(rng.uniform(0.8, 1.2))), look.opacity, kind == "mirror",
     )  # fmt: skip

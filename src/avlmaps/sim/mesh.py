@@ -25,6 +25,7 @@ class Material:
         emission: light that the surface gives off itself, in [0, 1]: lamps, screens, windows by day.
         gloss: 0 for matt, 1 for a mirror-like surface; a depth sensor may see nothing on very glossy or clear ones.
         opacity: 1 for solid; window panes and glass have less and are drawn as solid by the depth image.
+        mirror: whether it reflects like a looking glass, for a renderer that draws reflections; others show its colour.
     """
 
     colour: Triple = (0.7, 0.7, 0.7)
@@ -33,6 +34,7 @@ class Material:
     emission: float = 0.0
     gloss: float = 0.1
     opacity: float = 1.0
+    mirror: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,6 +16,7 @@ from avlmaps.sim import raster_kernels, shade_kernels
 from avlmaps.sim.atlas import Atlas, atlas_of, picture_maps
 from avlmaps.sim.lighting import light_map
 from avlmaps.sim.mesh import Mesh
+from avlmaps.sim.reflections import Plane, in_front_of, planes_shown, reflected
 from avlmaps.sim.scene import NOTHING, Scene
 
 SKY = (178, 204, 232)  # sRGB of pixels that show no triangle
@@ -27,7 +28,12 @@ _GLOW = 2.5  # linear light of a surface of emission 1 and of colour 1
 _MIDDLE_GREY = 0.24  # linear: to this the mean of a view is brought, as a camera's exposure does
 _BRIGHT = 0.85  # linear: the brighter tenth of a view stays about below this
 _GAINS = (0.12, 4.0)  # as far as the exposure goes
+REFLECTED = 0.92  # of what a mirror shows; the rest is the colour of its glass
 _METER_STEP = 61  # every so manieth pixel decides on the exposure
+
+
+# Nine coordinates of the corners of every triangle; of triangles that were cut, in two parts.
+_Corners = tuple[Float32[np.ndarray, "t 9"], ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,12 +134,14 @@ def _returns(mesh: Mesh, atlas: Atlas) -> Float32[np.ndarray, " m"]:
 class Renderer:
     """Draws views of one scene; not from two threads at once, since it reuses its working memory between views."""
 
-    def __init__(self, scene: Scene, lit: bool = True) -> None:
+    def __init__(self, scene: Scene, lit: bool = True, mirrors: bool = False) -> None:
         """Prepare a scene.
 
         Args:
             scene: what to look at.
             lit: work out lamps and shadows; without them surfaces show their plain colours.
+            mirrors: mirrors show what they reflect, and their depth is that of the reflected place, as structured
+                light measures it. Instance and category are the mirror's. Reflections in reflections are not drawn.
         """
         mesh = scene.mesh
         self.scene = scene
@@ -149,6 +157,8 @@ class Renderer:
         self._glow = (_GLOW if lit else 0.0) * np.array([m.emission for m in mesh.materials], np.float32)
         self._opacity = np.array([m.opacity for m in mesh.materials], np.float32)
         self._returns = _returns(mesh, atlas)
+        self._mirror = np.array([mirrors and m.mirror for m in mesh.materials], bool)[self._material]
+        self._any_mirror = bool(self._mirror.any())
         light = light_map(scene, atlas.mean) if lit and len(order) else None
         self._light = light and replace(light, sample=light.sample[order], turned=light.turned[order])
         self._category = scene.category_of_instance.astype(np.int32)
@@ -163,7 +173,31 @@ class Renderer:
         lens = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
         front, behind = self._layers_for(camera.height * camera.width)
         eye = _Eye(lens, rotation, -rotation @ origin, camera.width, camera.height)
-        self._draw(front, behind, eye)
+        self._paint(front, behind, eye, (self._corner,))
+        gain = _exposure(front) if self._light is not None else 1.0
+        view = self._finished(front, gain, camera.height, camera.width)
+        if self._any_mirror:
+            seen = planes_shown(front.shown, self._mirror, self._corner, self._normal, origin)
+            for pixels, plane in seen:
+                self._reflect(view, pixels, plane, eye, gain)
+        return view
+
+    def _reflect(self, view: View, pixels: Int[np.ndarray, " m"], plane: Plane, eye: _Eye, gain: float) -> None:
+        """Draw what a mirror reflects into the pixels of a view that show it."""
+        front, behind = self._layers_for(view.depth_m.size)
+        rotation, shift = reflected(plane, eye.rotation, eye.shift)
+        self._paint(front, behind, replace(eye, rotation=rotation, shift=shift), in_front_of(plane, self._corner))
+        other = self._finished(front, gain, eye.height, eye.width)
+        depth_m, there = view.depth_m.reshape(-1), other.depth_m.reshape(-1)
+        pixels = pixels[there[pixels] > depth_m[pixels]]
+        glass = REFLECTED * other.rgb.reshape(-1, 3)[pixels] + (1.0 - REFLECTED) * view.rgb.reshape(-1, 3)[pixels]
+        view.rgb.reshape(-1, 3)[pixels] = glass.astype(np.uint8)
+        depth_m[pixels] = there[pixels]
+        view.strength.reshape(-1)[pixels] = other.strength.reshape(-1)[pixels]
+
+    def _paint(self, front: _Layer, behind: _Layer, eye: _Eye, corners: _Corners) -> None:
+        """Find what each pixel shows, and the light that comes from there."""
+        self._draw(front, behind, eye, corners)
         self._shade(front, eye)
         if self._any_clear:
             shade_kernels.hide_equal(front.shown, behind.shown)
@@ -171,8 +205,6 @@ class Renderer:
             sky = np.square(np.array(SKY, np.float32) / 255.0)
             shade_kernels.blend_fragments(front.shown, behind.shown, self._opacity, self._material, sky,
                                           behind.colour, front.colour)  # fmt: skip
-        gain = _exposure(front) if self._light is not None else 1.0
-        return self._finished(front, gain, camera.height, camera.width)
 
     def _layers_for(self, pixels: int) -> tuple[_Layer, _Layer]:
         """Return the working memory for pictures of a size, reused from the view before."""
@@ -181,7 +213,7 @@ class Renderer:
             self._layers = (front, behind)
         return self._layers
 
-    def _draw(self, front: _Layer, behind: _Layer, eye: _Eye) -> None:
+    def _draw(self, front: _Layer, behind: _Layer, eye: _Eye, corners: _Corners) -> None:
         """Find the first surface of each pixel, and the first surface that nothing shines through."""
         groups = self._groups
         front.inverse.fill(0.0)
@@ -189,15 +221,16 @@ class Renderer:
         middle = self._middle @ eye.rotation.T + eye.shift
         order = np.argsort(np.einsum("gi,gi->g", middle, middle) - 1e6 * groups.large)
         clear = groups.clear[order]
-        self._draw_groups(order[~clear], eye, front)
+        self._draw_groups(order[~clear], eye, corners, front)
         if self._any_clear:
             np.copyto(behind.inverse, front.inverse)
             np.copyto(behind.shown, front.shown)
-            self._draw_groups(order[clear], eye, front)
+            self._draw_groups(order[clear], eye, corners, front)
 
-    def _draw_groups(self, which: Int[np.ndarray, " k"], eye: _Eye, layer: _Layer) -> None:
-        raster_kernels.draw(self._corner, self._groups.first, self._groups.box, which, eye.rotation, eye.shift,
-                            eye.lens, eye.width, eye.height, layer.inverse, layer.shown)  # fmt: skip
+    def _draw_groups(self, which: Int[np.ndarray, " k"], eye: _Eye, corners: _Corners, layer: _Layer) -> None:
+        for corner in corners:
+            raster_kernels.draw(corner, self._groups.first, self._groups.box, which, eye.rotation, eye.shift,
+                                eye.lens, eye.width, eye.height, layer.inverse, layer.shown)  # fmt: skip
 
     def _shade(self, layer: _Layer, eye: _Eye) -> None:
         """Work out the linear light that comes from what each pixel shows."""

@@ -23,7 +23,8 @@ _MODULES = ("seating", "seating_sofas", "seating_chairs", "seating_armchairs", "
             "bathroom", "bathtubs", "showers", "washbasins", "toiletries", "appliances", "heating", "ventilation",
             "electronics", "computers", "devices", "clocks", "decor", "vases", "lighting", "chandeliers", "plants",
             "drapes", "openings", "clutter", "crockery", "containers", "bags", "leisure", "nursery", "fitness",
-            "sports", "office")  # fmt: skip
+            "sports", "office", "people", "garments", "papers",
+            "shower_curtains")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
