@@ -11,6 +11,7 @@ from avlmaps.sim.free_space import floor_heights, free_space, reaching_part
 from avlmaps.sim.mesh import Material, Mesh, joined
 from avlmaps.sim.scene import Area, Scene, SceneBuilder
 from avlmaps.sim.shapes import box
+from avlmaps.sim.views import IN_HANDS, ON_A_ROBOT
 from avlmaps.sim.walk import WalkSettings, random_views, walk_through
 
 PLAIN = Material()
@@ -280,6 +281,15 @@ def test_random_views_stand_free_and_hold_the_camera_as_asked() -> None:
     pitch_deg = np.rad2deg(np.arcsin(poses[:, 2, 2]))
     assert pitch_deg.min() >= -35.01 and pitch_deg.max() <= 15.01 and np.ptp(pitch_deg) > 30
     assert np.linalg.det(poses[:, :3, :3]) == pytest.approx(np.ones(200))
+
+
+def test_cameras_in_hands_are_higher_and_nearer_to_things_and_look_down() -> None:
+    on_robot, in_hands = (
+        random_views(SCENE, np.random.default_rng(0), 200, CAMERA, stance) for stance in (ON_A_ROBOT, IN_HANDS)
+    )
+    np.testing.assert_array_equal(on_robot, random_views(SCENE, np.random.default_rng(0), 200, CAMERA))
+    assert 1.15 <= in_hands[:, 2, 3].min() and in_hands[:, 2, 3].max() <= 1.7
+    assert in_hands[:, 2, 2].mean() < on_robot[:, 2, 2].mean() - 0.05
 
 
 def test_random_views_look_at_things_more_often_than_chance() -> None:

@@ -38,8 +38,7 @@ class Options:
     resume: bool = False
     """Continue from the checkpoint in the folder ``work``."""
     start: Path | Literal["shipped"] | None = "shipped"
-    """A checkpoint to begin with. ``shipped``: the weights that ship; they saw real frames, so random ones without
-    ``--nyuv2``."""
+    """A checkpoint to begin with. ``shipped``: the weights that ship; None: random ones."""
     batch: int = 16
     """Pictures in a step; a GPU takes 128."""
     threads: int = 2
@@ -56,9 +55,12 @@ class Options:
     @property
     def begins_with(self) -> Path | None:
         """The weights to begin with; None for random ones."""
-        if self.start == "shipped":
-            return Path("training/pixels/start.npz") if self.nyuv2 else None
-        return self.start
+        return _WEIGHTS / f"{self.name}.onnx" if self.start == "shipped" else self.start
+
+    @property
+    def name(self) -> str:
+        """The name of the weights."""
+        return DEFAULT_WEIGHTS if self.nyuv2 else SYNTHETIC_WEIGHTS
 
     @property
     def network(self) -> Path:
@@ -116,12 +118,10 @@ def finish(options: Options) -> None:
     from training.pixels.instances import calibrate_instances
 
     real_frames = options.work / "real" / "development" if options.nyuv2 else None
-    name = DEFAULT_WEIGHTS if options.nyuv2 else SYNTHETIC_WEIGHTS
-    start = Path("training/pixels/start.npz") if options.nyuv2 else None
     calibrate(
         CalibrateOptions(
-            network=options.network, frames=options.work / "held-out", real=real_frames, out=options.out, name=name,
-            start=start,
+            network=options.network, frames=options.work / "held-out", real=real_frames, out=options.out,
+            name=options.name,
         )
     )  # fmt: skip
     profile = "embedded" if options.nyuv2 else "synthetic"

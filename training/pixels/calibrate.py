@@ -10,7 +10,7 @@ import torch
 import tyro
 from torch import Tensor, nn
 from training.pixels.batches import Shards
-from training.pixels.export import load_network, write_onnx, write_start
+from training.pixels.export import load_network, write_onnx
 from training.pixels.labels import CATEGORIES, FIRST_COARSE, ROOMS, UNLABELLED
 from training.pixels.lexicon import CALLED, KINDS
 from training.pixels.losses import groups
@@ -46,8 +46,6 @@ class Options:
     """Folder of the files that ship."""
     name: str = DEFAULT_WEIGHTS
     """Their name without an ending."""
-    start: Path | None = Path("training/pixels/start.npz")
-    """Where the weights are stored for a training that continues from them."""
     count: int = 500
     """Rendered frames to look at."""
     seed: int = 0
@@ -183,8 +181,6 @@ def calibrate(options: Options) -> None:
     weights = options.out / f"{options.name}.onnx"
     write_onnx(network, weights)
     notes = msgspec.structs.replace(notes, checksum=checksum_of(weights.read_bytes(), notes))
-    if options.start is not None:
-        write_start(network, options.start)
     path = options.out / f"{options.name}.json"
     path.write_bytes(msgspec.json.format(msgspec.json.encode(notes), indent=1) + b"\n")
     for name, part in zip(("rendered", "real"), parts, strict=False):

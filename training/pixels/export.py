@@ -17,19 +17,6 @@ def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
     return network.eval()
 
 
-def write_start(network: RoomNetwork, path: Path) -> None:
-    """Store the weights, in half precision, so that another training can continue from them."""
-    arrays = {name: value.numpy() for name, value in network.state_dict().items()}
-    path.write_bytes(b"")
-    np.savez_compressed(path, **{n: a.astype(np.float16) if a.dtype == np.float32 else a for n, a in arrays.items()})
-
-
-def read_start(path: Path) -> dict[str, torch.Tensor]:
-    """Return the weights that ``write_start`` stored."""
-    with np.load(path, allow_pickle=False) as arrays:
-        return {n: torch.from_numpy(a.astype(np.float32) if a.dtype == np.float16 else a) for n, a in arrays.items()}
-
-
 def write_onnx(network: RoomNetwork, path: Path) -> None:
     """Write the network; its pictures may have any size that is a multiple of 32."""
     inputs = (torch.zeros(1, GEOMETRY, 64, 96), torch.zeros(1, COLOUR, 64, 96))

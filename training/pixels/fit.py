@@ -20,12 +20,13 @@ import torch
 import tyro
 from torch import Tensor, nn
 from training.pixels.batches import Batch, Shards, View, draw_batch
-from training.pixels.export import load_network, read_start
+from training.pixels.export import load_network
 from training.pixels.labels import CATEGORIES, ROOMS
 from training.pixels.losses import Losses, coarse_weights, fine_weights
 from training.pixels.measure import real_figures, rendered_figures
 from training.pixels.muon import Muon
 from training.pixels.network import WIDTHS, RoomNetwork, begin_with
+from training.pixels.unfold import unfolded
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Options:
     resume: bool = False
     """Continue from the checkpoint, with its last weights."""
     start: Path | None = None
-    """Begin with these weights: ``training/pixels/start.npz``, those that ship, or a checkpoint, its mean."""
+    """Begin with these weights: a file that ships (``.onnx``), or a checkpoint, its mean."""
     widths: tuple[int, int, int, int, int] = WIDTHS
     """Channels at 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's size."""
     dropout: tuple[float, float] = (0.1, 0.1)
@@ -109,18 +110,30 @@ def optimisers_of(network: nn.Module, options: Options) -> list[torch.optim.Opti
     return [Muon(inside, lr=options.rate, weight_decay=options.decay), adam] if inside else [adam]
 
 
-def _begun(options: Options, device: torch.device) -> RoomNetwork:
+# Batches that tell what a network that ships is fed inside: 600 pictures.
+_LOOKED_AT = 40
+
+
+def _begun(options: Options, device: torch.device, sources: list[tuple[Shards, int]]) -> RoomNetwork:
     """Return the network: new, with the weights that ship, or as the checkpoint left it."""
     network = RoomNetwork(len(CATEGORIES), len(ROOMS), options.widths, options.dropout)
     state = None
     if options.resume:
         state = load_network(options.out, "last").state_dict()
     elif options.start is not None:
-        state = read_start(options.start) if options.start.suffix == ".npz" else _mean_of(options.start)
+        state = _shipped(options, sources) if options.start.suffix == ".onnx" else _mean_of(options.start)
     if state is not None:
         new = begin_with(network, state)
         print(f"{len(new)} arrays are new", file=sys.stderr)
     return network.train().to(device, memory_format=torch.channels_last)
+
+
+def _shipped(options: Options, sources: list[tuple[Shards, int]]) -> dict[str, Tensor]:
+    assert options.start is not None
+    rng = np.random.default_rng(options.seed)
+    drawn = (draw_batch(sources, options.view, rng) for _ in range(_LOOKED_AT))
+    looked_at = ((torch.from_numpy(batch.geometry), torch.from_numpy(batch.colour)) for batch in drawn)
+    return unfolded(options.start, len(CATEGORIES), len(ROOMS), looked_at).state_dict()
 
 
 def _mean_of(checkpoint: Path) -> dict[str, Tensor]:
@@ -143,7 +156,7 @@ class Run:
         self.sources = [(rendered, options.batch - count), *((one, count) for one in real)]
         coarse = coarse_weights(real[0]) if real else torch.ones(40)
         self.losses = Losses(fine_weights(rendered, self.rng), coarse).to(self.device)
-        self.network = _begun(options, self.device)
+        self.network = _begun(options, self.device, self.sources)
         self.compiled = torch.compile(self.network) if options.compiled else self.network
         self.average = Average(self.network)
         self.optimisers = optimisers_of(self.network, options)

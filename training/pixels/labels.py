@@ -23,7 +23,7 @@ CATEGORIES = (
     "baby stroller", "mat", "play tent", "aquarium", "pet bed",
     "whiteboard", "partition", "locker", "water dispenser",
     "other",
-    # Kinds that real frames teach alone: rendered worlds have none of them.
+    # Homes hold none of these; training worlds add them (``lived_in.py``).
     "clothing", "paper", "person", "shower curtain",
 )  # fmt: skip
 

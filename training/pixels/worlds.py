@@ -18,6 +18,7 @@ import numpy as np
 import tyro
 from training.pixels.borrowed import borrowed_furniture
 from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED, room_of
+from training.pixels.lived_in import lived_in
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.sim.furniture.catalogue import Families
@@ -51,6 +52,12 @@ class Options:
     """Families of shapes."""
     furniture: Path | None = None
     """Folder of artists' models (``borrowed.py``), which furnish half of the homes; those of ``which`` alone."""
+    lived_in: float = 0.8
+    """Share of homes with people, clothes, papers and shower curtains in them (``lived_in.py``)."""
+    mirrors: float = 0.6
+    """Share of homes whose mirrors reflect, in colour and in depth."""
+    in_hands: float = 0.5
+    """Share of views from cameras as people hold them, instead of robots'."""
     lit: float = 0.7
     """Share of homes rendered in colour; of the others only shape is learnt."""
     once: bool = False
@@ -58,13 +65,14 @@ class Options:
 
 
 def scene_of(seed: int, options: Options, rng: np.random.Generator) -> Scene:
-    """Return the home or office of a seed, with some things in it that are nothing in particular."""
+    """Return the home or office of a seed, with things that are nothing in particular and the traces of people."""
     from avlmaps.sim.homes import make_home, make_office
 
     borrows = options.furniture is not None and seed // options.step % 2 == 0
     with borrowed_furniture(options.furniture, options.which) if borrows and options.furniture else nullcontext():
         scene = make_office(seed, options.which) if seed % 6 == 5 else make_home(seed, options.which)
-    return with_oddities(scene, rng)
+    scene = with_oddities(scene, rng)
+    return lived_in(scene, rng, options.which) if rng.random() < options.lived_in else scene
 
 
 def with_oddities(scene: Scene, rng: np.random.Generator) -> Scene:
@@ -128,17 +136,19 @@ class Shard:
 def add_home(shard: Shard, seed: int, options: Options) -> None:
     """Render the views of one home into the shard."""
     from avlmaps.sim.render import Renderer
-    from avlmaps.sim.walk import random_views
+    from avlmaps.sim.views import IN_HANDS, ON_A_ROBOT, random_views
 
     rng = np.random.default_rng([seed, 7])
     scene = scene_of(seed, options, rng)
     lit = rng.random() < options.lit
-    renderer = Renderer(scene, lit=lit)
+    renderer = Renderer(scene, lit=lit, mirrors=rng.random() < options.mirrors)
     names = scene.categories
     number = np.array([_NAME.get(name, UNLABELLED) for name in names] + [UNLABELLED], np.uint8)
     dull = np.isin((*names, ""), ("wall", "floor", "ceiling", ""))
-    views = random_views(scene, rng, options.frames_per_home, camera_of(rng))
-    for pose in views:
+    held = round(options.in_hands * options.frames_per_home)
+    numbers = ((ON_A_ROBOT, options.frames_per_home - held), (IN_HANDS, held))
+    views = [random_views(scene, rng, count, camera_of(rng), stance) for stance, count in numbers if count]
+    for pose in np.concatenate(views):
         camera = camera_of(rng)
         view = renderer.render(camera, pose)
         if dull[view.category].mean() > 0.97 and rng.random() < 0.9:  # a bare wall teaches little

@@ -1,5 +1,7 @@
 """Camera poses: from heading, pitch and roll; and at random all over a building, for training. Metres, radians."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float
 
@@ -8,14 +10,35 @@ from avlmaps.sim.free_space import STRUCTURE, FreeSpace, floor_heights, free_spa
 from avlmaps.sim.grid_kernels import cast, sees_pairs
 from avlmaps.sim.scene import Scene
 
-_HEIGHT_M = (0.5, 1.8)
-_PITCH_RAD = (np.deg2rad(-35.0), np.deg2rad(15.0))
-_ROLL_RAD = np.deg2rad(2.0)
 _NEAR_M, _FAR_M = 0.8, 6.0  # the nearest thing ahead should be between these
-_AIMED = 0.5  # the share of views that look at an object
-_AIMED_FAR_M = 4.5
 _SMALLEST_M = 0.2  # objects smaller than this are not aimed at
 _TRIES = 10  # candidates drawn for each view
+
+
+@dataclass(frozen=True, slots=True)
+class Stance:
+    """Where cameras are and how they look.
+
+    Attributes:
+        height_m: least and greatest height above the floor.
+        pitch_deg: mean and standard deviation of the pitch of views that look at nothing in particular.
+        pitch_limits_deg: least and greatest pitch of all.
+        roll_deg: standard deviation of the roll.
+        aimed: the share of views that look towards an object.
+        aimed_m: how near and how far that is.
+    """
+
+    height_m: tuple[float, float] = (0.5, 1.8)
+    pitch_deg: tuple[float, float] = (-10.0, 11.0)
+    pitch_limits_deg: tuple[float, float] = (-35.0, 15.0)
+    roll_deg: float = 2.0
+    aimed: float = 0.5
+    aimed_m: tuple[float, float] = (_NEAR_M, 4.5)
+
+
+ON_A_ROBOT = Stance()
+# As a person holds a camera: at the height of the chest or the eyes, tilted, close to what it is about.
+IN_HANDS = Stance((1.15, 1.7), (-18.0, 11.0), (-50.0, 12.0), 4.0, 0.75, (0.5, 2.4))
 
 
 def camera_poses(
@@ -39,17 +62,20 @@ def camera_poses(
     return poses
 
 
-def random_views(scene: Scene, rng: np.random.Generator, n: int, camera: Pinhole) -> Float[np.ndarray, "n 4 4"]:
+def random_views(
+    scene: Scene, rng: np.random.Generator, n: int, camera: Pinhole, stance: Stance = ON_A_ROBOT
+) -> Float[np.ndarray, "n 4 4"]:
     """Return poses ``world_from_camera`` of n cameras that stand anywhere free on any floor.
 
-    Heights are 0.5 to 1.8 m, pitches -35 to +15 degrees. Half of the views look towards an object that is in
-    sight and 0.8 to 4.5 m away; the others anywhere where the next thing ahead is 0.8 to 6 m away.
+    A share of the views looks towards an object that is in sight; the others anywhere where the next thing ahead is
+    0.8 to 6 m away.
 
     Args:
         scene: the building.
         rng: draws everything.
         n: how many.
         camera: its field of view says how far beside the middle an object may come to lie.
+        stance: heights, pitches and distances.
 
     Raises:
         ValueError: nowhere is there a free place.
@@ -59,31 +85,35 @@ def random_views(scene: Scene, rng: np.random.Generator, n: int, camera: Pinhole
     if not room.sum():
         raise ValueError(f"no place on any floor of {scene.name} is free for a camera")
     share = rng.multinomial(n, room / room.sum())
-    poses = [_on_floor(scene, space, rng, int(k), camera) for space, k in zip(floors, share, strict=True) if k]
+    poses = [_on_floor(scene, space, rng, int(k), camera, stance) for space, k in zip(floors, share, strict=True) if k]
     return rng.permutation(np.concatenate([*poses, np.zeros((0, 4, 4))]), axis=0)
 
 
-def _on_floor(scene: Scene, space: FreeSpace, rng: np.random.Generator, n: int, camera: Pinhole) -> np.ndarray:
+def _on_floor(
+    scene: Scene, space: FreeSpace, rng: np.random.Generator, n: int, camera: Pinhole, stance: Stance
+) -> np.ndarray:
     middles = space.middles()
-    place, heading, target_m = _aimed(scene, space, rng, round(_AIMED * n))
+    place, heading, target_m = _aimed(scene, space, rng, round(stance.aimed * n), stance.aimed_m)
     free_place, free_heading = _ahead(scene, space, rng, n - len(place))
     aimed = np.arange(n) < len(place)
     place = np.concatenate([place, free_place]) if len(middles) else place
-    height = rng.uniform(*_HEIGHT_M, n)
+    height = rng.uniform(*stance.height_m, n)
     half_field = np.arctan(0.5 * np.array([camera.width / camera.fx, camera.height / camera.fy]))
     heading = np.concatenate([heading, free_heading]) + aimed * rng.uniform(-0.6, 0.6, n) * half_field[0]
-    pitch = rng.normal(np.deg2rad(-10.0), np.deg2rad(11.0), n)
+    pitch = rng.normal(*np.deg2rad(stance.pitch_deg), n)
     towards = np.arctan2(target_m[:, 1] - height[aimed], target_m[:, 0])
     pitch[aimed] = towards + rng.uniform(-0.6, 0.6, len(towards)) * half_field[1]
     # Past an end a pitch is drawn again, so that the ends themselves are not favoured.
-    outside = (pitch < _PITCH_RAD[0]) | (pitch > _PITCH_RAD[1])
-    pitch[outside] = rng.uniform(*_PITCH_RAD, int(outside.sum()))
+    least, most = np.deg2rad(stance.pitch_limits_deg)
+    outside = (pitch < least) | (pitch > most)
+    pitch[outside] = rng.uniform(least, most, int(outside.sum()))
+    roll = np.deg2rad(stance.roll_deg)
     position = np.column_stack([place + rng.uniform(-0.5, 0.5, (n, 2)) * space.cell_m, space.floor_m + height])
-    return camera_poses(position, heading, pitch, np.clip(rng.normal(0, _ROLL_RAD, n), -3 * _ROLL_RAD, 3 * _ROLL_RAD))
+    return camera_poses(position, heading, pitch, np.clip(rng.normal(0, roll, n), -3 * roll, 3 * roll))
 
 
 def _aimed(
-    scene: Scene, space: FreeSpace, rng: np.random.Generator, n: int
+    scene: Scene, space: FreeSpace, rng: np.random.Generator, n: int, reach_m: tuple[float, float]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return at most n places, headings to an object in sight, and its distance and height above the floor."""
     things = [
@@ -101,14 +131,14 @@ def _aimed(
     grown = 0.05
     low_xy, high_xy = low[pick, :2] - grown, high[pick, :2] + grown
     apart = np.linalg.norm(np.maximum(np.maximum(low_xy - place, place - high_xy), 0), axis=1)
-    good = (apart > _NEAR_M) & (apart < _AIMED_FAR_M)
+    good = (apart > reach_m[0]) & (apart < reach_m[1])
     place, pick, low_xy, high_xy = place[good], pick[good], low_xy[good], high_xy[good]
     opaque = occupied(scene, space, 1.0, 1.6)
     seen = np.flatnonzero(sees_pairs(place, low_xy, high_xy, opaque, space.origin, space.cell_m))[:n]
     place, pick = place[seen], pick[seen]
     offset = (low[pick, :2] + high[pick, :2]) / 2 - place
     middle_m = (low[pick, 2] + high[pick, 2]) / 2 - space.floor_m
-    distance = np.maximum(np.linalg.norm(offset, axis=1), _NEAR_M)
+    distance = np.maximum(np.linalg.norm(offset, axis=1), reach_m[0])
     return place, np.arctan2(offset[:, 1], offset[:, 0]), np.column_stack([distance, middle_m])
 
 

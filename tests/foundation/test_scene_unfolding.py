@@ -1,0 +1,71 @@
+"""The weights that ship, taken apart for training: the same scores, and normalisations that learn on."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("onnx")
+from training.pixels.export import write_onnx  # noqa: E402
+from training.pixels.network import RoomNetwork  # noqa: E402
+from training.pixels.unfold import unfolded  # noqa: E402
+
+CATEGORIES, ROOMS, WIDTHS = 5, 3, (8, 12, 16, 20, 24)
+
+
+def pictures(count: int, seed: int) -> list[tuple["torch.Tensor", "torch.Tensor"]]:
+    generator = torch.Generator().manual_seed(seed)
+    return [(torch.randn(2, 8, 64, 96, generator=generator), torch.randn(2, 3, 64, 96, generator=generator))
+            for _ in range(count)]  # fmt: skip
+
+
+@pytest.fixture
+def shipped(tmp_path: Path) -> tuple[Path, RoomNetwork]:
+    """Return a file and the network that it was written from, with statistics and scales of its own."""
+    network = RoomNetwork(CATEGORIES, ROOMS, WIDTHS)
+    for module in network.modules():
+        if isinstance(module, torch.nn.BatchNorm2d):
+            torch.nn.init.uniform_(module.weight, 0.3, 1.5)
+            torch.nn.init.uniform_(module.bias, -0.5, 0.5)
+    network.train()
+    for geometry, colour in pictures(4, 1):
+        network(geometry, colour)
+    write_onnx(network.eval(), tmp_path / "network.onnx")
+    return tmp_path / "network.onnx", network
+
+
+def test_it_scores_as_the_file_does(shipped: tuple[Path, RoomNetwork]) -> None:
+    path, network = shipped
+    again = unfolded(path, CATEGORIES, ROOMS, pictures(3, 2)).eval()
+    for geometry, colour in pictures(2, 3):
+        with torch.no_grad():
+            for one, other in zip(network(geometry, colour), again(geometry, colour), strict=True):
+                np.testing.assert_allclose(one.numpy(), other.numpy(), rtol=0.02, atol=0.02)  # halves in the file
+
+
+def test_it_computes_nearly_the_same_while_it_learns(shipped: tuple[Path, RoomNetwork]) -> None:
+    """In training the statistics are those of the batch; they were taken from such batches."""
+    path, _ = shipped
+    seen = pictures(1, 2)
+    again = unfolded(path, CATEGORIES, ROOMS, seen)
+    with torch.no_grad():
+        still = again.eval()(*seen[0])[0]
+        for module in again.modules():
+            if isinstance(module, torch.nn.BatchNorm2d):
+                module.train()
+        learning = again(*seen[0])[0]
+    np.testing.assert_allclose(still.numpy(), learning.numpy(), rtol=0.02, atol=0.02)
+
+
+def test_the_file_of_another_network_is_refused(shipped: tuple[Path, RoomNetwork], tmp_path: Path) -> None:
+    import onnx
+
+    path, _ = shipped
+    model = onnx.load(path)
+    kept = [node for node in model.graph.node if "/up1/" not in node.name]
+    del model.graph.node[:]
+    model.graph.node.extend(kept)
+    onnx.save(model, tmp_path / "other.onnx")
+    with pytest.raises(ValueError, match=r"no weights for up1\.first, up1\.second"):
+        unfolded(tmp_path / "other.onnx", CATEGORIES, ROOMS, pictures(1, 0))

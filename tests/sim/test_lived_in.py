@@ -1,0 +1,67 @@
+"""Training worlds with people, clothes and papers: the home stays, and what is added is where it should be."""
+
+import numpy as np
+import pytest
+from training.pixels.lived_in import lived_in, with_curtains_apart
+
+from avlmaps.sim.furniture import make
+from avlmaps.sim.homes import make_home, make_office
+from avlmaps.sim.scene import Scene, SceneBuilder
+
+ADDED = ("person", "clothing", "paper", "shower curtain")
+
+
+@pytest.fixture(scope="module")
+def worlds() -> list[tuple[Scene, Scene]]:
+    """Return homes and an office, each as it is made and with people in it."""
+    made = [make_home(seed, "training") for seed in (3, 4)] + [make_office(5, "training")]
+    return [(scene, lived_in(scene, np.random.default_rng(n), "training")) for n, scene in enumerate(made)]
+
+
+def test_the_home_stays_and_things_are_added_after_it(worlds: list[tuple[Scene, Scene]]) -> None:
+    for before, after in worlds:
+        assert after.objects[: len(before.objects)] == before.objects
+        assert {thing.category for thing in after.objects[len(before.objects) :]} <= set(ADDED)
+        count = len(before.mesh.triangle)
+        np.testing.assert_array_equal(after.mesh.corners()[:count], before.mesh.corners())
+        assert after.areas == before.areas and after.lights == before.lights
+    added = {thing.category for before, after in worlds for thing in after.objects[len(before.objects) :]}
+    assert {"person", "clothing", "paper"} <= added
+
+
+def test_what_is_added_lies_in_the_building(worlds: list[tuple[Scene, Scene]]) -> None:
+    for before, after in worlds:
+        low, high = before.mesh.low - 0.5, before.mesh.high + 0.5
+        for number, thing in enumerate(after.objects[len(before.objects) :], start=len(before.objects)):
+            assert (np.array(thing.low) >= low).all() and (np.array(thing.high) <= high).all()
+            at = after.mesh.corners()[after.instance == number].reshape(-1, 3)
+            np.testing.assert_allclose(at.min(axis=0), thing.low, atol=1e-5)
+            np.testing.assert_allclose(at.max(axis=0), thing.high, atol=1e-5)
+
+
+def test_people_stand_or_sit_on_a_floor(worlds: list[tuple[Scene, Scene]]) -> None:
+    people = [(scene, thing) for _, scene in worlds for thing in scene.objects if thing.category == "person"]
+    assert people
+    for scene, thing in people:
+        floors = [area.floor_m for area in scene.areas]
+        assert min(abs(thing.low[2] - floor) for floor in floors) < 0.3
+        assert 0.7 < thing.size[2] < 2.2
+
+
+def test_the_generator_alone_decides() -> None:
+    scene = make_home(3, "training")
+    one, two = (lived_in(scene, np.random.default_rng(8), "training") for _ in range(2))
+    assert one.objects == two.objects
+    np.testing.assert_array_equal(one.mesh.vertex, two.mesh.vertex)
+
+
+def test_the_cloth_of_a_tub_becomes_a_shower_curtain() -> None:
+    builder = SceneBuilder("bath")
+    piece = make("bathtub", np.random.default_rng(2), name="with shower curtain")
+    builder.add("bathtub", piece.mesh, family=piece.family)
+    builder.add("bathtub", make("bathtub", np.random.default_rng(2), name="built in").mesh.moved(x=3.0))
+    scene = with_curtains_apart(builder.build())
+    assert [thing.category for thing in scene.objects] == ["bathtub", "bathtub", "shower curtain"]
+    cloth = scene.objects[2]
+    assert cloth.size[2] > 1.4 and cloth.high[0] < 2.0
+    assert (scene.instance == 0).any() and (scene.instance == 2).any()

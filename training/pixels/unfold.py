@@ -1,0 +1,117 @@
+"""The weights that ship, as a network that can go on learning.
+
+A file for onnxruntime holds each convolution with its normalisation folded into it. Here they are taken apart again:
+the folded weights become the convolution's, and the normalisation gets the statistics of what comes out on some frames,
+and a scale and a shift that undo them. The network computes the same as before, and its normalisations work on.
+"""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import onnx
+import torch
+from onnx import numpy_helper
+from torch import Tensor, nn
+from training.pixels.network import RoomNetwork
+
+# The convolution's name within its part of the network, and that of the normalisation behind it.
+_NORM = {"0": "1", "first": "norm_first", "second": "norm_second", "mix": "norm"}
+
+
+def unfolded(path: Path, categories: int, rooms: int, batches: Iterable[tuple[Tensor, Tensor]]) -> RoomNetwork:
+    """Return the network of an ONNX file that ``write_onnx`` wrote.
+
+    Args:
+        path: the file.
+        categories: how many the network scores.
+        rooms: how many kinds of room.
+        batches: geometry and colour of some frames, to take the statistics from; each is looked at once.
+
+    Raises:
+        ValueError: the file holds another network.
+    """
+    arrays, convolutions = _read(path)
+    widths = tuple(
+        len(arrays[convolutions[name][1]]) for name in ("stem.0.0", "down2.0.0", "down3.0.0", "down4.0.0", "down5.0.0")
+    )
+    network = RoomNetwork(categories, rooms, widths)
+    state, named = network.state_dict(), dict(network.named_modules())
+    left = {name for name, module in named.items() if isinstance(module, nn.Conv2d)} - convolutions.keys()
+    if left:
+        raise ValueError(f"{path} holds no weights for {', '.join(sorted(left))}; it is another network.")
+    for name, (weight, bias) in convolutions.items():
+        state[f"{name}.weight"].copy_(torch.from_numpy(arrays[weight]))
+        norm = _norm_of(name, named)
+        shift = torch.from_numpy(arrays[bias])
+        if norm is None:
+            state[f"{name}.bias"].copy_(shift)
+            continue
+        module = named[norm]
+        assert isinstance(module, nn.BatchNorm2d)
+        state[f"{norm}.weight"].fill_(1.0)
+        state[f"{norm}.bias"].copy_(shift)
+        state[f"{norm}.running_mean"].zero_()
+        state[f"{norm}.running_var"].fill_(1.0 - module.eps)
+    for name, value in state.items():
+        if name in arrays:
+            value.copy_(torch.from_numpy(arrays[name]).reshape(value.shape))
+    network.load_state_dict(state)
+    _take_statistics(network.eval(), batches)
+    return network
+
+
+def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, tuple[str, str]]]:
+    """Return the arrays of a file, and for each convolution by its name those of its weight and bias."""
+    graph = onnx.load(path).graph
+    arrays = {each.name: numpy_helper.to_array(each) for each in graph.initializer}
+    for node in graph.node:
+        if node.op_type == "Cast" and node.input[0] in arrays:
+            arrays[node.output[0]] = arrays[node.input[0]].astype(np.float32)
+    arrays = {name: np.array(value, np.float32) for name, value in arrays.items()}
+    convolutions = {
+        _module_name(node.name): (node.input[1], node.input[2]) for node in graph.node if node.op_type == "Conv"
+    }
+    return arrays, convolutions
+
+
+def _module_name(node: str) -> str:
+    """Return the module of a node: ``/down3/down3.1/first/Conv`` is ``down3.1.first``."""
+    name = ""
+    for part in node.strip("/").split("/")[:-1]:
+        name = part if name and part.startswith(f"{name}.") else f"{name}.{part}".lstrip(".")
+    return name
+
+
+def _norm_of(convolution: str, named: dict[str, nn.Module]) -> str | None:
+    head, _, last = convolution.rpartition(".")
+    norm = f"{head}.{_NORM.get(last, '')}"
+    return norm if isinstance(named.get(norm), nn.BatchNorm2d) else None
+
+
+@torch.no_grad()
+def _take_statistics(network: RoomNetwork, batches: Iterable[tuple[Tensor, Tensor]]) -> None:
+    """Give each normalisation the mean and spread of what it is fed, and undo them in its scale and shift."""
+    norms = [module for module in network.modules() if isinstance(module, nn.BatchNorm2d)]
+    sums = {id(module): torch.zeros(3, module.num_features, dtype=torch.float64) for module in norms}
+
+    def look(module: nn.Module, inputs: tuple[Tensor, ...]) -> None:
+        x = inputs[0].double()
+        count = torch.full_like(x[0, :, 0, 0], x[:, 0].numel())
+        sums[id(module)] += torch.stack([count, x.sum((0, 2, 3)), x.square().sum((0, 2, 3))])
+
+    hooks = [module.register_forward_pre_hook(look) for module in norms]
+    for geometry, colour in batches:
+        network(geometry, colour)
+    for hook in hooks:
+        hook.remove()
+    for module in norms:
+        count, total, squares = sums[id(module)]
+        mean = (total / count).float()
+        spread = (squares / count - (total / count).square()).clamp(min=1e-6).float()
+        assert module.running_mean is not None
+        assert module.running_var is not None
+        module.bias += mean
+        module.running_mean.copy_(mean)
+        module.running_var.copy_(spread)
+        module.weight.copy_((spread + module.eps).sqrt())
