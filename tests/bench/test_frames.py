@@ -9,7 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from avlmaps.bench.frames import class_probabilities, class_table, interval_over_frames, measure, summary_table
+from avlmaps.bench.frames import (
+    ONCE,
+    SEVERAL,
+    class_probabilities,
+    class_table,
+    interval_over_frames,
+    measure,
+    summary_table,
+)
 from avlmaps.bench.nyu import (
     CAMERA,
     CLASSES,
@@ -50,10 +58,19 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def encoder_of(kinds: tuple[str, ...], said: np.ndarray):
-    """Return an encoder that sees the same in every frame; ``said`` names a kind for each cell of (60, 80)."""
-    probability = np.eye(len(kinds), dtype=np.float32)[said]
-    return SimpleNamespace(names=kinds, see=lambda frame: SimpleNamespace(category=probability))
+def encoder_of(kinds: tuple[str, ...], said: np.ndarray, several: np.ndarray | None = None):
+    """Return an encoder that sees the same in every frame; ``said`` names a kind for each cell of (60, 80).
+
+    ``several``: what it sees at several scales, if that is something else.
+    """
+    once, often = (
+        np.eye(len(kinds), dtype=np.float32)[cells] for cells in (said, said if several is None else several)
+    )
+    return SimpleNamespace(
+        names=kinds,
+        see=lambda frame: SimpleNamespace(category=once),
+        see_multi_scale=lambda frame: SimpleNamespace(category=often),
+    )
 
 
 @pytest.mark.parametrize("weights", [DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS])
@@ -69,7 +86,7 @@ def test_an_encoder_that_is_right_is_right_in_every_figure(folder: Path) -> None
     kinds = ("floor", "office chair", "wall")
     said = np.zeros((60, 80), int)
     said[10:40, 22:54] = 1
-    figures = measure(encoder_of(kinds, said), NyuFolder(folder))  # pyright: ignore[reportArgumentType]
+    figures = measure(encoder_of(kinds, said), NyuFolder(folder))[SEVERAL]  # pyright: ignore[reportArgumentType]
     assert (figures.accuracy, figures.class_accuracy, figures.mean_iou) == (1.0, 1.0, 1.0)
     assert figures.confusion.sum() == 35 * 300 + 100 * 100
     (row,) = summary_table({"once": figures})["rows"]
@@ -77,7 +94,11 @@ def test_an_encoder_that_is_right_is_right_in_every_figure(folder: Path) -> None
 
 
 def test_a_chair_taken_for_floor_costs_what_it_covers(folder: Path) -> None:
-    figures = measure(encoder_of(("floor", "chair"), np.zeros((60, 80), int)), NyuFolder(folder))  # pyright: ignore[reportArgumentType]
+    wrong, right = np.zeros((60, 80), int), np.zeros((60, 80), int)
+    right[10:40, 22:54] = 1
+    both = measure(encoder_of(("floor", "chair"), wrong, right), NyuFolder(folder))  # pyright: ignore[reportArgumentType]
+    assert both[SEVERAL].accuracy == 1.0
+    figures = both[ONCE]
     floor, chair = 35 * 300, 100 * 100
     assert figures.accuracy == pytest.approx(floor / (floor + chair))
     assert figures.class_accuracy == pytest.approx(0.5)

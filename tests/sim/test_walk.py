@@ -288,7 +288,7 @@ def test_cameras_in_hands_are_higher_and_nearer_to_things_and_look_down() -> Non
         random_views(SCENE, np.random.default_rng(0), 200, CAMERA, stance) for stance in (ON_A_ROBOT, IN_HANDS)
     )
     np.testing.assert_array_equal(on_robot, random_views(SCENE, np.random.default_rng(0), 200, CAMERA))
-    assert 1.15 <= in_hands[:, 2, 3].min() and in_hands[:, 2, 3].max() <= 1.7
+    assert in_hands[:, 2, 3].min() >= 1.15 and in_hands[:, 2, 3].max() <= 1.7
     assert in_hands[:, 2, 2].mean() < on_robot[:, 2, 2].mean() - 0.05
 
 

@@ -4,8 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import onnx
+import onnxruntime
 import torch
 from onnx import numpy_helper
+from torch import Tensor, nn
 from training.pixels.network import COLOUR, GEOMETRY, RoomNetwork
 
 
@@ -15,6 +17,19 @@ def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
     network = RoomNetwork(len(state["categories"]), len(state["rooms"]), tuple(state["widths"]))
     network.load_state_dict({name: value.float() for name, value in state[weights].items()})
     return network.eval()
+
+
+class Shipped(nn.Module):
+    """A file that ``write_onnx`` wrote, to be asked like the network."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self._session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+
+    def forward(self, geometry: Tensor, colour: Tensor) -> tuple[Tensor, ...]:
+        """Return the scores of categories and of rooms, and the floor's height."""
+        outputs = self._session.run(None, {"geometry": geometry.numpy(), "colour": colour.numpy()})
+        return tuple(torch.from_numpy(output) for output in outputs)
 
 
 def write_onnx(network: RoomNetwork, path: Path) -> None:

@@ -77,7 +77,7 @@ class Options:
     """Options of the measurement."""
 
     network: Path = Path("build/pixels/network.pt")
-    """Checkpoint."""
+    """Checkpoint, or weights that ship (``.onnx``), here without their calibration."""
     weights: str = "mean"
     """Which of its weights."""
     real: Path = Path("build/pixels/real/development")
@@ -90,9 +90,10 @@ class Options:
 
 def main(options: Options) -> None:
     """Print the figures."""
-    from training.pixels.export import load_network
+    from training.pixels.export import Shipped, load_network
 
-    network = load_network(options.network, options.weights)
+    is_shipped = options.network.suffix == ".onnx"
+    network = Shipped(options.network) if is_shipped else load_network(options.network, options.weights)
     for name, figures in (
         ("real", real_figures(network, Shards(options.real), options.flip)),
         ("rendered", rendered_figures(network, Shards(options.rendered))),

@@ -9,21 +9,22 @@ Frames are measured twice: seen once, as maps see each of their many frames, and
 (``perception.embedded.multi_scale``), as single frames are best seen.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
-from jaxtyping import Float32, Int
+from jaxtyping import Float32, Int, UInt8
 
 from avlmaps.bench.nyu import CAMERA, CLASSES, SCORED, NyuFolder, class_of_kinds
 from avlmaps.core.progress import progress
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
 
 STEP = 2
-MODES = {False: "once, as in maps", True: "at several scales"}
+# How frames are seen.
+ONCE, SEVERAL = "once, as in maps", "at several scales"
 Table = Mapping[str, Any]
 
 
@@ -83,21 +84,31 @@ def class_probabilities(
     return np.asarray(cv2.resize(summed, (CAMERA.width, CAMERA.height), interpolation=cv2.INTER_LINEAR), np.float32)
 
 
-def measure(encoder: EmbeddedPixels, folder: NyuFolder, multi_scale: bool = False) -> FrameFigures:
-    """Score every frame of a folder, seen once or at several scales."""
-    see = encoder.see_multi_scale if multi_scale else encoder.see
-    confusion, labelled, shares = np.zeros((SCORED, SCORED), np.int64), 0, []
-    for number in progress(range(len(folder)), "frames at several scales" if multi_scale else "frames"):
+def measure(encoder: EmbeddedPixels, folder: NyuFolder) -> dict[str, FrameFigures]:
+    """Score every frame of a folder, seen once and at several scales."""
+    modes = {ONCE: encoder.see, SEVERAL: encoder.see_multi_scale}
+    counts: dict[str, list[Int[np.ndarray, "37 37"]]] = {mode: [] for mode in modes}
+    labelled = 0
+    for number in progress(range(len(folder)), "frames"):
         one = folder.read(number)
-        said = class_probabilities(see(one.frame).category, encoder.names)[::STEP, ::STEP].argmax(axis=2)
-        truth = one.label[::STEP, ::STEP].astype(np.int64) - 1
-        scored = (truth >= 0) & (truth < SCORED)
-        counts = np.bincount(truth[scored] * SCORED + said[scored], minlength=SCORED**2).reshape(SCORED, SCORED)
-        confusion += counts
         labelled += one.floor_is_labelled
-        if scored.any():
-            shares.append(np.trace(counts) / scored.sum())
-    return FrameFigures(confusion, len(folder), labelled, np.array(shares, np.float32))
+        for mode, see in modes.items():
+            said = class_probabilities(see(one.frame).category, encoder.names).argmax(axis=2)
+            counts[mode].append(_confusion(one.label, said))
+    return {mode: _figures(own, labelled) for mode, own in counts.items()}
+
+
+def _confusion(label: UInt8[np.ndarray, "h w"], said: Int[np.ndarray, "h w"]) -> Int[np.ndarray, "37 37"]:
+    """Return the scored pixels of each true class that were taken for each class."""
+    truth, said = label[::STEP, ::STEP].astype(np.int64) - 1, said[::STEP, ::STEP]
+    scored = (truth >= 0) & (truth < SCORED)
+    return np.bincount(truth[scored] * SCORED + said[scored], minlength=SCORED**2).reshape(SCORED, SCORED)
+
+
+def _figures(counts: Sequence[Int[np.ndarray, "37 37"]], labelled: int) -> FrameFigures:
+    """Return the figures of frames from each one's confusion."""
+    shares = [np.trace(own) / own.sum() for own in counts if own.any()]
+    return FrameFigures(np.sum(counts, axis=0), len(counts), labelled, np.array(shares, np.float32))
 
 
 def run_frames(encoder: EmbeddedPixels, folder: Path) -> dict[str, Table]:
@@ -106,10 +117,12 @@ def run_frames(encoder: EmbeddedPixels, folder: Path) -> dict[str, Table]:
     Raises:
         RecordingError: the folder has no index, or a frame cannot be read.
     """
-    frames = NyuFolder(folder)
-    figures = {MODES[multi_scale]: measure(encoder, frames, multi_scale) for multi_scale in (False, True)}
-    once, often = (class_table(one) for one in figures.values())
-    return {"labelled frames": summary_table(figures), "by class": once, "by class at several scales": often}
+    figures = measure(encoder, NyuFolder(folder))
+    return {
+        "labelled frames": summary_table(figures),
+        "by class": class_table(figures[ONCE]),
+        "by class at several scales": class_table(figures[SEVERAL]),
+    }
 
 
 def summary_table(figures: Mapping[str, FrameFigures]) -> Table:
