@@ -33,16 +33,39 @@ INDEX = np.concatenate([block(one.low) for one in THINGS])
 
 
 @dataclass
+class Features:
+    """Voxels of which only the features count."""
+
+    feature: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.feature)
+
+
+WORDS = ("chair", "bed", "toilet", "wall", "armchair")
+
+
+def codes_of(words: list[str]) -> np.ndarray:
+    """Return a unit vector for each word that the encoder knows, zero for others."""
+    return np.array([[float(word == known) for known in WORDS] for word in words], np.float32)
+
+
+@dataclass
 class AskedMap:
-    """Answers from a table: for each word the blocks that it claims, and how surely."""
+    """Answers from a table: the blocks that each word claims, how surely, and the names of each block's voxels."""
 
     claims: dict[str, list[tuple[int, float]]]
+    names: tuple[str, str, str] = ("chair", "chair", "bed")
     space: Space = field(default_factory=lambda: Space(GridSpec(SIZE_M), INDEX, np.array([0.0, 0.0, 1.0])))
 
     @property
     def stored(self):
-        encoder = SimpleNamespace(vocabulary=("chair", "bed", "toilet", "wall"))
-        return SimpleNamespace(profile=SimpleNamespace(pixel_encoder=lambda: encoder))
+        encoder = SimpleNamespace(vocabulary=("chair", "bed", "toilet", "wall"), encode_words=codes_of)
+        return SimpleNamespace(
+            profile=SimpleNamespace(pixel_encoder=lambda: encoder),
+            require_model=lambda kind: None,
+            voxels=Features(np.repeat(codes_of(list(self.names)), 512, axis=0)),
+        )
 
     def object(self, word: str, primary: bool = False) -> Heatmap:
         owner = np.repeat(np.arange(3), 512)
@@ -60,7 +83,10 @@ def test_a_map_that_is_right_is_right_in_every_figure() -> None:
     assert figures.within == (2, 2)
     assert figures.precise == (3, 3)
     assert (figures.found_count, figures.true_count) == (3, 3)
-    assert table_of([figures])["rows"][0][-1].startswith("1.000")
+    row = dict(zip(table_of([figures])["columns"], table_of([figures])["rows"][0], strict=True))
+    assert row["found or not: AUROC"].startswith("1.000")
+    assert row["voxels named rightly"] == "100.0% of 1536"
+    assert row["mean over things"].startswith("100.0% of 3")
 
 
 def test_a_bed_taken_for_a_chair_costs_precision_and_the_bed() -> None:
@@ -69,6 +95,22 @@ def test_a_bed_taken_for_a_chair_costs_precision_and_the_bed() -> None:
     assert figures.reached["chair"] > 0.5
     assert figures.precise == (1, 2)
     assert (figures.found_count, figures.true_count) == (1, 3)
+
+
+def test_voxels_count_by_their_likeliest_name_whatever_the_map_claims() -> None:
+    figures = measure(AskedMap({}, ("chair", "bed", "bed")), THINGS, {}, "room")  # pyright: ignore[reportArgumentType]
+    assert list(figures.voxels) == [512, 512, 512] and list(figures.named) == [512, 0, 512]
+    row = table_of([figures])["rows"][0]
+    assert row[-2] == "66.7% of 1536" and row[-1].startswith("66.7% of 3 (1.3-100.0)")
+
+
+def test_voxels_in_two_boxes_and_things_of_unknown_names_count_for_none() -> None:
+    things = (THINGS[0], thing("chair", (0.2, 0, 0)), thing("hookah", (4, 0, 0)))
+    figures = measure(AskedMap({}), things, {}, "room")  # pyright: ignore[reportArgumentType]
+    # Boxes grow by 2 cm, less than half of a voxel: four of eight layers lie in both.
+    assert figures.voxels[0] == figures.named[0] == 4 * 64 and figures.voxels[2] == 0
+    none = table_of([measure(AskedMap({}), things[2:], {}, "room")])["rows"][0]  # pyright: ignore[reportArgumentType]
+    assert none[-2:] == ["none", "none"]
 
 
 def test_what_it_is_not_sure_of_does_not_count_against_it() -> None:

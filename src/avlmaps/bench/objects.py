@@ -1,11 +1,13 @@
 """The object benchmark: are things where the map says, are its instances real things, does it report absence.
 
-Three figures for each scene. *First goal*: of the categories that stand there, how many have the first answer
+Four figures for each scene. *First goal*: of the categories that stand there, how many have the first answer
 within half a metre of a true one. *Instances*: of the instances of confidence 0.5 or more how many are
 true, and of the true ones how many are found. *Found*: how well the best confidence separates categories that are there
 from those that are not (area under the ROC curve). Truth: boxes of things, of which the walk saw at least some. A thing
 of a narrower kind is true for a wider name: a dining table answers "table", a table does not answer "dining table".
-A true thing counts as found by its own name alone.
+A true thing counts as found by its own name alone. *Voxels*: of those in the box of one thing alone, how many have its
+name as their likeliest, over all and as a mean over things. It has no threshold, and tells encoders and fusions apart
+that the other figures do not.
 """
 
 from collections import Counter
@@ -24,6 +26,7 @@ from avlmaps.bench.harness.provenance import in_words, provenance, shown_scene
 from avlmaps.bench.output import draw, markdown, write_answer
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.progress import progress
+from avlmaps.query.naming import VoxelNamer
 from avlmaps.sim.scene import SceneObject
 
 if TYPE_CHECKING:
@@ -33,6 +36,8 @@ if TYPE_CHECKING:
 STRUCTURE = ("wall", "floor", "ceiling", "column", "stairs", "railing")
 # A box is grown by this: voxels and poses are that coarse.
 GROWN_M = 0.1
+# And by this where its voxels are told from those beside it.
+NARROW_M = 0.02
 REACH_M = 0.5
 FEWEST_VOXELS = 15
 SMALLEST_M = 0.3
@@ -65,6 +70,8 @@ class ObjectFigures:
         true_count: how many true things of some size the walk saw.
         found_count: how many of them the confident instances hold.
         best: for every queried category the highest confidence, and whether it is there.
+        voxels: of each thing how many voxels lie in its box alone.
+        named: how many of them have its name as their likeliest.
     """
 
     scene: str
@@ -73,6 +80,8 @@ class ObjectFigures:
     true_count: int
     found_count: int
     best: dict[str, tuple[float, bool]] = field(default_factory=dict)
+    voxels: Int[np.ndarray, " things"] = field(default_factory=lambda: np.zeros(0, np.int64))
+    named: Int[np.ndarray, " things"] = field(default_factory=lambda: np.zeros(0, np.int64))
 
     @property
     def within(self) -> tuple[int, int]:
@@ -125,11 +134,33 @@ def measure(avlmap: "AVLMap", things: Sequence[SceneObject], same: Mapping[str, 
             reached[word] = _distance(goals[0].position, [things[n] for n in of_word]) if goals else np.inf
     large = [n for n in seen if name[n] not in STRUCTURE and max(things[n].size) >= SMALLEST_M]
     found = sum(np.isin(inside[n], covered.get(name[n], [])).mean() >= _A_QUARTER for n in large)
-    return ObjectFigures(scene, reached, said, len(large), int(found), best)
+    movable = [(thing, called) for thing, called in zip(things, name, strict=True) if called not in STRUCTURE]
+    return ObjectFigures(scene, reached, said, len(large), int(found), best, *_named(avlmap, movable, words))
 
 
-def _inside(centres: Float[np.ndarray, "n 3"], thing: SceneObject) -> Int[np.ndarray, " m"]:
-    low, high = np.array(thing.low) - GROWN_M, np.array(thing.high) + GROWN_M
+def _named(
+    avlmap: "AVLMap", things: Sequence[tuple[SceneObject, str]], words: Sequence[str]
+) -> tuple[Int[np.ndarray, " things"], Int[np.ndarray, " things"]]:
+    """Return how many voxels lie in the box of each thing alone, and how many of them are named as it is.
+
+    Things whose name the map's encoder does not know count no voxel.
+    """
+    namer = VoxelNamer(avlmap.stored, words)
+    likeliest, _ = namer.best()
+    centres = avlmap.space.centres
+    inside = [_inside(centres, thing, NARROW_M) for thing, _ in things]
+    boxes = np.bincount(np.concatenate([*inside, np.zeros(0, np.int64)]), minlength=len(centres))
+    voxels, named = np.zeros((2, len(things)), np.int64)
+    for number, (rows, (_, name)) in enumerate(zip(inside, things, strict=True)):
+        alone = rows[boxes[rows] == 1]
+        if name in namer.names and len(alone) >= FEWEST_VOXELS:
+            voxels[number] = len(alone)
+            named[number] = np.count_nonzero(likeliest[alone] == namer.names.index(name))
+    return voxels, named
+
+
+def _inside(centres: Float[np.ndarray, "n 3"], thing: SceneObject, grown_m: float = GROWN_M) -> Int[np.ndarray, " m"]:
+    low, high = np.array(thing.low) - grown_m, np.array(thing.high) + grown_m
     return np.flatnonzero(((centres >= low) & (centres <= high)).all(axis=1))
 
 
@@ -207,7 +238,10 @@ def auroc(score: Float[np.ndarray, " n"], is_there: Bool[np.ndarray, " n"]) -> f
 
 def table_of(scenes: Sequence[ObjectFigures]) -> dict[str, list]:
     """Return the figures of scenes, and of all together, as a table."""
-    columns = ["scene", "first goal within 0.5 m", "instances true", "true things found", "found or not: AUROC"]
+    columns = [
+        "scene", "first goal within 0.5 m", "instances true", "true things found", "found or not: AUROC",
+        "voxels named rightly", "mean over things",
+    ]  # fmt: skip
     rows = [_row(scene.scene, [scene]) for scene in scenes]
     if len(scenes) > 1:
         rows.append(_row(f"all {len(scenes)}", scenes))
@@ -222,7 +256,19 @@ def _row(name: str, scenes: Sequence[ObjectFigures]) -> list[str]:
     ]
     best = [entry for s in scenes for entry in s.best.values()]
     score = auroc(np.array([b[0] for b in best]), np.array([b[1] for b in best], bool))
-    return [name, *(_share(int(a), int(n)) for a, n in pairs), f"{score:.3f} of {len(best)}"]
+    voxels, named = (np.concatenate([getattr(s, kind) for s in scenes]) for kind in ("voxels", "named"))
+    return [name, *(_share(int(a), int(n)) for a, n in pairs), f"{score:.3f} of {len(best)}", *_naming(voxels, named)]
+
+
+def _naming(voxels: Int[np.ndarray, " things"], named: Int[np.ndarray, " things"]) -> list[str]:
+    """Return the share of voxels named rightly, and its mean over things with an interval; voxels of one are alike."""
+    shares = named[voxels > 0] / voxels[voxels > 0]
+    if not len(shares):
+        return ["none", "none"]
+    half = 1.96 * shares.std(ddof=1) / np.sqrt(len(shares)) if len(shares) > 1 else 1.0
+    low, high = max(0.0, shares.mean() - half), min(1.0, shares.mean() + half)
+    over_things = f"{shares.mean():.1%} of {len(shares)} ({100 * low:.1f}-{100 * high:.1f})"
+    return [f"{named.sum() / voxels.sum():.1%} of {voxels.sum()}", over_things]
 
 
 def _share(count: int, of: int) -> str:
