@@ -20,7 +20,7 @@ def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
 
 
 class Shipped(nn.Module):
-    """A file that ``write_onnx`` wrote, to be asked like the network."""
+    """A file that ``write_onnx`` wrote, queried like the network."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()

@@ -110,7 +110,7 @@ def optimisers_of(network: nn.Module, options: Options) -> list[torch.optim.Opti
     return [Muon(inside, lr=options.rate, weight_decay=options.decay), adam] if inside else [adam]
 
 
-# Batches that tell what a network that ships is fed inside: 600 pictures.
+# Batches from which the statistics inside a network that ships are taken: 600 pictures.
 _LOOKED_AT = 40
 
 

@@ -1,4 +1,4 @@
-"""The weights that ship, as a network that can go on learning.
+"""The weights that ship, as a network that learns further.
 
 A file for onnxruntime holds each convolution with its normalisation folded into it. Here they are taken apart again:
 the folded weights become the convolution's, and the normalisation gets the statistics of what comes out on some frames,

@@ -6,7 +6,7 @@ true, and of the true ones how many are found. *Found*: how well the best confid
 from those that are not (area under the ROC curve). Truth: boxes of things, of which the walk saw at least some. A thing
 of a narrower kind is true for a wider name: a dining table answers "table", a table does not answer "dining table".
 A true thing counts as found by its own name alone. *Voxels*: of those in the box of one thing alone, how many have its
-name as their likeliest, over all and as a mean over things. It has no threshold, and tells encoders and fusions apart
+name as their likeliest, over all and as a mean over things. It has no threshold, and separates encoders and fusions
 that the other figures do not.
 """
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 STRUCTURE = ("wall", "floor", "ceiling", "column", "stairs", "railing")
 # A box is grown by this: voxels and poses are that coarse.
 GROWN_M = 0.1
-# And by this where its voxels are told from those beside it.
+# And by this where its voxels are separated from those beside it.
 NARROW_M = 0.02
 REACH_M = 0.5
 FEWEST_VOXELS = 15
