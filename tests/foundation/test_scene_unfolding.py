@@ -9,7 +9,7 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")
 from training.pixels.export import write_onnx  # noqa: E402
 from training.pixels.network import RoomNetwork  # noqa: E402
-from training.pixels.unfold import unfolded  # noqa: E402
+from training.pixels.unfold import TRAINED_RMS, unfolded  # noqa: E402
 
 CATEGORIES, ROOMS, WIDTHS = 5, 3, (8, 12, 16, 20, 24)
 
@@ -56,6 +56,14 @@ def test_it_computes_nearly_the_same_while_it_learns(shipped: tuple[Path, RoomNe
                 module.train()
         learning = again(*seen[0])[0]
     np.testing.assert_allclose(still.numpy(), learning.numpy(), rtol=0.02, atol=0.02)
+
+
+def test_its_convolutions_are_as_large_as_trained_ones(shipped: tuple[Path, RoomNetwork]) -> None:
+    """Steps of one size would otherwise tear small weights apart."""
+    again = unfolded(shipped[0], CATEGORIES, ROOMS, pictures(1, 2))
+    weights = [p for name, p in again.named_parameters() if p.ndim == 4 and "score" not in name]
+    sizes = [weight.square().mean().sqrt().item() for weight in weights]
+    np.testing.assert_allclose(sizes, TRAINED_RMS, rtol=1e-4)
 
 
 def test_the_file_of_another_network_is_refused(shipped: tuple[Path, RoomNetwork], tmp_path: Path) -> None:

@@ -3,6 +3,10 @@
 A file for onnxruntime holds each convolution with its normalisation folded into it. Here they are taken apart again:
 the folded weights become the convolution's, and the normalisation gets the statistics of what comes out on some frames,
 and a scale and a shift that undo them. The network computes the same as before, and its normalisations work on.
+
+Folded weights are up to ten times as small as those that were trained, and Muon's steps have one size: at the usual
+rate they would tear the network apart. So each convolution is enlarged to the size of trained weights
+(``TRAINED_RMS``), which its normalisation undoes.
 """
 
 from collections.abc import Iterable
@@ -15,6 +19,7 @@ from onnx import numpy_helper
 from torch import Tensor, nn
 from training.pixels.network import RoomNetwork
 
+TRAINED_RMS = 0.1  # root mean square of a convolution's weights after long training with Muon
 # The convolution's name within its part of the network, and that of the normalisation behind it.
 _NORM = {"0": "1", "first": "norm_first", "second": "norm_second", "mix": "norm"}
 
@@ -40,6 +45,7 @@ def unfolded(path: Path, categories: int, rooms: int, batches: Iterable[tuple[Te
     left = {name for name, module in named.items() if isinstance(module, nn.Conv2d)} - convolutions.keys()
     if left:
         raise ValueError(f"{path} holds no weights for {', '.join(sorted(left))}; it is another network.")
+    normed: list[tuple[nn.Conv2d, nn.BatchNorm2d]] = []
     for name, (weight, bias) in convolutions.items():
         state[f"{name}.weight"].copy_(torch.from_numpy(arrays[weight]))
         norm = _norm_of(name, named)
@@ -47,8 +53,10 @@ def unfolded(path: Path, categories: int, rooms: int, batches: Iterable[tuple[Te
         if norm is None:
             state[f"{name}.bias"].copy_(shift)
             continue
-        module = named[norm]
+        convolution, module = named[name], named[norm]
+        assert isinstance(convolution, nn.Conv2d)
         assert isinstance(module, nn.BatchNorm2d)
+        normed.append((convolution, module))
         state[f"{norm}.weight"].fill_(1.0)
         state[f"{norm}.bias"].copy_(shift)
         state[f"{norm}.running_mean"].zero_()
@@ -57,7 +65,7 @@ def unfolded(path: Path, categories: int, rooms: int, batches: Iterable[tuple[Te
         if name in arrays:
             value.copy_(torch.from_numpy(arrays[name]).reshape(value.shape))
     network.load_state_dict(state)
-    _take_statistics(network.eval(), batches)
+    _take_statistics(network.eval(), normed, batches)
     return network
 
 
@@ -90,28 +98,33 @@ def _norm_of(convolution: str, named: dict[str, nn.Module]) -> str | None:
 
 
 @torch.no_grad()
-def _take_statistics(network: RoomNetwork, batches: Iterable[tuple[Tensor, Tensor]]) -> None:
+def _take_statistics(
+    network: RoomNetwork,
+    normed: list[tuple[nn.Conv2d, nn.BatchNorm2d]],
+    batches: Iterable[tuple[Tensor, Tensor]],
+) -> None:
     """Give each normalisation the mean and spread of what it is fed, and undo them in its scale and shift."""
-    norms = [module for module in network.modules() if isinstance(module, nn.BatchNorm2d)]
-    sums = {id(module): torch.zeros(3, module.num_features, dtype=torch.float64) for module in norms}
+    sums = {id(norm): torch.zeros(3, norm.num_features, dtype=torch.float64) for _, norm in normed}
 
     def look(module: nn.Module, inputs: tuple[Tensor, ...]) -> None:
         x = inputs[0].double()
         count = torch.full_like(x[0, :, 0, 0], x[:, 0].numel())
         sums[id(module)] += torch.stack([count, x.sum((0, 2, 3)), x.square().sum((0, 2, 3))])
 
-    hooks = [module.register_forward_pre_hook(look) for module in norms]
+    hooks = [norm.register_forward_pre_hook(look) for _, norm in normed]
     for geometry, colour in batches:
         network(geometry, colour)
     for hook in hooks:
         hook.remove()
-    for module in norms:
-        count, total, squares = sums[id(module)]
+    for convolution, norm in normed:
+        count, total, squares = sums[id(norm)]
         mean = (total / count).float()
         spread = (squares / count - (total / count).square()).clamp(min=1e-6).float()
-        assert module.running_mean is not None
-        assert module.running_var is not None
-        module.bias += mean
-        module.running_mean.copy_(mean)
-        module.running_var.copy_(spread)
-        module.weight.copy_((spread + module.eps).sqrt())
+        larger = TRAINED_RMS / convolution.weight.square().mean().sqrt()
+        convolution.weight *= larger
+        assert norm.running_mean is not None
+        assert norm.running_var is not None
+        norm.running_mean.copy_(larger * mean)
+        norm.running_var.copy_(larger.square() * spread)
+        norm.bias += mean
+        norm.weight.copy_((norm.running_var + norm.eps).sqrt() / larger)
