@@ -1,12 +1,13 @@
-"""Training worlds with people, clothes and papers: the home stays, and what is added is where it should be."""
+"""Homes with people, clothes and papers: the home stays, and what is added is where it should be."""
 
 import numpy as np
 import pytest
-from training.pixels.lived_in import lived_in, with_curtains_apart
 
 from avlmaps.sim.furniture import make
-from avlmaps.sim.homes import make_home, make_office
+from avlmaps.sim.homes import lived_in, make_home, make_office
+from avlmaps.sim.homes.lived_in import with_curtains_apart
 from avlmaps.sim.scene import Scene, SceneBuilder
+from avlmaps.sim.scenes import SceneError, open_scene
 
 ADDED = ("person", "clothing", "paper", "shower curtain")
 
@@ -65,3 +66,18 @@ def test_the_cloth_of_a_tub_becomes_a_shower_curtain() -> None:
     cloth = scene.objects[2]
     assert cloth.size[2] > 1.4 and cloth.high[0] < 2.0
     assert (scene.instance == 0).any() and (scene.instance == 2).any()
+
+
+def test_a_scene_of_that_name_holds_people_and_mirrors_that_reflect() -> None:
+    bare, full = open_scene("house:3:training"), open_scene("house:3:training:lived-in")
+    assert full.objects[: len(bare.objects)] == bare.objects and len(full.objects) > len(bare.objects)
+    assert full.mirrors and not bare.mirrors
+    assert open_scene("house:3:lived-in").objects == open_scene("house:3:all:lived-in").objects
+
+
+@pytest.mark.parametrize(
+    "spec", ["house:3:lived", "house:lived-in", "house:3:lived-in:lived-in", "house:3:all:training"]
+)
+def test_other_words_are_refused(words: str) -> None:
+    with pytest.raises(SceneError, match="lived-in"):
+        open_scene(f"house:{words}")

@@ -33,7 +33,7 @@ def room(tilt_rad: float = 0.0) -> Scene:
 
 def views(scene: Scene, place: tuple[float, float, float], heading: float = np.pi, mirrors: bool = True):
     pose = camera_poses(np.array([place]), np.array([heading]), np.zeros(1), np.zeros(1))[0]
-    return Renderer(scene, lit=False, mirrors=mirrors).render(CAMERA, pose)
+    return Renderer(replace(scene, mirrors=mirrors), lit=False).render(CAMERA, pose)
 
 
 def test_a_flat_mirror_shows_the_wall_behind_the_camera_as_far_away_as_light_travels():

@@ -23,7 +23,7 @@ CATEGORIES = (
     "baby stroller", "mat", "play tent", "aquarium", "pet bed",
     "whiteboard", "partition", "locker", "water dispenser",
     "other",
-    # Homes hold none of these; training worlds add them (``lived_in.py``).
+    # Homes hold none of these; training worlds add them (``sim/homes/lived_in.py``).
     "clothing", "paper", "person", "shower curtain",
 )  # fmt: skip
 

@@ -10,7 +10,7 @@ import os
 import shutil
 import sys
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter, time
 
@@ -18,7 +18,6 @@ import numpy as np
 import tyro
 from training.pixels.borrowed import borrowed_furniture
 from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED, room_of
-from training.pixels.lived_in import lived_in
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.sim.furniture.catalogue import Families
@@ -53,7 +52,7 @@ class Options:
     furniture: Path | None = None
     """Folder of artists' models (``borrowed.py``), which furnish half of the homes; those of ``which`` alone."""
     lived_in: float = 0.8
-    """Share of homes with people, clothes, papers and shower curtains in them (``lived_in.py``)."""
+    """Share of homes with people, clothes, papers and shower curtains in them (``avlmaps.sim.homes.lived_in``)."""
     mirrors: float = 0.6
     """Share of homes whose mirrors reflect, in colour and in depth."""
     in_hands: float = 0.5
@@ -66,13 +65,15 @@ class Options:
 
 def scene_of(seed: int, options: Options, rng: np.random.Generator) -> Scene:
     """Return the home or office of a seed, with things that are nothing in particular and the traces of people."""
-    from avlmaps.sim.homes import make_home, make_office
+    from avlmaps.sim.homes import lived_in, make_home, make_office
 
     borrows = options.furniture is not None and seed // options.step % 2 == 0
     with borrowed_furniture(options.furniture, options.which) if borrows and options.furniture else nullcontext():
         scene = make_office(seed, options.which) if seed % 6 == 5 else make_home(seed, options.which)
     scene = with_oddities(scene, rng)
-    return lived_in(scene, rng, options.which) if rng.random() < options.lived_in else scene
+    if rng.random() < options.lived_in:
+        scene = lived_in(scene, rng, options.which)
+    return replace(scene, mirrors=bool(rng.random() < options.mirrors))
 
 
 def with_oddities(scene: Scene, rng: np.random.Generator) -> Scene:
@@ -141,7 +142,7 @@ def add_home(shard: Shard, seed: int, options: Options) -> None:
     rng = np.random.default_rng([seed, 7])
     scene = scene_of(seed, options, rng)
     lit = rng.random() < options.lit
-    renderer = Renderer(scene, lit=lit, mirrors=rng.random() < options.mirrors)
+    renderer = Renderer(scene, lit=lit)
     names = scene.categories
     number = np.array([_NAME.get(name, UNLABELLED) for name in names] + [UNLABELLED], np.uint8)
     dull = np.isin((*names, ""), ("wall", "floor", "ceiling", ""))

@@ -134,14 +134,13 @@ def _returns(mesh: Mesh, atlas: Atlas) -> Float32[np.ndarray, " m"]:
 class Renderer:
     """Draws views of one scene; not from two threads at once, since it reuses its working memory between views."""
 
-    def __init__(self, scene: Scene, lit: bool = True, mirrors: bool = False) -> None:
+    def __init__(self, scene: Scene, lit: bool = True) -> None:
         """Prepare a scene.
 
         Args:
-            scene: what to look at.
+            scene: what to look at. Where its mirrors reflect, their depth is that of the reflected place, as structured
+                light measures it; instance and category are the mirror's. Reflections in reflections are not drawn.
             lit: work out lamps and shadows; without them surfaces show their plain colours.
-            mirrors: mirrors show what they reflect, and their depth is that of the reflected place, as structured
-                light measures it. Instance and category are the mirror's. Reflections in reflections are not drawn.
         """
         mesh = scene.mesh
         self.scene = scene
@@ -157,7 +156,7 @@ class Renderer:
         self._glow = (_GLOW if lit else 0.0) * np.array([m.emission for m in mesh.materials], np.float32)
         self._opacity = np.array([m.opacity for m in mesh.materials], np.float32)
         self._returns = _returns(mesh, atlas)
-        self._mirror = np.array([mirrors and m.mirror for m in mesh.materials], bool)[self._material]
+        self._mirror = np.array([scene.mirrors and m.mirror for m in mesh.materials], bool)[self._material]
         self._any_mirror = bool(self._mirror.any())
         light = light_map(scene, atlas.mean) if lit and len(order) else None
         self._light = light and replace(light, sample=light.sample[order], turned=light.turned[order])

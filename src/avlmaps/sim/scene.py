@@ -103,6 +103,7 @@ class Scene:
         objects: what is there; walls, floors and ceilings are among them.
         areas: its rooms.
         lights: its lamps.
+        mirrors: whether its mirrors reflect; otherwise they show the colour of their glass.
     """
 
     name: str
@@ -111,6 +112,7 @@ class Scene:
     objects: tuple[SceneObject, ...]
     areas: tuple[Area, ...] = ()
     lights: tuple[Light, ...] = ()
+    mirrors: bool = False
 
     def __post_init__(self) -> None:
         if self.instance.shape != (len(self.mesh.triangle),):

@@ -1,7 +1,7 @@
 """Traces of people in a finished home: clothes, papers, shower curtains, and the people themselves.
 
-They are added to training worlds alone, after a home is made, so that the homes of the benchmarks stay what they are.
-The cloths of tubs and showers that have one become shower curtains of their own.
+They are added after a home is made, so that the home of a seed stays what it is; ``house:7:lived-in`` and training
+worlds have them. The cloths of tubs and showers that have one become shower curtains of their own.
 """
 
 from collections.abc import Sequence
