@@ -75,9 +75,7 @@ def test_a_scene_of_that_name_holds_people_and_mirrors_that_reflect() -> None:
     assert open_scene("house:3:lived-in").objects == open_scene("house:3:all:lived-in").objects
 
 
-@pytest.mark.parametrize(
-    "spec", ["house:3:lived", "house:lived-in", "house:3:lived-in:lived-in", "house:3:all:training"]
-)
+@pytest.mark.parametrize("words", ["3:lived", "lived-in", "3:lived-in:lived-in", "3:all:training"])
 def test_other_words_are_refused(words: str) -> None:
     with pytest.raises(SceneError, match="lived-in"):
         open_scene(f"house:{words}")

@@ -26,7 +26,7 @@ class Record(Verb):
     compiles: ClassVar[bool] = True
 
     scene: Annotated[str, arg(metavar="SCENE")]
-    """Building: house:SEED or office:SEED, made by rule (house:SEED:lived-in: with people, clothes, mirrors), or a .glb file, alone or with Matterport3D's _semantic.ply."""
+    """By rule: house:SEED, house:SEED:lived-in, office:SEED; or a .glb file, alone or with Matterport3D's _semantic.ply."""
     out: Annotated[Path, arg(metavar="REC")]
     """Recording folder to write (our format)."""
     sounds: Annotated[Path | None, arg(metavar="DIR")] = None
