@@ -26,7 +26,7 @@ class Record(Verb):
     compiles: ClassVar[bool] = True
 
     scene: Annotated[str, arg(metavar="SCENE")]
-    """By rule: house:SEED, house:SEED:lived-in, office:SEED; or a .glb file, alone or with Matterport3D's _semantic.ply."""
+    """house:SEED, house:SEED:lived-in or office:SEED, or a .glb file, alone or with Matterport3D's _semantic.ply."""
     out: Annotated[Path, arg(metavar="REC")]
     """Recording folder to write (our format)."""
     sounds: Annotated[Path | None, arg(metavar="DIR")] = None
