@@ -14,7 +14,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.poses import apply, inverse, rotation_angle_rad
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Keyframes, Voxels
-from avlmaps.query.photometric import Panoramas, PhotometricSettings, Start
+from avlmaps.query.photometric import ByColour, Panoramas, PhotometricSettings, Start
 from avlmaps.query.photometric_kernels import compare_panoramas, compare_view, draw_panoramas
 from avlmaps.query.voxel_space import Space
 from helpers.picture_room import CAMERA, RoomWalk, looking
@@ -78,8 +78,9 @@ def photo() -> np.ndarray:
     return plain(WALK.room.render(PHOTO_FROM)[0])
 
 
-def assert_near(found: np.ndarray | None, true: np.ndarray, metres: float = 0.3, degrees: float = 10.0) -> None:
-    assert found is not None
+def assert_near(guess: ByColour | None, true: np.ndarray, metres: float = 0.3, degrees: float = 10.0) -> None:
+    assert guess is not None
+    found = guess.world_from_camera
     assert np.linalg.norm(found[:3, 3] - true[:3, 3]) < metres
     assert np.rad2deg(rotation_angle_rad(found, true)) < degrees
 
@@ -118,6 +119,30 @@ def test_a_pose_that_enough_keypoints_agree_with_wins(room: Panoramas, photo: np
     trusting = copy(room)
     trusting.settings = replace(room.settings, inlier_worth=1.0)
     assert_near(trusting.likeliest(photo, CAMERA, [Start(elsewhere, inliers=9)]), elsewhere, metres=1.5, degrees=60.0)
+
+
+def test_a_photo_of_the_room_is_likelier_than_one_of_another(room: Panoramas, photo: np.ndarray) -> None:
+    """A place is the likelier the more alike the view, the more keypoints agree and the larger the lead."""
+    own = room.likeliest(photo, CAMERA)
+    rng = np.random.default_rng(3)
+    blots = cv2.resize(rng.integers(0, 256, (6, 8, 3)).astype(np.uint8), (320, 240), interpolation=cv2.INTER_LINEAR)
+    other = room.likeliest(blots, CAMERA)
+    assert own is not None and other is not None
+    assert own.likeness > other.likeness
+    assert own.confidence > 0.5 > other.confidence
+    started = room.likeliest(photo, CAMERA, [Start(own.world_from_camera, inliers=9)])
+    assert started is not None
+    assert started.inliers == 9 and started.confidence > own.confidence
+
+
+def test_of_two_places_that_look_alike_neither_has_a_lead(room: Panoramas, photo: np.ndarray) -> None:
+    own = room.likeliest(photo, CAMERA)
+    twice = copy(room)
+    twice.settings = replace(room.settings, elsewhere_m=0.0)  # each other pose is another place now, however near
+    near = twice.likeliest(photo, CAMERA)
+    assert own is not None and near is not None
+    assert 0.0 <= near.lead < own.lead + 1e-9
+    assert near.confidence <= own.confidence
 
 
 def test_what_is_of_one_colour_is_no_place(room: Panoramas) -> None:
@@ -208,6 +233,7 @@ def test_a_panorama_shows_each_voxel_in_its_direction_and_is_compared_at_every_h
 
 def test_poses_turn_back(room: Panoramas, photo: np.ndarray) -> None:
     """The pose that is told is a pose."""
-    found = room.likeliest(photo, CAMERA)
-    assert found is not None
+    guess = room.likeliest(photo, CAMERA)
+    assert guess is not None
+    found = guess.world_from_camera
     np.testing.assert_allclose(found @ inverse(found), np.eye(4), atol=1e-9)

@@ -366,7 +366,9 @@ class AVLMap:
         intrinsics: Pinhole | None = None,
         primary: bool = False,
     ) -> Heatmap:
-        """Return the heat of where a picture was taken; if it is not located, of the best guess, and not ``found``.
+        """Return the heat of where a picture was taken; if it is not located, of the best guess.
+
+        A guess is ``found`` where it is as likely right as wrong, or likelier.
 
         Args:
             picture: a file, or RGB uint8.
@@ -389,7 +391,9 @@ class AVLMap:
 
         starts = [] if located.guess is None else [Start(located.guess, located.guess_inliers)]
         guess = self._panoramas.likeliest(rgb, located.camera, starts)
-        return located if guess is None else replace(located, guess=guess)
+        if guess is None:
+            return located
+        return replace(located, guess=guess.world_from_camera, guess_confidence=guess.confidence)
 
     @cached_property
     def _panoramas(self) -> "Panoramas":

@@ -129,6 +129,7 @@ class NearThings(Factor):
         mask: which voxels are the object; the anchors are their middles, in the same order.
         with_uncertain: makes the same with the instances whose confidence is too low to count in a query for the
         thing alone: the context may select one of them. None where there are no others.
+        calibrated: whether the confidences are probabilities, as those of an encoder of names are.
     """
 
     space: Space
@@ -141,6 +142,7 @@ class NearThings(Factor):
     understood: str = ""
     note: str = ""
     with_uncertain: "Callable[[], NearThings] | None" = None
+    calibrated: bool = False
     flat: bool = field(default=False, init=False)
 
     def for_product(self) -> "NearThings":

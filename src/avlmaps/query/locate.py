@@ -108,6 +108,8 @@ class Located:
         camera: the camera that the pose holds for; another than the given one where its focal length was refined.
         guess: where it was not located, the likeliest pose nevertheless, if requested: not to be relied on.
         guess_inliers: keypoints that agree with the guess; 0 where it is only the place of a keyframe.
+        guess_confidence: the probability that the place of the guess is right, where something tried it; 0.5 and more
+            is as good as located for a query, not for a pose.
     """
 
     world_from_camera: Float[np.ndarray, "4 4"] | None
@@ -118,6 +120,7 @@ class Located:
     camera: Pinhole
     guess: Float[np.ndarray, "4 4"] | None = None
     guess_inliers: int = 0
+    guess_confidence: float = 0.0
 
 
 def locate(

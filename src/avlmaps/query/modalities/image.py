@@ -9,7 +9,7 @@ from avlmaps.core.arrays import UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Part
-from avlmaps.query.factors import HeatSettings, NearAnchors
+from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
@@ -56,15 +56,19 @@ def require_fitting(rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None)
 def image_factor(space: Space, located: "Located", part: Part, heat: HeatSettings) -> NearAnchors:
     """Return the heat of a picture: one anchor of score 1 at the camera.
 
-    Where it was not located, the anchor is at the best guess, if there is one; the heat is not "found", and its
-    confidence is that of the location, below 0.5.
+    Where it was not located, the anchor is at the best guess, if there is one, with the guess's confidence: below 0.5
+    the heat is not "found".
     """
-    sure = located.world_from_camera is not None
-    pose = located.world_from_camera if sure else located.guess
+    is_located = located.world_from_camera is not None
+    pose = located.world_from_camera if is_located else located.guess
+    confidence = 1.0 if is_located else max(located.score, located.guess_confidence, _LEAST_CERTAINTY)
+    found = pose is not None and confidence >= FOUND_AT
     anchors = np.zeros((0, 3)) if pose is None else np.asarray(pose, np.float64)[None, :3, 3]
-    note = "" if sure else f"the picture could not be located ({located.inliers} points agree)"
-    if pose is not None and not sure:
+    note = "" if is_located else f"the picture could not be located ({located.inliers} points agree)"
+    if pose is not None and not is_located:
         note += "; the heat is that of the best guess"
+    if found and not is_located:
+        note += f", whose confidence is {confidence:.2f} by its colours"
     return NearAnchors(
         space,
         part,
@@ -72,8 +76,8 @@ def image_factor(space: Space, located: "Located", part: Part, heat: HeatSetting
         anchors,
         np.ones(len(anchors)),
         np.zeros(len(anchors), np.int64),
-        sure,
+        found,
         part.query,
         note,
-        1.0 if sure else max(float(located.score), _LEAST_CERTAINTY),
+        float(confidence),
     )

@@ -87,8 +87,9 @@ def object_factor(
         falloff, alone = heat.falloff_per_m(part.role), None if with_uncertain else lambda: things(True)
         found = best >= FOUND_AT
         return NearThings(
-            space, part, falloff, pieces.mask, pieces.instance, pieces.confidence, found, understood, note, alone
-        )
+            space, part, falloff, pieces.mask, pieces.instance, pieces.confidence, found, understood, note, alone,
+            isinstance(encoder, NamedPixelEncoder),
+        )  # fmt: skip
 
     alone = things(False)
     if len(alone.confidence):
