@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -180,6 +182,40 @@ def test_it_is_not_found_where_one_part_is_not() -> None:
     heat = m.object("chair", primary=True) * m.sound("dog")
     assert not heat.found
     assert heat.goals()[0].score < 0.5
+
+
+@pytest.mark.parametrize(
+    ("confidence", "sound", "calibrated", "found"),
+    [(0.35, 0.9, True, True), (0.25, 0.9, True, False), (0.35, 0.4, True, False), (0.35, 0.9, False, False),
+     (0.6, 0.9, False, True)],
+)  # fmt: skip
+def test_a_doubtful_thing_is_found_in_the_company_of_what_is_found(
+    confidence: float, sound: float, calibrated: bool, found: bool
+) -> None:
+    """Who queries for the chair near a sound knows that there is one; a probability of .3 is enough then."""
+    m = AVLMap(furnished_map(sounds=sounds_of([track(0.5, 0.5)], [sound])))
+    sure = m.object("chair", primary=True).factors[0]
+    assert isinstance(sure, NearThings)
+    doubtful = replace(
+        sure, confidence=np.full(len(sure.confidence), confidence, np.float32), found=confidence >= 0.5,
+        calibrated=calibrated, with_uncertain=None,
+    )  # fmt: skip
+    assert Heatmap.of(doubtful).found == (confidence >= 0.5)
+    assert (Heatmap.of(doubtful) * m.sound("dog")).found == found
+    # The same holds where the thing is the context, and the sound is what is sought.
+    near = replace(doubtful, part=replace(doubtful.part, role=Role.CONTEXT), falloff_per_m=0.2)
+    assert (m.sound("dog", primary=True) * Heatmap.of(near)).found == found
+
+
+def test_two_doubtful_things_are_not_found_by_each_other() -> None:
+    m = AVLMap(furnished_map())
+    parts = []
+    for role in (Role.PRIMARY, Role.CONTEXT):
+        sure = m.object("chair", role is Role.PRIMARY).factors[0]
+        assert isinstance(sure, NearThings)
+        low = np.full(len(sure.confidence), 0.4, np.float32)
+        parts.append(replace(sure, confidence=low, found=False, calibrated=True, with_uncertain=None))
+    assert not (Heatmap.of(parts[0]) * Heatmap.of(parts[1])).found
 
 
 @pytest.mark.parametrize("primary", [True, False])

@@ -24,10 +24,9 @@ if TYPE_CHECKING:
 
 # Where all parts of the query are in the map, but nowhere together by at least this much heat, the whole is not found.
 LEAST_TOGETHER = 0.1
-# Of a thing with context ("the chair near the fridge") this probability is enough where the context is found: who
-# queries so knows that there is one. On six development homes first goals of queries with areas, photos and sounds are
-# right at least as often as not from here on, half of the queries being for things that are not there
-# (docs/experiments.md).
+# Of one thing in a query of several parts ("the chair near this photo") this probability is enough where all else is
+# found: who queries so knows that there is one. On six development homes first goals are right at least as often as not
+# from here on, half of the queries being for things that are not there (docs/experiments.md).
 FOUND_IN_COMPANY = 0.3
 # Two sounds heard at one place are one place to go to.
 SEPARATION_M = 1.0
@@ -148,13 +147,24 @@ def is_found(factors: Sequence[Factor], shares_of: Callable[[], Shares]) -> bool
     if len(factors) == 1:
         return factors[0].found
     lead = lead_of(factors)
-    if not all(factor.found for factor in factors if factor is not lead):
-        return False
-    least = FOUND_IN_COMPANY if isinstance(lead, NearThings) and lead.calibrated else FOUND_AT
-    if least == FOUND_AT and not lead.found:
+    context = [factor for factor in factors if factor is not lead and not factor.found]
+    if not context and _is_calibrated(lead):
+        least = FOUND_IN_COMPANY
+    elif lead.found and (not context or (len(context) == 1 and _is_likely_in_company(context[0]))):
+        least = FOUND_AT
+    else:
         return False
     likely = np.asarray(lead.confidence) >= least
     return bool((shares_of().peak[likely] >= LEAST_TOGETHER).any())
+
+
+def _is_calibrated(factor: Factor) -> bool:
+    """Return whether a factor is a thing whose confidences are probabilities."""
+    return isinstance(factor, NearThings) and factor.calibrated
+
+
+def _is_likely_in_company(factor: Factor) -> bool:
+    return _is_calibrated(factor) and float(np.max(factor.confidence, initial=0.0)) >= FOUND_IN_COMPANY
 
 
 def find_goals(factors: Sequence[Factor], shares: Shares, top: int) -> list[Goal]:

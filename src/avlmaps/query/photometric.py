@@ -73,7 +73,7 @@ class PhotometricSettings:
     most_inliers: int = 12
     """...up to this many of them."""
     elsewhere_m: float = 1.0
-    """A pose so far away is another place, over which the best has its lead."""
+    """A pose at least this far away is another place, over which the best has its lead."""
     odds: tuple[float, float, float, float] = (-15.3, 16.6, 0.5, 4.0)
     """Log-odds that the place is right within 0.75 m: a constant, and the worth of likeness, of each keypoint, of the
     lead. Fitted to 176 photos that keypoints do not locate, two thirds of them of other homes (docs/experiments.md)."""
@@ -96,7 +96,7 @@ class ByColour:
         likeness: correlation of the picture with the view drawn from there, at most 1.
         inliers: keypoints that agree with the pose, counted up to ``most_inliers``; 0 for one found by colours alone.
         lead: by how much it is ahead, in likeness and keypoints, of the best pose at another place; all of it where no
-            other place came so far.
+            other place was among the finalists.
         confidence: the probability that the place is right.
     """
 
