@@ -100,7 +100,8 @@ def _on_floor(
     height = rng.uniform(*stance.height_m, n)
     half_field = np.arctan(0.5 * np.array([camera.width / camera.fx, camera.height / camera.fy]))
     heading = np.concatenate([heading, free_heading]) + aimed * rng.uniform(-0.6, 0.6, n) * half_field[0]
-    pitch = rng.normal(*np.deg2rad(stance.pitch_deg), n)
+    mean_rad, spread_rad = np.deg2rad(stance.pitch_deg).tolist()
+    pitch = rng.normal(mean_rad, spread_rad, n)
     towards = np.arctan2(target_m[:, 1] - height[aimed], target_m[:, 0])
     pitch[aimed] = towards + rng.uniform(-0.6, 0.6, len(towards)) * half_field[1]
     # Past an end a pitch is drawn again, so that the ends themselves are not favoured.

@@ -4,7 +4,6 @@ They are added after a home is made, so that the home of a seed stays what it is
 worlds have them. The cloths of tubs and showers that have one become shower curtains of their own.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -217,7 +216,9 @@ def _in_rooms(filled: _Filled) -> None:
             _on_wall(filled, "paper", area.polygon, area.floor_m, (1.2, 1.7))
 
 
-def _on_wall(filled: _Filled, category: str, polygon: np.ndarray, floor_m: float, heights_m: Sequence[float]) -> None:
+def _on_wall(
+    filled: _Filled, category: str, polygon: np.ndarray, floor_m: float, heights_m: tuple[float, float]
+) -> None:
     """Hang something on a wall of a room; at times in front of a window or a picture, as people do."""
     rng = filled.rng
     edge = np.roll(polygon, -1, axis=0) - polygon
