@@ -198,7 +198,7 @@ def _standing(rng: np.random.Generator) -> Piece:
     return finished([body(pose, _tall(rng), _looks(rng))])
 
 
-@family("person", "walking")
+@family("person", "walking", held_out=True)
 def _walking(rng: np.random.Generator) -> Piece:
     step, side = draw(rng, 0.25, 0.55), pick(rng, (1.0, -1.0))
     hip = (side * step, -side * step)
@@ -221,7 +221,7 @@ def _lying(rng: np.random.Generator) -> Piece:
     return finished([body(pose, _tall(rng), _looks(rng)).tilted("y", -np.pi / 2)])
 
 
-@family("person", "crouching", held_out=True)
+@family("person", "crouching")
 def _crouching(rng: np.random.Generator) -> Piece:
     hip = draw(rng, 1.6, 2.1)
     pose = Pose(draw(rng, 0.2, 0.7), (hip, hip - draw(rng, 0.0, 0.5)), (hip + 0.5, hip + 0.3), 0.15,

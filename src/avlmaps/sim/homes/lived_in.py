@@ -28,6 +28,7 @@ _PAPERS_ON = {
     "filing cabinet": 0.5, "tv cabinet": 0.15, "bookshelf": 0.3, "shoe rack": 0.05,
 }  # fmt: skip
 _SEATED_ON = {"chair": 0.06, "office chair": 0.15, "armchair": 0.12, "sofa": 0.15, "bench": 0.08, "bed": 0.06}
+_LYING_ON = {"bed": 0.05, "sofa": 0.02}
 _THROWN_OVER = {"chair": 0.12, "office chair": 0.2, "armchair": 0.12, "sofa": 0.15}
 # How many lie, stand or hang in a room of a kind, on average.
 _CLOTHES_ON_FLOOR = {"bedroom": 0.8, "children's room": 0.9, "laundry room": 0.8, "bathroom": 0.4, "storage": 0.3}
@@ -36,6 +37,7 @@ _PAPERS_ON_FLOOR = {"office": 0.3, "children's room": 0.4, "open-plan office": 0
 _PAPERS_ON_WALL = {"office": 0.8, "open-plan office": 2.0, "kitchen": 0.4, "children's room": 0.6,
                    "meeting room": 0.6, "copy room": 0.8, "hallway": 0.2}  # fmt: skip
 _PEOPLE_STANDING = 0.3
+_ON_THEIR_FEET = ("standing", "walking", "crouching")  # families of people who need no seat
 _CURTAINS = 0.5  # share of tubs and showers that get one
 _SEAT_M = (0.3, 0.65)  # heights of seats and beds over their feet
 _FEWEST_M2 = 0.02  # of a top on which something lies
@@ -59,10 +61,13 @@ class _Filled:
         self.meshes.append(mesh)
 
     def piece(self, category: str, *, on_wall: bool = False) -> Mesh:
-        """Return something that lies or stands, or that hangs on a wall."""
-        names = families(category, self.which)
-        name = str(self.rng.choice([n for n in names if n.startswith("wall") == on_wall] or list(names)))
-        return make(category, self.rng, self.which, name).mesh
+        """Return something that lies or stands by itself, or that hangs on a wall."""
+        names = list(families(category, self.which))
+        if category == "person":
+            fit = [name for name in names if name in _ON_THEIR_FEET]
+        else:
+            fit = [name for name in names if name.startswith("wall") == on_wall] or names
+        return make(category, self.rng, self.which, str(self.rng.choice(fit))).mesh
 
     def times(self, mean: float) -> range:
         return range(int(self.rng.poisson(mean)))
@@ -124,6 +129,12 @@ def _on(filled: _Filled, thing: SceneObject, corners: np.ndarray) -> None:
             floor = thing.low[2]
             mesh = seated(rng, float(place[2]) - floor).turned(thing.heading_rad + rng.normal(0, 0.2))
             filled.add("person", mesh.moved(float(place[0]), float(place[1]), floor))
+    if rng.random() < _LYING_ON.get(kind, 0.0):
+        place = _a_top(rng, corners, *_SEAT_M)
+        if place is not None:
+            mesh = make("person", rng, name="lying").mesh.turned(thing.heading_rad + np.pi * int(rng.integers(2)))
+            middle = thing.centre
+            filled.add("person", mesh.moved(middle[0], middle[1], float(place[2]) - 0.02))
     if rng.random() < _THROWN_OVER.get(kind, 0.0):
         _throw_over(filled, thing, corners)
     if kind in ("bathtub", "shower") and "curtain" not in thing.family and rng.random() < _CURTAINS:
