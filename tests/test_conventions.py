@@ -14,7 +14,7 @@ from avlmaps.maps.fusion.settings import PAPERS_VARIANCE_M2
 from avlmaps.perception.embedded.meanings import Meanings
 from avlmaps.perception.profiles import profile
 from avlmaps.query.factors import FOUND_AT, ROUNDING, HeatSettings
-from avlmaps.query.goals import LEAST_TOGETHER
+from avlmaps.query.goals import FOUND_IN_COMPANY, LEAST_TOGETHER
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.recordings.layout import Description
 
@@ -40,7 +40,8 @@ def _claims() -> list[str]:
         f"instances of confidence {things.least_confidence} or more",
         f"instances of confidence {things.least_in_company} or more count as well",
         f"counts from {things.least_confidence} as before",
-        f"a confidence below {FOUND_AT}",
+        f"Of one thing in a query of several parts {FOUND_IN_COMPANY} is enough",
+        f"its confidence, and below {FOUND_AT} `found` is false",
         f"({Meanings.narrower_share} of their probability counts)",
         f"narrowest name that has a confidence of {FOUND_AT}",
         f"differ by less than {ROUNDING:.0e} are equal",
