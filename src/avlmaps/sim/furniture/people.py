@@ -202,8 +202,9 @@ def _standing(rng: np.random.Generator) -> Piece:
 def _walking(rng: np.random.Generator) -> Piece:
     step, side = draw(rng, 0.25, 0.55), pick(rng, (1.0, -1.0))
     hip = (side * step, -side * step)
-    knee = (draw(rng, 0.05, 0.3), draw(rng, 0.3, 0.7))
-    pose = Pose(draw(rng, 0.0, 0.15), hip, knee if side > 0 else knee[::-1], 0.04, (-hip[0], -hip[1]), 0.1,
+    ahead, behind = draw(rng, 0.05, 0.3), draw(rng, 0.3, 0.7)
+    knee = (ahead, behind) if side > 0 else (behind, ahead)
+    pose = Pose(draw(rng, 0.0, 0.15), hip, knee, 0.04, (-hip[0], -hip[1]), 0.1,
                 (draw(rng, 0.2, 0.9), draw(rng, 0.2, 0.9)))  # fmt: skip
     return finished([body(pose, _tall(rng), _looks(rng))])
 
