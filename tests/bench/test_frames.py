@@ -14,10 +14,10 @@ from avlmaps.bench.frames import (
     SEVERAL,
     class_probabilities,
     class_table,
-    interval_over_frames,
     measure,
     summary_table,
 )
+from avlmaps.bench.harness.intervals import of_mean
 from avlmaps.bench.nyu import (
     CAMERA,
     CLASSES,
@@ -183,5 +183,5 @@ def test_the_suite_writes_its_tables_in_every_form(tmp_path: Path, folder: Path)
 
 @given(st.lists(st.floats(0, 1, width=32), min_size=2, max_size=30))
 def test_the_interval_over_frames_holds_their_mean(shares: list[float]) -> None:
-    low, high = interval_over_frames(np.array(shares, np.float32))
+    low, high = of_mean(np.array(shares, np.float32))
     assert 0.0 <= low <= np.mean(shares) + 1e-6 and np.mean(shares) - 1e-6 <= high <= 1.0

@@ -26,6 +26,8 @@ def test_the_home_stays_and_things_are_added_after_it(worlds: list[tuple[Scene, 
         count = len(before.mesh.triangle)
         np.testing.assert_array_equal(after.mesh.corners()[:count], before.mesh.corners())
         assert after.areas == before.areas and after.lights == before.lights
+        names = [thing.name for thing in after.objects]
+        assert all(names) and len(set(names)) == len(names)
     added = {thing.category for before, after in worlds for thing in after.objects[len(before.objects) :]}
     assert {"person", "clothing", "paper"} <= added
 

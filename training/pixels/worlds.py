@@ -22,7 +22,7 @@ from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED, room_of
 from avlmaps.core.camera import Pinhole
 from avlmaps.sim.furniture.catalogue import Families
 from avlmaps.sim.mesh import Mesh, joined
-from avlmaps.sim.scene import Scene, SceneObject
+from avlmaps.sim.scene import Scene, SceneBuilder
 
 WIDTH, HEIGHT = 320, 240
 # Seeds of homes: those of the benchmarks begin at a million, those of calibration here, those of training at 0.
@@ -78,7 +78,7 @@ def scene_of(seed: int, options: Options, rng: np.random.Generator) -> Scene:
 
 def with_oddities(scene: Scene, rng: np.random.Generator) -> Scene:
     """Return the scene with some meaningless assemblies of simple solids on its floors: the category ``other``."""
-    meshes, instances, objects = [scene.mesh], [scene.instance], list(scene.objects)
+    builder = SceneBuilder.of(scene)
     for area in scene.areas:
         for _ in range(rng.poisson(0.5)):
             low, high = area.polygon.min(axis=0), area.polygon.max(axis=0)
@@ -86,11 +86,8 @@ def with_oddities(scene: Scene, rng: np.random.Generator) -> Scene:
             if not area.contains(np.array([x, y])):
                 continue
             mesh = _oddity(rng).moved(float(x), float(y), area.floor_m + max(0.0, rng.uniform(-1.5, 1.5)))
-            corners = [tuple(float(v) for v in corner) for corner in (mesh.low, mesh.high)]
-            instances.append(np.full(len(mesh.triangle), len(objects), np.int32))
-            objects.append(SceneObject("other", corners[0], corners[1]))  # pyright: ignore[reportArgumentType]
-            meshes.append(mesh)
-    return Scene(scene.name, joined(meshes), np.concatenate(instances), tuple(objects), scene.areas, scene.lights)
+            builder.add("other", mesh)
+    return builder.build()
 
 
 def _oddity(rng: np.random.Generator) -> Mesh:

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float32, Int, UInt8
 
+from avlmaps.bench.harness.intervals import of_mean
 from avlmaps.bench.nyu import CAMERA, CLASSES, SCORED, NyuFolder, class_of_kinds
 from avlmaps.core.progress import progress
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
@@ -135,20 +136,12 @@ def summary_table(figures: Mapping[str, FrameFigures]) -> Table:
 
 
 def _summary(mode: str, figures: FrameFigures) -> list[Any]:
-    low, high = interval_over_frames(figures.right_by_frame)
+    low, high = of_mean(figures.right_by_frame)
     return [
         figures.frames, figures.floors_labelled, int(figures.confusion.sum()),
         f"{figures.accuracy:.3f}", f"{low:.3f}-{high:.3f}", f"{figures.class_accuracy:.3f}", f"{figures.mean_iou:.3f}",
         int((figures.confusion.sum(axis=1) > 0).sum()), mode,
     ]  # fmt: skip
-
-
-def interval_over_frames(shares: Float32[np.ndarray, " n"]) -> tuple[float, float]:
-    """Return the 95 % interval of the mean over frames, by the normal; pixels of one frame are not independent."""
-    if len(shares) < 2:
-        return 0.0, 1.0
-    half = 1.96 * float(shares.std(ddof=1)) / np.sqrt(len(shares))
-    return max(0.0, float(shares.mean()) - half), min(1.0, float(shares.mean()) + half)
 
 
 def class_table(figures: FrameFigures) -> Table:

@@ -21,7 +21,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from avlmaps.bench.harness.chosen import chosen_on
-from avlmaps.bench.harness.intervals import wilson
+from avlmaps.bench.harness.intervals import of_mean, wilson
 from avlmaps.bench.harness.provenance import in_words, provenance, shown_scene
 from avlmaps.bench.output import draw, markdown, write_answer
 from avlmaps.core.lexicon import Kind, lexicon
@@ -265,8 +265,7 @@ def _naming(voxels: Int[np.ndarray, " things"], named: Int[np.ndarray, " things"
     shares = named[voxels > 0] / voxels[voxels > 0]
     if not len(shares):
         return ["none", "none"]
-    half = 1.96 * shares.std(ddof=1) / np.sqrt(len(shares)) if len(shares) > 1 else 1.0
-    low, high = max(0.0, shares.mean() - half), min(1.0, shares.mean() + half)
+    low, high = of_mean(shares)
     over_things = f"{shares.mean():.1%} of {len(shares)} ({100 * low:.1f}-{100 * high:.1f})"
     return [f"{named.sum() / voxels.sum():.1%} of {voxels.sum()}", over_things]
 

@@ -1,6 +1,5 @@
 """What mirrors reflect: which flat mirrors a view shows, and the camera as they turn it round."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,8 +29,8 @@ def planes_shown(
     corner: Float32[np.ndarray, "t 9"],
     normal: Float32[np.ndarray, "t 3"],
     origin: Float[np.ndarray, "3"],
-) -> Iterator[tuple[Int[np.ndarray, " m"], Plane]]:
-    """Yield the planes of the mirrors that a view shows, the largest first, and each one's pixels.
+) -> list[tuple[Int[np.ndarray, " m"], Plane]]:
+    """Return the planes of the mirrors that a view shows, the largest first, and each one's pixels.
 
     Args:
         shown: the triangle of each pixel, -1 for none.
@@ -42,7 +41,7 @@ def planes_shown(
     """
     pixels = np.flatnonzero((shown >= 0) & mirror[shown])
     if not len(pixels):
-        return
+        return []
     triangle = shown[pixels]
     across = normal[triangle].astype(np.float64)
     offset = np.einsum("ni,ni->n", across, corner[triangle, :3].astype(np.float64))
@@ -51,12 +50,11 @@ def planes_shown(
     key = np.column_stack([np.rint(across * 200), np.rint(offset * 100)]).astype(np.int64)
     _, first, which, count = np.unique(key, axis=0, return_index=True, return_inverse=True, return_counts=True)
     which = which.reshape(-1)
-    found = [
+    return [
         (pixels[which == number], Plane(across[first[number]], float(offset[first[number]])))
         for number in np.argsort(-count, kind="stable")[:_MOST]
         if count[number] >= _FEWEST_PIXELS
     ]
-    yield from found
 
 
 def reflected(

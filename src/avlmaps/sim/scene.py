@@ -148,8 +148,17 @@ class SceneBuilder:
     areas: list[Area] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
     objects: list[SceneObject] = field(default_factory=list)
+    mirrors: bool = False
     _meshes: list[Mesh] = field(default_factory=list)
     _instances: list[np.ndarray] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, scene: Scene) -> "SceneBuilder":
+        """Return a builder that holds all of a finished scene, to add more."""
+        return cls(
+            scene.name, list(scene.areas), list(scene.lights), list(scene.objects), scene.mirrors, [scene.mesh],
+            [scene.instance],
+        )  # fmt: skip
 
     def add(
         self, category: str, mesh: Mesh, heading_rad: float = 0.0, family: str = "", name: str = "", area: int = -1
@@ -168,4 +177,6 @@ class SceneBuilder:
         none: Float32[np.ndarray, " 0"] = np.zeros(0, np.float32)
         instance = np.concatenate(self._instances) if self._instances else none.astype(np.int32)
         mesh = joined(self._meshes)
-        return Scene(self.name, mesh, instance, tuple(self.objects), tuple(self.areas), tuple(self.lights))
+        return Scene(
+            self.name, mesh, instance, tuple(self.objects), tuple(self.areas), tuple(self.lights), self.mirrors
+        )

@@ -2,6 +2,9 @@
 
 import math
 
+import numpy as np
+from jaxtyping import Float
+
 _Z = 1.959964  # of the normal distribution, two-sided 95 %
 
 
@@ -13,6 +16,17 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
     middle = (share + square / (2 * count)) / (1 + square / count)
     half = _Z / (1 + square / count) * math.sqrt(share * (1 - share) / count + square / (4 * count * count))
     return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def of_mean(shares: Float[np.ndarray, " n"]) -> tuple[float, float]:
+    """Return the 95 % interval of the mean of shares, by the normal; all of [0, 1] for fewer than two.
+
+    For what is alike within a group, such as the pixels of a frame or the voxels of a thing: each group counts once.
+    """
+    if len(shares) < 2:
+        return 0.0, 1.0
+    half = 1.96 * float(shares.std(ddof=1)) / math.sqrt(len(shares))
+    return max(0.0, float(shares.mean()) - half), min(1.0, float(shares.mean()) + half)
 
 
 def in_percent(interval: tuple[float, float]) -> str:

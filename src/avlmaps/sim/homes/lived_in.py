@@ -13,8 +13,8 @@ from avlmaps.sim.furniture import families, make
 from avlmaps.sim.furniture.catalogue import Families
 from avlmaps.sim.furniture.garments import fabric, thrown_over
 from avlmaps.sim.furniture.people import seated
-from avlmaps.sim.mesh import Mesh, joined
-from avlmaps.sim.scene import Scene, SceneObject
+from avlmaps.sim.mesh import Mesh
+from avlmaps.sim.scene import Scene, SceneBuilder, SceneObject
 
 # How many of a thing lie on one of a category, on average; of the people how many sit there.
 _CLOTHES_ON = {
@@ -45,20 +45,12 @@ _FEWEST_M2 = 0.02  # of a top on which something lies
 
 @dataclass(eq=False)
 class _Filled:
-    """A scene and what is added to it."""
+    """A scene, and the builder that adds to it."""
 
     scene: Scene
     rng: np.random.Generator
     which: Families
-    meshes: list[Mesh]
-    objects: list[SceneObject]
-    instances: list[np.ndarray]
-
-    def add(self, category: str, mesh: Mesh) -> None:
-        low, high = ((float(x), float(y), float(z)) for x, y, z in (mesh.low, mesh.high))
-        self.instances.append(np.full(len(mesh.triangle), len(self.objects), np.int32))
-        self.objects.append(SceneObject(category, low, high))
-        self.meshes.append(mesh)
+    builder: SceneBuilder
 
     def piece(self, category: str, *, on_wall: bool = False) -> Mesh:
         """Return something that lies or stands by itself, or that hangs on a wall."""
@@ -72,10 +64,6 @@ class _Filled:
     def times(self, mean: float) -> range:
         return range(int(self.rng.poisson(mean)))
 
-    def build(self) -> Scene:
-        instance = np.concatenate(self.instances)
-        return replace(self.scene, mesh=joined(self.meshes), instance=instance, objects=tuple(self.objects))
-
 
 def lived_in(scene: Scene, rng: np.random.Generator, which: Families) -> Scene:
     """Return the home with clothes, papers, shower curtains and people in it.
@@ -86,7 +74,7 @@ def lived_in(scene: Scene, rng: np.random.Generator, which: Families) -> Scene:
         which: families of shapes.
     """
     scene = with_curtains_apart(scene)
-    filled = _Filled(scene, rng, which, [scene.mesh], list(scene.objects), [scene.instance])
+    filled = _Filled(scene, rng, which, SceneBuilder.of(scene))
     corners = scene.mesh.corners().astype(np.float64)
     order = np.argsort(scene.instance, kind="stable")
     ends = np.searchsorted(scene.instance[order], np.arange(len(scene.objects) + 1))
@@ -95,7 +83,7 @@ def lived_in(scene: Scene, rng: np.random.Generator, which: Families) -> Scene:
         if len(its):
             _on(filled, thing, its)
     _in_rooms(filled)
-    return filled.build()
+    return filled.builder.build()
 
 
 def with_curtains_apart(scene: Scene) -> Scene:
@@ -109,7 +97,8 @@ def with_curtains_apart(scene: Scene) -> Scene:
                 at = scene.mesh.corners()[cloth].reshape(-1, 3)
                 low, high = ((float(x), float(y), float(z)) for x, y, z in (at.min(axis=0), at.max(axis=0)))
                 instance[cloth] = len(objects)
-                objects.append(SceneObject("shower curtain", low, high, thing.heading_rad))
+                title = f"shower curtain#{1 + sum(o.category == 'shower curtain' for o in objects)}"
+                objects.append(SceneObject("shower curtain", low, high, thing.heading_rad, name=title))
     return replace(scene, instance=instance, objects=tuple(objects))
 
 
@@ -122,19 +111,19 @@ def _on(filled: _Filled, thing: SceneObject, corners: np.ndarray) -> None:
             if place is not None:
                 mesh = _no_larger(filled.piece(category), thing).turned(rng.uniform(0, 2 * np.pi))
                 sunk = 0.01 if category == "clothing" else 0.0
-                filled.add(category, mesh.moved(float(place[0]), float(place[1]), float(place[2]) - sunk))
+                filled.builder.add(category, mesh.moved(float(place[0]), float(place[1]), float(place[2]) - sunk))
     if rng.random() < _SEATED_ON.get(kind, 0.0):
         place = _a_top(rng, corners, *_SEAT_M)
         if place is not None:
             floor = thing.low[2]
             mesh = seated(rng, float(place[2]) - floor).turned(thing.heading_rad + rng.normal(0, 0.2))
-            filled.add("person", mesh.moved(float(place[0]), float(place[1]), floor))
+            filled.builder.add("person", mesh.moved(float(place[0]), float(place[1]), floor))
     if rng.random() < _LYING_ON.get(kind, 0.0):
         place = _a_top(rng, corners, *_SEAT_M)
         if place is not None:
             mesh = make("person", rng, name="lying").mesh.turned(thing.heading_rad + np.pi * int(rng.integers(2)))
             middle = thing.centre
-            filled.add("person", mesh.moved(middle[0], middle[1], float(place[2]) - 0.02))
+            filled.builder.add("person", mesh.moved(middle[0], middle[1], float(place[2]) - 0.02))
     if rng.random() < _THROWN_OVER.get(kind, 0.0):
         _throw_over(filled, thing, corners)
     if kind in ("bathtub", "shower") and "curtain" not in thing.family and rng.random() < _CURTAINS:
@@ -186,7 +175,7 @@ def _throw_over(filled: _Filled, thing: SceneObject, corners: np.ndarray) -> Non
     drop = rng.uniform(0.15, 0.5, 2) * (top - thing.low[2]) * 0.8
     mesh = thrown_over(rng, width, float(drop[0]), float(drop[1]), thick, fabric(rng)).turned(thing.heading_rad)
     x, y = front * (deep.min() + thick / 2) + left * at
-    filled.add("clothing", mesh.moved(float(x), float(y), top))
+    filled.builder.add("clothing", mesh.moved(float(x), float(y), top))
 
 
 def _curtain_before(filled: _Filled, thing: SceneObject, corners: np.ndarray) -> None:
@@ -198,7 +187,7 @@ def _curtain_before(filled: _Filled, thing: SceneObject, corners: np.ndarray) ->
     share = float(np.clip(np.ptp(wide) / piece.size[1], 0.5, 1.5))
     mesh = piece.scaled(1.0, share, 1.0).turned(thing.heading_rad + np.pi * int(rng.integers(2)))
     x, y = front * (deep.max() + 0.03) + left * (wide.min() + wide.max()) / 2
-    filled.add("shower curtain", mesh.moved(float(x), float(y), thing.low[2] + rng.uniform(0.08, 0.3)))
+    filled.builder.add("shower curtain", mesh.moved(float(x), float(y), thing.low[2] + rng.uniform(0.08, 0.3)))
 
 
 def _in_rooms(filled: _Filled) -> None:
@@ -219,7 +208,7 @@ def _in_rooms(filled: _Filled) -> None:
                 for _ in filled.times(mean):
                     x, y = inside[int(rng.integers(len(inside)))] + rng.uniform(-0.1, 0.1, 2)
                     mesh = filled.piece(category).turned(rng.uniform(0, 2 * np.pi))
-                    filled.add(category, mesh.moved(float(x), float(y), area.floor_m))
+                    filled.builder.add(category, mesh.moved(float(x), float(y), area.floor_m))
     for area in scene.areas:
         for _ in filled.times(_CLOTHES_ON_WALL.get(area.kind, 0.05)):
             _on_wall(filled, "clothing", area.polygon, area.floor_m, (1.5, 1.9))
@@ -248,7 +237,7 @@ def _on_wall(
         return  # part of an open plan: no wall is there
     top = float(rng.uniform(*heights_m))
     turned = mesh.turned(float(np.arctan2(inward[1], inward[0])))
-    filled.add(category, turned.moved(float(x), float(y), floor_m + max(0.1, top - float(mesh.size[2]))))
+    filled.builder.add(category, turned.moved(float(x), float(y), floor_m + max(0.1, top - float(mesh.size[2]))))
 
 
 def _over(place: np.ndarray, thing: SceneObject) -> bool:
