@@ -98,7 +98,7 @@ bench: $(READY)  ## Measure speed and accuracy; writes docs/benchmarks.md and th
 train: $(VENV)-training/.ready  ## Train the embedded encoders again (CPU, a night; SOUNDS=folder of clips with an index.csv).
 	$(VENV)-training/bin/python -m training.words
 	$(VENV)-training/bin/python -m training.sounds --sounds $(or $(SOUNDS),../shared/data/sounds)
-	$(VENV)-training/bin/python -m training.pixels --minutes $(or $(MINUTES),600)
+	$(VENV)-training/bin/python -m training.pixels --minutes $(or $(MINUTES),600) --out src/avlmaps/perception/embedded/weights
 	$(VENV)-training/bin/python -m training.rooms
 
 $(VENV)-training/.ready: pyproject.toml

@@ -171,6 +171,21 @@ def test_the_suite_needs_a_folder_and_an_encoder_of_kinds(tmp_path: Path, folder
         run_suite("frames", SuiteInputs(nyuv2=folder, profile="colours"), tmp_path)
 
 
+def test_the_suite_measures_the_chosen_model_not_the_profiles(tmp_path: Path, folder: Path) -> None:
+    with pytest.raises(BenchError, match="the pixel encoder 'colours'"):
+        run_suite("frames", SuiteInputs(nyuv2=folder, models=("pixels=colours",)), tmp_path)
+    chosen = SuiteInputs(nyuv2=folder, models=("pixels=embedded-synthetic",))
+    by_model = run_suite("frames", chosen, tmp_path / "model")["tables"]["by class"]["rows"]
+    by_profile = run_suite("frames", SuiteInputs(nyuv2=folder, profile="synthetic"), tmp_path / "profile")
+    assert by_model == by_profile["tables"]["by class"]["rows"]
+
+
+@pytest.mark.parametrize("suite", ["words", "sounds"])
+def test_suites_of_the_embedded_encoder_refuse_another_model(tmp_path: Path, suite: str) -> None:
+    with pytest.raises(BenchError, match="leave out --model pixels=colours"):
+        run_suite(suite, SuiteInputs(sounds=tmp_path, models=("pixels=colours",)), tmp_path / "out")
+
+
 def test_the_suite_writes_its_tables_in_every_form(tmp_path: Path, folder: Path) -> None:
     answer = run_suite("frames", SuiteInputs(nyuv2=folder, profile="synthetic"), tmp_path / "out")
     assert set(answer["tables"]) == {"labelled frames", "by class", "by class at several scales"}

@@ -1,8 +1,9 @@
-"""The whole making: ``python -m training.pixels`` renders, trains, calibrates and writes weights that ship.
+"""The whole making: ``python -m training.pixels`` renders, trains, calibrates and writes weights.
 
-With ``--nyuv2`` the weights learn from real frames as well and are those of the profile ``embedded``; without, from
-rendered worlds alone, and are those of ``synthetic``. Rendering runs beside the training, so that it never runs out
-of new homes.
+With ``--nyuv2`` the weights learn from real frames as well and are the first network, that of the profile
+``embedded``; without, from rendered worlds alone, and are the second, that of ``synthetic``. Rendering runs beside the
+training, so that it never runs out of new homes. The profile ``trained`` uses what is written
+(docs/guides/train-eyes.md).
 """
 
 import subprocess
@@ -25,8 +26,10 @@ class Options:
 
     work: Path = Path("build/pixels")
     """Folder for rendered frames and checkpoints; with much memory one in /dev/shm is quicker."""
-    out: Path = _WEIGHTS
-    """Folder of the weights that ship."""
+    out: Path = Path("build/pixels/eyes")
+    """Folder of the finished weights."""
+    id: str = ""
+    """Their name and version; ``""`` for those of weights that are replaced, or ``own/pixels-1``."""
     nyuv2: Path | None = None
     """Real frames: a folder in the layout of NYU Depth V2, or the file that ``training.pixels.real --pack`` wrote."""
     stage: Literal["all", "render", "fit", "finish"] = "all"
@@ -58,7 +61,7 @@ class Options:
         return _WEIGHTS / f"{self.name}.onnx" if self.start == "shipped" else self.start
 
     @property
-    def name(self) -> str:
+    def name(self) -> Literal["scene_encoder", "scene_encoder_synthetic"]:
         """The name of the weights."""
         return DEFAULT_WEIGHTS if self.nyuv2 else SYNTHETIC_WEIGHTS
 
@@ -121,11 +124,13 @@ def finish(options: Options) -> None:
     calibrate(
         CalibrateOptions(
             network=options.network, frames=options.work / "held-out", real=real_frames, out=options.out,
-            name=options.name,
+            name=options.name, id=options.id,
         )
     )  # fmt: skip
-    profile = "embedded" if options.nyuv2 else "synthetic"
-    calibrate_instances(InstanceOptions(work=options.work / "homes", out=options.out, profile=profile))
+    calibrate_instances(InstanceOptions(work=options.work / "homes", out=options.out, name=options.name))
+    models, eyes = options.out.absolute().parent, options.out.name
+    chosen = "" if eyes == "eyes" else f" --model pixels=trained@{eyes} views=trained@{eyes}"
+    print(f"build with them: avlmaps build REC --out MAP --profile trained --models {models}{chosen}", file=sys.stderr)
 
 
 def main(options: Options) -> None:

@@ -1,4 +1,4 @@
-"""Calibration of the scores on what was held out, and the files that ship: ``python -m training.pixels.calibrate``."""
+"""Calibration of the scores on what was held out, and a network's files: ``python -m training.pixels.calibrate``."""
 
 import sys
 from dataclasses import dataclass
@@ -24,6 +24,8 @@ PIXELS_PER_FRAME = 400
 # Of the biases that make single pixels likeliest only this share is applied: they favour walls, which fill most of a
 # view, and a thing whose pixels all lean to the wall is never seen. Instances are calibrated afterwards.
 PRIOR_SHARE = 0.25
+# What weights are called that do not ship.
+OWN = "own/pixels-1"
 NOTES = {
     "real": "A small network for homes and offices, trained on rendered rooms and on training frames of NYU Depth "
     "V2, which is published for research and states no licence: decide whether that suits you, or take "
@@ -42,8 +44,8 @@ class Options:
     """Rendered frames of held-out homes."""
     real: Path | None = None
     """Real frames held out; with them the notes say what the weights saw."""
-    out: Path = Path("src/avlmaps/perception/embedded/weights")
-    """Folder of the files that ship."""
+    out: Path = Path("build/pixels/eyes")
+    """Folder of the files."""
     name: str = DEFAULT_WEIGHTS
     """Their name without an ending."""
     count: int = 500
@@ -52,8 +54,8 @@ class Options:
     """Draws them."""
     weights: str = "mean"
     """``mean``: of the training's last stretch, or the ``last`` ones."""
-    version: int = 2
-    """Of the model, in its name."""
+    id: str = ""
+    """The model's name and version; ``""`` for those of the file that is replaced, or ``own/pixels-1``."""
 
 
 @dataclass(frozen=True)
@@ -154,6 +156,11 @@ def figures(scores: Scores, bias: np.ndarray, temperature: float) -> dict[str, f
     return told
 
 
+def _replaced_id(notes: Path) -> str:
+    """Return the name and version that the notes which are written again bear; ``OWN`` where there are none."""
+    return msgspec.json.decode(notes.read_bytes(), type=Notes).id if notes.is_file() else OWN
+
+
 def calibrate(options: Options) -> None:
     """Write NAME.onnx and NAME.json, and print the figures on what was held out."""
     network = load_network(options.network, options.weights)
@@ -164,8 +171,9 @@ def calibrate(options: Options) -> None:
     bias, temperature = fit_scores(parts)
     bias = PRIOR_SHARE * bias
     known = set(CATEGORIES) | set(ROOMS)
+    path = options.out / f"{options.name}.json"
     notes = Notes(
-        id=f"avlmaps/pixels-{options.version}",
+        id=options.id or _replaced_id(path),
         note=NOTES["real" if options.real else "synthetic"],
         categories=CATEGORIES,
         rooms=ROOMS,
@@ -181,7 +189,6 @@ def calibrate(options: Options) -> None:
     weights = options.out / f"{options.name}.onnx"
     write_onnx(network, weights)
     notes = msgspec.structs.replace(notes, checksum=checksum_of(weights.read_bytes(), notes))
-    path = options.out / f"{options.name}.json"
     path.write_bytes(msgspec.json.format(msgspec.json.encode(notes), indent=1) + b"\n")
     for name, part in zip(("rendered", "real"), parts, strict=False):
         for figure, value in figures(part, bias, temperature).items():

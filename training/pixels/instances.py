@@ -9,7 +9,7 @@ as well, did no better on homes left out (README).
 import sys
 from collections.abc import Iterator
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -22,12 +22,15 @@ from training.pixels.worlds import FIRST_CALIBRATION_SEED
 from avlmaps.bench.objects import FEWEST_VOXELS, GROWN_M, STRUCTURE
 from avlmaps.core.errors import MapError
 from avlmaps.core.lexicon import Entry, Kind, lexicon
+from avlmaps.core.registry import Kind as Module
 from avlmaps.maps.build import build_map
 from avlmaps.maps.keyframes.describe import KeyframeSettings
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.reader import StoredMap
 from avlmaps.perception.embedded.pixels import LARGEST_LOG_AREA, SMALLEST_LOG_AREA, EmbeddedPixels
-from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS, InstanceNotes, Notes
+from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, InstanceNotes, Notes
+from avlmaps.perception.models.settings import model_settings, using_models
+from avlmaps.perception.profiles import profile
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.pieces import object_pieces
@@ -55,16 +58,21 @@ class Options:
 
     work: Path = Path("build/pixels/homes")
     """Folder of the recordings and maps."""
-    out: Path = Path("src/avlmaps/perception/embedded/weights")
-    """Folder of the notes, which are written again."""
-    profile: Literal["embedded", "synthetic"] = "embedded"
-    """Whose weights."""
+    out: Path = Path("build/pixels/eyes")
+    """Folder of the weights; the notes are written again."""
+    name: Literal["scene_encoder", "scene_encoder_synthetic"] = DEFAULT_WEIGHTS
+    """Which: the first network, with the second one that goes with it, or the second alone."""
     furniture: Path | None = None
     """Folder of artists' models that take the places of most pieces (borrowed.py); None for pieces made by rule."""
     homes: int = 12
     """How many held-out homes; every sixth is an office."""
     frames: int = 300
     """Limit of frames of each walk."""
+
+    @property
+    def model(self) -> Path:
+        """What the eyes are loaded from: the folder with both networks, or the file of the second."""
+        return self.out if self.name == DEFAULT_WEIGHTS else self.out / f"{self.name}.onnx"
 
 
 @dataclass(frozen=True)
@@ -79,14 +87,15 @@ class Pieces:
 
 def pieces_of(options: Options, number: int) -> Iterator[Pieces]:
     """Record and map a held-out home and yield the instances of every category."""
-    seed, sensor, profile = FIRST_CALIBRATION_SEED + 1000 + number, SENSORS[number % len(SENSORS)], options.profile
+    seed, sensor = FIRST_CALIBRATION_SEED + 1000 + number, SENSORS[number % len(SENSORS)]
     recording = options.work / f"{seed}-{sensor}"
     if not (recording / "objects.json").is_file():
         with nullcontext() if options.furniture is None else borrowed_furniture(options.furniture, "held-out"):
             scene = open_scene(f"{'office' if number % 6 == 5 else 'house'}:{seed}:held-out")
         settings = RecordSettings(hearing="none", sensor=sensor, fps=5.0, max_frames=options.frames, workers=1)
         record_scene(scene, recording, settings, seed)
-    asked = AVLMap(_map_of(open_recording(recording), options.work / f"{seed}-{sensor}-{profile}.avlmap", profile))
+    path = options.work / f"{seed}-{sensor}-{options.name}.avlmap"
+    asked = AVLMap(_map_of(open_recording(recording), path, options.model.name))
     encoder = asked.stored.profile.pixel_encoder()
     assert isinstance(encoder, EmbeddedPixels)
     things, feature, space = read_truth(recording).objects, asked.stored.voxels.feature, asked.space
@@ -108,12 +117,14 @@ def pieces_of(options: Options, number: int) -> Iterator[Pieces]:
         yield Pieces(name, pieces.mean_probability[large], area[large], share[large] >= 0.5)
 
 
-def _map_of(recording: Recording, path: Path, profile: str) -> StoredMap:
+def _map_of(recording: Recording, path: Path, model: str) -> StoredMap:
     """Return the map of a recording by the weights as they are now; one that is there already is not made again."""
+    eyes = f"trained@{model}"
+    chosen = profile("trained").choosing({Module.PIXELS: eyes, Module.VIEWS: eyes})
     try:
-        return build_map(recording, path, profile, FEW_KEYFRAMES)
+        return build_map(recording, path, chosen, FEW_KEYFRAMES)
     except MapError:  # by other weights
-        return build_map(recording, path, profile, FEW_KEYFRAMES, overwrite=True)
+        return build_map(recording, path, chosen, FEW_KEYFRAMES, overwrite=True)
 
 
 def usual_area_m2(entry: Entry) -> float | None:
@@ -152,9 +163,10 @@ def log_odds(pieces: Pieces, notes: InstanceNotes) -> np.ndarray:
 
 def calibrate_instances(options: Options) -> None:
     """Map held-out homes, fit, and write the notes again."""
-    found = [piece for number in range(options.homes) for piece in pieces_of(options, number) if len(piece.is_true)]
-    weights = DEFAULT_WEIGHTS if options.profile == "embedded" else SYNTHETIC_WEIGHTS
-    path = options.out / f"{weights}.json"
+    with using_models(replace(model_settings(), folder=options.model.absolute().parent)):
+        pieces = [piece for number in range(options.homes) for piece in pieces_of(options, number)]
+    found = [piece for piece in pieces if len(piece.is_true)]
+    path = options.out / f"{options.name}.json"
     notes = msgspec.json.decode(path.read_bytes(), type=Notes)
     notes = msgspec.structs.replace(notes, instances=fit_instances(found, notes.categories))
     path.write_bytes(msgspec.json.format(msgspec.json.encode(notes), indent=1) + b"\n")

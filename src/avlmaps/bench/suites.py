@@ -140,16 +140,16 @@ def _locate(inputs: SuiteInputs) -> Mapping[str, Table]:
 def _frames(inputs: SuiteInputs) -> Mapping[str, Table]:
     from avlmaps.bench.frames import run_frames
     from avlmaps.perception.embedded.pixels import EmbeddedPixels
-    from avlmaps.perception.profiles import profile
 
     if inputs.nyuv2 is None:
         raise BenchError("This suite measures on labelled frames in the layout of NYU Depth V2; name their folder with "
                          "--nyuv2.")  # fmt: skip
-    encoder = profile(inputs.profile).pixel_encoder()
+    used = choose_models(inputs.profile, inputs.models)
+    encoder = used.pixel_encoder()
     if not isinstance(encoder, EmbeddedPixels):
         raise BenchError(
-            f"The suite frames sums probabilities of kinds, which the pixel encoder of the profile {inputs.profile!r} "
-            "does not give. Choose embedded or synthetic."
+            f"The suite frames sums probabilities of kinds, which the pixel encoder {used.pixels!r} does not give. "
+            "Choose the profile embedded, synthetic or trained."
         )
     return run_frames(encoder, inputs.nyuv2)
 
@@ -179,3 +179,7 @@ def _clips(inputs: SuiteInputs) -> Path:
 def _embedded_only(inputs: SuiteInputs, suite: str) -> None:
     if inputs.profile != "embedded":
         raise BenchError(f"The suite {suite} measures the embedded encoder; it has no figures for {inputs.profile!r}.")
+    if inputs.models:
+        raise BenchError(
+            f"The suite {suite} measures the embedded encoder; leave out --model {' '.join(inputs.models)}."
+        )

@@ -117,6 +117,10 @@ _LIGHT = (
     _light(Kind.VIEWS, "views:LightViews"),
     _light(Kind.SOUNDS, "sounds:LightSounds"),
 )
+_TRAINED = (
+    Backend(Kind.PIXELS, "trained", f"{_EMBEDDED}.trained:trained_pixels", model="eyes", licence="your own"),
+    Backend(Kind.VIEWS, "trained", f"{_EMBEDDED}.trained:trained_views", model="eyes", licence="your own"),
+)
 _foundation, _paper = partial(_with_torch, "foundation"), partial(_with_torch, "paper")
 _OF_TORCH = (
     _foundation(Kind.PIXELS, "tipsv2", "tipsv2:TipsPixels", "google/tipsv2-b14", "Apache-2.0", "transformers"),
@@ -175,7 +179,8 @@ _OF_TORCH = (
         "transformers",
     ),
 )
-_registered: dict[tuple[Kind, str], Backend] = {(b.kind, b.name): b for b in (*_BUILT_IN, *_LIGHT, *_OF_TORCH)}
+_ALL = (*_BUILT_IN, *_LIGHT, *_TRAINED, *_OF_TORCH)
+_registered: dict[tuple[Kind, str], Backend] = {(b.kind, b.name): b for b in _ALL}
 
 
 def entry_points(group: str) -> "EntryPoints":

@@ -273,3 +273,12 @@ register_profile(
         about="as embedded, but its eyes learnt from rendered worlds alone; weaker in real rooms",
     )
 )
+register_profile(
+    replace(
+        _EMBEDDED,
+        name="trained",
+        pixels="trained",
+        views="trained",
+        about="as embedded, with eyes that you trained yourself",
+    )
+)

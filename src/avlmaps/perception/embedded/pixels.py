@@ -23,13 +23,19 @@ class EmbeddedPixels(NamedEncoder):
     Args:
         network: which; the two that ship, together, if None.
         words: the word encoder whose space the features live in; the embedded one if None.
+        licence: of the networks.
     """
 
-    def __init__(self, network: SceneNetwork | PairedNetworks | None = None, words: WordEncoder | None = None) -> None:
+    def __init__(
+        self,
+        network: SceneNetwork | PairedNetworks | None = None,
+        words: WordEncoder | None = None,
+        licence: str = "MIT",
+    ) -> None:
         super().__init__("categories", load_pair() if network is None else network, words)
         notes = self._network.notes
         self.card = ModelCard(
-            id=notes.id, dim=self.codes.shape[1], licence="MIT", checksum=self._network.checksum, note=notes.note
+            id=notes.id, dim=self.codes.shape[1], licence=licence, checksum=self._network.checksum, note=notes.note
         )
 
     @property

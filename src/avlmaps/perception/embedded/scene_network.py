@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from hashlib import sha256
 from importlib.resources import files
-from typing import Any
+from importlib.resources.abc import Traversable
+from typing import Any, Final
 
 import msgspec
 import numpy as np
@@ -26,7 +27,8 @@ from avlmaps.recordings.types import Frame
 # Without ground a camera is taken to be upright and as high as people and robots mostly hold it.
 _USUAL_HEIGHT_M = 1.3
 # Names of the weights that ship.
-DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS = "scene_encoder", "scene_encoder_synthetic"
+DEFAULT_WEIGHTS: Final = "scene_encoder"
+SYNTHETIC_WEIGHTS: Final = "scene_encoder_synthetic"
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +150,14 @@ class SceneNetwork:
         options.inter_op_num_threads = 1
         # Threads that wait for the next frame leave the cores to decoding and fusion: a build takes 0.6 of the time.
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-        return onnxruntime.InferenceSession(self._read_weights(), options, providers=["CPUExecutionProvider"])
+        weights = self._read_weights()
+        try:
+            return onnxruntime.InferenceSession(weights, options, providers=["CPUExecutionProvider"])
+        except Exception as fault:  # onnxruntime raises types of its own
+            raise BackendError(
+                f"The weights of {self.notes.id} cannot be run by onnxruntime {onnxruntime.__version__} "
+                f"({type(fault).__name__}); update onnxruntime, or install or train the weights again."
+            ) from fault
 
     def see(self, frame: Frame, look: Look = PLAIN) -> Seen:
         """Encode a frame; its ``ground`` gives the up direction, where it is known."""
@@ -191,23 +200,40 @@ def load_network(weights: str = DEFAULT_WEIGHTS) -> SceneNetwork:
         BackendError: its files are missing or damaged.
     """
     folder = files("avlmaps.perception.embedded") / "weights"
+    return read_network(folder, weights, "install the package again, or make them with 'python -m training.pixels'")
+
+
+def read_network(folder: Traversable, weights: str, remedy: str) -> SceneNetwork:
+    """Return the network of two files: ``WEIGHTS.onnx``, and its ``Notes``, ``WEIGHTS.json``.
+
+    Args:
+        folder: where they lie.
+        weights: their name without an ending.
+        remedy: what the user can do where they are missing or damaged, for the error.
+
+    Raises:
+        BackendError: the notes cannot be read. The weights are read for the first frame, and raise it there.
+    """
+
+    def unusable(fault: object) -> BackendError:
+        return BackendError(f"The embedded pixel encoder's weights cannot be read ({fault}); {remedy}.")
 
     def read(end: str) -> bytes:
         try:
             return (folder / f"{weights}.{end}").read_bytes()
         except OSError as fault:
-            raise _unusable(str(fault)) from fault
+            raise unusable(fault) from fault
 
     def read_weights() -> bytes:
         content = read("onnx")
         if checksum_of(content, notes) != notes.checksum:
-            raise _unusable(f"{weights}.onnx and {weights}.json do not belong together")
+            raise unusable(f"{weights}.onnx and {weights}.json do not belong together")
         return content
 
     try:
         notes = msgspec.json.decode(read("json"), type=Notes)
-    except msgspec.MsgspecError as fault:
-        raise _unusable(str(fault)) from fault
+    except (msgspec.MsgspecError, UnicodeDecodeError) as fault:
+        raise unusable(fault) from fault
     return SceneNetwork(read_weights, notes)
 
 
@@ -223,13 +249,6 @@ def checksum_of(weights: bytes, notes: Notes) -> str:
     said = msgspec.structs.replace(notes, called={}, kinds={}, instances=InstanceNotes(), note="")
     makes = {name: value for name, value in msgspec.structs.asdict(said).items() if name != "checksum"}
     return sha256(weights + msgspec.json.encode(makes)).hexdigest()
-
-
-def _unusable(fault: str) -> BackendError:
-    return BackendError(
-        f"The embedded pixel encoder's weights cannot be read ({fault}); install the package again, or make them "
-        "with 'python -m training.pixels'."
-    )
 
 
 def at_working_size(

@@ -19,15 +19,21 @@ class EmbeddedViews(NamedEncoder):
     Args:
         network: which; the two that ship, together, if None.
         words: the word encoder whose space the features live in; the embedded one if None.
+        licence: of the networks.
     """
 
-    def __init__(self, network: SceneNetwork | PairedNetworks | None = None, words: WordEncoder | None = None) -> None:
+    def __init__(
+        self,
+        network: SceneNetwork | PairedNetworks | None = None,
+        words: WordEncoder | None = None,
+        licence: str = "MIT",
+    ) -> None:
         super().__init__("rooms", load_pair() if network is None else network, words)
         notes = self._network.notes
         self.card = ModelCard(
             id=notes.id.replace("pixels", "views"),
             dim=self.codes.shape[1],
-            licence="MIT",
+            licence=licence,
             checksum=self._network.checksum,
             note=f"Knows these kinds of room: {', '.join(self.names)}.",
         )

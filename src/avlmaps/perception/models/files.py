@@ -45,6 +45,24 @@ def model_file(name: str, how_to_get: str) -> Path:
     raise BackendError(f"The checkpoint {name} is not here (looked {looked}); get it with: {how_to_get}")
 
 
+def local_model(model: str, how_to_get: str) -> Path:
+    """Return the folder or file of a model that is never fetched.
+
+    Args:
+        model: its name in the folder of models, or a path.
+        how_to_get: the command that makes or brings it, for the error.
+
+    Raises:
+        BackendError: it is not here.
+    """
+    for place in _places(model):
+        if place.exists():
+            return place
+    folder = model_settings().folder
+    looked = f"in {folder} and " if folder else "in no folder of models, --models DIR sets one, and "
+    raise BackendError(f"The model {model} is not here (looked {looked}for that path); get it with: {how_to_get}")
+
+
 def _places(model: str) -> list[Path]:
     """Return where a model may lie, the likeliest first."""
     folder = model_settings().folder

@@ -42,6 +42,7 @@ PUBLISHED: dict[str, Published] = {
     "avlmaps/light-1": Published(
         fetched="manifest.json", get="avlmaps profiles --fetch light --from URL|DIR", size_mb=250
     ),
+    "eyes": Published(get="python -m training.pixels --out MODELS/eyes (docs/guides/train-eyes.md)"),
     "google/tipsv2-b14": Published(size_mb=750),
     "timm/PE-Core-B-16": Published(size_mb=1800),
     "google/siglip2-base-patch16-224": Published(size_mb=1500),

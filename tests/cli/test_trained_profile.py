@@ -1,0 +1,73 @@
+"""The profile ``trained`` from the command line: listed, built with, queried, and other weights refused."""
+
+import shutil
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.registry import forget_loaded
+from avlmaps.maps.store.reader import open_stored
+from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, Notes, checksum_of
+from avlmaps.recordings.types import Frame
+from avlmaps.recordings.writer import RecordingWriter
+from helpers.raycast import render
+from helpers.room import Room
+
+CAMERA = Pinhole(80.0, 80.0, 60.0, 45.0, 120, 90)
+
+
+@pytest.fixture
+def walk(tmp_path: Path) -> Path:
+    """Five frames in the analytic room."""
+    path, room, rig = tmp_path / "rec", Room(), Rig(CAMERA, CAMERA)
+    with RecordingWriter(path, rig, up_in_world=np.array([0.0, 0.0, 1.0])) as writer:
+        for index, pose in enumerate(room.walk()[100:105]):
+            view = render(room.scene, CAMERA, pose)
+            writer.add(Frame(index, f"{index:06d}", index / 4.0, view.rgb, view.depth_m, pose, rig))
+    return path
+
+
+@pytest.fixture
+def models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder of models with eyes in it, as ``python -m training.pixels`` writes them without real frames."""
+    monkeypatch.delenv("AVLMAPS_MODELS", raising=False)
+    write_eyes(tmp_path / "models" / "eyes", temperature=1.5)
+    yield tmp_path / "models"
+    forget_loaded()
+
+
+def write_eyes(folder: Path, temperature: float) -> None:
+    """Write the network that ships as if it had been trained and calibrated anew."""
+    folder.mkdir(parents=True)
+    shipped = Path(str(files("avlmaps.perception.embedded") / "weights"))
+    weights = (shipped / f"{SYNTHETIC_WEIGHTS}.onnx").read_bytes()
+    shutil.copy(shipped / f"{SYNTHETIC_WEIGHTS}.onnx", folder)
+    notes = msgspec.json.decode((shipped / f"{SYNTHETIC_WEIGHTS}.json").read_bytes(), type=Notes)
+    notes = msgspec.structs.replace(notes, id="own/pixels-1", temperature=temperature)
+    notes = msgspec.structs.replace(notes, checksum=checksum_of(weights, notes))
+    (folder / f"{SYNTHETIC_WEIGHTS}.json").write_bytes(msgspec.json.encode(notes))
+
+
+def test_a_map_is_built_with_them_and_queried(walk: Path, models: Path, run, answer, tmp_path: Path) -> None:
+    listed = {one["name"]: one for one in answer("profiles", "--models", models)["profiles"]}
+    assert [b["state"] for b in listed["trained"]["backends"][:2]] == ["ready", "ready"]
+    home = tmp_path / "m.avlmap"
+    answer("build", walk, "--out", home, "--profile", "trained", "--voxel-size-m", "0.1", "--models", models)
+    made_by = open_stored(home).info.models
+    assert (made_by["pixels"].id, made_by["pixels"].backend) == ("own/pixels-1", "trained@eyes")
+    assert (made_by["views"].id, made_by["views"].licence) == ("own/views-1", "your own")
+    assert 0.0 <= answer("query", home, "--object", "wall", "--models", models)["parts"][0]["peak"] <= 1.0
+
+    status, out, err = run("query", home, "--object", "wall")
+    assert (status, out, err.count("\n")) == (1, "", 1)
+    assert "The model eyes is not here" in err and "--models DIR" in err
+
+    write_eyes(tmp_path / "others" / "eyes", temperature=2.5)
+    status, out, err = run("query", home, "--object", "wall", "--models", tmp_path / "others")
+    assert (status, out, err.count("\n")) == (1, "", 1)
+    assert "was built with own/pixels-1 (checksum" in err and "as it was (--models DIR)" in err
