@@ -1,5 +1,8 @@
 """The frame benchmark: the kinds of its classes, the reader of its folders, and its arithmetic on known answers."""
 
+import json
+from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,20 +21,17 @@ from avlmaps.bench.frames import (
     summary_table,
 )
 from avlmaps.bench.harness.intervals import of_mean
-from avlmaps.bench.nyu import (
-    CAMERA,
-    CLASSES,
-    KINDS_OF_CLASS,
-    MARGIN_PX,
-    METRES_A_STEP,
-    SCORED,
-    NyuFolder,
-    class_of_kinds,
-    smooth_depth,
-)
+from avlmaps.bench.labelled_folder import MARGIN_PX, METRES_A_STEP, LabelledFolder, LabelledFrame, smooth_depth
+from avlmaps.bench.nyu import CAMERA, CLASSES, KINDS_OF_CLASS, SCORED, class_of_kinds
 from avlmaps.bench.suites import BenchError, SuiteInputs, run_suite
+from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS, load_network
+from avlmaps.recordings.types import Frame, Ground
+
+with pytest.MonkeyPatch.context() as patch:  # training is beside the package, not in it
+    patch.syspath_prepend(str(Path(__file__).resolve().parents[2]))
+    real = import_module("training.pixels.real")
 
 CHAIR, FLOOR, OTHER_PROP = (CLASSES.index(name) for name in ("chair", "floor", "other prop"))
 
@@ -86,7 +86,7 @@ def test_an_encoder_that_is_right_is_right_in_every_figure(folder: Path) -> None
     kinds = ("floor", "office chair", "wall")
     said = np.zeros((60, 80), int)
     said[10:40, 22:54] = 1
-    figures = measure(encoder_of(kinds, said), NyuFolder(folder))[SEVERAL]  # pyright: ignore[reportArgumentType]
+    figures = measure(encoder_of(kinds, said), LabelledFolder(folder))[SEVERAL]  # pyright: ignore[reportArgumentType]
     assert (figures.accuracy, figures.class_accuracy, figures.mean_iou) == (1.0, 1.0, 1.0)
     assert figures.confusion.sum() == 35 * 300 + 100 * 100
     (row,) = summary_table({"once": figures})["rows"]
@@ -96,7 +96,7 @@ def test_an_encoder_that_is_right_is_right_in_every_figure(folder: Path) -> None
 def test_a_chair_taken_for_floor_costs_what_it_covers(folder: Path) -> None:
     wrong, right = np.zeros((60, 80), int), np.zeros((60, 80), int)
     right[10:40, 22:54] = 1
-    both = measure(encoder_of(("floor", "chair"), wrong, right), NyuFolder(folder))  # pyright: ignore[reportArgumentType]
+    both = measure(encoder_of(("floor", "chair"), wrong, right), LabelledFolder(folder))  # pyright: ignore[reportArgumentType]
     assert both[SEVERAL].accuracy == 1.0
     figures = both[ONCE]
     floor, chair = 35 * 300, 100 * 100
@@ -110,7 +110,7 @@ def test_a_chair_taken_for_floor_costs_what_it_covers(folder: Path) -> None:
 def test_kinds_of_a_class_add_up_against_a_likelier_kind_of_another() -> None:
     kinds = ("sofa", "chair", "armchair", "kettle")
     p = np.tile(np.array([0.3, 0.2, 0.15, 0.35], np.float32), (6, 8, 1))
-    summed = class_probabilities(p, kinds)
+    summed = class_probabilities(p, kinds, (480, 640))
     assert summed.shape == (480, 640, SCORED)
     assert (summed.argmax(axis=2) == CHAIR).all()
     assert summed.sum(axis=2).max() == pytest.approx(0.65, abs=1e-5)
@@ -121,14 +121,14 @@ def test_kinds_of_a_class_add_up_against_a_likelier_kind_of_another() -> None:
 def test_the_sums_of_classes_keep_all_probability_that_is_scored(kinds: list[str]) -> None:
     p = np.full((4, 4, len(kinds)), 1.0 / len(kinds), np.float32)
     scored = float((class_of_kinds(tuple(kinds)) < SCORED).mean())
-    np.testing.assert_allclose(class_probabilities(p, tuple(kinds)).sum(axis=2), scored, atol=1e-5)
+    np.testing.assert_allclose(class_probabilities(p, tuple(kinds), (12, 16)).sum(axis=2), scored, atol=1e-5)
 
 
 def test_the_labelled_floor_gives_the_height_of_the_camera(folder: Path) -> None:
-    one = NyuFolder(folder).read(0)
+    one = LabelledFolder(folder).read(0)
     assert one.floor_is_labelled and one.frame.ground is not None
     assert one.frame.ground.camera_height_m(np.eye(4)) == pytest.approx(1.2, abs=0.03)
-    other = NyuFolder(folder).read(1)
+    other = LabelledFolder(folder).read(1)
     assert not other.floor_is_labelled and other.frame.ground is not None
 
 
@@ -161,7 +161,94 @@ def test_steps_of_depth_are_smoothed_and_edges_stay() -> None:
 def test_a_damaged_folder_is_refused_in_one_sentence(folder: Path, damage, says: str) -> None:
     damage(folder)
     with pytest.raises(RecordingError, match=says):
-        NyuFolder(folder).read(0)
+        LabelledFolder(folder).read(0)
+
+
+OWN = Pinhole(300.0, 310.0, 200.0, 110.0, 400, 225)
+
+
+@pytest.fixture
+def own_camera(tmp_path: Path) -> Path:
+    """Return a folder of one frame of another camera: 16 bit of depth, a floor 1 m under it, and a chair."""
+    rows = np.arange(OWN.height) + 0.5
+    below_mm = np.rint(1000.0 * np.clip(1.0 * OWN.fy / np.maximum(rows - OWN.cy, 1.0), 0.5, 5.0)).astype(np.uint16)
+    label = np.zeros((OWN.height, OWN.width), np.uint8)
+    label[200:] = FLOOR + 1
+    label[50:150, 100:200] = CHAIR + 1
+    (tmp_path / "frames.csv").write_text("frame,up_x,up_y,up_z\nhall-a,0,-1,0\n")
+    (tmp_path / "camera.json").write_text(json.dumps(asdict(OWN)))
+    cv2.imwrite(str(tmp_path / "hall-a.color.png"), np.full((OWN.height, OWN.width, 3), 90, np.uint8))
+    cv2.imwrite(str(tmp_path / "hall-a.depth.png"), np.repeat(below_mm[:, None], OWN.width, axis=1))
+    cv2.imwrite(str(tmp_path / "hall-a.label.png"), label)
+    return tmp_path
+
+
+def test_frames_of_another_camera_are_read_and_scored(own_camera: Path) -> None:
+    read = LabelledFolder(own_camera)
+    one = read.read(0)
+    assert read.camera == one.frame.rig.depth == one.frame.rig.rgb == OWN
+    assert one.floor_is_labelled and one.frame.ground is not None
+    assert one.frame.ground.camera_height_m(np.eye(4)) == pytest.approx(1.0, abs=0.01)
+    said = np.zeros((45, 80), int)
+    said[9:31, 19:41] = 1
+    figures = measure(encoder_of(("floor", "chair"), said), read)[ONCE]  # pyright: ignore[reportArgumentType]
+    assert figures.accuracy == 1.0 and figures.confusion.sum() == 50 * 50 + 13 * 200
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("camera.json", b"{", "is no camera"),
+        ("camera.json", b'{"fx": 300}', "needs fx, fy, cx, cy, width and height"),
+        ("camera.json", b'{"fx":-1,"fy":1,"cx":0,"cy":0,"width":400,"height":225}', "positive focal lengths"),
+        ("camera.json", b'{"fx":300,"fy":300,"cx":0,"cy":0,"width":640,"height":480}', "480 rows and 640 columns"),
+        ("hall-a.depth.png", None, "it must be uint16"),
+    ],
+)
+def test_a_damaged_camera_or_depth_is_refused_in_one_sentence(
+    own_camera: Path, name: str, content: bytes | None, says: str
+) -> None:
+    if content is None:
+        cv2.imwrite(str(own_camera / name), np.zeros((OWN.height, OWN.width), np.uint8))
+    else:
+        (own_camera / name).write_bytes(content)
+    with pytest.raises(RecordingError, match=says):
+        LabelledFolder(own_camera).read(0)
+
+
+@given(st.integers(20, 900), st.integers(20, 900), st.floats(0.5, 2.0))
+def test_a_frame_that_is_learnt_keeps_its_rays_whatever_its_shape(width: int, height: int, focal: float) -> None:
+    camera = Pinhole(focal * width, focal * width, 0.4 * width, 0.6 * height, width, height)
+    number = np.arange(width * height).reshape(height, width)
+    frame = Frame(
+        0, "a", 0.0, np.zeros((height, width, 3), np.uint8), number.astype(np.float32) % 60, np.eye(4),
+        Rig(camera, camera), Ground(np.array([0.0, -1.0, 0.0]), np.zeros(1), np.array([-1.2])),
+    )  # fmt: skip
+    shown = real.fitted(LabelledFrame(frame, (number % 41).astype(np.uint8), True), camera)
+    assert shown.depth_mm.shape == shown.label.shape == shown.rgb.shape[:2] == (240, 320)
+    fx, fy, cx, cy, *up, height_m, is_known = shown.camera
+    assert (up, height_m, is_known) == ([0.0, -1.0, 0.0], 1.2, 1.0)
+    w, h = round(width * cx / camera.cx), round(height * cy / camera.cy)
+    assert max(w / 320, h / 240) == pytest.approx(1.0) and w <= 320 and h <= 240
+    assert (shown.label[h:] == 255).all() and (shown.label[:, w:] == 255).all()
+    assert not shown.depth_mm[h:].any() and not shown.depth_mm[:, w:].any()
+    row, column = np.arange(h) * height // h, np.arange(w) * width // w
+    # The pixel that a cell was sampled from lies on the cell's ray, to the width of a cell or of a pixel.
+    off_x = (np.arange(w) + 0.5 - cx) / fx - (column + 0.5 - camera.cx) / camera.fx
+    off_y = (np.arange(h) + 0.5 - cy) / fy - (row + 0.5 - camera.cy) / camera.fy
+    assert np.abs(off_x).max() <= max(1.0 / fx, 1.0 / camera.fx)
+    assert np.abs(off_y).max() <= max(1.0 / fy, 1.0 / camera.fy)
+    np.testing.assert_array_equal(shown.depth_mm[:h, :w], (number[row[:, None], column] % 60) * 1000)
+
+
+@given(st.lists(st.integers(0, 3), min_size=1, max_size=200))
+def test_held_out_frames_are_whole_blocks_between_gaps(steps: list[int]) -> None:
+    numbers = np.cumsum(np.array(steps) + 1)
+    for names in (tuple(f"{n:04d}" for n in numbers), tuple(f"hall-{n}" for n in numbers)):
+        cut = real.blocks(names)
+        assert [row for block in cut for row in block] == list(range(len(names)))
+        assert all(len(block) >= real.BLOCK for block in cut[:-1])
+    assert all(len(block) == real.BLOCK for block in cut[:-1])  # names without numbers show no gaps
 
 
 def test_the_suite_needs_a_folder_and_an_encoder_of_kinds(tmp_path: Path, folder: Path) -> None:

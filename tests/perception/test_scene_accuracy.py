@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from avlmaps.bench.frames import ONCE, measure
-from avlmaps.bench.nyu import CLASSES, NyuFolder, class_of_kinds
+from avlmaps.bench.labelled_folder import LabelledFolder
+from avlmaps.bench.nyu import CLASSES, class_of_kinds
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
 from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS, SceneNetwork, load_network
@@ -74,7 +75,7 @@ def test_scores_that_do_not_follow_the_picture_would_fail(home: Views) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("weights", "least"), [(DEFAULT_WEIGHTS, 0.55), (SYNTHETIC_WEIGHTS, 0.33)])
 def test_real_frames_of_nyu_are_recognised(shared_data: Path, weights: str, least: float) -> None:
-    folder = NyuFolder(_shared(shared_data / "data" / "nyuv2"))
+    folder = LabelledFolder(_shared(shared_data / "data" / "nyuv2"))
     folder.names = HELD_OUT
     figures = measure(EmbeddedPixels(load_network(weights)), folder)[ONCE]
     assert figures.accuracy > least

@@ -31,7 +31,7 @@ class Options:
     id: str = ""
     """Their name and version; ``""`` for those of weights that are replaced, or ``own/pixels-1``."""
     nyuv2: Path | None = None
-    """Real frames: a folder in the layout of NYU Depth V2, or the file that ``training.pixels.real --pack`` wrote."""
+    """Real labelled frames: a folder (docs/guides/train-eyes.md), or a file of ``training.pixels.real --pack``."""
     stage: Literal["all", "render", "fit", "finish"] = "all"
     """Render the first shards, train, calibrate and write; or one of these."""
     minutes: float = 600.0

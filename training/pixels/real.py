@@ -1,8 +1,9 @@
 """Real labelled frames as shards: ``python -m training.pixels.real --nyuv2 DIR``.
 
-The frames are those of NYU Depth V2's training split in the layout of ``avlmaps.bench.nyu``. Their labels are coarse:
-NYU's class c stands in a shard as ``FIRST_COARSE + c`` and teaches the sum of its kinds' probabilities. Neighbouring
-numbers are often one room, so whole blocks of them are held out for development.
+The frames are those of NYU Depth V2's training split, or of any camera, in the layout of
+``avlmaps.bench.labelled_folder``. Their labels are coarse: NYU's class c stands in a shard as ``FIRST_COARSE + c`` and
+teaches the sum of its kinds' probabilities. Neighbouring numbers are often one room, so whole blocks of them are held
+out for development.
 """
 
 import io
@@ -18,7 +19,9 @@ import numpy as np
 import tyro
 from training.pixels.labels import CATEGORIES, FIRST_COARSE, ROOMS, UNLABELLED
 
-from avlmaps.bench.nyu import CAMERA, CLASSES, NyuFolder
+from avlmaps.bench.labelled_folder import LabelledFolder, LabelledFrame
+from avlmaps.bench.nyu import CLASSES
+from avlmaps.core.camera import Pinhole
 
 WIDTH, HEIGHT = 320, 240
 # The frames in their order are cut into blocks of about this size, at gaps in their numbers; each sixth is held out.
@@ -32,7 +35,7 @@ class Options:
     """Where real frames come from and go to."""
 
     nyuv2: Path
-    """Folder in the layout of NYU Depth V2, or a file that ``--pack`` wrote."""
+    """Folder of labelled frames (``avlmaps.bench.labelled_folder``), or a file that ``--pack`` wrote."""
     out: Path = Path("build/pixels/real")
     """Folder of the shards: ``training`` and ``development`` in it."""
     pack: Path | None = None
@@ -40,10 +43,14 @@ class Options:
 
 
 def blocks(names: tuple[str, ...]) -> list[list[int]]:
-    """Return rows of an index in blocks: cut where numbers have a gap, as soon as a block has enough."""
+    """Return rows of an index in blocks: cut where numbers have a gap, as soon as a block has enough.
+
+    Names that are no numbers show no gaps: there every block has the same size.
+    """
     cut: list[list[int]] = [[]]
-    for row, name in enumerate(names):
-        gap = row > 0 and int(name) - int(names[row - 1]) > 1
+    numbers = [int(name) for name in names] if all(name.isdecimal() for name in names) else None
+    for row in range(len(names)):
+        gap = row > 0 and (numbers is None or numbers[row] - numbers[row - 1] > 1)
         if gap and len(cut[-1]) >= BLOCK:
             cut.append([])
         cut[-1].append(row)
@@ -57,7 +64,7 @@ def held_out_rows(names: tuple[str, ...]) -> list[int]:
 
 @dataclass
 class Real:
-    """A frame at half its size: what a shard needs of it."""
+    """A frame at the size of shards: what they need of it."""
 
     depth_mm: np.ndarray
     label: np.ndarray
@@ -65,21 +72,32 @@ class Real:
     camera: np.ndarray
 
 
-def read_folder(folder: NyuFolder) -> Iterator[Real]:
+def read_folder(folder: LabelledFolder) -> Iterator[Real]:
     """Read every frame; the camera's last number says whether the labels gave its height."""
-    small = CAMERA.resized(WIDTH, HEIGHT)
     for number in range(len(folder)):
-        one = folder.read(number)
-        ground = one.frame.ground
-        assert ground is not None
-        label = np.where(one.label == 0, UNLABELLED, FIRST_COARSE + one.label.astype(int) - 1).astype(np.uint8)
-        numbers = [small.fx, small.fy, small.cx, small.cy, *ground.up_in_world, -ground.floor_m[0]]
-        yield Real(
-            np.rint(one.frame.depth_m[::2, ::2] * 1000).astype(np.uint16),
-            label[::2, ::2],
-            cv2.resize(one.frame.rgb, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA),
-            np.array([*numbers, float(one.floor_is_labelled)]),
-        )
+        yield fitted(folder.read(number), folder.camera)
+
+
+def fitted(one: LabelledFrame, camera: Pinhole) -> Real:
+    """Return a frame as large as fits into a shard's, with nothing to its right and below where it is of another shape.
+
+    Depth and labels are sampled, since a mean over an edge would be a place where nothing is.
+    """
+    scale = min(WIDTH / camera.width, HEIGHT / camera.height)
+    w, h = max(1, round(camera.width * scale)), max(1, round(camera.height * scale))
+    row, column = (np.arange(h) * camera.height // h)[:, None], np.arange(w) * camera.width // w
+    label = np.where(one.label == 0, UNLABELLED, FIRST_COARSE + one.label.astype(int) - 1).astype(np.uint8)
+    ground = one.frame.ground
+    assert ground is not None
+    small = camera.resized(w, h)
+    numbers = [small.fx, small.fy, small.cx, small.cy, *ground.up_in_world, -ground.floor_m[0]]
+    rest = ((0, HEIGHT - h), (0, WIDTH - w))
+    return Real(
+        np.pad(np.rint(one.frame.depth_m[row, column] * 1000).astype(np.uint16), rest),
+        np.pad(label[row, column], rest, constant_values=UNLABELLED),
+        np.pad(cv2.resize(one.frame.rgb, (w, h), interpolation=cv2.INTER_AREA), (*rest, (0, 0))),
+        np.array([*numbers, float(one.floor_is_labelled)]),
+    )
 
 
 def write_pack(frames: list[Real], names: tuple[str, ...], path: Path) -> None:
@@ -141,7 +159,7 @@ def main(options: Options) -> None:
     if options.nyuv2.is_file():
         frames, names = read_pack(options.nyuv2)
     else:
-        folder = NyuFolder(options.nyuv2)
+        folder = LabelledFolder(options.nyuv2)
         frames, names = list(read_folder(folder)), folder.names
     if options.pack is not None:
         write_pack(frames, names, options.pack)

@@ -19,7 +19,8 @@ import numpy as np
 from jaxtyping import Float32, Int, UInt8
 
 from avlmaps.bench.harness.intervals import of_mean
-from avlmaps.bench.nyu import CAMERA, CLASSES, SCORED, NyuFolder, class_of_kinds
+from avlmaps.bench.labelled_folder import LabelledFolder
+from avlmaps.bench.nyu import CLASSES, SCORED, class_of_kinds
 from avlmaps.core.progress import progress
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
 
@@ -75,17 +76,23 @@ class FrameFigures:
 
 
 def class_probabilities(
-    probability: Float32[np.ndarray, "h w k"], kinds: tuple[str, ...]
-) -> Float32[np.ndarray, "480 640 37"]:
-    """Return the sums over each scored class's kinds, spread over the picture."""
+    probability: Float32[np.ndarray, "hc wc k"], kinds: tuple[str, ...], size: tuple[int, int]
+) -> Float32[np.ndarray, "h w 37"]:
+    """Return the sums over each scored class's kinds, spread over the picture.
+
+    Args:
+        probability: of each kind, on the encoder's grid.
+        kinds: their names.
+        size: rows and columns of the picture.
+    """
     number = class_of_kinds(kinds)
     group = np.zeros((len(kinds), len(CLASSES)), np.float32)
     group[np.arange(len(kinds)), number] = 1.0
     summed = probability @ group[:, :SCORED]
-    return np.asarray(cv2.resize(summed, (CAMERA.width, CAMERA.height), interpolation=cv2.INTER_LINEAR), np.float32)
+    return np.asarray(cv2.resize(summed, size[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
 
 
-def measure(encoder: EmbeddedPixels, folder: NyuFolder) -> dict[str, FrameFigures]:
+def measure(encoder: EmbeddedPixels, folder: LabelledFolder) -> dict[str, FrameFigures]:
     """Score every frame of a folder, seen once and at several scales."""
     modes = {ONCE: encoder.see, SEVERAL: encoder.see_multi_scale}
     counts: dict[str, list[Int[np.ndarray, "37 37"]]] = {mode: [] for mode in modes}
@@ -94,7 +101,7 @@ def measure(encoder: EmbeddedPixels, folder: NyuFolder) -> dict[str, FrameFigure
         one = folder.read(number)
         labelled += one.floor_is_labelled
         for mode, see in modes.items():
-            said = class_probabilities(see(one.frame).category, encoder.names).argmax(axis=2)
+            said = class_probabilities(see(one.frame).category, encoder.names, one.label.shape).argmax(axis=2)
             counts[mode].append(_confusion(one.label, said))
     return {mode: _figures(own, labelled) for mode, own in counts.items()}
 
@@ -118,7 +125,7 @@ def run_frames(encoder: EmbeddedPixels, folder: Path) -> dict[str, Table]:
     Raises:
         RecordingError: the folder has no index, or a frame cannot be read.
     """
-    figures = measure(encoder, NyuFolder(folder))
+    figures = measure(encoder, LabelledFolder(folder))
     return {
         "labelled frames": summary_table(figures),
         "by class": class_table(figures[ONCE]),

@@ -142,7 +142,7 @@ def _frames(inputs: SuiteInputs) -> Mapping[str, Table]:
     from avlmaps.perception.embedded.pixels import EmbeddedPixels
 
     if inputs.nyuv2 is None:
-        raise BenchError("This suite measures on labelled frames in the layout of NYU Depth V2; name their folder with "
+        raise BenchError("This suite measures on labelled frames (docs/guides/train-eyes.md); name their folder with "
                          "--nyuv2.")  # fmt: skip
     used = choose_models(inputs.profile, inputs.models)
     encoder = used.pixel_encoder()

@@ -67,7 +67,8 @@ class Bench(ModelVerb):
     language: commands and questions that strangers wrote; needs nothing.
     sounds, segmentation: need --sounds, a folder of clips with an index.csv.
     locate: needs --scenes, recordings with poses; half of the frames become the map, the others are located.
-    frames: needs --nyuv2, labelled frames in the layout of NYU Depth V2; kinds of pixels, without any map.
+    frames: needs --nyuv2, labelled frames of NYU Depth V2 or of your own camera (docs/guides/train-eyes.md); kinds of
+    pixels, without any map.
     objects: positions of objects, in the scenes of indexing, whose maps it shares.
     indexing: the paper's Tables III to V, in twelve held-out homes, in --scenes, or in a recording with objects.json.
     navigation: the paper's Tables I, II and VI and its commands, in twelve held-out homes or in --scenes.
@@ -84,7 +85,7 @@ class Bench(ModelVerb):
     scenes: Annotated[tuple[str, ...], arg(metavar="SCENE ...")] = ()
     """Recordings with poses (locate); names of scenes such as house:1000000:held-out (the others)."""
     nyuv2: Annotated[Path | None, arg(metavar="DIR")] = None
-    """Folder of labelled frames (frames.csv, NNNN.color.jpg, NNNN.depth8.png, NNNN.label.png)."""
+    """Folder of labelled frames (frames.csv, NAME.color.jpg, NAME.depth.png, NAME.label.png, camera.json)."""
     profile: Annotated[str, arg(metavar="PROFILE")] = "embedded"
     """Models to measure (see `avlmaps profiles`)."""
     model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
