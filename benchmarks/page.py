@@ -70,6 +70,13 @@ ENTRIES = (
     Entry("locate", "Position of a photo", "avlmaps bench locate --scenes RECORDING --out OUT", 0.2),
     Entry("house", "Objects of an artist's house", "avlmaps bench objects --scenes HOUSE --out OUT", 0.3),
     Entry("objects", "Objects of twelve held-out homes", "avlmaps bench objects --out OUT", 1.0),
+    Entry(
+        "objects-lived-in", "Objects of six of these homes with people in them",
+        f"avlmaps bench objects --scenes {' '.join(f'house:{1_000_000 + n}:held-out:lived-in' for n in range(6))} "
+        "--out OUT", 0.5,
+        "The first six of the twelve: the same walls and furniture, with people, clothes, papers and mirrors that "
+        "reflect. The rendered worlds that the weights learnt from had none of these.",
+    ),
     Entry("indexing", "The paper's Tables III to V", "avlmaps bench indexing --out OUT", 1.5, _INDEXING),
     Entry(
         "indexing-clips", "The same with recorded sounds", "avlmaps bench indexing --sounds SOUNDS --out OUT", 2.5,
