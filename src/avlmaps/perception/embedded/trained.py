@@ -18,10 +18,11 @@ from avlmaps.perception.embedded.scene_network import (
 )
 from avlmaps.perception.embedded.views import EmbeddedViews
 from avlmaps.perception.models.files import local_model
+from avlmaps.perception.models.published_models import PUBLISHED
 
 # The name under which a folder of models holds them, unless another is chosen.
 MODEL = "eyes"
-_HOW_TO_GET = "python -m training.pixels --out MODELS/eyes (docs/guides/train-eyes.md)"
+_HOW_TO_GET = PUBLISHED[MODEL].get
 _REMEDY = f"train them again with {_HOW_TO_GET}"
 # Whose the weights are: nobody but who trained them knows under which terms the frames came.
 _LICENCE = "your own"
