@@ -18,6 +18,8 @@ from training.pixels import fit, real, worlds
 from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS
 
 _WEIGHTS = Path("src/avlmaps/perception/embedded/weights")
+# What paid in the trainings whose weights ship (README).
+DROPOUT, DECAY = (0.15, 0.15), 0.1
 
 
 @dataclass(frozen=True)
@@ -42,8 +44,12 @@ class Options:
     """Continue from the checkpoint in the folder ``work``."""
     start: Path | Literal["shipped"] | None = "shipped"
     """A checkpoint to begin with. ``shipped``: the weights that ship; None: random ones."""
+    rate: float | None = None
+    """Highest learning rate. None: 0.001 from weights, 0.002 from random ones."""
     batch: int = 16
     """Pictures in a step; a GPU takes 128."""
+    compiled: bool = False
+    """Let torch compile the network first (two minutes; needs a C++ compiler): a step takes about 0.6 of the time."""
     threads: int = 2
     """CPU threads of the network."""
     renderers: int = 1
@@ -52,6 +58,8 @@ class Options:
     """Number of processes that draw batches; 1 is one thread."""
     shards: int = 12
     """Shards of about 500 frames (240 MB) that are stored; the oldest is replaced."""
+    furniture: Path | None = None
+    """Folder of artists' models (``borrowed.py``) that furnish half of the homes."""
     first_seed: int = 10_000
     """Seed of the first home; another one for each sitting shows new homes."""
 
@@ -89,7 +97,8 @@ def render(options: Options) -> None:
 
 def _renderer(options: Options, number: int) -> list[str]:
     seeds = ["--first-seed", str(options.first_seed + number), "--step", str(options.renderers)]
-    return ["training.pixels.worlds", "--out", str(options.work / "training"), *seeds]
+    models = [] if options.furniture is None else ["--furniture", str(options.furniture)]
+    return ["training.pixels.worlds", "--out", str(options.work / "training"), *seeds, *models]
 
 
 def train(options: Options) -> None:
@@ -105,7 +114,8 @@ def train(options: Options) -> None:
                 shards=options.work / "training", real=options.work / "real" if options.nyuv2 else None,
                 held_out=options.work / "held-out", out=options.network, minutes=options.minutes,
                 sitting=options.sitting, resume=options.resume, start=options.begins_with, batch=options.batch,
-                threads=options.threads, readers=options.readers,
+                threads=options.threads, readers=options.readers, compiled=options.compiled, dropout=DROPOUT,
+                decay=DECAY, rate=options.rate or (2e-3 if options.begins_with is None else 1e-3),
             )
         )  # fmt: skip
     finally:
@@ -114,7 +124,7 @@ def train(options: Options) -> None:
 
 
 def finish(options: Options) -> None:
-    """Calibrate, and write the files that ship."""
+    """Calibrate, write the files, and say how they do beside those that ship."""
     from training.pixels.calibrate import Options as CalibrateOptions
     from training.pixels.calibrate import calibrate
     from training.pixels.instances import Options as InstanceOptions
@@ -128,9 +138,29 @@ def finish(options: Options) -> None:
         )
     )  # fmt: skip
     calibrate_instances(InstanceOptions(work=options.work / "homes", out=options.out, name=options.name))
+    if options.out.resolve() == _WEIGHTS.resolve():
+        return
+    for name, folder in (("the weights that ship", _WEIGHTS), ("yours", options.out)):
+        print(f"{name}, before calibration: {_figures(folder / f'{options.name}.onnx', options)}", file=sys.stderr)
     models, eyes = options.out.absolute().parent, options.out.name
     chosen = "" if eyes == "eyes" else f" --model pixels=trained@{eyes} views=trained@{eyes}"
     print(f"build with them: avlmaps build REC --out MAP --profile trained --models {models}{chosen}", file=sys.stderr)
+
+
+def _figures(weights: Path, options: Options) -> str:
+    """Return what a network does on frames that were held out, in words."""
+    from training.pixels.batches import Shards
+    from training.pixels.export import Shipped
+    from training.pixels.measure import real_figures, rendered_figures
+
+    network = Shipped(weights)
+    told = {"rendered frames": rendered_figures(network, Shards(options.work / "held-out"))}
+    if options.nyuv2:
+        told["real frames"] = real_figures(network, Shards(options.work / "real" / "development"))
+    return "; ".join(
+        f"{what}: {', '.join(f'{name} {value:.3f}' for name, value in figures.items())}"
+        for what, figures in told.items()
+    )
 
 
 def main(options: Options) -> None:
