@@ -12,8 +12,9 @@ import pytest
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
+from avlmaps.perception.conformance import check
 from avlmaps.perception.embedded.paired_networks import load_pair
-from avlmaps.perception.embedded.pixels import EmbeddedPixels, synthetic_pixels
+from avlmaps.perception.embedded.pixels import synthetic_pixels
 from avlmaps.perception.embedded.scene_network import (
     DEFAULT_WEIGHTS,
     SYNTHETIC_WEIGHTS,
@@ -61,10 +62,11 @@ def rewrite(folder: Path, name: str, content: bytes | None = None, **changes: ob
     path.write_bytes(msgspec.json.encode(notes))
 
 
-def test_both_networks_are_the_pair(eyes: Path) -> None:
+def test_both_networks_are_the_pair_and_satisfy_the_protocols(eyes: Path) -> None:
     bring(eyes, DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS)
     assert open_trained().checksum == load_pair().checksum
-    np.testing.assert_allclose(trained_pixels().encode(FRAME), EmbeddedPixels().encode(FRAME), atol=1e-6)
+    check(Kind.PIXELS, trained_pixels())
+    check(Kind.VIEWS, trained_views())
 
 
 def test_a_first_network_looks_with_the_second_that_ships(eyes: Path) -> None:
