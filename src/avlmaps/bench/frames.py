@@ -2,8 +2,8 @@
 
 Each of our kinds belongs to one of the classes (``avlmaps.bench.nyu``); the likeliest of the 37 scored classes, by the
 sum of its kinds' probabilities, is the answer for a pixel. Every second pixel is scored where it has one of the 37.
-Up is the data set's. The floor is the median height of the labelled floor where that has 800 pixels or more, else the
-one that ``find_ground`` estimates from the frame alone, as a build does from all frames.
+Up is the data set's. The floor is the median height of the labelled floor where that has 800 of 640x480 pixels or
+more, else the one that ``find_ground`` estimates from the frame alone, as a build does from all frames.
 
 Frames are measured twice: seen once, as maps see each of their many frames, and at several scales and mirrored
 (``perception.embedded.multi_scale``), as single frames are best seen.

@@ -24,6 +24,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.maps.gravity.floor import find_ground
+from avlmaps.recordings.layout import CameraNumbers
 from avlmaps.recordings.types import Frame, Ground
 
 METRES_A_STEP = 1.0 / 25.5
@@ -47,15 +48,6 @@ class LabelledFrame:
     frame: Frame
     label: UInt8[np.ndarray, "h w"]
     floor_is_labelled: bool
-
-
-class _CameraFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    width: int
-    height: int
 
 
 class LabelledFolder:
@@ -140,8 +132,8 @@ def _camera_of(path: Path) -> Pinhole:
     if not path.is_file():
         return CAMERA
     try:
-        told: _CameraFile = decode_json(read_regular(path, DESCRIPTION_BYTES), _CameraFile)
-        return Pinhole(told.fx, told.fy, told.cx, told.cy, told.width, told.height)
+        told: CameraNumbers = decode_json(read_regular(path, DESCRIPTION_BYTES), CameraNumbers)
+        return told.camera()
     except (OSError, msgspec.DecodeError, UnicodeDecodeError, ValueError) as fault:
         raise RecordingError(f"{path} is no camera ({fault}); it needs fx, fy, cx, cy, width and height.") from fault
 
