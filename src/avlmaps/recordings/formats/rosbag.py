@@ -7,11 +7,8 @@ or a pose topic together with the static transforms from the body to the camera.
 """
 
 import hashlib
-import os
 import tempfile
-import threading
-from collections.abc import Generator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -20,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.camera import Rig
-from avlmaps.core.errors import AvlmapsError, RecordingError
-from avlmaps.core.files import DESCRIPTION_BYTES, SAMPLED_BYTES, checked_size
+from avlmaps.core.errors import RecordingError
 from avlmaps.core.timeline import associate, gap_notices, in_order
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.content import add_files, stamp_of
+from avlmaps.recordings.formats.bag_files import Bag, check_files
 from avlmaps.recordings.formats.ros_audio import STAMPED, Pcm, extract_audio
-from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of, header_stamp_s, pose_of
+from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of, pose_of
 from avlmaps.recordings.formats.ros_transforms import TransformTree
 from avlmaps.recordings.plausible import plausible_walk
 from avlmaps.recordings.types import BaseHeight, Frame, Recording
@@ -81,99 +78,15 @@ def open_rosbag(path: Path, topics: Mapping[str, str] | None = None) -> "RosbagR
     return RosbagRecording(Path(path), RosTopics(**(topics or {})))
 
 
-class _Bag:
-    """An open bag; one reader for each thread, since readers keep a file position."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._local = threading.local()
-
-    @property
-    def reader(self) -> Any:
-        if not hasattr(self._local, "reader"):
-            from rosbags.highlevel import AnyReader
-            from rosbags.typesys import Stores, get_typestore
-
-            try:
-                # Old ROS 2 bags carry no message definitions; the long-term release's are the best guess.
-                reader = AnyReader([self.path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
-                reader.open()
-            except Exception as error:  # rosbags, sqlite and yaml raise their own kinds
-                raise RecordingError(
-                    f"{self.path} cannot be read as a ROS bag ({type(error).__name__}: {_first_line(error)}); if it "
-                    "was cut off while recording, fix it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
-                ) from error
-            names: list[Any] = [connection.topic for connection in reader.connections]
-            if odd := [name for name in names if not isinstance(name, str)]:  # as YAML reads an unquoted number
-                raise RecordingError(
-                    f"{self.path} lists a topic called {odd[0]!r}, which is no text; fix its metadata.yaml with "
-                    "`ros2 bag reindex`."
-                )
-            self._local.reader = reader
-        return self._local.reader
-
-    def connections(self, topic: str) -> list[Any]:
-        return [connection for connection in self.reader.connections if connection.topic == topic]
-
-    def topics_of(self, types: tuple[str, ...]) -> list[str]:
-        found = {c.topic: c.msgtype for c in self.reader.connections if c.msgtype in types}
-        return sorted(found, key=lambda topic: (types.index(found[topic]), topic))
-
-    def messages(self, topic: str) -> Any:
-        """Yield (receive time in ns, message) of a topic."""
-        connections = self.connections(topic)
-        if connections:
-            with self._readable(topic):
-                for connection, received_ns, raw in self.reader.messages(connections=connections):
-                    yield received_ns, self.reader.deserialize(raw, connection.msgtype)
-
-    @contextmanager
-    def _readable(self, topic: str) -> Generator[None]:
-        """Turn what rosbags, sqlite and decompressors raise over damaged messages into one sentence."""
-        try:
-            yield
-        except (AvlmapsError, GeneratorExit):
-            raise
-        except Exception as error:
-            raise RecordingError(
-                f"A message of {topic} in {self.path} cannot be read ({type(error).__name__}: {_first_line(error)}); "
-                "the bag is damaged: copy it, or fix it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
-            ) from error
-
-    def stamps(self, topic: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return the header stamps (s) and receive times (ns) of a topic's messages."""
-        stamps_s: list[float] = []
-        received: list[int] = []
-        with self._readable(topic):
-            for _, received_ns, raw in self.reader.messages(connections=self.connections(topic)):
-                stamps_s.append(header_stamp_s(raw, self.reader.is2))
-                received.append(received_ns)
-        return np.array(stamps_s), np.array(received, np.int64)
-
-    def message_at(self, topic: str, received_ns: int, stamp_s: float) -> Any:
-        with self._readable(topic):
-            found = self.reader.messages(connections=self.connections(topic), start=received_ns, stop=received_ns + 1)
-            for connection, _, raw in found:
-                if abs(header_stamp_s(raw, self.reader.is2) - stamp_s) < 1e-6:
-                    return self.reader.deserialize(raw, connection.msgtype)
-        raise RecordingError(
-            f"{self.path} lost the message of {topic} at {stamp_s:.6f} s; was the bag changed meanwhile?"
-        )
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().split("\n")[0][:200].rstrip(".") or "no reason given"
-
-
 class RosbagRecording(Recording):
     """See the module's docstring."""
 
     format = "rosbag"
 
     def __init__(self, path: Path, topics: RosTopics) -> None:
-        _check_files(path)
+        check_files(path)
         self.path = path
-        self._bag = _Bag(path)
+        self._bag = Bag(path)
         self._rgb_topic, self._depth_topic = _image_topics(self._bag, topics)
         tree = TransformTree()
         _add_tf(self._bag, "/tf_static", tree)
@@ -269,17 +182,6 @@ class RosbagRecording(Recording):
         return extract_audio(self._bag.messages(found[0]), info, found[0], folder, self._start_s, pcm)
 
 
-def _check_files(path: Path) -> None:
-    """Raise ``RecordingError`` unless a bag and what lies in its folder are regular files."""
-    if not os.path.lexists(path):
-        raise RecordingError(f"There is no bag at {path}.")
-    for file in sorted(entry for entry in path.iterdir() if not entry.is_dir()) if path.is_dir() else [path]:
-        try:
-            checked_size(file, DESCRIPTION_BYTES if file.suffix == ".yaml" else SAMPLED_BYTES)
-        except OSError as error:
-            raise RecordingError(f"{file} cannot be read ({error.strerror or error}); check the file.") from None
-
-
 def _no_pose(path: Path, camera_frame: str, stamps_s: np.ndarray, tree: TransformTree) -> str:
     span = tree.span_s(camera_frame)
     when = f" (they go from {stamps_s[0]:.3f} to {stamps_s[-1]:.3f} s)" if len(stamps_s) else ""
@@ -304,7 +206,7 @@ def _base_height(tree: TransformTree, camera_frame: str, stamp_s: float) -> Base
     return None
 
 
-def _image_topics(bag: _Bag, topics: RosTopics) -> tuple[str, str]:
+def _image_topics(bag: Bag, topics: RosTopics) -> tuple[str, str]:
     images = bag.topics_of(_IMAGE_TYPES)
     every = ", ".join(images) or "none"
     for topic in (topics.rgb, topics.depth):
@@ -328,7 +230,7 @@ def _pick(candidates: list[str], better: tuple[str, ...]) -> str:
     return next(iter(likely or candidates), "")
 
 
-def _read_rig(bag: _Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree) -> tuple[Rig, list[str], str]:
+def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree) -> tuple[Rig, list[str], str]:
     """Return the cameras, the notices about them, and the depth camera's frame; ``mounts`` links the two."""
     cameras: dict[str, Any] = {}
     notices: list[str] = []
@@ -360,7 +262,7 @@ def _read_rig(bag: _Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree
     return Rig(cameras[rgb_topic], cameras[depth_topic], rgb_from_depth), notices, frames[depth_topic]
 
 
-def _info_topic(bag: _Bag, image_topic: str) -> str:
+def _info_topic(bag: Bag, image_topic: str) -> str:
     """Return the calibration published beside an image topic, or nothing."""
     infos = bag.topics_of(_INFO_TYPES)
     parts = image_topic.split("/")
@@ -371,7 +273,7 @@ def _info_topic(bag: _Bag, image_topic: str) -> str:
     return ""
 
 
-def _add_tf(bag: _Bag, topic: str, tree: TransformTree) -> None:
+def _add_tf(bag: Bag, topic: str, tree: TransformTree) -> None:
     for _, message in bag.messages(topic):
         for transform in message.transforms:
             stamp = transform.header.stamp
@@ -380,7 +282,7 @@ def _add_tf(bag: _Bag, topic: str, tree: TransformTree) -> None:
             tree.add(transform.header.frame_id, transform.child_frame_id, pose_of(transform), stamp_s, static)
 
 
-def _check_pose_topic(bag: _Bag, topic: str) -> None:
+def _check_pose_topic(bag: Bag, topic: str) -> None:
     found = sorted({connection.msgtype for connection in bag.connections(topic)})
     if not found:
         raise RecordingError(f"{bag.path} has no topic {topic!r}; name one that it has (pose=TOPIC).")
@@ -391,7 +293,7 @@ def _check_pose_topic(bag: _Bag, topic: str) -> None:
         )
 
 
-def _add_motion(bag: _Bag, topics: RosTopics, camera_frame: str, tree: TransformTree) -> str:
+def _add_motion(bag: Bag, topics: RosTopics, camera_frame: str, tree: TransformTree) -> str:
     """Add to the tree of mounts what moves the camera: /tf, else odometry or a pose topic; return which."""
     if not topics.pose:
         _add_tf(bag, "/tf", tree)
