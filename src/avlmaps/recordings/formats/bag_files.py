@@ -1,4 +1,4 @@
-"""The messages of a ROS bag by topic, with their stamps, whatever container they lie in."""
+"""The messages of a ROS bag by topic, with their stamps, in any container."""
 
 import os
 import threading
@@ -23,7 +23,7 @@ class Bag:
 
     @property
     def reader(self) -> Any:
-        """The calling thread's reader, opened when it is first asked for."""
+        """The calling thread's reader, opened when it is first needed."""
         if not hasattr(self._local, "reader"):
             from rosbags.highlevel import AnyReader
             from rosbags.typesys import Stores, get_typestore
