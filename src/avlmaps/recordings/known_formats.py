@@ -1,0 +1,170 @@
+"""The registry of recording formats: what each is recognised by, and where its opener lies.
+
+Other packages add theirs through the entry point group ``avlmaps.formats``; an entry's name is the format's name and
+its value ``package.module:FORMAT``, a ``Format``. A built-in format goes before another package's where both recognise
+a folder; ``--format NAME`` chooses.
+"""
+
+import importlib
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from functools import cache
+from itertools import islice
+from pathlib import Path
+
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.registry import entry_points
+from avlmaps.recordings import layout
+from avlmaps.recordings.faults import Report, stop_at_first
+from avlmaps.recordings.types import Recording
+
+ENTRY_POINT_GROUP = "avlmaps.formats"
+# A folder of a million files must not be listed to be recognised.
+LOOKED_AT = 2000
+_BAG_SUFFIXES = (".bag", ".mcap", ".db3")
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """One format of recordings.
+
+    Attributes:
+        name: its name on the command line.
+        looks_for: what makes a folder or file this format, in words.
+        matches: the same as a quick test.
+        opener: ``package.module:function``, called with the path (and ``report=`` if it reports faults one by one).
+        tells_faults: whether the opener takes ``report``.
+        has_topics: whether the opener takes topics by name.
+    """
+
+    name: str
+    looks_for: str
+    matches: Callable[[Path], bool]
+    opener: str
+    tells_faults: bool = True
+    has_topics: bool = False
+
+    def open(self, path: Path, report: Report = stop_at_first, topics: Mapping[str, str] | None = None) -> Recording:
+        """Open a recording with this format's opener.
+
+        Raises:
+            RecordingError: it cannot be used, or topics are named and this format has none.
+        """
+        module, _, function = self.opener.partition(":")
+        opener = getattr(importlib.import_module(module), function)
+        if self.has_topics:
+            recording = opener(path, topics or {})
+        elif topics:
+            raise RecordingError(f"{path} is of the format {self.name}, which has no topics; leave them out.")
+        else:
+            recording = opener(path, report=report) if self.tells_faults else opener(path)
+        if recording.audio is not None:
+            recording.notices = (*recording.notices, *recording.audio.notices)
+        return recording
+
+
+def holds(*names: str) -> Callable[[Path], bool]:
+    """Return a test for a folder that has entries of all these names."""
+    return lambda path: all((path / name).exists() for name in names)
+
+
+def some_name(folder: Path, *patterns: str) -> bool:
+    """Return whether one of a folder's first entries has a name like one of the patterns."""
+    if not folder.is_dir():
+        return False
+    with os.scandir(folder) as entries:
+        return any(fnmatch(entry.name, pattern) for entry in islice(entries, LOOKED_AT) for pattern in patterns)
+
+
+def _is_folder(path: Path) -> bool:
+    return (path / layout.DESCRIPTION).exists() or (path / layout.UNFINISHED).exists()
+
+
+def _is_seven_scenes(path: Path) -> bool:
+    return some_name(path, "frame-*.pose.txt", "frame-*.color.*")
+
+
+def _is_rosbag(path: Path) -> bool:
+    if not path.is_dir():
+        return path.suffix.lower() in _BAG_SUFFIXES
+    return (path / "metadata.yaml").exists() and some_name(path, "*.db3", "*.mcap", "*.db3.*", "*.mcap.*")
+
+
+_HERE = "avlmaps.recordings.formats"
+FORMATS: tuple[Format, ...] = (
+    Format(
+        "folder",
+        "recording.json with rgb/ (or rgb.mp4), depth/ and poses.csv",
+        _is_folder,
+        f"{_HERE}.folder:open_folder",
+    ),
+    Format(
+        "7scenes",
+        "frame-000000.color.jpg or .png, .depth.png and .pose.txt",
+        _is_seven_scenes,
+        f"{_HERE}.seven_scenes:open_seven_scenes",
+    ),
+    Format("tum", "rgb.txt, depth.txt and groundtruth.txt", holds("rgb.txt", "depth.txt"), f"{_HERE}.tum:open_tum"),
+    Format("replica", "traj.txt and results/", holds("traj.txt", "results"), f"{_HERE}.replica:open_replica"),
+    Format(
+        "scannet",
+        "color/, depth/, pose/ and intrinsic/",
+        holds("color", "depth", "pose"),
+        f"{_HERE}.scannet:open_scannet",
+    ),
+    Format(
+        "avlmaps",
+        "poses.txt and rgb/ (with depth/ of .npy)",
+        holds("poses.txt", "rgb"),
+        f"{_HERE}.avlmaps_layout:open_avlmaps",
+    ),
+    Format(
+        "rosbag",
+        "a .bag or .mcap file, or a ROS 2 bag's folder with metadata.yaml",
+        _is_rosbag,
+        f"{_HERE}.rosbag:open_rosbag",
+        tells_faults=False,
+        has_topics=True,
+    ),
+)
+_BUILT_IN = frozenset(known.name for known in FORMATS)
+_registered: dict[str, Format] = {}
+
+
+def register(format: Format) -> None:
+    """Add a format for this process (a notebook's, a test's); packages use the entry point."""
+    _registered[format.name] = format
+
+
+def formats() -> tuple[Format, ...]:
+    """Return every format that is known: built in, registered, or brought by another package.
+
+    Raises:
+        RecordingError: another package's format cannot be loaded.
+    """
+    own = {known.name: known for known in (*_brought_formats(), *_registered.values(), *FORMATS)}
+    return (*FORMATS, *(known for name, known in own.items() if name not in _BUILT_IN))
+
+
+@cache
+def _brought_formats() -> tuple[Format, ...]:
+    return tuple(_brought(entry.name, entry.value) for entry in entry_points(group=ENTRY_POINT_GROUP))
+
+
+def _brought(name: str, target: str) -> Format:
+    module, _, attribute = target.partition(":")
+    try:
+        brought = getattr(importlib.import_module(module), attribute)
+    except Exception as fault:  # an import runs another's code
+        raise RecordingError(
+            f"The recording format {name!r} cannot be loaded from {target} ({fault}); fix or remove the package that "
+            "brings it."
+        ) from fault
+    if not isinstance(brought, Format) or brought.name != name:
+        raise RecordingError(
+            f"The entry point {name!r} of {ENTRY_POINT_GROUP} leads to {target}, which is no Format of that name; fix "
+            "or remove the package that brings it."
+        )
+    return brought
