@@ -13,6 +13,7 @@ from avlmaps.bench.indexing import IndexingSettings
 from avlmaps.bench.navigation import NavigationSettings
 from avlmaps.cli.bench import Indexing, Navigation
 from avlmaps.cli.go import Chat
+from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.verb import ModelVerb, Verb
 from avlmaps.cli.verbs import VERBS
 from avlmaps.demo.run import run_demo
@@ -36,7 +37,10 @@ from avlmaps.sim.recorder import RecordSettings, record_scene
 from avlmaps.view.server import ViewServer
 
 EVERYWHERE = ("json", "models", "device", "precision")  # checked once, by test_the_models_options
-GROUPS = {"bench.indexing": Indexing, "bench.navigation": Navigation, "go.chat": Chat}
+GROUPS = {
+    "bench.indexing": Indexing, "bench.navigation": Navigation, "go.chat": Chat,
+    "build.reading": Reading, "info.reading": Reading, "add-sounds.reading": Reading,
+}  # fmt: skip
 OPTIONS: dict[str, type] = {**VERBS, **GROUPS}
 
 
@@ -215,6 +219,11 @@ def test_chat_options_leave_it_to_the_settings() -> None:
     assert set(defaults(Chat).values()) == {None}
     assert {name.removeprefix("chat_") for name in defaults(Chat)} == {"model", "url", "replay"}
     assert {"model", "base_url", "replay"} <= set(defaults(ChatSettings))
+
+
+def test_options_of_reading_leave_it_to_the_recording() -> None:
+    assert set(defaults(Reading).values()) == {None, ()}
+    assert not Reading().corrections()
 
 
 def test_a_sentence_and_its_parts_give_as_many_goals() -> None:

@@ -1,16 +1,14 @@
 """`avlmaps add-sounds`: put recorded sounds into a track."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-from tyro.conf import Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from avlmaps.cli.output import emit, place, table_lines
+from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.verb import Verb
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +45,8 @@ class AddSounds(Verb):
     """Signal-to-noise ratio of each sound, dB. Default: 20 with --background. Alone it adds white noise."""
     format: Annotated[str, arg(metavar="FORMAT")] = "auto"
     """Format of the recording."""
+    reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
+    """What you know better than the recording's files."""
 
     def run(self) -> None:
         """Write the new recording."""
@@ -54,7 +54,7 @@ class AddSounds(Verb):
         from avlmaps.recordings.open import open_recording
 
         events = add_sounds(
-            open_recording(self.recording, format=self.format),
+            open_recording(self.recording, format=self.format, corrections=self.reading.corrections()),
             self.clips,
             self.out,
             categories=self.category or None,

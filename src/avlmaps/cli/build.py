@@ -1,14 +1,15 @@
 """`avlmaps build`: build a map from a recording."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from tyro.conf import Positional, UseAppendAction, arg
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from avlmaps.cli.info import describe_map, info_lines
 from avlmaps.cli.output import UsageError, emit
+from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.progress import say
 
@@ -55,6 +56,8 @@ class Build(ModelVerb):
     """Sound file to use instead of the recording's own track."""
     topics: Annotated[tuple[str, ...], arg(metavar="KIND=TOPIC ...")] = ()
     """Topics of a ROS bag that their type does not identify: rgb=, depth=, pose= or audio=TOPIC."""
+    reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
+    """What you know better than the recording's files."""
     frame_step: Annotated[int, arg(metavar="N")] = 1
     """Fuse every n-th frame."""
     max_bad_share: Annotated[float, arg(metavar="SHARE")] = 0.05
@@ -99,7 +102,13 @@ def build(verb: "Build") -> dict[str, Any]:
         _choose_models(verb.profile, [word for words in verb.model for word in words]),
         _cache(verb.feature_cache, verb.feature_cache_gb),
     )
-    recording = open_recording(verb.recording, format=verb.format, audio=verb.audio, topics=_topics(verb.topics))
+    recording = open_recording(
+        verb.recording,
+        format=verb.format,
+        audio=verb.audio,
+        topics=_topics(verb.topics),
+        corrections=verb.reading.corrections(),
+    )
     for notice in recording.notices:
         say(f"note: {notice}")
     settings = BuildSettings(

@@ -1,19 +1,21 @@
 """`avlmaps info`: describe a map or a recording, verify it, repair it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from tyro.conf import Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from avlmaps.cli.output import UsageError, emit, ground_lines, place, size_of
+from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.verb import Verb
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.recordings.corrections import Corrections
     from avlmaps.recordings.types import Recording
 
 MAP_MANIFEST = "map.json"
@@ -46,17 +48,23 @@ class Info(Verb):
     """Sound file that was given to `build --audio`, if any (--repair)."""
     plot: Annotated[Path | None, arg(metavar="FILE")] = None
     """Draw a top-down view with the path, the sounds, and the names of things and rooms into this picture."""
+    reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
+    """What you know better than the recording's files (REC, --repair)."""
 
     def run(self) -> None:
         """Describe it."""
         if self.recording is not None and not self.repair:
             raise UsageError("--recording belongs to --repair.")
         repaired = repair(self) if self.repair else {}
-        answer = describe_path(self.path, self.format, verify=self.verify, plot=self.plot) | repaired
+        given = self.reading.corrections()
+        answer = describe_path(self.path, self.format, verify=self.verify, plot=self.plot, corrections=given)
+        answer |= repaired
         emit(answer, info_lines(answer), self.json)
 
 
-def describe_path(path: Path, format: str, verify: bool, plot: Path | None) -> dict[str, Any]:
+def describe_path(
+    path: Path, format: str, verify: bool, plot: Path | None, corrections: "Corrections | None" = None
+) -> dict[str, Any]:
     """Describe a map or a recording."""
     if (path / MAP_MANIFEST).exists() or path.suffix == ".avlmap":
         return _describe_map(path, verify, plot)
@@ -68,7 +76,7 @@ def describe_path(path: Path, format: str, verify: bool, plot: Path | None) -> d
     find_format(path, format)  # a place that holds no recording has no faults to list
     faults = [str(fault) for fault in validate(path, format, None if verify else DECODED_BY_INFO)]
     try:
-        recording = open_recording(path, format=format)
+        recording = open_recording(path, format=format, corrections=corrections)
     except AvlmapsError:
         for fault in faults:
             say(f"fault: {fault}")
@@ -83,7 +91,8 @@ def repair(verb: "Info") -> dict[str, Any]:
 
     recording = None
     if verb.recording is not None:
-        recording = open_recording(verb.recording, format=verb.format, audio=verb.audio)
+        given = verb.reading.corrections()
+        recording = open_recording(verb.recording, format=verb.format, audio=verb.audio, corrections=given)
     done = repair_map(verb.path, recording)
     if not done.files:
         say(f"every file of {verb.path} is whole; there is nothing to repair.")

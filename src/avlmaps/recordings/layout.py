@@ -20,6 +20,7 @@ import numpy as np
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
+from avlmaps.recordings.corrections import Corrections, PoseKind
 from avlmaps.recordings.faults import Fault, Report
 
 SCHEMA_VERSION = 1
@@ -78,6 +79,9 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         audio_start_s: the recording's time at which the sound track begins.
         frames: how many pictures there are, as a check.
         origin: what made the recording.
+        poses: how poses.csv is to be read (``--poses``).
+        camera_axes: where the axes of the poses' camera point (``--camera-axes``); OpenCV's if None.
+        pose_delay_s: by how much the stamps of poses.csv are later than the pictures' (``--pose-delay``).
     """
 
     schema_version: int
@@ -90,6 +94,18 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     audio_start_s: float = 0.0
     frames: int | None = None
     origin: str = ""
+    poses: PoseKind | tuple[PoseKind, ...] = ()
+    camera_axes: str | None = None
+    pose_delay_s: float | None = None
+
+    def corrections(self) -> Corrections:
+        """Return how the poses are to be read.
+
+        Raises:
+            RecordingError: it cannot be so.
+        """
+        kinds = (self.poses,) if isinstance(self.poses, PoseKind) else self.poses
+        return Corrections(poses=kinds, camera_axes=self.camera_axes, pose_delay_s=self.pose_delay_s)
 
     def rig(self) -> Rig:
         """Return the cameras.
@@ -165,8 +181,11 @@ def _impossible(description: Description) -> str:
     """Return the impossible value of a well-formed description, or an empty string."""
     try:
         description.rig()
+        description.corrections()
     except ValueError as error:
         return str(error)
+    except RecordingError as error:
+        return str(error).rstrip(".")
     if not 0.0 < description.depth_units_per_m <= _MOST_DEPTH_UNITS:
         return (
             f"depth_units_per_m is {description.depth_units_per_m:g}; it must be positive and at most "

@@ -8,6 +8,7 @@ from pathlib import Path
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.corrections import Corrections, corrected
 from avlmaps.recordings.known_formats import FORMATS, LOOKED_AT, Format, formats
 from avlmaps.recordings.types import Recording
 
@@ -20,6 +21,7 @@ def open_recording(
     format: str = "auto",
     audio: Path | str | None = None,
     topics: Mapping[str, str] | None = None,
+    corrections: Corrections | None = None,
 ) -> Recording:
     """Open a recording in place: nothing is copied, and no picture is read before it is needed.
 
@@ -28,6 +30,7 @@ def open_recording(
         format: one of the names in ``FORMATS``, or ``auto`` to find out.
         audio: another sound track, beginning with the recording; it takes the place of the recording's own.
         topics: of a ROS bag, by what they are for (``rgb``, ``depth``, ``pose``, ``audio``); the others are found.
+        corrections: what someone knows better than the files; a notice repeats it.
 
     Raises:
         RecordingError: there is nothing there, it is of no known format, or it cannot be used.
@@ -41,6 +44,9 @@ def open_recording(
     if audio is not None:
         recording.audio = AudioTrack.open(Path(audio))
         recording.notices = (*recording.notices, *recording.audio.notices)
+    if corrections:
+        recording = corrected(recording, corrections)
+        recording.notices = (*recording.notices, f"Read as given: {corrections.words()}.")
     return recording
 
 

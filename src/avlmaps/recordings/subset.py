@@ -39,6 +39,7 @@ class Subset(Recording):
         self.audio = whole.audio
         self.notices = whole.notices
         self.base_height = whole.base_height
+        self.trajectory = whole.trajectory
 
     def frame(self, index: int) -> Frame:
         """Read one frame; its ``index`` is the one in the subset."""
@@ -60,6 +61,11 @@ class Subset(Recording):
     def depth_units_per_m(self) -> float:
         """The whole recording's."""
         return self.whole.depth_units_per_m
+
+    @property
+    def stored_depth_unit_m(self) -> float:
+        """The whole recording's."""
+        return self.whole.stored_depth_unit_m
 
     def change_stamp(self) -> str:
         """Of the whole recording."""

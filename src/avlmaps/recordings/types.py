@@ -11,6 +11,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, UInt8
 from avlmaps.core.camera import Rig
+from avlmaps.core.timeline import Trajectory
 from avlmaps.recordings.audio import AudioTrack
 
 
@@ -109,6 +110,8 @@ class Recording(ABC):
         notices: one sentence for each thing worth knowing (gaps, clock jumps, frames left out).
         topics: of a bag, which topic was chosen for what (rgb, depth, pose, audio); empty for others.
         base_height: where the robot's base is under the camera in the first frame, None where that is not known.
+        trajectory: the poses at their own rate on the frames' clock, where the reader interpolated them; None where
+            each frame has its own.
     """
 
     path: Path
@@ -121,6 +124,7 @@ class Recording(ABC):
     notices: tuple[str, ...]
     topics: Mapping[str, str] = MappingProxyType({})
     base_height: "BaseHeight | None" = None
+    trajectory: Trajectory | None = None
 
     @abstractmethod
     def frame(self, index: int) -> Frame:
@@ -163,6 +167,11 @@ class Recording(ABC):
     def depth_units_per_m(self) -> float:
         """How many units of such a file make a metre."""
         return 1000.0
+
+    @property
+    def stored_depth_unit_m(self) -> float:
+        """How many metres one unit of the depth makes as it is stored; 1 where it is stored as floats in metres."""
+        return 1.0 / self.depth_units_per_m
 
     def __len__(self) -> int:
         return len(self.stamps_s)

@@ -9,6 +9,7 @@ from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.core.files import PICTURE_BYTES, decode_json, read_regular
 from avlmaps.core.progress import progress
 from avlmaps.recordings import images
+from avlmaps.recordings.corrections import uncorrected
 from avlmaps.recordings.faults import Fault, Report
 from avlmaps.recordings.formats.file_recording import FileRecording
 from avlmaps.recordings.formats.tables import text_lines
@@ -33,7 +34,7 @@ def validate(path: Path | str, format: str = "auto", max_decoded: int | None = N
     path = Path(path)
     faults: list[Fault] = []
     try:
-        recording = find_format(path, format).open(path, faults.append)
+        recording = uncorrected(find_format(path, format).open(path, faults.append))
     except AvlmapsError as error:
         if not any(str(error) == fault.sentence for fault in faults):
             faults.append(Fault(str(error)))

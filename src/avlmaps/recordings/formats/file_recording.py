@@ -139,6 +139,7 @@ class FileRecording(Recording):
         audio: the sound track on the frames' clock, or None.
         notices: one sentence for each thing worth knowing.
         video: the colour pictures, where they are one video.
+        trajectory: the poses at their own rate, where those of the frames were interpolated.
     """
 
     path: Path
@@ -150,6 +151,7 @@ class FileRecording(Recording):
     audio: AudioTrack | None = None
     notices: tuple[str, ...] = ()
     video: VideoFrames | None = None
+    trajectory: timeline.Trajectory | None = None
     stamps_s: Float[np.ndarray, " n"] = field(init=False)
     world_from_camera: Float[np.ndarray, "n 4 4"] = field(init=False)
 
@@ -201,6 +203,12 @@ class FileRecording(Recording):
     def depth_units_per_m(self) -> float:
         """Units of the depth files in a metre."""
         return self.depth_units
+
+    @property
+    def stored_depth_unit_m(self) -> float:
+        """Metres of one unit of the depth files: of an NPY 1, since it holds metres."""
+        in_metres = len(self.shots.depth) > 0 and self.shots.depth[0].endswith(".npy")
+        return 1.0 if in_metres else 1.0 / self.depth_units
 
     @cached_property
     def fingerprint(self) -> str:

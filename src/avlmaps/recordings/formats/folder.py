@@ -13,11 +13,13 @@ from avlmaps.core import poses, timeline
 from avlmaps.core.errors import NoAudioStreamError, RecordingError
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.corrections import corrected
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names, settle
 from avlmaps.recordings.formats.tables import read_table, text_lines
 from avlmaps.recordings.layout import Description
 from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault
+from avlmaps.recordings.types import Recording
 from avlmaps.recordings.video import VideoFrames
 
 # Stamps beyond this are a date (seconds since 1970), not seconds from the start of a recording.
@@ -26,7 +28,7 @@ _DATE_S = 1e8
 _MAX_QUATERNION_FAULT = 0.05
 
 
-def open_folder(path: Path, report: Report = stop_at_first) -> FileRecording:
+def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
     """Open a recording in our own format.
 
     Args:
@@ -45,11 +47,11 @@ def open_folder(path: Path, report: Report = stop_at_first) -> FileRecording:
     video = _find_video(path, description)
     found = _find_pictures(path, description, known, video, report)
     _check_clocks(path, description, found, known)
-    shots, notices, start_s = _pose_pictures(found, known)
+    shots, notices, start_s, trajectory = _pose_pictures(found, known)
     shots, more = settle(path, shots, report, pose_file=None)
     audio_start_s = description.audio_start_s - (start_s if description.audio_start_s > _DATE_S else 0.0)
     up = description.up_in_world
-    return FileRecording(
+    recording = FileRecording(
         path=path,
         format="folder",
         rig=description.rig(),
@@ -59,7 +61,9 @@ def open_folder(path: Path, report: Report = stop_at_first) -> FileRecording:
         audio=_open_audio(path, audio_start_s, video),
         notices=(*notices, *more),
         video=video,
+        trajectory=trajectory,
     )
+    return corrected(recording, description.corrections())
 
 
 def _check_clocks(folder: Path, description: Description, found: "_Pictures", known: "_Poses") -> None:
@@ -224,11 +228,12 @@ def _stamps_without_list(
     return np.arange(len(names), dtype=np.float64)
 
 
-def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, tuple[str, ...], float]:
+def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, tuple[str, ...], float, timeline.Trajectory | None]:
     """Give every picture a pose: its own row's, or one interpolated at its stamp where the poses allow it.
 
     Returns:
-        The shots, the notices about them, and the date that was subtracted from the stamps, seconds.
+        The shots, the notices about them, the date that was subtracted from the stamps, seconds, and the poses at
+        their own rate where they were interpolated.
     """
     stamps_s = known.stamps_s if found.stamps_s is None else found.stamps_s
     start_s = 0.0
@@ -238,18 +243,20 @@ def _pose_pictures(found: _Pictures, known: _Poses) -> tuple[Shots, tuple[str, .
         start_s = float(finite_s.min())
         notices.append(f"The stamps are dates; time 0 is the first frame's, {start_s:.6f} s since 1970.")
     own_row = len(stamps_s) == len(known.stamps_s) and np.array_equal(stamps_s, known.stamps_s, equal_nan=True)
-    covered, world_from_camera = np.ones(len(stamps_s), bool), known.world_from_camera
+    covered, world_from_camera, known_at = np.ones(len(stamps_s), bool), known.world_from_camera, None
     if not own_row:
-        covered, world_from_camera, more = _interpolated(stamps_s, known)
+        covered, world_from_camera, known_at, more = _interpolated(stamps_s, known)
         notices += more
     shots = Shots(found.names, found.colour, found.depth, stamps_s - start_s, world_from_camera, found.video_frames)
-    return shots.take(np.flatnonzero(covered)), tuple(notices), start_s
+    if known_at is not None:
+        known_at = timeline.Trajectory(known_at.stamps_s - start_s, known_at.world_from_body)
+    return shots.take(np.flatnonzero(covered)), tuple(notices), start_s, known_at
 
 
 def _interpolated(
     stamps_s: Float[np.ndarray, " n"], known: _Poses
-) -> tuple[Bool[np.ndarray, " n"], Float[np.ndarray, "n 4 4"], list[str]]:
-    """Return where a pose is known, the poses (NaN elsewhere), and sentences about what cannot be used."""
+) -> tuple[Bool[np.ndarray, " n"], Float[np.ndarray, "n 4 4"], timeline.Trajectory | None, list[str]]:
+    """Return where a pose is known, the poses there (NaN elsewhere), all of them, and what cannot be used."""
     notices: list[str] = []
     usable = np.flatnonzero(known.usable)
     if len(usable) < len(known.usable):
@@ -258,6 +265,7 @@ def _interpolated(
     notices += order.notices
     rows = usable[order.index]
     covered, world_from_camera = np.zeros(len(stamps_s), bool), np.full((len(stamps_s), 4, 4), np.nan)
+    trajectory = None
     if len(rows):
         trajectory = timeline.Trajectory(known.stamps_s[rows], known.world_from_camera[rows])
         covered = trajectory.covers(stamps_s)
@@ -269,4 +277,4 @@ def _interpolated(
             f"{lost} of {len(stamps_s)} frame(s) lie outside the poses of {layout.POSES} ({span}) or in a gap of them; "
             "left out."
         )
-    return covered, world_from_camera, notices
+    return covered, world_from_camera, trajectory, notices

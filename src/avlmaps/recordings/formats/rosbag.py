@@ -157,6 +157,14 @@ class RosbagRecording(Recording):
         digest.update(self.stamps_s.tobytes() + self.world_from_camera.tobytes() + repr(self.rig).encode())
         return digest.hexdigest()
 
+    @property
+    def stored_depth_unit_m(self) -> float:
+        """Metres of one unit of the depth messages: 1 for floats, which are metres (REP 118), else a millimetre."""
+        received_ns, stamp_s = self._depth_at[0]
+        message = self._bag.message_at(self._depth_topic, received_ns, stamp_s)
+        encoding = getattr(message, "encoding", None) or getattr(message, "format", "")
+        return 1.0 if encoding.startswith("32F") else 1.0 / self.depth_units_per_m
+
     def change_stamp(self) -> str:
         """See ``Recording.change_stamp``."""
         return stamp_of(self.path.parent, (), self._files())

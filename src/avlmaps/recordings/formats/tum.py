@@ -70,6 +70,7 @@ def open_tum(path: Path, report: Report = stop_at_first) -> FileRecording:
         up_in_world=up_in_world,
         audio=open_audio(path),
         notices=(*notices, *notice, *more),
+        trajectory=timeline.Trajectory(trajectory.stamps_s - start_s, trajectory.world_from_body),
     )
 
 
