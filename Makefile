@@ -4,6 +4,10 @@ VENV := .venv
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 TORCH := .venv-foundation
+ROS2 := .venv-ros2
+# The wheels of ROS 2 are for CPython 3.12 alone.
+PYTHON312 ?= $(firstword $(foreach one,python3.12 $(PYTHON) $(wildcard $(HOME)/.pyenv/versions/3.12*/bin/python3.12) \
+  $(shell uv python find 3.12 2>/dev/null),  $(shell $(one) -c 'import sys; sys.version_info[:2] == (3, 12) and print(sys.executable)' 2>/dev/null)))
 # Small matrices run many times slower on several BLAS threads when a machine is shared.
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
@@ -22,7 +26,7 @@ FAST := tests/core tests/test_imports.py tests/test_conventions.py tests/query/t
   tests/query/test_pieces.py tests/maps/test_grid.py tests/navigate/test_planner.py tests/perception/test_codes.py \
   tests/perception/test_matching.py tests/language/test_program_run.py tests/cli/test_help.py
 
-.PHONY: help demo test test-fast dist-test test-kernels bounds test-foundation types-foundation lint format docs fuzz bench train lock clean
+.PHONY: help demo test test-fast dist-test test-kernels bounds test-foundation types-foundation test-ros2 python312 lint format docs fuzz bench train lock clean
 
 help:  ## Show what can be made.
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -75,6 +79,24 @@ $(TORCH)/.ready: requirements/lock.txt requirements/foundation.txt pyproject.tom
 	$(TORCH)/bin/python -m pip install --quiet --require-hashes -r requirements/lock.txt
 	$(TORCH)/bin/python -m pip install --quiet -r requirements/foundation.txt
 	$(TORCH)/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	touch $@
+
+python312:  ## Say which Python 3.12 `make test-ros2` takes; fail where there is none.
+	@$(if $(PYTHON312),echo $(PYTHON312),echo "no Python 3.12 was found; say where one is with: make PYTHON312=/path/to/python3.12" >&2; exit 1)
+
+test-ros2: $(ROS2)/.ready  ## Run the tests against real ROS 2 (rclpy from wheels, in a virtual environment of its own, 1 GB).
+	$(ROS2)/bin/python -m pytest tests/ros2
+
+# Message packages that the wheels lack are built from definitions of the tests' own, with the wheels' rosidl tools.
+INTERFACES := $(wildcard tests/ros2/interfaces/*) $(wildcard examples/ros2/avlmaps_msgs)
+$(ROS2)/.ready: requirements/lock.txt requirements/ros2.txt pyproject.toml tests/ros2/build_interfaces.py \
+  $(foreach one,$(INTERFACES),$(wildcard $(one)/* $(one)/*/*))
+	@$(MAKE) --no-print-directory python312
+	$(PYTHON312) -m venv $(ROS2)
+	$(ROS2)/bin/python -m pip install --quiet --require-hashes -r requirements/lock.txt
+	$(ROS2)/bin/python -m pip install --quiet -r requirements/ros2.txt
+	$(ROS2)/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	$(ROS2)/bin/python tests/ros2/build_interfaces.py $(INTERFACES)
 	touch $@
 
 format: $(READY)  ## Put the code in order.

@@ -1,0 +1,87 @@
+"""Processes of a test's robot, and what its log says that the body did."""
+# pyright: reportMissingImports=false
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
+
+HERE = Path(__file__).parent
+
+
+class Robot:
+    """A simulated robot: a process for its body and one for its Nav2, and the log of both."""
+
+    def __init__(self, folder: Path, correction_hz: float = 10.0) -> None:
+        self.log, self._hz = folder / "robot.jsonl", correction_hz
+        self.processes: dict[str, subprocess.Popen] = {}
+        rclpy.init(args=[])
+        self.node = Node("test")
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._modes = self.node.create_publisher(String, "simulated/mode", latched)
+
+    def __enter__(self) -> "Robot":
+        self.start("body")
+        self.start("nav2")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for role in list(self.processes):
+            self.end(role)
+        self.node.destroy_node()
+        rclpy.try_shutdown()
+
+    def start(self, role: str) -> None:
+        ready = "up" if role == "body" else "localised"
+        before = len(self.rows(ready))
+        command = [
+            sys.executable,
+            HERE / "simulated_robot.py",
+            role,
+            "--log",
+            self.log,
+            "--correction-hz",
+            str(self._hz),
+        ]
+        self.processes[role] = subprocess.Popen(list(map(str, command)))
+        assert self.soon(lambda: len(self.rows(ready)) > before), f"the {role} did not start"
+
+    def end(self, role: str) -> None:
+        """Kill a process, as `kill -9` does."""
+        process = self.processes.pop(role)
+        process.kill()
+        process.wait()
+
+    def mode(self, name: str) -> None:
+        self._modes.publish(String(data=name))
+        assert self.soon(lambda: any(row["mode"] == name for row in self.rows("mode"))), f"nobody heard {name}"
+
+    def rows(self, *kinds: str) -> list[dict[str, Any]]:
+        text = self.log.read_text() if self.log.exists() else ""
+        rows = [json.loads(line) for line in text.splitlines() if line.endswith("}")]
+        return [row for row in rows if row["kind"] in kinds]
+
+    @property
+    def moves(self) -> bool:
+        """Whether the body moves, by its own log."""
+        row = self.rows("body")[-1]
+        return abs(row["v"]) > 0.01 or abs(row["w"]) > 0.02
+
+    def last_moved_s(self) -> float:
+        """Return when the body last moved, by the wall's clock."""
+        moved = [row["t"] for row in self.rows("body") if abs(row["v"]) > 0.01 or abs(row["w"]) > 0.02]
+        return moved[-1] if moved else 0.0
+
+    def soon(self, holds: Callable[[], bool], within_s: float = 20.0) -> bool:
+        until_s = time.monotonic() + within_s
+        while not holds() and time.monotonic() < until_s:
+            time.sleep(0.02)
+        return holds()
