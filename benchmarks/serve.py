@@ -33,7 +33,6 @@ from avlmaps.maps.types import HeardSounds, Keyframes, Voxels  # noqa: E402
 from avlmaps.perception.embedded.codes import features_of  # noqa: E402
 from avlmaps.perception.profiles import profile  # noqa: E402
 from avlmaps.query.avlmap import AVLMap  # noqa: E402
-from avlmaps.query.sentences import ask_sentence  # noqa: E402
 from avlmaps.recordings.audio import Sound, write_flac  # noqa: E402
 from avlmaps.recordings.types import Frame, Recording  # noqa: E402
 from queries import VOXEL_SIZE_M, building  # noqa: E402
@@ -226,7 +225,7 @@ def report(path: Path, asked: Any) -> None:
     begin = time.thread_time()
     expected: dict[str, Any] = {}
     for sentence in sentences():
-        expected[sentence] = essence(json.loads(json.dumps(ask_sentence(opened, sentence).to_json())))
+        expected[sentence] = essence(json.loads(json.dumps(opened.ask(sentence).to_dict())))
     alone_ms = 1e3 * (time.thread_time() - begin) / len(expected)
     command = [sys.executable, "-m", "avlmaps", "serve", f"home={path}", "--port", "0", "--json"]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)

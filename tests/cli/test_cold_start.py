@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.cli import main
-from avlmaps.cli.one_thing import named_thing
 from avlmaps.cli.plain_query import read_plain_query
-from avlmaps.cli.query import Query, _thing_alone
+from avlmaps.cli.query import Query
 from avlmaps.cli.verbs import read_command
 from avlmaps.core.question import Modality, Part, Question
 from avlmaps.core.registry import Kind, load
 from avlmaps.language.questions import parse_sentence
+from avlmaps.query.asking import Asked, thing_alone
 
 HEAVY = {
     "numba", "llvmlite", "scipy", "onnxruntime", "av", "matplotlib", "trimesh", "soundfile", "PIL",
@@ -53,7 +53,7 @@ def asked(word: str, encoder: object) -> Question | None:
     stored = SimpleNamespace(
         info=SimpleNamespace(models={"pixels": None}), profile=SimpleNamespace(pixel_encoder=lambda: encoder)
     )
-    return named_thing(word, SimpleNamespace(stored=stored))  # pyright: ignore[reportArgumentType]
+    return thing_alone(Asked(sentence=word), SimpleNamespace(stored=stored))  # pyright: ignore[reportArgumentType]
 
 
 def test_one_word_loads_no_heavy_package(room_map: Path) -> None:
@@ -124,6 +124,6 @@ def test_all_else_is_left_to_the_grammar(words: str, encoder: object) -> None:
     assert asked(words, encoder) is None
 
 
-def test_a_part_alone_is_a_question(encoder: object) -> None:
-    verb, parts = Query(map=Path("m"), object="red sofa"), [Part(Modality.OBJECT, "red sofa")]
-    assert _thing_alone(verb, SimpleNamespace(), parts) == Question.of(parts)  # pyright: ignore[reportArgumentType]
+def test_a_part_alone_is_a_question() -> None:
+    asked, parts = Asked(object="red sofa"), [Part(Modality.OBJECT, "red sofa")]
+    assert thing_alone(asked, SimpleNamespace()) == Question.of(parts)  # pyright: ignore[reportArgumentType]

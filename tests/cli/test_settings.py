@@ -26,9 +26,9 @@ from avlmaps.navigate.bodies import BodyShape
 from avlmaps.navigate.skills import RobotSettings
 from avlmaps.perception.cache.feature_store import CacheSettings
 from avlmaps.perception.models.settings import ModelSettings, Precision
+from avlmaps.query.asking import Asked
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.rules import Rules
-from avlmaps.query.sentences import ask_sentence
 from avlmaps.recordings.add_sounds import add_sounds
 from avlmaps.recordings.open import open_recording
 from avlmaps.serve.drive.robots import RobotFile
@@ -227,4 +227,4 @@ def test_options_of_reading_leave_it_to_the_recording() -> None:
 
 
 def test_a_sentence_and_its_parts_give_as_many_goals() -> None:
-    assert of(ask_sentence, "top")() == of(AVLMap.ask, "top")()
+    assert Asked(sentence="bed").top == of(AVLMap.ask, "top")()

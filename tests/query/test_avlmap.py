@@ -35,8 +35,8 @@ def locating(
 
 
 def test_the_answer_has_the_keys_of_the_contract(heard: AVLMap) -> None:
-    answer = heard.ask(Question.of([CHAIR, DOG]), top=1).to_json()
-    assert list(answer) == ["goals", "found", "parts", "elapsed_ms", "frame", "level_from_recording"]
+    answer = heard.ask(Question.of([CHAIR, DOG]), top=1).to_dict()
+    assert list(answer) == ["goals", "found", "probability", "parts", "elapsed_ms", "frame", "level_from_recording"]
     (goal,) = answer["goals"]
     assert list(goal) == ["position", "score", "size", "parts"]
     assert set(goal["parts"]) == {"object", "sound"}
@@ -82,7 +82,7 @@ def test_an_empty_map_answers_honestly(monkeypatch: pytest.MonkeyPatch) -> None:
     for heat in (empty.object("chair"), empty.sound("dog"), empty.image(picture)):
         assert (heat.peak, heat.found, heat.goals(), len(heat)) == (0.0, False, [], 0)
         assert heat.factors[0].note
-    answer = empty.ask(Question.of([CHAIR, DOG])).to_json()
+    answer = empty.ask(Question.of([CHAIR, DOG])).to_dict()
     assert (answer["goals"], answer["found"]) == ([], False)
     assert [part["note"] for part in answer["parts"]] == ["the map holds no voxels", "the map holds no sounds"]
 

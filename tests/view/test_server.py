@@ -76,7 +76,7 @@ def test_a_question_has_the_answer_of_query_and_its_heat(posted, room: AVLMap) -
     status, content = posted("/api/ask", sentence="the red thing")
     assert status == 200
     told, heat = parted(content)
-    wanted = room.ask("the red thing", top=5).to_json()
+    wanted = room.ask("the red thing", top=5).to_dict()
     got = told["answers"][0]
     assert {key: got[key] for key in got if key != "elapsed_ms"} == {
         key: value for key, value in wanted.items() if key != "elapsed_ms"
@@ -102,7 +102,7 @@ def test_a_photo_and_a_clip_are_asked_with_and_no_answer_names_a_file_of_the_ser
     assert told["answers"][0]["parts"][0]["query"] == "beep.flac"
     assert str(served.session._folder) not in json.dumps(told)
     status, error = posted("/api/ask", sentence="the red thing", clip=number)
-    assert status == 400 and "do not speak of the file" in error["error"]["message"]
+    assert status == 400 and "does not speak of the file" in error["error"]["message"]
 
 
 @pytest.mark.parametrize(

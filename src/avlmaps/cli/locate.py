@@ -66,13 +66,21 @@ def camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":
     """Read ``fx,fy,cx,cy`` in pixels for a picture of this size."""
     from avlmaps.core.camera import Pinhole
 
+    return Pinhole(*numbers_of(intrinsics), width=width, height=height)
+
+
+def numbers_of(intrinsics: str) -> tuple[float, float, float, float]:
+    """Read ``fx,fy,cx,cy`` in pixels."""
+    from avlmaps.core.camera import Pinhole
+
     try:
         fx, fy, cx, cy = (float(word) for word in intrinsics.split(","))
-        return Pinhole(fx, fy, cx, cy, width=width, height=height)
+        Pinhole(fx, fy, cx, cy, width=1, height=1)  # no camera has a focal length of 0, or NaN
     except ValueError:
         raise UsageError(
             f"--intrinsics takes fx,fy,cx,cy in pixels, such as 525,525,320,240; not {intrinsics!r}."
         ) from None
+    return fx, fy, cx, cy
 
 
 def locate_lines(answer: "LocateAnswer") -> list[str]:

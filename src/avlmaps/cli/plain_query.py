@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from avlmaps.cli.one_thing import answer_thing, is_small, named_thing
 from avlmaps.cli.output import emit, query_lines
 
 
@@ -26,19 +25,11 @@ class PlainQuery:
 
     def run(self) -> None:
         """Answer the query."""
-        answer = self._answer()
-        emit(answer, query_lines(answer), self.json)
-
-    def _answer(self) -> dict[str, Any]:
+        from avlmaps.cli.asking import answered
         from avlmaps.query.avlmap import AVLMap
 
-        avlmap = AVLMap.open(self.map)
-        thing = named_thing(self.sentence, avlmap)
-        if thing is not None and is_small(avlmap):
-            return answer_thing(thing, avlmap, self.top)
-        from avlmaps.cli.query import Query, ask
-
-        return ask(Query(map=self.map, sentence=self.sentence, top=self.top, json=self.json), avlmap)
+        answer = answered(lambda: AVLMap.open(self.map), self.sentence, self.top, once=True)
+        emit(answer, query_lines(answer), self.json)
 
 
 def read_plain_query(words: Sequence[str]) -> PlainQuery | None:

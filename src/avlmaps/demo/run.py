@@ -184,7 +184,7 @@ def _answer(avlmap: "AVLMap", ask: Ask, number: int, out: Path) -> "tuple[Step, 
     picture = f"question_{number}.png"
     if answer.heat is not None:
         answer.heat.plot(out / picture)
-    return Step(ask, answer.to_json(), picture), answer
+    return Step(ask, answer.to_dict(), picture), answer
 
 
 def _write_page(avlmap: "AVLMap", asks: "list[Ask]", out: Path) -> None:

@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from avlmaps.core.poses import FRAME
-from avlmaps.core.question import Part
+from avlmaps.core.question import Part, Question
 from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
 
 if TYPE_CHECKING:
-    from avlmaps.query.schema import PartOutcome, QueryAnswer
+    from avlmaps.query.schema import AlternativeAnswer, PartOutcome, QueryAnswer
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class PartAnswer:
     understood: str = ""
     note: str = ""
 
-    def to_json(self) -> "PartOutcome":
+    def to_dict(self) -> "PartOutcome":
         """Return the part as the command line prints it."""
         return {
             "modality": str(self.part.modality),
@@ -44,15 +44,42 @@ class PartAnswer:
 
 
 @dataclass(frozen=True, slots=True)
+class Alternative:
+    """Another question that the sentence may mean, and its outcome: of "where can I sit?" the armchair.
+
+    Attributes:
+        question: its parts.
+        probability: that its first goal is right.
+        found: whether that is likely enough.
+        goals: the best one; none where it has none.
+    """
+
+    question: Question
+    probability: float
+    found: bool
+    goals: tuple[Goal, ...] = ()
+
+    def to_dict(self) -> "AlternativeAnswer":
+        """Return it as the command line prints it."""
+        parts = ", ".join(part.query for part in self.question.parts)
+        goals = [goal.to_json() for goal in self.goals]
+        return {"query": parts, "probability": self.probability, "found": self.found, "goals": goals}
+
+
+@dataclass(frozen=True, slots=True)
 class Answer:
     """Goals, best first, and whether they match the query.
 
     Attributes:
         goals: may hold places even where ``found`` is false: the best guesses, with low scores.
-        found: every part is in the map and they come together somewhere.
+        found: whether the first goal is likely enough to be right.
         parts: one for each part of the question.
         elapsed_ms: from the question to the goals.
         heat: the fused heatmap, for plots.
+        probability: that the first goal is right, all parts together, in [0, 1]; 0 where there is no goal.
+        count: number of likely things, where a sentence asks how many there are.
+        notes: one sentence each: how words were read.
+        alternatives: the other questions that a sentence may mean, the likeliest first.
     """
 
     goals: tuple[Goal, ...]
@@ -60,14 +87,26 @@ class Answer:
     parts: tuple[PartAnswer, ...]
     elapsed_ms: float
     heat: Heatmap | None = field(default=None, repr=False, compare=False)
+    probability: float = 0.0
+    count: int | None = None
+    notes: tuple[str, ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
 
-    def to_json(self) -> "QueryAnswer":
-        """Return the answer with exactly the keys of the contract; positions are in the frame that ``frame`` names."""
-        return {
+    def to_dict(self) -> "QueryAnswer":
+        """Return the answer with the keys of the contract; positions are in the frame that ``frame`` names."""
+        answer: QueryAnswer = {
             "goals": [goal.to_json() for goal in self.goals],
             "found": self.found,
-            "parts": [part.to_json() for part in self.parts],
+            "probability": self.probability,
+            "parts": [part.to_dict() for part in self.parts],
             "elapsed_ms": self.elapsed_ms,
             "frame": FRAME,
             "level_from_recording": None if self.heat is None else self.heat.space.level_from_recording.tolist(),
         }
+        if self.count is not None:
+            answer["count"] = self.count
+        if self.notes:
+            answer["notes"] = list(self.notes)
+        if self.alternatives:
+            answer["alternatives"] = [one.to_dict() for one in self.alternatives]
+        return answer

@@ -1,6 +1,5 @@
 """The map as a user meets it: four modalities, each a heatmap, and whole questions."""
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -17,10 +16,9 @@ from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder
 from avlmaps.perception.room_contents import read_room_contents
 from avlmaps.query import loops
-from avlmaps.query.answer import Answer, PartAnswer
-from avlmaps.query.factors import Factor, HeatSettings, NearAnchors, NearThings
+from avlmaps.query.factors import HeatSettings
 from avlmaps.query.floor_plan import FloorPlan, storeys
-from avlmaps.query.heatmap import Heatmap, product
+from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor, area_names, name_shares
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
 from avlmaps.query.modalities.object import object_factor
@@ -41,6 +39,7 @@ from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.answer import Answer
     from avlmaps.query.contents import Contents, Room, SoundEvent, Thing, Watch
     from avlmaps.query.locate import Located
     from avlmaps.query.photometric import Panoramas
@@ -448,43 +447,53 @@ class AVLMap:
 
     def ask(
         self,
-        question: Question | str,
+        question: Question | str = "",
         top: int = 3,
-        intrinsics: Pinhole | None = None,
+        intrinsics: "Pinhole | Sequence[float] | None" = None,
         attachments: "Mapping[str, Attachment] | None" = None,
-    ) -> Answer:
-        """Answer a query with places.
+        *,
+        object: str | None = None,
+        sound: str | None = None,
+        area: str | None = None,
+        image: str | Path | None = None,
+        clip: str | Path | None = None,
+        primary: Modality | str | None = None,
+    ) -> "Answer":
+        """Answer a query with places, as the command line, the server and the viewer do.
 
         Args:
-            question: a sentence, such as "the chair near the sound of glass breaking", or its parts.
+            question: a sentence, such as "the chair near the sound of glass breaking" or "how many chairs are there";
+                or a question, whose parts are known. Without it the parts are those that are named below.
             top: number of goals at most.
-            intrinsics: of the camera that took the question's pictures; by default the map's own.
+            intrinsics: of the camera that took the question's pictures: a camera, or fx, fy, cx, cy in pixels; by
+                default the map's own.
             attachments: pictures and sounds by the name that the parts have for them. Where given, no file is opened: a
                 part of a file that is not among them is an error.
+            object: instead of a sentence, the name of an object.
+            sound: the name of a sound.
+            area: the name of an area, such as a kitchen.
+            image: a photo; with a sentence, what "this photo" in it means.
+            clip: a sound clip; with a sentence, what "this recording" in it means.
+            primary: which part is sought; the others say where it is.
 
         Raises:
+            AskError: there is nothing to ask, both a sentence and parts, or a file that the sentence does not speak of.
             QueryError: the sentence is not understood, or a part of the query cannot be used.
         """
-        begin = time.perf_counter()
-        if isinstance(question, str):
-            from avlmaps.language.questions import parse_sentence
+        from avlmaps.query.asking import Asked, AskError, Files, answer_question, ask
 
-            question = parse_sentence(question)
-        heat = product([self.heat(part, intrinsics, attachments) for part in question.parts])
-        goals, found = heat.goals(top), heat.found
-        elapsed_ms = 1e3 * (time.perf_counter() - begin)
-        parts = [
-            PartAnswer(part, _peak(factor), factor.found, factor.understood, factor.note)
-            for part, factor in zip(question.parts, heat.factors, strict=True)
-        ]
-        return Answer(tuple(goals), found, tuple(parts), elapsed_ms, heat)
-
-
-def _peak(factor: Factor) -> float:
-    """Return the highest heat: 1 on an object, the best score at a place, which may be far from any voxel."""
-    if isinstance(factor, NearThings):
-        return float(factor.mask.any())
-    return float(factor.scores.max(initial=0.0)) if isinstance(factor, NearAnchors) else 0.0
+        files = Files(intrinsics, attachments)
+        if isinstance(question, Question):
+            if any(part is not None for part in (object, sound, area, image, clip, primary)):
+                raise AskError("A question holds its parts already; give a sentence or parts instead.")
+            return answer_question(self, question, top, files)
+        photo, recording = (None if file is None else str(file) for file in (image, clip))
+        sought = None if primary is None else Modality(primary)
+        asked = Asked(
+            sentence=question, object=object, sound=sound, area=area, image=photo, clip=recording, primary=sought,
+            top=top,
+        )  # fmt: skip
+        return ask(self, asked, files)
 
 
 def _role(primary: bool) -> Role:

@@ -48,17 +48,30 @@ class PartOutcome(TypedDict):
     note: Annotated[str, Meta(description="why it is not found, or empty")]
 
 
+class AlternativeAnswer(TypedDict):
+    """Another thing that a sentence may mean, and its outcome."""
+
+    query: str
+    probability: Unit
+    found: bool
+    goals: Annotated[list[GoalAnswer], Meta(description="the best one")]
+
+
 class QueryAnswer(TypedDict):
     """Goals of a query, best first. With ``found`` false they are guesses."""
 
     goals: list[GoalAnswer]
     found: bool
+    probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that the first goal is right, all parts together")]
     parts: list[PartOutcome]
     elapsed_ms: float
     frame: Frame
     level_from_recording: Matrix | None
     notes: NotRequired[Annotated[list[str], Meta(description="how words of the sentence were read")]]
     count: NotRequired[Annotated[int, Meta(description="the number of things, for a sentence such as 'how many'")]]
+    alternatives: NotRequired[
+        Annotated[list[AlternativeAnswer], Meta(description="the other things that the sentence may mean")]
+    ]
     plot: NotRequired[str]
 
 

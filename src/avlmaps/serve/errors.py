@@ -6,6 +6,7 @@ from pathlib import Path
 
 from avlmaps.core.errors import AvlmapsError, LanguageError, NavigationError, QueryError
 from avlmaps.core.printable import printable
+from avlmaps.query.asking import AskError
 from avlmaps.query.schema import ErrorAnswer
 
 _STATUS = {"map": 503, "backend": 503}
@@ -71,6 +72,8 @@ class Privacy:
         """Return the HTTP status and the JSON of an error."""
         if isinstance(error, RequestError):
             return error.status, _answer(error.kind, str(error))
+        if isinstance(error, AskError):
+            return 400, _answer("usage", str(error))
         if isinstance(error, AvlmapsError):
             kind = _kind(error)
             # These quote nothing but the client's own words, which may look like a path; others may quote a file.

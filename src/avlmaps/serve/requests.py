@@ -10,7 +10,7 @@ from jaxtyping import Float
 from msgspec import Meta, Struct
 
 from avlmaps.core.errors import QueryError
-from avlmaps.core.question import MOST_CHARACTERS, Modality, Part
+from avlmaps.core.question import MOST_CHARACTERS
 from avlmaps.serve.errors import RequestError
 
 T = TypeVar("T", bound=Struct)
@@ -59,17 +59,6 @@ class AskQuery(Struct, forbid_unknown_fields=True):
         Short | None,
         Meta(description="fx,fy,cx,cy of the photo's camera in pixels. Default: the map's own camera."),
     ] = None
-
-    def parts(self, with_photo: bool, with_clip: bool) -> list[Part]:
-        """Return the parts, with files by the names of their form fields."""
-        named = (
-            (Modality.OBJECT, self.object, False),
-            (Modality.IMAGE, PHOTO if with_photo else None, True),
-            (Modality.SOUND, self.sound, False),
-            (Modality.SOUND, CLIP if with_clip else None, True),
-            (Modality.AREA, self.area, False),
-        )
-        return [Part(modality, query, is_file=is_file) for modality, query, is_file in named if query is not None]
 
 
 class PictureQuery(AskQuery, forbid_unknown_fields=True):

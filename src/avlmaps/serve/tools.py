@@ -123,8 +123,8 @@ def _list_rooms(task: Task, query: RoomsQuery) -> ToolResult:
 
 def _ask(task: Task, query: AskToolQuery) -> ToolResult:
     task = replace(task, uploads=Uploads(_bytes_of(query.photo, "photo"), _bytes_of(query.clip, "clip")))
-    reply = work.ask_map(task, query)
-    return ToolResult(reply.json, small_picture(task.map, reply.answer) if query.picture else None)
+    answer = work.ask_map(task, query)
+    return ToolResult(answer.to_dict(), small_picture(task.map, answer) if query.picture else None)
 
 
 def _locate(task: Task, query: LocatePhotoQuery) -> ToolResult:
@@ -146,7 +146,7 @@ def _last_seen(task: Task, query: LastSeenQuery) -> ToolResult:
 
 def _goal_near(task: Task, query: GoalNearQuery) -> ToolResult:
     reply = work.ask_map(task, AskQuery(sentence=query.sentence, top=20))
-    answer = goals_near(task.map.paths, reply.answer, place_of(query.near), query.top)
+    answer = goals_near(task.map.paths, reply, place_of(query.near), query.top)
     return ToolResult(answer, small_picture(task.map, places=[np.array(one["position"]) for one in answer["goals"]]))
 
 

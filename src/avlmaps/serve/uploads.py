@@ -125,10 +125,20 @@ def camera_of(intrinsics: str | None, photo: UInt8[np.ndarray, "h w 3"] | None) 
         return None
     if photo is None:
         raise RequestError("Intrinsics belong to a photo; there is none.")
+    return Pinhole(*numbers_of(intrinsics), width=photo.shape[1], height=photo.shape[0])
+
+
+def numbers_of(intrinsics: str) -> tuple[float, float, float, float]:
+    """Return ``fx,fy,cx,cy``.
+
+    Raises:
+        RequestError: the numbers are not four, or no camera has them.
+    """
     try:
         fx, fy, cx, cy = (float(word) for word in intrinsics.split(","))
-        return Pinhole(fx, fy, cx, cy, width=photo.shape[1], height=photo.shape[0])
+        Pinhole(fx, fy, cx, cy, width=1, height=1)  # no camera has a focal length of 0, or NaN
     except ValueError:
         raise RequestError(
             f"Intrinsics are fx,fy,cx,cy in pixels, such as 525,525,320,240; not {intrinsics[:80]!r}."
         ) from None
+    return fx, fy, cx, cy

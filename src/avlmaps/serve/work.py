@@ -8,7 +8,6 @@ import numpy as np
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME
-from avlmaps.core.question import Modality, Question
 from avlmaps.navigate.paths import PathAnswer
 from avlmaps.query.answer import Answer
 from avlmaps.query.description import map_answer
@@ -23,7 +22,6 @@ from avlmaps.query.schema import (
     ThingAnswer,
     locate_answer,
 )
-from avlmaps.query.sentences import SentenceAnswer, UnusedFileError, ask_sentence
 from avlmaps.serve.errors import RequestError, without_folders
 from avlmaps.serve.lanes import Watch
 from avlmaps.serve.requests import (
@@ -43,7 +41,7 @@ from avlmaps.serve.requests import (
 from avlmaps.serve.settings import Limits
 from avlmaps.serve.shelf import ServedMap, Shelf
 from avlmaps.serve.tiles import TilesAnswer
-from avlmaps.serve.uploads import Uploads, camera_of
+from avlmaps.serve.uploads import Uploads, camera_of, numbers_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,68 +209,31 @@ def sound_clip(task: Task, query: NoQuery) -> File:
     return File(content, "audio/flac", {"etag": f'"{task.map.version}"'})
 
 
-@dataclass(frozen=True, slots=True)
-class QueryReply:
-    """A query and its answer.
-
-    Attributes:
-        answer: with its heat, for pictures.
-        json: as it is sent.
-    """
-
-    answer: Answer
-    json: QueryAnswer
-
-
-def ask_map(task: Task, query: AskQuery) -> QueryReply:
+def ask_map(task: Task, query: AskQuery) -> Answer:
     """Answer a sentence or parts, with the files of the request.
 
     Raises:
-        RequestError: there is neither a sentence nor a part, or both.
+        AskError: what is given does not fit together.
         QueryError: the query cannot be answered.
     """
     attachments = task.uploads.attachments(task.limits)
-    photo = attachments.get(PHOTO)
-    camera = camera_of(query.intrinsics, photo if isinstance(photo, np.ndarray) else None)
-    words = bool((query.sentence or "").strip())
-    parts = query.parts(PHOTO in attachments, CLIP in attachments)
-    if (not words and not parts) or (words and any(not part.is_file for part in parts)):
-        raise RequestError(
-            "A query is a sentence, or parts (object, sound, area, photo, clip), and not both; for example: "
-            "sentence=the red cabinet near the sound of a dog."
-        )
-    primary = Modality(query.primary) if query.primary else None
-    top = min(query.top, task.limits.goals)
-    if not words:
-        answer = task.map.avlmap.ask(Question.of(parts, primary), top, camera, attachments)
-        return QueryReply(answer, answer.to_json())
-    reply = _sentence_answer(task, query, top, primary, attachments, camera)
-    return QueryReply(reply.answer, reply.to_json())
-
-
-def _sentence_answer(
-    task: Task, query: AskQuery, top: int, primary: Modality | None, attachments: Any, camera: Any
-) -> SentenceAnswer:
-    try:
-        return ask_sentence(
-            task.map.avlmap,
-            query.sentence or "",
-            top=top,
-            primary=primary,
-            image=PHOTO if PHOTO in attachments else None,
-            clip=CLIP if CLIP in attachments else None,
-            attachments=attachments,
-            camera_of=lambda _: camera,
-        )
-    except UnusedFileError:
-        raise RequestError(
-            "The sentence does not speak of the file; say 'this photo' or 'this recording' in it."
-        ) from None
+    return task.map.avlmap.ask(
+        query.sentence or "",
+        min(query.top, task.limits.goals),
+        None if query.intrinsics is None else numbers_of(query.intrinsics),
+        attachments,
+        object=query.object,
+        sound=query.sound,
+        area=query.area,
+        image=PHOTO if PHOTO in attachments else None,
+        clip=CLIP if CLIP in attachments else None,
+        primary=query.primary,
+    )
 
 
 def ask(task: Task, query: AskQuery) -> QueryAnswer:
     """Return what ``avlmaps query --json`` prints."""
-    return ask_map(task, query).json
+    return ask_map(task, query).to_dict()
 
 
 def locate(task: Task, query: LocateQuery) -> LocateAnswer:
@@ -312,10 +273,10 @@ def picture(task: Task, query: PictureQuery) -> File:
     if not asks:
         content = map_picture(task.map) if query.size == "full" else small_picture(task.map)
         return File(content, "image/png")
-    reply = ask_map(task, AskQuery(**values))
+    answer = ask_map(task, AskQuery(**values))
     task.watch.step("drawing")
     draw = full_picture if query.size == "full" else small_picture
-    return File(draw(task.map, reply.answer), "image/png")
+    return File(draw(task.map, answer), "image/png")
 
 
 def tiles(task: Task, query: NoQuery) -> TilesAnswer:
@@ -328,7 +289,7 @@ def tile(task: Task, query: TilesQuery) -> File:
     """Return one tile."""
     heat = None
     if query.heat is not None:
-        shown = ask_map(task, AskQuery(sentence=query.heat)).answer.heat
+        shown = ask_map(task, AskQuery(sentence=query.heat)).heat
         heat = None if shown is None else shown.shown
     level, i, j, k = (int(task.path[name]) for name in ("level", "i", "j", "k"))
     content = task.map.pyramid.tile(level, (i, j, k), heat)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
     from avlmaps.navigate.driver import Driver
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.view.asking import Upload
+    from avlmaps.view.uploads import Upload
 
 MakeRobot = Callable[["AVLMap"], "Driver"]
 """Puts a robot that really moves (a simulated one) into the world that a map was made of."""

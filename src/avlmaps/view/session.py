@@ -14,15 +14,16 @@ from avlmaps.query.modalities.image import read_picture
 from avlmaps.query.modalities.sound import read_clip
 from avlmaps.query.naming import VoxelNamer, keyframes_that_saw
 from avlmaps.recordings.containers import self_contained_suffix
-from avlmaps.view.asking import Upload, ask, without_paths
 from avlmaps.view.labels import Labels, palettes
 from avlmaps.view.layout import Layout
 from avlmaps.view.route import Guide, MakeRobot
+from avlmaps.view.uploads import Upload, without_paths
 
 if TYPE_CHECKING:
     from avlmaps.core.question import Question
     from avlmaps.query.contents import Thing
 
+TOP = 5  # goals on a page
 MOST_UPLOAD_BYTES = 32_000_000
 _MOST_UPLOADS = 12  # the oldest file is forgotten then
 _MOST_VIEWS = 12  # keyframes that are named of those which saw a voxel
@@ -143,15 +144,16 @@ class ViewSession:
             QueryError: the query is empty, or not understood.
         """
         files = self._upload(photo), self._upload(clip)
+        image, recording = (None if upload is None else upload.path for upload in files)
         answers, heats = [], []
         with self._asking:
             for one in self.maps:
                 try:
-                    reply = ask(one.avlmap, sentence, *files, question=question)
+                    answer = one.avlmap.ask(question or sentence, TOP, image=image, clip=recording)
                 except AvlmapsError as fault:
                     raise QueryError(without_paths(str(fault), *files)) from fault
-                heat = reply.answer.heat
-                answers.append(_cleaned(reply.to_json(), *files))
+                heat = answer.heat
+                answers.append(_cleaned(answer.to_dict(), *files))
                 heats.append(one.layout.in_order(heat.shown).tobytes() if heat is not None else bytes(len(one.layout)))
         return {"question": sentence, "answers": answers}, b"".join(heats)
 

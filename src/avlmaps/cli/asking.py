@@ -1,0 +1,66 @@
+"""A query of the command line and its shell, answered as JSON; apart from the parser, which takes longer to load."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from avlmaps.cli.output import UsageError
+from avlmaps.query.asking import Asked, AskError, Files, ask, thing_alone
+from avlmaps.query.loops import plain_loops
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
+
+_SMALL_MAP = 400_000  # voxels; plain NumPy takes 0.1 s for them
+
+
+def answered(
+    open_map: "Callable[[], AVLMap]",
+    sentence: str = "",
+    top: int = 3,
+    *,
+    image: Path | None = None,
+    clip: Path | None = None,
+    intrinsics: tuple[float, ...] | None = None,
+    plot: Path | None = None,
+    once: bool = False,
+    **parts: Any,
+) -> dict[str, Any]:
+    """Return the answer to a query.
+
+    Args:
+        open_map: opens the map, once the query is known to fit together.
+        sentence: the words.
+        top: most goals.
+        image: what "this photo" means.
+        clip: what "this recording" means.
+        intrinsics: fx, fy, cx, cy of the photo's camera, pixels.
+        plot: a picture to write.
+        once: whether this process answers no other query.
+        parts: object, sound, area and primary; see ``Asked``.
+
+    Raises:
+        UsageError: what is given does not fit together.
+    """
+    if top < 1:
+        raise UsageError(f"--top is {top}; it must be 1 or more.")
+    photo, recording = (None if file is None else str(file) for file in (image, clip))
+    try:
+        asked = Asked(sentence=sentence, image=photo, clip=recording, top=top, **parts)
+        avlmap = open_map()
+        with _loops(asked, avlmap, once and plot is None):
+            answer = ask(avlmap, asked, Files(intrinsics))
+    except AskError as error:
+        raise UsageError(str(error)) from None
+    drawn = {} if plot is None or answer.heat is None else {"plot": str(answer.heat.plot(plot, top=top))}
+    return {**answer.to_dict(), **drawn}
+
+
+def _loops(asked: Asked, avlmap: "AVLMap", once: bool) -> "AbstractContextManager[None]":
+    """Return the context of a query: plain loops for one thing in a small map, whose process answers nothing else."""
+    if once and len(avlmap.stored.voxels) <= _SMALL_MAP and thing_alone(asked, avlmap) is not None:
+        return plain_loops()
+    from avlmaps.core.compiling import announce_compiling
+
+    return announce_compiling()

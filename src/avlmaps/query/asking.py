@@ -1,0 +1,239 @@
+"""One function answers every query: a sentence or parts, from Python, the command line, the server and the viewer.
+
+The questions of a sentence are alternatives: the likeliest answer counts, and the others are named beside it.
+"""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from avlmaps.core.errors import QueryError
+from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.question import Modality, Part, Question
+from avlmaps.perception.protocols import NamedPixelEncoder
+from avlmaps.query.answer import Alternative, Answer, PartAnswer
+from avlmaps.query.factors import Factor, NearAnchors, NearThings
+from avlmaps.query.heatmap import product
+
+if TYPE_CHECKING:
+    from avlmaps.core.camera import Pinhole
+    from avlmaps.language.questions import AskedSentence
+    from avlmaps.query.avlmap import Attachment, AVLMap
+
+# For a count, up to this many instances are taken; those count that score at least this part of the best one.
+_MOST_COUNTED, _AS_LIKELY = 200, 0.5
+_EXAMPLE = "the red cabinet near the sound of a dog barking"
+
+
+class AskError(QueryError):
+    """What a query is given does not fit together: nothing, a sentence beside parts, a file that nobody speaks of."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """A query as it is given: a sentence, or parts; a file may come with either.
+
+    Attributes:
+        sentence: in words.
+        object: an object by its name.
+        sound: a sound by its name.
+        area: an area by its name.
+        image: a photo: the path of a file, or the name of an attachment.
+        clip: a sound clip, likewise.
+        primary: the part that is sought. None: the sentence says it, or the first of object, image, sound, area.
+        top: most goals.
+    """
+
+    sentence: str = ""
+    object: str | None = None
+    sound: str | None = None
+    area: str | None = None
+    image: str | None = None
+    clip: str | None = None
+    primary: Modality | None = None
+    top: int = 3
+
+    def __post_init__(self) -> None:
+        named = any(part is not None for part in (self.object, self.sound, self.area))
+        words = bool(self.sentence.strip())
+        if words == named and (words or not self.files):
+            raise AskError(
+                "A query takes a sentence, or parts (object, sound, area, photo, clip), and not both; for example: "
+                f"{_EXAMPLE}."
+            )
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The photo and the clip that are given."""
+        return tuple(file for file in (self.image, self.clip) if file is not None)
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The parts, where no sentence is given."""
+        named = (
+            (Modality.OBJECT, self.object, False),
+            (Modality.IMAGE, self.image, True),
+            (Modality.SOUND, self.sound, False),
+            (Modality.SOUND, self.clip, True),
+            (Modality.AREA, self.area, False),
+        )
+        return tuple(Part(modality, query, is_file=is_file) for modality, query, is_file in named if query is not None)
+
+
+@dataclass(frozen=True, slots=True)
+class Files:
+    """What belongs to the files of a query.
+
+    Attributes:
+        camera: of its pictures: a camera, or its fx, fy, cx, cy in pixels; None for the map's own.
+        attachments: pictures and sounds by name; None where the names are those of files.
+    """
+
+    camera: "Pinhole | Sequence[float] | None" = None
+    attachments: "Mapping[str, Attachment] | None" = None
+
+    def camera_of(self, question: Question) -> "Pinhole | None":
+        """Return the camera of a question's picture.
+
+        Raises:
+            AskError: the question has no picture, or no camera has such numbers.
+        """
+        from avlmaps.core.camera import Pinhole
+
+        if self.camera is None or isinstance(self.camera, Pinhole):
+            return self.camera
+        picture = next((part.query for part in question.parts if part.modality is Modality.IMAGE), None)
+        if picture is None:
+            raise AskError("Intrinsics belong to a photo; there is none.")
+        try:
+            fx, fy, cx, cy = self.camera
+            height, width = self._shape(picture)
+            return Pinhole(fx, fy, cx, cy, width=width, height=height)
+        except ValueError:
+            raise AskError(
+                f"Intrinsics are fx,fy,cx,cy in pixels, such as 525,525,320,240; not {tuple(self.camera)}."
+            ) from None
+
+    def _shape(self, picture: str) -> tuple[int, int]:
+        import numpy as np
+
+        from avlmaps.query.modalities.image import read_picture
+
+        attached = None if self.attachments is None else self.attachments.get(picture)
+        if self.attachments is not None and not isinstance(attached, np.ndarray):
+            raise AskError("Intrinsics belong to a photo; there is none.")
+        return (read_picture(Path(picture).expanduser()) if attached is None else np.asarray(attached)).shape[:2]
+
+
+def ask(avlmap: "AVLMap", asked: Asked, files: Files | None = None) -> Answer:
+    """Answer a sentence or parts.
+
+    Args:
+        avlmap: the map.
+        asked: the query.
+        files: cameras and contents of its files.
+
+    Raises:
+        AskError: the sentence does not speak of a file that was given, or intrinsics come without a photo.
+        QueryError: the sentence is not understood, or a part of it cannot be used.
+    """
+    begin, files = time.perf_counter(), files or Files()
+    question = thing_alone(asked, avlmap)
+    if question is None and asked.parts and not asked.sentence.strip():
+        question = Question.of(asked.parts, asked.primary)
+    if question is not None:
+        return answer_question(avlmap, question, asked.top, files)
+    answer = _answer_sentence(avlmap, asked, files)
+    return replace(answer, elapsed_ms=1e3 * (time.perf_counter() - begin))
+
+
+def answer_question(avlmap: "AVLMap", question: Question, top: int = 3, files: Files | None = None) -> Answer:
+    """Answer a question whose parts are known.
+
+    Raises:
+        AskError: intrinsics come without a photo, or no goal is wanted.
+        QueryError: a part cannot be used.
+    """
+    begin, files = time.perf_counter(), files or Files()
+    if top < 1:
+        raise AskError(f"At most {top} goals are wanted; the number must be 1 or more.")
+    camera = files.camera_of(question)
+    heat = product([avlmap.heat(part, camera, files.attachments) for part in question.parts])
+    goals, found = tuple(heat.goals(top)), heat.found
+    parts = [
+        PartAnswer(part, _peak(factor), factor.found, factor.understood, factor.note)
+        for part, factor in zip(question.parts, heat.factors, strict=True)
+    ]
+    elapsed_ms = 1e3 * (time.perf_counter() - begin)
+    return Answer(goals, found, tuple(parts), elapsed_ms, heat, goals[0].score if goals else 0.0)
+
+
+def thing_alone(asked: Asked, avlmap: "AVLMap") -> Question | None:
+    """Return the question where a query is the name of one thing and nothing else; None for others.
+
+    A sentence that is one of the encoder's names is read as the grammar reads it, without loading that. Stairs are a
+    thing and an area; the grammar decides which is meant.
+    """
+    if asked.files or asked.primary not in (None, Modality.OBJECT):
+        return None
+    if not asked.sentence.strip():
+        return Question.of(asked.parts) if len(asked.parts) == 1 and asked.object is not None else None
+    kinds = {entry.kind for entry in lexicon().senses(asked.sentence)}
+    if kinds != {Kind.THING} or "pixels" not in avlmap.stored.info.models:
+        return None
+    encoder = avlmap.stored.profile.pixel_encoder()
+    is_name = isinstance(encoder, NamedPixelEncoder) and asked.sentence in encoder.vocabulary
+    return Question.of([Part(Modality.OBJECT, asked.sentence)]) if is_name else None
+
+
+def _answer_sentence(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
+    from avlmaps.language.intents import Ask
+
+    read = _read(asked.sentence, asked.image, asked.clip)
+    counted = read.inquiry.ask is Ask.HOW_MANY
+    answers: list[tuple[Question, Answer]] = []
+    for question in read.questions:
+        if asked.primary is not None:
+            question = Question.of(question.parts, asked.primary)
+        used = {part.query for part in question.parts if part.is_file}
+        if not used.issuperset(asked.files):
+            raise AskError(
+                "The sentence does not speak of the file; say 'near where this photo was taken' or 'near the sound of "
+                "this recording' in it, or take the sentence or the file away."
+            )
+        answers.append((question, answer_question(avlmap, question, _MOST_COUNTED if counted else asked.top, files)))
+    answers.sort(key=lambda one: (one[1].found, one[1].probability), reverse=True)
+    (_, best), others = answers[0], answers[1:]
+    alternatives = tuple(Alternative(question, one.probability, one.found, one.goals[:1]) for question, one in others)
+    return replace(
+        best,
+        goals=best.goals[: asked.top],
+        count=_count(best) if counted else None,
+        notes=read.notes,
+        alternatives=alternatives,
+    )
+
+
+def _count(answer: Answer) -> int:
+    if not answer.found:
+        return 0
+    return sum(goal.score >= _AS_LIKELY * answer.goals[0].score for goal in answer.goals)
+
+
+@lru_cache(maxsize=512)
+def _read(sentence: str, image: str | None, clip: str | None) -> "AskedSentence":
+    """Return the reading of a sentence; it depends on nothing but the words, and agents repeat theirs."""
+    from avlmaps.language.questions import read_question
+    from avlmaps.language.sentence import Given
+
+    return read_question(sentence, Given(image, clip, knows=lambda _: True))
+
+
+def _peak(factor: Factor) -> float:
+    """Return the highest heat: 1 on an object, the best score at a place, which may be far from any voxel."""
+    if isinstance(factor, NearThings):
+        return float(factor.mask.any())
+    return float(factor.scores.max(initial=0.0)) if isinstance(factor, NearAnchors) else 0.0

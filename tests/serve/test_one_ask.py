@@ -1,0 +1,148 @@
+"""One query has one answer, by whichever front it is asked: Python, command line, shell, HTTP, agent, viewer."""
+
+import io
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import anyio
+import pytest
+from mcp.client.client import Client
+from starlette.testclient import TestClient
+
+from avlmaps.cli import main
+from avlmaps.core.question import Modality, Part, Question
+from avlmaps.maps.build import build_map
+from avlmaps.maps.settings import BuildSettings
+from avlmaps.query.asking import AskError
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.recordings.open import open_recording
+from avlmaps.serve.agents import agent_server
+from avlmaps.serve.app import create_app
+from avlmaps.serve.service import Service
+from avlmaps.view.session import TOP, ViewSession
+
+SENTENCES = [
+    "chair",
+    "where can I sit?",
+    "how many chairs are there",
+    "the chair near the sofa",
+    "the chiar in the kitchen",
+    "the sound of a doorbell",
+    "a zebra",
+]
+PARTS = [
+    {"object": "sofa", "area": "kitchen"},
+    {"object": "red chair"},
+    {"sound": "doorbell", "object": "table", "primary": "sound"},
+]
+
+
+@pytest.fixture(scope="module")
+def home(walk: Path) -> Path:
+    """A map of the same room by an encoder of names."""
+    path = walk.parent / "home.avlmap"
+    build_map(open_recording(walk), path, "embedded", BuildSettings(voxel_size_m=0.1), progress=False)
+    return path
+
+
+@pytest.fixture(scope="module")
+def opened(home: Path) -> AVLMap:
+    return AVLMap.open(home)
+
+
+@pytest.fixture(scope="module")
+def home_service(home: Path) -> Iterator[Service]:
+    service = Service.open({"home": home})
+    yield service
+    service.close()
+
+
+def plain(answer: dict[str, Any]) -> dict[str, Any]:
+    """Return an answer as JSON has it, without its time."""
+    return json.loads(json.dumps(answer)) | {"elapsed_ms": None}
+
+
+def by_command_line(home: Path, query: dict[str, str], capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    words = [query["sentence"]] if "sentence" in query else []
+    options = [word for key, value in query.items() if key != "sentence" for word in (f"--{key}", value)]
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as stop:
+        main(["query", str(home), *words, *options, "--json", "--top", str(TOP)])
+    assert stop.value.code == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def by_shell(home: Path, query: dict[str, str], capsys: Any, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    words = query.get("sentence") or " ".join(f'--{key} "{value}"' for key, value in query.items() if key != "sentence")
+    words = f"query --top {TOP} " + (f'"{words}"' if "sentence" in query else words)
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(f"{words}\n".encode()), encoding="utf-8"))
+    capsys.readouterr()
+    with pytest.raises(SystemExit):
+        main(["shell", str(home), "--json"])
+    return json.loads(capsys.readouterr().out)
+
+
+def by_agent(service: Service, query: dict[str, str]) -> dict[str, Any]:
+    async def conversation() -> Any:
+        async with Client(agent_server(service)) as client:
+            return await client.call_tool("ask", {**query, "top": TOP, "picture": False})
+
+    result = anyio.run(conversation)
+    assert not result.is_error, result.content
+    return json.loads(result.content[0].text)
+
+
+@pytest.mark.parametrize(
+    "query", [{"sentence": words} for words in SENTENCES] + PARTS, ids=lambda one: "+".join(one.values())
+)
+def test_every_front_gives_the_answer_of_the_package(
+    home: Path,
+    opened: AVLMap,
+    home_service: Service,
+    query: dict[str, str],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    given: dict[str, Any] = {**query}
+    expected = plain({**opened.ask(given.pop("sentence", ""), TOP, **given).to_dict()})
+    with TestClient(create_app(home_service), base_url="http://127.0.0.1:8750") as client:
+        served = client.get("/maps/home/ask", params={**query, "top": TOP}).json()
+    fronts = {
+        "command line": by_command_line(home, query, capsys),
+        "shell": by_shell(home, query, capsys, monkeypatch),
+        "server": served,
+        "agent": by_agent(home_service, query),
+    }
+    if "sentence" in query:
+        fronts["viewer"] = ViewSession([AVLMap.open(home)]).ask(query["sentence"])[0]["answers"][0]
+    for front, answer in fronts.items():
+        assert plain(answer) == expected, front
+
+
+def test_python_counts_and_weighs_all_that_a_sentence_may_mean(opened: AVLMap) -> None:
+    sit = opened.ask("where can I sit?")
+    assert len(sit.alternatives) > 1
+    assert all(sit.probability >= other.probability for other in sit.alternatives if other.found == sit.found)
+    told = sit.to_dict()
+    assert [one["query"] for one in told.get("alternatives", [])]
+    assert opened.ask("how many zebras are there").count == 0
+    assert "count" not in opened.ask("chair").to_dict()
+
+
+NOTHING: list[tuple[Callable[[AVLMap], object], str]] = [
+    (lambda m: m.ask(), "takes a sentence, or parts"),
+    (lambda m: m.ask(" "), "takes a sentence, or parts"),
+    (lambda m: m.ask("chair", object="chair"), "not both"),
+    (lambda m: m.ask("the chair", image="photo.png"), "does not speak of the file"),
+    (lambda m: m.ask("chair", 0), "0 goals"),
+    (lambda m: m.ask("chair", intrinsics=(1, 1, 1, 1)), "there is none"),
+    (lambda m: m.ask(Question.of([Part(Modality.OBJECT, "chair")]), area="kitchen"), "holds its parts already"),
+]
+
+
+@pytest.mark.parametrize(("ask", "says"), NOTHING, ids=[says for _, says in NOTHING])
+def test_what_does_not_fit_together_is_refused(opened: AVLMap, ask: Callable[[AVLMap], object], says: str) -> None:
+    with pytest.raises(AskError, match=says):
+        ask(opened)
