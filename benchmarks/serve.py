@@ -54,7 +54,7 @@ class _Corner(Recording):
         self.world_from_camera[:, 0, 3] = 0.3 * np.arange(8)
         self.up_in_world, self.audio, self.notices = np.array([0.0, 0.0, 1.0]), None, ()
 
-    @property
+    @cached_property
     def fingerprint(self) -> str:
         return "made up"
 
@@ -207,7 +207,7 @@ def run(url: str, seconds: float, rate: float, clients: int, expected: dict[str,
 
 def main() -> None:
     """Print the table, or one JSON object."""
-    arguments = parser(__doc__.splitlines()[0])
+    arguments = parser(str(__doc__).splitlines()[0])
     arguments.add_argument("--voxels", type=int, default=300_000)
     arguments.add_argument("--clients", type=int, default=8)
     arguments.add_argument("--rate", type=float, default=30.0)

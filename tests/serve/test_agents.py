@@ -87,7 +87,7 @@ def test_every_tool_answers_to_its_schema_with_a_small_picture(talk: Any, room: 
 def test_answers_are_those_of_the_package(talk: Any, room: Path) -> None:
     opened = AVLMap.open(room)
     asked = talk(lambda client: client.call_tool("ask", {"sentence": "the red thing", "top": 2, "picture": False}))
-    expected = opened.ask("the red thing", top=2).to_dict()
+    expected = opened.ask("the red thing", top=2).to_json()
     assert asked.structured_content["goals"] == expected["goals"]
     assert len(asked.content) == 1
     seen = talk(lambda client: client.call_tool("last_seen", {"thing": "red thing"})).structured_content

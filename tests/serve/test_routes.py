@@ -146,7 +146,7 @@ def test_a_query_has_one_answer_by_every_method(
 
 def test_a_query_is_answered_as_the_package_does(client: TestClient, opened: AVLMap) -> None:
     answer = client.get("/maps/room/ask", params={"sentence": "the red thing", "top": 4}).json()
-    assert plain(answer) == plain(opened.ask("the red thing", top=4).to_dict())
+    assert plain(answer) == plain(opened.ask("the red thing", top=4).to_json())
     again = client.get("/maps/room/ask", params={"sentence": "the red thing", "top": 4}).json()
     assert plain(again) == plain(answer), "the remembered heat gives the same answer"
 

@@ -110,3 +110,7 @@ class Answer:
         if self.alternatives:
             answer["alternatives"] = [one.to_dict() for one in self.alternatives]
         return answer
+
+    def to_json(self) -> "QueryAnswer":
+        """Return ``to_dict()``: the name that it had before."""
+        return self.to_dict()
