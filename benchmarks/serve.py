@@ -13,6 +13,7 @@ import sys
 import tempfile
 import threading
 import time
+from functools import cached_property
 from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
