@@ -137,7 +137,7 @@ class Nav2(Node):
         return GoalResponse.REJECT if self.mode == "reject" else GoalResponse.ACCEPT
 
     def _asked_to_cancel(self) -> CancelResponse:
-        self.log("cancel asked")
+        self.log("cancel")
         return CancelResponse.REJECT if self.mode == "deaf" else CancelResponse.ACCEPT
 
     def _do(self, name, kind, handle):
