@@ -102,6 +102,10 @@ class FloorPlan:
         i, j = (np.clip(cell, 0, np.array(self.wall.shape[1:]) - 1)).astype(np.int64).T
         return self._open[np.ravel_multi_index((storey, i, j), self.wall.shape)]
 
+    def storeys_of(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
+        """Return the storey of each point, counted from 0, the lowest."""
+        return _storey_of(self.space.level(points_world)[:, 2], self.floors_m)
+
     @cached_property
     def voxel_cells(self) -> Int[np.ndarray, " n"]:
         """The open cell nearest to each voxel of the map; see ``cells_of``."""

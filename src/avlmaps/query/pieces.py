@@ -171,7 +171,8 @@ def named_confidence(
     mean = np.bincount(instance, weights=np.square(score)) / np.maximum(count, 1)
     names = encoded.meant(encoder)
     sure = [encoder.instance_probability(name, mean, count * voxel_size_m**2) for name in names]
-    return np.max(sure, axis=0).astype(np.float32)
+    nothing = np.zeros(len(count))  # of a word that names none of the encoder's names
+    return np.max([nothing, *sure], axis=0).astype(np.float32)
 
 
 def _longest_m(encoder: PixelEncoder, encoded: EncodedWord, settings: ObjectSettings) -> float:

@@ -2,53 +2,85 @@
 
 import base64
 import binascii
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from msgspec import Meta, Struct
 
-from avlmaps.navigate.paths import NearGoalsAnswer, goals_near
-from avlmaps.query.places import LastSeenAnswer, PlaceAnswer, last_seen
-from avlmaps.query.schema import LocateAnswer, QueryAnswer
-from avlmaps.serve import work
+from avlmaps.navigate.paths import goals_near
+from avlmaps.query.places import last_seen
+from avlmaps.serve import agent_lists, work
+from avlmaps.serve.agent_lists import (
+    ListRoomsQuery,
+    ListSoundsQuery,
+    ListThingsQuery,
+    MapQuery,
+    Place,
+    place_given,
+)
 from avlmaps.serve.errors import RequestError
 from avlmaps.serve.pictures import small_picture
-from avlmaps.serve.requests import AskQuery, LocateQuery, NoQuery, PlaceQuery, RoomsQuery, ThingsQuery, Words, place_of
+from avlmaps.serve.requests import AskQuery, LocateQuery, PlaceQuery, Short, Words
 from avlmaps.serve.uploads import Uploads
 from avlmaps.serve.work import Task
 
-_Base64 = Annotated[str, Meta(description="base64 of a file's bytes; paths are not read", max_length=1 << 26)]
+_Base64 = Annotated[str, Meta(max_length=1 << 26)]
+Intrinsics = Annotated[Short | None, Meta(description="fx,fy,cx,cy of another camera than the map's")]
+_MOST_MARKS = 20
 
 
 class AskToolQuery(AskQuery, forbid_unknown_fields=True):
     """A query in words, with a photo or a clip if it speaks of one."""
 
-    photo: Annotated[_Base64 | None, Meta(description="PNG or JPEG in base64, for 'this photo'.")] = None
-    clip: Annotated[_Base64 | None, Meta(description="Sound file in base64, for 'this recording'.")] = None
-    picture: Annotated[bool, Meta(description="Return a small top-down picture of the heat and the goals.")] = True
+    sentence: Annotated[Words | None, Meta(description="such as 'a chair near a dog barking', 'how many cups'")] = None
+    object: Words | None = None
+    sound: Words | None = None
+    area: Words | None = None
+    primary: Annotated[
+        Literal["object", "sound", "image", "area"] | None, Meta(description="the part that is sought")
+    ] = None
+    top: Annotated[int, Meta(ge=1, le=100)] = 3
+    intrinsics: Intrinsics = None
+    photo: Annotated[_Base64 | None, Meta(description="base64, for 'this photo'")] = None
+    clip: Annotated[_Base64 | None, Meta(description="base64, for 'this recording'")] = None
+    picture: bool = False
 
 
 class LocatePhotoQuery(LocateQuery, forbid_unknown_fields=True, kw_only=True):
     """A photo to locate."""
 
-    photo: Annotated[_Base64, Meta(description="PNG or JPEG in base64.")]
+    photo: Annotated[_Base64, Meta(description="base64 of a PNG or JPEG")]
+    intrinsics: Intrinsics = None
+    picture: bool = False
+
+
+class DescribePlaceQuery(PlaceQuery, forbid_unknown_fields=True, kw_only=True):
+    """A place."""
+
+    x: float
+    y: float
+    z: Annotated[float | None, Meta(description="without it x, y are in the level frame")] = None
+    radius_m: Annotated[float, Meta(gt=0.0, le=5.0)] = 0.15
+    picture: bool = False
 
 
 class LastSeenQuery(Struct, forbid_unknown_fields=True):
     """A thing by its name."""
 
-    thing: Annotated[Words, Meta(description="Such as 'red mug'.")]
-    top: Annotated[int, Meta(ge=1, le=20, description="Most places.")] = 3
+    thing: Annotated[Words, Meta(description="such as 'red mug'")]
+    top: Annotated[int, Meta(ge=1, le=20)] = 3
+    picture: bool = False
 
 
 class GoalNearQuery(Struct, forbid_unknown_fields=True):
     """A query, and a place to be near to."""
 
-    sentence: Annotated[Words, Meta(description="The query in words, such as 'a chair' or 'the sound of water'.")]
-    near: Annotated[str, Meta(max_length=100, description="x,y,z in the recording frame, or x,y of the floor plan.")]
-    top: Annotated[int, Meta(ge=1, le=20, description="Most goals.")] = 3
+    sentence: Annotated[Words, Meta(description="such as 'a chair'")]
+    near: Place
+    top: Annotated[int, Meta(ge=1, le=20)] = 3
+    picture: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +102,8 @@ class AgentTool:
 
     Attributes:
         name: as agents call it.
-        title: for people.
         about: what it does, for agents.
         query: type of its arguments; ``map`` is added.
-        answer: type of its answer.
         work: makes the outcome, in a thread.
         slow: whether it is work for the slow lane.
         read_only: whether it changes nothing, in the map or in the world.
@@ -81,10 +111,8 @@ class AgentTool:
     """
 
     name: str
-    title: str
     about: str
     query: type[Struct]
-    answer: Any
     work: Callable[[Task, Any], ToolResult]
     slow: bool = False
     read_only: bool = True
@@ -100,25 +128,25 @@ def _bytes_of(text: str | None, what: str) -> bytes | None:
         raise RequestError(f"The {what} is no base64; send the file's bytes in base64.") from None
 
 
-def _list_things(task: Task, query: ThingsQuery) -> ToolResult:
-    answer = work.list_things(task, query)
-    return ToolResult(
-        answer, small_picture(task.map, places=[np.array(one["position"]) for one in answer["things"][:20]])
-    )
+def _listed(lists: Callable[[Task, Any], dict[str, Any]], key: str) -> Callable[[Task, Any], ToolResult]:
+    """Return the work of a tool that lists things, sounds or rooms, with their places in the picture."""
+
+    def listing(task: Task, query: Any) -> ToolResult:
+        answer = lists(task, query)
+        return ToolResult(answer, _marked(task, query, [one["position"] for one in answer.get(key, [])]))
+
+    return listing
 
 
-def _list_sounds(task: Task, query: NoQuery) -> ToolResult:
-    answer = work.list_sounds(task, query)
-    return ToolResult(
-        answer, small_picture(task.map, places=[np.array(one["position"]) for one in answer["sounds"][:20]])
-    )
+def _describe_map(task: Task, query: MapQuery) -> ToolResult:
+    return ToolResult(agent_lists.describe_building(task, query), _marked(task, query, []))
 
 
-def _list_rooms(task: Task, query: RoomsQuery) -> ToolResult:
-    answer = work.list_rooms(task, query)
-    return ToolResult(
-        answer, small_picture(task.map, places=[np.array(one["position"]) for one in answer["rooms"][:20]])
-    )
+def _marked(task: Task, query: Any, places: Sequence[Sequence[float]]) -> bytes | None:
+    """Return a picture of some places where the query wants one."""
+    if not query.picture:
+        return None
+    return small_picture(task.map, places=[np.array(place) for place in places[:_MOST_MARKS]])
 
 
 def _ask(task: Task, query: AskToolQuery) -> ToolResult:
@@ -130,45 +158,44 @@ def _ask(task: Task, query: AskToolQuery) -> ToolResult:
 def _locate(task: Task, query: LocatePhotoQuery) -> ToolResult:
     answer = work.locate(replace(task, uploads=Uploads(_bytes_of(query.photo, "photo"))), query)
     pose = answer["world_from_camera"]
-    at = [] if pose is None else [np.array([row[3] for row in pose[:3]])]
-    return ToolResult(answer, small_picture(task.map, places=at))
+    at = [] if pose is None else [[row[3] for row in pose[:3]]]
+    return ToolResult(answer, _marked(task, query, at))
 
 
-def _describe_place(task: Task, query: PlaceQuery) -> ToolResult:
+def _describe_place(task: Task, query: DescribePlaceQuery) -> ToolResult:
     answer = work.place(task, query)
-    return ToolResult(answer, small_picture(task.map, places=[np.array(answer["position"])]))
+    return ToolResult(answer, _marked(task, query, [answer["position"]]))
 
 
 def _last_seen(task: Task, query: LastSeenQuery) -> ToolResult:
     answer = last_seen(task.map.avlmap, query.thing, query.top)
-    return ToolResult(answer, small_picture(task.map, places=[np.array(one["position"]) for one in answer["places"]]))
+    return ToolResult(answer, _marked(task, query, [one["position"] for one in answer["places"]]))
 
 
 def _goal_near(task: Task, query: GoalNearQuery) -> ToolResult:
     reply = work.ask_map(task, AskQuery(sentence=query.sentence, top=20))
-    answer = goals_near(task.map.paths, reply, place_of(query.near), query.top)
-    return ToolResult(answer, small_picture(task.map, places=[np.array(one["position"]) for one in answer["goals"]]))
+    answer = goals_near(task.map.paths, reply, place_given(query.near), query.top)
+    return ToolResult(answer, _marked(task, query, [one["position"] for one in answer["goals"]]))
 
 
 TOOLS = (
-    AgentTool("list_things", "List things", "List the things of a map with confidence, position and size.",
-              ThingsQuery, work.ThingsAnswer, _list_things, slow=True),
-    AgentTool("list_sounds", "List sounds", "List the sounds that the robot recorded, with names, times and positions.",
-              NoQuery, work.SoundsAnswer, _list_sounds, slow=True),
-    AgentTool("list_rooms", "List rooms", "List the rooms of a map with confidence and position.",
-              RoomsQuery, work.RoomsAnswer, _list_rooms, slow=True),
-    AgentTool("ask", "Query the map",
-              "Find places by a sentence ('the chair near the sound of a dog', 'how many chairs are in the kitchen') "
-              "or by parts (object, sound, area, photo, clip). Goals are ranked; with found=false they are guesses.",
-              AskToolQuery, QueryAnswer, _ask),
-    AgentTool("locate_photo", "Locate a photo", "Return the pose of the camera that took a photo in this building.",
-              LocatePhotoQuery, LocateAnswer, _locate, slow=True),
-    AgentTool("describe_place", "What is here?",
-              "Return the likeliest names of what is at a place, when it was last seen, and the kind of room.",
-              PlaceQuery, PlaceAnswer, _describe_place),
-    AgentTool("last_seen", "When was it last seen?", "Return where a thing is and when the robot last saw it.",
-              LastSeenQuery, LastSeenAnswer, _last_seen),
-    AgentTool("goal_near", "Nearest goal",
-              "Return the goals of a query by the length of the path from a place, with the point where a robot stops.",
-              GoalNearQuery, NearGoalsAnswer, _goal_near, slow=True),
+    AgentTool("describe_map", "Start here: floors, kinds of room, and how many things of each name.",
+              MapQuery, _describe_map, slow=True),
+    AgentTool("list_rooms", "List the rooms, each with the number of its things.",
+              ListRoomsQuery, _listed(agent_lists.list_rooms, "rooms"), slow=True),
+    AgentTool("list_things", "List the things of a room, near a place, or of a name; total counts them.",
+              ListThingsQuery, _listed(agent_lists.list_things, "things"), slow=True),
+    AgentTool("list_sounds", "List recorded sounds: name, time, the robot's position then.",
+              ListSoundsQuery, _listed(agent_lists.list_sounds, "sounds"), slow=True),
+    AgentTool("ask",
+              "Find places by a sentence, or by parts (object, sound, area, photo, clip). With found=false goals are "
+              "guesses.", AskToolQuery, _ask),
+    AgentTool("locate_photo", "Return the pose of the camera that took a photo here.",
+              LocatePhotoQuery, _locate, slow=True),
+    AgentTool("describe_place", "Return what is at a place: names, kind of room, last seen.",
+              DescribePlaceQuery, _describe_place),
+    AgentTool("last_seen", "Return where a thing is and when the robot last saw it.",
+              LastSeenQuery, _last_seen),
+    AgentTool("goal_near", "Return goals by the length of the path from a place, and where to stop.",
+              GoalNearQuery, _goal_near, slow=True),
 )  # fmt: skip

@@ -1,9 +1,9 @@
 """Calls, bound to what is called before anything runs: the right name, as many arguments, none given twice."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from difflib import get_close_matches
+from collections.abc import Mapping, Sequence
 
 from avlmaps.core.errors import ProgramError
+from avlmaps.core.suggestions import nearest
 from avlmaps.language.program.budget import refused
 from avlmaps.language.program.syntax import Argument, BuiltinCall, Expression, SkillCall
 from avlmaps.language.program.table import ROBOT, SKILLS, Parameter, Skill
@@ -18,13 +18,6 @@ BUILTINS: Mapping[str, tuple[int, int | None]] = {
     "round": (1, 2),
 }
 RESERVED = frozenset({ROBOT, *SKILLS, *BUILTINS})
-_MOST_COMPARED = 200
-
-
-def nearest(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name that is spelt most like one, if any comes close."""
-    close = get_close_matches(name, list(known)[:_MOST_COMPARED], n=1)
-    return close[0] if close else None
 
 
 def skill_named(line: int, name: str) -> Skill:

@@ -1,0 +1,122 @@
+"""The floors and rooms of a map as names, and which of them a point lies in: building, floor, room, things."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from avlmaps.core.arrays import Float, Int
+from avlmaps.core.errors import QueryError
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.contents import Room
+    from avlmaps.query.floor_plan import FloorPlan
+    from avlmaps.query.rooms import RoomField
+
+NOWHERE = -1
+"""The room of a point in a map without rooms."""
+_MOST_NAMED = 30
+
+
+@dataclass(frozen=True, eq=False)
+class Whereabouts:
+    """The floors and rooms of one map.
+
+    Attributes:
+        rooms: those with most views first.
+        names: of each room, all different: the kind of room, and a number where there are several of a kind.
+        avlmap: the map.
+        plan: its storeys; None for a map without a floor plan.
+        field: the kinds of room of each place; None for a map whose rooms are groups of views.
+    """
+
+    rooms: "tuple[Room, ...]"
+    names: tuple[str, ...]
+    avlmap: "AVLMap"
+    plan: "FloorPlan | None"
+    field: "RoomField | None"
+
+    @classmethod
+    def of(cls, avlmap: "AVLMap") -> "Whereabouts":
+        """Find the rooms of a map; none where it has no model of views.
+
+        Raises:
+            MapError: the map was built with another encoder than is installed.
+        """
+        if "views" not in avlmap.stored.info.models:
+            votes = avlmap.room_votes
+            return cls((), (), avlmap, None if votes is None else votes.plan, None)
+        rooms, field = tuple(avlmap.rooms()), avlmap.room_field
+        names = numbered([room.name for room in rooms])
+        return cls(rooms, names, avlmap, None if field is None else field.plan, field)
+
+    @property
+    def floor_count(self) -> int:
+        """Number of storeys; 1 where they are not known."""
+        return 1 if self.plan is None else len(self.plan.floors_m)
+
+    def floors_of(self, points: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
+        """Return the storey of each point (metres, recording frame), counted from 0, the lowest."""
+        points = np.asarray(points, np.float64).reshape(-1, 3)
+        return np.zeros(len(points), np.int64) if self.plan is None else self.plan.storeys_of(points)
+
+    def rooms_of(self, points: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
+        """Return the number of the room of each point: the one whose region holds it, else the nearest of its storey.
+
+        Args:
+            points: metres, recording frame.
+
+        Returns:
+            Numbers into ``rooms``; ``NOWHERE`` for a map without rooms.
+        """
+        from scipy.spatial import KDTree
+
+        points = np.asarray(points, np.float64).reshape(-1, 3)
+        if not self.rooms or not len(points):
+            return np.full(len(points), NOWHERE, np.int64)
+        level = self.avlmap.space.level
+        places = np.concatenate([room.places for room in self.rooms])
+        number = np.repeat(np.arange(len(self.rooms)), [len(room.places) for room in self.rooms])
+        nearest = KDTree(self._by_storey(level(places), places)).query(self._by_storey(level(points), points))[1]
+        out = number[nearest]
+        if self.field is None:
+            return out
+        region = self.field.regions()
+        of_region = dict(zip(region[self.field.plan.cells_of(places)].tolist(), number.tolist(), strict=True))
+        of_points = region[self.field.plan.cells_of(points)].tolist()
+        return np.array([of_region.get(one, other) for one, other in zip(of_points, out.tolist(), strict=True)])
+
+    def _by_storey(self, level: Float[np.ndarray, "m 3"], points: Float[np.ndarray, "m 3"]) -> np.ndarray:
+        """Return level x and y, and a third number that puts other storeys farther away than any place of the same."""
+        return np.c_[level[:, :2], 1e4 * self.floors_of(points)]
+
+    def numbers_of(self, asked: str) -> list[int]:
+        """Return the numbers of the rooms that a word names: one by its own name, or all of a kind.
+
+        Raises:
+            QueryError: there is no such room; the sentence lists those that there are.
+        """
+        word = " ".join(asked.casefold().split()).removeprefix("the ")
+        own = [k for k, name in enumerate(self.names) if name.casefold() == word]
+        numbers = own or [k for k, room in enumerate(self.rooms) if room.name.casefold() == word]
+        if numbers:
+            return numbers
+        if not self.names:
+            raise QueryError("The map has no rooms: it was built without a model of views; leave out the room.")
+        more = f" and {len(self.names) - _MOST_NAMED} more" if len(self.names) > _MOST_NAMED else ""
+        raise QueryError(
+            f"There is no room {asked[:60]!r}; the rooms are: {', '.join(self.names[:_MOST_NAMED])}{more}."
+        )
+
+
+def numbered(names: Sequence[str]) -> tuple[str, ...]:
+    """Return names that are all different: those that occur several times get a number each, from 1."""
+    often, given = Counter(names), Counter[str]()
+    out: list[str] = []
+    for name in names:
+        given[name] += 1
+        out.append(f"{name} {given[name]}" if often[name] > 1 else name)
+    return tuple(out)
