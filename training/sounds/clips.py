@@ -2,9 +2,8 @@
 
 import csv
 import re
-from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -50,29 +49,16 @@ class Clip:
 
 
 def read_index(sounds_folder: Path) -> list[Clip]:
-    """Read ``index.csv``; clips of ESC-50 get a fold by their source, so that no recording is in two folds."""
+    """Read ``index.csv``; a clip of ESC-50 has its fold in its name, a recording that of its first clip."""
     with (sounds_folder / "index.csv").open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
-    clips = []
+    clips, fold_of = [], dict[int, int]()
     for row in rows:
-        named = re.search(r"\d-(\d+)-[A-Z]", row["path"])
-        source, kind = int(named[1]) if named else 0, kind_of(row["category"])
-        clips.append(Clip(row["path"], row["category"], kind, int(row["fold"] or 0), source, row["licence"]))
-    return _with_folds(clips)
-
-
-def _with_folds(clips: Sequence[Clip]) -> list[Clip]:
-    """Put the sources of each kind without folds evenly into folds, the one with most clips first."""
-    fold_of = {clip.source: clip.fold for clip in clips if clip.fold}
-    total: Counter[int] = Counter()
-    for kind in sorted({clip.kind for clip in clips if not clip.fold and clip.source}):
-        sizes = Counter(clip.source for clip in clips if clip.kind == kind and not clip.fold and clip.source)
-        own: Counter[int] = Counter()
-        for source in sorted(sizes, key=lambda s: (-sizes[s], str(s))):
-            fold = fold_of.setdefault(source, min(FOLDS, key=lambda f: (own[f], total[f], f)))
-            own[fold] += sizes[source]
-            total[fold] += sizes[source]
-    return [replace(clip, fold=fold_of.get(clip.source, 0)) for clip in clips]
+        named = re.search(r"(\d)-(\d+)-[A-Z]", row["path"])
+        source, fold = (int(named[2]), int(named[1])) if named else (0, 0)
+        fold = fold_of.setdefault(source, fold) if source else 0
+        clips.append(Clip(row["path"], row["category"], kind_of(row["category"]), fold, source, row["licence"]))
+    return clips
 
 
 def read_samples(path: Path) -> Float32[np.ndarray, " n"]:

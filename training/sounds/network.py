@@ -39,11 +39,14 @@ class SoundNet(nn.Module):
         """Return the maps (n, 2 width, 16, 56) of the first layer and the first block."""
         return self.blocks[0](functional.relu(self.stem_norm(self.stem(x))))
 
-    def upper(self, maps: Tensor) -> Tensor:
-        """Return unit vectors from those maps: the mean and the highest over time of the mean over bands."""
+    def pooled(self, maps: Tensor) -> Tensor:
+        """Return the mean and the highest over time of the mean over bands (n, 12 width), from those maps."""
         y = self.blocks[1:](maps).float().mean(dim=2)
-        pooled = torch.cat([y.mean(dim=2), y.amax(dim=2)], dim=1)
-        return functional.normalize(self.head(self.dropout(pooled)), dim=1)
+        return torch.cat([y.mean(dim=2), y.amax(dim=2)], dim=1)
+
+    def upper(self, maps: Tensor) -> Tensor:
+        """Return unit vectors from those maps."""
+        return functional.normalize(self.head(self.dropout(self.pooled(maps))), dim=1)
 
     def forward(self, x: Tensor) -> Tensor:
         """Return unit vectors."""

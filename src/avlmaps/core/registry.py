@@ -116,6 +116,13 @@ _LIGHT = (
     _light(Kind.PIXELS, "pixels:LightPixels"),
     _light(Kind.VIEWS, "views:LightViews"),
     _light(Kind.SOUNDS, "sounds:LightSounds"),
+    Backend(
+        Kind.SOUNDS,
+        "efficientat",
+        "avlmaps.perception.light.efficientat:EfficientATSounds",
+        model="efficientat/mn04_as.onnx",
+        licence="MIT",
+    ),
 )
 _TRAINED = (
     Backend(Kind.PIXELS, "trained", f"{_EMBEDDED}.trained:trained_pixels", model="eyes", licence="your own"),

@@ -1,0 +1,231 @@
+"""Fit a network to what a published network says of mixtures, and to the words of what they hold.
+
+``python -m training.sounds.distil --without 5`` fits without one fold and prints how that fold is named.
+"""
+
+import argparse
+import copy
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import torch
+import torch.nn.functional as functional
+from torch import Tensor, nn
+from training.sounds.augmentation import (
+    Augmentation,
+    coloured,
+    heard,
+    in_noise,
+    in_rooms,
+    masked,
+    peak_normalised,
+    segmented,
+)
+from training.sounds.clips import mels_of, read_index, read_samples
+from training.sounds.export import write_onnx
+from training.sounds.fit import encode, share_of_rate, steady_noise, targets
+from training.sounds.kinds import NAMES, RECORDED
+from training.sounds.mixtures import Mixtures, Recipe, of_training, stored_mixtures
+from training.sounds.network import SoundNet
+
+from avlmaps.core.progress import say
+from avlmaps.perception.embedded.sound_calibration import typical_examples
+from avlmaps.perception.embedded.words import EmbeddedWords
+
+ROOT = Path(__file__).resolve().parents[2]
+SHARED = ROOT.parent / "shared"
+REPORTED = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How the student is fitted.
+
+    Attributes:
+        steps: batches.
+        batch: mixtures in one.
+        width: of the network.
+        rate: highest learning rate.
+        decay: weight decay.
+        averaging: constant of the moving average of the weights, which is the result.
+        temperature: of the softmax over kinds.
+        smoothing: share of the target that is spread over all kinds.
+        names: weight of the teacher's names.
+        features: weight of the teacher's features.
+        clean: share of a batch that is heard without room, noise or cuts.
+        seed: of everything.
+    """
+
+    steps: int = 5000
+    batch: int = 64
+    width: int = 32
+    rate: float = 3e-3
+    decay: float = 2e-2
+    averaging: float = 0.998
+    temperature: float = 0.07
+    smoothing: float = 0.05
+    names: float = 20.0
+    features: float = 2.0
+    clean: float = 0.35
+    seed: int = 0
+    augmentation: Augmentation = field(
+        default_factory=lambda: Augmentation(reverberation=0.6, noisy=0.6, equaliser_db=3.0)
+    )
+
+
+class Student(SoundNet):
+    """A sound network with two more heads, which serve training alone."""
+
+    def __init__(self, dim: int, width: int, names: int, features: int) -> None:
+        super().__init__(dim, width)
+        pooled = self.head.in_features
+        self.named, self.felt = nn.Linear(pooled, names), nn.Linear(pooled, features)
+
+    def answers(self, x: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Return unit vectors (n, dim), logits of the teacher's names, and its standardised features."""
+        pooled = self.pooled(self.lower(x))
+        dropped = self.dropout(pooled)
+        return functional.normalize(self.head(dropped), dim=1), self.named(dropped), self.felt(dropped)
+
+
+class Heard:
+    """Draws batches of mixtures, each in new circumstances."""
+
+    def __init__(self, mixtures: Mixtures, settings: Settings) -> None:
+        self._m, self._s = mixtures, settings
+        self._rng = np.random.default_rng(settings.seed)
+        self._generator = torch.Generator().manual_seed(settings.seed)
+        scale = mixtures.features.std(axis=0) + 1e-3
+        self._features = torch.from_numpy((mixtures.features - mixtures.features.mean(axis=0)) / scale)
+        self._probabilities = torch.sigmoid(torch.from_numpy(mixtures.logits))
+
+    @torch.no_grad()
+    def draw(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Return the network's input, the shares of the kinds, the teacher's probabilities and its features."""
+        s, generator = self._s, self._generator
+        rows = self._rng.integers(len(self._m.mels), size=s.batch)
+        power = peak_normalised(torch.from_numpy(self._m.mels[rows].astype(np.float32)))
+        power = coloured(power, s.augmentation, generator)
+        clean = int(s.clean * s.batch)
+        rest = power[clean:]
+        rest, background = in_noise(
+            in_rooms(rest, s.augmentation, generator), steady_noise(len(rest), generator), s.augmentation, generator
+        )
+        rest = segmented(rest, background, s.augmentation, generator)
+        x = masked(heard(peak_normalised(torch.cat([power[:clean], rest]))), s.augmentation, generator)
+        kinds, share = torch.from_numpy(self._m.kinds[rows]), torch.from_numpy(self._m.share[rows])[:, None]
+        aim = (
+            functional.one_hot(kinds[:, 0], len(NAMES)) * (1.0 - share)
+            + functional.one_hot(kinds[:, 1], len(NAMES)) * share
+        )
+        at = torch.from_numpy(rows)
+        return x.to(memory_format=torch.channels_last), aim, self._probabilities[at], self._features[at]
+
+
+def fit(mixtures: Mixtures, words: Tensor, settings: Settings, check: Path | None = None) -> Student:
+    """Return the averaged student.
+
+    Args:
+        mixtures: what it learns from.
+        words: targets (templates, kinds, dim).
+        settings: how.
+        check: where to store the averaged weights while it goes; nowhere if None.
+    """
+    torch.manual_seed(settings.seed)
+    drawn = Heard(mixtures, settings)
+    net = Student(words.shape[2], settings.width, mixtures.logits.shape[1], mixtures.features.shape[1]).train()
+    average = copy.deepcopy(net).eval()
+    optimiser = torch.optim.AdamW(net.parameters(), lr=settings.rate, weight_decay=settings.decay)
+    s, totals = settings, np.zeros(3)
+    for step in range(settings.steps):
+        for group in optimiser.param_groups:
+            group["lr"] = settings.rate * share_of_rate(step, settings.steps, 0.8)
+        x, aim, probabilities, features = drawn.draw()
+        vectors, names, felt = net.answers(x)
+        template = words[int(torch.randint(len(words), ()))]
+        losses = torch.stack([
+            functional.cross_entropy(vectors @ template.T / s.temperature, aim, label_smoothing=s.smoothing),
+            settings.names * functional.binary_cross_entropy_with_logits(names, probabilities),
+            settings.features * functional.mse_loss(felt, features),
+        ])  # fmt: skip
+        optimiser.zero_grad()
+        losses.sum().backward()
+        optimiser.step()
+        keep = min(settings.averaging, (1 + step) / (10 + step))
+        with torch.no_grad():
+            for old, new in zip(average.state_dict().values(), net.state_dict().values(), strict=True):
+                if old.is_floating_point():
+                    old.lerp_(new, 1.0 - keep)
+                else:
+                    old.copy_(new)
+        totals += losses.detach().numpy()
+        if (step + 1) % REPORTED == 0:
+            said = " ".join(f"{value:.3f}" for value in totals / REPORTED)
+            say(f"step {step + 1}/{settings.steps} kinds, names, features: {said}")
+            totals[:] = 0.0
+            if check is not None:
+                torch.save(average.state_dict(), check)
+    return average
+
+
+def named_first(net: SoundNet, words: Tensor, taught: tuple[np.ndarray, np.ndarray], mels: np.ndarray) -> np.ndarray:
+    """Return the recorded kind that words and typical examples together put first, for each window of mel power.
+
+    Args:
+        net: the network.
+        words: targets (templates, kinds, dim).
+        taught: mel power of clips that it learnt from, and their kinds.
+        mels: of the sounds to name.
+    """
+    bank, kinds = encode(net, taught[0]), taught[1]
+    order = np.argsort(kinds, kind="stable")
+    present, starts = np.unique(kinds[order], return_index=True)
+    typical = typical_examples(bank[order], starts)
+    prototypes = functional.normalize(words.mean(dim=0), dim=1).numpy()[present]
+    features = encode(net, mels)
+    return present[(features @ prototypes.T + features @ typical.T).argmax(axis=1)]
+
+
+def main() -> None:
+    """Make mixtures, fit, name the fold that was left out."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sounds", type=Path, default=SHARED / "data" / "sounds")
+    parser.add_argument("--teacher", type=Path, default=SHARED / "teachers" / "mn04_as_mAP_432.pt")
+    parser.add_argument("--work", type=Path, default=ROOT / "build" / "sounds")
+    parser.add_argument("--without", type=int, default=5, help="the fold that nothing is learnt from; 0 for none")
+    parser.add_argument("--mixtures", type=int, default=Recipe.count)
+    parser.add_argument("--steps", type=int, default=5000)
+    parser.add_argument("--width", type=int, default=32)
+    arguments = parser.parse_args()
+    torch.set_num_threads(1)
+    clips = tuple(read_index(arguments.sounds))
+    learnt = of_training(clips, arguments.without)
+    recipe = Recipe(count=arguments.mixtures)
+    file = arguments.work / f"mixtures-{recipe.count}-{arguments.without}.npz"
+    mixtures = stored_mixtures(file, arguments.sounds, learnt, arguments.teacher, recipe)
+    words = targets(EmbeddedWords().encode)
+    name = f"distilled-{arguments.width}-{arguments.steps}-{arguments.without}"
+    settings = Settings(steps=arguments.steps, width=arguments.width)
+    student = fit(mixtures, words, settings, arguments.work / f"{name}.pt")
+    torch.save(student.state_dict(), arguments.work / f"{name}.pt")
+    write_onnx([student], arguments.work / f"{name}.onnx")
+    if not arguments.without:
+        return
+
+    def mels(chosen: list) -> np.ndarray:
+        return np.stack([mels_of(read_samples(arguments.sounds / clip.path)) for clip in chosen])
+
+    held = [clip for clip in clips if clip.fold == arguments.without and 0 <= clip.kind < len(RECORDED)]
+    taught = mels(learnt), np.array([clip.kind for clip in learnt])
+    right = named_first(student, words, taught, mels(held)) == [clip.kind for clip in held]
+    household = np.array([clip.path.startswith("esc50") for clip in held])
+    for label, rows in (("household", household), ("ESC-10", ~household)):
+        hits, share = int(right[rows].sum()), right[rows].mean()
+        margin = 1.96 * math.sqrt(share * (1 - share) / rows.sum())
+        say(f"{label}: {hits} of {int(rows.sum())} first ({share:.3f} ± {margin:.3f})")
+
+
+if __name__ == "__main__":
+    main()
