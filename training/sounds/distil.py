@@ -54,7 +54,7 @@ class Settings:
         smoothing: share of the target that is spread over all kinds.
         names: weight of the teacher's names.
         features: weight of the teacher's features.
-        clean: share of a batch that is heard without room, noise or cuts.
+        clean: share of a batch that gets no room, noise or cuts.
         seed: of everything.
     """
 

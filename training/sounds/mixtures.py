@@ -1,8 +1,8 @@
 """Mixtures of the training clips, made once as audio, with what the teacher makes of each.
 
-The teacher hears every mixture dry. The student hears its mel power in rooms, noise and cuts that are drawn again in
-every step (``augmentation``), and is asked for what the teacher said of the dry sound: so it learns to hear through
-them. Sounds are mixed as audio, since the teacher's answer to two sounds is not the sum of its answers to each.
+The teacher gets every mixture dry. The student gets its mel power in rooms, noise and cuts that are drawn again in
+every step (``augmentation``), and has to say what the teacher said of the dry sound, so rooms and noise matter less
+to it. Sounds are mixed as audio, since the teacher's answer to two sounds is not the sum of its answers to each.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from avlmaps.sim.synthesis import MAKERS
 SECONDS = 5.2  # one window of the encoder
 SAMPLES = int(SECONDS * RATE_HZ)
 BLOCK = 512  # samples over which loudness is taken
-BATCH = 32  # mixtures that the teacher hears at once
+BATCH = 32  # mixtures that go through the teacher at once
 
 
 @dataclass(frozen=True, slots=True)
