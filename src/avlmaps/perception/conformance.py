@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.conformance import NonConformanceError, hold
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import (
@@ -41,50 +42,41 @@ PROTOCOLS: dict[Kind, type] = {
 PHRASES = ("red chair", "dog bark", "kitchen")
 
 
-class NonConformanceError(AssertionError):
-    """A backend breaks a promise of its protocol."""
-
-
 def check(kind: Kind, backend: Any) -> None:
     """Hold a backend to its protocol.
 
     Raises:
         NonConformanceError: it breaks a promise.
     """
-    _hold(isinstance(backend, PROTOCOLS[kind]), f"{backend!r} lacks a member of {PROTOCOLS[kind].__name__}")
+    hold(isinstance(backend, PROTOCOLS[kind]), f"{backend!r} lacks a member of {PROTOCOLS[kind].__name__}")
     _check_card(backend.card)
     _CHECKS[kind](backend)
 
 
-def _hold(condition: object, promise: str) -> None:
-    if not condition:
-        raise NonConformanceError(promise)
-
-
 def _check_card(card: ModelCard) -> None:
-    _hold(card.id and card.licence, f"the card {card} must name a model and its licence")
-    _hold(card.dim >= 1, f"the card's dim is {card.dim}")
-    _hold(
+    hold(card.id and card.licence, f"the card {card} must name a model and its licence")
+    hold(card.dim >= 1, f"the card's dim is {card.dim}")
+    hold(
         len(card.checksum) == 64 and set(card.checksum) <= set("0123456789abcdef"),
         f"the card's checksum must be a hex SHA-256, not {card.checksum!r}",
     )
-    _hold(card.prompts and all("{}" in prompt for prompt in card.prompts), "each prompt must hold {} for the word")
+    hold(card.prompts and all("{}" in prompt for prompt in card.prompts), "each prompt must hold {} for the word")
 
 
 def _check_rows(rows: np.ndarray, count: int, dim: int, what: str, zero_allowed: bool = False) -> None:
-    _hold(rows.dtype == np.float32, f"{what} must be float32, not {rows.dtype}")
-    _hold(rows.shape == (count, dim), f"{what} must have shape {(count, dim)}, not {rows.shape}")
-    _hold(np.isfinite(rows).all(), f"{what} must be finite")
+    hold(rows.dtype == np.float32, f"{what} must be float32, not {rows.dtype}")
+    hold(rows.shape == (count, dim), f"{what} must have shape {(count, dim)}, not {rows.shape}")
+    hold(np.isfinite(rows).all(), f"{what} must be finite")
     length = np.linalg.norm(rows, axis=-1)
     unit = np.abs(length - 1.0) < 1e-3
-    _hold((unit | (length == 0.0)).all() if zero_allowed else unit.all(), f"{what} must have unit length, not {length}")
+    hold((unit | (length == 0.0)).all() if zero_allowed else unit.all(), f"{what} must have unit length, not {length}")
 
 
 def _check_words(encode: Callable[[Any], np.ndarray], dim: int, zero_allowed: bool) -> None:
     rows = encode(PHRASES)
     _check_rows(rows, len(PHRASES), dim, "word features", zero_allowed)
     alone = np.concatenate([encode((phrase,)) for phrase in PHRASES])
-    _hold(np.allclose(rows, alone, atol=2e-3), "a phrase's feature must not depend on what is encoded beside it")
+    hold(np.allclose(rows, alone, atol=2e-3), "a phrase's feature must not depend on what is encoded beside it")
 
 
 def example_frame(seed: int = 0, width: int = 96, height: int = 64) -> Frame:
@@ -120,14 +112,14 @@ def _check_word_encoder(encoder: WordEncoder) -> None:
 
 def _check_pixel_encoder(encoder: PixelEncoder) -> None:
     features = encoder.encode(example_frame())
-    _hold(features.ndim == 3, f"pixel features must have three axes, not {features.ndim}")
+    hold(features.ndim == 3, f"pixel features must have three axes, not {features.ndim}")
     flat = features.reshape(-1, features.shape[-1])
     _check_rows(flat, len(flat), encoder.card.dim, "pixel features", zero_allowed=True)
-    _hold(_equal(features, encoder.encode(example_frame())), "the same frame must give the same features")
-    _hold(all(isinstance(word, str) for word in encoder.vocabulary), "the vocabulary must be words")
+    hold(_equal(features, encoder.encode(example_frame())), "the same frame must give the same features")
+    hold(all(isinstance(word, str) for word in encoder.vocabulary), "the vocabulary must be words")
     _check_words(encoder.encode_words, encoder.card.dim, zero_allowed=True)
     for phrase, row in zip(PHRASES, encoder.encode_words(PHRASES), strict=True):
-        _hold(
+        hold(
             bool(encoder.understood(phrase)) == bool(row.any()),
             f"understood({phrase!r}) is {encoder.understood(phrase)!r} but its feature says otherwise",
         )
@@ -137,7 +129,7 @@ def _check_view_encoder(encoder: ViewEncoder) -> None:
     frames = [example_frame(seed) for seed in range(3)]
     _check_rows(encoder.encode(frames), 3, encoder.card.dim, "view features")
     alone = np.concatenate([encoder.encode([frame]) for frame in frames])
-    _hold(np.allclose(encoder.encode(frames), alone, atol=2e-3), "a frame's feature must not depend on its batch")
+    hold(np.allclose(encoder.encode(frames), alone, atol=2e-3), "a frame's feature must not depend on its batch")
     _check_words(encoder.encode_words, encoder.card.dim, zero_allowed=False)
 
 
@@ -145,14 +137,14 @@ def _check_sound_encoder(encoder: SoundEncoder) -> None:
     short, long = encoder.encode(example_sound()), encoder.encode(example_sound(seconds=30.0))
     _check_rows(short, len(short), encoder.card.dim, "sound features")
     _check_rows(long, len(long), encoder.card.dim, "sound features")
-    _hold(len(short) >= 1, "any sound must have a window")
-    _hold(len(long) > len(short), "a long sound must be encoded whole, by windows")
+    hold(len(short) >= 1, "any sound must have a window")
+    hold(len(long) > len(short), "a long sound must be encoded whole, by windows")
     if isinstance(encoder, FrameSoundEncoder):
-        _hold(
+        hold(
             abs(len(long) - 30.0 / encoder.hop_s - 0.5) <= 0.5 + 1e-6,
             f"30 s must have a vector for each of its steps of {encoder.hop_s} s, not {len(long)}",
         )
-    _hold(_equal(short, encoder.encode(example_sound())), "the same sound must give the same features")
+    hold(_equal(short, encoder.encode(example_sound())), "the same sound must give the same features")
     for bad in (np.zeros(0, np.float32), np.full(800, np.nan, np.float32)):
         try:
             encoder.encode(Sound(bad, 16000))
@@ -162,12 +154,12 @@ def _check_sound_encoder(encoder: SoundEncoder) -> None:
     _check_words(encoder.encode_words, encoder.card.dim, zero_allowed=False)
     _check_scores(encoder.score_words([short, long], PHRASES), (2, len(PHRASES)), "score_words")
     _check_scores(encoder.score_sounds([short, long], short), (2,), "score_sounds")
-    _hold(encoder.score_words([], PHRASES).shape == (0, len(PHRASES)), "score_words must survive a map without sounds")
+    hold(encoder.score_words([], PHRASES).shape == (0, len(PHRASES)), "score_words must survive a map without sounds")
 
 
 def _check_scores(scores: np.ndarray, shape: tuple[int, ...], what: str) -> None:
-    _hold(scores.shape == shape, f"{what} must have shape {shape}, not {scores.shape}")
-    _hold(((scores >= 0.0) & (scores <= 1.0)).all(), f"{what} must lie in [0, 1]")
+    hold(scores.shape == shape, f"{what} must have shape {shape}, not {scores.shape}")
+    hold(((scores >= 0.0) & (scores <= 1.0)).all(), f"{what} must lie in [0, 1]")
 
 
 def _example_local(encoder_dim: int, seed: int = 0, count: int = 40) -> LocalFeatures:
@@ -183,14 +175,14 @@ def _check_local_encoder(encoder: LocalEncoder) -> None:
     frame = example_frame(width=320, height=240)
     found = encoder.encode(frame.rgb)
     _check_rows(found.descriptors, len(found.xy), encoder.card.dim, "local descriptors")
-    _hold(found.xy.shape == (len(found.xy), 2), f"keypoints must have shape (n, 2), not {found.xy.shape}")
-    _hold(((found.xy >= 0) & (found.xy <= (320, 240))).all(), "keypoints must lie in the picture")
+    hold(found.xy.shape == (len(found.xy), 2), f"keypoints must have shape (n, 2), not {found.xy.shape}")
+    hold(((found.xy >= 0) & (found.xy <= (320, 240))).all(), "keypoints must lie in the picture")
     if len(found.score):
         _check_scores(found.score, (len(found.xy),), "keypoints' scores, where there are any,")
-    _hold(found.size in ((0, 0), (320, 240)), f"the picture's size must be (width, height) or (0, 0), not {found.size}")
-    _hold(_equal(found.xy, encoder.encode(frame.rgb).xy), "the same picture must give the same keypoints")
+    hold(found.size in ((0, 0), (320, 240)), f"the picture's size must be (width, height) or (0, 0), not {found.size}")
+    hold(_equal(found.xy, encoder.encode(frame.rgb).xy), "the same picture must give the same keypoints")
     blank = encoder.encode(np.full((240, 320, 3), 128, np.uint8))
-    _hold(blank.descriptors.shape == (0, encoder.card.dim), "a blank picture has no keypoints, and descriptors (0, d)")
+    hold(blank.descriptors.shape == (0, encoder.card.dim), "a blank picture has no keypoints, and descriptors (0, d)")
 
 
 def _check_place_encoder(encoder: PlaceEncoder) -> None:
@@ -199,14 +191,14 @@ def _check_place_encoder(encoder: PlaceEncoder) -> None:
     rgb = example_frame().rgb
     state = encoder.fit(local, np.random.default_rng(0))
     again = encoder.fit(local, np.random.default_rng(0))
-    _hold(all(_equal(state[key], again[key]) for key in state), "the same seed must learn the same")
+    hold(all(_equal(state[key], again[key]) for key in state), "the same seed must learn the same")
     rows = np.stack([encoder.encode(rgb, features, state) for features in local])
     _check_rows(rows, 4, rows.shape[1], "place descriptors")
     none = LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, dim), np.float32), np.zeros(0, np.float32))
     blank = encoder.encode(rgb, none, state)
     _check_rows(blank[None], 1, rows.shape[1], "the descriptor of a picture without keypoints", zero_allowed=True)
-    _hold(not (state and blank.any()), "what learns from keypoints must have descriptor zero where there are none")
-    _hold(_equal(rows[0], encoder.encode(rgb, local[0], state)), "the same picture must give the same descriptor")
+    hold(not (state and blank.any()), "what learns from keypoints must have descriptor zero where there are none")
+    hold(_equal(rows[0], encoder.encode(rgb, local[0], state)), "the same picture must give the same descriptor")
 
 
 def _check_matcher(matcher: Matcher) -> None:
@@ -216,15 +208,15 @@ def _check_matcher(matcher: Matcher) -> None:
     pairs = matcher.match(a, b)
     for found, count in ((pairs, len(b.xy)), (matcher.match(a, other), len(other.xy))):
         _check_pairs(found, len(a.xy), count)
-    _hold(np.array_equal(pairs, matcher.match(a, b)), "the same keypoints must give the same matches")
+    hold(np.array_equal(pairs, matcher.match(a, b)), "the same keypoints must give the same matches")
     as_before = {(i, order[j]) for i, j in pairs.tolist()} ^ {(i, j) for i, j in matcher.match(a, a).tolist()}
-    _hold(len(as_before) <= 0.1 * len(pairs) + 1, "the order of a picture's keypoints must not matter")
+    hold(len(as_before) <= 0.1 * len(pairs) + 1, "the order of a picture's keypoints must not matter")
     if not isinstance(matcher, LearnedMatcher):
-        _hold(len(pairs) >= len(a.xy) // 2, "a picture must match itself")
-        _hold(np.array_equal(order[pairs[:, 1]], pairs[:, 0]), "a picture's keypoints must match themselves")
+        hold(len(pairs) >= len(a.xy) // 2, "a picture must match itself")
+        hold(np.array_equal(order[pairs[:, 1]], pairs[:, 0]), "a picture's keypoints must match themselves")
     none = _taken(a, order[:0])
     for found in (matcher.match(a, none), matcher.match(none, a)):
-        _hold(found.shape == (0, 2), "matching with nothing must give no matches, shape (0, 2)")
+        hold(found.shape == (0, 2), "matching with nothing must give no matches, shape (0, 2)")
 
 
 def _taken(local: LocalFeatures, rows: np.ndarray) -> LocalFeatures:
@@ -234,11 +226,11 @@ def _taken(local: LocalFeatures, rows: np.ndarray) -> LocalFeatures:
 
 
 def _check_pairs(pairs: np.ndarray, first: int, second: int) -> None:
-    _hold(pairs.ndim == 2 and pairs.shape[1] == 2, f"matches must have shape (m, 2), not {pairs.shape}")
-    _hold(np.issubdtype(pairs.dtype, np.integer), f"matches must be whole numbers, not {pairs.dtype}")
+    hold(pairs.ndim == 2 and pairs.shape[1] == 2, f"matches must have shape (m, 2), not {pairs.shape}")
+    hold(np.issubdtype(pairs.dtype, np.integer), f"matches must be whole numbers, not {pairs.dtype}")
     for column, count in zip(pairs.T, (first, second), strict=True):
-        _hold(((column >= 0) & (column < count)).all(), f"matches must be numbers of keypoints below {count}")
-        _hold(len(np.unique(column)) == len(column), "a keypoint may be matched at most once")
+        hold(((column >= 0) & (column < count)).all(), f"matches must be numbers of keypoints below {count}")
+        hold(len(np.unique(column)) == len(column), "a keypoint may be matched at most once")
 
 
 _CHECKS: dict[Kind, Callable[[Any], None]] = {
