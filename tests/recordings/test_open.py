@@ -74,10 +74,8 @@ def test_nothing_there_is_told(tmp_path: Path):
 
 
 def test_an_unknown_format_lists_the_known_ones(tmp_path: Path):
-    sentence = (
-        "There is no recording format called 'kitti'; known are: auto, folder, 7scenes, tum, replica, scannet, "
-        "avlmaps, rosbag."
-    )
+    names = ", ".join(known.name for known in FORMATS)
+    sentence = f"There is no recording format called 'kitti'; known are: auto, {names}."
     with pytest.raises(RecordingError, match=re.escape(sentence)):
         open_recording(tmp_path, format="kitti")
 

@@ -92,5 +92,6 @@ class Rig:
     @property
     def registered(self) -> bool:
         """Whether a depth pixel and the colour pixel at the same place of the picture see the same thing."""
-        same_view = self.rgb == self.depth.resized(self.rgb.width, self.rgb.height)
-        return same_view and np.array_equal(self.rgb_from_depth, np.eye(4))
+        own, other = self.rgb, self.depth.resized(self.rgb.width, self.rgb.height)
+        same_view = np.allclose([own.fx, own.fy, own.cx, own.cy], [other.fx, other.fy, other.cx, other.cy], rtol=1e-9)
+        return bool(same_view) and np.array_equal(self.rgb_from_depth, np.eye(4))

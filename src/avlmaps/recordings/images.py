@@ -149,15 +149,36 @@ def read_colour(path: Path, camera: Pinhole) -> UInt8[np.ndarray, "h w 3"]:
     Raises:
         RecordingError: the file is missing, truncated, no picture or not of the camera's size.
     """
+    return decode_colour(path, read_bytes(path), camera)
+
+
+def decode_colour(path: Path, content: bytes, camera: Pinhole) -> UInt8[np.ndarray, "h w 3"]:
+    """Decode a colour picture that was read before; ``path`` is for the sentences. Errors as of ``read_colour``."""
     import cv2
 
-    content = read_bytes(path)
     _check_outside(path, content, camera)
     bgr = decode_picture(content, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if bgr is None:
         raise RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
     _check_size(path, bgr.shape, camera)
     return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+
+
+def read_mask(path: Path, camera: Pinhole) -> UInt8[np.ndarray, "h w"]:
+    """Read an 8-bit picture of one channel that belongs to a depth picture.
+
+    Raises:
+        RecordingError: the file is missing, truncated, no picture or not of the camera's size.
+    """
+    import cv2
+
+    content = read_bytes(path)
+    _check_outside(path, content, camera)
+    mask = decode_picture(content, cv2.IMREAD_GRAYSCALE)
+    if mask is None:
+        raise RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
+    _check_size(path, mask.shape, camera)
+    return mask
 
 
 def decode_picture(content: bytes, flags: int) -> np.ndarray | None:

@@ -1,8 +1,8 @@
 """The registry of recording formats: what each is recognised by, and where its opener lies.
 
 Other packages add theirs through the entry point group ``avlmaps.formats``; an entry's name is the format's name and
-its value ``package.module:FORMAT``, a ``Format``. A built-in format goes before another package's where both recognise
-a folder; ``--format NAME`` chooses.
+its value ``package.module:FORMAT``, a ``Format``. A built-in format goes before another package's where both
+recognise a folder; ``--format NAME`` chooses.
 """
 
 import importlib
@@ -23,6 +23,7 @@ from avlmaps.recordings.types import Recording
 ENTRY_POINT_GROUP = "avlmaps.formats"
 # A folder of a million files must not be listed to be recognised.
 LOOKED_AT = 2000
+_HERE = "avlmaps.recordings.formats"
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
 
 
@@ -86,13 +87,22 @@ def _is_seven_scenes(path: Path) -> bool:
     return some_name(path, "frame-*.pose.txt", "frame-*.color.*")
 
 
+def _later(target: str) -> Callable[[Path], bool]:
+    """Return a test that is imported when it is needed."""
+
+    def matches(path: Path) -> bool:
+        module, _, function = target.partition(":")
+        return getattr(importlib.import_module(f"{_HERE}.{module}"), function)(path)
+
+    return matches
+
+
 def _is_rosbag(path: Path) -> bool:
     if not path.is_dir():
         return path.suffix.lower() in _BAG_SUFFIXES
     return (path / "metadata.yaml").exists() and some_name(path, "*.db3", "*.mcap", "*.db3.*", "*.mcap.*")
 
 
-_HERE = "avlmaps.recordings.formats"
 FORMATS: tuple[Format, ...] = (
     Format(
         "folder",
@@ -127,6 +137,48 @@ FORMATS: tuple[Format, ...] = (
         f"{_HERE}.rosbag:open_rosbag",
         tells_faults=False,
         has_topics=True,
+    ),
+    Format(
+        "record3d",
+        "a .r3d file, or EXR_RGBD/metadata.json with rgb/ and depth/",
+        _later("record3d:is_record3d"),
+        f"{_HERE}.record3d:open_record3d",
+    ),
+    Format(
+        "stray-scanner",
+        "odometry.csv, camera_matrix.csv, rgb.mp4 and depth/",
+        holds("odometry.csv", "camera_matrix.csv"),
+        f"{_HERE}.stray_scanner:open_stray_scanner",
+    ),
+    Format(
+        "nerfstudio",
+        "transforms.json with depth_file_path",
+        holds("transforms.json"),
+        f"{_HERE}.nerfstudio:open_nerfstudio",
+    ),
+    Format(
+        "polycam",
+        "keyframes/ with images/, depth/ and cameras/",
+        _later("polycam:is_polycam"),
+        f"{_HERE}.polycam:open_polycam",
+    ),
+    Format(
+        "redwood",
+        "trajectory.log (or NAME-traj.txt), color/ and depth/",
+        _later("redwood:is_redwood"),
+        f"{_HERE}.redwood:open_redwood",
+    ),
+    Format(
+        "icl-nuim",
+        "associations.txt, rgb/, depth/ and a .gt.freiburg",
+        holds("associations.txt", "rgb", "depth"),
+        f"{_HERE}.icl_nuim:open_icl_nuim",
+    ),
+    Format(
+        "rtabmap",
+        "a .db file of RTAB-Map",
+        _later("rtabmap:is_rtabmap"),
+        f"{_HERE}.rtabmap:open_rtabmap",
     ),
 )
 _BUILT_IN = frozenset(known.name for known in FORMATS)

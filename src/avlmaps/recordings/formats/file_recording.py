@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -35,6 +36,8 @@ class Shots:
         stamps_s: when, on any clock.
         world_from_camera: (n, 4, 4); NaN or infinity where tracking was lost.
         video_frames: which frame of the video each is; empty where colour is files.
+        confidence: an 8-bit picture for each depth, below the recording's folder, in which 0 says that the depth is not
+            to be trusted; empty where the recording has none.
     """
 
     names: Sequence[str]
@@ -43,6 +46,7 @@ class Shots:
     stamps_s: Float[np.ndarray, " n"]
     world_from_camera: Float[np.ndarray, "n 4 4"]
     video_frames: Sequence[int] = ()
+    confidence: Sequence[str] = ()
 
     def take(self, index: np.ndarray) -> "Shots":
         """Return some of the shots."""
@@ -56,6 +60,7 @@ class Shots:
             self.stamps_s[index],
             self.world_from_camera[index],
             [self.video_frames[i] for i in rows] if len(self.video_frames) else (),
+            [self.confidence[i] for i in rows] if len(self.confidence) else (),
         )
 
 
@@ -166,6 +171,8 @@ class FileRecording(Recording):
         depth_camera = self.rig.depth
         if len(self.shots.depth):
             depth_m = images.read_depth(self.path / self.shots.depth[index], depth_camera, self.depth_units)
+            if len(self.shots.confidence):
+                depth_m[images.read_mask(self.path / self.shots.confidence[index], depth_camera) == 0] = 0.0
         else:
             depth_m = np.zeros((depth_camera.height, depth_camera.width), np.float32)
         return Frame(
@@ -194,8 +201,8 @@ class FileRecording(Recording):
         return self.path / self.shots.colour[index]
 
     def depth_file(self, index: int) -> Path | None:
-        """Return the frame's depth file where it is a PNG."""
-        if len(self.shots.depth) == 0 or not self.shots.depth[index].endswith(".png"):
+        """Return the frame's depth file where it is a PNG and all of it counts."""
+        if len(self.shots.depth) == 0 or len(self.shots.confidence) or not self.shots.depth[index].endswith(".png"):
             return None
         return self.path / self.shots.depth[index]
 
@@ -213,13 +220,9 @@ class FileRecording(Recording):
     @cached_property
     def fingerprint(self) -> str:
         """A hex SHA-256 over poses, stamps, cameras and every file's content; see ``Recording.fingerprint``."""
-        digest = hashlib.sha256(f"{self.format} {_numbers(self.rig)} {self.depth_units}".encode())
-        up = np.zeros(3) if self.up_in_world is None else self.up_in_world
-        for numbers in (up, self.stamps_s, self.world_from_camera):
-            # Rounded, so that another machine's last bit makes no other recording; + 0.0 turns -0.0 into 0.0.
-            digest.update(np.ascontiguousarray(np.round(numbers, 9) + 0.0, "<f8").tobytes())
-        names = (*self._video_names(), *self.shots.colour, *self.shots.depth)
-        add_files(digest, self.path, names)
+        digest = hashlib.sha256()
+        geometry_digest(digest, self, f" {self.depth_units}")
+        add_files(digest, self.path, self._names())
         if self.audio is not None:
             add_files(digest, self.audio.path.parent, [self.audio.path.name])
             digest.update(f"{self.audio.start_s}".encode())
@@ -228,10 +231,20 @@ class FileRecording(Recording):
     def change_stamp(self) -> str:
         """Return a hash over every file's size and time of change; see ``Recording.change_stamp``."""
         files = [self.audio.path] if self.audio is not None else []
-        return stamp_of(self.path, (*self._video_names(), *self.shots.colour, *self.shots.depth), files)
+        return stamp_of(self.path, self._names(), files)
 
-    def _video_names(self) -> list[str]:
-        return [self.video.path.name] if self.video is not None else []
+    def _names(self) -> list[str]:
+        video = [self.video.path.name] if self.video is not None else []
+        return [*video, *self.shots.colour, *self.shots.depth, *self.shots.confidence]
+
+
+def geometry_digest(digest: Any, recording: Recording, more: str = "") -> None:
+    """Add a recording's format, cameras, up direction, stamps and poses to a hash of ``hashlib``."""
+    digest.update(f"{recording.format} {_numbers(recording.rig)}{more}".encode())
+    up = np.zeros(3) if recording.up_in_world is None else recording.up_in_world
+    for numbers in (up, recording.stamps_s, recording.world_from_camera):
+        # Rounded, so that another machine's last bit makes no other recording; + 0.0 turns -0.0 into 0.0.
+        digest.update(np.ascontiguousarray(np.round(numbers, 9) + 0.0, "<f8").tobytes())
 
 
 def _numbers(rig: Rig) -> list[float]:

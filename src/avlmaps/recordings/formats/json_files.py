@@ -1,0 +1,41 @@
+"""JSON that describes others' recordings: what a reader needs of it, and the keys that nothing reads."""
+
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import MANIFEST_BYTES, decode_json, read_regular
+
+T = TypeVar("T")
+
+
+def read_json(file: Path, kind: type[T], limit_bytes: int = MANIFEST_BYTES) -> tuple[T, dict[str, Any]]:
+    """Return a JSON file as a type, and as it is (for its other keys).
+
+    Raises:
+        RecordingError: it is missing, damaged, or lacks what the type needs.
+    """
+    try:
+        return parse_json(file, read_regular(file, limit_bytes), kind)
+    except FileNotFoundError:
+        raise RecordingError(f"{file} is missing; the recording needs it.") from None
+    except OSError as error:
+        raise RecordingError(f"{file} cannot be read ({error.strerror or error}); check the file.") from None
+
+
+def parse_json(file: Path, content: bytes, kind: type[T]) -> tuple[T, dict[str, Any]]:
+    """Return the content of a JSON file as a type, and as it is; errors as of ``read_json``."""
+    try:
+        plain = decode_json(content)
+        return msgspec.convert(plain, kind), plain
+    except (msgspec.DecodeError, msgspec.ValidationError, UnicodeDecodeError) as error:
+        raise RecordingError(f"{file} is not as it should be ({error}); fix the file.") from None
+
+
+def unread_notice(file: Path, present: Mapping[str, Any], known: Collection[str]) -> tuple[str, ...]:
+    """Return a notice that names the keys of a file that nothing reads, or nothing."""
+    unread = sorted(present.keys() - set(known))
+    return (f"{file.name} has keys that are not read: {', '.join(unread[:8])}.",) if unread else ()

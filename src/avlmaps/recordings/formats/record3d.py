@@ -1,0 +1,265 @@
+"""Record3D (an iPhone or iPad with LiDAR): its own ``.r3d``, that file unpacked, or its export "EXR + JPG sequence".
+
+Facts of the data (nerfstudio's and viser's readers; Record3D's notes on its export): a JSON ``metadata`` has the
+intrinsics ``K`` column by column, of colour pictures of ``w`` x ``h``, or ``perFrameIntrinsicCoeffs`` (fx fy cx cy);
+``poses`` are qx qy qz qw tx ty tz in ARKit's axes (camera: y up, looking along -z; world: y up); ``frameTimestamps``
+are seconds, else ``fps`` counts. In a ``.r3d``, which is a ZIP archive, ``rgbd/N.jpg``, ``N.depth`` and ``N.conf``
+belong together; depth is float32 metres of ``dw`` x ``dh``, compressed by LZFSE, and where the confidence is 0 it is
+left out. The export has ``EXR_RGBD/metadata.json``, ``rgb/N.jpg`` and ``depth/N.exr``.
+"""
+
+import zipfile
+import zlib
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from jaxtyping import Float, Float32, UInt8
+
+from avlmaps.core import poses
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import MANIFEST_BYTES, PICTURE_BYTES
+from avlmaps.core.lzfse import decompress
+from avlmaps.recordings import images
+from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.formats.exr import read_channel
+from avlmaps.recordings.formats.file_recording import Shots, list_names, open_audio, settle
+from avlmaps.recordings.formats.intrinsics import fitted, median_camera, resized_notice
+from avlmaps.recordings.formats.json_files import parse_json, read_json
+from avlmaps.recordings.formats.phones import UP_IN_WORLD, from_opengl
+from avlmaps.recordings.formats.stored_recording import StoredRecording
+
+_COLOUR = (".jpg", ".jpeg", ".png")
+
+
+class _Metadata(msgspec.Struct, frozen=True):
+    w: int
+    h: int
+    poses: list[list[float]]
+    K: list[float] = []
+    perFrameIntrinsicCoeffs: list[list[float]] = []  # noqa: N815 - Record3D's names
+    frameTimestamps: list[float] = []  # noqa: N815
+    fps: float = 60.0
+    dw: int = 0
+    dh: int = 0
+
+
+def is_record3d(path: Path) -> bool:
+    """Return whether a file or folder is Record3D's."""
+    if path.is_file():
+        return path.suffix.lower() == ".r3d"
+    return (path / "EXR_RGBD/metadata.json").is_file() or _layout(path) is not None
+
+
+def _layout(path: Path) -> tuple[str, str, str] | None:
+    """Return the names of the metadata, and of the folders of colour and depth."""
+    for names in (("metadata.json", "rgb", "depth"), ("metadata", "rgbd", "rgbd")):
+        if (path / names[0]).is_file() and (path / names[1]).is_dir() and (path / names[2]).is_dir():
+            return names
+    return None
+
+
+class _Files:
+    """The files of a recording by name, in a folder or in an archive."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self._archive = zipfile.ZipFile(path) if path.is_file() else None
+        except (zipfile.BadZipFile, OSError) as error:
+            raise RecordingError(
+                f"{path} is no whole .r3d, which is a ZIP archive ({error}); share it from Record3D again."
+            ) from None
+
+    def names(self, folder: str, suffixes: tuple[str, ...]) -> list[str]:
+        if self._archive is None:
+            return list_names(self.path / folder, suffixes)
+        every = [name.split("/") for name in self._archive.namelist()]
+        return [name[-1] for name in every if name[:-1] == [folder] and name[-1].lower().endswith(suffixes)]
+
+    def read(self, name: str, limit: int = PICTURE_BYTES) -> bytes:
+        if self._archive is None:
+            return images.read_bytes(self.path / name)
+        try:
+            if self._archive.getinfo(name).file_size > limit:
+                raise RecordingError(f"{self.path} says that {name} has more than {limit:,} bytes; share it again.")
+            return self._archive.read(name)
+        except KeyError:
+            raise RecordingError(f"{self.path} has no {name}; share it from Record3D again.") from None
+        except (zipfile.BadZipFile, OSError, EOFError, zlib.error, NotImplementedError, RuntimeError) as error:
+            raise RecordingError(f"{name} in {self.path} cannot be read ({error}); share it again.") from None
+
+    def has(self, name: str) -> bool:
+        if self._archive is None:
+            return (self.path / name).is_file()
+        return name in self._archive.NameToInfo
+
+
+class _Pictures:
+    """Colour as files, depth as LZFSE or EXR."""
+
+    def __init__(self, files: _Files) -> None:
+        self._files = files
+
+    def colour(self, name: str, camera: Pinhole) -> UInt8[np.ndarray, "h w 3"]:
+        return images.decode_colour(self._files.path / name, self._files.read(name), camera)
+
+    def depth(self, name: str, camera: Pinhole) -> Float32[np.ndarray, "h w"]:
+        depth_m = _depth(self._files, name, (camera.width, camera.height))
+        confidence = name.removesuffix(".depth") + ".conf"
+        if name.endswith(".depth") and self._files.has(confidence):
+            depth_m[_unfolded(self._files, confidence, depth_m.size).reshape(depth_m.shape) == 0] = 0.0
+        return depth_m
+
+
+def _unfolded(files: _Files, name: str, size: int) -> UInt8[np.ndarray, " n"]:
+    """Return the bytes of a file that is compressed by LZFSE, or as long as it is unfolded."""
+    content = files.read(name)
+    raw = content if len(content) == size else _decompressed(files, name, content, size)
+    if len(raw) != size:
+        raise RecordingError(
+            f"{name} in {files.path} has {len(raw):,} bytes where {size:,} belong; share or copy it again."
+        )
+    return np.frombuffer(raw, np.uint8)
+
+
+def _decompressed(files: _Files, name: str, content: bytes, most: int) -> bytes:
+    try:
+        return decompress(content, most)
+    except ValueError as error:
+        raise RecordingError(f"{name} in {files.path} cannot be read: {error}; share or copy it again.") from None
+
+
+def _depth(files: _Files, name: str, size: tuple[int, int]) -> Float32[np.ndarray, "h w"]:
+    width, height = size
+    if name.endswith(".exr"):
+        try:
+            depth_m = read_channel(files.read(name), images.MOST_PIXELS)
+        except ValueError as error:
+            raise RecordingError(
+                f"{files.path / name} cannot be read as OpenEXR: {error}; copy it again, or share the .r3d instead."
+            ) from None
+        if depth_m.shape != (height, width):
+            raise RecordingError(
+                f"{files.path / name} is {depth_m.shape[1]}x{depth_m.shape[0]}, the others {width}x{height}; every "
+                "picture of a recording must have one size."
+            )
+    else:
+        depth_m = _unfolded(files, name, 4 * width * height).view("<f4").reshape(height, width).copy()
+    depth_m[~(np.isfinite(depth_m) & (depth_m > 0.0))] = 0.0
+    return depth_m
+
+
+def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording:
+    """Open a recording in place.
+
+    Args:
+        path: a ``.r3d``, or the folder of one that was unpacked, or of an export.
+        report: called with every fault.
+
+    Raises:
+        RecordingError: it is damaged, or no frame has colour, depth and pose.
+    """
+    inside = path / "EXR_RGBD" if (path / "EXR_RGBD").is_dir() else path
+    layout = ("metadata", "rgbd", "rgbd") if path.is_file() else _layout(inside)
+    if layout is None:
+        raise RecordingError(f"{path} holds neither metadata with rgbd/ nor metadata.json with rgb/ and depth/.")
+    files = _Files(inside)
+    described, colour_in, depth_in = layout
+    file = inside / described
+    given = _metadata(files, file, described)
+    colour = {_number(name): name for name in files.names(colour_in, _COLOUR)}
+    depth = {_number(name): name for name in files.names(depth_in, (".depth", ".exr"))}
+    numbers = [n for n in range(len(given.poses)) if n in colour and n in depth]
+    if not numbers:
+        raise RecordingError(
+            f"{inside} has {len(given.poses)} poses, {len(colour)} colour and {len(depth)} depth pictures, and no "
+            "frame with all three; was it recorded with LiDAR?"
+        )
+    notices: list[str] = []
+    if len(numbers) < max(len(given.poses), len(colour)):
+        left = max(len(given.poses), len(colour)) - len(numbers)
+        notices.append(f"{left} frame(s) lack one of colour, depth and pose and are left out.")
+        report(Fault(f"{inside}: {notices[-1]}", file, fatal=False))
+    shots = Shots(
+        names=[str(n) for n in numbers],
+        colour=[f"{colour_in}/{colour[n]}" for n in numbers],
+        depth=[f"{depth_in}/{depth[n]}" for n in numbers],
+        stamps_s=_stamps(given)[numbers],
+        world_from_camera=_poses(file, given)[numbers],
+    )
+    rig, more = _rig(files, file, given, shots)
+    shots, settled = settle(path, shots, report, lambda _: file)
+    return StoredRecording(
+        path=path,
+        format="record3d",
+        rig=rig,
+        shots=shots,
+        pictures=_Pictures(files),
+        up_in_world=UP_IN_WORLD.copy(),
+        audio=open_audio(path) if path.is_dir() else None,
+        notices=(*notices, *more, *settled),
+    )
+
+
+def _metadata(files: _Files, file: Path, name: str) -> _Metadata:
+    if files.path.is_dir():
+        return read_json(file, _Metadata)[0]
+    return parse_json(file, files.read(name, MANIFEST_BYTES), _Metadata)[0]
+
+
+def _number(name: str) -> int:
+    stem = name.split(".", 1)[0]
+    return int(stem) if stem.isascii() and stem.isdigit() else -1
+
+
+def _stamps(given: _Metadata) -> Float[np.ndarray, " n"]:
+    if len(given.frameTimestamps) >= len(given.poses):
+        return np.array(given.frameTimestamps, np.float64)
+    return np.arange(len(given.poses)) / (given.fps if given.fps > 0.0 else 60.0)
+
+
+def _poses(file: Path, given: _Metadata) -> Float[np.ndarray, "n 4 4"]:
+    if any(len(row) != 7 for row in given.poses):
+        raise RecordingError(f"{file} has a pose of other than seven numbers (qx qy qz qw tx ty tz); share it again.")
+    rows = np.array(given.poses, np.float64).reshape(-1, 7)
+    length = np.linalg.norm(rows[:, :4], axis=1)
+    usable = np.abs(length - 1.0) <= poses.MAX_ROTATION_FAULT
+    found = poses.from_quaternion(rows[:, 4:], np.where(usable[:, None], rows[:, :4], (0.0, 0.0, 0.0, 1.0)))
+    found[~usable] = np.nan
+    return from_opengl(found)
+
+
+def _rig(files: _Files, file: Path, given: _Metadata, shots: Shots) -> tuple[Rig, tuple[str, ...]]:
+    per_frame = [row for row in given.perFrameIntrinsicCoeffs if len(row) == 4]
+    k = given.K
+    if not per_frame and len(k) != 9:
+        raise RecordingError(f"{file} has no intrinsics (K has {len(k)} numbers, not 9); share it again.")
+    numbers = np.array(per_frame or [[k[0], k[4], k[6] or k[2], k[7] or k[5]]], np.float64)
+    camera, notices = median_camera(file, numbers, given.w, given.h)
+    rgb_size = images.picture_size(files.path / shots.colour[0], files.read(shots.colour[0]))
+    depth_size = (given.dw, given.dh)
+    if shots.depth[0].endswith(".exr"):
+        depth_size = _exr_size(files, shots.depth[0])
+    elif not (given.dw > 0 and given.dh > 0):
+        depth_size = _size_like(files, shots.depth[0], camera)
+    rig = Rig(fitted(camera, rgb_size, file, "colour"), fitted(camera, depth_size, file, "depth"))
+    return rig, (*notices, *resized_notice(camera, rgb_size))
+
+
+def _size_like(files: _Files, name: str, camera: Pinhole) -> tuple[int, int]:
+    """Return the size of depth, of the colour camera's shape, that has as many pixels as were stored."""
+    count = len(_decompressed(files, name, files.read(name), 4 * camera.width * camera.height)) // 4
+    width = max(1, round((count * camera.width / camera.height) ** 0.5))
+    return width, count // width
+
+
+def _exr_size(files: _Files, name: str) -> tuple[int, int]:
+    try:
+        height, width = read_channel(files.read(name), images.MOST_PIXELS).shape
+    except ValueError as error:
+        raise RecordingError(
+            f"{files.path / name} cannot be read as OpenEXR: {error}; copy it again, or share the .r3d instead."
+        ) from None
+    return width, height

@@ -1,0 +1,166 @@
+"""Redwood and Open3D: ``color/`` (or ``rgb/``, ``image/``), ``depth/`` and a ``trajectory.log``.
+
+Facts of the data: the log has five lines a frame: three whole numbers, the first of which counts the frames, and a
+4x4 camera-to-world matrix (x right, y down, z forward); Redwood's own scenes call it ``NAME-traj.txt``, Open3D's
+reconstruction writes ``scene/trajectory.log``. Depth is in 16-bit millimetres unless ``intrinsic.json`` says
+otherwise (``depth_scale``). That file (Open3D's, the matrix column by column) gives the intrinsics, with the centre
+of the first pixel at (0, 0), so that half a pixel is added; without one the PrimeSense's are taken, as Open3D does.
+Names such as ``00012-000000366849.jpg`` carry a stamp in microseconds; others are counted at 30 frames/s. Up is not
+known.
+"""
+
+import os
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, settle
+from avlmaps.recordings.formats.intrinsics import fitted, resized_notice
+from avlmaps.recordings.formats.json_files import read_json, unread_notice
+from avlmaps.recordings.formats.tables import text_lines
+from avlmaps.recordings.images import first_picture_size
+
+RATE_HZ = 30.0
+COLOUR_FOLDERS = ("color", "rgb", "image")
+_INTRINSICS = ("intrinsic.json", "camera_intrinsic.json", "intrinsics.json", "camera_primesense.json")
+_PRIMESENSE = Pinhole(525.0, 525.0, 320.0, 240.0, 640, 480)
+# What Open3D's recorder writes beside; it says nothing that changes how pictures are read.
+_IDLE = ("color_format", "depth_format", "device_name", "serial_number", "stream_length_usec", "fps")
+
+
+class _Intrinsics(msgspec.Struct, frozen=True):
+    width: int
+    height: int
+    intrinsic_matrix: list[float]
+    depth_scale: float = 1000.0
+
+
+def find_trajectory(path: Path) -> Path | None:
+    """Return a folder's log of poses, or None."""
+    for name in ("trajectory.log", "scene/trajectory.log"):
+        if os.path.lexists(path / name):
+            return path / name
+    return next(iter(sorted(path.glob("*-traj.txt"))), None) if path.is_dir() else None
+
+
+def is_redwood(path: Path) -> bool:
+    """Return whether a folder has a log of poses and depth."""
+    return (path / "depth").is_dir() and find_trajectory(path) is not None
+
+
+def open_redwood(path: Path, report: Report = stop_at_first) -> FileRecording:
+    """Open a scene in place.
+
+    Args:
+        path: the folder with colour, ``depth/`` and the log.
+        report: called with every fault.
+
+    Raises:
+        RecordingError: poses and pictures do not match, or a file is damaged.
+    """
+    log = find_trajectory(path)
+    folder = next((name for name in COLOUR_FOLDERS if (path / name).is_dir()), None)
+    if log is None or folder is None:
+        what = "trajectory.log" if log is None else f"folder of colour pictures ({', '.join(COLOUR_FOLDERS)})"
+        raise RecordingError(f"{path} has no {what}; the recording needs it.")
+    colour, depth = list_names(path / folder, (".jpg", ".jpeg", ".png")), list_names(path / "depth", (".png",))
+    pose = _read_log(log, report)
+    whole = min(len(colour), len(depth), len(pose))
+    if whole == 0:
+        raise RecordingError(f"{path} has {len(colour)} colour and {len(depth)} depth pictures and {len(pose)} poses.")
+    notices: list[str] = []
+    if not len(colour) == len(depth) == len(pose):
+        notices.append(
+            f"There are {len(colour)} colour pictures, {len(depth)} depth pictures and {len(pose)} poses; they are "
+            f"matched in order, and the first {whole} are used."
+        )
+        report(Fault(f"{path}: {notices[-1]}", log, fatal=False))
+    stamps_s = _stamps(depth[:whole])
+    if stamps_s is None:
+        notices.append("The recording has no clock; 30 frames/s are assumed.")
+        stamps_s = np.arange(whole) / RATE_HZ
+    shots = Shots(
+        names=[name.rsplit(".", 1)[0] for name in colour[:whole]],
+        colour=[f"{folder}/{name}" for name in colour[:whole]],
+        depth=[f"depth/{name}" for name in depth[:whole]],
+        stamps_s=stamps_s,
+        world_from_camera=pose[:whole],
+    )
+    rig, units, more = _rig(path, shots)
+    shots, settled = settle(path, shots, report, lambda _: log)
+    return FileRecording(
+        path=path,
+        format="redwood",
+        rig=rig,
+        shots=shots,
+        depth_units=units,
+        audio=open_audio(path),
+        notices=(*notices, *more, *settled),
+    )
+
+
+def _read_log(file: Path, report: Report) -> Float[np.ndarray, "n 4 4"]:
+    """Read the matrices of a log, which must be whole: after a line that is lost, every pose would be another's."""
+    lines = list(text_lines(file, report))
+    if len(lines) % 5:
+        raise RecordingError(
+            f"{file} has {len(lines)} lines, but each pose takes five (three whole numbers, then a 4x4 matrix); is it "
+            "cut off?"
+        )
+    poses = np.full((len(lines) // 5, 4, 4), np.nan)
+    for at in range(0, len(lines), 5):
+        number, text = lines[at]
+        try:
+            if not (len(text.split()) == 3 and all(word.lstrip("+-").isdigit() for word in text.split())):
+                raise ValueError(text)
+            for row in range(4):
+                number, text = lines[at + 1 + row]
+                poses[at // 5, row] = [float(word) for word in text.split()]
+        except ValueError:
+            wanted = "three whole numbers" if number == lines[at][0] else "four numbers of a matrix"
+            raise RecordingError(
+                f"{file}, line {number}: {text[:40]!r} stands where {wanted} belong; fix it."
+            ) from None
+    return poses
+
+
+def _stamps(names: list[str]) -> Float[np.ndarray, " n"] | None:
+    """Return the stamps that names such as ``00012-000000366849.png`` carry, in seconds from the first; else None."""
+    parts = [name.split(".", 1)[0].split("-") for name in names]
+    if not all(len(p) == 2 and p[1].isascii() and p[1].isdigit() for p in parts):
+        return None
+    stamps_s = np.array([int(p[1]) for p in parts], np.float64) * 1e-6
+    return stamps_s - stamps_s[0] if (np.diff(stamps_s) > 0.0).all() else None
+
+
+def _rig(path: Path, shots: Shots) -> tuple[Rig, float, tuple[str, ...]]:
+    file = next((path / name for name in _INTRINSICS if os.path.lexists(path / name)), None)
+    rgb_size, depth_size = first_picture_size(path, shots.colour), first_picture_size(path, shots.depth)
+    if file is None:
+        notice = "There is no intrinsic.json; a PrimeSense is assumed (focal length 525 at 640x480), as Open3D does."
+        camera, units, notices = _PRIMESENSE, 1000.0, (notice,)
+    else:
+        given, plain = read_json(file, _Intrinsics)
+        notices = unread_notice(file, plain, (*_Intrinsics.__struct_fields__, *_IDLE))
+        camera, units = _camera(file, given), given.depth_scale
+    rig = Rig(fitted(camera, rgb_size, file or path, "colour"), fitted(camera, depth_size, file or path, "depth"))
+    return rig, units, (*notices, *(resized_notice(camera, rgb_size) if file else ()))
+
+
+def _camera(file: Path, given: _Intrinsics) -> Pinhole:
+    k = given.intrinsic_matrix
+    try:
+        if len(k) != 9:
+            raise ValueError(f"intrinsic_matrix has {len(k)} numbers, not 9")
+        if not given.depth_scale > 0.0:
+            raise ValueError(f"depth_scale is {given.depth_scale}; it must be positive")
+        if k[6] == k[7] == 0.0:  # written by hand, row by row
+            k = [k[i] for i in (0, 3, 6, 1, 4, 7, 2, 5, 8)]
+        return Pinhole(k[0], k[4], k[6] + 0.5, k[7] + 0.5, given.width, given.height)
+    except ValueError as error:
+        raise RecordingError(f"{file} holds no camera: {error}; fix the file.") from None

@@ -1,0 +1,33 @@
+"""Every reader is held to one truth, written in its format; and to a plain sentence for each damaged file."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from avlmaps.recordings.conformance import check, check_damage
+from avlmaps.recordings.known_formats import FORMATS
+from avlmaps.recordings.open import find_format, open_recording
+from helpers.format_writers import WRITTEN
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_a_reader_gives_back_the_truth_that_was_written(tmp_path: Path, name: str) -> None:
+    written, truth = WRITTEN[name], WRITTEN[name].truth()
+    path = written.write(tmp_path / "walk", truth)
+    assert find_format(path).name == written.format
+    recording = check(lambda: open_recording(path), truth, **(written.options or {}))
+    assert recording.format == written.format
+    assert (recording.up_in_world is not None) == written.knows_up
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_a_damaged_file_is_a_sentence_or_fewer_frames(tmp_path: Path, name: str) -> None:
+    written = WRITTEN[name]
+    path = written.write(tmp_path / "walk", written.truth())
+    check_damage(path, lambda copy: open_recording(copy, format=written.format), tmp_path / "damaged")
+
+
+def test_every_format_has_a_writer_of_the_truth() -> None:
+    assert {written.format for written in WRITTEN.values()} | {"rosbag"} == {known.name for known in FORMATS}
+    assert np.all([written.truth is not None for written in WRITTEN.values()])
