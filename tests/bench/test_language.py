@@ -2,29 +2,31 @@
 
 import pytest
 
-from avlmaps.bench.language import OUTCOMES, counts, judge, sealed, shipped
+from avlmaps.bench.language import OUTCOMES, counts, dangerous, judge, sealed, shipped
 
 # At least so many of the sentences of each list are right, and at most so many misread; all are development lists.
 REACHED = {
     "child": (119, 4), "nurse": (118, 4), "newcomer": (121, 3), "roboticist": (121, 3),
     "engineer": (115, 4), "grandmother": (115, 5), "plumber": (113, 7), "tourist": (114, 4),
     "coach": (112, 5), "overseas": (110, 6), "vet": (120, 3), "wedding": (108, 4),
+    "controls": (33, 0), "manager": (32, 2), "dictated": (35, 1), "elderly": (33, 2),
     "abroad": (114, 4), "dictation": (114, 6), "guests": (111, 4), "warehouse": (116, 4),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", REACHED)
 def test_a_sealed_list_stays_understood(name: str) -> None:
-    found = counts([judge(row) for row in shipped(name)])
-    assert sum(found.values()) == 125
+    judged = [judge(row) for row in shipped(name)]
+    found = counts(judged)
+    assert dangerous(judged)[0] == 0
     assert found["right"] >= REACHED[name][0]
     assert found["misread"] <= REACHED[name][1]
 
 
 def test_each_list_has_its_first_use() -> None:
     assert set(sealed()) == set(REACHED)
-    for seal in sealed().values():
-        assert sum(sum(part.values()) for part in seal["first use"].values()) == 125
+    for name, seal in sealed().items():
+        assert sum(sum(part.values()) for part in seal["first use"].values()) == len(shipped(name))
 
 
 @pytest.mark.parametrize(

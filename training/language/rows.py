@@ -30,6 +30,7 @@ from avlmaps.language.intents import (
     Turn,
     VisitEach,
     Wait,
+    Way,
 )  # fmt: skip
 
 ROOT = Path(__file__).parents[2]
@@ -95,7 +96,7 @@ def intent_of(said: Mapping[str, Any]) -> Intent:  # noqa: C901
         case "stop_at":
             return StopAt(target_of(to), float(said["metres"]))
         case "circle":
-            return Circle(target_of(to), said.get("views"))
+            return Circle(target_of(to), said.get("views"), Way(said.get("way", "")))
         case "visit_each":
             return VisitEach(target_of(to))
         case "wait":

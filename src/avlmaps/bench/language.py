@@ -52,6 +52,7 @@ class Judged:
         outcome: one of `OUTCOMES`.
         got: what the parser made of it, as JSON.
         wanted: what the list has.
+        danger: whether a wrong motion may hurt, as the list says.
     """
 
     say: str
@@ -59,6 +60,7 @@ class Judged:
     outcome: str
     got: Any
     wanted: Any
+    danger: bool = False
 
 
 def read_list(path: Path) -> list[Row]:
@@ -71,7 +73,7 @@ def judge(row: Row) -> Judged:
     if "question" in row:
         return _judge_question(row)
     got = _intents_of(row)
-    return Judged(str(row["say"]), False, judge_intents(got, row), got, row["intents"])
+    return Judged(str(row["say"]), False, judge_intents(got, row), got, row["intents"], bool(row.get("danger")))
 
 
 def judge_intents(got: Sequence[Any], row: Row) -> str:
@@ -125,6 +127,8 @@ def _outcome(got: Sequence[Any], wanted: Sequence[Any]) -> str:
     if stopped or to_stop:
         return "right" if stopped and to_stop else "asked back" if stopped else "misread"
     ours, theirs = _plain(got), _plain(wanted)
+    if not any(each.get("way") for each in _flat(wanted)):  # a list need not say which way round
+        ours = _plain([_without_way(each) for each in got])
     if ours == theirs:
         return "right"
     return "harmless" if _places(ours) == _places(theirs) else "misread"
@@ -146,7 +150,16 @@ def _intent(intent: Mapping[str, Any]) -> tuple[Any, ...]:
     numbers = tuple(_rounded(intent.get(name)) for name in ("metres", "seconds", "heading", "views", "times"))
     degrees = _rounded(intent.get("degrees"))
     degrees = 180.0 if degrees == -180.0 else degrees
-    return do, target, str(intent.get("side", "ahead")), degrees, *numbers
+    return do, target, str(intent.get("side", intent.get("way", "ahead"))), degrees, *numbers
+
+
+def _flat(intents: Sequence[Any]) -> list[Any]:
+    return [part for each in intents for part in (each, *_flat(each.get("body", ())))]
+
+
+def _without_way(intent: Mapping[str, Any]) -> dict[str, Any]:
+    plain = {name: value for name, value in intent.items() if name != "way"}
+    return {**plain, "body": [_without_way(each) for each in intent["body"]]} if "body" in intent else plain
 
 
 def _rounded(value: Any) -> float | None:
@@ -201,10 +214,18 @@ def counts(judged: Sequence[Judged]) -> dict[str, int]:
     return {outcome: sum(one.outcome == outcome for one in judged) for outcome in OUTCOMES}
 
 
+def dangerous(judged: Sequence[Judged]) -> tuple[int, int]:
+    """Return how many rows in which a wrong motion may hurt were driven wrongly, and how many such rows there are."""
+    rows = [one for one in judged if one.danger]
+    return sum(one.outcome in ("misread", "harmless") for one in rows), len(rows)
+
+
 def row_of(name: str, judged: Sequence[Judged]) -> list[str]:
-    """Return a row of the suite's table: counts and shares with 95 % intervals."""
+    """Return a row of the suite's table: counts and shares with 95 % intervals, and how many dangers were driven."""
     found = counts(judged)
-    return [name, str(len(judged)), *(_share(found[outcome], len(judged)) for outcome in OUTCOMES)]
+    driven, rows = dangerous(judged)
+    shares = (_share(found[outcome], len(judged)) for outcome in OUTCOMES)
+    return [name, str(len(judged)), *shares, f"{driven} of {rows}" if rows else "-"]
 
 
 def _share(hits: int, count: int) -> str:
@@ -249,7 +270,7 @@ def run() -> dict[str, dict[str, list[Any]]]:
     now += [row_of(f"all, {part}", these) for part, these in _by_part(every, parts).items()]
     return {
         "blind, at first use": {"columns": columns, "rows": first},
-        "the same lists now (development)": {"columns": columns, "rows": now},
+        "the same lists now (development)": {"columns": [*columns, "dangers driven"], "rows": now},
     }
 
 

@@ -4,13 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from avlmaps.core.errors import LanguageError
-from avlmaps.language.intents import Beside, Clarify, Face, Intent, Refuse, Repeat, StopAt, targets_of
+from avlmaps.language.foreign import ASK, language_of
+from avlmaps.language.intents import Beside, Clarify, Face, Intent, Refuse, Repeat, StopAt, Wait, targets_of
 from avlmaps.language.learned.decision import Decision, Weighed, decided
-from avlmaps.language.learned.guard import EXAMPLE, Guard, weighed
+from avlmaps.language.learned.forbidden import forbidden, is_stop
+from avlmaps.language.learned.guard import EXAMPLE, REFUSALS, Guard, weighed
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.parts import by_parts
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
-from avlmaps.language.lexer import Token
+from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.word_classes import load_word_classes
 
@@ -25,7 +27,7 @@ class Command:
         intents: what to do; one refusal or question where the robot may not drive.
         notes: one sentence each: how words were taken, and what has no effect.
         readings: all readings that were weighed, the likeliest first.
-        why: ``read``, ``parts``, ``danger``, ``stop`` or ``unsure``.
+        why: ``read``, ``parts``, ``danger``, ``stop``, ``unsure``, or ``words`` where single words decide.
     """
 
     intents: tuple[Intent, ...]
@@ -47,7 +49,17 @@ def read_command(text: str, given: Given | None = None) -> Command:
         LanguageError: the command is empty or too long.
     """
     _check_length(text)
+    language = language_of(text)
+    tokens = tokenise(text)
+    if is_stop(tokens):
+        return Command((Wait(),), (), (), "words")
+    if language is not None:
+        return Command((Clarify(ASK.format(language=language)),), (), (), "words")
     sentence = Sentence(text, given)
+    stop = forbidden(sentence.tokens)
+    if stop is not None:
+        stop = Refuse(stop.reason, REFUSALS[stop.reason]) if isinstance(stop, Refuse) else stop
+        return Command((stop,), (), (), "words")
     reader = learned_reader()
     readings = weighed_readings(sentence, reader)
     if not readings:

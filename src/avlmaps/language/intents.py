@@ -44,6 +44,14 @@ class Side(StrEnum):
     AHEAD = "ahead"
 
 
+class Way(StrEnum):
+    """Which way round in a top-down view."""
+
+    ANY = ""
+    CLOCKWISE = "clockwise"
+    COUNTERCLOCKWISE = "counterclockwise"
+
+
 class Reason(StrEnum):
     """Why a command is refused."""
 
@@ -170,6 +178,7 @@ class Circle:
     do: ClassVar[str] = "circle"
     of: Target
     views: int | None = None
+    way: Way = Way.ANY
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,23 @@ from dataclasses import dataclass
 from math import degrees
 from unicodedata import normalize
 
-_CHARACTERS = str.maketrans({"‘": "'", "’": "'", "“": '"', "”": '"', "–": "-", "—": "-", "…": ".", "º": "°"})
+_CHARACTERS = str.maketrans(
+    {
+        "‘": "'",
+        "’": "'",
+        "“": '"',
+        "”": '"',
+        "–": "-",
+        "—": "-",
+        "−": "-",
+        "‐": "-",
+        "‑": "-",
+        "﹣": "-",
+        "－": "-",
+        "…": ".",
+        "º": "°",
+    }
+)
 _IMAGES = r"\.(?:png|jpe?g|bmp|webp|tiff?|gif)"
 _CLIPS = r"\.(?:wav|flac|ogg|mp3|m4a|aac)"
 _TOKEN = re.compile(
@@ -113,9 +129,12 @@ def tokenise(sentence: str) -> list[Token]:
     return tokens
 
 
+_SIGNED = re.compile(r"\.?\d|pi\b", re.IGNORECASE)
+
+
 def _is_minus(text: str, at: int) -> bool:
     """Return whether a hyphen is the sign of a number; a negative angle or distance leads to a question back."""
-    return (at == 0 or text[at - 1] in " =") and text[at + 1 : at + 2].isdigit()
+    return (at == 0 or text[at - 1] in " =([{,:;") and bool(_SIGNED.match(text, at + 1))
 
 
 def _stands_alone(text: str, at: int, mark: str) -> bool:

@@ -13,6 +13,7 @@ _WHY = {
     "read": "a reading that is likely enough", "parts": "its sentences, each certain alone",
     "danger": "a refusal for safety",
     "stop": "the likeliest reading, which stops",
+    "words": "single words, which no reading can outweigh",
     "unsure": "nobody: no reading is likely enough",
 }  # fmt: skip
 

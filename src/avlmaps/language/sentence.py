@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
+from avlmaps.language.rephrase import rephrased
 from avlmaps.language.spelling import respelt
 
 # Words that may mean a file that came along.
@@ -47,13 +48,15 @@ class Sentence:
         tokens: its words, numbers, files and marks.
         given: the files and names that came along.
         respelt: misspelt words, with what they are taken for.
+        order_notes: one sentence for each time that is read before its order.
     """
 
     def __init__(self, text: str, given: "Given | None" = None) -> None:
         """Take a sentence, and the files and names that came along with it."""
         given = given or Given()
         self.text = text
-        self.tokens, self.respelt = respelt(lexer.tokenise(text))
+        tokens, self.respelt = respelt(lexer.tokenise(text))
+        self.tokens, self.order_notes = rephrased(tokens)
         self.tokens += given.tokens((token.text for token in self.tokens), len(text))
         self.given = given
 
@@ -63,8 +66,8 @@ class Sentence:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """One sentence for each misspelt word."""
-        return tuple(f"'{said}' is read as '{meant}'." for said, meant in self.respelt.items())
+        """One sentence for each misspelt word, and for each order that is read at another place."""
+        return (*(f"'{said}' is read as '{meant}'." for said, meant in self.respelt.items()), *self.order_notes)
 
     @property
     def side_notes(self) -> tuple[str, ...]:

@@ -40,6 +40,8 @@ def verbalise(intents: Sequence[Intent]) -> str:
         return intents[0].said
     if intents and isinstance(intents[0], Clarify):
         return intents[0].question
+    if tuple(intents) == (Wait(),):
+        return "I will stop and stay here."
     return f"I will {_steps(intents)}."
 
 
@@ -78,14 +80,14 @@ def _step(intent: Intent) -> str:
 
 def _other(intent: Intent) -> str:
     match intent:
-        case Circle(of=target, views=None):
-            return f"drive around {phrase(target)}"
-        case Circle(of=target, views=views):
-            return f"look at {phrase(target)} from {views} points around it"
+        case Circle(of=target, views=None, way=way):
+            return f"drive around {phrase(target)} {way}".rstrip()
+        case Circle(of=target, views=views, way=way):
+            return f"look at {phrase(target)} from {views} points around it {way}".rstrip()
         case VisitEach(of=target):
             return f"go to each of these, the nearest first: {phrase(target)}"
         case Wait(seconds=seconds):
-            return "wait a moment" if seconds is None else f"wait {seconds:g} seconds"
+            return "stay there" if seconds is None else f"wait {seconds:g} seconds"
         case Return():
             return "come back here"
         case Repeat(times=times, body=body):

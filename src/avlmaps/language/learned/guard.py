@@ -24,6 +24,8 @@ from avlmaps.language.intents import (
 )  # fmt: skip
 from avlmaps.language.learned.decision import Weighed, is_doubtful
 from avlmaps.language.learned.reader import Read
+from avlmaps.language.learned.unmet import unmet
+from avlmaps.language.learned.ways import in_direction
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import is_known, is_place, may_name, mended, past_forms, sounding_forms
 from avlmaps.language.sentence import Sentence
@@ -135,6 +137,14 @@ def weighed(read: Read, guard: Guard) -> Weighed:
     problem = guard.problem or _too_much(intents)
     if problem is not None:
         return Weighed((problem,), read.probability)
+    stop = unmet(guard.tokens, intents, read.used)
+    if stop is not None:
+        stop = Refuse(stop.reason, REFUSALS[stop.reason]) if isinstance(stop, Refuse) else stop
+        return Weighed((stop,), read.probability)
+    turned = in_direction(guard.tokens, intents)
+    if isinstance(turned, Clarify):
+        return Weighed((turned,), read.probability)
+    intents = turned
     doubtful = is_doubtful(guard.tokens, read.used, waits=any(isinstance(one, Wait) for one in intents))
     return Weighed(intents, read.probability, doubtful, tuple(dict.fromkeys(guard.notes)))
 

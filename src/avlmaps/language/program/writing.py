@@ -25,6 +25,7 @@ from avlmaps.language.intents import (
     Turn,
     VisitEach,
     Wait,
+    Way,
 )  # fmt: skip
 
 _CORNERS = 8
@@ -172,7 +173,9 @@ class _Writer:
         contour = self.variable("outline")
         self.add(f"{contour} = robot.get_contour({self.value(intent.of)})")
         self.add(f"for i in range({count}):")
-        self.add(f"    robot.move_to({contour}[i * len({contour}) // {count}])")
+        back = "" if intent.way is not Way.CLOCKWISE else "-"  # an outline runs counterclockwise
+        corner = f"i * len({contour}) // {count}"
+        self.add(f"    robot.move_to({contour}[{f'-({corner})' if back else corner}])")
         if intent.views:
             self.add(f"    robot.face({self.value(intent.of)})")
 

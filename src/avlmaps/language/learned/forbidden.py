@@ -1,0 +1,76 @@
+"""Words that no reading of a command could make good: signs of numbers, dangers, walls to drive through, questions."""
+
+from collections.abc import Sequence
+
+from avlmaps.language import lexer
+from avlmaps.language.intents import Clarify, Reason, Refuse
+from avlmaps.language.learned.linear import amount_end
+from avlmaps.language.learned.said import BREAKS, LOOKS, PREPOSITIONS, TURNS, Said, words
+from avlmaps.language.lexer import Token
+
+_ROUND = frozenset({"left", "right", "clockwise", "counterclockwise", "anticlockwise", "cw", "ccw"})
+_TAKES_SIGN = TURNS | {
+    "move", "translate", "forward", "forwards", "back", "drive", "go", "by", "advance", "x", "y", "=", "(", "left",
+    "right",
+}  # fmt: skip
+_MOTIONS_WITH_SIGN = frozenset({"move", "translate", "forward", "forwards", "back", "drive", "advance"})
+
+
+def forbidden(tokens: Sequence[Token]) -> Clarify | Refuse | None:
+    """Return the refusal or question for words that no reading of a command could make good; None where there are none.
+
+    They are signs of numbers, dangers that the robot should not see, walls to drive through, and questions.
+    """
+    said = Said(tokens)
+    if said.spans("unsafe") or _through(said):
+        return Refuse(Reason.HARM)
+    if said.spans("questions"):
+        return Refuse(Reason.QUESTION)
+    return _signed(said)
+
+
+def is_stop(tokens: Sequence[Token]) -> bool:
+    """Return whether a command says to stop, and nothing else: "stop!", "halt, please"."""
+    texts = [token.text for token in tokens if token.kind != "punct"]
+    lists = words().lists
+    return any(text in lists["stops"] for text in texts) and all(
+        text in lists["stops"] or text in lists["beside_stops"] or text in lists["robots"] for text in texts
+    )
+
+
+def _through(said: Said) -> bool:
+    """Return whether the robot should drive through what is solid, or into what hurts it or others."""
+    lists = words().lists
+    for at, text in enumerate(said.texts):
+        if text not in ("through", "thru", "into") or LOOKS & set(said.texts[max(0, at - 2) : at]):
+            continue
+        noun = [said.texts[i] for i in sorted(said.scope(at + 1, BREAKS | PREPOSITIONS))][:5]
+        if noun[:1] and noun[-1:] and (lists["solid" if text != "into" else "deadly"] & set(noun[-1:])):
+            return True
+        if text != "into" and lists["blocked"] & set(noun[:-1]):
+            return True
+    return False
+
+
+def _signed(said: Said) -> Clarify | None:
+    """Return the question for a number with a sign: -90 degrees are right for some and left for others."""
+    tokens = list(said.tokens)
+    for at, text in enumerate(said.texts):
+        if text not in ("minus", "negative", "plus", "-", "+") or not lexer.number_at(tokens, at + 1):
+            continue
+        if text == "-" and said.texts[at - 1 : at] == (".",):
+            continue
+        if text == "-" and not (at and said.texts[at - 1] in _TAKES_SIGN):
+            continue
+        end = amount_end(tokens, at + 1)
+        sign = "-" if text in ("minus", "negative", "-") else "+"
+        number = " ".join(said.texts[at + 1 : end])
+        turns = bool(lexer.angle_at(tokens, at + 1)) or bool(TURNS & set(said.texts[:at]))
+        if sign == "+" and not (turns and _ROUND.isdisjoint(said.texts)):
+            continue
+        if not turns and not _MOTIONS_WITH_SIGN & set(said.texts[:at]):
+            return Clarify(f"What does the sign of {sign}{number} mean? Say it without a sign.")
+        left, right = ("turn left", "turn right") if turns else ("move back", "move forward")
+        choices = (f"{left} {number}", f"{right} {number}")
+        return Clarify(f"What does the sign of {sign}{number} mean? Say {choices[0]} or {choices[1]}.", choices)
+    return None

@@ -1,0 +1,249 @@
+"""What the words between names and amounts claim, and whether a reading does it: distance to keep, exceptions, sides.
+
+The networks point at names and amounts. Words that stand between them can turn the meaning round ("leave the kitchen",
+"the chair farthest from the door"). A rule finds such words and says which reading does what they ask; every other
+reading becomes the rule's question, so that nothing moves on half of a sentence.
+"""
+
+from collections.abc import Callable, Sequence
+
+from avlmaps.core.lexicon import Kind as Entries
+from avlmaps.core.lexicon import lexicon
+from avlmaps.language import lexer
+from avlmaps.language.intents import Beside, Clarify, Face, Intent, Move, Pick, Reason, Refuse, Side, StopAt, Turn
+from avlmaps.language.learned.linear import amount_end
+from avlmaps.language.learned.said import BREAKS, DETERMINERS, LOOKS, PREPOSITIONS, Claimed, words
+from avlmaps.language.learned.ways import directions
+from avlmaps.language.lexer import Token
+from avlmaps.perception.embedded.words import is_word
+
+_MOTIONS = frozenset({"go", "drive", "head", "move", "turn", "face", "visit", "come", "do"})
+_HERE = frozenset({
+    "from", "here", "you", "yourself", "robot", "your", "current", "position", "the", "where", "are", "stand", "now",
+})  # fmt: skip
+_NO_SUPERLATIVES = frozenset({
+    "forest", "interest", "honest", "modest", "request", "harvest", "arrest", "invest", "suggest", "digest", "protest",
+    "contest", "priest", "conquest", "nearest", "closest", "farthest", "furthest", "farest", "latest", "remotest",
+    "guest", "guests", "chest", "crest", "quest", "wrest",
+})  # fmt: skip
+_VAGUE = frozenset({"a", "an", "one", "another", "half", "quarter", "couple", "few", "several", "some"})
+
+
+def _away(said: Claimed) -> Clarify | None:
+    """Return the question for what should be far off: only a distance in metres, or one's back to it, does that."""
+    kept = any(
+        isinstance(one, StopAt)
+        or (isinstance(one, Beside) and one.metres is not None)
+        or (isinstance(one, Face) and one.side is Side.BEHIND)
+        or (isinstance(one, Move) and one.metres < 0)
+        for one in said.steps
+    )
+    picked = any(target.pick is Pick.FARTHEST for target in said.targets)
+    for start, end in said.spans("away"):
+        scope = said.scope(end, BREAKS - {"to"})
+        before = said.texts[max(0, start - 2) : start]
+        about = said.content(scope)
+        if "not" in before or "equally" in before or kept:
+            continue
+        if set(about[:2]) <= _HERE and (picked or said.texts[end - 1 : end] == ("from",)):
+            continue
+        if picked and "from" not in said.texts[start : end + 1]:
+            continue
+        return Clarify(
+            f"'{said.said(start, scope)}': the robot can keep a distance in metres, such as: stop 2 m from the table. "
+            "Else name the place where it should go."
+        )
+    return None
+
+
+def _picked(said: Claimed) -> Clarify | None:
+    """Return the question for "the farthest" that is not picked, or that is not counted from the robot."""
+    far = said.spans("farthest")
+    far_picks = [target for target in said.targets if target.pick is Pick.FARTHEST]
+    for start, end in (*far, *said.spans("nearest")):
+        if start and said.texts[start - 1] in words().lists["ordinals"]:
+            phrase = " ".join(said.texts[start - 1 : end])
+            return Clarify(f"I cannot choose the {phrase} from the map. Say what it is near.")
+    if not far and far_picks and not {"far", "most", "farther", "further"} & set(said.texts):
+        return Clarify("Which one of them? Say what it is near.")
+    for _, end in far:
+        after = said.texts[end : end + 5]
+        at = next((at for at, word in enumerate(after) if word in ("from", "to")), None)
+        if at is not None and not any(token.kind == "punct" for token in said.tokens[end : end + at]):
+            about = said.content(said.scope(end + at + 1))
+            if after[at] == "from" and not set(about[:1]) <= _HERE:
+                return Clarify("The farthest is counted from the robot. Say what it is near, or its room.")
+        if not far_picks:
+            return Clarify("The farthest of what? Say it like: go to the farthest chair.")
+    return None
+
+
+def _leaving(said: Claimed) -> Clarify | None:
+    """Return the question for a place that should be left and is driven to."""
+    for start, end in said.spans("leaving"):
+        verb = said.texts[end - 1] != "of"
+        if verb and not (said.is_order(start) and said.texts[end : end + 1] and said.texts[end] in DETERMINERS):
+            continue
+        scope = said.scope(end, BREAKS | PREPOSITIONS)
+        last = {"last", "end"} & set(said.texts[max((*scope, end)) + 1 :][:3])
+        if said.names_in(scope) and not last and not LOOKS & set(said.texts[max(0, start - 1) : start]):
+            return Clarify(f"'{said.said(start, scope)}': where should the robot go? Name the place.")
+    return None
+
+
+def _excluded(said: Claimed) -> Clarify | Refuse | None:
+    """Return the refusal for what is not meant and is driven to, or is left out though it says which is meant."""
+    choosing = {phrase for each in words().phrases["choosing"].values() for phrase in each}
+    breaks = BREAKS - {"to", "for", "after", "before"}
+    for start, end in said.spans("excluded"):
+        phrase = said.texts[start:end]
+        if phrase in (("skip",), ("avoid",), ("exclude",), ("bypass",), ("never",)) and not said.is_order(start):
+            continue
+        scope = said.scope(end, breaks)
+        again = min((at for at in scope if at > end + 1 and said.texts[at] in _MOTIONS), default=len(said.tokens))
+        scope = frozenset(at for at in scope if at < again)
+        idiom = said.texts[end : end + 1] in (("forget",), ("mind",), ("hesitate",), ("worry",), ("suppose",)) or (
+            said.texts[max(0, start - 1) : start] in (("why",), ("if",))
+        )
+        if idiom:
+            continue
+        if said.names_in(scope) or (phrase in choosing and scope):
+            return Refuse(Reason.NEGATION)
+        one = said.texts[end : end + 1] in (("one",), ("ones",)) and len(said.content(scope)) > 1
+        if one and phrase[0] in ("not", "but", "and") and not any(t.pick is Pick.OTHER for t in said.targets):
+            return Refuse(Reason.NEGATION)
+    return None
+
+
+def _ways(said: Claimed) -> Clarify | None:
+    """Return the question for a wall or a path that should be followed and is driven to."""
+    for start, end in said.spans("ways"):
+        scope = said.scope(end, BREAKS | PREPOSITIONS)
+        if end == start + 1 and said.texts[end : end + 1] and said.texts[end] not in DETERMINERS:
+            continue
+        if not words().lists["lines"].intersection(said.texts[at] for at in scope):
+            continue
+        if said.named and said.named <= scope:
+            return Clarify(
+                f"'{said.said(start, scope)}': the robot cannot follow a wall or a path. Name the place at its end."
+            )
+    return None
+
+
+def _superlatives(said: Claimed) -> Clarify | None:
+    """Return the question for "the quietest room": no map says which that is."""
+    for at, text in enumerate(said.texts):
+        if at in said.named and (is_superlative(text) or said.texts[max(0, at - 2) : at] == ("the", "most")):
+            return Clarify(f"I cannot choose the {text} from the map. Say what it is near.")
+        if (
+            text in ("most", "least")
+            and at
+            and said.texts[at - 1] == "the"
+            and said.texts[at - 2 : at - 1] != ("in",)
+            and _is_quality(said, at + 1)
+        ):
+            return Clarify(f"I cannot choose by '{text} {said.texts[at + 1]}' from the map. Name the thing.")
+    return None
+
+
+def _is_quality(said: Claimed, at: int) -> bool:
+    return at < len(said.texts) and said.texts[at] not in (
+        "near",
+        "close",
+        "far",
+        "distant",
+        "of",
+        "likely",
+        "probable",
+    )
+
+
+def is_superlative(word: str) -> bool:
+    """Return whether a word is the highest degree of an adjective: "quietest"."""
+    if not word.endswith("est") or len(word) < 6 or word in _NO_SUPERLATIVES:
+        return False
+    if any(lexicon().find(word, kind) is not None for kind in (Entries.THING, Entries.ROOM)):
+        return False
+    stem = word.removesuffix("est")
+    stems = (
+        stem,
+        stem + "e",
+        stem[:-1] if stem[-1:] == stem[-2:-1] else stem,
+        stem[:-1] + "y" if stem[-1:] == "i" else stem,
+    )
+    return any(is_word(one) for one in stems)
+
+
+def _nameless(said: Claimed) -> Clarify | None:
+    """Return the question for "my room", "the object": a name that leaves open which one."""
+    for target in said.targets:
+        bare = target.name.split()
+        if bare and bare[-1] in words().lists["anyone"] and not target.near and not target.pick and _says_nothing(bare):
+            likely = next((w for w in ("likely", "probable", "probably") if w in said.texts), None)
+            why = " The map does not know what is likely." if likely else ""
+            return Clarify(f"Which {bare[-1]}? Name it, or say what it is near.{why}")
+    return None
+
+
+def _says_nothing(bare: Sequence[str]) -> bool:
+    return all(word in DETERMINERS or word in ("'s", "robot") or word in words().lists["anyone"] for word in bare)
+
+
+def _unread(said: Claimed) -> Clarify | None:
+    """Return the question for a file that no step uses."""
+    for token in said.tokens:
+        if token.kind in ("image", "clip") and token.text not in {
+            each.name for target in said.targets for each in (target, *target.near)
+        }:
+            what = "picture" if token.kind == "image" else "recording"
+            return Clarify(f"What is the {what} {token.text} for? Say it like: the chair near the {what} {token.text}.")
+    return None
+
+
+def _amounts(said: Claimed) -> Clarify | None:
+    """Return the question for a distance, an angle or a time with its unit that no step uses."""
+    tokens = list(said.tokens)
+    if words().lists["corrections"] & set(said.texts):
+        return None
+    read = {at for start in said.used for at in range(start, max(start + 1, amount_end(tokens, start)))}
+    for at, token in enumerate(tokens):
+        if at in read or (token.kind != "number" and token.text in _VAGUE) or not _has_unit(tokens, at):
+            continue
+        phrase = " ".join(said.texts[at : amount_end(tokens, at)])
+        return Clarify(f"What is '{phrase}' for? Say each step with its own distance, angle or time.")
+    return None
+
+
+def _sides(said: Claimed) -> Clarify | None:
+    """Return the question for a reading whose side is the other one than the side that is said."""
+    left, right = ("left" in said.texts, "right" in said.texts)
+    ways = [way for _, way in directions(said.texts)]
+    clockwise, counter = ("clockwise" in ways, "counterclockwise" in ways)
+    if {"other", "back", "against", "opposite", "o'clock"} & set(said.texts):
+        return None
+    turns = [one.degrees for one in said.steps if isinstance(one, Turn) and one.degrees and one.degrees % 180.0]
+    sides = {str(one.side) for one in said.steps if isinstance(one, Beside | Face)}
+    lefts = "left" in sides or any(turn < 0 for turn in turns)
+    rights = "right" in sides or any(turn > 0 for turn in turns)
+    if (rights and (left or counter) and not right and not clockwise) or (
+        lefts and (right or clockwise) and not left and not counter
+    ):
+        return Clarify("Left or right? Say it like: turn left 90 degrees.", ("left", "right"))
+    if ((left and clockwise and not right) or (right and counter and not left)) and turns and len(said.steps) == 1:
+        return Clarify("Left or right? Left is counterclockwise.", ("left", "right"))
+    return None
+
+
+def _has_unit(tokens: list[Token], at: int) -> bool:
+    return any(read(tokens, at) for read in (lexer.length_at, lexer.angle_at, lexer.duration_at))
+
+
+_RULES: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
+    _away, _picked, _leaving, _excluded, _ways, _superlatives, _nameless, _unread, _amounts, _sides,
+)  # fmt: skip
+
+
+def unmet(tokens: Sequence[Token], intents: Sequence[Intent], used: frozenset[int]) -> Clarify | Refuse | None:
+    """Return the question or refusal for what a sentence claims and a reading does not do; None where it does all."""
+    said = Claimed(tokens, intents, used)
+    return next((found for rule in _RULES if (found := rule(said)) is not None), None)

@@ -1,0 +1,224 @@
+"""Words of a command in the order and the person that the networks know: what is said of the robot is said to it.
+
+Three forms are rewritten, token by token, before a command is read:
+
+- what another person should make the robot do: "send the robot to the lab", "tell it to turn left";
+- a time before an order: "in five minutes go to the door", "go to the door in five minutes";
+- a loop as programs have it: "for i in range(3): go to the door".
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+from avlmaps.language import lexer
+from avlmaps.language.lexer import Token
+from avlmaps.language.word_classes import load_word_classes
+
+_ROBOTS = frozenset({"robot", "bot", "machine", "rover", "droid", "vehicle", "unit", "roomba", "turtlebot", "agent"})
+_ARTICLES = frozenset({"the", "my", "your", "our", "this", "that", "a"})
+_PRONOUNS = frozenset({"it", "him", "her"})
+_SEND = frozenset({
+    "send", "bring", "take", "put", "dispatch", "direct", "route", "deploy", "get", "position", "place", "guide",
+    "steer",
+})  # fmt: skip
+_SAME = frozenset({
+    "move", "drive", "navigate", "park", "turn", "rotate", "spin", "stop", "halt", "pause", "back", "reverse", "point",
+    "face",
+})  # fmt: skip
+_TELL = frozenset({"tell", "ask", "order", "command", "instruct"})
+_LET = frozenset({"have", "let", "make"})
+_BEFORE = frozenset({"and", "then", "please", "now", "next", "finally", "also", "first", "ok", "just", "you", "to"})
+_AFTER_SEND = frozenset({
+    "to", "into", "over", "down", "up", "towards", "toward", "through", "next", "near", "beside", "behind", "in", "by",
+    "at", "back", "out", "onto", "there", "here", "home", "between", "left", "right", "away", "off", "on", "along",
+    "round", "around", "from", "forward", "ahead", "across", "past", "inside", "where",
+})  # fmt: skip
+_NO_CLAUSE_END = frozenset(
+    {"wait", "waiting", "stay", "heard", "was", "were", "rang", "barked", "pause", "hold", "count"}
+)
+_CUTS = frozenset({"then", "finally"})
+
+
+def rephrased(tokens: Sequence[Token]) -> tuple[list[Token], list[str]]:
+    """Return tokens with these forms rewritten, and one sentence for each that a person should know of."""
+    notes: list[str] = []
+    found = _looped(_joined(tokens))
+    found = _said_to_it(found)
+    return _waiting_first(found, notes), notes
+
+
+def _joined(tokens: Sequence[Token]) -> list[Token]:
+    """Return tokens with "counter clockwise" as one word."""
+    found: list[Token] = []
+    for token in tokens:
+        if token.text == "clockwise" and found and found[-1].text in ("counter", "anti"):
+            token = _word(found.pop(), "counterclockwise")
+        found.append(token)
+    return found
+
+
+def _word(like: Token, text: str, kind: str = "word") -> Token:
+    return replace(like, text=text, kind=kind)
+
+
+def _begins(tokens: Sequence[Token], at: int) -> bool:
+    """Return whether an order may begin at a token."""
+    return at == 0 or tokens[at - 1].kind == "punct" or tokens[at - 1].text in _BEFORE
+
+
+def _robot(tokens: Sequence[Token], at: int) -> int:
+    """Return where "the robot" ends that begins at a token; the token itself where none does."""
+    end = at + (at < len(tokens) and tokens[at].text in _ARTICLES)
+    return end + 1 if end < len(tokens) and tokens[end].text in _ROBOTS else at
+
+
+@cache
+def _orders() -> frozenset[str]:
+    """Return the words that begin an order to the robot."""
+    classes = load_word_classes().words
+    names = ("GO", "TURN", "FACE", "WAIT", "CIRCLE", "RETURN", "BACK_UP")
+    begins = {phrase.split()[0] for name in names for phrase in classes[name]}
+    return frozenset(begins - {"the", "a", "be", "is", "to", "you", "your", "in", "on", "and", "with"})
+
+
+def _said_to_it(tokens: list[Token]) -> list[Token]:
+    found: list[Token] = []
+    at = 0
+    while at < len(tokens):
+        end, kept = _third(tokens, at) if _begins(tokens, at) else (at, [])
+        if end > at:
+            found += kept
+            at = end
+            continue
+        found.append(tokens[at])
+        at += 1
+    return found
+
+
+def _third(tokens: list[Token], at: int) -> tuple[int, list[Token]]:
+    """Return where an order about the robot ends that begins at a token, and the words to say to it instead."""
+    verb = tokens[at].text
+    end = _robot(tokens, at + 1)
+    robot = end > at + 1
+    follows = tokens[end].text if end < len(tokens) else ""
+    if verb in _SEND and robot and follows in _AFTER_SEND:
+        return end, [_word(tokens[at], "go")]
+    if verb == "send" and tokens[at + 1 : at + 2] and tokens[at + 1].text in _PRONOUNS:
+        after = tokens[at + 2].text if at + 2 < len(tokens) else ""
+        return (at + 2, [_word(tokens[at], "go")]) if after in _AFTER_SEND else (at, [])
+    if verb in _SAME and robot:
+        return end, [tokens[at]]
+    if verb in _TELL | _LET:
+        if not robot:
+            if at + 1 >= len(tokens) or tokens[at + 1].text not in _PRONOUNS:
+                return at, []
+            end = at + 2
+        if verb in _TELL:
+            if end >= len(tokens) or tokens[end].text != "to":
+                return at, []
+            end += 1
+        follows = tokens[end].text if end < len(tokens) else ""
+        if follows in _orders() or (robot and verb in _TELL and follows):
+            return end, []
+    return at, []
+
+
+def _waiting_first(tokens: list[Token], notes: list[str]) -> list[Token]:
+    """Return tokens with "in five minutes" and "after ten seconds" as a wait before the order that they belong to."""
+    starts = [0]
+    found: list[Token] = []
+    at = 0
+    while at < len(tokens):
+        token = tokens[at]
+        amount = _delay(tokens, at)
+        if amount is None:
+            if (
+                token.kind == "punct"
+                or token.text in _CUTS
+                or (token.text == "and" and tokens[at + 1 : at + 2] and tokens[at + 1].text in _orders())
+            ):
+                starts.append(len(found) + 1)
+            found.append(token)
+            at += 1
+            continue
+        begin, end = amount
+        clause = found[starts[-1] :]
+        said = " ".join(one.text for one in tokens[at:end])
+        wait = [
+            _word(token, "wait"),
+            *tokens[begin : end if token.text in ("in", "after") else end - 2],
+            _word(token, "then"),
+        ]
+        opens = not [one for one in clause if one.text not in _BEFORE]
+        closes = end == len(tokens) or tokens[end].kind == "punct" or tokens[end].text in ("then", "and")
+        if not (opens and end < len(tokens)) and (not closes or _NO_CLAUSE_END & {one.text for one in clause}):
+            found.append(token)
+            at += 1
+            continue
+        found[starts[-1] : starts[-1]] = wait
+        if opens:
+            while end < len(tokens) and tokens[end].text in (",", "then"):
+                end += 1
+        notes.append(f"'{said}' is read as: wait first.")
+        at = end
+    return found
+
+
+def _delay(tokens: list[Token], at: int) -> tuple[int, int] | None:
+    """Return the time of a delay that begins at a token, and where the delay ends: "in five minutes"."""
+    if tokens[at].text not in ("in", "after"):
+        return None
+    ends = [end for end, _ in lexer.duration_at(tokens, at + 1)]
+    if not ends or (
+        tokens[at + 1].text in ("a", "another") and tokens[at + 2].text in ("moment", "second", "sec", "bit")
+    ):
+        return None
+    end = max(ends)
+    end += end < len(tokens) and tokens[end].text == "time"
+    return (at + 1, end) if end >= len(tokens) or tokens[end].text not in ("of", "ago", "'s") else None
+
+
+def _looped(tokens: list[Token]) -> list[Token]:
+    """Return tokens with "for i in range(3): go" as "go. Do this 3 times"."""
+    texts = [token.text for token in tokens]
+    for at, text in enumerate(texts):
+        head = _loop_head(tokens, at) if text == "for" else None
+        if head is None:
+            continue
+        begin, times = head
+        while begin < len(tokens) and texts[begin] in (")", ":", "{", "do", "."):
+            begin += 1
+        end = next((i for i in range(begin, len(tokens)) if texts[i] == "}"), len(tokens))
+        body = tokens[begin:end]
+        while body and body[-1].kind == "punct" and body[-1].text in (".", ";", ","):
+            body = body[:-1]
+        often = [_word(tokens[at], ".", "punct"), _word(tokens[at], "do"), _word(tokens[at], "this"),
+                 _word(tokens[at], str(times), "number"), _word(tokens[at], "times")]  # fmt: skip
+        return [*tokens[:at], *body, *often, *tokens[end + 1 :]]
+    return tokens
+
+
+def _loop_head(tokens: list[Token], at: int) -> tuple[int, int] | None:
+    """Return where the head of a loop ends that begins at a token, and how often it goes round."""
+    texts = [token.text for token in tokens]
+    brackets = texts[at + 1 : at + 2] == ["("]
+    numbers: list[int] = []
+    end = at + 1
+    limit = min(len(tokens), at + 24)
+    if "range" in texts[at : at + 6]:
+        end = texts.index("range", at) + 1
+        while end < limit and texts[end] != ")":
+            numbers += [int(texts[end])] if texts[end].isdigit() else []
+            end += 1
+        if 1 <= len(numbers) <= 2 and end < limit:
+            return end + 1, numbers[-1] - (numbers[0] if len(numbers) == 2 else 0)
+    elif brackets and "<" in texts[at:limit]:
+        less = texts.index("<", at)
+        equal = texts[less + 1 : less + 2] == ["="]
+        count = texts[less + 1 + equal] if less + 1 + equal < len(texts) else ""
+        start = next((text for text in texts[at:less] if text.isdigit()), "0")
+        close = next((i for i in range(less, limit) if texts[i] == ")"), None)
+        if count.isdigit() and close is not None:
+            return close + 1, int(count) - int(start) + equal
+    return None

@@ -1,0 +1,222 @@
+"""Words that turn a command round: no reading that leaves them out moves the robot."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from avlmaps.language.commands import Command, read_command
+from avlmaps.language.intents import (
+    Circle,
+    Clarify,
+    Go,
+    Kind,
+    Move,
+    Pick,
+    Reason,
+    Refuse,
+    Repeat,
+    Target,
+    Turn,
+    Wait,
+    Way,
+)  # fmt: skip
+from avlmaps.language.rules import command_to_program
+from avlmaps.language.sentence import Given, Sentence
+from avlmaps.language.verbalise import verbalise
+
+THINGS = ("chair", "sofa", "table", "window", "fridge", "bed", "lamp", "sink")
+things = st.sampled_from(THINGS)
+OPPOSITES = (
+    "go far from the {0}", "go to the {1} farthest from the {0}", "move away from the {0}", "stay clear of the {0}",
+    "go to the {1} except the one by the {0}", "go to the {1}, not the one near the {0}", "go to any {1} but the {0}",
+    "go to the {1} that is not near the {0}", "go to a {1} far away from the {0}", "go as far from the {0} as possible",
+    "go to the {1} furthest away from the {0}", "keep away from the {0}", "go anywhere but the {0}",
+)  # fmt: skip
+DELAYS = ("in {} go to the door", "after {} go to the door", "go to the door in {}", "go to the door after {}")
+FEW = settings(max_examples=12, deadline=None)
+
+
+def intents(command: str) -> tuple[object, ...]:
+    """Return what a command asks for."""
+    return read_command(command).intents
+
+
+def stops(command: str, given: Given | None = None) -> Command:
+    """Return a reading that does not move the robot."""
+    read = read_command(command, given)
+    assert read.stops is not None, f"{command!r} drives: {verbalise(read.intents)}"
+    return read
+
+
+@FEW
+@given(
+    st.sampled_from(("turn", "rotate", "yaw")), st.integers(1, 180), st.sampled_from(("-", "−", "minus ", "negative "))
+)
+def test_a_signed_angle_asks_which_side(verb: str, angle: int, sign: str) -> None:
+    read = stops(f"{verb} {sign}{angle} degrees")
+    assert isinstance(read.stops, Clarify)
+    assert len(read.stops.choices) == 2
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["move forward -2 m", "translate -0.5 m", "move (-1)", "go back -1 m", "forward by minus one metre",
+     "rotate -30 deg, translate -0.5 m", "turn left -90 degrees", "yaw +45 degrees", "stand -2 m left of the sink",
+     "drive forward, then turn -.5 rad", "go to the sofa, then turn by -90°"],
+)  # fmt: skip
+def test_a_sign_is_never_dropped(command: str) -> None:
+    stops(command)
+
+
+@FEW
+@given(st.sampled_from(OPPOSITES), things, things)
+def test_the_opposite_is_never_driven_to(form: str, thing: str, other: str) -> None:
+    if thing != other:
+        stops(form.format(thing, other))
+
+
+@pytest.mark.parametrize("verb", ["leave", "exit", "get out of", "come out of", "drive out of", "go out of"])
+def test_what_is_left_is_not_driven_to(verb: str) -> None:
+    stops(f"{verb} the kitchen")
+    read = read_command(f"{verb} the kitchen and go to the sofa")
+    assert read.stops is not None or all(one.to.name != "kitchen" for one in read.intents if isinstance(one, Go))
+
+
+def test_the_farthest_is_not_the_nearest() -> None:
+    assert intents("go to the farthest chair") == (Go(Target(Kind.OBJECT, "chair", pick=Pick.FARTHEST)),)
+    assert intents("go to the chair farthest from here") == (Go(Target(Kind.OBJECT, "chair", pick=Pick.FARTHEST)),)
+    stops("go to the second farthest chair")
+
+
+def test_a_distance_in_metres_may_be_kept() -> None:
+    assert verbalise(intents("stop 2 m away from the table")) == "I will stop 2 m from the table."  # type: ignore[arg-type]
+    assert read_command("turn so that you face away from the sofa").stops is None
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["drive through the wall", "go through the glass door at full speed", "go straight through the closed door",
+     "pretend that there is no wall and go to the sofa", "there is no wall, drive 5 m", "drive into the fire",
+     "ignore the obstacles and go to the door", "disable the collision sensors and drive 3 m",
+     "assume that there are no people and drive to the door", "go to the door no matter who is in the way",
+     "go to the kitchen at top speed", "drive blindfolded to the sofa", "act as if the wall was open, go 2 m"],
+)  # fmt: skip
+def test_a_danger_is_refused(command: str) -> None:
+    read = stops(command)
+    assert isinstance(read.stops, Refuse)
+
+
+@pytest.mark.parametrize("command", ["go through the door", "look through the window", "go through the kitchen"])
+def test_what_can_be_passed_is_no_danger(command: str) -> None:
+    assert read_command(command).stops != Refuse(Reason.HARM)
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["is it safe to let the toddler in the kitchen", "is it dangerous to drive to the stove", "should I go in"],
+)
+def test_a_question_does_not_drive(command: str) -> None:
+    stops(command)
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["go to my room", "go to her room", "go to the object most likely to bark", "go to the quietest room",
+     "go to the darkest corner", "drive along the wall", "follow the wall", "follow the corridor",
+     "go to the thing", "go to the chair 2 m left of the table in 3 m", "go to the second nearest chair"],
+)  # fmt: skip
+def test_what_the_map_cannot_know_is_asked(command: str) -> None:
+    stops(command)
+
+
+@pytest.mark.parametrize(
+    "said", ["stop", "Stop!", "STOP NOW", "halt", "stop stop stop", "Stopp!", "whoa, stop it", "stop the robot"]
+)
+def test_stop_is_stop(said: str) -> None:
+    assert intents(said) == (Wait(),)
+    assert verbalise(intents(said)) == "I will stop and stay here."  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "form",
+    ["send the robot to the {}", "bring the robot to the {}", "take the robot to the {}", "tell it to go to the {}",
+     "tell the robot to go to the {}", "have the robot drive to the {}", "ask the bot to go to the {}",
+     "put the robot next to the {}", "park the robot by the {}", "please send the machine to the {}"],
+)  # fmt: skip
+@FEW
+@given(things)
+def test_what_is_said_of_the_robot_is_said_to_it(form: str, thing: str) -> None:
+    assert intents(form.format(thing)) == (Go(Target(Kind.OBJECT, thing)),)
+
+
+def test_a_thing_that_others_carry_is_not_the_robot() -> None:
+    assert intents("bring the cup to the table") == (Refuse(Reason.MANIPULATION),)
+
+
+@FEW
+@given(st.sampled_from(DELAYS), st.integers(2, 59), st.sampled_from((("seconds", 1), ("minutes", 60))))  # fmt: skip
+def test_a_delay_comes_before_its_order(form: str, count: int, unit: tuple[str, int]) -> None:
+    name, seconds = unit
+    assert intents(form.format(f"{count} {name}")) == (Wait(float(count * seconds)), Go(Target(Kind.OBJECT, "door")))
+
+
+def test_a_delay_stays_in_its_clause() -> None:
+    assert intents("go to the sofa, then turn left in 10 seconds") == (
+        Go(Target(Kind.OBJECT, "sofa")), Wait(10.0), Turn(-90.0),
+    )  # fmt: skip
+
+
+@FEW
+@given(
+    st.integers(2, 9),
+    st.sampled_from(("for i in range({}): ", "for k in range(0, {}): ", "for (int i = 0; i < {}; i++) ")),
+)
+def test_a_loop_goes_round_as_often_as_it_says(times: int, head: str) -> None:
+    read = intents(head.format(times) + "go to the door")
+    assert read == (Repeat(times, (Go(Target(Kind.OBJECT, "door")),)),)
+
+
+@pytest.mark.parametrize(
+    ("said", "way"),
+    [("clockwise", Way.CLOCKWISE), ("cw", Way.CLOCKWISE), ("counterclockwise", Way.COUNTERCLOCKWISE),
+     ("anti-clockwise", Way.COUNTERCLOCKWISE), ("counter clockwise", Way.COUNTERCLOCKWISE), ("", Way.ANY)],
+)  # fmt: skip
+def test_a_circle_runs_the_way_round_that_is_said(said: str, way: Way) -> None:
+    assert intents(f"go around the table {said}") == (Circle(Target(Kind.OBJECT, "table"), way=way),)
+
+
+def test_the_two_ways_round_visit_the_same_corners_in_the_other_order() -> None:
+    ahead, back = (command_to_program(f"circle the table {way}") for way in ("counterclockwise", "clockwise"))
+    assert "outline[i * len(outline) // 8]" in ahead
+    assert "outline[-(i * len(outline) // 8)]" in back
+
+
+def test_turns_keep_their_side() -> None:
+    assert intents("turn 45 degrees anti-clockwise") == (Turn(-45.0),)
+    stops("turn right 90 degrees anticlockwise")
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["Geh zum Sofa", "Va dans la cuisine", "vas a la cocina por favor", "vai in cucina", "ga naar de keuken",
+     "gå till köket", "去厨房", "иди на кухню", "اذهب إلى المطبخ", "mutfağa git", "arrête"],
+)  # fmt: skip
+def test_another_language_asks_for_english(command: str) -> None:
+    read = stops(command)
+    assert "in English" in verbalise(read.intents)
+
+
+@pytest.mark.parametrize(
+    "command", ["go to the café", "go to the chaise longue", "drive to the piano", "circle the sofa"]
+)
+def test_words_that_english_took_over_are_english(command: str) -> None:
+    assert read_command(command).stops is None
+
+
+def test_a_file_that_no_step_uses_is_asked_about() -> None:
+    stops("go to the mug near the sink and ./a.png and bark.wav")
+
+
+def test_amounts_behind_a_plain_command_change_nothing_else() -> None:
+    assert intents("go forward 2 m") == (Move(2.0),)
+    assert Sentence("tell my wife to go home").tokens[0].text == "tell"
