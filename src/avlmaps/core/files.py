@@ -145,7 +145,7 @@ def replace_atomically(path: Path) -> Generator[BinaryIO]:
     """
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        with partial.open("wb") as stream:
+        with open_new(partial) as stream:
             yield stream
             stream.flush()
             os.fsync(stream.fileno())
@@ -153,6 +153,27 @@ def replace_atomically(path: Path) -> Generator[BinaryIO]:
         sync_folder(path.parent)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def open_new(path: Path) -> BinaryIO:
+    """Make a file and open it for writing; what has its name goes, a link without what it points to."""
+    path.unlink(missing_ok=True)
+    return path.open("xb")
+
+
+def linked_folder(folder: Path) -> Path | None:
+    """Return the first symbolic link to a folder that lies somewhere below a folder, None where there is none.
+
+    What is written or removed below such a link would be someone else's. To be called before a folder of ours is
+    written. A link to a file does no harm: files are replaced by new ones, never opened for writing.
+    """
+    if not folder.is_dir():
+        return None
+    for at, folders, _ in os.walk(folder):
+        for name in folders:
+            if (found := Path(at, name)).is_symlink():
+                return found
+    return None
 
 
 def write_bytes_atomically(path: Path, content: bytes) -> None:

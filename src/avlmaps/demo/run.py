@@ -115,8 +115,12 @@ def _stage(name: str, seconds: dict[str, float], sentence: str) -> Iterator[None
 def _make_room(out: Path) -> None:
     if out.exists() and any(out.iterdir()) and not (out / MARKER).exists():
         raise MapError(f"{out} holds something else than a demonstration; choose another folder with --out.")
-    shutil.rmtree(out, ignore_errors=True)
-    out.mkdir(parents=True)
+    out.mkdir(parents=True, exist_ok=True)
+    for entry in out.iterdir():  # one by one, since the folder may be a link
+        if entry.is_dir() and not entry.is_symlink():
+            shutil.rmtree(entry, ignore_errors=True)
+        else:
+            entry.unlink()
     (out / MARKER).touch()
 
 

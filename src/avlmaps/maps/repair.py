@@ -9,7 +9,7 @@ from avlmaps.core.progress import say
 from avlmaps.maps.build import build_map
 from avlmaps.maps.integrity import Guard, remember_checked
 from avlmaps.maps.plan import make_plan
-from avlmaps.maps.store.array_files import FileInfo, explain_write_errors, sync_names, verify_file
+from avlmaps.maps.store.array_files import FileInfo, explain_write_errors, refuse_links, sync_names, verify_file
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import MANIFEST, MapInfo, parse_manifest, read_manifest, write_manifest
 from avlmaps.maps.store.reader import open_stored, profile_of_map
@@ -65,6 +65,7 @@ def repair_map(path: Path | str, recording: Recording | None) -> Repaired:
         MapError: files are damaged and there is no recording, or it is not the one, or the models are other ones.
     """
     path = Path(path)
+    refuse_links(path)
     info, damaged = _manifest(path), damaged_files(path)
     if not damaged:
         shutil.rmtree(path / _WORKSHOP, ignore_errors=True)

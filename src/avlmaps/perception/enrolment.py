@@ -107,6 +107,7 @@ def forget_sound(name: str, folder: Path | None = None) -> None:
     if not (place / "sound.json").is_file():
         known = ", ".join(taught.name for taught in enrolled_sounds(folder)) or "none"
         raise BackendError(f"No sound called {name!r} was taught; taught are: {known}.")
+    _refuse_link(place)
     (place / "sound.json").unlink()  # first: a folder without notes is not a sound, even with other files left in it
     shutil.rmtree(place)
 
@@ -146,6 +147,7 @@ def _audible(clip: Path | str | Sound) -> tuple[str, Sound]:
 
 def _keep(taught: TaughtSound, root: Path) -> None:
     place = root / _slug(taught.name)
+    _refuse_link(place)
     place.mkdir(parents=True, exist_ok=True)
     (place / "sound.json").unlink(missing_ok=True)
     with replace_atomically(place / "features.npy") as stream:
@@ -158,6 +160,11 @@ def _keep(taught: TaughtSound, root: Path) -> None:
         "checksum": taught.checksum,
     }
     write_bytes_atomically(place / "sound.json", json.dumps(notes, indent=1, ensure_ascii=False).encode())
+
+
+def _refuse_link(place: Path) -> None:
+    if place.is_symlink():
+        raise BackendError(f"{place} is a symbolic link; avlmaps writes nothing behind it: remove the link first.")
 
 
 def _read(notes_file: Path) -> TaughtSound:

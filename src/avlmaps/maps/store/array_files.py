@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.errors import MapError
-from avlmaps.core.files import checked_size, sha256_of_file, sync_folder
+from avlmaps.core.files import checked_size, linked_folder, open_new, sha256_of_file, sync_folder
 from avlmaps.core.npy import load_npy
 
 SMALL_BYTES = 1 << 20  # files up to this size are read whole and always compared with their checksum
@@ -57,6 +57,15 @@ def explain_write_errors(folder: Path) -> Generator[None]:
         ) from fault
 
 
+def refuse_links(folder: Path) -> None:
+    """Raise ``MapError`` where a symbolic link inside a map's folder leads to another: nothing is written there."""
+    if (link := linked_folder(folder)) is not None:
+        raise MapError(
+            f"{link} is a symbolic link to a folder; avlmaps neither writes nor removes anything behind a link: remove "
+            "it, or give the folder a place of its own. A map's folder itself may be a link."
+        )
+
+
 def write_array(folder: Path, name: str, array: np.ndarray) -> FileInfo:
     """Write an array as ``<folder>/<name>-<checksum>.npy`` and return its entry for the manifest.
 
@@ -89,7 +98,7 @@ def _write(folder: Path, name: str, suffix: str, chunks: Iterable[bytes | memory
         stem.parent.mkdir(parents=True, exist_ok=True)
         partial = stem.with_name(f".{stem.name}.{os.getpid()}.partial")
         try:
-            with partial.open("wb") as stream:
+            with open_new(partial) as stream:
                 size, checksum = _hashed(stream, chunks)
             final = stem.with_name(f"{stem.name}-{checksum[:16]}{suffix}")
             partial.replace(final)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from avlmaps.core.errors import MapError
-from avlmaps.maps.store.array_files import explain_write_errors
+from avlmaps.maps.store.array_files import explain_write_errors, refuse_links
 
 LOCK = ".lock"
 
@@ -41,11 +41,14 @@ def lock_folder(folder: Path) -> Generator[None]:
     """Hold the folder's lock; the folder is made if it is not there.
 
     Raises:
-        MapError: another build holds it, or the folder cannot be written.
+        MapError: another build holds it, the folder cannot be written, or holds a link to another folder.
     """
+    refuse_links(folder)
     with explain_write_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+        if (folder / LOCK).is_symlink():  # it would be emptied
+            (folder / LOCK).unlink()
+        descriptor = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
     try:
         try:
             _grab_patiently(descriptor)

@@ -158,6 +158,8 @@ class FeatureStore:
         found: list[tuple[float, int, Path]] = []
         for path in self.folder.glob("*/*"):
             with suppress(OSError):  # another process may have removed it
+                if path.parent.is_symlink():
+                    continue
                 state = path.stat()
                 if path.suffix == ".npy":
                     found.append((state.st_mtime, state.st_size, path))

@@ -76,6 +76,8 @@ def fetch_light(place: str = "") -> Fetched:
         return Fetched(target, manifest, 0)
     partial = target.with_name(f".{target.name}.partial")
     try:
+        if partial.is_symlink():
+            partial.unlink()
         partial.mkdir(parents=True, exist_ok=True)
         _require_room(partial, manifest)
         received = _bring_all(source, manifest, partial)
