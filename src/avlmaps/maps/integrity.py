@@ -129,10 +129,12 @@ def _fault_of(path: Path, name: str, info: FileInfo) -> str:
     dtype = np.dtype(info.dtype or np.uint8)
     header = info.bytes - math.prod(info.shape) * dtype.itemsize if info.dtype else 0
     digest, odd = hashlib.sha256(), ""
+    row = info.shape[1:]
+    row_bytes = max(1, math.prod(row) * dtype.itemsize)
     with open_regular(path, info.bytes) as stream:
         digest.update(stream.read(header))
-        while chunk := stream.read(_CHUNK_BYTES // dtype.itemsize * dtype.itemsize):
+        while chunk := stream.read(max(1, _CHUNK_BYTES // row_bytes) * row_bytes):
             digest.update(chunk)
-            if not odd and len(chunk) % dtype.itemsize == 0:
-                odd = content_fault(name, np.frombuffer(chunk, dtype))
+            if not odd and len(chunk) % row_bytes == 0:
+                odd = content_fault(name, np.frombuffer(chunk, dtype).reshape(-1, *row))
     return odd if digest.hexdigest() == info.sha256 else "its checksum is not the one that was written"

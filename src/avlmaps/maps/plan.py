@@ -14,7 +14,8 @@ from avlmaps.core.progress import say
 from avlmaps.maps.partial_maps import BUILD_VERSION, fusion_key
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import Checkpoint, F, find_checkpoint, key_of, load_checkpoint, save_checkpoint
-from avlmaps.maps.store.manifest import MANIFEST, MapInfo, ModelInfo, parse_manifest, read_manifest
+from avlmaps.maps.store.manifest import MapInfo, ModelInfo
+from avlmaps.maps.store.manifest_file import MANIFEST, parse_manifest, read_manifest
 from avlmaps.maps.store.reader import PARTS
 from avlmaps.maps.store.writer import is_map_or_free, sweep
 from avlmaps.perception.profiles import Profile

@@ -11,7 +11,8 @@ from avlmaps.maps.integrity import Guard, remember_checked
 from avlmaps.maps.plan import make_plan
 from avlmaps.maps.store.array_files import FileInfo, explain_write_errors, refuse_links, sync_names, verify_file
 from avlmaps.maps.store.lock import lock_folder
-from avlmaps.maps.store.manifest import MANIFEST, MapInfo, parse_manifest, read_manifest, write_manifest
+from avlmaps.maps.store.manifest import MapInfo
+from avlmaps.maps.store.manifest_file import MANIFEST, parse_manifest, read_manifest, write_manifest
 from avlmaps.maps.store.reader import open_stored, profile_of_map
 from avlmaps.maps.store.writer import sweep
 from avlmaps.recordings.types import Recording

@@ -18,7 +18,7 @@ from avlmaps.core.errors import AvlmapsError, BackendError, QueryError
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.language.questions import parse_sentence
 from avlmaps.maps.integrity import stamp
-from avlmaps.maps.store.manifest import MANIFEST
+from avlmaps.maps.store.manifest_file import MANIFEST
 from avlmaps.maps.store.reader import open_stored
 from avlmaps.query.avlmap import Attachment, AVLMap, QuerySettings
 from avlmaps.query.factors import NearAnchors

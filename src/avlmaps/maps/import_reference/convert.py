@@ -31,16 +31,14 @@ from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import (
-    MANIFEST,
     Box,
     Counts,
     MapInfo,
     RigInfo,
     Timings,
     UpInfo,
-    parse_manifest,
-    read_manifest,
 )
+from avlmaps.maps.store.manifest_file import MANIFEST, parse_manifest, read_manifest
 from avlmaps.maps.store.reader import PARTS, StoredMap, open_stored
 from avlmaps.maps.store.writer import MapContent, is_map_or_free, write_map
 from avlmaps.maps.types import Voxels

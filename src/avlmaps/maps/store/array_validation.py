@@ -19,6 +19,9 @@ RAGGED: dict[type, tuple[tuple[str, str], ...]] = {
 # Arrays that are empty where nothing is known, and the field along whose rows they go where it is.
 ROWS_OR_NONE: dict[type, tuple[tuple[str, str], ...]] = {Keyframes: (("score", "xy"),)}
 # The keypoints' points are NaN where there was no depth.
+# Features: of unit length, or zero where there is nothing to say.
+UNIT_ROWS = frozenset({"voxels/feature", "sounds/feature", "keyframes/view", "keyframes/descriptors"})
+_UNIT = 0.02
 MAY_BE_NAN = frozenset({"keyframes/points_world"})
 MOST_EXTENT_M = 10_000.0
 MOST_AWAY_M = 1e6
@@ -88,7 +91,7 @@ def content_fault(name: str, array: np.ndarray) -> str:
 
     Args:
         name: what it holds, such as ``voxels/feature``.
-        array: of any shape.
+        array: of any shape; of a piece of an array of features, whole rows.
     """
     if name in MAY_BE_NAN or array.dtype.kind != "f":
         return ""
@@ -96,7 +99,14 @@ def content_fault(name: str, array: np.ndarray) -> str:
         finite = bool(((array.view(np.uint16) & 0x7C00) != 0x7C00).all())
     else:
         finite = bool(np.isfinite(array).all())
-    return "" if finite else "it holds numbers that are NaN or infinite"
+    if not finite:
+        return "it holds numbers that are NaN or infinite"
+    if name in UNIT_ROWS and array.ndim == 2 and array.shape[1]:
+        rows = array.astype(np.float32)
+        square = np.einsum("ij,ij->i", rows, rows)
+        if not ((np.abs(square - 1.0) < 2.0 * _UNIT) | (square == 0.0)).all():
+            return "it holds features that have neither unit length nor are zero"
+    return ""
 
 
 def check_extent(index: np.ndarray, voxel_size_m: float, where: str) -> None:

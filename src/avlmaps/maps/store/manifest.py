@@ -1,6 +1,5 @@
-"""``map.json``: what is written about a map beside its arrays, and how it is read with suspicion."""
+"""The content of ``map.json``: what is written about a map beside its arrays."""
 
-from pathlib import Path
 from typing import Literal
 
 import msgspec
@@ -8,16 +7,13 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.core.errors import MapError
-from avlmaps.core.files import MANIFEST_BYTES, decode_json, read_regular, write_bytes_atomically
 from avlmaps.maps.fusion.sensor import SensorModel
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.array_files import FileInfo, explain_write_errors
+from avlmaps.maps.store.array_files import FileInfo
 from avlmaps.perception.models.names import public_choice, public_name
 from avlmaps.perception.protocols import ModelCard
 
 SCHEMA_VERSION = 1
-MANIFEST = "map.json"
 
 Vector = tuple[float, float, float]
 
@@ -283,6 +279,7 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
         files: every file, by what it holds (``voxels/feature``); nothing else in the folder is part of the map.
         bytes: size of all files.
         timings: when it was built and how long it took; the only part that differs when a build is repeated.
+        checksum: hex SHA-256 of all the rest but the timings; empty in maps of older releases.
     """
 
     format: Literal["avlmap"] = "avlmap"
@@ -307,57 +304,4 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
     timings: Timings
     sensor: SensorInfo | None = None
     removed: Removed = Removed()
-
-
-class _Ident(msgspec.Struct):
-    format: str = ""
-    schema_version: int = 0
-
-
-def write_manifest(folder: Path, info: MapInfo) -> None:
-    """Write ``map.json``; with it the folder becomes this map, and not before."""
-    content = msgspec.json.format(msgspec.json.encode(info), indent=2)
-    with explain_write_errors(folder):
-        write_bytes_atomically(folder / MANIFEST, content + b"\n")
-
-
-def read_manifest(path: Path) -> bytes:
-    """Return the content of ``map.json``.
-
-    Raises:
-        FileNotFoundError, NotADirectoryError: there is none.
-        MapError: it cannot be read, or is not a regular file of a possible size.
-    """
-    try:
-        return read_regular(path, MANIFEST_BYTES)
-    except (FileNotFoundError, NotADirectoryError):
-        raise
-    except OSError as fault:
-        raise MapError(f"{path} cannot be read ({fault.strerror or fault}); check the file.") from fault
-
-
-def parse_manifest(content: bytes, path: Path) -> MapInfo:
-    """Return the content of ``map.json``.
-
-    Args:
-        content: of the file.
-        path: the file, for the errors.
-
-    Raises:
-        MapError: it is not JSON, not UTF-8, of no map, of another schema version, or lacks something.
-    """
-    try:
-        ident = decode_json(content, _Ident)
-    except (msgspec.DecodeError, UnicodeDecodeError) as fault:
-        raise MapError(f"{path} is damaged: it is not JSON in UTF-8 ({fault}); restore it from a copy.") from fault
-    if ident.format != "avlmap":
-        raise MapError(f"{path} belongs to no map of avlmaps; give the folder that `avlmaps build` wrote.")
-    if ident.schema_version != SCHEMA_VERSION:
-        how = "upgrade avlmaps" if ident.schema_version > SCHEMA_VERSION else "build the map again with --overwrite"
-        raise MapError(
-            f"{path} has schema version {ident.schema_version}, this avlmaps reads version {SCHEMA_VERSION}; {how}."
-        )
-    try:
-        return decode_json(content, MapInfo)
-    except (msgspec.DecodeError, ValueError, MapError) as fault:
-        raise MapError(f"{path} is damaged: {str(fault).rstrip('.')}; restore it from a copy.") from fault
+    checksum: str = ""

@@ -17,8 +17,10 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.integrity import Guard
 from avlmaps.maps.store.array_files import MEND, FileInfo, read_array, verify_file
 from avlmaps.maps.store.array_validation import array_fields, check_extent, check_order, content_fault, validate_arrays
+from avlmaps.maps.store.consistency import arrays_fault
 from avlmaps.maps.store.lock import is_locked
-from avlmaps.maps.store.manifest import MANIFEST, GroundInfo, MapInfo, parse_manifest, read_manifest
+from avlmaps.maps.store.manifest import GroundInfo, MapInfo
+from avlmaps.maps.store.manifest_file import MANIFEST, RESTORE, parse_manifest, read_manifest
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 from avlmaps.perception.models.names import public_choice, public_name
 from avlmaps.perception.profiles import Profile, profile
@@ -186,6 +188,9 @@ def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
         raise MapError(f"{path / MANIFEST} is damaged: its counts are not those of the arrays; restore it from a copy.")
     guard = Guard(path, names, trusting=not verify)
     check_extent(np.asarray(voxels.index), grid.voxel_size_m, f"{path}/voxels")
+    if fault := arrays_fault(info, voxels, keyframes, sounds):
+        guard.require_whole()  # a file that is not what was written is the better reason
+        raise MapError(f"{path} is damaged: {fault}; {RESTORE}.")
     if verify:
         guard.require_whole()
         check_order(voxels, f"{path}/voxels")

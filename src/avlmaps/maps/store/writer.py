@@ -16,7 +16,8 @@ from avlmaps.maps.integrity import remember_checked
 from avlmaps.maps.store.array_files import FileInfo, sync_names, write_array, write_copy
 from avlmaps.maps.store.array_validation import array_fields
 from avlmaps.maps.store.lock import LOCK
-from avlmaps.maps.store.manifest import MANIFEST, MapInfo, write_manifest
+from avlmaps.maps.store.manifest import MapInfo
+from avlmaps.maps.store.manifest_file import MANIFEST, write_manifest
 from avlmaps.maps.store.reader import CLIPS, PARTS, STATE
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 
