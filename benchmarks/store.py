@@ -120,9 +120,15 @@ def manifest(made_up: MapContent) -> MapInfo:
         models={},
         settings=BuildSettings(),
         seed=0,
-        recording=RecordingInfo(name="made up", format="none", fingerprint="", frames=0, duration_s=0.0),
+        recording=RecordingInfo(
+            name="made up",
+            format="none",
+            fingerprint="",
+            frames=0,
+            duration_s=float(np.ptp(made_up.voxels.last_seen_s)),
+        ),
         counts=Counts(frames=0, keyframes=len(made_up.keyframes), voxels=len(made_up.voxels), sounds=0),
-        bounding_box_m=Box(low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0)),
+        bounding_box_m=Box.of(made_up.voxels.index, 0.05),
         timings=Timings(finished="", elapsed_s=0.0, stages_s={}),
     )
 

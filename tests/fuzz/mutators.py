@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 from seeds import files_of, is_text, numbers_of
 
+from helpers.signing import signed
+
 Rng = np.random.Generator
 
 
@@ -239,7 +241,7 @@ def resigned(rng: Rng, seed: Path) -> str:
     np.save(seed / entry["path"], array)
     content = (seed / entry["path"]).read_bytes()
     entry.update(bytes=len(content), sha256=hashlib.sha256(content).hexdigest())
-    manifest.write_text(json.dumps(info))
+    manifest.write_text(signed(json.dumps(info)))
     return f"resigned {name}"
 
 

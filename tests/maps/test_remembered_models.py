@@ -18,6 +18,7 @@ from avlmaps.maps.store.manifest import ModelInfo
 from avlmaps.maps.store.reader import open_stored
 from avlmaps.perception.models.names import public_choice, public_name
 from avlmaps.perception.profiles import Profile, profile, register_profile
+from helpers.signing import signed
 
 PROFILE = register_fakes()
 WEIGHTS: dict[str, str] = {}
@@ -120,7 +121,7 @@ def test_where_a_model_lay_is_nobodys_business(tmp_path: Path, place: str) -> No
 def test_a_path_in_a_strangers_map_is_not_followed(tmp_path: Path) -> None:
     build_map(Walk(), tmp_path / "map", used_with("chosen@org/large"), SETTINGS)
     manifest = tmp_path / "map" / "map.json"
-    manifest.write_text(manifest.read_text().replace("chosen@org/large", "chosen@../../etc/large"))
+    manifest.write_text(signed(manifest.read_text().replace("chosen@org/large", "chosen@../../etc/large")))
     assert open_stored(tmp_path / "map").profile.pixels == "chosen@large"
 
 

@@ -12,6 +12,7 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.serve.service import Service
 from helpers.injected_server import injected_server
 from helpers.injections import MARKS, ORDERS, injections
+from helpers.signing import signed
 
 COUNT = 220
 
@@ -58,13 +59,14 @@ def test_injected_strings_in_a_map_file_reach_no_terminal_as_they_are(room: Path
     for (holder, key), injected in zip(texts[:60], injections(5), strict=False):
         before = holder[key]
         holder[key] = injected
-        manifest.write_text(json.dumps(content), encoding="utf-8")
+        manifest.write_text(signed(json.dumps(content)), encoding="utf-8")
         holder[key] = before
         try:
             str(AVLMap.open(copy).sounds())
         except AvlmapsError as error:
             assert not UNSAFE.search(str(error))
-    manifest.write_text(json.dumps({**content, "profile": next(injections(6)) + "\x1b[2J"}), encoding="utf-8")
+    injected = json.dumps({**content, "profile": next(injections(6)) + "\x1b[2J"})
+    manifest.write_text(signed(injected), encoding="utf-8")
     for words in (["info"], ["things"], ["info", "--json"]):
         try:
             main([words[0], str(copy), *words[1:]])

@@ -284,7 +284,7 @@ def _manifest(
             voxels=len(content.voxels),
             sounds=len(content.sounds),
         ),
-        bounding_box_m=_box(content.voxels, plan.settings.voxel_size_m),
+        bounding_box_m=Box.of(content.voxels.index, plan.settings.voxel_size_m),
         bad_frames=tuple(bad),
         notices=tuple(_notices(plan, up, ground, len(bad))),
         timings=timings,
@@ -300,12 +300,6 @@ def _recording_info(recording: Recording) -> RecordingInfo:
         duration_s=recording.duration_s,
         notices=tuple(strip_folder(notice, recording) for notice in recording.notices),
     )
-
-
-def _box(voxels: Voxels, voxel_size_m: float) -> Box:
-    corners = np.stack([voxels.index.min(axis=0), voxels.index.max(axis=0) + 1]) * voxel_size_m
-    low, high = (tuple(round(float(value), 6) for value in corner) for corner in corners)
-    return Box(low=low, high=high)  # pyright: ignore[reportArgumentType]
 
 
 def _notices(plan: Plan, up: UpInfo, ground: GroundInfo, bad: int) -> Iterator[str]:

@@ -143,8 +143,6 @@ def _write(path: Path, source: Source, settings: ImportSettings, key: str, begin
     content = MapContent(voxels, walk.keyframes(grid.centre_of(voxels.index)), {}, heard, clips)
     elapsed_s = perf_counter() - begin
     finished = datetime.now(UTC).isoformat(timespec="seconds")
-    corners = np.stack([voxels.index.min(axis=0), voxels.index.max(axis=0) + 1]) * grid.voxel_size_m
-    low, high = (tuple(round(float(value), 6) for value in corner) for corner in corners)
     info = MapInfo(
         avlmaps_version=__version__,
         build_key=key,
@@ -159,7 +157,7 @@ def _write(path: Path, source: Source, settings: ImportSettings, key: str, begin
         counts=Counts(
             frames=source.voxels.frames, keyframes=len(content.keyframes), voxels=len(voxels), sounds=len(heard)
         ),
-        bounding_box_m=Box(low=low, high=high),  # pyright: ignore[reportArgumentType]
+        bounding_box_m=Box.of(voxels.index, grid.voxel_size_m),
         notices=tuple(source.notices(len(voxels), left_out)),
         timings=Timings(finished=finished, elapsed_s=elapsed_s, stages_s={"import": elapsed_s}),
     )

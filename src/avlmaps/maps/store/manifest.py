@@ -5,7 +5,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from avlmaps.core.arrays import Float
+from avlmaps.core.arrays import Float, Int32
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.maps.fusion.sensor import SensorModel
 from avlmaps.maps.settings import BuildSettings
@@ -243,6 +243,13 @@ class Box(msgspec.Struct, frozen=True, kw_only=True):
 
     low: Vector
     high: Vector
+
+    @classmethod
+    def of(cls, index: Int32[np.ndarray, "n 3"], voxel_size_m: float) -> "Box":
+        """Return the box around voxels, of which there is at least one."""
+        corners = np.stack([index.min(axis=0), index.max(axis=0) + 1]) * voxel_size_m
+        low, high = (tuple(round(float(value), 6) for value in corner) for corner in corners)
+        return cls(low=low, high=high)  # pyright: ignore[reportArgumentType]
 
 
 class Timings(msgspec.Struct, frozen=True, kw_only=True):
