@@ -7,9 +7,19 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stderr
 from typing import TYPE_CHECKING
 
+from avlmaps.cli.address_space import require_address_space
 from avlmaps.cli.model_options import models_in_force
-from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_of, system_sentence
-from avlmaps.cli.pipes import READER_GONE, drop, reader_gone
+from avlmaps.cli.output import (
+    AnsweredError,
+    UsageError,
+    emit,
+    error_answer,
+    fault_sentence,
+    is_short_of_memory,
+    kind_of,
+    system_sentence,
+)
+from avlmaps.cli.pipes import READER_GONE, drop, reader_gone, settle_streams
 from avlmaps.cli.plain_query import PlainQuery, read_plain_query
 from avlmaps.cli.shortened_files import end_at_shortened_files
 from avlmaps.core.errors import AvlmapsError
@@ -32,6 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Args:
         arguments: the words after ``avlmaps``; those of this process if None.
     """
+    settle_streams()
     try:
         try:
             _main(sys.argv[1:] if arguments is None else list(arguments))
@@ -42,6 +53,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
             sys.exit(READER_GONE)
         drop(sys.stdout)
         sys.exit(_complain(system_sentence(error), 1))
+    except Exception as fault:  # of loading the verbs; what a verb meets is a sentence already
+        if not is_short_of_memory(fault):
+            raise
+        sys.exit(_complain(fault_sentence(fault), 1))
     except KeyboardInterrupt:  # while it was reading its words
         sys.exit(_complain("stopped", 130))
 
@@ -99,24 +114,24 @@ def _run(verb: "Verb | PlainQuery") -> int:
         return _fail(verb, error, str(error), 2)
     except AvlmapsError as error:
         return _fail(verb, error, str(error), 1)
-    except (OSError, MemoryError) as error:
-        if isinstance(error, BrokenPipeError) and reader_gone():
-            return READER_GONE
-        return _fail(verb, error, system_sentence(error), 1)
     except KeyboardInterrupt as stop:
         if (status := getattr(stop, "status", None)) is not None:  # of a robot that was driving; its answer is printed
             return _complain(stop, status)
         return _fail(verb, stop, "stopped; the same command continues where this one ended, where it can", 130)
     except Exception as fault:
+        if isinstance(fault, BrokenPipeError) and reader_gone():
+            return READER_GONE
+        if isinstance(fault, OSError) or is_short_of_memory(fault):
+            return _fail(verb, fault, fault_sentence(fault), 1)
         if verb.json:
-            _emit_error(
-                kind_of(fault), f"{type(fault).__name__}: {fault}; this is a fault of avlmaps, please report it."
-            )
+            _emit_error(kind_of(fault), fault_sentence(fault))
         raise
     return 0
 
 
 def _compiling(verb: "Verb | PlainQuery") -> AbstractContextManager[None]:
+    if verb.compiles or isinstance(verb, PlainQuery):
+        require_address_space()
     if not verb.compiles:
         return nullcontext()
     from avlmaps.core.compiling import announce_compiling

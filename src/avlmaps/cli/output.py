@@ -1,11 +1,14 @@
 """The output of a verb: one JSON object, or lines for a person."""
 
+import errno
 import json
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from avlmaps.cli.address_space import AddressSpaceError
+from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.printable import printable, printable_json
 
 
@@ -20,15 +23,54 @@ class AnsweredError(Exception):
 _SHOWN = 200
 
 
-def system_sentence(error: OSError | MemoryError) -> str:
+NO_MEMORY = (
+    "there is not enough memory for this; give the process more (ulimit -v, a container's limit), close other programs "
+    "or use smaller inputs"
+)
+# What libraries say in exceptions of their own, where Python has MemoryError.
+_MEMORY_WORDS = re.compile(
+    "cannot allocate memory|failed to map segment|insufficient memory|out of memory|bad_alloc|failed to allocate"
+    "|unable to allocate|can't start new thread|can't allocate",
+    re.IGNORECASE,
+)
+
+
+def is_short_of_memory(error: BaseException) -> bool:
+    """Return whether an error, or what it came from, is that there was too little memory, whoever noticed."""
+    seen: set[int] = set()
+    cause: BaseException | None = error
+    while cause is not None and id(cause) not in seen:
+        seen.add(id(cause))
+        if isinstance(cause, MemoryError) or getattr(cause, "errno", None) == errno.ENOMEM:
+            return True
+        if not isinstance(cause, AvlmapsError) and _MEMORY_WORDS.search(str(cause)):
+            return True
+        cause = cause.__cause__ or cause.__context__
+    return False
+
+
+def system_sentence(error: OSError) -> str:
     """Return the reason of the system's refusal, without its error number."""
-    if isinstance(error, MemoryError):
-        return "there is not enough memory for this; check the sizes in the input, or free some"
+    if error.errno == errno.ENOMEM:
+        return NO_MEMORY
+    if error.errno == errno.EBADF and error.filename is None:
+        return "standard output is closed, so that the answer is lost; send it to a file, or to /dev/null"
     if error.filename is None or error.strerror is None:
         return f"{error.strerror or error}; check the files and the space on the disk."
     name = str(error.filename)
     shown = name if len(name) <= _SHOWN else f"{name[: _SHOWN // 2]}...{name[-_SHOWN // 2 :]}"
     return f"{shown}: {error.strerror}; check the path, its permissions and the space on the disk."
+
+
+def fault_sentence(fault: Exception) -> str:
+    """Return the sentence for an error that is none of ours: of the system, of too little memory, or unforeseen."""
+    if isinstance(fault, AddressSpaceError):
+        return str(fault)
+    if is_short_of_memory(fault):
+        return NO_MEMORY
+    if isinstance(fault, OSError):
+        return system_sentence(fault)
+    return f"{type(fault).__name__}: {fault}; this is a fault of avlmaps, please report it."
 
 
 def error_answer(kind: str, message: str) -> dict[str, Any]:
@@ -38,6 +80,8 @@ def error_answer(kind: str, message: str) -> dict[str, Any]:
 
 def kind_of(error: BaseException) -> str:
     """Return the name of a kind of error for scripts: ``recording``, ``goal-not-found``, ``usage`` and so on."""
+    if is_short_of_memory(error):
+        return "memory"
     return "system" if isinstance(error, OSError) else kind_named(type(error).__name__)
 
 
@@ -49,10 +93,20 @@ def kind_named(error_type: str) -> str:
 def emit(answer: Mapping[str, Any], lines: Iterable[str], as_json: bool) -> None:
     """Print the answer as one JSON object, or as lines."""
     if as_json:
-        sys.stdout.write(printable_json(json.dumps(answer, allow_nan=False, ensure_ascii=False)) + "\n")
+        sys.stdout.write(json_line(answer, sys.stdout.encoding) + "\n")
     else:
         for line in lines:
             sys.stdout.write(printable(line) + "\n")
+
+
+def json_line(answer: Mapping[str, Any], encoding: str | None = "utf-8") -> str:
+    """Return an answer as one line of JSON that an encoding can hold; what it lacks is escaped as JSON has it."""
+    line = printable_json(json.dumps(answer, allow_nan=False, ensure_ascii=False))
+    try:
+        line.encode(encoding or "utf-8")
+    except UnicodeEncodeError:
+        return json.dumps(answer, allow_nan=False)
+    return line
 
 
 def table_lines(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:

@@ -1,5 +1,6 @@
-"""Noticing that nobody reads the output any more, as in `avlmaps info MAP | head -1`."""
+"""Standard streams as they come: closed, in another encoding than UTF-8, or with a reader that goes away."""
 
+import io
 import os
 import select
 import sys
@@ -7,6 +8,35 @@ from typing import TextIO
 
 READER_GONE = 141
 """Exit status then: what a shell reports for a program that SIGPIPE (13) ended."""
+
+
+def settle_streams() -> None:
+    """Make the standard streams usable before anything is opened or printed.
+
+    A closed one (``>&-``) is None in Python, and its number would go to the next file that is opened, which would then
+    get what is printed. Standard output that is closed refuses what is written, so that an answer that is lost is an
+    error; the others go nowhere. Characters that an encoding lacks are printed as escapes.
+    """
+    sys.stdin = sys.stdin or _opened(0, os.O_RDONLY, "r")
+    sys.stdout = sys.stdout or _opened(1, os.O_RDONLY, "w")
+    sys.stderr = sys.stderr or _opened(2, os.O_WRONLY, "w")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors in ("strict", "surrogateescape"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _opened(number: int, flags: int, mode: str) -> TextIO:
+    """Open the null device under the number of a closed stream; unless something else has that number by now."""
+    try:
+        os.fstat(number)
+    except OSError:
+        null = os.open(os.devnull, flags)
+        if null != number:
+            os.dup2(null, number)
+            os.close(null)
+    else:
+        number = os.open(os.devnull, flags)
+    return open(number, mode, encoding="utf-8", closefd=False)
 
 
 def reader_gone() -> bool:

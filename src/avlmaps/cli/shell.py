@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.go import read_start
-from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_of, system_sentence
+from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, fault_sentence, kind_of
 from avlmaps.cli.shell_session import VERBS, WITH_FILES, Given, Over, Session
 from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.errors import AvlmapsError, BackendError
@@ -94,14 +94,14 @@ def answer_lines(session: Session, lines: "Lines", as_json: bool) -> tuple[int, 
             _report(error, str(error), as_json)
         except BrokenPipeError:
             raise
-        except (OSError, MemoryError) as error:
-            failed += 1
-            _report(error, system_sentence(error), as_json)
         except KeyboardInterrupt as stop:
             if not lines.interactive or getattr(stop, "number", signal.SIGINT) != signal.SIGINT:
                 raise
             failed += 1
             _report(stop, str(stop) or "stopped", as_json)
+        except Exception as fault:  # noqa: BLE001 - one line that fails must not end the others
+            failed += 1
+            _report(fault, fault_sentence(fault), as_json)
         sys.stdout.flush()
 
 

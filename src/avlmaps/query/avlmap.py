@@ -188,7 +188,7 @@ class AVLMap:
             structure: list walls, floors and the like as well.
 
         Raises:
-            QueryError: ``least_confidence`` lies outside [0, 1].
+            QueryError: ``least_confidence`` lies outside [0, 1], or the pixel encoder does not know a name.
         """
         from avlmaps.query.contents import Contents
 
