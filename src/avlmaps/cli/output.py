@@ -36,7 +36,7 @@ _MEMORY_WORDS = re.compile(
 
 
 def is_short_of_memory(error: BaseException) -> bool:
-    """Return whether an error, or what it came from, is that there was too little memory, whoever noticed."""
+    """Return whether an error, or what it came from, is that there was too little memory."""
     seen: set[int] = set()
     cause: BaseException | None = error
     while cause is not None and id(cause) not in seen:
