@@ -4,7 +4,7 @@ import io
 import os
 import select
 import sys
-from typing import TextIO
+from typing import Literal, TextIO
 
 READER_GONE = 141
 """Exit status then: what a shell reports for a program that SIGPIPE (13) ended."""
@@ -25,7 +25,7 @@ def settle_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-def _opened(number: int, flags: int, mode: str) -> TextIO:
+def _opened(number: int, flags: int, mode: Literal["r", "w"]) -> TextIO:
     """Open the null device under the number of a closed stream; unless something else has that number by now."""
     try:
         os.fstat(number)
