@@ -6,6 +6,7 @@ It runs on twisted's one reactor, as the client does; roslibpy brings autobahn, 
 import json
 import threading
 from collections.abc import Callable
+from hashlib import md5
 from math import cos, sin
 from time import monotonic, sleep
 from typing import Any
@@ -40,8 +41,15 @@ class _Client(WebSocketServerProtocol):
             self.robot.clients.remove(self)
 
     def tell(self, message: dict[str, Any]) -> None:
+        payload = json.dumps(message).encode()
+        if self.robot.late_s:
+            reactor.callLater(self.robot.late_s, self._send, payload)
+        else:
+            self._send(payload)
+
+    def _send(self, payload: bytes) -> None:
         if self.state == self.STATE_OPEN:
-            self.sendMessage(json.dumps(message).encode())
+            self.sendMessage(payload)
 
 
 class FakeRobot:
@@ -57,6 +65,13 @@ class FakeRobot:
         self.received: list[dict[str, Any]] = []
         self.clients: list[_Client] = []
         self.goals: dict[str, dict[str, Any]] = {}  # id: goal with its status
+        self.listing = True  # servers tell of the goals that they are at
+        self.clock_s = monotonic  # by which transforms are stamped
+        self.absent: set[str] = set()  # actions without a server
+        self.drives = False  # a goal that does "drive on" moves the body
+        self.late_s = 0.0  # what it says arrives later by that much
+        self.map_every_s = 0.0  # the transform of the map is renewed no more often
+        self.answers = True  # its servers answer
         self.headers: dict[str, str] = {}
         self.moves_on = False
 
@@ -96,6 +111,23 @@ class FakeRobot:
         for client in list(self.clients):
             reactor.callFromThread(client.transport.abortConnection)
 
+    def shut(self) -> None:
+        """Break every connection off, and take none."""
+        blockingCallFromThread(reactor, self._listener.stopListening)
+        self.drop()
+
+    def reopen(self) -> None:
+        """Take connections again, at the same address."""
+        blockingCallFromThread(reactor, self._open)
+
+    def die(self) -> None:
+        """End what takes goals; the body stands, and its pose is reported."""
+        self.listing = self.answers = self.moves_on = False
+
+    def forget(self) -> None:
+        """Start what takes goals anew: it knows of none."""
+        reactor.callFromThread(self._forget)
+
     def publish(self, topic: str, message: dict[str, Any]) -> None:
         reactor.callFromThread(self._publish, topic, message)
 
@@ -106,11 +138,24 @@ class FakeRobot:
         factory.setProtocolOptions(closeHandshakeTimeout=0.2, maxMessagePayloadSize=10_000_000)
         factory.protocol = type("Client", (_Client,), {"robot": self})
         self._factory = factory
-        self._listener = reactor.listenTCP(0, factory, interface="127.0.0.1")
-        self.port = self._listener.getHost().port
+        self.port = 0
+        self._open()
         self._ticked_s = monotonic()
+        self._told: dict[str, int] = {}
+        self._mapped_s = 0.0
         self._ticks = LoopingCall(self._tick)
         self._ticks.start(0.03)
+
+    def _open(self) -> None:
+        self._listener = reactor.listenTCP(self.port, self._factory, interface="127.0.0.1")
+        self.port = self._listener.getHost().port
+
+    def _forget(self) -> None:
+        self.moves_on = False
+        for goal in self.goals.values():
+            goal.update(status=6 if self.ros == 2 else 4, listed=False)
+        if self.ros == 2:
+            self._publish("/navigate_to_pose/_action/status", {"status_list": []})
 
     def _leave(self) -> Any:
         self._ticks.stop()
@@ -125,9 +170,30 @@ class FakeRobot:
         self._ticked_s = now_s
         if self.tf_on:
             self._tell_transforms()
-        if self.ros == 1:
-            states = [_state(name, goal["status"]) for name, goal in self.goals.items() if goal["listed"]]
+        listed = {name: goal for name, goal in self.goals.items() if goal["listed"]}
+        if self.ros == 1 and self.listing:
+            states = [_state(name, goal["status"]) for name, goal in listed.items()]
             self._publish("/move_base/status", {"header": {}, "status_list": states})
+        if self.ros == 2 and self.listing:
+            for name, goal in listed.items():
+                if goal["status"] == 1 and goal["client"] is not None:
+                    self._feed(name)
+            if (told := {name: goal["status"] for name, goal in listed.items()}) != self._told:
+                self._told = told
+                self._tell_states()
+
+    def _tell_states(self) -> None:
+        """Publish the goals of each action, as its server does at a change."""
+        for action in {goal["action"] for goal in self.goals.values()}:
+            states = [
+                {
+                    "goal_info": {"goal_id": {"uuid": list(uuid_of(name))}, "stamp": {"sec": 1, "nanosec": 0}},
+                    "status": goal["status"] or 6,
+                }
+                for name, goal in self.goals.items()
+                if goal["action"] == action and goal["listed"]
+            ]
+            self._publish(f"{action}/_action/status", {"status_list": states})
 
     def _tell_transforms(self) -> None:
         fixed, middle, body = self.frames
@@ -140,8 +206,12 @@ class FakeRobot:
         told = [_transform(middle, body, within), _transform(body, "laser", GroundPose(0.2, 0.0))]
         if self.spoiled != 0.0:
             told[0]["transform"]["translation"]["x"] = self.spoiled
-        self._publish("/tf", {"transforms": told})
-        self._publish("/tf", {"transforms": [_transform(fixed, middle, odometry)]})
+        now_s = self.clock_s()
+        self._publish("/tf", {"transforms": [stamped(one, now_s, self.ros) for one in told]})
+        if now_s - self._mapped_s < self.map_every_s:
+            return
+        self._mapped_s = now_s
+        self._publish("/tf", {"transforms": [stamped(_transform(fixed, middle, odometry), now_s, self.ros)]})
 
     def _publish(self, topic: str, message: dict[str, Any]) -> None:
         for client in list(self.clients):
@@ -153,12 +223,17 @@ class FakeRobot:
         match message["op"]:
             case "subscribe":
                 client.topics[message["topic"]] = message["type"]
+                if message["topic"].endswith("/_action/status"):
+                    self._tell_states()  # the last list is kept for those who come late
             case "send_action_goal":
                 self._begin(client, message["action"], message["id"], message["args"])
             case "cancel_action_goal":
                 self._called_off(message["id"])
             case "call_service":
                 self._serve(client, message)
+            case "publish" if message["topic"].endswith("/avlmaps/echo"):
+                self.received.pop()
+                self._publish(message["topic"], message["msg"])
             case "publish" if message["topic"] == "/move_base/goal":
                 self._begin(client, "/move_base", message["msg"]["goal_id"]["id"], message["msg"]["goal"])
             case "publish" if message["topic"] == "/move_base/cancel":
@@ -173,11 +248,13 @@ class FakeRobot:
         if does == "deaf":
             self.does[action] = "succeed"  # the first message of a new topic is lost
             return
-        told = does not in ("silent", "mute")
+        told = does not in ("silent", "mute", "reject", "no server")
         goal = {"client": client, "action": action, "args": args, "does": does, "status": 1, "listed": told}
         self.goals[name] = goal
         if does not in ("lie", "reject", "no server", "silent", "mute"):
             self._feed(name)
+        if does == "drive on" and self.drives:
+            self.moves_on = True
         later = {
             "succeed": (self._arrive, name),
             "lie": (self._end, name, 4 if self.ros == 2 else 3),
@@ -192,9 +269,10 @@ class FakeRobot:
         if does == "arrive unseen":
             self.tf_on = False
         if does == "malformed":
-            for payload in MALFORMED:
-                client.sendMessage(payload)
-            client.sendMessage(b"\x00\x01", True)
+            for each in self.clients:
+                for payload in MALFORMED:
+                    each.sendMessage(payload)
+                each.sendMessage(b"\x00\x01", True)
         if does in later:
             reactor.callLater(0.05, *later[does])
 
@@ -245,6 +323,8 @@ class FakeRobot:
             goal["listed"] = True
             self._publish("/move_base/result", {"header": {}, "status": _state(name, status, text), "result": {}})
             return
+        if goal["client"] is None:
+            return
         values = {"error_code": 208 if status == 6 else 0, "error_msg": ""}
         told = {"op": "action_result", "id": name, "action": goal["action"], "values": values, "status": status}
         if self.does.get("format") == "old":
@@ -263,14 +343,40 @@ class FakeRobot:
             reactor.callLater(0.05, self._end, name, 5 if self.ros == 2 else 2)
 
     def _serve(self, client: _Client, message: dict[str, Any]) -> None:
-        agreed = self.does[""] not in ("stubborn", "mute") and message["service"].endswith("/_action/cancel_goal")
+        """Answer action_msgs/CancelGoal, as the library of action servers does."""
         action = message["service"].removesuffix("/_action/cancel_goal")
-        for name, goal in list(self.goals.items()):
-            if goal["action"] == action:
-                self._called_off(name, everything=True)
-        values: Any = {"return_code": 0, "goals_canceling": []} if agreed else "Service does not exist"
+        does = self.does.get(action, self.does[""])
+        wanted = bytes(message["args"]["goal_info"]["goal_id"]["uuid"])
         told = {"op": "service_response", "id": message["id"], "service": message["service"]}
-        client.tell({**told, "values": values, "result": agreed})
+        if does in ("silent", "mute") or not self.answers:
+            return
+        if does == "no server" or action in self.absent or not message["service"].endswith("/_action/cancel_goal"):
+            client.tell({**told, "values": f"Service {message['service']} does not exist", "result": False})
+            return
+        named = {name: goal for name, goal in self.goals.items() if goal["action"] == action}
+        meant = [name for name in named if not any(wanted) or uuid_of(name) == wanted]
+        active = [name for name in meant if named[name]["status"] in (0, 1)]
+        code = 2 if any(wanted) and not meant else 3 if any(wanted) and not active else 0
+        if active and all(named[name]["does"] in ("stubborn", "mute") for name in active):
+            code, active = 1, []
+        for name in active:
+            self._called_off(name, everything=True)
+        cancelling = [{"goal_id": {"uuid": list(uuid_of(name))}, "stamp": {"sec": 0, "nanosec": 0}} for name in active]
+        client.tell({**told, "values": {"return_code": code, "goals_canceling": cancelling}, "result": True})
+
+    def operate(self, name: str = "rviz") -> None:
+        """Take a goal of an operator, which ends those before it; it moves the robot until it is called off."""
+        reactor.callFromThread(self._operated, name)
+
+    def _operated(self, name: str) -> None:
+        for other, goal in list(self.goals.items()):
+            if goal["status"] in (0, 1):
+                self._end(other, 6 if self.ros == 2 else 2)
+        action = "/move_base" if self.ros == 1 else "/navigate_to_pose"
+        self.goals[name] = {
+            "client": None, "action": action, "args": {}, "does": "drive on", "status": 1, "listed": True,
+        }  # fmt: skip
+        self.moves_on = True
 
 
 MALFORMED = (
@@ -312,6 +418,19 @@ def _transform(parent: str, child: str, pose: GroundPose) -> dict[str, Any]:
             "rotation": {"x": 0.0, "y": 0.0, "z": sin(half), "w": cos(half)},
         },
     }
+
+
+def stamped(transform: dict[str, Any], stamp_s: float, ros: int) -> dict[str, Any]:
+    """Date a transform by the robot's clock."""
+    names = ("secs", "nsecs") if ros == 1 else ("sec", "nanosec")
+    whole = int(stamp_s)
+    stamp = dict(zip(names, (whole, int((stamp_s - whole) * 1e9)), strict=True))
+    return {**transform, "header": {**transform["header"], "stamp": stamp}}
+
+
+def uuid_of(name: str) -> bytes:
+    """Return an action server's own name for a goal."""
+    return md5(name.encode(), usedforsecurity=False).digest()
 
 
 def _pose(message: dict[str, Any]) -> GroundPose:

@@ -178,13 +178,13 @@ def test_a_goal_that_takes_too_long_is_cancelled(robot):
         assert (np.diff(arrival.path[:, 0]) >= 0).all()
 
 
-def test_a_goal_that_ignores_its_cancelling_is_cancelled_with_all_others(robot):
-    robot.does[""] = "deaf to ids"
-    with opened(robot, settings=quick(goal_timeout_s=0.3, cancel_timeout_s=2.0)) as driver:
+def test_a_goal_that_the_bridge_has_forgotten_is_cancelled_by_the_name_that_nav2_gave_it():
+    settings = quick(goal_timeout_s=0.3, cancel_timeout_s=2.0)
+    with FakeRobot(2, "deaf to ids") as robot, opened(robot, settings=settings) as driver:
         arrival = driver.go_to(PLACE)
         assert not arrival.reached
         assert "may still be driving" not in arrival.note
-        assert robot.soon(lambda: all(goal["status"] in (2, 5) for goal in robot.goals.values())), robot.goals
+        assert all(goal["status"] in (2, 5) for goal in robot.goals.values()), robot.goals
 
 
 def test_a_robot_that_will_not_stop_is_told_of(robot):
@@ -210,12 +210,12 @@ def test_a_connection_lost_on_the_way_calls_the_goal_off_and_is_made_again_for_t
 
 
 def test_a_robot_that_is_gone_is_an_ordinary_result_and_its_last_pose_is_kept(robot):
-    settings = quick(connect_timeout_s=5.0, goal_timeout_s=5.0)
+    settings = quick(connect_timeout_s=1.0, goal_timeout_s=1.0, cancel_timeout_s=0.5)
     robot.pose = GroundPose(3.0, 4.0, 1.0)
     driver = opened(robot, settings=settings)
     robot.__exit__()
     try:
-        assert robot.soon(lambda: driver._contact.link.lost is not None)
+        assert robot.soon(lambda: driver._contact.session.lost is not None)
         for arrival in (driver.go_to(PLACE), driver.turn(1.0), driver.forward(1.0), driver.stop()):
             assert not arrival.reached
             assert arrival.note
@@ -230,13 +230,13 @@ def test_nothing_malformed_stops_a_drive(robot):
     with opened(robot) as driver:
         arrival = driver.go_to(PLACE)
         assert arrival.reached, arrival.note
-        assert driver._contact.link.unread > 10
+        assert driver._contact.session.link.unread > 10
 
 
 def test_a_message_too_large_ends_the_connection_and_not_the_process(robot):
     with opened(robot) as driver:
         robot.say(b'{"op": "publish", "topic": "/tf", "msg": "' + b"x" * 2_000_000 + b'"}')
-        assert robot.soon(lambda: driver._contact.link.lost is not None)
+        assert robot.soon(lambda: driver._contact.session.lost is not None)
         assert driver.go_to(PLACE).reached
 
 
@@ -347,18 +347,18 @@ def test_a_cancel_that_the_bridge_loses_is_sent_again():
         take, lost = robot.take, []
 
         def loses_the_first(client, message):
-            if message["op"] == "cancel_action_goal" and not lost:
+            if len(lost) < 2 and message["op"] in ("cancel_action_goal", "call_service"):
                 lost.append(message)
                 return
             take(client, message)
 
-        robot.take = loses_the_first
         thread, results = in_thread(lambda: driver.go_to(PLACE))
         assert robot.soon(lambda: bool(goals(robot)))
+        robot.take = loses_the_first
         driver._halted.set()
         thread.join(20.0)
-        assert lost
-        assert cancels(robot) == 1
+        assert len(lost) == 2
+        assert cancels(robot) >= 1
         assert "may still be driving" not in results[0].note
 
 
@@ -437,7 +437,8 @@ def test_nav2_without_its_behaviours_turns_by_goals_and_remembers(absent):
             assert driver.turn(1.0).reached
             assert driver.turn(1.0).reached
         actions = [message["action"] for message in robot.ops("send_action_goal")]
-    assert actions == ["/spin", "/navigate_to_pose", "/navigate_to_pose"]
+    sent = ["/spin"] if absent == "silent" else []  # a server that is known not to be there gets no goal
+    assert actions == [*sent, "/navigate_to_pose", "/navigate_to_pose"]
     assert robot.pose.heading_rad == pytest.approx(2.0)
 
 

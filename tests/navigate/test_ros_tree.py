@@ -74,7 +74,8 @@ def test_the_oldest_moving_transform_tells_the_age_and_static_ones_never_age():
     clock.now += 1.0
     seen = tree.seen("map", "base_link")
     assert seen is not None
-    assert (seen.heard_s, seen.age_s) == (pytest.approx(clock.now - 5.0), pytest.approx(5.0))
+    assert (seen.taken_s, seen.age_s) == (pytest.approx(clock.now - 5.0), pytest.approx(5.0))
+    assert seen.heard_s == pytest.approx(clock.now - 1.0)  # the newest
     tree.hear(message(transform("map", "odom")), static=False)
     assert tree.seen("map", "base_link").age_s == pytest.approx(1.0)
 

@@ -65,7 +65,7 @@ class Driver(Protocol):
         ...
 
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
-        """Drive to a place, or as near to it as the robot can stand and see it.
+        """Drive to a place, or as near to it as the robot can stand and see it, and stand there.
 
         Args:
             place: in the world, metres; its height does not matter.
@@ -86,7 +86,7 @@ class Driver(Protocol):
         ...
 
     def stop(self) -> Arrival:
-        """Stand still."""
+        """Stand still, whatever moves the robot, also others: a person's stop, and no part of other movements."""
         ...
 
 

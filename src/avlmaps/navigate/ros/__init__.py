@@ -2,10 +2,9 @@
 
 from avlmaps.navigate.ros.base import RosDriver
 from avlmaps.navigate.ros.frames import Frames, GroundTransform
-from avlmaps.navigate.ros.move_base import MoveBaseDriver
-from avlmaps.navigate.ros.nav2 import Nav2Driver
-from avlmaps.navigate.ros.opening import RosKind, open_ros_driver
+from avlmaps.navigate.ros.opening import MoveBaseDriver, Nav2Driver, open_ros_driver
 from avlmaps.navigate.ros.settings import RosSettings
+from avlmaps.navigate.ros.transports import RosKind
 
 __all__ = [
     "Frames",

@@ -1,13 +1,17 @@
-"""Parts that driving Nav2 and move_base share: seeing a goal to its end, calling it off, and the report."""
+"""The driver of a robot that plans and steers by itself: it sees each goal to its end, or calls it off.
+
+These are the laws of safety, over any transport (`session`): what was sent is watched; what is not watched any more is
+called off until the robot confirms it; only goals of ours are called off; and nothing new is sent before.
+"""
 
 import threading
-from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from math import pi
+from math import isfinite, pi
 from time import monotonic
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from jaxtyping import Float
@@ -16,20 +20,24 @@ from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.interrupts import Halt
+from avlmaps.navigate.ros.calling_off import AGAIN_S, call_off, ended_within
 from avlmaps.navigate.ros.contact import Contact
-from avlmaps.navigate.ros.frames import Frames
 from avlmaps.navigate.ros.goals import End, Goal, Plan, Task, Track, Watch
 from avlmaps.navigate.ros.guard import Guard
-from avlmaps.navigate.ros.link import Link
 from avlmaps.navigate.ros.plans import LEAST_M, LONGEST_M, Standing, ahead_of, place_to_stand, plan_turn
-from avlmaps.navigate.ros.settings import RosSettings
+from avlmaps.navigate.ros.session import Opener
+from avlmaps.navigate.ros.tasks import Tasks
 
 _LOOK_EVERY_S = 0.1
-_CANCEL_AGAIN_S = 1.0
+_ASK_S = 1.5
+_REGULAR = 3
+_NEXT_LIST_S = 0.5
+_ASK_AFTER = 0.4  # of the time for which a server may be silent
 _IDLE = Halt(True, "no goal was active")
+_UNCONFIRMED = "the robot did not confirm that it gave up its goal"
 
 
-class RosDriver(ABC):
+class RosDriver:
     """Drives a robot that plans and steers by itself. One movement at a time; ``stop`` may come from any thread.
 
     Attributes:
@@ -38,89 +46,41 @@ class RosDriver(ABC):
         guard: a second process that cancels when this one dies; None where nobody started one.
     """
 
-    called: ClassVar[str]
-    """The program that drives the robot, as notes name it."""
-    tf_kind: ClassVar[str]
-    """The type of /tf."""
-    heartbeat_kind: ClassVar[str]
-    """The type of the heartbeat: text, the id of the active goal."""
-
     def __init__(
         self,
-        url: str,
-        frames: Frames | None = None,
-        settings: RosSettings | None = None,
+        opener: Opener,
+        tasks: Tasks,
         *,
         standing: Standing | None = None,
         level_from_world: Float[np.ndarray, "3 3"] | None = None,
-        token: str | None = None,
         clock: Callable[[], float] = monotonic,
     ) -> None:
         """Connect, and wait until the robot reports its pose.
 
         Args:
-            url: of rosbridge, ``ws://host:9090``.
-            frames: the robot's frames; ``map`` and ``base_link``, lying as the map's level frame, by default.
-            settings: names, patience, tolerances.
+            opener: opens sessions with the robot.
+            tasks: makes its goals.
             standing: moves a goal to where a body can stand; goals are sent as they are without it.
             level_from_world: the map's rotation into its level frame; the identity by default.
-            token: for a proxy before the bridge.
             clock: seconds, by which poses age and the loop's own stalls are measured; replaced in tests.
 
         Raises:
-            NavigationError: there is no bridge, or the robot does not report its pose.
-            BackendError: roslibpy is not installed.
+            NavigationError: nobody answers there, or the robot does not report its pose.
+            BackendError: what the transport needs is not installed.
         """
-        self.frames = frames or Frames()
-        self.settings = settings or RosSettings()
+        self.frames, self.settings, self._tasks = tasks.frames, tasks.settings, tasks
         self._standing = standing
         self._level_from_world = np.eye(3) if level_from_world is None else np.asarray(level_from_world, np.float64)
-        self._busy, self._halted = threading.Lock(), threading.Event()
+        self._busy, self._halted, self._closing = threading.Lock(), threading.Event(), threading.Event()
         self._goal: Goal | None = None
+        self._owed: Goal | None = None  # was sent, and its end is not confirmed
+        self._ours: deque[Goal] = deque(maxlen=50)
         self._halt = _IDLE
         self._clock = clock
         self.guard: Guard | None = None
         self._absent: set[str] = set()
-        self._contact = Contact(url, token, self.frames, self.settings, self.tf_kind, self._greeted, clock)
-
-    # The differences between the two.
-
-    @abstractmethod
-    def _greet(self, link: Link) -> None:
-        """Subscribe and advertise what goals need."""
-
-    @abstractmethod
-    def _send(self, goal: Goal) -> None:
-        """Send a goal."""
-
-    @abstractmethod
-    def _cancel(self, goal: Goal) -> None:
-        """Request the cancel of one goal."""
-
-    @abstractmethod
-    def _cancel_all(self, link: Link, wait_s: float) -> bool:
-        """Request that the robot's task, if any, be cancelled; return whether it agreed within that time."""
-
-    @abstractmethod
-    def _pose_task(self, pose: GroundPose) -> Task:
-        """Return the task of standing at a pose, level frame."""
-
-    def _turn_tasks(self, start: GroundPose, angle_rad: float) -> tuple[Task, ...]:
-        return (self._pose_task(start.turned(angle_rad)),)
-
-    def _forward_tasks(self, start: GroundPose, distance_m: float) -> tuple[Task, ...]:
-        return (self._pose_task(start.ahead(distance_m)),)
-
-    def _greeted(self, link: Link) -> None:
-        link.advertise(self._heartbeat_topic, self.heartbeat_kind)
-        self._greet(link)
-
-    @property
-    def _heartbeat_topic(self) -> str:
-        return f"{self.settings.namespace}/avlmaps/heartbeat"
-
-    def _remind(self, goal: Goal) -> None:  # noqa: B027 - most need none
-        """Send a goal again where it may have been lost."""
+        self._mute: set[str] = set()
+        self._contact = Contact(opener, self.frames, self.settings, clock)
 
     # The Driver protocol.
 
@@ -137,12 +97,12 @@ class RosDriver(ABC):
 
     def turn(self, angle_rad: float) -> Arrival:
         """Turn on the spot, to the left by a positive angle."""
-        return self._move(lambda start: plan_turn(start, angle_rad, self.settings, self._turn_tasks))
+        return self._move(lambda start: plan_turn(start, angle_rad, self.settings, self._tasks.turn))
 
     def forward(self, distance_m: float) -> Arrival:
         """Drive straight ahead; for a negative distance it turns round first, so that it sees where it goes."""
         if not -LONGEST_M < distance_m <= -LEAST_M:
-            return self._move(lambda start: ahead_of(start, distance_m, self.settings, self._forward_tasks))
+            return self._move(lambda start: ahead_of(start, distance_m, self.settings, self._tasks.forward))
         turned = self.turn(pi)
         if not turned.reached:
             return turned
@@ -150,14 +110,24 @@ class RosDriver(ABC):
         return replace(driven, path=np.concatenate([turned.path, driven.path]))
 
     def stop(self) -> Arrival:
-        """Cancel the robot's task, from this client or another, and report whether it stands still."""
+        """Cancel whatever the robot is at, also for others, and report whether it stands still.
+
+        A lost connection is made again first. It takes at most four times ``cancel_timeout_s``.
+        """
         self._halted.set()
-        track, contact = Track(self.pose), self._contact
-        if contact.link.lost is not None:
-            return self._arrival(False, track, f"{contact.loss()}; use the robot's own stop")
-        self._cancel_all(contact.link, 0.0)
-        still = contact.stands_still(self.settings.cancel_timeout_s)
-        return self._arrival(still, track, "" if still else "The robot was stopped, but its pose changes or is lost")
+        track, contact, wait_s = Track(self.pose), self._contact, self.settings.cancel_timeout_s
+        if not contact.renewed_within(wait_s):
+            return self._arrival(False, track, f"{contact.loss()}, and it cannot be reached; use the robot's own stop")
+        idle = self._all_called_off(wait_s)
+        still = contact.stands_still(wait_s)
+        if idle and self._owed is not None:
+            self._settle(self._owed)
+        if not still:
+            return self._arrival(False, track, "The robot was stopped, but its pose changes or is lost")
+        if idle is False:
+            return self._arrival(False, track, f"{self._tasks.called} does not give up its goal; the robot pauses")
+        silent = "" if idle else f"The robot stands, but {self._tasks.called} does not say that it has no goal"
+        return self._arrival(True, track, silent)
 
     def fault(self) -> str:
         """Return why the robot cannot be driven now, in part of a sentence; "" where it can.
@@ -165,20 +135,21 @@ class RosDriver(ABC):
         A lost connection is made again, and a guard that ended is started again.
         """
         try:
-            self._contact.renew()
+            if why := self._unready():
+                return why[:1].lower() + why[1:]
         except NavigationError as fault:
             return str(fault)
-        if self._contact.pose_within(self.settings.pose_max_age_s) is None:
-            return f"its pose is not known: {self._contact.unseen()}"
         if self.guard is not None and not self.guard.revived():
             return "the guard, which cancels its goals when this program dies, cannot be started"
         return ""
 
     def halt(self) -> Halt:
-        """Return whether the robot stands after an interrupt, which has cancelled the goal that was active.
+        """Return whether the robot stands after its last movement, whose goal was called off if it was interrupted.
 
         Unlike ``stop`` it leaves goals of others alone. It waits at most ``cancel_timeout_s``.
         """
+        if self._owed is not None:
+            return Halt(False, _UNCONFIRMED)
         halt = self._halt
         if not halt.stopped:
             return halt
@@ -187,14 +158,20 @@ class RosDriver(ABC):
             return Halt(True, f"{halt.note}; the robot stands at ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
         return Halt(False, f"{halt.note}, but the robot is not seen to stand")
 
+    @property
+    def owes(self) -> bool:
+        """Whether a goal was sent whose end the robot has not confirmed, so that it may still be driving."""
+        return self._owed is not None
+
     def close(self) -> None:
-        """End the connection; a goal that is under way is called off first."""
-        goal, link = self._goal, self._contact.link
-        if goal is not None and link.lost is None:
-            self._called_off(goal)
-        link.close()
+        """End the connection; a goal that is not over is called off first, and else left to the guard."""
+        goal = self._goal or self._owed
+        if goal is not None and goal.end is None:
+            self._called_off(goal, self.settings.cancel_timeout_s)
+        self._closing.set()
+        self._contact.session.close()
         if self.guard is not None:
-            self.guard.close()
+            self.guard.close(dismissed=goal is None or goal.end is not None)
 
     def __enter__(self) -> Self:
         return self
@@ -211,7 +188,7 @@ class RosDriver(ABC):
     def _plan_to(
         self, start: GroundPose, wanted: Float[np.ndarray, "2"], looked_at: Float[np.ndarray, "2"] | None
     ) -> Plan | str:
-        return place_to_stand(start, wanted, looked_at, self._standing, self.settings, self._pose_task)
+        return place_to_stand(start, wanted, looked_at, self._standing, self.settings, self._tasks.pose)
 
     def _move(self, planned: Callable[[GroundPose], Plan | str]) -> Arrival:
         if not self._busy.acquire(blocking=False):
@@ -219,17 +196,59 @@ class RosDriver(ABC):
         try:
             self._halted.clear()
             self._halt = _IDLE
-            self._contact.renew()
-            start = self._contact.pose_within(self.settings.pose_max_age_s)
-            if start is None:
-                why = f"Where the robot is is not known: {self._contact.unseen()}"
+            if why := self._unready():
                 return self._arrival(False, Track(self.pose), why)
+            start = self.pose
             plan = planned(start)
             return self._arrival(False, Track(start), plan) if isinstance(plan, str) else self._done(plan, Track(start))
         except NavigationError as fault:
             return self._arrival(False, Track(self.pose), str(fault))
         finally:
             self._busy.release()
+
+    def _unready(self) -> str:
+        """Return why nothing may be sent now; "" where it may. Connect again, and call off what is owed, first.
+
+        Raises:
+            NavigationError: the robot is not there.
+        """
+        contact = self._contact
+        contact.renew()
+        if self._owed is not None and not self._called_off(self._owed, self.settings.cancel_timeout_s):
+            return "An earlier goal may still be driving the robot: it does not confirm the cancel"
+        if self._owed is not None:
+            self._settle(self._owed)
+        if contact.pose_within(self.settings.pose_max_age_s) is None:
+            late = contact.session.lost is None and contact.sighting() is not None
+            # A new connection has no queue, and takes the robot's clock as it is now.
+            if not (late and contact.replace() and contact.pose_within(self.settings.pose_max_age_s) is not None):
+                return f"Where the robot is is not known: {contact.unseen()}"
+        if self._others(_ASK_S):
+            return f"{self._tasks.called} is at a goal of another client; wait for its end, or stop it"
+        return ""
+
+    def _others(self, wait_s: float = 0.0) -> bool:
+        """Return whether a goal of others is under way, by the servers' lists, also after some time."""
+        contact, until_s, asked = self._contact, monotonic() + wait_s, False
+        every_s = contact.session.lists_every_s
+        while True:
+            names = frozenset(name for goal in self._ours for name in goal.names)
+            lists = contact.ear.servers.under_way(None if every_s is None else 10.0 * every_s)
+            servers = [server for server, goals in lists.items() if goals - names]
+            if not servers or monotonic() >= until_s:
+                return bool(servers)
+            if not asked:  # a list may be the last of a server that is gone
+                asked = True
+                for server in servers:
+                    contact.session.ask(server)
+            with contact.session.heard:
+                contact.session.heard.wait(_LOOK_EVERY_S)
+
+    def _others_soon(self) -> bool:
+        """Return whether a goal of others took the place of ours, by the next list."""
+        session = self._contact.session
+        with session.heard:
+            return session.heard.wait_for(lambda: self._others(), _NEXT_LIST_S)
 
     def _done(self, plan: Plan, track: Track) -> Arrival:
         """Do what was planned, and see whether it was done."""
@@ -241,43 +260,72 @@ class RosDriver(ABC):
                 break
             self._absent.add(task.action)
         if end is not End.SUCCEEDED:
-            return self._arrival(False, track, note or f"{self.called} did not do it")
+            others = ". A goal of another client goes on" if self._others_soon() else ""
+            return self._arrival(False, track, (note or f"{self._tasks.called} did not do it") + others)
+        called = self._tasks.called
         now = self._contact.pose_from_now(self.settings.pose_max_age_s)
         if now is None:
-            why = f"{self.called} says that it arrived, but its pose is not reported any more: {self._contact.unseen()}"
+            why = f"{called} says that it arrived, but its pose is not reported any more: {self._contact.unseen()}"
             return self._arrival(False, track, why)
         track.passed(now)
         off = plan.off(now)
         if off:
             why = "its goal tolerance is loose, or the frames are wrong"
-            return self._arrival(False, track, f"{self.called} says that it arrived, but {off}; {why}")
+            return self._arrival(False, track, f"{called} says that it arrived, but {off}; {why}")
         return self._arrival(True, track, plan.note)
 
     def _pursue(self, task: Task, track: Track) -> Goal:
         """Send one goal and see it to its end, good or bad."""
-        goal = self._goal = Goal(task)
+        goal = Goal(task)
+        if self._is_absent(task.action):
+            goal.over(End.ABSENT, f"No action server takes the goal; start {self._tasks.called}, or name its namespace")
+            return goal
+        self._goal = goal
+        self._ours.append(goal)
         try:
             self._beat(goal)
-            self._send(goal)
+            self._contact.session.send(goal)
             why, absent = self._watch(goal, track)
             if goal.end is None:
                 self._give_up(goal, why, absent)
         except BaseException:  # above all KeyboardInterrupt: nobody watches the robot any more
-            agreed = (self._contact.link.lost is None and self._called_off(goal)) or self._call_off_anew()
-            note = "the active goal was cancelled" if agreed else "the robot did not confirm that it gave up its goal"
-            self._halt = Halt(agreed, note)
+            agreed = self._called_off(goal, 2.0 * self.settings.cancel_timeout_s)
+            self._halt = Halt(agreed, "the active goal was cancelled" if agreed else _UNCONFIRMED)
             raise
         finally:
             self._goal = None
-            if self.guard is not None and goal.end is not None:
-                self.guard.rest()
+            if goal.end is None:
+                self._owed = goal
+            else:
+                self._settle(goal)
         return goal
+
+    def _settle(self, goal: Goal) -> None:
+        """Take note that nothing is left of a goal."""
+        goal.over(End.CANCELLED)
+        if self._owed is goal:
+            self._owed = None
+        if self.guard is not None and self._owed is None:
+            self.guard.rest()
+
+    def _is_absent(self, server: str) -> bool:
+        """Return whether a server is known not to be there, after asking where nobody has."""
+        session, servers = self._contact.session, self._contact.ear.servers
+        begun_s = self._clock()
+        served = servers.serves(server)
+        if (server not in self._mute and (served is None or not served[1])) and session.ask(server):
+            with session.heard:
+                session.heard.wait_for(lambda: (servers.serves(server) or (-1.0, True))[0] >= begun_s, _ASK_S)
+            served = servers.serves(server)
+            if served is None:  # the bridge may hand out no services
+                self._mute.add(server)
+        return served is not None and not served[1]
 
     def _watch(self, goal: Goal, track: Track) -> tuple[str, bool]:
         """Wait for a goal's end; else return why it is to be given up, and whether nobody is there to take it."""
-        watch, settings = Watch(), self.settings
-        looked_s = beaten_s = self._clock()
-        while not self._ended_within(goal, _LOOK_EVERY_S):
+        watch, settings, session = Watch(), self.settings, self._contact.session
+        sent_s = looked_s = beaten_s = asked_s = self._clock()
+        while not ended_within(goal, session, _LOOK_EVERY_S):
             now_s = self._clock()
             stood_s, looked_s = now_s - looked_s, now_s
             if stood_s > settings.stall_s:
@@ -286,62 +334,106 @@ class RosDriver(ABC):
                 beaten_s = now_s
                 self._beat(goal)
             track.passed(self.pose)
-            if self._contact.link.lost is not None:
-                return self._contact.loss(), False
-            if self._halted.is_set():
-                return "The robot was stopped", False
+            silent_s = self._silent_s(goal, sent_s, now_s)
+            if why := self._lost_sight(goal, silent_s):
+                return why, False
             if not goal.answered and watch.took_s > settings.answer_timeout_s:
-                within = f"within {settings.answer_timeout_s:g} s; is {self.called} running?"
+                says = f" The bridge says: {session.complaint}" if session.complaint else ""
+                within = f"within {settings.answer_timeout_s:g} s; is {self._tasks.called} running?{says}"
                 return f"Nothing answers at {goal.task.action} {within}", True
             if watch.took_s > goal.task.limit_s:
-                return f"{self.called} was not done within {goal.task.limit_s:g} s", False
-            if self._contact.is_unseen_for(settings.pose_max_age_s):
-                return f"Where the robot is is not known any more: {self._contact.unseen()}", False
-            self._remind(goal)
+                return f"{self._tasks.called} was not done within {goal.task.limit_s:g} s", False
+            if silent_s > _ASK_AFTER * settings.server_max_age_s and now_s - asked_s > AGAIN_S:
+                asked_s = now_s
+                session.ask(goal.task.action)
+            session.remind(goal)
         return "", False
 
+    def _lost_sight(self, goal: Goal, silent_s: float) -> str:
+        """Return why a goal cannot be watched any more, or must not go on; "" where it can."""
+        contact, settings = self._contact, self.settings
+        if contact.session.lost is not None:
+            return contact.loss()
+        if self._halted.is_set():
+            return "The robot was stopped"
+        if contact.is_unseen_for(settings.pose_max_age_s):
+            return f"Where the robot is is not known any more: {contact.unseen()}"
+        if silent_s > settings.server_max_age_s:
+            since = f"for {silent_s:.1f} s" if isfinite(silent_s) else "and its action server is gone"
+            return f"{self._tasks.called} has said nothing of {goal.task.action} {since}; it may have ended"
+        return ""
+
+    def _silent_s(self, goal: Goal, sent_s: float, now_s: float) -> float:
+        """Return since when nothing shows that a server is there that had taken a goal."""
+        if goal.heard_s is None:
+            return 0.0
+        served = self._contact.ear.servers.serves(goal.task.action)
+        if served is None or served[0] <= max(sent_s, goal.heard_s):
+            return now_s - goal.heard_s
+        if not served[1]:
+            return float("inf")
+        # A server that told regularly of a goal has lost it when it does not any more, though it be there.
+        return now_s - (goal.heard_s if goal.shown >= _REGULAR else served[0])
+
+    # Calling off.
+
     def _give_up(self, goal: Goal, why: str, absent: bool) -> None:
-        """Call a goal off, by every way there is, and say how it went."""
-        link = self._contact.link
-        if link.lost is not None:
-            goal.over(End.FAILED)  # before a message over the next connection ends it otherwise
-            agreed = self._call_off_anew()
-            outcome = "it was reached again and stopped" if agreed else "it may still be driving: use its own stop"
-            goal.note = f"{why}; {outcome}"
-            return
-        wait_s = self.settings.cancel_timeout_s
-        agreed = self._called_off(goal, min(wait_s, 1.0) if absent else wait_s)
-        agreed = agreed or self._call_off_anew() or absent
-        goal.end = End.ABSENT if absent else End.CANCELLED
-        goal.note = why if agreed else f"{why}; it does not say that it gave up, and may still be driving"
-        if absent and link.complaints:
-            goal.note += f" ({link.complaints[-1]})"
+        """Call a goal off, for as long as it could last, and say how it went."""
+        was_lost = self._contact.session.lost is not None
+        wait_s = min(self.settings.cancel_timeout_s, 1.0) if absent else goal.task.limit_s
+        agreed = self._called_off(goal, wait_s)
+        if absent:
+            goal.end = End.ABSENT
+        if agreed or absent:
+            goal.note = f"{why}; it was reached again and stopped" if was_lost and not absent else why
+        elif was_lost:
+            goal.note = f"{why}; it may still be driving: use its own stop"
+        else:
+            goal.note = f"{why}; it does not say that it gave up, and may still be driving"
+
+    def _called_off(self, goal: Goal, wait_s: float) -> bool:
+        """Cancel a goal until the robot confirms it; return whether it does.
+
+        A lost connection is made again for as long as it takes. A connection that stands and brings no confirmation is
+        replaced once: it may be stuck.
+
+        Args:
+            goal: ours.
+            wait_s: how long to try; a robot that is reached and does not obey is given less.
+        """
+        contact, patience_s = self._contact, self.settings.cancel_timeout_s
+        until_s, tries = monotonic() + wait_s, 0
+        while goal.end is None and tries < 2 and not self._closing.is_set() and (left_s := until_s - monotonic()) > 0.0:
+            if not contact.renewed_within(min(left_s, AGAIN_S)):
+                continue
+            if tries and not contact.replace():
+                continue
+            session = contact.session
+            call_off(goal, session, min(until_s, monotonic() + patience_s), self._closing.is_set)
+            tries += session.lost is None
+        return goal.end is not None
+
+    def _all_called_off(self, wait_s: float) -> bool | None:
+        """Cancel every goal until the servers say that they are at none; return what they said last."""
+        contact, since_s, idle = self._contact, self._clock(), None
+        for replaced in (False, True):
+            if replaced and not contact.replace():
+                break
+            session, until_s = contact.session, monotonic() + wait_s / 2
+            while session.lost is None and monotonic() < until_s:
+                session.cancel_all()
+                with session.heard:
+                    session.heard.wait_for(lambda s=session: s.is_idle(since_s) or s.lost is not None, AGAIN_S)
+                idle = session.is_idle(since_s)
+                if idle:
+                    return True
+        return idle
 
     def _beat(self, goal: Goal) -> None:
-        """Publish that this loop runs and wants the goal to continue."""
+        """Report that a goal is active and watched, to the guard and to the robot."""
         if self.guard is not None:
-            self.guard.beat()
-        if self._contact.link.lost is None:
-            self._contact.link.publish(self._heartbeat_topic, {"data": goal.id})
-
-    def _called_off(self, goal: Goal, wait_s: float | None = None) -> bool:
-        """Cancel a goal until the robot confirms it: a bridge that has only just received it may miss the first."""
-        until_s = monotonic() + (self.settings.cancel_timeout_s if wait_s is None else wait_s)
-        while goal.end is None and self._contact.link.lost is None and (left_s := until_s - monotonic()) > 0.0:
-            self._cancel(goal)
-            self._ended_within(goal, min(left_s, _CANCEL_AGAIN_S))
-        return goal.end is not None
-
-    def _call_off_anew(self) -> bool:
-        """Cancel everything over a new connection: the old one is lost, or waits behind the goal itself."""
-        with self._contact.anew() as link:
-            return link is not None and self._cancel_all(link, self.settings.cancel_timeout_s)
-
-    def _ended_within(self, goal: Goal, wait_s: float) -> bool:
-        link = self._contact.link
-        with link.heard:
-            link.heard.wait_for(lambda: goal.end is not None or link.lost is not None, wait_s)
-        return goal.end is not None
+            self.guard.beat(goal)
+        self._contact.session.beat(goal)
 
     def _arrival(self, reached: bool, track: Track, note: str) -> Arrival:
         pose = self.pose

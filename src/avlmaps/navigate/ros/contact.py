@@ -1,95 +1,100 @@
 """The connection to one robot, made again when it was lost, and where the robot says that it is."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import threading
+from collections.abc import Callable
+from contextlib import suppress
 from time import monotonic, sleep
 
 from avlmaps.core.errors import NavigationError
-from avlmaps.core.motion import GroundPose, wrap_angle
+from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.ros.frames import Frames
-from avlmaps.navigate.ros.link import Link
+from avlmaps.navigate.ros.session import Ear, Opener, Session
 from avlmaps.navigate.ros.settings import RosSettings
-from avlmaps.navigate.ros.tree import LiveTree, Sighting
+from avlmaps.navigate.ros.standing import Stillness
+from avlmaps.navigate.ros.tree import Sighting
 
 _LOOK_EVERY_S = 0.02
-_STILL_M, _STILL_RAD, _STILL_S = 0.02, 0.03, 0.3
+_AGAIN_S = 0.25
+_QUICK_S = 2.0
 
 
 class Contact:
-    """One robot behind one address.
+    """One robot, over one session after the other.
 
     Attributes:
         frames: the robot's frames, and how they lie to the map.
         settings: patience and names.
-        link: the connection that stands, or stood last.
+        session: the connection that stands, or stood last.
+        ear: what that session has heard.
     """
 
     def __init__(
-        self,
-        url: str,
-        token: str | None,
-        frames: Frames,
-        settings: RosSettings,
-        tf_kind: str,
-        greet: Callable[[Link], None],
-        clock: Callable[[], float] = monotonic,
+        self, opener: Opener, frames: Frames, settings: RosSettings, clock: Callable[[], float] = monotonic
     ) -> None:
         """Connect, and wait until the robot reports its pose.
 
         Args:
-            url: of rosbridge.
-            token: for a proxy before it.
+            opener: opens a session.
             frames: the robot's frames.
             settings: patience and names.
-            tf_kind: the type of /tf.
-            greet: called with every new connection, to subscribe to what else is needed.
             clock: seconds, by which the age of a pose is measured; replaced in tests.
 
         Raises:
-            NavigationError: there is no bridge, or the robot does not report its pose.
-            BackendError: roslibpy is not installed.
+            NavigationError: nobody answers there, or the robot does not report its pose.
+            BackendError: what the transport needs is not installed.
         """
         self.frames, self.settings = frames, settings
-        self._url, self._token, self._tf_kind, self._greet = url, token, tf_kind, greet
-        self._clock = clock
+        self._opener, self._clock = opener, clock
         self._last: GroundPose | None = None
-        self._connect()
+        self._renewing = threading.Lock()
+        self.session, self.ear = self._opened(settings.connect_timeout_s)
         if self.pose_within(settings.pose_timeout_s) is None:
-            self.link.close()
+            self.session.close()
             raise NavigationError(
-                f"The robot at {self.link.url} does not report its pose: {self.unseen(closed=True)}; start its "
+                f"The robot at {self.session.name} does not report its pose: {self.unseen(closed=True)}; start its "
                 "localisation, give it its initial pose, and name its frames as docs/robots.md shows."
             )
 
-    def _connect(self) -> None:
-        link = Link(self._url, self._token, self.settings.connect_timeout_s)
-        tree, prefix = LiveTree(self._clock), self.settings.tf_namespace
-        link.subscribe(f"{prefix}/tf", self._tf_kind, lambda message: tree.hear(message, static=False))
-        link.subscribe(f"{prefix}/tf_static", self._tf_kind, lambda message: tree.hear(message, static=True))
-        self._greet(link)
-        self.link, self._tree = link, tree
+    def _opened(self, within_s: float) -> tuple[Session, Ear]:
+        ear = Ear(self._clock)
+        return self._opener(ear, within_s), ear
 
-    def renew(self) -> None:
+    def renew(self, within_s: float | None = None) -> None:
         """Connect again where the connection was lost.
+
+        Args:
+            within_s: ``connect_timeout_s`` by default.
 
         Raises:
             NavigationError: the robot is not there.
         """
-        if self.link.lost is not None:
-            self._connect()
+        with self._renewing:
+            if self.session.lost is not None:
+                self.session.close()
+                self.session, self.ear = self._opened(self.settings.connect_timeout_s if within_s is None else within_s)
 
-    @contextmanager
-    def anew(self) -> Iterator[Link | None]:
-        """Open a second connection for a moment; None where the robot is not there."""
-        try:
-            link = Link(self._url, self._token, min(2.0, self.settings.connect_timeout_s))
-        except NavigationError:
-            yield None
-            return
-        try:
-            yield link
-        finally:
-            link.close()
+    def renewed_within(self, wait_s: float) -> bool:
+        """Connect again where the connection was lost, and try until some time is over; return whether it stands."""
+        until_s = monotonic() + wait_s
+        while self.session.lost is not None:
+            with suppress(NavigationError):
+                self.renew(min(_QUICK_S, self.settings.connect_timeout_s))
+                continue
+            if monotonic() >= until_s:
+                return False
+            sleep(_AGAIN_S)
+        return True
+
+    def replace(self) -> bool:
+        """Connect a second time and leave the first connection, which may be stuck; return whether that succeeded."""
+        with self._renewing:
+            before = self.session
+            try:
+                self.session, self.ear = self._opened(min(_QUICK_S, self.settings.connect_timeout_s))
+            except NavigationError:
+                return False
+        before.close()
+        return True
 
     @property
     def pose(self) -> GroundPose:
@@ -102,63 +107,56 @@ class Contact:
         """Return the pose as soon as it is fresh; None where it is not by then."""
         until_s = monotonic() + wait_s
         while not self._fresh():
-            if self.link.lost is not None or monotonic() > until_s:
+            if self.session.lost is not None or monotonic() > until_s:
                 return None
             sleep(_LOOK_EVERY_S)
         return self._last
 
     def pose_from_now(self, wait_s: float) -> GroundPose | None:
-        """Return a pose that was reported after this call; None where none is within that time."""
+        """Return a pose that was taken after this call; None where none is within that time."""
         now_s, until_s = self._clock(), monotonic() + wait_s
-        while monotonic() < until_s and self.link.lost is None:
+        while monotonic() < until_s and self.session.lost is None:
             seen = self.sighting()
-            if seen is not None and seen.heard_s > now_s:
+            if seen is not None and seen.taken_s > now_s:
                 self._last = self.frames.to_level(seen.pose)
                 return self._last
             sleep(_LOOK_EVERY_S)
         return None
 
     def stands_still(self, wait_s: float) -> bool:
-        """Return whether the robot comes to stand within that time.
-
-        Only poses from now on count: two poses some time apart, and no other place between them. A robot that
-        reports nothing is not seen to stand.
-        """
-        begun_s, until_s = self._clock(), monotonic() + wait_s
-        since_s, at = begun_s, None
-        while monotonic() < until_s and self.link.lost is None:
+        """Return whether the robot is seen to come to stand within that time; see `Stillness`."""
+        still, until_s = Stillness(self._clock()), monotonic() + wait_s
+        while monotonic() < until_s and self.session.lost is None:
             sleep(_LOOK_EVERY_S)
-            seen = self.sighting()
-            if seen is None or seen.heard_s <= begun_s:
-                continue
-            if at is None or _is_elsewhere(at, seen.pose):
-                since_s, at = seen.heard_s, seen.pose
-            elif seen.heard_s - since_s >= _STILL_S:
+            if still.shown(self.sighting()):
+                self._fresh()
                 return True
         return False
 
     def is_unseen_for(self, longest_s: float) -> bool:
-        """Return whether no pose has arrived for that time."""
+        """Return whether the pose is older than that."""
         seen = self.sighting()
         return seen is None or seen.age_s > longest_s
 
     def unseen(self, closed: bool = False) -> str:
         """Return why the pose is not known, in part of a sentence."""
-        if self.link.lost is not None and not closed:
+        if self.session.lost is not None and not closed:
             return self.loss()
-        seen = self.sighting()
+        seen, tree = self.sighting(), self.ear.tree
         if seen is not None:
-            return f"its transforms are {seen.age_s:.1f} s old"
-        refused = f"; {self._tree.refused} transforms were NaN or no rotation" if self._tree.refused else ""
-        return self._tree.why_not(self.frames.map_frame, self.frames.base_frame) + refused
+            late_s = seen.age_s - (self._clock() - seen.heard_s)
+            queued = "; they arrive late, behind a bridge or a network that is too slow" if late_s > 1.0 else ""
+            return f"its transforms are {seen.age_s:.1f} s old{queued}"
+        refused = f"; {tree.refused} transforms were NaN or no rotation" if tree.refused else ""
+        return tree.why_not(self.frames.map_frame, self.frames.base_frame) + refused
 
     def loss(self) -> str:
         """Return that the connection was lost, and how."""
-        return f"The connection to the robot was lost ({(self.link.lost or '').rstrip('.')})"
+        return f"The connection to the robot was lost ({(self.session.lost or '').rstrip('.')})"
 
     def sighting(self) -> Sighting | None:
         """Return the pose by the transforms now, in the robot's frame."""
-        return self._tree.seen(self.frames.map_frame, self.frames.base_frame)
+        return self.ear.tree.seen(self.frames.map_frame, self.frames.base_frame)
 
     def _fresh(self) -> bool:
         seen = self.sighting()
@@ -166,8 +164,3 @@ class Contact:
             return False
         self._last = self.frames.to_level(seen.pose)
         return True
-
-
-def _is_elsewhere(before: GroundPose, now: GroundPose) -> bool:
-    turned_rad = abs(wrap_angle(now.heading_rad - before.heading_rad))
-    return now.distance_m(before) > _STILL_M or turned_rad > _STILL_RAD

@@ -45,26 +45,46 @@ class Task:
 
 @dataclass(slots=True, eq=False)
 class Goal:
-    """A task that was sent. The network's thread writes what comes of it; the first end stands.
+    """A task that was sent. The transport's thread writes what comes of it; the first end stands.
 
     Attributes:
         task: the requested task.
-        id: its name on the bridge, unlike any other client's.
-        answered: whether any message about it arrived.
+        id: our name for it, unlike any other client's.
+        alias: the server's name for it, where that is another and is known.
+        heard_s: when the server last showed that it is at it, by the driver's clock; None before it did.
+        shown: how often it did.
         end: how it ended; None while it has not.
         note: why, where the robot says.
     """
 
     task: Task
     id: str = field(default_factory=lambda: f"avlmaps-{uuid4().hex}")
-    answered: bool = False
+    alias: str = ""
+    heard_s: float | None = None
+    shown: int = 0
     end: End | None = None
     note: str = ""
+
+    @property
+    def answered(self) -> bool:
+        """Whether anything came of it."""
+        return self.heard_s is not None or self.end is not None
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Each name under which a server may list it."""
+        return frozenset(name for name in (self.id, self.alias) if name)
+
+    def show(self, now_s: float) -> None:
+        """Take note that the server is at it."""
+        self.heard_s = now_s
+        self.shown += 1
 
     def over(self, end: End, note: str = "") -> None:
         """Take note that it ended."""
         if self.end is None:
-            self.answered, self.end, self.note = True, end, note
+            self.note = note
+            self.end = end
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,9 @@
-"""A second process that cancels the robot's goals when the first one dies or stands still.
+"""A second process that cancels the robot's goal when the first one dies or stands still.
 
 A process that is killed cannot cancel anything, and Nav2 and move_base finish a goal on their own. The guard reads the
 driver's beats from a pipe. When the pipe closes, or no beat comes while a goal is active, it connects to the robot and
-cancels every goal. It runs in a session of its own: what ends the terminal does not end it.
+cancels that goal until the robot confirms it; goals of others go on. It runs in a session of its own: what ends the
+terminal does not end it.
 
 Run as ``python -m avlmaps.navigate.ros.guard`` by `Guard`; it reads its orders, then beats, from standard input.
 """
@@ -13,25 +14,45 @@ import subprocess
 import sys
 from contextlib import suppress
 from time import monotonic, sleep
-from typing import Literal
 
 import msgspec
 
 from avlmaps.core.errors import AvlmapsError
+from avlmaps.navigate.ros.calling_off import call_off
+from avlmaps.navigate.ros.goals import Goal, Task
+from avlmaps.navigate.ros.session import Ear
+from avlmaps.navigate.ros.settings import RosSettings
+from avlmaps.navigate.ros.transports import RosKind, session_opener
 
-_ACTIVE, _IDLE, _OVER = b"+", b"-", b"."
-_BETWEEN_TRIES_S = 1.0
+_BETWEEN_TRIES_S = 0.5
+_ONE_TRY_S = 5.0
 
 
 class Orders(msgspec.Struct):
     """The settings of a guard, in one line of JSON."""
 
-    kind: Literal["nav2", "move_base"]
+    kind: RosKind
     url: str
     token: str | None
-    namespace: str
+    settings: RosSettings
     silence_s: float
     trying_s: float
+
+
+class Beat(msgspec.Struct, omit_defaults=True):
+    """One line of the driver: that a goal is active, that none is, or that the guard's work is over.
+
+    Attributes:
+        id: our name for the active goal; "" where none is active.
+        alias: the server's name for it.
+        action: name of the server.
+        over: whether the guard ends.
+    """
+
+    id: str = ""
+    alias: str = ""
+    action: str = ""
+    over: bool = False
 
 
 class Guard:
@@ -49,7 +70,7 @@ class Guard:
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=silent, stderr=silent, start_new_session=True, bufsize=0
         )
-        self._write(msgspec.json.encode(self._orders) + b"\n")
+        self._write(self._orders)
 
     @property
     def stands(self) -> bool:
@@ -62,76 +83,71 @@ class Guard:
             self._start()
         return self.stands
 
-    def beat(self) -> None:
+    def beat(self, goal: Goal) -> None:
         """Report that a goal is active and watched; a guard that has done its work, or died, is started again."""
         if not self.stands:
             self._start()
-        self._write(_ACTIVE)
+        self._write(Beat(goal.id, goal.alias, goal.task.action))
 
     def rest(self) -> None:
         """Report that no goal is active."""
-        self._write(_IDLE)
+        self._write(Beat())
 
-    def close(self) -> None:
-        """End the guard."""
-        self._write(_OVER)
+    def close(self, dismissed: bool = True) -> None:
+        """End the guard.
+
+        Args:
+            dismissed: no goal is left; else the guard cancels the last one, and ends when the robot confirms that.
+        """
+        if dismissed:
+            self._write(Beat(over=True))
         with suppress(OSError):
             if self._process.stdin is not None:
                 self._process.stdin.close()
-        with suppress(subprocess.TimeoutExpired):
-            self._process.wait(1.0)
+        if dismissed:
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(1.0)
 
-    def _write(self, content: bytes) -> None:
+    def _write(self, line: msgspec.Struct) -> None:
         with suppress(OSError):  # a guard that died: the driver continues, and ``stands`` says so
             assert self._process.stdin is not None
-            self._process.stdin.write(content)
+            self._process.stdin.write(msgspec.json.encode(line) + b"\n")
 
 
-def watch(pipe: int, silence_s: float) -> bool:
-    """Read beats until they end; return whether a goal was left active.
+def watch(pipe: int, silence_s: float) -> Beat | None:
+    """Read beats until they end; return the goal that was left active, None where none was.
 
     Args:
         pipe: the file descriptor of the beats.
         silence_s: how long an active goal may go without a beat.
     """
-    active = False
+    last, rest = Beat(), b""
     while True:
-        ready, _, _ = select.select([pipe], [], [], silence_s if active else None)
+        ready, _, _ = select.select([pipe], [], [], silence_s if last.id else None)
         content = os.read(pipe, 4096) if ready else b""
-        if _OVER in content:
-            return False
         if not content:  # closed, or silent for too long
-            return active
-        active = content[-1:] == _ACTIVE
+            return last if last.id else None
+        *lines, rest = (rest + content).split(b"\n")
+        for line in lines:
+            last = msgspec.json.decode(line, type=Beat)
+            if last.over:
+                return None
 
 
-def cancel_all(orders: Orders) -> bool:
-    """Connect and cancel every goal; return whether the robot was reached."""
-    from avlmaps.navigate.ros.link import Link
-
+def cancelled(orders: Orders, goal: Goal) -> bool:
+    """Connect once and cancel a goal; return whether the robot confirms that it is over."""
     try:
-        link = Link(orders.url, orders.token, min(5.0, orders.trying_s))
+        session = session_opener(orders.kind, orders.url, orders.settings, orders.token)(Ear(), 2.0)
     except AvlmapsError:
         return False
-    if orders.kind == "move_base":
-        topic = f"{orders.namespace}/move_base/cancel"
-        link.advertise(topic, "actionlib_msgs/GoalID")
-        for _ in range(5):  # a topic that was just advertised may lose its first messages
-            link.publish(topic, {"stamp": {"secs": 0, "nsecs": 0}, "id": ""})
-            sleep(0.3)
-    else:
-        for action in ("navigate_to_pose", "spin", "drive_on_heading"):
-            service = f"{orders.namespace}/{action}/_action/cancel_goal"
-            call = {"op": "call_service", "id": f"avlmaps-guard-{action}", "service": service, "args": {}}
-            link.send({**call, "type": "action_msgs/srv/CancelGoal"})
-        sleep(1.0)
-    reached = link.lost is None
-    link.close()
-    return reached
+    try:
+        return call_off(goal, session, monotonic() + _ONE_TRY_S)
+    finally:
+        session.close()
 
 
 def main() -> None:
-    """Watch, and cancel where a goal is left active; try as long as the orders say."""
+    """Watch, and cancel a goal that is left active; try as long as the orders say."""
     line = b""
     while not line.endswith(b"\n"):
         content = os.read(0, 1)
@@ -139,10 +155,12 @@ def main() -> None:
             return
         line += content
     orders = msgspec.json.decode(line, type=Orders)
-    if not watch(0, orders.silence_s):
+    left = watch(0, orders.silence_s)
+    if left is None:
         return
+    goal = Goal(Task(left.action, "", {}, orders.trying_s), left.id, left.alias)
     until_s = monotonic() + orders.trying_s
-    while not cancel_all(orders) and monotonic() < until_s:
+    while not cancelled(orders, goal) and monotonic() < until_s:
         sleep(_BETWEEN_TRIES_S)
 
 

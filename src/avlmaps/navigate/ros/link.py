@@ -37,13 +37,16 @@ class Link:
         unread: how many messages were none, and were left out.
     """
 
-    def __init__(self, url: str, token: str | None = None, timeout_s: float = 10.0) -> None:
+    def __init__(
+        self, url: str, token: str | None = None, timeout_s: float = 10.0, heard: threading.Condition | None = None
+    ) -> None:
         """Connect.
 
         Args:
             url: ``ws://host:9090`` or ``wss://host``.
             token: sent as ``Authorization: Bearer``, for a proxy in front of the bridge that asks for it.
             timeout_s: how long to wait for the robot.
+            heard: notified by this connection; one of its own by default.
 
         Raises:
             BackendError: roslibpy is not installed.
@@ -51,7 +54,7 @@ class Link:
         """
         self.url = address(url)
         headers = {} if token is None else {"Authorization": f"Bearer {_checked(token, self.url)}"}
-        self.heard = threading.Condition()
+        self.heard = heard or threading.Condition()
         self.lost: str | None = None
         self.complaints: list[str] = []
         self.unread = 0
@@ -104,6 +107,34 @@ class Link:
 
         if self.lost is None:
             self._bridge.send_on_ready(roslibpy.Message(operation))
+
+    def repeat(self, every_s: float, work: Callable[[], None]) -> None:
+        """Do something in the network's thread again and again, until the connection is over."""
+        from avlmaps.navigate.ros.wire import repeat
+
+        def turn() -> bool:
+            if self.lost is None:
+                work()
+            return self.lost is None
+
+        repeat(every_s, turn)
+
+    def later(self, wait_s: float, work: Callable[[], None]) -> None:
+        """Do something in the network's thread after some seconds."""
+        from avlmaps.navigate.ros.wire import later
+
+        def then() -> None:
+            work()
+            with self.heard:
+                self.heard.notify_all()
+
+        later(wait_s, then)
+
+    def drop(self) -> None:
+        """End the connection without waiting for its end."""
+        with self.heard:
+            self.lost = self.lost or "it was closed"
+        self._bridge.factory.drop()
 
     def close(self) -> None:
         """End the connection."""

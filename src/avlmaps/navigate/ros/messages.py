@@ -4,6 +4,9 @@ Sources: the rosbridge v2 protocol; the definitions of nav2_msgs, action_msgs, a
 tf2_msgs. rosbridge writes NaN as null, which no number here takes.
 """
 
+from base64 import b64decode
+from collections.abc import Sequence
+from dataclasses import dataclass
 from math import cos, sin
 from typing import Annotated, Any
 
@@ -47,8 +50,22 @@ class Incoming(msgspec.Struct):
     level: _Name = ""
 
 
+class _Time(msgspec.Struct):
+    """ROS 2 names the parts ``sec`` and ``nanosec``, ROS 1 ``secs`` and ``nsecs``."""
+
+    sec: int = 0
+    nanosec: int = 0
+    secs: int = 0
+    nsecs: int = 0
+
+    @property
+    def seconds(self) -> float:
+        return self.sec + self.secs + 1e-9 * (self.nanosec + self.nsecs)
+
+
 class _Stamped(msgspec.Struct):
     frame_id: _Name
+    stamp: _Time = msgspec.field(default_factory=_Time)
 
 
 class _Vector(msgspec.Struct):
@@ -79,6 +96,12 @@ class _Transforms(msgspec.Struct):
     transforms: Annotated[list[msgspec.Raw], msgspec.Meta(max_length=_MOST_TRANSFORMS)]
 
 
+class Text(msgspec.Struct):
+    """A std_msgs/String."""
+
+    data: Annotated[str, msgspec.Meta(max_length=256)]
+
+
 class _GoalId(msgspec.Struct):
     id: _Name
 
@@ -103,6 +126,47 @@ class GoalUpdate(msgspec.Struct):
     status: GoalState
 
 
+class _Uuid(msgspec.Struct):
+    uuid: str | list[int]
+
+    @property
+    def hex(self) -> str:
+        try:
+            raw = b64decode(self.uuid, validate=True) if isinstance(self.uuid, str) else bytes(self.uuid)
+        except ValueError:
+            raise ValueError("no UUID") from None
+        return raw.hex()
+
+
+class _GoalInfo(msgspec.Struct):
+    goal_id: _Uuid
+
+
+class ActionState(msgspec.Struct):
+    """How a goal of an action server of ROS 2 stands (action_msgs/GoalStatus)."""
+
+    goal_info: _GoalInfo
+    status: int
+
+    @property
+    def name(self) -> str:
+        """The server's name for the goal, in hexadecimal digits."""
+        return self.goal_info.goal_id.hex
+
+
+class ActionStates(msgspec.Struct):
+    """The goals of an action server, told at each change."""
+
+    status_list: list[ActionState]
+
+
+class CancelAnswer(msgspec.Struct):
+    """The answer of action_msgs/CancelGoal."""
+
+    return_code: int = 0
+    goals_canceling: list[_GoalInfo] = msgspec.field(default_factory=list)
+
+
 class ActionEnd(msgspec.Struct):
     """The result of a goal of Nav2; old bridges nest it in ``result`` and put the status here."""
 
@@ -112,11 +176,28 @@ class ActionEnd(msgspec.Struct):
     result: msgspec.Raw = msgspec.Raw(b"null")
 
 
-def transforms_in(message: msgspec.Raw) -> tuple[list[tuple[str, str, Float[np.ndarray, "4 4"]]], int]:
+@dataclass(frozen=True, slots=True, eq=False)
+class Transform:
+    """One transform of /tf or /tf_static.
+
+    Attributes:
+        parent: name of a frame.
+        child: name of another.
+        parent_from_child: (4, 4), metres.
+        stamp_s: by the robot's clock; 0 where there is none.
+    """
+
+    parent: str
+    child: str
+    parent_from_child: Float[np.ndarray, "4 4"]
+    stamp_s: float = 0.0
+
+
+def transforms_in(message: msgspec.Raw) -> tuple[list[Transform], int]:
     """Read a message of /tf or /tf_static.
 
     Returns:
-        Parent, child and ``parent_from_child`` of each transform, and how many were refused: NaN, no rotation.
+        The transforms, and how many were refused: NaN, no rotation.
 
     Raises:
         msgspec.MsgspecError: it is no such message.
@@ -126,20 +207,30 @@ def transforms_in(message: msgspec.Raw) -> tuple[list[tuple[str, str, Float[np.n
     for raw in raws:
         try:
             stamped = msgspec.json.decode(raw, type=_TransformStamped)
-            parent, child = stamped.header.frame_id.lstrip("/"), stamped.child_frame_id.lstrip("/")
-            read.append((parent, child, _rigid(stamped.transform)))
+            shift, turn = stamped.transform.translation, stamped.transform.rotation
+            matrix = rigid((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w))
+            read.append(
+                Transform(stamped.header.frame_id, stamped.child_frame_id, matrix, stamped.header.stamp.seconds)
+            )
         except ValueError:
             refused += 1
     return read, refused
 
 
-def _rigid(transform: _Transform) -> Float[np.ndarray, "4 4"]:
-    shift, turn = transform.translation, transform.rotation
-    place = np.array([shift.x, shift.y, shift.z])
-    quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
-    if not np.abs(place).max() < _FAR_M or not abs(float(np.linalg.norm(quaternion)) - 1.0) < 0.05:
+def rigid(place: Sequence[float], quaternion: Sequence[float]) -> Float[np.ndarray, "4 4"]:
+    """Return the matrix of a transform that came from outside.
+
+    Args:
+        place: x, y, z, metres.
+        quaternion: x, y, z, w.
+
+    Raises:
+        ValueError: it is no rigid transform, or lies beyond the Earth.
+    """
+    xyz, xyzw = np.array(place, np.float64), np.array(quaternion, np.float64)
+    if not np.abs(xyz).max() < _FAR_M or not abs(float(np.linalg.norm(xyzw)) - 1.0) < 0.05:
         raise ValueError("no rigid transform")
-    return from_quaternion(place, quaternion)
+    return from_quaternion(xyz, xyzw)
 
 
 def stamped_pose(pose: GroundPose, frame: str, ros: int) -> dict[str, Any]:

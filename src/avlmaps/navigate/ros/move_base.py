@@ -10,50 +10,56 @@ from typing import ClassVar
 import msgspec
 
 from avlmaps.core.motion import GroundPose
-from avlmaps.navigate.ros.base import RosDriver
+from avlmaps.navigate.ros.bridge import BridgeSession
 from avlmaps.navigate.ros.goals import End, Goal, Task
-from avlmaps.navigate.ros.link import Link
 from avlmaps.navigate.ros.messages import GoalState, GoalStates, GoalUpdate, sanitize_line, stamped_pose
+from avlmaps.navigate.ros.tasks import Tasks
 
 # actionlib_msgs/GoalStatus
 _PENDING, _ACTIVE, _PREEMPTED, _SUCCEEDED, _ABORTED, _REJECTED, _PREEMPTING, _RECALLING, _RECALLED, _LOST = range(10)
-_UNDER_WAY = (_PENDING, _ACTIVE, _PREEMPTING, _RECALLING)
+_UNDER_WAY = (_PENDING, _ACTIVE, _PREEMPTING)  # a goal that is recalled never began
 _SEND_AGAIN_S = 1.0
+_UNKNOWN_AFTER_S = 1.0  # a topic that was just advertised loses its first messages, and a list may be on its way
+_ANYONE = ""
 
 
-class MoveBaseDriver(RosDriver):
-    """Sends goals to move_base. It has no turns and straight drives of its own, so they are goals as well.
+class MoveBaseTasks(Tasks):
+    """Goals of move_base. It has no turns and straight drives of its own, so they are goals as well.
 
     A movement smaller than move_base's tolerances is then no movement, and reported as one that was not made.
     """
 
     called: ClassVar[str] = "move_base"
+
+    def pose(self, pose: GroundPose) -> Task:
+        """Return the task of standing at a pose."""
+        target = stamped_pose(self.frames.to_robot(pose), self.frames.map_frame, ros=1)
+        server = f"{self.settings.namespace}/move_base"
+        return Task(server, "move_base_msgs/MoveBaseAction", {"target_pose": target}, self.settings.goal_timeout_s)
+
+
+class MoveBaseSession(BridgeSession):
+    """A connection to move_base."""
+
     tf_kind: ClassVar[str] = "tf2_msgs/TFMessage"
-    heartbeat_kind: ClassVar[str] = "std_msgs/String"
+    text_kind: ClassVar[str] = "std_msgs/String"
+    lists_every_s: ClassVar[float | None] = 0.2
 
     def _topic(self, name: str) -> str:
-        return f"{self.settings.namespace}/move_base/{name}"
+        return self._named(f"move_base/{name}")
 
-    def _greet(self, link: Link) -> None:
-        self._under_way: bool | None = None  # of any goal, as the server last said
+    def _greet(self) -> None:
         self._sent_s = 0.0
+        link = self.link
         link.advertise(self._topic("goal"), "move_base_msgs/MoveBaseActionGoal")
         link.advertise(self._topic("cancel"), "actionlib_msgs/GoalID")
         link.subscribe(self._topic("status"), "actionlib_msgs/GoalStatusArray", self._status)
         link.subscribe(self._topic("result"), "move_base_msgs/MoveBaseActionResult", self._update)
         link.subscribe(self._topic("feedback"), "move_base_msgs/MoveBaseActionFeedback", self._update)
 
-    def _pose_task(self, pose: GroundPose) -> Task:
-        frames = self.frames
-        target = stamped_pose(frames.to_robot(pose), frames.map_frame, ros=1)
-        return Task(
-            self._topic("").rstrip("/"),
-            "move_base_msgs/MoveBaseAction",
-            {"target_pose": target},
-            self.settings.goal_timeout_s,
-        )
-
-    def _send(self, goal: Goal) -> None:
+    def send(self, goal: Goal) -> None:
+        """Publish a goal."""
+        self._adopt(goal)
         self._sent_s = monotonic()
         stamp = {"secs": 0, "nsecs": 0}
         message = {
@@ -61,50 +67,61 @@ class MoveBaseDriver(RosDriver):
             "goal_id": {"stamp": stamp, "id": goal.id},
             "goal": goal.task.arguments,
         }
-        self._contact.link.publish(self._topic("goal"), message)
+        self.link.publish(self._topic("goal"), message)
 
-    def _cancel(self, goal: Goal) -> None:
-        self._contact.link.publish(self._topic("cancel"), {"stamp": {"secs": 0, "nsecs": 0}, "id": goal.id})
-
-    def _cancel_all(self, link: Link, wait_s: float) -> bool:
-        """Publish an empty goal id, which means every goal, until none is under way."""
-        cancel = self._topic("cancel")
-        if link is not self._contact.link:
-            link.advertise(cancel, "actionlib_msgs/GoalID")
-            link.subscribe(self._topic("status"), "actionlib_msgs/GoalStatusArray", self._status)
-        until_s = monotonic() + wait_s
-        while True:
-            self._under_way = None
-            link.publish(cancel, {"stamp": {"secs": 0, "nsecs": 0}, "id": ""})
-            with link.heard:
-                link.heard.wait_for(lambda: self._under_way is False or link.lost is not None, min(wait_s, 0.5))
-                if self._under_way is False or link.lost is not None or monotonic() >= until_s:
-                    return self._under_way is False
-
-    def _remind(self, goal: Goal) -> None:
+    def remind(self, goal: Goal) -> None:
         """Send a goal again that got no answer: a topic that was just advertised may lose its first message.
 
         The server knows a goal by its id, and takes it only once.
         """
         if not goal.answered and monotonic() - self._sent_s > _SEND_AGAIN_S:
-            self._send(goal)
+            self.send(goal)
+
+    def cancel(self, goal: Goal) -> None:
+        """Publish the goal's id; the server remembers it, also where the goal comes after its cancel."""
+        self._calling_off(goal)
+        self._call_off(goal.id)
+
+    def cancel_all(self) -> None:
+        """Publish an empty id, which means every goal."""
+        self._call_off(_ANYONE)
+
+    def _call_off(self, name: str) -> None:
+        self.link.publish(self._topic("cancel"), {"stamp": {"secs": 0, "nsecs": 0}, "id": name})
+
+    def is_idle(self, since_s: float) -> bool | None:
+        """Return whether the list that came last is empty."""
+        listed = self.ear.servers.list_of(self._named("move_base"))
+        return None if listed is None or listed[0] <= since_s else not listed[1]
+
+    # In the network's thread.
 
     def _status(self, message: msgspec.Raw) -> None:
         states = msgspec.json.decode(message, type=GoalStates).status_list
-        self._under_way = any(state.status in _UNDER_WAY for state in states)
-        for state in states:
-            self._note(state)
+        listed = {state.goal_id.id: state for state in states}
+        self.ear.servers.listed(
+            self._named("move_base"), [name for name, state in listed.items() if state.status in _UNDER_WAY]
+        )
+
+        def take(goal: Goal) -> None:
+            if goal.id in listed:
+                self._note(goal, listed[goal.id])
+            elif goal.heard_s is not None and goal.id not in self._cancelled_s:
+                goal.over(End.FAILED, "move_base does not know the goal any more; it was started anew")
+            elif self.ear.clock() - self._cancelled_s.get(goal.id, self.ear.clock()) >= _UNKNOWN_AFTER_S:
+                goal.over(End.CANCELLED, "move_base does not know the goal")
+
+        self._each(take)
 
     def _update(self, message: msgspec.Raw) -> None:
-        self._note(msgspec.json.decode(message, type=GoalUpdate).status)
+        state = msgspec.json.decode(message, type=GoalUpdate).status
+        self._each(lambda goal: self._note(goal, state) if goal.id == state.goal_id.id else None)
 
-    def _note(self, state: GoalState) -> None:
-        """In the network's thread: take in how a goal stands."""
-        goal = self._goal
-        if goal is None or state.goal_id.id != goal.id:
-            return
-        goal.answered = True
-        if state.status not in _UNDER_WAY:
+    def _note(self, goal: Goal, state: GoalState) -> None:
+        """Take in how a goal stands."""
+        if state.status in _UNDER_WAY:
+            goal.show(self.ear.clock())
+        else:
             goal.over(*_end_of(state))
 
 
@@ -113,7 +130,7 @@ def _end_of(state: GoalState) -> tuple[End, str]:
     match state.status:
         case 3:
             return End.SUCCEEDED, ""
-        case 2 | 8:
+        case 2 | 7 | 8:
             return End.CANCELLED, f"The goal was cancelled, by another goal or another user of the robot{why}"
         case 5:
             return End.FAILED, f"move_base refused the goal{why}"

@@ -1,84 +1,63 @@
-"""Driving with Nav2 (ROS 2): NavigateToPose for places, its behaviours for turns and straight drives."""
+"""Driving with Nav2 (ROS 2) over rosbridge: NavigateToPose for places, its behaviours for turns and straight drives."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 from uuid import uuid4
 
 import msgspec
 
-from avlmaps.core.motion import GroundPose
-from avlmaps.navigate.ros.base import RosDriver
-from avlmaps.navigate.ros.goals import End, Goal, Task
+from avlmaps.navigate.ros.bridge import BridgeSession
+from avlmaps.navigate.ros.errands import Errands
+from avlmaps.navigate.ros.goals import End, Goal
 from avlmaps.navigate.ros.link import Link
-from avlmaps.navigate.ros.messages import ActionEnd, Incoming, duration, sanitize_line, stamped_pose, text_in
+from avlmaps.navigate.ros.messages import ActionEnd, ActionStates, CancelAnswer, Incoming, sanitize_line, text_in
+from avlmaps.navigate.ros.nav2_tasks import MOVING, NAVIGATE, SPIN, STRAIGHT, why_of
 
 _SUCCEEDED, _CANCELLED = 4, 5  # action_msgs/GoalStatus
-# nav2_msgs' error codes, by the action that sets them: ComputePathToPose 2xx, FollowPath 1xx, behaviours 7xx.
-_WHY = {
-    103: "the path is not valid",
-    105: "it makes no progress",
-    106: "no safe path was found",
-    203: "it stands outside of its own map",
-    204: "the goal is outside of its own map",
-    205: "it stands in what its own map has for an obstacle",
-    206: "the goal is in what its own map has for an obstacle",
-    207: "planning took too long",
-    208: "no path leads there on its own map",
-    701: "turning took too long",
-    703: "an obstacle blocks the turn",
-    721: "driving straight took too long",
-    723: "an obstacle is ahead",
-}
+_UNDER_WAY = (1, 2, 3)
+_REFUSED, _UNKNOWN, _ENDED = 1, 2, 3  # return codes of action_msgs/CancelGoal
+_RESULT_WITHIN_S = 1.0  # after a list says that a goal is over, its result says why
+_NOBODY = [0] * 16
+_FORGOTTEN = "Nav2 does not know the goal any more; it was started anew"
 
 
-class Nav2Driver(RosDriver):
-    """Sends goals to Nav2.
+class Nav2Session(BridgeSession):
+    """A connection to Nav2: topics on one websocket, goals and calls on others (`Errands`)."""
 
-    Turns go to its ``spin`` behaviour, straight drives to ``drive_on_heading``: they do what is less than the
-    tolerance of a goal, and look out for obstacles. Where no behaviour server runs they become goals.
-    """
-
-    called: ClassVar[str] = "Nav2"
     tf_kind: ClassVar[str] = "tf2_msgs/msg/TFMessage"
-    heartbeat_kind: ClassVar[str] = "std_msgs/msg/String"
+    text_kind: ClassVar[str] = "std_msgs/msg/String"
+    lists_every_s: ClassVar[float | None] = None
 
-    def _greet(self, link: Link) -> None:
-        self._answers: dict[str, bool] = {}
-        link.listen(self._heard)
+    def _greet(self) -> None:
+        self._errands = Errands(lambda within_s: Link(self._url, self._token, within_s, self.heard), self._answered)
+        self._calls: dict[str, tuple[str, bool, Goal | None]] = {}  # server, every goal or one, and which of ours
+        self._known: dict[str, frozenset[str]] = {}  # goals that a server had listed before ours was sent
+        self._agreed_s: dict[str, tuple[float, bool]] = {}
+        self._sent = ""
+        for action in (NAVIGATE, SPIN, STRAIGHT):
+            server = self._named(action)
+            topic = f"{server}/_action/status"
+            self.link.subscribe(
+                topic, "action_msgs/msg/GoalStatusArray", lambda told, server=server: self._listed(server, told)
+            )
 
-    def _named(self, action: str) -> str:
-        return f"{self.settings.namespace}/{action}"
+    @property
+    def lost(self) -> str | None:
+        """Why the connection is over, or that which waits for the goal's result."""
+        return self.link.lost or (self._errands.lost(self._sent) if self._sent else None)
 
-    def _pose_task(self, pose: GroundPose) -> Task:
-        frames = self.frames
-        goal = stamped_pose(frames.to_robot(pose), frames.map_frame, ros=2)
-        return Task(
-            self._named("navigate_to_pose"),
-            "nav2_msgs/action/NavigateToPose",
-            {"pose": goal, "behavior_tree": ""},
-            self.settings.goal_timeout_s,
-        )
+    def ask(self, server: str) -> bool:
+        """Cancel a goal that does not exist: the answer shows whether there is a server."""
+        return self._call(server, list(uuid4().bytes), None)
 
-    def _turn_tasks(self, start: GroundPose, angle_rad: float) -> tuple[Task, ...]:
-        allowed_s = 10.0 + abs(angle_rad) / 0.1
-        arguments = {"target_yaw": angle_rad, "time_allowance": duration(allowed_s)}
-        spin = Task(self._named("spin"), "nav2_msgs/action/Spin", arguments, allowed_s + 5.0)
-        return (spin, *super()._turn_tasks(start, angle_rad))
-
-    def _forward_tasks(self, start: GroundPose, distance_m: float) -> tuple[Task, ...]:
-        speed = self.settings.speed_m_s
-        allowed_s = 10.0 + 3.0 * distance_m / speed
-        arguments = {
-            "target": {"x": distance_m, "y": 0.0, "z": 0.0},
-            "speed": speed,
-            "time_allowance": duration(allowed_s),
-        }
-        kind = "nav2_msgs/action/DriveOnHeading"
-        straight = Task(self._named("drive_on_heading"), kind, arguments, allowed_s + 5.0)
-        return (straight, *super()._forward_tasks(start, distance_m))
-
-    def _send(self, goal: Goal) -> None:
+    def send(self, goal: Goal) -> None:
+        """Send a goal, on a connection to itself."""
         task = goal.task
-        self._contact.link.send(
+        self._adopt(goal)
+        listed = self.ear.servers.list_of(task.action)
+        self._known[goal.id] = frozenset() if listed is None else listed[1]
+        self._sent = goal.id
+        sent = self._errands.send(
+            goal.id,
             {
                 "op": "send_action_goal",
                 "id": goal.id,
@@ -86,40 +65,119 @@ class Nav2Driver(RosDriver):
                 "action_type": task.kind,
                 "args": task.arguments,
                 "feedback": True,
-            }
+            },
+            lasting=True,
         )
+        if not sent:
+            goal.over(End.FAILED, "The bridge takes no second connection, over which the goal would go")
 
-    def _cancel(self, goal: Goal) -> None:
-        self._contact.link.send({"op": "cancel_action_goal", "id": goal.id, "action": goal.task.action})
+    def remind(self, goal: Goal) -> None:
+        """Do nothing: a goal that was sent arrives."""
 
-    def _cancel_all(self, link: Link, wait_s: float) -> bool:
-        """Call the cancel service of each action; an empty request means every goal."""
-        link.listen(self._heard)
-        calls = {f"avlmaps-{uuid4().hex}": self._named(name) for name in ("navigate_to_pose", *self._used())}
-        for call, action in calls.items():
-            service = f"{action}/_action/cancel_goal"
-            link.send(
-                {"op": "call_service", "id": call, "service": service, "type": "action_msgs/srv/CancelGoal", "args": {}}
-            )
-        main = next(iter(calls))
-        with link.heard:
-            link.heard.wait_for(lambda: main in self._answers or link.lost is not None, wait_s)
-            return self._answers.pop(main, False)
+    def cancel(self, goal: Goal) -> None:
+        """Cancel a goal by our name at the bridge, which forgets it when it restarts, and by Nav2's where it is known.
 
-    def _used(self) -> tuple[str, ...]:
-        return tuple(name for name in ("spin", "drive_on_heading") if self._named(name) not in self._absent)
+        Where Nav2's name is not known and Nav2 lists no other goal, every goal is cancelled: that is ours, if any.
+        """
+        self._calling_off(goal)
+        action = goal.task.action
+        name = f"avlmaps-{uuid4().hex}"
+        self._errands.send(name, {"op": "cancel_action_goal", "id": goal.id, "action": action})
+        self._errands.done(name)  # a bridge never answers it
+        listed = self.ear.servers.list_of(action)
+        if goal.alias:
+            self._call(action, list(bytes.fromhex(goal.alias)), goal)
+        elif listed is None or (len(listed[1]) == 1 and listed[1].isdisjoint(self._known.get(goal.id, ()))):
+            self._call(action, _NOBODY, goal)
 
-    def _heard(self, message: Incoming) -> None:
-        """In the network's thread: take in what answers a goal or a call."""
-        if message.op == "service_response" and message.id is not None and message.id.startswith("avlmaps-"):
-            self._answers = dict(list(self._answers.items())[-20:]) | {message.id: message.result}
-        goal = self._goal
-        if goal is None or message.id != goal.id:
+    def cancel_all(self) -> None:
+        """Call the cancel service of each action that moves the robot; an empty request means every goal."""
+        for action in MOVING:
+            self._call(self._named(action), _NOBODY, None)
+
+    def _call(self, server: str, goal_id: list[int], goal: Goal | None) -> bool:
+        name = f"avlmaps-{uuid4().hex}"
+        self._calls[name] = server, goal_id == _NOBODY, goal
+        while len(self._calls) > 100:
+            self._calls.pop(next(iter(self._calls)))
+        args: dict[str, Any] = {"goal_info": {"goal_id": {"uuid": goal_id}, "stamp": {"sec": 0, "nanosec": 0}}}
+        service = f"{server}/_action/cancel_goal"
+        call = {"op": "call_service", "id": name, "service": service, "type": "action_msgs/srv/CancelGoal"}
+        return self._errands.send(name, {**call, "args": args})
+
+    def is_idle(self, since_s: float) -> bool | None:
+        """Return whether each server that is there has agreed to stop, and lists no goal."""
+        servers = [self._named(action) for action in MOVING]
+        answers = [self._agreed_s.get(server, (0.0, False)) for server in servers]
+        fresh = [agreed for at_s, agreed in answers if at_s >= since_s]
+        if not fresh:
+            return None
+        under_way = any(self.ear.servers.under_way().get(server) for server in servers)
+        return not under_way and all(fresh) and answers[0][0] >= since_s
+
+    def close(self) -> None:
+        """End the connections."""
+        self._errands.close()
+        super().close()
+
+    # In the network's thread.
+
+    def _listed(self, server: str, message: msgspec.Raw) -> None:
+        states = {one.name: one.status for one in msgspec.json.decode(message, type=ActionStates).status_list}
+        under_way = frozenset(name for name, status in states.items() if status in _UNDER_WAY)
+        self.ear.servers.listed(server, under_way)
+        taken = {goal.alias for goal in self._ours.values()}
+
+        def take(goal: Goal) -> None:
+            if goal.task.action != server:
+                return
+            new = under_way - self._known.get(goal.id, under_way) - taken
+            if not goal.alias and len(new) == 1:
+                goal.alias = next(iter(new))
+            status = states.get(goal.alias)
+            if status in _UNDER_WAY:
+                goal.show(self.ear.clock())
+            elif (goal.id in self._cancelled_s and not under_way) or status is not None:
+                self._over_soon(goal, status)
+
+        self._each(take)
+
+    def _over_soon(self, goal: Goal, status: int | None) -> None:
+        """Take a goal for over by its list, unless its result comes before, which says more."""
+        end = {_SUCCEEDED: End.SUCCEEDED, _CANCELLED: End.CANCELLED}.get(status or 0, End.FAILED)
+        note = "" if end is End.SUCCEEDED else "Nav2 lists the goal as over"
+        self.link.later(_RESULT_WITHIN_S if goal.id == self._sent else 0.0, lambda: goal.over(end, note))
+
+    def _answered(self, message: Incoming) -> None:
+        if message.op == "service_response" and message.id in self._calls:
+            self._called(*self._calls.pop(message.id), message)
+            self._errands.done(message.id)
+        goal = self._ours.get(message.id or "")
+        if goal is None:
             return
         if message.op == "action_feedback":
-            goal.answered = True
+            goal.show(self.ear.clock())
         elif message.op == "action_result":
+            self._errands.done(goal.id)
             goal.over(*_end_of(message))
+            self._each(lambda _: None)
+
+    def _called(self, server: str, everyone: bool, goal: Goal | None, message: Incoming) -> None:
+        if not message.result:
+            if "not exist" in text_in(message.values):
+                self.ear.servers.answered(server, serves=False)
+                if goal is not None:
+                    goal.over(End.CANCELLED, "Its action server is gone")
+            return
+        try:
+            answer = msgspec.json.decode(message.values, type=CancelAnswer)
+        except ValueError:
+            return
+        self.ear.servers.answered(server, serves=True)
+        self._agreed_s[server] = self.ear.clock(), answer.return_code != _REFUSED
+        stopped = answer.return_code in (_UNKNOWN, _ENDED) or (everyone and answer == CancelAnswer())
+        if goal is not None and stopped:
+            goal.over(End.CANCELLED, "Nav2 is not at the goal any more")
 
 
 def _end_of(message: Incoming) -> tuple[End, str]:
@@ -139,7 +197,5 @@ def _end_of(message: Incoming) -> tuple[End, str]:
         return End.SUCCEEDED, ""
     if status == _CANCELLED:
         return End.CANCELLED, "The goal was cancelled, by the robot or another of its users"
-    code = end.error_code or inner.error_code
-    known = _WHY.get(code, "" if code == 0 else f"error {code}")
-    why = sanitize_line(end.error_msg or inner.error_msg) or known or "it does not say why"
+    why = why_of(end.error_code or inner.error_code, sanitize_line(end.error_msg or inner.error_msg))
     return End.FAILED, f"Nav2 gave up ({why})"

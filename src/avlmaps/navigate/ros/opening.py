@@ -1,7 +1,9 @@
 """Opening a driver for a real robot by the name of what drives it."""
 
 import os
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Callable
+from time import monotonic
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -9,16 +11,61 @@ from jaxtyping import Float
 from avlmaps.navigate.ros.base import RosDriver
 from avlmaps.navigate.ros.frames import Frames
 from avlmaps.navigate.ros.guard import Guard, Orders
-from avlmaps.navigate.ros.move_base import MoveBaseDriver
-from avlmaps.navigate.ros.nav2 import Nav2Driver
 from avlmaps.navigate.ros.plans import Standing
 from avlmaps.navigate.ros.settings import RosSettings
+from avlmaps.navigate.ros.transports import RosKind, session_opener, tasks_of
 
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
     from avlmaps.navigate.planner import Planner
 
-RosKind = Literal["nav2", "move_base"]
+
+class _BridgeDriver(RosDriver):
+    kind: ClassVar[RosKind]
+
+    def __init__(
+        self,
+        url: str,
+        frames: Frames | None = None,
+        settings: RosSettings | None = None,
+        *,
+        standing: Standing | None = None,
+        level_from_world: Float[np.ndarray, "3 3"] | None = None,
+        token: str | None = None,
+        clock: Callable[[], float] = monotonic,
+    ) -> None:
+        """Connect over rosbridge, and wait until the robot reports its pose.
+
+        Args:
+            url: of rosbridge, ``ws://host:9090``.
+            frames: the robot's frames; ``map`` and ``base_link``, lying as the map's level frame, by default.
+            settings: names, patience, tolerances.
+            standing: moves a goal to where a body can stand; goals are sent as they are without it.
+            level_from_world: the map's rotation into its level frame; the identity by default.
+            token: for a proxy before the bridge.
+            clock: seconds; replaced in tests.
+
+        Raises:
+            NavigationError: there is no bridge, or the robot does not report its pose.
+            BackendError: roslibpy is not installed.
+        """
+        settings = settings or RosSettings()
+        super().__init__(
+            session_opener(self.kind, url, settings, token), tasks_of(self.kind, frames or Frames(), settings),
+            standing=standing, level_from_world=level_from_world, clock=clock,
+        )  # fmt: skip
+
+
+class Nav2Driver(_BridgeDriver):
+    """Drives a robot that runs Nav2, over rosbridge."""
+
+    kind: ClassVar[RosKind] = "nav2"
+
+
+class MoveBaseDriver(_BridgeDriver):
+    """Drives a robot that runs move_base, over rosbridge."""
+
+    kind: ClassVar[RosKind] = "move_base"
 
 
 def open_ros_driver(
@@ -44,7 +91,7 @@ def open_ros_driver(
             or else the identity, by default.
         token: sent as ``Authorization: Bearer`` to a proxy before the bridge; by default the environment variable
             AVLMAPS_ROS_TOKEN, where it is set.
-        guarded: start a second process that cancels the robot's goals when this one dies or stands still.
+        guarded: start a second process that cancels the driver's goal when this one dies or stands still.
 
     Raises:
         NavigationError: nobody answers there, or the robot does not know where it is.
@@ -59,7 +106,7 @@ def open_ros_driver(
     opened = driver(url, frames, settings, standing=standing, level_from_world=level_from_world, token=token)
     if guarded:
         silence_s = settings.stall_s + settings.heartbeat_s
-        opened.guard = Guard(Orders(kind, url, token, settings.namespace, silence_s, settings.goal_timeout_s))
+        opened.guard = Guard(Orders(kind, url, token, settings, silence_s, settings.goal_timeout_s))
     return opened
 
 

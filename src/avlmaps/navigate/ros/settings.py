@@ -18,6 +18,7 @@ _RANGES: Mapping[str, tuple[float, float]] = {
     "connect_timeout_s": (0.1, 600.0),
     "pose_timeout_s": (0.1, 600.0),
     "pose_max_age_s": (0.1, 60.0),
+    "server_max_age_s": (0.5, 60.0),
     "heartbeat_s": (0.05, 5.0),
     "stall_s": (0.5, 60.0),
     "reached_m": (0.01, 5.0),
@@ -48,6 +49,8 @@ class RosSettings:
     """How long to wait for the first pose."""
     pose_max_age_s: float = 3.0
     """Transforms that are older give no pose; the robot is not driven without one."""
+    server_max_age_s: float = 3.0
+    """A goal of which its server has said nothing for this time is lost, and cancelled."""
     heartbeat_s: float = 0.5
     """While a goal is active, a heartbeat is published on ``avlmaps/heartbeat`` once in this time."""
     stall_s: float = 3.0

@@ -1,9 +1,9 @@
 """The robot's tree of frames by the current /tf and /tf_static, and the pose of its body in it."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import atan2, hypot
+from math import atan2, hypot, isfinite
 from time import monotonic
 
 import msgspec
@@ -11,10 +11,11 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose
-from avlmaps.navigate.ros.messages import sanitize_line, transforms_in
+from avlmaps.navigate.ros.messages import Transform, sanitize_line, transforms_in
 
 _MOST_FRAMES = 5000
 _FAR_M = 1e6
+_OVERTAKEN_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,38 +23,76 @@ class _Edge:
     parent: str
     parent_from_child: Float[np.ndarray, "4 4"]
     static: bool
+    stamp_s: float
     heard_s: float
+    taken_s: float
+
+
+@dataclass(slots=True)
+class _Stamps:
+    """How much later than at its fastest a transform comes, by its stamps; the robot's clock may be set otherwise."""
+
+    first_s: float
+    least_lag_s: float
+    run: bool = False
+
+    def late_s(self, stamp_s: float, now_s: float) -> float:
+        self.run = self.run or stamp_s != self.first_s  # a stamp that never changes says nothing
+        self.least_lag_s = min(self.least_lag_s, now_s - stamp_s)
+        return now_s - stamp_s - self.least_lag_s if self.run else 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
     """A pose by the tree.
 
+    Each moving transform was made between ``taken_s`` and ``heard_s``, by this machine's clock. To order events,
+    compare these: a process may stand still between two looks at a clock.
+
     Attributes:
         pose: of the body on the ground, in the fixed frame.
-        heard_s: when the oldest of the moving transforms that it is made of was heard, by the tree's clock.
-        age_s: since then, at the moment of looking. To order events, compare ``heard_s``: a process may
-            stand still between two looks at a clock.
+        taken_s: a time after which every one of the moving transforms was made.
+        heard_s: when the newest of them was heard.
+        age_s: since ``taken_s``, at the moment of looking.
     """
 
     pose: GroundPose
+    taken_s: float
     heard_s: float
     age_s: float
+
+
+def _never(_: float) -> None:
+    """Know nothing of when what has arrived was sent."""
 
 
 class LiveTree:
     """Stores the newest transform of each frame, by this machine's clock: the robot's may be set otherwise.
 
+    A transform is as old as its way was long. That shows in two ways: the time since its stamp grows beyond the least
+    there was, and echoes come back late (`Echoes`). Whichever is later counts.
+
     Attributes:
         refused: how many transforms were left out, being NaN or no rotation.
+        overtaken: how many were left out because a newer one had come before.
     """
 
-    def __init__(self, clock: Callable[[], float] = monotonic) -> None:
-        """Begin with no frames."""
-        self._clock = clock
+    def __init__(
+        self,
+        clock: Callable[[], float] = monotonic,
+        sent_before: Callable[[float], float | None] = _never,
+    ) -> None:
+        """Begin with no frames.
+
+        Args:
+            clock: seconds.
+            sent_before: returns, for a time of arrival, a time after which the robot had sent it; None if unknown.
+        """
+        self._clock, self._sent_before = clock, sent_before
         self._edges: dict[str, _Edge] = {}
+        self._stamps: dict[str, _Stamps] = {}
         self._lock = threading.Lock()
-        self.refused = 0
+        self.refused = self.overtaken = 0
 
     def hear(self, message: msgspec.Raw, static: bool) -> None:
         """Take in one message.
@@ -62,13 +101,31 @@ class LiveTree:
             ValueError: it is none.
         """
         transforms, refused = transforms_in(message)
+        self.refused += refused
+        self.take(transforms, static)
+
+    def take(self, transforms: Sequence[Transform], static: bool) -> None:
+        """Take in transforms that have just arrived."""
         now_s = self._clock()
         with self._lock:
-            self.refused += refused
-            for parent, child, parent_from_child in transforms:
-                known = child in self._edges or len(self._edges) < _MOST_FRAMES
-                if known and child and parent and child != parent:
-                    self._edges[child] = _Edge(parent, parent_from_child, static, now_s)
+            for transform in transforms:
+                parent, child = transform.parent.lstrip("/"), transform.child.lstrip("/")
+                before = self._edges.get(child)
+                if not child or not parent or child == parent or (before is None and len(self._edges) >= _MOST_FRAMES):
+                    continue
+                stamp_s = transform.stamp_s if isfinite(transform.stamp_s) else 0.0
+                late_s = self._late_s(child, stamp_s, now_s)
+                if before is not None and _is_overtaken(before, stamp_s, now_s):
+                    self.overtaken += 1
+                    continue
+                edge = _Edge(parent, transform.parent_from_child, static, stamp_s, now_s, now_s - late_s)
+                self._edges[child] = edge
+
+    def _late_s(self, child: str, stamp_s: float, now_s: float) -> float:
+        if stamp_s == 0.0:
+            return 0.0
+        stamps = self._stamps.setdefault(child, _Stamps(stamp_s, now_s - stamp_s))
+        return stamps.late_s(stamp_s, now_s)
 
     def seen(self, fixed: str, body: str) -> Sighting | None:
         """Return where the body is in the fixed frame; None where no chain of transforms leads there."""
@@ -76,7 +133,7 @@ class LiveTree:
             chain = self._chain(fixed, body)
         if chain is None:
             return None
-        fixed_from_body, heard_s = np.eye(4), [edge.heard_s for edge in chain if not edge.static]
+        fixed_from_body = np.eye(4)
         for edge in chain:
             fixed_from_body = edge.parent_from_child @ fixed_from_body
         ahead_x, ahead_y = fixed_from_body[:2, 0]
@@ -86,9 +143,15 @@ class LiveTree:
         if max(abs(x_m), abs(y_m)) > _FAR_M:
             return None
         pose = GroundPose(x_m, y_m, atan2(ahead_y, ahead_x))
+        moving = [edge for edge in chain if not edge.static]
         now_s = self._clock()
-        oldest_s = min(heard_s, default=now_s)
-        return Sighting(pose, oldest_s, now_s - oldest_s)
+        taken_s = min((self._taken_s(edge) for edge in moving), default=now_s)
+        heard_s = max((edge.heard_s for edge in moving), default=now_s)
+        return Sighting(pose, taken_s, heard_s, now_s - taken_s)
+
+    def _taken_s(self, edge: _Edge) -> float:
+        sent_s = self._sent_before(edge.heard_s)
+        return edge.taken_s if sent_s is None else min(edge.taken_s, sent_s)
 
     def why_not(self, fixed: str, body: str) -> str:
         """Return the missing link between two frames, as part of a sentence."""
@@ -115,6 +178,11 @@ class LiveTree:
             chain.append(edge)
             name = edge.parent
         return chain
+
+
+def _is_overtaken(before: _Edge, stamp_s: float, now_s: float) -> bool:
+    """Return whether a newer transform came before; one that is long past does not count: clocks are set back."""
+    return 0.0 < stamp_s < before.stamp_s and now_s - before.heard_s < _OVERTAKEN_S
 
 
 def _listed(names: list[str], most: int = 8) -> str:

@@ -142,6 +142,21 @@ class Bridge(roslibpy.Ros):
         super().connect()
 
 
+def repeat(every_s: float, turn: Callable[[], bool]) -> None:
+    """Call a function in the reactor's thread until it returns False."""
+
+    def again() -> None:
+        if turn():
+            reactor.callLater(every_s, again)
+
+    reactor.callFromThread(again)
+
+
+def later(wait_s: float, work: Callable[[], None]) -> None:
+    """Call a function in the reactor's thread after some seconds."""
+    reactor.callFromThread(reactor.callLater, wait_s, work)
+
+
 def start_reactor() -> None:
     """Run twisted's reactor in a thread of its own, once in a process.
 

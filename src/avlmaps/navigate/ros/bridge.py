@@ -1,0 +1,133 @@
+"""A session over rosbridge: what Nav2 and move_base have in common there."""
+
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import ClassVar
+
+import msgspec
+
+from avlmaps.navigate.ros.goals import Goal
+from avlmaps.navigate.ros.link import Link
+from avlmaps.navigate.ros.messages import Text
+from avlmaps.navigate.ros.session import Ear
+from avlmaps.navigate.ros.settings import RosSettings
+
+_ECHO_EVERY_S = 0.2
+
+
+class BridgeSession(ABC):
+    """One connection to rosbridge, over which topics come and go; nothing on it ever waits for a goal.
+
+    Attributes:
+        name: address of the bridge.
+        heard: notified whenever something arrived or changed.
+    """
+
+    tf_kind: ClassVar[str]
+    """The type of /tf."""
+    text_kind: ClassVar[str]
+    """The type of heartbeats and echoes."""
+    lists_every_s: ClassVar[float | None]
+
+    def __init__(self, url: str, token: str | None, settings: RosSettings, ear: Ear, timeout_s: float) -> None:
+        """Connect.
+
+        Args:
+            url: ``ws://host:9090``.
+            token: for a proxy before the bridge.
+            settings: names.
+            ear: takes what is heard.
+            timeout_s: how long to wait for the robot.
+
+        Raises:
+            BackendError: roslibpy is not installed.
+            NavigationError: there is no bridge.
+        """
+        self.heard = threading.Condition()
+        self.settings, self.ear = settings, ear
+        self._ours: dict[str, Goal] = {}
+        self._cancelled_s: dict[str, float] = {}
+        self._url, self._token = url, token
+        self.link = Link(url, token, timeout_s, self.heard)
+        self.name = self.link.url
+        link, tree = self.link, ear.tree
+        link.subscribe(f"{settings.tf_namespace}/tf", self.tf_kind, lambda told: tree.hear(told, static=False))
+        link.subscribe(f"{settings.tf_namespace}/tf_static", self.tf_kind, lambda told: tree.hear(told, static=True))
+        link.advertise(self._named("avlmaps/heartbeat"), self.text_kind)
+        echo = self._named("avlmaps/echo")
+        link.advertise(echo, self.text_kind)
+        link.subscribe(echo, self.text_kind, lambda told: ear.echoes.back(msgspec.json.decode(told, type=Text).data))
+        link.repeat(_ECHO_EVERY_S, lambda: link.publish(echo, {"data": ear.echoes.next()}))
+        self._greet()
+
+    @abstractmethod
+    def _greet(self) -> None:
+        """Subscribe and advertise what goals need."""
+
+    def _named(self, name: str) -> str:
+        return f"{self.settings.namespace}/{name}"
+
+    @property
+    def lost(self) -> str | None:
+        """Why the connection is over; None while it stands."""
+        return self.link.lost
+
+    @property
+    def complaint(self) -> str:
+        """The latest complaint of the bridge."""
+        complaints = self.link.complaints
+        return complaints[-1] if complaints else ""
+
+    def ask(self, server: str) -> bool:
+        """Return False: this robot's servers tell of themselves."""
+        del server
+        return False
+
+    @abstractmethod
+    def send(self, goal: Goal) -> None:
+        """Send a goal."""
+
+    @abstractmethod
+    def remind(self, goal: Goal) -> None:
+        """Send a goal again where it may have been lost."""
+
+    @abstractmethod
+    def cancel(self, goal: Goal) -> None:
+        """Ask for the end of one goal."""
+
+    @abstractmethod
+    def cancel_all(self) -> None:
+        """Ask for the end of every goal."""
+
+    @abstractmethod
+    def is_idle(self, since_s: float) -> bool | None:
+        """Return whether the servers are at nothing."""
+
+    def beat(self, goal: Goal) -> None:
+        """Publish a heartbeat."""
+        self.link.publish(self._named("avlmaps/heartbeat"), {"data": goal.id})
+
+    def close(self) -> None:
+        """End the connection."""
+        self.link.close()
+
+    # Our goals, as servers list them.
+
+    def _adopt(self, goal: Goal) -> None:
+        """Hear what becomes of a goal, also of one that another session sent."""
+        self._ours[goal.id] = goal
+
+    def _calling_off(self, goal: Goal) -> float:
+        """Adopt a goal that is cancelled, and return since when this session has done so."""
+        self._adopt(goal)
+        return self._cancelled_s.setdefault(goal.id, self.ear.clock())
+
+    def _each(self, take: Callable[[Goal], None]) -> None:
+        """Do something with each goal of ours that has not ended; forget the others."""
+        for name, goal in list(self._ours.items()):
+            if goal.end is None:
+                take(goal)
+            if goal.end is not None:
+                self._ours.pop(name, None)
+                self._cancelled_s.pop(name, None)

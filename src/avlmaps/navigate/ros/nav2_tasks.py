@@ -1,0 +1,73 @@
+"""What Nav2 is asked for, and its reasons in words: the same over every transport."""
+
+from typing import ClassVar
+
+from avlmaps.core.motion import GroundPose
+from avlmaps.navigate.ros.goals import Task
+from avlmaps.navigate.ros.messages import duration, stamped_pose
+from avlmaps.navigate.ros.tasks import Tasks
+
+NAVIGATE, SPIN, STRAIGHT = "navigate_to_pose", "spin", "drive_on_heading"
+MOVING = (NAVIGATE, "navigate_through_poses", "follow_waypoints", SPIN, STRAIGHT, "backup", "follow_path")
+"""Each of Nav2's actions that moves a robot, whoever asks for it."""
+
+# nav2_msgs' error codes, by the action that sets them: ComputePathToPose 2xx, FollowPath 1xx, behaviours 7xx.
+_WHY = {
+    103: "the path is not valid",
+    105: "it makes no progress",
+    106: "no safe path was found",
+    203: "it stands outside of its own map",
+    204: "the goal is outside of its own map",
+    205: "it stands in what its own map has for an obstacle",
+    206: "the goal is in what its own map has for an obstacle",
+    207: "planning took too long",
+    208: "no path leads there on its own map",
+    701: "turning took too long",
+    703: "an obstacle blocks the turn",
+    721: "driving straight took too long",
+    723: "an obstacle is ahead",
+}
+
+
+def why_of(code: int, text: str) -> str:
+    """Return why Nav2 gave up, in part of a sentence, by what its result says."""
+    return text or _WHY.get(code, "" if code == 0 else f"error {code}") or "it does not say why"
+
+
+class Nav2Tasks(Tasks):
+    """Goals of Nav2.
+
+    Turns go to its ``spin`` behaviour, straight drives to ``drive_on_heading``: they do what is less than the
+    tolerance of a goal, and look out for obstacles. Where no behaviour server runs they become goals.
+    """
+
+    called: ClassVar[str] = "Nav2"
+
+    def _named(self, action: str) -> str:
+        return f"{self.settings.namespace}/{action}"
+
+    def pose(self, pose: GroundPose) -> Task:
+        """Return the task of standing at a pose."""
+        goal = stamped_pose(self.frames.to_robot(pose), self.frames.map_frame, ros=2)
+        arguments = {"pose": goal, "behavior_tree": ""}
+        kind = "nav2_msgs/action/NavigateToPose"
+        return Task(self._named(NAVIGATE), kind, arguments, self.settings.goal_timeout_s)
+
+    def turn(self, start: GroundPose, angle_rad: float) -> tuple[Task, ...]:
+        """Return the tasks of a turn on the spot."""
+        allowed_s = 10.0 + abs(angle_rad) / 0.1
+        arguments = {"target_yaw": angle_rad, "time_allowance": duration(allowed_s)}
+        spin = Task(self._named(SPIN), "nav2_msgs/action/Spin", arguments, allowed_s + 5.0)
+        return (spin, *super().turn(start, angle_rad))
+
+    def forward(self, start: GroundPose, distance_m: float) -> tuple[Task, ...]:
+        """Return the tasks of a straight drive."""
+        speed = self.settings.speed_m_s
+        allowed_s = 10.0 + 3.0 * distance_m / speed
+        arguments = {
+            "target": {"x": distance_m, "y": 0.0, "z": 0.0},
+            "speed": speed,
+            "time_allowance": duration(allowed_s),
+        }
+        straight = Task(self._named(STRAIGHT), "nav2_msgs/action/DriveOnHeading", arguments, allowed_s + 5.0)
+        return (straight, *super().forward(start, distance_m))
