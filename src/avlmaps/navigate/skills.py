@@ -304,7 +304,12 @@ class Robot:
         self._done(skill, name, None, [self.driver.turn(angle)])
 
     def _done(self, skill: str, name: str, goal: Float[np.ndarray, "3"] | None, arrivals: Sequence[Arrival]) -> None:
-        """Store the result of a movement; a drive to a place ends in a stop, where the paper's tasks are judged."""
+        """Store the result of a movement, and stop where it was to a place: there the paper's tasks are judged.
+
+        A robot that takes no discrete actions has ended its goal by itself; its driver's stop would be everybody's.
+        """
+        if goal is not None and arrivals[-1].actions and arrivals[-1].actions[-1] is not Action.STOP:
+            arrivals = [*arrivals, self.driver.stop()]
         arrival = concat_motions(arrivals)
         world = self.asked.space.world
         pose = arrival.pose
