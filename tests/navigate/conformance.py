@@ -183,7 +183,7 @@ def test_a_goal_of_an_operator_goes_on_when_ours_ends(field: Any) -> None:
         field.operate()
         arrival = ended(thread, results)
         assert not arrival.reached
-        assert "goal of another client goes on" in arrival.note, arrival.note
+        assert "goal of another client continues" in arrival.note, arrival.note
         assert list(field.goals().values())[-1], "the operator's goal was cancelled"
     sleep(0.3)
     assert list(field.goals().values())[-1], "the operator's goal was cancelled at the end"

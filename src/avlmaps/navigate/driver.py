@@ -86,7 +86,7 @@ class Driver(Protocol):
         ...
 
     def stop(self) -> Arrival:
-        """Stand still, whatever moves the robot, also others: a person's stop, and no part of other movements."""
+        """Stand still, also where another client drives the robot: a person's stop, and no part of other movements."""
         ...
 
 

@@ -110,7 +110,7 @@ class RosDriver:
         return replace(driven, path=np.concatenate([turned.path, driven.path]))
 
     def stop(self) -> Arrival:
-        """Cancel whatever the robot is at, also for others, and report whether it stands still.
+        """Cancel every goal of the robot, also those of others, and report whether it stands still.
 
         A lost connection is made again first. It takes at most four times ``cancel_timeout_s``.
         """
@@ -260,7 +260,7 @@ class RosDriver:
                 break
             self._absent.add(task.action)
         if end is not End.SUCCEEDED:
-            others = ". A goal of another client goes on" if self._others_soon() else ""
+            others = ". A goal of another client continues" if self._others_soon() else ""
             return self._arrival(False, track, (note or f"{self._tasks.called} did not do it") + others)
         called = self._tasks.called
         now = self._contact.pose_from_now(self.settings.pose_max_age_s)
@@ -350,7 +350,7 @@ class RosDriver:
         return "", False
 
     def _lost_sight(self, goal: Goal, silent_s: float) -> str:
-        """Return why a goal cannot be watched any more, or must not go on; "" where it can."""
+        """Return why a goal cannot be watched any more, or must not continue; "" where it can."""
         contact, settings = self._contact, self.settings
         if contact.session.lost is not None:
             return contact.loss()
@@ -372,7 +372,7 @@ class RosDriver:
             return now_s - goal.heard_s
         if not served[1]:
             return float("inf")
-        # A server that told regularly of a goal has lost it when it does not any more, though it be there.
+        # A server that listed a goal regularly and does so no more has lost it, also where it runs.
         return now_s - (goal.heard_s if goal.shown >= _REGULAR else served[0])
 
     # Calling off.

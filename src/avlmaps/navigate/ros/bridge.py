@@ -37,7 +37,7 @@ class BridgeSession(ABC):
             url: ``ws://host:9090``.
             token: for a proxy before the bridge.
             settings: names.
-            ear: takes what is heard.
+            ear: stores what arrives.
             timeout_s: how long to wait for the robot.
 
         Raises:
@@ -80,7 +80,7 @@ class BridgeSession(ABC):
         return complaints[-1] if complaints else ""
 
     def ask(self, server: str) -> bool:
-        """Return False: this robot's servers tell of themselves."""
+        """Return False: this robot's servers list their goals by themselves."""
         del server
         return False
 

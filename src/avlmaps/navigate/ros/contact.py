@@ -25,7 +25,7 @@ class Contact:
         frames: the robot's frames, and how they lie to the map.
         settings: patience and names.
         session: the connection that stands, or stood last.
-        ear: what that session has heard.
+        ear: what has arrived over that session.
     """
 
     def __init__(

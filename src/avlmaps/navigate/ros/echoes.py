@@ -1,7 +1,7 @@
 """How late what arrives is at most: by messages of ours that come back through the same queue.
 
 A bridge and a network keep the order of what they bring. What arrives after an echo left the robot after that echo was
-sent, whatever the clocks of the two machines say.
+sent, independent of the clocks of the two machines.
 """
 
 import threading

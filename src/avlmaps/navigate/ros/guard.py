@@ -2,7 +2,7 @@
 
 A process that is killed cannot cancel anything, and Nav2 and move_base finish a goal on their own. The guard reads the
 driver's beats from a pipe. When the pipe closes, or no beat comes while a goal is active, it connects to the robot and
-cancels that goal until the robot confirms it; goals of others go on. It runs in a session of its own: what ends the
+cancels that goal until the robot confirms it; goals of others continue. It runs in a session of its own: what ends the
 terminal does not end it.
 
 Run as ``python -m avlmaps.navigate.ros.guard`` by `Guard`; it reads its orders, then beats, from standard input.

@@ -155,7 +155,7 @@ class ActionState(msgspec.Struct):
 
 
 class ActionStates(msgspec.Struct):
-    """The goals of an action server, told at each change."""
+    """The goals of an action server, published at each change."""
 
     status_list: list[ActionState]
 

@@ -107,7 +107,7 @@ class MoveBaseSession(BridgeSession):
             if goal.id in listed:
                 self._note(goal, listed[goal.id])
             elif goal.heard_s is not None and goal.id not in self._cancelled_s:
-                goal.over(End.FAILED, "move_base does not know the goal any more; it was started anew")
+                goal.over(End.FAILED, "move_base does not know the goal any more; it was restarted")
             elif self.ear.clock() - self._cancelled_s.get(goal.id, self.ear.clock()) >= _UNKNOWN_AFTER_S:
                 goal.over(End.CANCELLED, "move_base does not know the goal")
 

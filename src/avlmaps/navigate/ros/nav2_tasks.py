@@ -1,4 +1,4 @@
-"""What Nav2 is asked for, and its reasons in words: the same over every transport."""
+"""The requests to Nav2, and its reasons in words: the same over every transport."""
 
 from typing import ClassVar
 
@@ -9,7 +9,7 @@ from avlmaps.navigate.ros.tasks import Tasks
 
 NAVIGATE, SPIN, STRAIGHT = "navigate_to_pose", "spin", "drive_on_heading"
 MOVING = (NAVIGATE, "navigate_through_poses", "follow_waypoints", SPIN, STRAIGHT, "backup", "follow_path")
-"""Each of Nav2's actions that moves a robot, whoever asks for it."""
+"""Each of Nav2's actions that moves a robot."""
 
 # nav2_msgs' error codes, by the action that sets them: ComputePathToPose 2xx, FollowPath 1xx, behaviours 7xx.
 _WHY = {

@@ -1,8 +1,8 @@
-"""What the safety laws ask of a transport, and what a transport tells them.
+"""The interface between the safety laws and a transport.
 
 `Contact` and `RosDriver` hold the laws: when a robot stands, how old its pose is, whose goal may be cancelled, what is
 done when the connection breaks. They know no transport. A transport is a `Session`: one connection to one robot, which
-writes what it hears into an `Ear`.
+writes what arrives into an `Ear`.
 """
 
 import threading
@@ -39,7 +39,7 @@ class Servers:
                 self._lists.pop(server, None)
 
     def serves(self, server: str) -> tuple[float, bool] | None:
-        """Return when a server was last found to be there or not, and which; None where nobody has asked."""
+        """Return when a server was last found to be there or not, and which; None where that is not known."""
         with self._lock:
             return self._served.get(server)
 
@@ -52,7 +52,7 @@ class Servers:
         """Return the goals under way, by server.
 
         Args:
-            longest_s: leave out lists that are older; servers that tell only of changes have old ones. None: none.
+            longest_s: leave out lists that are older; servers that publish only changes have old ones. None: none.
         """
         now_s = self._clock()
         with self._lock:
@@ -65,7 +65,7 @@ class Servers:
 
 @dataclass(frozen=True, slots=True)
 class Ear:
-    """What one session hears; a new session gets a new one.
+    """What has arrived over one session; a new session gets a new one.
 
     Attributes:
         clock: seconds; everything in here is dated by it.
@@ -93,7 +93,7 @@ class Session(Protocol):
     Attributes:
         name: of the robot's address, for sentences.
         heard: notified whenever something arrived or changed.
-        lists_every_s: how often servers list their goals; None where they tell only of changes.
+        lists_every_s: how often servers list their goals; None where they publish only changes.
     """
 
     name: str
@@ -114,7 +114,7 @@ class Session(Protocol):
         """Ask whether an action server is there; the answer comes to `Servers.answered`, or never.
 
         Returns:
-            Whether an answer may come; servers that list their goals regularly need not be asked.
+            Whether an answer may come; servers that list their goals regularly need no question.
         """
         ...
 
@@ -123,7 +123,7 @@ class Session(Protocol):
         ...
 
     def remind(self, goal: Goal) -> None:
-        """Send a goal again where it may have been lost on the way; servers take each goal once."""
+        """Send a goal again where it may have been lost; servers take each goal once."""
         ...
 
     def cancel(self, goal: Goal) -> None:
@@ -135,7 +135,7 @@ class Session(Protocol):
         ...
 
     def cancel_all(self) -> None:
-        """Ask for the end of every goal, whoever sent it."""
+        """Ask for the end of every goal, also those of others."""
         ...
 
     def is_idle(self, since_s: float) -> bool | None:

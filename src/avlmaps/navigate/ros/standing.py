@@ -1,4 +1,4 @@
-"""When a robot is seen to stand: a law of its sightings, whatever brings them."""
+"""When a robot is seen to stand: a law of its sightings, over any transport."""
 
 from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps.navigate.ros.tree import Sighting

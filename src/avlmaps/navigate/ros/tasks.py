@@ -1,4 +1,4 @@
-"""The goals that a robot's own stack takes, whatever brings them there."""
+"""The goals that a robot's own stack takes, over any transport."""
 
 from abc import ABC, abstractmethod
 from typing import ClassVar

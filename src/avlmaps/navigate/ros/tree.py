@@ -69,8 +69,8 @@ def _never(_: float) -> None:
 class LiveTree:
     """Stores the newest transform of each frame, by this machine's clock: the robot's may be set otherwise.
 
-    A transform is as old as its way was long. That shows in two ways: the time since its stamp grows beyond the least
-    there was, and echoes come back late (`Echoes`). Whichever is later counts.
+    A transform is older than its arrival by the time that it spent in queues. Two signs show that time: the time from
+    its stamp to its arrival grows beyond the least of them, and echoes come back late (`Echoes`). The greater counts.
 
     Attributes:
         refused: how many transforms were left out, being NaN or no rotation.
