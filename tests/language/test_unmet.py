@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from avlmaps.core.errors import QueryError
 from avlmaps.language.commands import Command, read_command
 from avlmaps.language.intents import (
     Circle,
@@ -20,6 +21,7 @@ from avlmaps.language.intents import (
     Wait,
     Way,
 )  # fmt: skip
+from avlmaps.language.questions import read_question
 from avlmaps.language.rules import command_to_program
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.verbalise import verbalise
@@ -220,3 +222,35 @@ def test_a_file_that_no_step_uses_is_asked_about() -> None:
 def test_amounts_behind_a_plain_command_change_nothing_else() -> None:
     assert intents("go forward 2 m") == (Move(2.0),)
     assert Sentence("tell my wife to go home").tokens[0].text == "tell"
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    ["which chair is farthest from the window", "the lamp that is not in the bedroom", "my room", "the quietest room",
+     "is it safe to let the toddler in the kitchen", "how many chairs are there without armrests", "wo ist das Sofa",
+     "the mug near the sink, ./a.png and the sound of glass breaking", "the chair 2 m left of the table",
+     "the chair away from the wall", "the chair except the one by the window"],
+)  # fmt: skip
+def test_a_question_that_turns_round_is_not_answered_half(sentence: str) -> None:
+    with pytest.raises(QueryError):
+        read_question(sentence, Given(knows=lambda _: True))
+
+
+def test_contexts_of_different_kinds_are_all_kept() -> None:
+    sentence = "the chair near the sound of dog barking and the area of the kitchen and the image ./a.png"
+    (target,) = read_question(sentence, Given(knows=lambda _: True)).inquiry.of
+    assert {str(one.kind) for one in target.near} == {"sound", "area", "image"}
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["drive past the sink and stop at the second door", "go to something red by the sofa", "goto !kitchen",
+     "spin three full revolutions", "go to the sound with confidence > 0.5", "drive at 2 m/s to the kitchen"],
+)  # fmt: skip
+def test_a_word_that_no_step_holds_is_asked_about(command: str) -> None:
+    stops(command)
+
+
+def test_words_that_sound_like_numbers() -> None:
+    assert intents("move forward too metres") == (Move(2.0),)
+    assert intents("in a quarter of an hour go to the door") == (Wait(900.0), Go(Target(Kind.OBJECT, "door")))

@@ -122,6 +122,8 @@ def tokenise(sentence: str) -> list[Token]:
             tokens += _words(raw, found.start())
         elif raw == "-" and _is_minus(plain, found.start()):
             tokens.append(Token("minus", raw, "word", found.start(), found.end()))
+        elif raw == "!" and re.match(r"(^|.*\s)![^\W\d_]", plain[: found.end() + 1], re.DOTALL):
+            tokens.append(Token("not", raw, "word", found.start(), found.end()))  # as programs have it: "!kitchen"
         elif raw not in ("-", '"', "'", "`", "*", "_") or _stands_alone(plain, found.start(), raw):
             word = "word" if kind == "clock" or raw == "°" else kind
             text = {"@": "at", "->": ">", "=>": ">", "\n": "."}.get(raw, "." if raw.startswith(".") else raw.lower())

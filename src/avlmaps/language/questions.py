@@ -9,11 +9,13 @@ from avlmaps.core.lexicon import Kind as Entries
 from avlmaps.core.lexicon import lexicon
 from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
 from avlmaps.language.asking_back import lacks_file
+from avlmaps.language.foreign import ASK, language_of
 from avlmaps.language.intents import Ask, Inquiry, Kind, Pick, Target
 from avlmaps.language.learned.decision import is_doubtful
 from avlmaps.language.learned.guard import Guard, kind_of
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.reader import Read, learned_reader
+from avlmaps.language.learned.unmet import unmet_by
 from avlmaps.language.names import is_entry, sounds_like
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.word_classes import load_word_classes
@@ -75,6 +77,9 @@ def read_question(text: str, given: Given | None = None) -> AskedSentence:
         raise QueryError(
             f"The sentence has {len(text)} characters, more than {MOST_CHARACTERS}; say it shorter, like: {_EXAMPLE}."
         )
+    language = language_of(text)
+    if language is not None:
+        raise QueryError(ASK.format(language=language))
     sentence = Sentence(text, given)
     named = by_name(sentence)
     if named is not None:
@@ -131,6 +136,9 @@ def _likely(reads: Sequence[Read], sentence: Sentence, limits: Limits) -> Inquir
     alike = sum(one.probability for one in reads if isinstance(one.meaning, Inquiry) and one.meaning.of == best.of)
     if alike < (limits.question_doubtful if is_doubtful(sentence.tokens, reads[0].used) else limits.question):
         raise QueryError(f"{sentence.text.strip()[:80]!r} is not understood; say it like: {_EXAMPLE}.")
+    back = unmet_by(sentence.tokens, best, reads[0].used)
+    if back is not None:
+        raise QueryError(back)
     return best
 
 

@@ -49,11 +49,13 @@ def rephrased(tokens: Sequence[Token]) -> tuple[list[Token], list[str]]:
 
 
 def _joined(tokens: Sequence[Token]) -> list[Token]:
-    """Return tokens with "counter clockwise" as one word."""
+    """Return tokens with "counter clockwise" as one word, and "sleep(5)" as a wait."""
     found: list[Token] = []
     for token in tokens:
         if token.text == "clockwise" and found and found[-1].text in ("counter", "anti"):
             token = _word(found.pop(), "counterclockwise")
+        elif (token.kind == "number" or token.text == "(") and found and found[-1].text == "sleep":
+            found[-1] = _word(found[-1], "wait")
         found.append(token)
     return found
 
@@ -169,14 +171,17 @@ def _delay(tokens: list[Token], at: int) -> tuple[int, int] | None:
     """Return the time of a delay that begins at a token, and where the delay ends: "in five minutes"."""
     if tokens[at].text not in ("in", "after"):
         return None
-    ends = [end for end, _ in lexer.duration_at(tokens, at + 1)]
+    first = at + 1
+    if tokens[first : first + 1] and tokens[first].text == "a" and tokens[first + 1 : first + 2]:
+        first += tokens[first + 1].text in ("quarter", "half", "third")
+    ends = [end for end, _ in lexer.duration_at(tokens, first)]
     if not ends or (
         tokens[at + 1].text in ("a", "another") and tokens[at + 2].text in ("moment", "second", "sec", "bit")
     ):
         return None
     end = max(ends)
     end += end < len(tokens) and tokens[end].text == "time"
-    return (at + 1, end) if end >= len(tokens) or tokens[end].text not in ("of", "ago", "'s") else None
+    return (first, end) if end >= len(tokens) or tokens[end].text not in ("of", "ago", "'s") else None
 
 
 def _looped(tokens: list[Token]) -> list[Token]:

@@ -24,7 +24,7 @@ def forbidden(tokens: Sequence[Token]) -> Clarify | Refuse | None:
     said = Said(tokens)
     if said.spans("unsafe") or _through(said):
         return Refuse(Reason.HARM)
-    if said.spans("questions"):
+    if said.spans("risks") or said.spans("questions"):
         return Refuse(Reason.QUESTION)
     return _signed(said)
 
@@ -56,6 +56,8 @@ def _signed(said: Said) -> Clarify | None:
     """Return the question for a number with a sign: -90 degrees are right for some and left for others."""
     tokens = list(said.tokens)
     for at, text in enumerate(said.texts):
+        if text in ("<", ">") and tokens[at].raw == text and lexer.number_at(tokens, at + 1):
+            return Clarify(f"What does '{text} {said.texts[at + 1]}' mean? Say only where to go.")
         if text not in ("minus", "negative", "plus", "-", "+") or not lexer.number_at(tokens, at + 1):
             continue
         if text == "-" and said.texts[at - 1 : at] == (".",):

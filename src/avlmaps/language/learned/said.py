@@ -42,7 +42,7 @@ class Words:
 def words() -> Words:
     """Return the phrases and lists that ship."""
     told = tomllib.loads(files("avlmaps.language").joinpath("claims.toml").read_text(encoding="utf-8"))
-    classes = ("away", "farthest", "nearest", "leaving", "excluded", "choosing", "ways", "unsafe", "questions")
+    classes = ("away", "farthest", "nearest", "leaving", "excluded", "choosing", "ways", "unsafe", "risks", "questions")
     phrases: dict[str, dict[str, list[tuple[str, ...]]]] = {name: {} for name in classes}
     for name in classes:
         for phrase in expanded(told[name]):

@@ -6,18 +6,35 @@ reading becomes the rule's question, so that nothing moves on half of a sentence
 """
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 from avlmaps.core.lexicon import Kind as Entries
 from avlmaps.core.lexicon import lexicon
 from avlmaps.language import lexer
-from avlmaps.language.intents import Beside, Clarify, Face, Intent, Move, Pick, Reason, Refuse, Side, StopAt, Turn
+from avlmaps.language.intents import (
+    Ask,
+    Beside,
+    Clarify,
+    Face,
+    Go,
+    Inquiry,
+    Intent,
+    Move,
+    Pick,
+    Reason,
+    Refuse,
+    Side,
+    StopAt,
+    Turn,
+)  # fmt: skip
 from avlmaps.language.learned.linear import amount_end
-from avlmaps.language.learned.said import BREAKS, DETERMINERS, LOOKS, PREPOSITIONS, Claimed, words
+from avlmaps.language.learned.said import BREAKS, DETERMINERS, LOOKS, PREPOSITIONS, Claimed, Said, words
 from avlmaps.language.learned.ways import directions
 from avlmaps.language.lexer import Token
 from avlmaps.perception.embedded.words import is_word
 
 _MOTIONS = frozenset({"go", "drive", "head", "move", "turn", "face", "visit", "come", "do"})
+_ANYTHING = frozenset({"something", "anything", "somewhere", "anywhere", "someplace"})
 _HERE = frozenset({
     "from", "here", "you", "yourself", "robot", "your", "current", "position", "the", "where", "are", "stand", "now",
 })  # fmt: skip
@@ -26,7 +43,11 @@ _NO_SUPERLATIVES = frozenset({
     "contest", "priest", "conquest", "nearest", "closest", "farthest", "furthest", "farest", "latest", "remotest",
     "guest", "guests", "chest", "crest", "quest", "wrest",
 })  # fmt: skip
-_VAGUE = frozenset({"a", "an", "one", "another", "half", "quarter", "couple", "few", "several", "some"})
+_ONLY_ORDERS = frozenset({("skip",), ("skipping",), ("avoid",), ("avoiding",), ("exclude",), ("bypass",), ("never",)})
+_ORDINALS = frozenset({"second", "third", "fourth", "fifth", "last", "next", "previous"})
+_NUMBERED = frozenset({"floor", "class", "storey", "story", "level", "hand"})
+_VAGUE = frozenset({"a", "an", "one", "another"})
+_COUNTED = frozenset({"times", "turns", "revolutions", "rotations", "spins", "laps", "rounds", "circles", "loops"})
 
 
 def _away(said: Claimed) -> Clarify | None:
@@ -97,7 +118,7 @@ def _excluded(said: Claimed) -> Clarify | Refuse | None:
     breaks = BREAKS - {"to", "for", "after", "before"}
     for start, end in said.spans("excluded"):
         phrase = said.texts[start:end]
-        if phrase in (("skip",), ("avoid",), ("exclude",), ("bypass",), ("never",)) and not said.is_order(start):
+        if phrase in _ONLY_ORDERS and not said.is_order(start):
             continue
         scope = said.scope(end, breaks)
         again = min((at for at in scope if at > end + 1 and said.texts[at] in _MOTIONS), default=len(said.tokens))
@@ -107,7 +128,10 @@ def _excluded(said: Claimed) -> Clarify | Refuse | None:
         )
         if idiom:
             continue
-        if said.names_in(scope) or (phrase in choosing and scope):
+        lacks = phrase in choosing or (
+            phrase == ("without",) and not words().lists["manners"].intersection(said.texts[end : end + 1])
+        )
+        if said.names_in(scope) or (lacks and scope):
             return Refuse(Reason.NEGATION)
         one = said.texts[end : end + 1] in (("one",), ("ones",)) and len(said.content(scope)) > 1
         if one and phrase[0] in ("not", "but", "and") and not any(t.pick is Pick.OTHER for t in said.targets):
@@ -131,7 +155,11 @@ def _ways(said: Claimed) -> Clarify | None:
 
 
 def _superlatives(said: Claimed) -> Clarify | None:
-    """Return the question for "the quietest room": no map says which that is."""
+    """Return the question for "the quietest room", "the second door": no map says which that is."""
+    for target in said.targets:
+        for name in (target.name.split(), *(near.name.split() for near in target.near)):
+            if len(name) > 1 and name[0] in _ORDINALS and name[1] not in _NUMBERED and not _is_entry(" ".join(name)):
+                return Clarify(f"I cannot choose the {' '.join(name)} from the map. Say what it is near.")
     for at, text in enumerate(said.texts):
         if at in said.named and (is_superlative(text) or said.texts[max(0, at - 2) : at] == ("the", "most")):
             return Clarify(f"I cannot choose the {text} from the map. Say what it is near.")
@@ -144,6 +172,10 @@ def _superlatives(said: Claimed) -> Clarify | None:
         ):
             return Clarify(f"I cannot choose by '{text} {said.texts[at + 1]}' from the map. Name the thing.")
     return None
+
+
+def _is_entry(name: str) -> bool:
+    return any(lexicon().find(name, kind) is not None for kind in (Entries.THING, Entries.ROOM))
 
 
 def _is_quality(said: Claimed, at: int) -> bool:
@@ -175,7 +207,10 @@ def is_superlative(word: str) -> bool:
 
 
 def _nameless(said: Claimed) -> Clarify | None:
-    """Return the question for "my room", "the object": a name that leaves open which one."""
+    """Return the question for "my room", "something to sit on": a name that leaves open which one."""
+    for before, text in pairwise(said.texts):
+        if before in ("to", "towards", "toward", "find", "visit", "near", "approach") and text in _ANYTHING:
+            return Clarify(f"Which thing is '{text}'? Name it.")
     for target in said.targets:
         bare = target.name.split()
         if bare and bare[-1] in words().lists["anyone"] and not target.near and not target.pick and _says_nothing(bare):
@@ -207,7 +242,9 @@ def _amounts(said: Claimed) -> Clarify | None:
         return None
     read = {at for start in said.used for at in range(start, max(start + 1, amount_end(tokens, start)))}
     for at, token in enumerate(tokens):
-        if at in read or (token.kind != "number" and token.text in _VAGUE) or not _has_unit(tokens, at):
+        if at in read or (token.kind != "number" and token.text in _VAGUE):
+            continue
+        if not _has_unit(tokens, at) and not _is_count(tokens, at):
             continue
         phrase = " ".join(said.texts[at : amount_end(tokens, at)])
         return Clarify(f"What is '{phrase}' for? Say each step with its own distance, angle or time.")
@@ -234,6 +271,15 @@ def _sides(said: Claimed) -> Clarify | None:
     return None
 
 
+def _is_count(tokens: list[Token], at: int) -> bool:
+    """Return whether a number of turns or rounds begins at a token: "three full revolutions"."""
+    for end, value in lexer.number_at(tokens, at):
+        after = [token.text for token in tokens[end : end + 2] if token.text not in ("full", "complete", "whole")]
+        if value > 1 and after[:1] and after[0] in _COUNTED:
+            return True
+    return False
+
+
 def _has_unit(tokens: list[Token], at: int) -> bool:
     return any(read(tokens, at) for read in (lexer.length_at, lexer.angle_at, lexer.duration_at))
 
@@ -241,6 +287,25 @@ def _has_unit(tokens: list[Token], at: int) -> bool:
 _RULES: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
     _away, _picked, _leaving, _excluded, _ways, _superlatives, _nameless, _unread, _amounts, _sides,
 )  # fmt: skip
+
+
+_ASKED: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
+    _picked, _excluded, _superlatives, _nameless, _unread, _amounts,
+)  # fmt: skip
+
+
+def unmet_by(tokens: Sequence[Token], inquiry: Inquiry, used: frozenset[int]) -> str | None:
+    """Return the question back for what a question claims and its reading leaves out; None where it does all."""
+    if Said(tokens).spans("risks"):
+        return "A map cannot judge what is safe or allowed; ask where things and sounds are."
+    said = Claimed(tokens, tuple(Go(target) for target in inquiry.of), used)
+    if _away(said) is not None:
+        return "A map finds what is near something, not what is far from it; say what it is near."
+    rules = (rule for rule in _ASKED if inquiry.ask is Ask.WHERE or rule is not _nameless)
+    found = next((found for rule in rules if (found := rule(said)) is not None), None)
+    if isinstance(found, Refuse):
+        return "A map finds what is named, not what is left out; say only what is sought."
+    return None if found is None else found.question
 
 
 def unmet(tokens: Sequence[Token], intents: Sequence[Intent], used: frozenset[int]) -> Clarify | Refuse | None:
