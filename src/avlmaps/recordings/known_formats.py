@@ -7,7 +7,7 @@ recognise a folder; ``--format NAME`` chooses.
 
 import importlib
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from functools import cache
@@ -37,7 +37,7 @@ class Format:
         matches: the same as a quick test.
         opener: ``package.module:function``, called with the path (and ``report=`` if it reports faults one by one).
         tells_faults: whether the opener takes ``report``.
-        has_topics: whether the opener takes topics by name.
+        has_topics: whether the opener takes topics by name, and several files of one recording.
     """
 
     name: str
@@ -47,16 +47,32 @@ class Format:
     tells_faults: bool = True
     has_topics: bool = False
 
-    def open(self, path: Path, report: Report = stop_at_first, topics: Mapping[str, str] | None = None) -> Recording:
+    def open(
+        self,
+        path: Path,
+        report: Report = stop_at_first,
+        topics: Mapping[str, str] | None = None,
+        more: Sequence[Path] = (),
+    ) -> Recording:
         """Open a recording with this format's opener.
 
+        Args:
+            path: the recording.
+            report: called with every fault.
+            topics: names by what they are for.
+            more: further files of the same recording.
+
         Raises:
-            RecordingError: it cannot be used, or topics are named and this format has none.
+            RecordingError: it cannot be used, or topics or further files are named and this format has none.
         """
         module, _, function = self.opener.partition(":")
         opener = getattr(importlib.import_module(module), function)
         if self.has_topics:
-            recording = opener(path, topics or {})
+            recording = opener(path, topics or {}, more)
+        elif more:
+            raise RecordingError(
+                f"{path} is of the format {self.name}, which is one folder or file; leave {more[0]} out."
+            )
         elif topics:
             raise RecordingError(f"{path} is of the format {self.name}, which has no topics; leave them out.")
         else:
@@ -100,7 +116,8 @@ def _later(target: str) -> Callable[[Path], bool]:
 def _is_rosbag(path: Path) -> bool:
     if not path.is_dir():
         return path.suffix.lower() in _BAG_SUFFIXES
-    return (path / "metadata.yaml").exists() and some_name(path, "*.db3", "*.mcap", "*.db3.*", "*.mcap.*")
+    packed = (path / "metadata.yaml").exists() and some_name(path, "*.db3.*", "*.mcap.*")
+    return packed or some_name(path, *(f"*{suffix}" for suffix in _BAG_SUFFIXES))
 
 
 FORMATS: tuple[Format, ...] = (
@@ -132,7 +149,7 @@ FORMATS: tuple[Format, ...] = (
     ),
     Format(
         "rosbag",
-        "a .bag or .mcap file, or a ROS 2 bag's folder with metadata.yaml",
+        "a .bag, .mcap or .db3 file, or a folder of them",
         _is_rosbag,
         f"{_HERE}.rosbag:open_rosbag",
         tells_faults=False,

@@ -1,7 +1,7 @@
 """Opening a recording of any known format in place, found by what the folder or file holds."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 
@@ -17,7 +17,7 @@ _MAP = "map.json"
 
 
 def open_recording(
-    path: Path | str,
+    path: Path | str | Sequence[Path | str],
     format: str = "auto",
     audio: Path | str | None = None,
     topics: Mapping[str, str] | None = None,
@@ -26,7 +26,7 @@ def open_recording(
     """Open a recording in place: nothing is copied, and no picture is read before it is needed.
 
     Args:
-        path: a folder or a file.
+        path: a folder or a file; of a bag that was split, all of its files.
         format: one of the names in ``FORMATS``, or ``auto`` to find out.
         audio: another sound track, beginning with the recording; it takes the place of the recording's own.
         topics: of a ROS bag, by what they are for (``rgb``, ``depth``, ``pose``, ``audio``); the others are found.
@@ -36,11 +36,11 @@ def open_recording(
         RecordingError: there is nothing there, it is of no known format, or it cannot be used.
         AudioError: the sound track cannot be used.
     """
-    path = Path(path)
+    path, *more = [Path(path)] if isinstance(path, str | Path) else map(Path, path)
     found = find_format(path, format)
     if audio is not None and found.has_topics and not (topics or {}).get("audio"):
         topics = {**(topics or {}), "audio": "none"}  # its own sound need not be readable
-    recording = found.open(path, topics=topics)
+    recording = found.open(path, topics=topics, more=more)
     if audio is not None:
         recording.audio = AudioTrack.open(Path(audio))
         recording.notices = (*recording.notices, *recording.audio.notices)

@@ -105,13 +105,13 @@ def _decoded(content: Any, name: str, camera: Pinhole | None, colour: bool) -> n
 
 
 def _decompressed_depth(message: Any, name: str, camera: Pinhole | None) -> Float32[np.ndarray, "h w"]:
-    """Undo `compressed_depth_image_transport`: a 12-byte header, then PNG; 32FC1 travels as quantised inverse depth."""
-    if "rvl" in message.format.lower():
-        raise RecordingError(
-            f"The depth {name} is RVL-compressed; republish it as PNG compressedDepth or as raw images."
-        )
+    """Undo `compressed_depth_image_transport`: a 12-byte header, then PNG or RVL; of 32FC1 the inverse, quantised."""
     raw = np.asarray(message.data, np.uint8)
-    picture = _decoded(raw[12:] if "compressedDepth" in message.format else raw, name, camera, colour=False)
+    inside = raw[12:] if "compressedDepth" in message.format else raw
+    if "rvl" in message.format.lower():
+        picture = _rvl(inside.tobytes(), name, camera)
+    else:
+        picture = _decoded(inside, name, camera, colour=False)
     if picture.ndim != 2 or picture.dtype != np.uint16:
         raise RecordingError(f"The depth {name} is not a 16-bit picture of one channel; republish as 16UC1 or 32FC1.")
     if not message.format.startswith("32FC1"):
@@ -120,6 +120,20 @@ def _decompressed_depth(message: Any, name: str, camera: Pinhole | None) -> Floa
     inverse = picture.astype(np.float32)
     valid = inverse > 0
     return np.where(valid, a / np.where(valid, inverse - b, 1.0), 0.0).astype(np.float32)
+
+
+def _rvl(content: bytes, name: str, camera: Pinhole | None) -> np.ndarray:
+    """Decode RVL: columns and rows as int32, then the picture."""
+    from avlmaps.core.rvl import decode_rvl
+
+    width, height = struct.unpack_from("<ii", content) if len(content) >= 8 else (0, 0)
+    expected = (width, height) if camera is None else (camera.width, camera.height)
+    if (width, height) != expected or not 0 < width * height <= MOST_PIXELS:
+        raise RecordingError(f"The depth {name} says that it is {width}x{height}; its calibration says otherwise.")
+    try:
+        return decode_rvl(content[8:], width, height)
+    except ValueError as error:
+        raise RecordingError(f"The depth {name} cannot be decoded ({error}); it is cut short or damaged.") from None
 
 
 def camera_of(info: Any, name: str) -> tuple[Pinhole, bool]:

@@ -1,16 +1,18 @@
-"""ROS 1 bags, ROS 2 bags and MCAP files, read in place through `rosbags`; no ROS is needed.
+"""ROS 1 bags, ROS 2 bags and MCAP files (of ROS or Foxglove), read in place; no ROS is needed.
 
 Topics are found by type, or named: ``{"rgb": "/camera/color/image_raw", "pose": "/odom"}``. The pose of the
 depth camera comes from /tf where the tree reaches from the camera to a world that it moves in, else from odometry
-or a pose topic together with the static transforms from the body to the camera. World: the tree's root (``map``,
-``odom``), which by ROS's own convention (REP 103) has z up.
+or a pose topic together with the static transforms from the body to the camera, or a file of poses. World: the tree's
+root (``map``, ``odom``), which by ROS's own convention (REP 103) has z up. Where there are no depth images, the point
+clouds of a LiDAR are projected into the colour camera.
 """
 
 import hashlib
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -18,28 +20,27 @@ import numpy as np
 
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.poses import apply, inverse
 from avlmaps.core.timeline import associate, gap_notices, in_order
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.content import add_files, stamp_of
-from avlmaps.recordings.formats.bag_files import Bag, check_files
+from avlmaps.recordings.formats import ros_clouds
+from avlmaps.recordings.formats.bag_files import Bag
 from avlmaps.recordings.formats.ros_audio import STAMPED, Pcm, extract_audio
-from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of, pose_of
+from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of
+from avlmaps.recordings.formats.ros_motion import base_height, find_motion, is_tf, no_pose, read_tf
 from avlmaps.recordings.formats.ros_transforms import TransformTree
 from avlmaps.recordings.plausible import plausible_walk
-from avlmaps.recordings.types import BaseHeight, Frame, Recording
+from avlmaps.recordings.types import Frame, Recording
 
 _IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _INFO_TYPES = ("sensor_msgs/msg/CameraInfo",)
-_POSE_TYPES = (
-    "nav_msgs/msg/Odometry",
-    "geometry_msgs/msg/PoseWithCovarianceStamped",
-    "geometry_msgs/msg/PoseStamped",
-)
-_TRANSFORM_TYPE = "geometry_msgs/msg/TransformStamped"
 _AUDIO_INFO_TYPES = ("audio_common_msgs/msg/AudioInfo",)
 _AUDIO_TYPES = ("audio_common_msgs/msg/AudioData", "audio_common_msgs/msg/AudioDataStamped", STAMPED)
 # A colour and a depth picture at most this far apart are taken for one moment.
 PAIRING_TOLERANCE_S = 0.05
+# A LiDAR turns ten times a second: the nearest picture is at most half a turn away.
+CLOUD_TOLERANCE_S = 0.06
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +49,8 @@ class RosTopics:
 
     Attributes:
         rgb: colour images (raw or compressed).
-        depth: depth images (raw or compressedDepth).
-        pose: odometry, or poses of the camera or the body; empty: /tf first.
+        depth: depth images (raw or compressedDepth), or point clouds.
+        pose: odometry, poses of the camera or the body, transforms, or a file of poses; empty: /tf first.
         audio: audio data; ``none`` leaves the sound out.
         audio_pcm: no topic: ``16000,1`` says that audio data are plain 16-bit samples, 16,000 a second, in one channel.
     """
@@ -61,12 +62,13 @@ class RosTopics:
     audio_pcm: str = ""
 
 
-def open_rosbag(path: Path, topics: Mapping[str, str] | None = None) -> "RosbagRecording":
-    """Open a ROS 1 ``.bag``, a ROS 2 bag's folder, an ``.mcap`` or a ``.db3`` file.
+def open_rosbag(path: Path, topics: Mapping[str, str] | None = None, more: Sequence[Path] = ()) -> "RosbagRecording":
+    """Open a ROS 1 ``.bag``, a ROS 2 bag's folder, an ``.mcap`` or a ``.db3`` file, or the files of one walk.
 
     Args:
-        path: the file or folder.
+        path: the file or folder; a folder may hold the files that one recording was split into.
         topics: names by what they are for, see ``RosTopics``; the others are found by type.
+        more: further files of the same walk.
 
     Raises:
         RecordingError: it cannot be read, has no depth or colour images, no calibration or no poses.
@@ -75,7 +77,7 @@ def open_rosbag(path: Path, topics: Mapping[str, str] | None = None) -> "RosbagR
     for name in topics or {}:
         if name not in known:
             raise RecordingError(f"There is no {name!r} among the topics that can be named: {', '.join(known)}.")
-    return RosbagRecording(Path(path), RosTopics(**(topics or {})))
+    return RosbagRecording(Path(path), RosTopics(**(topics or {})), more)
 
 
 class RosbagRecording(Recording):
@@ -83,25 +85,30 @@ class RosbagRecording(Recording):
 
     format = "rosbag"
 
-    def __init__(self, path: Path, topics: RosTopics) -> None:
-        check_files(path)
+    def __init__(self, path: Path, topics: RosTopics, more: Sequence[Path] = ()) -> None:
         self.path = path
-        self._bag = Bag(path)
+        self._bag = Bag(path, more)
         self._rgb_topic, self._depth_topic = _image_topics(self._bag, topics)
-        tree = TransformTree()
-        _add_tf(self._bag, "/tf_static", tree)
-        self.rig, rig_notices, camera_frame = _read_rig(self._bag, self._rgb_topic, self._depth_topic, tree)
-        rgb_s, rgb_ns = self._bag.stamps(self._rgb_topic)
-        depth_s, depth_ns = self._bag.stamps(self._depth_topic)
-        rgb_order, depth_order = in_order(rgb_s, "colour images"), in_order(depth_s, "depth images")
+        self._of_points = self._depth_topic in self._bag.topics_of(ros_clouds.TYPES)
+        named_tf = topics.pose if topics.pose and is_tf(self._bag, topics.pose) else ""
+        transforms, tf_topic = read_tf(self._bag, self._rgb_topic, named_tf)
+        mounts = transforms.mounts()
+        self.rig, rig_notices, camera_frame = _read_rig(self._bag, self._rgb_topic, self._depth_topic, mounts)
+        rgb_s, rgb_ns = _stamps(self._bag, self._rgb_topic)
+        depth_s, depth_ns = _stamps(self._bag, self._depth_topic)
+        what = "point clouds" if self._of_points else "depth images"
+        rgb_order, depth_order = in_order(rgb_s, "colour images"), in_order(depth_s, what)
         rgb, depth = rgb_order.index, depth_order.index
-        a, b = associate(depth_s[depth], rgb_s[rgb], PAIRING_TOLERANCE_S)
-        notices = [*rig_notices, *rgb_order.notices, *depth_order.notices]
+        tolerance_s = CLOUD_TOLERANCE_S if self._of_points else PAIRING_TOLERANCE_S
+        a, b = associate(depth_s[depth], rgb_s[rgb], tolerance_s)
+        notices = [*self._bag.notices, *rig_notices, *rgb_order.notices, *depth_order.notices]
         if len(a) < len(depth):
-            notices.append(f"{len(depth) - len(a)} of {len(depth)} depth images have no colour image within 50 ms.")
-        stamps_s = depth_s[depth][a]
-        pose_topic = _add_motion(self._bag, topics, camera_frame, tree)
-        self.topics = {"rgb": self._rgb_topic, "depth": self._depth_topic, "pose": pose_topic}
+            lost, within = len(depth) - len(a), f"{1000 * tolerance_s:.0f} ms"
+            notices.append(f"{lost} of {len(depth)} {what} have no colour image within {within}.")
+        stamps_s = rgb_s[rgb][b] if self._of_points else depth_s[depth][a]
+        motion = find_motion(self._bag, topics.pose, camera_frame, transforms, tf_topic)
+        tree = motion.tree
+        self.topics = {"rgb": self._rgb_topic, "depth": self._depth_topic, "pose": motion.topic}
         if cycle := tree.cycle(camera_frame):
             raise RecordingError(
                 f"The transforms of {path} go round in a circle ({cycle}), so that the camera {camera_frame!r} is "
@@ -109,7 +116,12 @@ class RosbagRecording(Recording):
             )
         poses, known = tree.root_from(camera_frame, stamps_s)
         if not known.any():
-            raise RecordingError(_no_pose(path, camera_frame, stamps_s, tree))
+            raise RecordingError(no_pose(path, camera_frame, stamps_s, tree))
+        if self._of_points:
+            self._camera_from_cloud, seen = _clouds_in_cameras(
+                self._bag, self._depth_topic, camera_frame, tree, depth_s[depth][a], poses
+            )
+            known &= seen
         if not known.all():
             notices.append(
                 f"{int((~known).sum())} of {len(known)} frames lie outside of the known poses and are left out."
@@ -119,14 +131,16 @@ class RosbagRecording(Recording):
         if walk.fault:
             raise RecordingError(f"{path}: {walk.fault}")
         rows = rows[walk.index]
-        notices += [*tree.notices, *walk.notices]
+        notices += [*motion.notices, *tree.notices, *tree.seldom(camera_frame, stamps_s), *walk.notices]
+        if self._of_points:
+            self._camera_from_cloud = self._camera_from_cloud[rows]
         self._start_s = float(stamps_s[rows[0]])
         self.stamps_s = stamps_s[rows] - self._start_s
         self.world_from_camera = poses[rows]
         self._rgb_at = [(int(rgb_ns[rgb[i]]), float(rgb_s[rgb[i]])) for i in b[rows]]
         self._depth_at = [(int(depth_ns[depth[i]]), float(depth_s[depth[i]])) for i in a[rows]]
-        self.up_in_world = np.array([0.0, 0.0, 1.0])
-        self.base_height = _base_height(tree, camera_frame, float(stamps_s[rows[0]]))
+        self.up_in_world = np.array([0.0, 0.0, 1.0]) if motion.z_is_up else None
+        self.base_height = base_height(tree, camera_frame, float(stamps_s[rows[0]]))
         self.audio, audio_notices = self._read_audio(topics)
         self.notices = (*notices, *gap_notices(self.stamps_s, "frames"), *audio_notices)
 
@@ -137,7 +151,12 @@ class RosbagRecording(Recording):
         rgb = colour_of(self._bag.message_at(self._rgb_topic, received_ns, stamp_s), name, self.rig.rgb)
         received_ns, stamp_s = self._depth_at[index]
         name = f"{self._depth_topic} at {stamp_s:.3f} s"
-        depth_m = depth_of(self._bag.message_at(self._depth_topic, received_ns, stamp_s), name, self.rig.depth)
+        message = self._bag.message_at(self._depth_topic, received_ns, stamp_s)
+        if self._of_points:
+            points = apply(self._camera_from_cloud[index], ros_clouds.points_of(message, name))
+            depth_m = ros_clouds.depth_of_points(points, self.rig.depth)
+        else:
+            depth_m = depth_of(message, name, self.rig.depth)
         for picture, camera in ((rgb, self.rig.rgb), (depth_m, self.rig.depth)):
             if picture.shape[:2] != (camera.height, camera.width):
                 raise RecordingError(
@@ -160,6 +179,8 @@ class RosbagRecording(Recording):
     @property
     def stored_depth_unit_m(self) -> float:
         """Metres of one unit of the depth messages: 1 for floats, which are metres (REP 118), else a millimetre."""
+        if self._of_points:
+            return 1.0
         received_ns, stamp_s = self._depth_at[0]
         message = self._bag.message_at(self._depth_topic, received_ns, stamp_s)
         encoding = getattr(message, "encoding", None) or getattr(message, "format", "")
@@ -170,7 +191,8 @@ class RosbagRecording(Recording):
         return stamp_of(self.path.parent, (), self._files())
 
     def _files(self) -> list[Path]:
-        return sorted(file for file in self.path.rglob("*") if file.is_file()) if self.path.is_dir() else [self.path]
+        inside = (sorted(file.rglob("*")) if file.is_dir() else [file] for file in self._bag.files)
+        return [file for files in inside for file in files if file.is_file()]
 
     def _read_audio(self, topics: RosTopics) -> tuple[AudioTrack | None, tuple[str, ...]]:
         pcm = Pcm.parse_rate(topics.audio_pcm) if topics.audio_pcm else None
@@ -190,46 +212,32 @@ class RosbagRecording(Recording):
         return extract_audio(self._bag.messages(found[0]), info, found[0], folder, self._start_s, pcm)
 
 
-def _no_pose(path: Path, camera_frame: str, stamps_s: np.ndarray, tree: TransformTree) -> str:
-    span = tree.span_s(camera_frame)
-    when = f" (they go from {stamps_s[0]:.3f} to {stamps_s[-1]:.3f} s)" if len(stamps_s) else ""
-    poses = f"; its poses go from {span[0]:.3f} to {span[1]:.3f} s, so check that both use one clock" if span else ""
-    return (
-        f"{path} has no pose of its camera frame {camera_frame!r} at the time of any of its {len(stamps_s)} "
-        f"images{when}{poses}; record /tf, /tf_static or odometry, or name the topic (pose=/odom)."
-    )
-
-
-def _base_height(tree: TransformTree, camera_frame: str, stamp_s: float) -> BaseHeight | None:
-    """Return how far the robot's base lies below the camera; by REP 120 ``base_footprint`` lies on the floor."""
-    at_s = np.array([stamp_s])
-    camera, _ = tree.root_from(camera_frame, at_s)
-    for name, on_floor in (("base_footprint", True), ("base_link", False)):
-        if tree.root(name) != tree.root(camera_frame):  # the bag has no such frame, or not in this tree
-            continue
-        base, known = tree.root_from(name, at_s)
-        below_m = float(camera[0, 2, 3] - base[0, 2, 3])
-        if known[0] and below_m > 0.0:
-            return BaseHeight(below_m, on_floor)
-    return None
-
-
 def _image_topics(bag: Bag, topics: RosTopics) -> tuple[str, str]:
-    images = bag.topics_of(_IMAGE_TYPES)
+    images, clouds = bag.topics_of(_IMAGE_TYPES), bag.topics_of(ros_clouds.TYPES)
     every = ", ".join(images) or "none"
-    for topic in (topics.rgb, topics.depth):
-        if topic and topic not in images:
+    for topic, known in ((topics.rgb, images), (topics.depth, [*images, *clouds])):
+        if topic and topic not in known:
             raise RecordingError(f"{bag.path} has no image topic {topic!r}; its image topics are: {every}.")
     depth = topics.depth or _pick([t for t in images if "depth" in t.lower()], ("align", "registered"))
     rgb = topics.rgb or _pick(
         [t for t in images if t != depth and "depth" not in t.lower()], ("color", "rgb", "colour")
     )
+    depth = depth or next(iter(clouds), "")
     if not depth or not rgb:
         missing, name = ("depth", "depth") if not depth else ("colour", "rgb")
         raise RecordingError(
-            f"{bag.path} has no topic of {missing} images (image topics: {every}); name it ({name}=TOPIC)."
+            f"{bag.path} has no topic of {missing} images (image topics: {every}); name it "
+            f"({name}=TOPIC).{_other_topics(bag)}"
         )
     return rgb, depth
+
+
+def _other_topics(bag: Bag) -> str:
+    """Return a sentence about what a bag without images holds, or nothing."""
+    types = sorted(set(bag.topics.values()))
+    if bag.topics_of(_IMAGE_TYPES) or not types:
+        return ""
+    return f" It holds messages of: {', '.join(types[:8])}{' ...' if len(types) > 8 else ''}."
 
 
 def _pick(candidates: list[str], better: tuple[str, ...]) -> str:
@@ -243,7 +251,8 @@ def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree)
     cameras: dict[str, Any] = {}
     notices: list[str] = []
     frames: dict[str, str] = {}
-    for topic in (rgb_topic, depth_topic):
+    of_points = depth_topic in bag.topics_of(ros_clouds.TYPES)
+    for topic in (rgb_topic,) if of_points else (rgb_topic, depth_topic):
         info_topic = _info_topic(bag, topic)
         if not info_topic and topic == depth_topic:  # drivers that register depth often publish one calibration
             info_topic = _info_topic(bag, rgb_topic)
@@ -261,6 +270,10 @@ def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree)
             )
         image = next(iter(bag.messages(topic)), None)
         frames[topic] = (image[1] if image else first[1]).header.frame_id
+    if of_points:
+        rgb = cameras[rgb_topic]
+        notices.append(f"Depth is that of the points of {depth_topic}, as the camera of {rgb_topic} sees them.")
+        return Rig(rgb, ros_clouds.cloud_camera(rgb)), notices, frames[rgb_topic]
     rgb_from_depth = mounts.fixed(frames[rgb_topic], frames[depth_topic])
     if rgb_from_depth is None:
         rgb_from_depth = np.eye(4)
@@ -271,60 +284,41 @@ def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree)
 
 
 def _info_topic(bag: Bag, image_topic: str) -> str:
-    """Return the calibration published beside an image topic, or nothing."""
+    """Return the calibration published beside an image topic, or one of another name for its frame, or nothing."""
     infos = bag.topics_of(_INFO_TYPES)
     parts = image_topic.split("/")
     for length in range(len(parts) - 1, 0, -1):
-        beside = "/".join([*parts[:length], "camera_info"])
-        if beside in infos:
-            return beside
-    return ""
+        for name in ("camera_info", "info/camera_info"):  # the latter as RealSense's viewer has it
+            if (beside := "/".join([*parts[:length], name])) in infos:
+                return beside
+    image = next(iter(bag.messages(image_topic)), None)
+    frame = image[1].header.frame_id if image else ""
+    others = [topic for topic in infos if frame and not topic.endswith("/camera_info")]
+    alike = [t for t in others for _, info in islice(bag.messages(t), 1) if info.header.frame_id == frame]
+    return max(alike, key=lambda topic: sum(a == b for a, b in zip(topic, image_topic, strict=False)), default="")
 
 
-def _add_tf(bag: Bag, topic: str, tree: TransformTree) -> None:
-    for _, message in bag.messages(topic):
-        for transform in message.transforms:
-            stamp = transform.header.stamp
-            stamp_s = stamp.sec + stamp.nanosec * 1e-9
-            static = topic == "/tf_static"
-            tree.add(transform.header.frame_id, transform.child_frame_id, pose_of(transform), stamp_s, static)
-
-
-def _check_pose_topic(bag: Bag, topic: str) -> None:
-    found = sorted({connection.msgtype for connection in bag.connections(topic)})
-    if not found:
-        raise RecordingError(f"{bag.path} has no topic {topic!r}; name one that it has (pose=TOPIC).")
-    if not set(found) & {*_POSE_TYPES, _TRANSFORM_TYPE}:
-        known = ", ".join(kind.rsplit("/", 1)[1] for kind in (*_POSE_TYPES, _TRANSFORM_TYPE))
+def _stamps(bag: Bag, topic: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the header stamps (s) and receive times (ns) of a topic, where its driver set stamps at all."""
+    stamps_s, received_ns = bag.stamps(topic)
+    if len(stamps_s) > 1 and not stamps_s.any():
         raise RecordingError(
-            f"{topic!r} of {bag.path} is of the type {found[0]}, which holds no poses; name a topic of {known}."
+            f"All {len(stamps_s)} header stamps of {topic} in {bag.path} are zero, so that nothing says where its "
+            "camera was; let its driver set them, and record again."
         )
+    return stamps_s, received_ns
 
 
-def _add_motion(bag: Bag, topics: RosTopics, camera_frame: str, tree: TransformTree) -> str:
-    """Add to the tree of mounts what moves the camera: /tf, else odometry or a pose topic; return which."""
-    if not topics.pose:
-        _add_tf(bag, "/tf", tree)
-        if tree.moves(camera_frame):
-            return "/tf"
-    if topics.pose:
-        _check_pose_topic(bag, topics.pose)
-    candidates = [topics.pose] if topics.pose else bag.topics_of(_POSE_TYPES)
-    if not candidates:
+def _clouds_in_cameras(
+    bag: Bag, topic: str, camera_frame: str, tree: TransformTree, stamps_s: np.ndarray, world_from_camera: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return ``camera_from_cloud`` of each cloud, taken at its own stamp, and where it is known."""
+    first = next(iter(bag.messages(topic)), None)
+    frame = first[1].header.frame_id if first else ""
+    if tree.root(frame) != tree.root(camera_frame):
         raise RecordingError(
-            f"{bag.path} has no poses: no /tf that moves {camera_frame!r}, no odometry and no pose topic; "
-            "record one of them."
+            f"No transform of {bag.path} links the LiDAR {frame!r} of {topic} to the camera {camera_frame!r}; record "
+            "/tf_static with both."
         )
-    body = ""
-    for _, message in bag.messages(candidates[0]):
-        stamp = message.header.stamp
-        body = getattr(message, "child_frame_id", "") or camera_frame
-        tree.add(
-            message.header.frame_id or "world", body, pose_of(message), stamp.sec + stamp.nanosec * 1e-9, static=False
-        )
-    if not tree.moves(camera_frame):
-        raise RecordingError(
-            f"{bag.path} has poses of {body!r} on {candidates[0]} but no static transform from there to the camera "
-            f"{camera_frame!r}; record /tf_static."
-        )
-    return candidates[0]
+    world_from_cloud, known = tree.root_from(frame, stamps_s)
+    return inverse(world_from_camera) @ world_from_cloud, known
