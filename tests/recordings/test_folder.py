@@ -213,7 +213,7 @@ def test_a_clock_that_was_set_back_costs_the_shorter_part_and_no_more(tmp_path: 
         ({"depth_units_per_m": 0}, "recording.json: depth_units_per_m is 0; it must be positive and at most 1e+06, 10"),
         ({"depth_units_per_m": 1e300}, "depth_units_per_m is 1e+300; it must be positive and at most 1e+06, 1000 for"),
         ({"rgb_rate_hz": -1}, "recording.json: rgb_rate_hz is -1.0; it must be positive; fix the file."),
-        ({"depth_scale": 5000}, "recording.json: object contains unknown field `depth_scale`; fix the file."),
+        ({"depth_scale": 5000}, "recording.json: the key 'depth_scale' is not known; known there are schema_version, "),
         ({"world_from_camera": "opengl"}, "recording.json at world_from_camera: invalid enum value 'opengl'; fix"),
         ({"up_in_world": [0, 0, 9.81]}, "it must be a unit vector, or null where up is not known; fix the file."),
         ({"intrinsics": {}}, "recording.json at intrinsics: object missing required field `rgb`; fix the file."),
@@ -352,7 +352,7 @@ def test_a_copy_takes_its_sound_track_along(tmp_path: Path):
     assert audio is not None and audio.start_s == -0.25 and audio.duration_s == pytest.approx(0.5)
 
 
-def test_opening_five_thousand_frames_opens_no_picture_and_takes_little_memory(
+def test_opening_five_thousand_frames_opens_few_pictures_and_takes_little_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     count = 5_000
@@ -372,7 +372,8 @@ def test_opening_five_thousand_frames_opens_no_picture_and_takes_little_memory(
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert len(recording) == count
-    assert [file.name for file in opened] == ["recording.json", "poses.csv"]
+    assert [file.name for file in opened if file.suffix != ".png"] == ["recording.json", "poses.csv"]
+    assert len(opened) <= 2 + 2 * 9, "the heads of a few pictures, for their size"
     assert peak < 2000 * count
     monkeypatch.undo()
     assert picture.exists()

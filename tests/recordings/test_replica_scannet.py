@@ -62,9 +62,12 @@ def test_replica_frames_beyond_the_trajectory_are_left_out_and_told(tmp_path: Pa
     ("content", "sentence"),
     [
         ("{", "cam_params.json is not as it should be (Input data was truncated); fix the file."),
-        ('{"camera": {"fx": 0}}', "cam_params.json holds no camera: a camera needs finite numbers and positive focal"),
         (
-            '{"camera": {"scale": 0}}',
+            '{"camera": {"fx": 0, "fy": 1, "cx": 1, "cy": 1}}',
+            "cam_params.json holds no camera: a camera needs finite numbers and positive focal",
+        ),
+        (
+            '{"camera": {"fx": 9, "fy": 9, "cx": 9, "cy": 9, "scale": 0}}',
             "cam_params.json holds no camera: scale is 0.0; it must be positive; fix the file.",
         ),
     ],

@@ -11,6 +11,7 @@ audio.flac        or .wav, .ogg: the sound track; without it that of the video
 events.csv, semantic/, objects.json   truth, which mapping never reads
 """
 
+import re
 from pathlib import Path
 from typing import Literal
 
@@ -166,10 +167,18 @@ def _decode(path: Path) -> Description:
         raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None
     except msgspec.ValidationError as error:
         message, _, where = str(error).partition(" - at ")
+        if unknown := re.search("unknown field `([^`]*)`", message):
+            message = f"the key {unknown.group(1)!r} is not known; known there are {_known_keys(where)}"
         at = f" at {where.strip('`').removeprefix('$.')}" if where else ""
         raise RecordingError(f"{path}{at}: {_lower(message)}; fix the file.") from None
     except msgspec.DecodeError as error:
         raise RecordingError(f"{path} is not JSON ({_lower(str(error))}); fix the file.") from None
+
+
+def _known_keys(where: str) -> str:
+    """Return the keys of the object that a decoding error points to."""
+    kind = Intrinsics if where.endswith("intrinsics`") else CameraNumbers if "intrinsics." in where else Description
+    return ", ".join(kind.__struct_fields__)
 
 
 def _lower(message: str) -> str:

@@ -35,6 +35,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.formats.columns import POSE
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names, settle
 from avlmaps.recordings.formats.tables import read_table
 from avlmaps.recordings.images import first_picture_size
@@ -82,7 +83,7 @@ def read_habitat_poses(path: Path, report: Report = stop_at_first) -> Float[np.n
     Raises:
         RecordingError: the file is missing or damaged.
     """
-    table = read_table(path, (7, 16), report)
+    table = read_table(path, (7, 16), report, names=POSE[1:])
     values = table.values
     if values.shape[1] == 16:
         return values.reshape(-1, 4, 4)

@@ -2,8 +2,10 @@
 
 import hashlib
 import os
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from decimal import Decimal
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,7 @@ from avlmaps.recordings.types import Frame, Recording
 from avlmaps.recordings.video import VideoFrames
 
 _SHOWN = 3
+_NUMBER = re.compile(r"([0-9]+(?:\.[0-9]+)?)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +97,7 @@ def settle(
         shots = _orthonormal(shots, report, [pose_file(int(i)) for i in kept])
     if fault := date_fault(shots.stamps_s, "frames"):
         report(Fault(f"{path}: {fault}", path))
+    disagreement = order_notices(shots.names, shots.stamps_s)
     order = timeline.in_order(shots.stamps_s, "frames")
     shots = shots.take(order.index)
     walk = plausible_walk(shots.stamps_s, shots.world_from_camera[:, :3, 3], shots.names)
@@ -104,7 +108,13 @@ def settle(
         report(Fault(f"{path}: {walk.fault}", path))
     if len(shots.names) == 0:
         report(Fault(f"{path} has no frame with a usable pose, so there is nothing to map.", path))
-    return shots, (*notices, *order.notices, *walk.notices, *timeline.gap_notices(shots.stamps_s, "frames"))
+    return shots, (
+        *notices,
+        *disagreement,
+        *order.notices,
+        *walk.notices,
+        *timeline.gap_notices(shots.stamps_s, "frames"),
+    )
 
 
 def _orthonormal(shots: Shots, report: Report, pose_files: Sequence[Path]) -> Shots:
@@ -255,7 +265,7 @@ def _numbers(rig: Rig) -> list[float]:
 
 
 def list_names(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
-    """Return the names of a folder's files with one of the suffixes, in the order of their numbers, then of letters.
+    """Return the names of a folder's files with one of the suffixes, in the order of the numbers in them.
 
     Raises:
         RecordingError: the folder is missing or cannot be listed.
@@ -267,12 +277,39 @@ def list_names(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
         raise RecordingError(f"{folder} is missing; the recording needs it.") from None
     except OSError as error:
         raise RecordingError(f"{folder} cannot be listed ({error.strerror or error}); check the folder.") from None
-    return sorted((name for name in names if not name.startswith(".")), key=_by_number)
+    return sorted((name for name in names if not name.startswith(".")), key=natural_key)
 
 
-def _by_number(name: str) -> tuple[int, str]:
-    stem = name.split(".", 1)[0]
-    return (int(stem) if stem.isascii() and stem.isdigit() else -1, name)
+def natural_key(name: str) -> tuple[tuple[str | int | Decimal, ...], str]:
+    """Return a key that sorts file names as people count: ``frame_2`` before ``frame_10``, ``7.05`` before ``7.5``."""
+    parts = _NUMBER.split(name.rsplit(".", 1)[0])
+    return tuple(_counted(part) if at % 2 else part for at, part in enumerate(parts)), name
+
+
+def _counted(digits: str) -> int | Decimal:
+    return Decimal(digits) if "." in digits else int(digits)
+
+
+def order_notices(names: Sequence[str], stamps_s: Float[np.ndarray, " n"]) -> tuple[str, ...]:
+    """Return a notice where names that count frames and the frames' stamps have different orders, or nothing.
+
+    Args:
+        names: of the frames in the order of their list, of one pattern but for the numbers in them; other names have
+            no order. What runs backwards in the list itself is another matter (``timeline.in_order``).
+        stamps_s: of the frames.
+    """
+    keys = [natural_key(f"{name}.")[0] for name in names]
+    if len({key[::2] for key in keys}) != 1 or len(names) < 2:
+        return ()
+    rows: list[int] = sorted(range(len(names)), key=keys.__getitem__)
+    back = np.flatnonzero(np.diff(stamps_s[rows]) < 0.0)
+    if len(back) == 0 or rows == list(range(len(names))):
+        return ()
+    before, after = names[rows[int(back[0])]], names[rows[int(back[0]) + 1]]
+    return (
+        f"The names of the frames and their stamps have different orders ({len(back)} time(s); frame {after} is "
+        f"earlier than {before}); the stamps are used, so check that each belongs to its picture.",
+    )
 
 
 def open_audio(folder: Path) -> AudioTrack | None:

@@ -15,8 +15,10 @@ from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.corrections import corrected
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.formats.columns import NAMED_FILE, POSE, named_order, split_header
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names, settle
 from avlmaps.recordings.formats.tables import read_table, text_lines
+from avlmaps.recordings.images import first_picture_size
 from avlmaps.recordings.layout import Description
 from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault
 from avlmaps.recordings.types import Recording
@@ -46,6 +48,7 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
     known = _read_poses(path, report)
     video = _find_video(path, description)
     found = _find_pictures(path, description, known, video, report)
+    _check_sizes(path, description, found)
     _check_clocks(path, description, found, known)
     shots, notices, start_s, trajectory = _pose_pictures(found, known)
     shots, more = settle(path, shots, report, pose_file=None)
@@ -64,6 +67,29 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
         trajectory=trajectory,
     )
     return corrected(recording, description.corrections())
+
+
+def _check_sizes(folder: Path, description: Description, found: "_Pictures") -> None:
+    """Raise ``RecordingError`` where pictures have another size than their intrinsics."""
+    rgb, own = description.intrinsics.rgb, description.intrinsics.depth
+    for files, camera, name in ((found.colour, rgb, "rgb"), (found.depth, own or rgb, "depth")):
+        size = (camera.width, camera.height)
+        if files:
+            with suppress(RecordingError):  # of files that are missing or damaged, each has a sentence of its own
+                size = first_picture_size(folder, files)
+        if size == (camera.width, camera.height):
+            continue
+        if name == "depth" and own is None:
+            raise RecordingError(
+                f"{folder / layout.DESCRIPTION} has the intrinsics of rgb only ({rgb.width}x{rgb.height}), but depth "
+                f"pictures are {size[0]}x{size[1]}; add intrinsics.depth with fx, fy, cx, cy, width and height of depth"
+                " (those of rgb scaled to its size, if depth is registered to colour)."
+            )
+        raise RecordingError(
+            f"The {name} pictures of {folder} are {size[0]}x{size[1]}, but intrinsics.{name} of {layout.DESCRIPTION} "
+            f"are of {camera.width}x{camera.height}; give the intrinsics of these pictures (turned or resized ones "
+            "have others)."
+        )
 
 
 def _check_clocks(folder: Path, description: Description, found: "_Pictures", known: "_Poses") -> None:
@@ -120,7 +146,7 @@ def _read_poses(folder: Path, report: Report) -> _Poses:
     path = folder / layout.POSES
     if not os.path.lexists(path):
         raise RecordingError(f"{path} is missing; the recording needs it.")
-    table = read_table(path, (8,), report, header=True)
+    table = read_table(path, (8,), report, names=POSE)
     stamps_s, translation, quaternion = table.values[:, 0], table.values[:, 1:4], table.values[:, 4:8]
     length = np.linalg.norm(quaternion, axis=1)
     finite = np.isfinite(table.values).all(axis=1)
@@ -181,11 +207,17 @@ def _find_pictures(
         )
     path = folder / layout.FRAMES
     if os.path.lexists(path):
-        rows = list(_listed(path, report))
+        rows = list(_listed(path, found, report))
         names = [name for name, _ in rows]
         stamps_s: Float[np.ndarray, " n"] | None = np.array([stamp for _, stamp in rows], np.float64)
         if not names:
             raise RecordingError(f"{path} lists no frame, so there is nothing to map.")
+        if lost := [name for name in names if name not in found]:
+            sentence = (
+                f"{len(lost)} of the {len(names)} names in {path} have no picture in {where}/ (the first is "
+                f"{lost[0]!r}); write the names of the files without their extension."
+            )
+            report(Fault(sentence, path, fatal=len(lost) == len(names)))
     else:
         names = list(found)
         stamps_s = video.stamps_s if video else _stamps_without_list(folder, names, description, known, report)
@@ -200,17 +232,31 @@ def _find_pictures(
     return _Pictures(names, colour, depth, stamps_s)
 
 
-def _listed(path: Path, report: Report) -> Iterator[tuple[str, float]]:
+def _listed(path: Path, found: dict[str, str], report: Report) -> Iterator[tuple[str, float]]:
+    """Yield the name and the stamp of each line; a name may have its file's extension."""
+    files = {file: stem for stem, file in found.items()}
+    at, factor, first = (0, 1), 1.0, True
     for number, text in text_lines(path, report):
-        if text.replace(" ", "") == layout.FRAMES_HEADER:
-            continue
-        name, _, stamp = text.rpartition(",")
+        fields = [field.strip() for field in text.replace(";", ",").split(",")]
         try:
-            if not name or "/" in name or "\\" in name:
-                raise ValueError(name)
-            yield name, float(stamp)
-        except ValueError:
-            report(Fault(f"{path}, line {number}: {text[:40]!r} is not name,stamp_s; fix the line.", path, number))
+            if first and not any(map(_is_number, fields)):
+                order = named_order(split_header(text), NAMED_FILE)
+                at, factor, first = order.columns, order.factors[1], False
+                continue
+            first = False
+            if len(fields) != 2 or not (name := fields[at[0]]) or "/" in name or "\\" in name:
+                raise ValueError(f"{text[:40]!r} is not {layout.FRAMES_HEADER}; fix the line")
+            yield files.get(name, name), float(fields[at[1]]) * factor
+        except ValueError as error:
+            report(Fault(f"{path}, line {number}: {error}.", path, number))
+
+
+def _is_number(field: str) -> bool:
+    try:
+        float(field)
+    except ValueError:
+        return False
+    return True
 
 
 def _stamps_without_list(

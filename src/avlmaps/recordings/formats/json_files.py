@@ -1,5 +1,6 @@
 """JSON that describes others' recordings: what a reader needs of it, and the keys that nothing reads."""
 
+import re
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -10,6 +11,11 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import MANIFEST_BYTES, decode_json, read_regular
 
 T = TypeVar("T")
+# A key with such a word in it is about where a pixel lies in space; it is never passed over.
+_ABOUT_GEOMETRY = re.compile(
+    r"(^|_)(f|c|fl|focal|fov|k\d|p\d|w|h)(_?[xy])?($|_)|scale|depth|unit|dist|intrinsic|extrinsic|crop|resize"
+    r"|width|height|size|rotat|orient|transform|axes|convention|offset|delay|principal|center|centre|matrix|pose|model"
+)
 
 
 def read_json(file: Path, kind: type[T], limit_bytes: int = MANIFEST_BYTES) -> tuple[T, dict[str, Any]]:
@@ -36,6 +42,15 @@ def parse_json(file: Path, content: bytes, kind: type[T]) -> tuple[T, dict[str, 
 
 
 def unread_notice(file: Path, present: Mapping[str, Any], known: Collection[str]) -> tuple[str, ...]:
-    """Return a notice that names the keys of a file that nothing reads, or nothing."""
+    """Return a notice that names the keys of a file that nothing reads, or nothing.
+
+    Raises:
+        RecordingError: one of them is about the camera, the depth or the poses: without it the map may be wrong.
+    """
     unread = sorted(present.keys() - set(known))
+    if telling := [key for key in unread if _ABOUT_GEOMETRY.search(key.lower())]:
+        raise RecordingError(
+            f"{file} has the key {telling[0]!r}, which is not read here and may change the map; known are "
+            f"{', '.join(sorted(known))}. Write it as one of them, or remove it."
+        )
     return (f"{file.name} has keys that are not read: {', '.join(unread[:8])}.",) if unread else ()

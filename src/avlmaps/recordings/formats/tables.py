@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, TABLE_BYTES, open_regular, read_regular
 from avlmaps.recordings.faults import Fault, Report
+from avlmaps.recordings.formats.columns import is_header_in_comment, named_order, split_header
 
 # A line holds 16 numbers or a name; without a limit a file of zeros would be one line of gigabytes.
 _LINE_BYTES = 1 << 14
@@ -35,6 +36,10 @@ def text_lines(path: Path, report: Report) -> Iterator[tuple[int, str]]:
 
     Lines that are not UTF-8 are reported and passed over.
     """
+    return ((number, text) for number, text in _lines(path, report) if not text.startswith("#"))
+
+
+def _lines(path: Path, report: Report) -> Iterator[tuple[int, str]]:
     try:
         stream = open_regular(path, TABLE_BYTES)
     except FileNotFoundError:
@@ -53,29 +58,42 @@ def text_lines(path: Path, report: Report) -> Iterator[tuple[int, str]]:
             except UnicodeDecodeError:
                 report(Fault(f"{path}, line {number}: this is not UTF-8 text; save the file as UTF-8.", path, number))
                 continue
-            if text and not text.startswith("#"):
+            if text:
                 yield number, text
 
 
-def read_table(path: Path, columns: tuple[int, ...], report: Report, header: bool = False) -> Table:
-    """Read lines of numbers, split at commas or white space.
+def read_table(
+    path: Path, columns: tuple[int, ...], report: Report, header: bool = False, names: Sequence[str] = ()
+) -> Table:
+    """Read lines of numbers, split at commas, semicolons (with decimal commas, too) or white space.
 
     Args:
         path: the file.
         columns: how many numbers a line may have; the first line decides which of them.
         report: called with every line that is not as it should be.
         header: whether the first line may name the columns instead.
+        names: the columns that are wanted. Where the first line, or the comment above it, names columns, they are
+            returned in this order and in seconds and metres; a name that is not known is a fault.
     """
     values, lines, width = array("d"), array("q"), 0
-    for row_number, (number, text) in enumerate(text_lines(path, report)):
-        fields = text.replace(",", " ").split()
+    heading: tuple[int, str] | None = None
+    first = True
+    for number, text in _lines(path, report):
+        if text.startswith("#"):
+            if names and first and is_header_in_comment(split_header(text), names):
+                heading = number, text
+            continue
+        fields = _fields(text)
         try:
             row = [_number(field) for field in fields]
         except ValueError:
-            if header and row_number == 0 and not _any_number(fields):
+            if (header or names) and first and not _any_number(fields):
+                heading, first = (number, text) if names else None, False
                 continue
+            first = False
             report(Fault(f"{path}, line {number}: {text[:40]!r} is not all numbers; fix the line.", path, number))
             continue
+        first = False
         if len(row) not in columns or (width and len(row) != width):
             wanted = width or " or ".join(map(str, columns))
             sentence = f"{path}, line {number}: there are {len(row)} numbers where {wanted} belong; fix the line."
@@ -85,7 +103,31 @@ def read_table(path: Path, columns: tuple[int, ...], report: Report, header: boo
         values.extend(row)
         lines.append(number)
     table = np.frombuffer(values, np.float64) if len(values) else np.zeros(0)
-    return Table(table.reshape(-1, width or columns[0]), np.array(lines, np.int64))
+    table = table.reshape(-1, width or columns[0])
+    return Table(_in_order(path, heading, table, names, report), np.array(lines, np.int64))
+
+
+def _in_order(
+    path: Path, heading: tuple[int, str] | None, table: Float[np.ndarray, "n c"], names: Sequence[str], report: Report
+) -> Float[np.ndarray, "n c"]:
+    """Return a table's columns as its heading names them."""
+    if heading is None or (len(table) and table.shape[1] != len(names)):
+        return table
+    number, text = heading
+    try:
+        return named_order(split_header(text), names).applied(table)
+    except ValueError as error:
+        sentence = f"{path}, line {number}: {error}; write the header as {','.join(names)}, or leave it out."
+        report(Fault(sentence, path, number))
+        return table
+
+
+def _fields(text: str) -> list[str]:
+    if ";" not in text:
+        return text.replace(",", " ").split()
+    # Where semicolons part the numbers, a comma is the decimal point of many languages.
+    text = text.replace(",", " ") if "." in text else text.replace(",", ".")
+    return text.replace(";", " ").split()
 
 
 def _number(field: str) -> float:

@@ -5,6 +5,7 @@ published intrinsics place the centre of the first pixel at (0, 0), so half a pi
 of the benchmark (``freiburg1`` to ``freiburg3`` in the name) the motion capture's world has z up.
 """
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from avlmaps.core import poses, timeline
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.formats.columns import POSE
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, open_audio, settle
 from avlmaps.recordings.formats.tables import read_table, text_lines
 from avlmaps.recordings.images import first_picture_size
@@ -87,12 +89,12 @@ def _stream(folder: Path, name: str, report: Report) -> _Stream:
     files: list[str] = []
     path = folder / name
     for number, text in text_lines(path, report):
-        stamp, _, file = text.partition(" ")
+        stamp, *rest = re.split(r"[\s,;]+", text, maxsplit=1)
         try:
-            if not file.strip():
+            if not rest or not rest[0]:
                 raise ValueError(text)
             stamps.append(float(stamp))
-            files.append(file.strip())
+            files.append(rest[0] if "/" in rest[0] else rest[0].replace("\\", "/"))  # as Windows writes paths
         except ValueError:
             sentence = f"{path}, line {number}: {text[:40]!r} is not a stamp and a file; fix the line."
             report(Fault(sentence, path, number))
@@ -133,7 +135,7 @@ def _pairs(
 
 
 def _trajectory(path: Path, report: Report) -> tuple[timeline.Trajectory, tuple[str, ...]]:
-    table = read_table(path, (8,), report)
+    table = read_table(path, (8,), report, names=POSE)
     values = table.values
     norm = np.linalg.norm(values[:, 4:8], axis=1) if len(values) else np.zeros(0)
     usable = np.isfinite(values).all(axis=1) & (np.abs(norm - 1.0) <= poses.MAX_ROTATION_FAULT)
