@@ -120,7 +120,7 @@ def _camera(path: Path, shots: Shots) -> tuple[Rig, float, tuple[str, ...]]:
 
 def _parameters(file: Path) -> tuple[_Camera, tuple[str, ...]]:
     """Read the camera of ``cam_params.json``: in a section of its own, or at the top."""
-    plain, _ = read_json(file, dict, DESCRIPTION_BYTES)
+    plain = read_json(file, dict, DESCRIPTION_BYTES)[1]
     section = next((name for name in _SECTIONS if isinstance(plain.get(name), dict)), "")
     beside = unread_notice(file, plain, (section,)) if section else ()
     numbers: dict[str, Any] = {}
