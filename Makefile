@@ -26,7 +26,7 @@ FAST := tests/core tests/test_imports.py tests/test_conventions.py tests/query/t
   tests/query/test_pieces.py tests/maps/test_grid.py tests/navigate/test_planner.py tests/perception/test_codes.py \
   tests/perception/test_matching.py tests/language/test_program_run.py tests/cli/test_help.py
 
-.PHONY: help demo test test-fast dist-test test-kernels bounds test-foundation types-foundation test-ros2 python312 lint format docs fuzz bench train lock clean
+.PHONY: help demo test test-fast dist-test test-kernels bounds test-foundation types-foundation test-ros2 python312 lint format pictures docs fuzz bench train lock clean
 
 help:  ## Show what can be made.
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -102,6 +102,10 @@ $(ROS2)/.ready: requirements/lock.txt requirements/ros2.txt pyproject.toml tests
 format: $(READY)  ## Put the code in order.
 	$(RUN)/ruff check --fix .
 	$(RUN)/ruff format .
+
+pictures: $(READY)  ## Make the viewer's pictures of the guide: a demo home, clicked through in Chromium.
+	test -d demo_out/home.avlmap || $(VENV)/bin/avlmaps demo
+	AVLMAPS_VIEW_MAP=demo_out/home.avlmap AVLMAPS_VIEW_PICTURES=docs/pictures $(VENV)/bin/pytest -q -p no:xdist tests/view/test_pictures.py
 
 docs: $(VENV)-docs/.ready  ## Build the documentation site into build/site (links are checked).
 	NO_MKDOCS_2_WARNING=1 $(VENV)-docs/bin/mkdocs build --quiet

@@ -47,7 +47,9 @@ def opened(browser, url: str, width: int = 1000, height: int = 640):
 def picture(page) -> np.ndarray:
     """Return the map's canvas as it is on the screen, RGB, once all voxels are drawn; nothing lies over it."""
     page.wait_for_selector("#canvas[data-state=whole]")
-    page.add_style_tag(content="#overlay *, #tools { opacity: 0 !important; pointer-events: none !important }")
+    page.add_style_tag(
+        content="#overlay *, #tools, #scale, #legend { opacity: 0 !important; pointer-events: none !important }"
+    )
     shot = page.locator("#canvas").screenshot()
     return cv2.cvtColor(cv2.imdecode(np.frombuffer(shot, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
 
@@ -195,6 +197,136 @@ def test_the_file_opens_without_a_server(browser, room: AVLMap, tmp_path: Path) 
     page.close()
 
 
+def camera(page) -> dict:
+    """Return the view, and whether two points over one another are one point of the picture."""
+    return page.evaluate(
+        """() => { const { camera } = avlmapsView.viewer, { clipFromLevel } = camera.seen(1.5);
+        const seen = (p) => [0, 1].map((row) => [0, 1, 2].reduce((sum, k) => sum + clipFromLevel[4 * k + row] * p[k],
+            clipFromLevel[12 + row]) / [0, 1, 2].reduce((sum, k) => sum + clipFromLevel[4 * k + 3] * p[k],
+            clipFromLevel[15]));
+        const [x, y, z] = camera.target;
+        return { numbers: camera.saved(), low: seen([x + 1, y + 1, z]), high: seen([x + 1, y + 1, z + 1]) }; }"""
+    )
+
+
+def edges(shown: np.ndarray) -> np.ndarray:
+    """Return the outermost pixels of a picture."""
+    return np.concatenate([shown[0], shown[-1], shown[:, 0], shown[:, -1]])
+
+
+@pytest.mark.parametrize(("width", "height"), [(1300, 420), (390, 780)])
+def test_the_whole_map_is_in_the_picture_from_its_side_and_as_a_plan(
+    browser, served: ViewServer, width: int, height: int
+) -> None:
+    page = opened(browser, served.url, width, height)
+    for button in ("#whole", "#above"):
+        page.focus("#canvas")
+        for key in ("ArrowLeft", "ArrowLeft", "ArrowLeft", "+", "+", "w"):
+            page.keyboard.press(key)
+        page.locator("#canvas").blur()  # its ring would be in the picture
+        page.locator(button).evaluate("button => button.click()")  # picture() hides it
+        shown = picture(page)
+        ground = shown[2, 2]
+        assert (edges(shown) == ground).all(), "nothing is cut off"
+        rows, columns = np.nonzero((shown != ground).any(axis=2))
+        filled = max(np.ptp(rows) / shown.shape[0], np.ptp(columns) / shown.shape[1])
+        assert 0.6 < filled < 0.95, "and it is as large as fits"
+    seen = camera(page)
+    assert seen["low"] == pytest.approx(seen["high"], abs=1e-6), "a plan has no perspective"
+    assert seen["numbers"][:2] == pytest.approx([-np.pi / 2, np.pi / 2], abs=1e-3), "x to the right, y up"
+    assert page.faults == []
+    page.close()
+
+
+def test_the_scale_is_as_long_as_it_says(page) -> None:
+    page.click("#above")
+    page.wait_for_selector("#canvas[data-state=whole]")
+    metres = float(page.get_attribute("#scale-bar", "data-metres"))
+    bar = page.locator("#scale-bar").bounding_box()["width"]
+    apart = page.evaluate(
+        """(metres) => { const viewer = avlmapsView.viewer, [place] = viewer.places(), { camera } = viewer;
+        const { clipFromLevel } = camera.seen(place.aspect);
+        return clipFromLevel[0] * metres * place.box.seenWidth / 2; }""",
+        metres,
+    )
+    assert bar == pytest.approx(apart, abs=0.6)
+    assert "level frame" in page.inner_text("#scale-text")
+
+
+def test_a_pressed_button_can_be_read(page) -> None:
+    page.click("#measure")
+    shades = page.locator("#measure").evaluate(
+        "e => [getComputedStyle(e).color, getComputedStyle(e).backgroundColor].map((c) => c.match(/[0-9.]+/g))"
+    )
+    ink, ground = (np.array(shade[:3], float) for shade in shades)
+    assert abs(ink - ground).sum() > 250
+
+
+def test_a_reload_brings_back_the_view_and_the_question(page) -> None:
+    page.fill("#sentence", "the red thing")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#answer .verdict.found")
+    page.click("#above")
+    page.select_option("#colour", "thing")
+    page.locator("#high").evaluate("e => { e.value = 1.0; e.dispatchEvent(new Event('input')); }")
+    before = camera(page)["numbers"]
+    page.wait_for_function("() => location.hash.includes('colour=thing') && location.hash.includes('cut=')")
+    page.reload()
+    page.wait_for_selector("#answer .verdict.found")
+    assert page.input_value("#sentence") == "the red thing"
+    assert camera(page)["numbers"] == pytest.approx(before, abs=2e-3)
+    assert page.input_value("#colour") == "thing"
+    assert float(page.input_value("#high")) == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.parametrize("hash_", ["#view=a,b,c,d,e,f,g&cut=x", "#view=0,0,-1,0,0,0,0&colour=none"])
+def test_an_address_that_means_nothing_opens_the_whole_map(browser, served: ViewServer, hash_: str) -> None:
+    page, plain = opened(browser, served.url + hash_), opened(browser, served.url)
+    assert camera(page)["numbers"] == camera(plain)["numbers"]
+    assert page.faults == []
+    page.close()
+    plain.close()
+
+
+def test_a_name_on_the_map_is_a_way_to_go_there(page) -> None:
+    page.wait_for_selector("#canvas[data-state=whole]")
+    mark = page.locator(".mark.thing:visible").first
+    name, before = mark.inner_text(), camera(page)["numbers"]
+    mark.click()
+    after = camera(page)["numbers"]
+    things = page.evaluate("avlmapsView.contents[0].things.map(({ name, position }) => ({ name, position }))")
+    reached = [t for t in things if t["name"] == name and t["position"] == pytest.approx(after[3:6], abs=2e-3)]
+    assert reached and after[2] < before[2]
+
+
+def test_the_legend_lies_on_the_map_with_a_colour_for_each_kind(page) -> None:
+    page.select_option("#colour", "thing")
+    shades = page.locator("#legend li i").evaluate_all("all => all.map((e) => getComputedStyle(e).backgroundColor)")
+    assert len(shades) == len(set(shades)) >= 2
+    assert page.locator("#stage #legend").is_visible()
+    legend, goals = page.locator("#legend").bounding_box(), page.locator("#panel").bounding_box()
+    assert legend["x"] + legend["width"] <= goals["x"]
+    page.locator("details:has(#things) summary").click()
+    listed = page.locator("#things .swatch").evaluate_all("all => all.map((e) => getComputedStyle(e).backgroundColor)")
+    assert set(listed) <= set(shades)
+
+
+def test_a_picture_is_saved(page, tmp_path: Path) -> None:
+    page.fill("#sentence", "the red thing")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#answer .verdict.found")
+    page.wait_for_selector("#canvas[data-state=whole]")
+    with page.expect_download() as download:
+        page.click("#save")
+    download.value.save_as(tmp_path / "map.png")
+    assert download.value.suggested_filename == "room.png"
+    saved = cv2.imread(str(tmp_path / "map.png"))
+    box = page.locator("#canvas").bounding_box()
+    assert saved.shape[1] == round(box["width"]) and saved.shape[0] > box["height"]
+    x, y = (round(value) for value in goal_at(page))
+    assert saved[y - 12 : y + 12, x - 12 : x + 12].min() < 60, "the goal's number is in the picture"
+
+
 def test_two_maps_are_seen_side_by_side_and_one_over_the_other(browser, room: AVLMap) -> None:
     from avlmaps.view.session import ViewSession
     from helpers.viewing import serving
@@ -210,5 +342,7 @@ def test_two_maps_are_seen_side_by_side_and_one_over_the_other(browser, room: AV
         page.fill("#sentence", "the red thing")
         page.keyboard.press("Enter")
         page.wait_for_selector("#goals ol >> nth=1")
+        assert page.locator("#goals h3").all_inner_texts() == ["Goals in room.avlmap"] * 2
+        assert "two places" in page.inner_text("#goals .warning")
         assert page.faults == []
         page.close()

@@ -32,7 +32,6 @@ _FACES = (
     ((0, 0, 1), ((0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))),
     ((0, 0, -1), ((0, 0, 0), (0, 1, 0), (1, 1, 0), (1, 0, 0))),
 )
-_PALETTE_SEED = 5
 
 
 def thing_colors(count: int, things: "Sequence[Thing]") -> UInt8[np.ndarray, "n 3"]:
@@ -56,13 +55,23 @@ def heat_colors(values: Float32[np.ndarray, " n"]) -> UInt8[np.ndarray, "n 3"]:
 
 
 def palette(count: int) -> UInt8[np.ndarray, "k 3"]:
-    """Return colours far apart in hue; the same for the same count."""
+    """Return colours far apart to the eye, and from gray; the first of them are the same for any count.
+
+    Each is the one of some hundred colours that lies farthest from those before it, in CIELAB.
+    """
+    import cv2
     from matplotlib.colors import hsv_to_rgb
 
-    hue = (np.arange(count) * 0.61803398875) % 1.0
-    rng = np.random.default_rng(_PALETTE_SEED)
-    hsv = np.stack([hue, rng.uniform(0.55, 0.9, count), rng.uniform(0.7, 0.95, count)], axis=1)
-    return (255 * hsv_to_rgb(hsv.reshape(-1, 3))).round().astype(np.uint8)
+    hue, saturation, value = np.meshgrid(np.arange(36) / 36, (0.45, 0.65, 0.8), (0.6, 0.8, 0.95), indexing="ij")
+    rgb = hsv_to_rgb(np.stack([hue, saturation, value], axis=-1).reshape(-1, 3)).astype(np.float32)
+    lab = cv2.cvtColor(rgb[None], cv2.COLOR_RGB2LAB)[0]
+    gray = cv2.cvtColor(np.full((1, 1, 3), 0.63, np.float32), cv2.COLOR_RGB2LAB)[0, 0]
+    away = np.linalg.norm(lab - gray, axis=1)
+    chosen: list[int] = []
+    for _ in range(count):
+        chosen.append(int(np.argmax(away)))
+        away = np.minimum(away, np.linalg.norm(lab - lab[chosen[-1]], axis=1))
+    return (255 * rgb[chosen]).round().astype(np.uint8).reshape(-1, 3)
 
 
 def write_ply(

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 RECORD = np.dtype([("cell", "<u2", (3,)), ("seen", "<u2"), ("rgb", "u1", (3,)), ("spare", "u1")])
 """One voxel as the page reads it: where, when it was last seen (65535 is the end of the recording), its colour."""
 _MOST_CELLS = 65535
+_NEAR_SHARE = 0.25  # of the map's extent: voxels up to this far out of the bulk of it count as the whole map
 _HEADROOM_M = 0.3  # the page opens with what is higher over the highest camera cut away
 
 
@@ -97,6 +98,9 @@ class Layout:
         stored, space = self.avlmap.stored, self.avlmap.space
         level = space.level(space.centres) if len(space) else np.zeros((1, 3))
         low, high = np.percentile(level, [0.1, 99.9], axis=0)
+        # What lies far from all else, seen through a window, does not make the rest small.
+        reach = _NEAR_SHARE * (high - low) + space.grid.voxel_size_m
+        least, most = np.maximum(level.min(axis=0), low - reach), np.minimum(level.max(axis=0), high + reach)
         cameras = camera_path(space)
         ceiling = float(cameras[:, 2].max()) + _HEADROOM_M if len(cameras) else float(level[:, 2].max())
         camera = stored.rig.rgb
@@ -111,6 +115,8 @@ class Layout:
             "level_from_recording": space.level_from_recording.ravel().tolist(),
             "low": low.tolist(),
             "high": high.tolist(),
+            "least": (least - 0.5 * space.grid.voxel_size_m).tolist(),
+            "most": (most + 0.5 * space.grid.voxel_size_m).tolist(),
             "floor_m": _floor_m(level, cameras),
             "ceiling_m": ceiling,
             "duration_s": self.duration_s,

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from avlmaps.view.labels import Labels
     from avlmaps.view.session import MapOnPage
 
-SCRIPTS = ("matrix.js", "source.js", "shaders.js", "renderer.js", "camera.js", "marks.js", "viewer.js", "panel.js")
+SCRIPTS = ("matrix.js", "source.js", "shaders.js", "renderer.js", "camera.js", "marks.js", "viewer.js", "address.js",
+           "saving.js", "panel.js")  # fmt: skip
 _MARK = re.compile(r"\{\{(\w+)\}\}")
 _MOST_PICTURES = 60
 _MOST_QUESTIONS = 8

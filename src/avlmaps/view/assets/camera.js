@@ -2,6 +2,7 @@
 
 const SLOPE = Math.tan((25 * Math.PI) / 180); // half the field of view, up and down
 const STEEPEST = 1.555;
+const FILLED = 0.88; // share of the picture's width and height that a whole map takes
 
 class Camera {
   constructor() {
@@ -9,17 +10,37 @@ class Camera {
     this.yaw = -2.2;
     this.pitch = 0.95;
     this.distance = 10;
+    this.flat = false; // drawn without perspective, straight from above
   }
 
-  /** Look at a whole map from above its side. */
+  /** Look at a whole map from above its side; all of it is in the picture. */
   frame(low, high, aspect) {
-    this.home = { low, high };
-    this.target = mix(low, high, 0.5);
     const sides = sub(high, low);
-    if (sides[0] > sides[1]) this.yaw = -Math.PI / 2 + 0.35;
-    else this.yaw = 0.35;
+    this.flat = false;
+    this.yaw = sides[0] > sides[1] ? -Math.PI / 2 + 0.35 : 0.35;
     this.pitch = 0.95;
-    this.distance = (0.46 * Math.hypot(...sides)) / (SLOPE * Math.min(1.25, Math.max(0.45, aspect)));
+    this.fit(low, high, aspect);
+  }
+
+  /** Look at a whole map as a plan: from straight above, x to the right and y up, with one scale everywhere. */
+  frameAbove(low, high, aspect) {
+    this.flat = true;
+    this.yaw = -Math.PI / 2;
+    this.pitch = Math.PI / 2;
+    this.fit(low, high, aspect);
+  }
+
+  /** Go as near as all corners of a box stay in the picture. */
+  fit(low, high, aspect) {
+    this.target = mix(low, high, 0.5);
+    const { ahead, right, up } = this.look();
+    this.distance = 0.15;
+    for (let k = 0; k < 8; k++) {
+      const corner = sub([k & 1 ? high[0] : low[0], k & 2 ? high[1] : low[1], k & 4 ? high[2] : low[2]], this.target);
+      const beyond = this.flat ? 0 : dot(corner, ahead);
+      const wide = Math.max(Math.abs(dot(corner, right)) / aspect, Math.abs(dot(corner, up)));
+      this.distance = Math.max(this.distance, wide / (FILLED * SLOPE) - beyond);
+    }
   }
 
   look() {
@@ -30,21 +51,52 @@ class Camera {
   /** All that drawing needs for a picture of some shape. */
   seen(aspect) {
     const { ahead, right, up } = this.look();
-    const eye = sub(this.target, scaled(ahead, this.distance));
+    // Without perspective the eye may be anywhere on its line: it is over everything.
+    const away = this.flat ? this.distance + 400 : this.distance;
+    const eye = sub(this.target, scaled(ahead, away));
     const near = Math.max(0.02, Math.min(0.3, this.distance * 0.05));
-    const far = this.distance + 400;
+    const far = away + 400;
+    const slope = this.flat ? SLOPE * this.distance : SLOPE; // half the picture's height, metres or metres a metre
     const view = Float64Array.of(
       right[0], up[0], -ahead[0], 0, right[1], up[1], -ahead[1], 0, right[2], up[2], -ahead[2], 0,
       -dot(right, eye), -dot(up, eye), dot(ahead, eye), 1,
     );
-    const lens = Float64Array.of(
-      1 / (SLOPE * aspect), 0, 0, 0, 0, 1 / SLOPE, 0, 0,
-      0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0,
-    );
-    return { eye, ahead, right, up, near, far, slope: SLOPE, aspect, clipFromLevel: multiplied(lens, view) };
+    const depth = this.flat
+      ? [0, 0, 2 / (near - far), 0, 0, 0, (far + near) / (near - far), 1]
+      : [0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0];
+    const lens = Float64Array.of(1 / (slope * aspect), 0, 0, 0, 0, 1 / slope, 0, 0, ...depth);
+    return { eye, ahead, right, up, near, far, slope, aspect, flat: this.flat, clipFromLevel: multiplied(lens, view) };
+  }
+
+  /** The ray through a place of the picture, given from -1 to 1 to the right and up: from where, and along what. */
+  ray(aspect, u, v) {
+    const { eye, ahead, right, up, slope, flat } = this.seen(aspect);
+    const aside = add(scaled(right, u * slope * aspect), scaled(up, v * slope));
+    return flat ? { from: add(eye, aside), along: ahead } : { from: eye, along: unit(add(ahead, aside)) };
+  }
+
+  /** How many pixels of a picture of some height a metre takes, in the middle of it. */
+  pixelsOfMetre(height) {
+    return height / (2 * SLOPE * this.distance);
+  }
+
+  /** The numbers that bring this view back. */
+  saved() {
+    return [this.yaw, this.pitch, this.distance, ...this.target, this.flat ? 1 : 0].map((value) => +value.toFixed(3));
+  }
+
+  /** Look as the numbers say; anything but seven numbers that make a view changes nothing. */
+  restore([yaw, pitch, distance, x, y, z, flat, ...more]) {
+    const numbers = [yaw, pitch, distance, x, y, z, flat];
+    if (more.length || !numbers.every(Number.isFinite) || !(distance > 0) || Math.abs(pitch) > 1.58) return false;
+    const straight = flat === 1;
+    Object.assign(this, { yaw, pitch: straight ? Math.PI / 2 : pitch, distance, target: [x, y, z], flat: straight });
+    this.zoom(1);
+    return true;
   }
 
   turn(dx, dy) {
+    this.flat = false;
     this.yaw -= dx;
     this.pitch = Math.min(STEEPEST, Math.max(-STEEPEST, this.pitch + dy));
   }
@@ -74,6 +126,7 @@ class Camera {
 
   /** Look as a robot's camera did. */
   standAt(frame) {
+    this.flat = false;
     this.yaw = Math.atan2(-frame.ahead[1], -frame.ahead[0]);
     this.pitch = Math.asin(Math.max(-1, Math.min(1, -frame.ahead[2])));
     this.distance = 0.5;

@@ -31,7 +31,9 @@ class Panel {
     this.files = {};
     this.viewer = new Viewer($("canvas"), $("overlay"), told);
     this.viewer.onClick = (hit) => this.clicked(hit);
+    this.viewer.onMove = (height) => this.viewMoved(height);
     this.tape = [];
+    this.question = "";
   }
 
   /** Fill the page: first the voxels, then what takes longer. */
@@ -46,6 +48,8 @@ class Panel {
     this.bindDrive();
     this.bindTools();
     this.viewer.frameAll();
+    this.restore();
+    window.addEventListener("hashchange", () => location.hash === Address.own || this.restore());
     try {
       await Promise.all(this.maps.map((_, k) => this.load(k)));
       $("loading").hidden = true;
@@ -100,6 +104,53 @@ class Panel {
     this.contents.forEach((one, k) => one && this.viewer.fields[k].layer.setPalettes(one.palettes));
   }
 
+  /** Bring back what the address says: the view, the cut, the question, the colours. */
+  restore() {
+    const { question, view, colour, cut } = Address.read();
+    if (view.length && this.viewer.camera.restore(view)) this.viewer.moved();
+    if (cut.length === 2 && cut.every(Number.isFinite)) {
+      [$("low").value, $("high").value] = cut;
+      this.cut();
+    }
+    const known = [...$("colour").options].some((one) => one.value === colour);
+    if (known) this.colourBy(colour);
+    if (question) {
+      $("sentence").value = question;
+      this.ask(question, !known);
+    } else if (!this.source.live && this.told.questions.length) {
+      this.ask(this.told.questions[0].question, false);
+    }
+  }
+
+  /** The view moved: the scale is another one, and soon the address. */
+  viewMoved(height) {
+    const { camera } = this.viewer;
+    const most = 120 / camera.pixelsOfMetre(height);
+    const power = 10 ** Math.floor(Math.log10(most));
+    const metre = power * [5, 2, 1].find((one) => one * power <= most);
+    $("scale-bar").style.width = `${(metre * camera.pixelsOfMetre(height)).toFixed(1)}px`;
+    $("scale-bar").dataset.metres = metre;
+    const text = metre < 1 ? `${Math.round(100 * metre)} cm` : `${metre} m`;
+    $("scale-text").textContent = text + (camera.flat ? "; x right, y up, level frame" : " in the middle of the picture");
+    this.keep();
+  }
+
+  /** Write the state into the address once it rests. */
+  keep() {
+    clearTimeout(this.keeping);
+    this.keeping = setTimeout(() => Address.write({
+      question: this.question, view: this.viewer.camera.saved(), colour: $("colour").value,
+      cut: this.isCut ? [Number($("low").value), Number($("high").value)] : [],
+    }), 250);
+  }
+
+  async save() {
+    const names = this.maps.map((map) => map.name.replace(/\.avlmap$/, ""));
+    const asked = this.question && this.answers ? `: ${this.question}` : "";
+    const blob = await pictureOf($("canvas"), $("stage"), `${names.join(" and ")}${asked}. ${$("scale-text").textContent}`);
+    saveAs(blob, `${names.join("-")}.png`);
+  }
+
   fault(fault) {
     $("loading").hidden = false;
     $("loading").classList.add("fault");
@@ -121,7 +172,6 @@ class Panel {
       $("ask").hidden = true;
       $("drive-section").hidden = true;
       for (const { question } of this.told.questions) this.offer(question);
-      if (this.told.questions.length) this.ask(this.told.questions[0].question, false);
     }
     $("ask").addEventListener("submit", (event) => {
       event.preventDefault();
@@ -189,6 +239,8 @@ class Panel {
         at += layer.count;
       }
       this.answers = told.answers;
+      this.question = this.files.photo || this.files.clip ? "" : sentence; // files are not kept
+      this.keep();
       if (turnToHeat) this.colourBy("heat");
       this.showAnswer(sentence, told.answers, performance.now() - begun);
     } catch (fault) {
@@ -205,6 +257,8 @@ class Panel {
 
   forget() {
     this.answers = null;
+    this.question = "";
+    this.keep();
     for (const { layer } of this.viewer.fields) layer.setHeat(new Uint8Array(layer.count));
     $("answer").replaceChildren();
     $("goals").replaceChildren();
@@ -216,6 +270,9 @@ class Panel {
   showAnswer(sentence, answers, tookMs) {
     $("answer").replaceChildren();
     $("goals").replaceChildren();
+    if (this.maps.length > 1) {
+      $("goals").append(made("p", { className: "warning soft", textContent: this.arePlaces() }));
+    }
     answers.forEach((answer, k) => {
       const of = this.maps.length > 1 ? `${this.maps[k].name}: ` : "";
       const count = answer.count === undefined ? "" : ` ${answer.count} of them.`;
@@ -233,12 +290,25 @@ class Panel {
       }
       for (const note of answer.notes ?? []) texts.push(made("p", { className: "soft", textContent: note }));
       $("answer").append(...texts);
-      $("goals").append(made("ol", {}, ...answer.goals.map((goal, i) => this.goalItem(k, goal, i))));
+      if (of) $("goals").append(made("h3", { textContent: `Goals in ${this.maps[k].name}` }));
+      const label = of ? `Goals in ${this.maps[k].name}` : "Goals";
+      $("goals").append(made("ol", { ariaLabel: label }, ...answer.goals.map((goal, i) => this.goalItem(k, goal, i))));
     });
     $("answer").append(made("p", { className: "soft", textContent: `${Math.round(tookMs)} ms` }));
     $("answer").dataset.question = sentence;
     this.marks();
     this.viewer.changed();
+  }
+
+  /** What to know of the goals of two maps. */
+  arePlaces() {
+    const [a, b] = this.maps;
+    const meet = [0, 1].map((axis) => Math.min(a.high[axis], b.high[axis]) - Math.max(a.low[axis], b.low[axis]));
+    const least = Math.min(...[a, b].map((map) => (map.high[0] - map.low[0]) * (map.high[1] - map.low[1])));
+    const share = meet.every((side) => side > 0) ? (meet[0] * meet[1]) / least : 0;
+    const first = share < 0.5 ? "These seem to be two places: the maps overlap by less than half." :
+      "These are two maps; if they do not show one place in one frame, they are two places.";
+    return `${first} Each list is of its own map, and its positions are in that map's own frame.`;
   }
 
   goalItem(k, goal, i) {
@@ -266,6 +336,7 @@ class Panel {
       Object.assign($(id), { min: low - 0.1, max: high + 0.1, step: 0.05, value: start });
       $(id).addEventListener("input", () => this.cut());
     }
+    this.uncut = [Number($("low").value), Number($("high").value)];
     this.cut();
     $("colour").addEventListener("change", () => this.colourBy($("colour").value));
     for (const kind of ["things", "boxes", "sounds", "rooms", "path"]) {
@@ -291,7 +362,9 @@ class Panel {
     const [low, high] = [Number($("low").value), Number($("high").value)];
     $("low-m").textContent = metres(low);
     $("high-m").textContent = metres(high);
+    this.isCut = [low, high].some((value, k) => value !== this.uncut?.[k]);
     const all = Number($("high").value) >= Number($("high").max) - 1e-6;
+    this.keep();
     this.viewer.look.cut = [low, all ? 1e9 : high];
     if (low <= Number($("low").min) + 1e-6) this.viewer.look.cut[0] = -1e9;
     this.viewer.changed();
@@ -302,6 +375,7 @@ class Panel {
     this.viewer.look.colour = name;
     $("overlay").classList.toggle("hot", name === "heat");
     this.legend();
+    this.keep();
     this.viewer.changed();
   }
 
@@ -351,7 +425,9 @@ class Panel {
       })) : []);
       marks.set("room", 3, shown("rooms") ? apart(contents.rooms).map((room) => {
         const place = this.toLevel(k, room.position);
-        return { place: [place[0], place[1], map.floor_m + 0.02], text: room.name };
+        const onFloor = [place[0], place[1], map.floor_m + 0.02];
+        return { place: onFloor, text: room.name, title: `go to the ${room.name}`,
+          onClick: () => this.viewer.flyTo(onFloor, 6) };
       }) : []);
       marks.set("thing", 4, shown("things") ? contents.things.map((thing) => {
         const [r, g, b] = contents.palettes.thing.slice(3 * thing.label, 3 * thing.label + 3);
@@ -375,14 +451,18 @@ class Panel {
 
   list() {
     const { things, sounds, rooms } = this.contents[0];
-    const row = (text, more, place, distance) => {
-      const button = made("button", { type: "button" }, text, made("small", { textContent: more }));
+    const { palettes } = this.contents[0];
+    const row = (text, more, place, distance, [kind, label] = []) => {
+      const swatch = kind ? [made("i", { className: "swatch" })] : [];
+      if (kind) swatch[0].style.background = `rgb(${palettes[kind].slice(3 * label, 3 * label + 3).join(",")})`;
+      const button = made("button", { type: "button" }, made("span", { className: "named" }, ...swatch, text),
+        made("small", { textContent: more }));
       button.addEventListener("click", () => this.viewer.flyTo(this.toLevel(0, place), distance));
       return made("li", {}, button);
     };
     $("things").replaceChildren(...things.map((thing) =>
       row(thing.name, `${percent(thing.confidence)} · ${thing.size.map((side) => side.toFixed(1)).join(" × ")} m`,
-        thing.position, 3)));
+        thing.position, 3, ["thing", thing.label])));
     $("sounds").replaceChildren(...sounds.map((sound, i) => {
       const item = row(sound.names[0] ?? `sound ${i + 1}`,
         `${clock(sound.onset_s)}, ${(sound.offset_s - sound.onset_s).toFixed(1)} s` +
@@ -392,7 +472,7 @@ class Panel {
       return item;
     }));
     $("rooms").replaceChildren(...rooms.map((room) =>
-      row(room.name, `${percent(room.confidence)} · ${room.views} views`, room.position, 7)));
+      row(room.name, `${percent(room.confidence)} · ${room.views} views`, room.position, 7, ["room", room.label])));
     for (const [id, list] of [["things", things], ["sounds", sounds], ["rooms", rooms]]) {
       $(`${id}-count`).textContent = `(${list.length})`;
     }
@@ -473,11 +553,8 @@ class Panel {
 
   bindTools() {
     $("whole").addEventListener("click", () => this.viewer.frameAll());
-    $("above").addEventListener("click", () => {
-      this.viewer.frameAll();
-      this.viewer.camera.pitch = STEEPEST;
-      this.viewer.moved();
-    });
+    $("above").addEventListener("click", () => this.viewer.frameAll(true));
+    $("save").addEventListener("click", () => this.save().catch((fault) => this.note(fault.message)));
     const press = (on) => {
       $("measure").setAttribute("aria-pressed", String(on));
       $("canvas").classList.toggle("measuring", on);

@@ -285,6 +285,7 @@ class Renderer {
       gl.uniform4f(places.viewport, ...view.viewport);
       gl.uniform1f(places.near, camera.near);
       gl.uniform1f(places.far, camera.far);
+      gl.uniform1f(places.flatness, camera.flat ? 1 : 0);
     }
     gl.bindVertexArray(layer.array);
     gl.drawArrays(gl.POINTS, start, count);

@@ -42,20 +42,22 @@ void main() { shown = vec4(colour, 1.0); }`;
 const BLOCK_FRAGMENT = `#version 300 es
 precision highp float;
 flat in vec3 colour, middle;
-uniform float edge, near, far;
+uniform float edge, near, far, flatness;
 uniform vec3 eye;
 uniform mat3 ray;
 uniform vec4 viewport;
 out vec4 shown;
 void main() {
-  vec3 along = ray * vec3((gl_FragCoord.xy - viewport.xy) / viewport.zw * 2.0 - 1.0, 1.0);
-  vec3 slope = 1.0 / along, start = slope * (eye - middle), width = abs(slope) * edge * 0.5;
+  vec2 at = (gl_FragCoord.xy - viewport.xy) / viewport.zw * 2.0 - 1.0;
+  vec3 along = ray * vec3(at * (1.0 - flatness), 1.0), from = eye + ray * vec3(at * flatness, 0.0);
+  vec3 slope = 1.0 / along, start = slope * (from - middle), width = abs(slope) * edge * 0.5;
   vec3 enter = -start - width, leave = -start + width;
   float first = max(max(enter.x, enter.y), enter.z), last = min(min(leave.x, leave.y), leave.z);
   if (first > last || first < near) discard;
   float shade = first == enter.z ? 1.0 : first == enter.x ? 0.80 : 0.89;
   shown = vec4(colour * shade, 1.0);
-  gl_FragDepth = 0.5 + 0.5 * ((far + near) - 2.0 * far * near / first) / (far - near);
+  float inDepth = ((far + near) - 2.0 * far * near / first) / (far - near);
+  gl_FragDepth = flatness > 0.5 ? (first - near) / (far - near) : 0.5 + 0.5 * inDepth;
 }`;
 
 const LINE_VERTEX = `#version 300 es

@@ -54,20 +54,22 @@ class Viewer {
       return { map, layer, marks: new Marks(box), lines: new Map() };
     });
     this.onClick = () => {};
+    this.onMove = () => {};
     this.waiting = false;
     steer(canvas, this.camera, () => this.moved(), (x, y) => this.clicked(x, y));
     new ResizeObserver(() => this.moved()).observe(canvas);
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.changed());
   }
 
-  /** The whole of what is shown, for the first picture. */
-  frameAll() {
-    const lows = this.fields.map(({ map }) => map.low);
-    const highs = this.fields.map(({ map }) => [map.high[0], map.high[1], Math.min(map.high[2], map.ceiling_m)]);
+  /** The whole of what is shown: from above its side, or as a plan. */
+  frameAll(asPlan = false) {
+    const lows = this.fields.map(({ map }) => map.least);
+    const highs = this.fields.map(({ map }) => [map.most[0], map.most[1], Math.min(map.most[2], map.ceiling_m)]);
     const least = lows.reduce((a, b) => a.map((value, k) => Math.min(value, b[k])));
     const most = highs.reduce((a, b) => a.map((value, k) => Math.max(value, b[k])));
     const [field] = this.places();
-    this.camera.frame(least, most, field.aspect);
+    if (asPlan) this.camera.frameAbove(least, most, field.aspect);
+    else this.camera.frame(least, most, field.aspect);
     this.moved();
   }
 
@@ -137,6 +139,7 @@ class Viewer {
       this.resting = true;
       this.renderer.drawMoving(views, this.look);
       for (const view of views) view.field.marks.update(view.camera, view.box, this.look.cut);
+      this.onMove(views[0].box.seenHeight);
       return this.schedule();
     }
     if (!this.resting) return undefined;
@@ -152,11 +155,10 @@ class Viewer {
       x >= box.left && x < box.left + box.width && y >= box.top && y < box.top + box.height);
     if (!place) return null;
     const { box, aspect, field, k } = place;
-    const camera = this.camera.seen(aspect);
     const u = (2 * (x - box.left - box.x)) / box.seenWidth - 1;
     const v = 1 - (2 * (y - box.top - box.y)) / box.seenHeight;
-    const along = unit(add(camera.ahead, add(scaled(camera.right, u * SLOPE * aspect), scaled(camera.up, v * SLOPE))));
-    const hit = field.layer.pick(camera.eye, along, this.look.cut);
+    const { from, along } = this.camera.ray(aspect, u, v);
+    const hit = field.layer.pick(from, along, this.look.cut);
     return hit && { k, ...hit };
   }
 
