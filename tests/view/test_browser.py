@@ -5,13 +5,13 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.view.page import write_page
 from avlmaps.view.server import ViewServer
+from helpers.viewing import decoded, serving
 
 pytestmark = pytest.mark.browser
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -47,11 +47,9 @@ def opened(browser, url: str, width: int = 1000, height: int = 640):
 def picture(page) -> np.ndarray:
     """Return the map's canvas as it is on the screen, RGB, once all voxels are drawn; nothing lies over it."""
     page.wait_for_selector("#canvas[data-state=whole]")
-    page.add_style_tag(
-        content="#overlay *, #tools, #scale, #legend { opacity: 0 !important; pointer-events: none !important }"
-    )
-    shot = page.locator("#canvas").screenshot()
-    return cv2.cvtColor(cv2.imdecode(np.frombuffer(shot, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+    over = "#overlay *, #tools, #scale, #legend"
+    page.add_style_tag(content=f"{over} {{ opacity: 0 !important; pointer-events: none !important }}")
+    return decoded(page.locator("#canvas").screenshot())
 
 
 def goal_at(page) -> tuple[float, float]:
@@ -320,7 +318,7 @@ def test_a_picture_is_saved(page, tmp_path: Path) -> None:
         page.click("#save")
     download.value.save_as(tmp_path / "map.png")
     assert download.value.suggested_filename == "room.png"
-    saved = cv2.imread(str(tmp_path / "map.png"))
+    saved = decoded(tmp_path / "map.png")
     box = page.locator("#canvas").bounding_box()
     assert saved.shape[1] == round(box["width"]) and saved.shape[0] > box["height"]
     x, y = (round(value) for value in goal_at(page))
@@ -329,7 +327,6 @@ def test_a_picture_is_saved(page, tmp_path: Path) -> None:
 
 def test_two_maps_are_seen_side_by_side_and_one_over_the_other(browser, room: AVLMap) -> None:
     from avlmaps.view.session import ViewSession
-    from helpers.viewing import serving
 
     for server in serving(ViewSession([room, AVLMap(room.stored)])):
         page = opened(browser, server.url)
