@@ -121,3 +121,33 @@ def test_a_map_is_told_from_a_recording(tmp_path: Path):
         RecordingError, match=r"is a map, not a recording; ask it with `avlmaps query`, or give the rec"
     ):
         open_recording(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("names", "sentence"),
+    [
+        (("mav0/imu0/data.csv",), "holds measurements of an IMU and no pictures, from which no map can be built"),
+        (("imu0/data.csv", "cam0/data.csv"), "an IMU and cameras without depth, from which no map is built"),
+        (("frame-000000.depth.pgm", "_info.txt"), "unpacked by ScanNet's C++ reader, whose .depth.pgm is not read"),
+        (("images/0.jpg", "sparse/0/cameras.bin"), "is a reconstruction of COLMAP"),
+        (("scene_00_0000.depth", "scene_00_0000.png"), "is ICL-NUIM in POV-Ray's own files"),
+    ],
+)
+def test_what_is_recognised_and_not_read_says_why(tmp_path: Path, names: tuple[str, ...], sentence: str):
+    with pytest.raises(RecordingError, match=re.escape(sentence)):
+        open_recording(_touch(tmp_path / "x", *names))
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("x.sens", "is ScanNet's packed recording; unpack it with ScanNet's SensReader"),
+        ("x.svo2", "is a recording of a ZED camera, which its own SDK alone reads"),
+        ("x.db", "is no database of RTAB-Map (it is no SQLite file)"),
+        ("x.ply", "is a finished model, without the pictures that a map is built from"),
+    ],
+)
+def test_a_file_that_is_recognised_and_not_read_says_why(tmp_path: Path, name: str, sentence: str):
+    (tmp_path / name).write_bytes(b"x")
+    with pytest.raises(RecordingError, match=re.escape(sentence)):
+        open_recording(tmp_path / name)

@@ -32,7 +32,10 @@ class Build(ModelVerb):
     compiles: ClassVar[bool] = True
 
     recording: Annotated[Positional[Path], arg(metavar="REC")]
-    """Recording: our folder, 7-Scenes/3DMatch, AVLMaps/VLMaps, TUM RGB-D, Replica, ScanNet, a ROS 1 or 2 bag, MCAP."""
+    """Recording: our folder, a bag (or a folder of its parts), a phone's scan, a data set; docs/recordings.md lists "
+    "all."""
+    more: Annotated[Positional[tuple[Path, ...]], arg(metavar="[BAG ...]")] = ()
+    """Further files of a bag that was split."""
     out: Annotated[Path, arg(metavar="MAP")]
     """Map folder to write, by custom NAME.avlmap."""
     profile: Annotated[str, arg(metavar="PROFILE")] = "embedded"
@@ -55,7 +58,8 @@ class Build(ModelVerb):
     audio: Annotated[Path | None, arg(metavar="FILE")] = None
     """Sound file to use instead of the recording's own track."""
     topics: Annotated[tuple[str, ...], arg(metavar="KIND=TOPIC ...")] = ()
-    """Topics of a ROS bag that their type does not identify: rgb=, depth=, pose= or audio=TOPIC."""
+    """Topics of a ROS bag that their type does not identify: rgb=, depth=, pose= or audio=TOPIC; or pose=FILE, a
+    table of stamp tx ty tz qx qy qz qw."""
     reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
     """What you know better than the recording's files."""
     frame_step: Annotated[int, arg(metavar="N")] = 1
@@ -103,7 +107,7 @@ def build(verb: "Build") -> dict[str, Any]:
         _cache(verb.feature_cache, verb.feature_cache_gb),
     )
     recording = open_recording(
-        verb.recording,
+        [verb.recording, *verb.more],
         format=verb.format,
         audio=verb.audio,
         topics=_topics(verb.topics),

@@ -1,6 +1,6 @@
 """`avlmaps info`: describe a map or a recording, verify it, repair it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -36,6 +36,8 @@ class Info(Verb):
 
     path: Annotated[Positional[Path], arg(metavar="REC|MAP")]
     """Recording or map folder."""
+    more: Annotated[Positional[tuple[Path, ...]], arg(metavar="[BAG ...]")] = ()
+    """Further files of a bag that was split."""
     format: Annotated[str, arg(metavar="FORMAT")] = "auto"
     """Format of the recording, if its files do not show it."""
     verify: bool = False
@@ -57,13 +59,20 @@ class Info(Verb):
             raise UsageError("--recording belongs to --repair.")
         repaired = repair(self) if self.repair else {}
         given = self.reading.corrections()
-        answer = describe_path(self.path, self.format, verify=self.verify, plot=self.plot, corrections=given)
+        answer = describe_path(
+            self.path, self.format, verify=self.verify, plot=self.plot, corrections=given, more=self.more
+        )
         answer |= repaired
         emit(answer, info_lines(answer), self.json)
 
 
 def describe_path(
-    path: Path, format: str, verify: bool, plot: Path | None, corrections: "Corrections | None" = None
+    path: Path,
+    format: str,
+    verify: bool,
+    plot: Path | None,
+    corrections: "Corrections | None" = None,
+    more: Sequence[Path] = (),
 ) -> dict[str, Any]:
     """Describe a map or a recording."""
     if (path / MAP_MANIFEST).exists() or path.suffix == ".avlmap":
@@ -74,9 +83,9 @@ def describe_path(
     from avlmaps.recordings.validate import validate
 
     find_format(path, format)  # a place that holds no recording has no faults to list
-    faults = [str(fault) for fault in validate(path, format, None if verify else DECODED_BY_INFO)]
+    faults = [str(fault) for fault in validate(path, format, None if verify else DECODED_BY_INFO, more)]
     try:
-        recording = open_recording(path, format=format, corrections=corrections)
+        recording = open_recording([path, *more], format=format, corrections=corrections)
     except AvlmapsError:
         for fault in faults:
             say(f"fault: {fault}")

@@ -11,6 +11,7 @@ from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.corrections import Corrections, corrected
 from avlmaps.recordings.known_formats import FORMATS, LOOKED_AT, Format, formats
 from avlmaps.recordings.types import Recording
+from avlmaps.recordings.unreadable import why_unreadable
 
 # Files that a map's folder holds and no recording's does.
 _MAP = "map.json"
@@ -79,6 +80,8 @@ def _recognised(path: Path) -> Format | None:
 
 
 def _unknown(path: Path) -> str:
+    if why := why_unreadable(path):
+        return why
     looked_for = "; ".join(f"{f.name}: {f.looks_for}" for f in formats())
     if path.is_file() and path.suffix.lower() in layout.VIDEO_SUFFIXES:
         return (

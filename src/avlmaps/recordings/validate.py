@@ -1,5 +1,6 @@
 """Naming every fault of a recording, each in one sentence with its file and line."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
@@ -20,7 +21,9 @@ from avlmaps.recordings.types import Recording
 _MAX_AUDIO_LACK_S = 0.5
 
 
-def validate(path: Path | str, format: str = "auto", max_decoded: int | None = None) -> list[Fault]:
+def validate(
+    path: Path | str, format: str = "auto", max_decoded: int | None = None, more: Sequence[Path] = ()
+) -> list[Fault]:
     """Return every fault of a recording; an empty list says that there is none.
 
     Texts, poses, stamps and the sound track are checked wholly, and so are the outsides of all pictures (there,
@@ -30,11 +33,12 @@ def validate(path: Path | str, format: str = "auto", max_decoded: int | None = N
         path: a recording of any format.
         format: as for ``open_recording``.
         max_decoded: how many frames to decode, spread evenly; all of them if None.
+        more: further files of a bag that was split.
     """
     path = Path(path)
     faults: list[Fault] = []
     try:
-        recording = uncorrected(find_format(path, format).open(path, faults.append))
+        recording = uncorrected(find_format(path, format).open(path, faults.append, more=more))
     except AvlmapsError as error:
         if not any(str(error) == fault.sentence for fault in faults):
             faults.append(Fault(str(error)))

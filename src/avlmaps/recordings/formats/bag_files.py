@@ -28,7 +28,7 @@ class Bag:
             more: further files of the same walk.
         """
         self.path = path
-        self.files = [file for given in (path, *more) for file in bag_files(given)]
+        self.files = sorted((file for given in (path, *more) for file in bag_files(given)), key=_by_numbers)
         self.notices = _unfinished(path)
         suffixes = {file.suffix.lower() for file in self.files}
         if len(self.files) > 1 and len(suffixes) > 1:
