@@ -4,6 +4,7 @@
 import json
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -85,3 +86,11 @@ class Robot:
         while not holds() and time.monotonic() < until_s:
             time.sleep(0.02)
         return holds()
+
+
+def in_thread(work: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]:
+    """Run something beside the test; its result comes into the list."""
+    results: list[Any] = []
+    thread = threading.Thread(target=lambda: results.append(work()), daemon=True)
+    thread.start()
+    return thread, results

@@ -95,7 +95,8 @@ class Body(Node):
 class Nav2(Node):
     """Drives as Nav2 does: a newer goal of the same action ends the older one, a cancel brakes.
 
-    Modes: ``abort``, ``reject``, ``deaf`` (refuses cancels), ``lie`` (succeeds without moving), ``normal``.
+    Modes: ``abort``, ``reject``, ``deaf`` (refuses cancels), ``runaway`` (accepts them and drives on), ``lie``
+    (succeeds without moving), ``normal``.
     """
 
     def __init__(self, log: Log) -> None:
@@ -156,7 +157,7 @@ class Nav2(Node):
                 handle.abort()
                 self.log("replaced", id=uuid)
                 return result
-            if handle.is_cancel_requested:
+            if handle.is_cancel_requested and self.mode != "runaway":
                 self._drive(0.0, 0.0)
                 handle.canceled()
                 self.log("cancelled", id=uuid)
