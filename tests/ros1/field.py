@@ -56,6 +56,12 @@ def generate(checkout: Path, out: Path) -> None:
     authentication = out / "defs" / "Authentication.srv"
     authentication.parent.mkdir(parents=True, exist_ok=True)
     authentication.write_text(_AUTHENTICATION)
+    # Debian packs the messages of move_base for Python without their manifest, which rosbridge reads.
+    manifest = out / "packages" / "move_base_msgs" / "package.xml"
+    manifest.parent.mkdir(parents=True, exist_ok=True)
+    about = "<version>1.0.0</version><description>messages</description><license>BSD</license>"
+    person = '<maintainer email="nobody@example.org">nobody</maintainer>'
+    manifest.write_text(f'<package format="2"><name>move_base_msgs</name>{about}{person}</package>')
     msgs = sorted((checkout / "rosbridge_msgs" / "msg").glob("*.msg"))
     for package, kind, files in (("rosbridge_msgs", "msg", msgs), ("rosauth", "srv", [authentication])):
         folder = out / package / kind
@@ -96,7 +102,7 @@ class Field:
             "ROS_MASTER_URI": f"http://127.0.0.1:{self.master}",
             "ROS_IP": "127.0.0.1",
             "ROS_ROOT": "/usr/share/ros",
-            "ROS_PACKAGE_PATH": "/usr/share",
+            "ROS_PACKAGE_PATH": f"{made / 'packages'}:/usr/share",
             "ROS_DISTRO": "noetic",
             "ROS_LOG_DIR": str(self.folder / "log"),
             "HOME": str(self.folder),
