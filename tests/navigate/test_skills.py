@@ -1,5 +1,7 @@
 """Left is left, north is north, and a world that is turned or mirrored turns or mirrors what the robot does."""
 
+from contextlib import nullcontext
+from dataclasses import replace
 from inspect import getdoc, signature
 from math import atan2, cos, degrees, pi, radians, sin
 from typing import get_type_hints
@@ -13,6 +15,7 @@ from avlmaps.core.errors import NavigationError, ProgramError
 from avlmaps.core.motion import Action, GroundPose, wrap_angle
 from avlmaps.language.program import SKILLS
 from avlmaps.language.program.vocabulary import Vocabulary
+from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.skills import Robot, RobotSettings
 from helpers.kinematic import KinematicDriver, box, robot_among
 
@@ -245,3 +248,25 @@ def test_a_misused_skill_says_what_it_takes(skill: str, arguments: tuple[object,
     with pytest.raises(ProgramError, match=sentence):
         getattr(robot, skill)(*arguments)
     assert driver_of(robot).told == []
+
+
+class OwnStack(KinematicDriver):
+    """A robot that plans and steers by itself: its movements are no discrete actions, its stop is everybody's."""
+
+    stops = 0
+
+    def go_to(self, place: np.ndarray, *, face: np.ndarray | None = None) -> Arrival:
+        return replace(super().go_to(place, face=face), actions=())
+
+    def stop(self) -> Arrival:
+        self.stops += 1
+        return super().stop()
+
+
+@pytest.mark.parametrize("reaches", [True, False])
+def test_a_robot_with_its_own_stack_is_not_stopped_after_each_place(reaches: bool) -> None:
+    robot = robot_among(GroundPose(0.0, 0.0), a=box(3.0, 0.0))
+    driver = robot.driver = OwnStack(GroundPose(0.0, 0.0), reaches=reaches)
+    with nullcontext() if reaches else pytest.raises(NavigationError):
+        robot.move_to("a")
+    assert driver.stops == 0

@@ -5,6 +5,7 @@ client.py URL wait       waits for lines on standard input: stop, pose, go X Y
 """
 
 import json
+import signal
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -39,7 +40,8 @@ def main(url: str, what: str) -> int:
     try:
         with raised_signals():
             if what == "drive":
-                say("arrival", **told(driver.go_to(np.array([60.0, 0.0, 0.0]))))
+                ahead = driver.pose.ahead(40.0)
+                say("arrival", **told(driver.go_to(np.array([ahead.x_m, ahead.y_m, 0.0]))))
                 halt = driver.halt()
                 say("halt", stopped=halt.stopped, note=halt.note)
                 return 0 if halt.stopped else 3
@@ -65,6 +67,7 @@ def main(url: str, what: str) -> int:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell in the background has it ignored
     status = main(sys.argv[1], sys.argv[2])
     say("exit", status=status)
     sys.exit(status)

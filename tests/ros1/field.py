@@ -135,7 +135,7 @@ class Field:
             "body": [*stand_in, "body", "--log", str(self.body_log), "--map-hz", str(self.map_hz)],
             "move_base": [*stand_in, "move_base", "--log", str(self.server_log), "--speed", str(self.speed)],
             "proxy": [sys.executable, str(HERE / "proxy.py"), str(self.near), str(self.port)],
-            "watchdog": [ROS_PYTHON, str(HERE / "watchdog.py"), "--log", str(self.server_log)],
+            "watchdog": [ROS_PYTHON, str(HERE.parents[1] / "src" / "avlmaps" / "watchdog.py")],
         }
         out = (self.folder / f"{name}.out").open("a")
         self._outs.append(out)
@@ -170,6 +170,10 @@ class Field:
             f"pose: {{position: {{x: {x}, y: {y}}}, orientation: {{w: 1.0}}}}}}}}}}"
         )
         self._ros_run("rostopic", "pub", "-1", "/move_base/goal", "move_base_msgs/MoveBaseActionGoal", goal)
+
+    def operate_stop(self) -> None:
+        """Cancel every goal, as an operator does."""
+        self._ros_run("rostopic", "pub", "-1", "/move_base/cancel", "actionlib_msgs/GoalID", "{}")
 
     def _ros_run(self, *words: str) -> None:
         subprocess.run(words, env=self._ros, check=True, capture_output=True, timeout=30.0)

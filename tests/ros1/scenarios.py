@@ -1,6 +1,6 @@
 """What may befall a drive, each as it befalls a real robot: what the body did is read from its own log.
 
-    scenarios.py [NAME ...]     prints one line of JSON for each; AVLMAPS_SRC names other sources to drive by
+scenarios.py [NAME ...]     prints one line of JSON for each; AVLMAPS_SRC names other sources to drive by
 """
 
 import json

@@ -5,9 +5,11 @@ The body integrates ``cmd_vel``, stands when none comes for half a second, repor
 really did into a log. The move_base is a real actionlib server that drives straight to its goal.
 """
 
+# pyright: reportMissingImports=false
 import argparse
 import json
 import math
+import random
 import threading
 import time
 from pathlib import Path
@@ -44,7 +46,7 @@ class Body:
         self.log, self.map_hz = log, map_hz
         self.x = self.y = self.yaw = self.speed = self.turn = 0.0
         self.command, self.commanded_s = (0.0, 0.0), 0.0
-        self.telling = True
+        self.telling, self.shuffled, self.held = True, False, []
         rospy.Subscriber("cmd_vel", Twist, self.take, queue_size=1)
         rospy.Subscriber("body/mode", String, self.mode)
 
@@ -52,7 +54,7 @@ class Body:
         self.command, self.commanded_s = (command.linear.x, command.angular.z), time.monotonic()
 
     def mode(self, word):
-        self.telling = word.data != "silent"
+        self.telling, self.shuffled = word.data != "silent", word.data == "shuffled"
         self.log.say("mode", mode=word.data)
 
     def run(self):
@@ -70,7 +72,13 @@ class Body:
             self.y += self.speed * math.sin(self.yaw) * dt
             self.yaw += self.turn * dt
             if self.telling:
-                tell.sendTransform(transform("odom", "base_link", self.x, self.y, self.yaw))
+                self.held.append(transform("odom", "base_link", self.x, self.y, self.yaw))
+                if len(self.held) >= (20 if self.shuffled else 1):
+                    if self.shuffled:
+                        random.shuffle(self.held)
+                    for told in self.held:
+                        tell.sendTransform(told)
+                    self.held.clear()
                 if ticks % max(1, round(1.0 / self.map_hz / TICK_S)) == 0:
                     tell.sendTransform(transform("map", "odom", 0.0, 0.0, 0.0))
             if ticks % 3 == 0:

@@ -1,6 +1,7 @@
 """The driving server: plan, confirm, stop, status; one order at a time, each logged, none without its token."""
 
 import json
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from time import monotonic, sleep
@@ -412,3 +413,36 @@ def test_agents_plan_confirm_and_stop_by_tools_of_their_own(client: TestClient, 
     assert tool("stop_robot", nonsense=[1, 2])["structuredContent"]["stopped"] is True
     assert tool("robot_status")["structuredContent"]["state"] == "idle"
     assert {entry["who"]["by"] for entry in drive.entries} == {"mcp"}
+
+
+def test_a_stop_voids_plans_that_are_still_computed(
+    client: TestClient, drive: Driven, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    computing, stopped = threading.Event(), threading.Event()
+    prepare = drive.machine.prepare
+
+    def slowly(*given: Any) -> Any:
+        computing.set()
+        assert stopped.wait(30.0)
+        return prepare(*given)
+
+    monkeypatch.setattr(drive.machine, "prepare", slowly)
+    answers: list[Any] = []
+    # The first is being computed when the stop comes, the others wait for their turn.
+    asking = [
+        threading.Thread(target=lambda: answers.append(client.post("/drive/plan", json={"words": "turn left"})))
+        for _ in range(3)
+    ]
+    for thread in asking:
+        thread.start()
+    assert computing.wait(30.0)
+    until(lambda: drive.service.waiting == 3)
+    assert client.post("/drive/stop").status_code == 200
+    stopped.set()
+    for thread in asking:
+        thread.join(60.0)
+    assert [answer.status_code for answer in answers] == [409] * 3
+    assert {answer.json()["error"]["kind"] for answer in answers} == {"stopped"}
+    assert client.get("/drive/status").json()["plans_waiting"] == 0
+    token = plan(client, "turn left")["token"]
+    assert client.post("/drive/confirm", json={"token": token}).status_code == 202

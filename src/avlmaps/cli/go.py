@@ -84,7 +84,7 @@ class Go(ModelVerb):
 
     def run(self) -> None:
         """Drive."""
-        from avlmaps.navigate.interrupts import Interrupted
+        from avlmaps.navigate.interrupts import UNCONFIRMED_STATUS, Interrupted
 
         try:
             answer = go(self)
@@ -95,7 +95,7 @@ class Go(ModelVerb):
         failed = failure(answer)
         emit({**answer, "error": failed}, go_lines(answer), self.json)
         if failed is not None:
-            raise AnsweredError(failed["message"])
+            raise AnsweredError(failed["message"], UNCONFIRMED_STATUS if answer.get("robot_stopped") is False else 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +108,7 @@ class Ready:
         obstacles: the obstacles that the map knows.
         contacts: returns where it touched something that the map does not know.
         halt: returns how the robot stands after an interrupt.
+        owes: returns whether a goal was sent whose end is not confirmed.
         close: ends the connection; a real robot stops where it is.
     """
 
@@ -116,6 +117,7 @@ class Ready:
     obstacles: "Obstacles"
     contacts: "Callable[[], Float[np.ndarray, 'm 2'] | None]"
     halt: "Callable[[], Halt]"
+    owes: "Callable[[], bool]"
     close: "Callable[[], None]"
 
 
@@ -196,13 +198,14 @@ def drive(
         raise
     finally:
         robot.close()
+    unconfirmed = {"robot_stopped": False} if robot.owes() else {}
     if verb.plot is not None:
         from avlmaps.navigate.trace_plot import plot_path
 
         title = f"“{verb.sentence}”"
         plot_path(verb.plot, avlmap.space, robot.start, outcome.moves, robot.obstacles, robot.contacts(), title)
-        return {**outcome.to_json(), "plot": str(verb.plot)}
-    return outcome.to_json()
+        return {**outcome.to_json(), **unconfirmed, "plot": str(verb.plot)}
+    return {**outcome.to_json(), **unconfirmed}
 
 
 def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":
@@ -253,7 +256,9 @@ def simulated_robot(verb: "Go", avlmap: "AVLMap", start: "GroundPose | None") ->
 
     robot = robot_in(avlmap, open_scene(verb.scene or ""), SHAPES[verb.body], start)
     halt = Halt(True, "the simulated robot moves only while the command runs")
-    return Ready(robot.driver, robot.start, robot.obstacles, lambda: robot.contacts, lambda: halt, lambda: None)
+    return Ready(
+        robot.driver, robot.start, robot.obstacles, lambda: robot.contacts, lambda: halt, lambda: False, lambda: None
+    )
 
 
 def _real(verb: "Go", avlmap: "AVLMap") -> Ready:
@@ -267,11 +272,14 @@ def _real(verb: "Go", avlmap: "AVLMap") -> Ready:
     obstacles = obstacles_for(avlmap, SHAPES[verb.body])
     kind = "nav2" if verb.robot == "nav2" else "move_base"
     driver = open_ros_driver(kind, verb.ros, frames, obstacles, settings=settings, guarded=True)
-    return Ready(driver, driver.pose, obstacles, lambda: None, driver.halt, driver.close)
+    return Ready(driver, driver.pose, obstacles, lambda: None, driver.halt, lambda: driver.owes, driver.close)
 
 
 def failure(answer: dict[str, Any]) -> dict[str, Any] | None:
     """Return why a command was not obeyed to its end, as ``error`` in JSON has it; None where it was."""
+    if answer.get("robot_stopped") is False:
+        message = "The robot did not confirm that it gave up its goal, and may still be driving; use its own stop."
+        return error_answer("navigation", message)
     if answer["ok"]:
         return None
     if answer["error"] is not None:

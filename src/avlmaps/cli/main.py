@@ -109,7 +109,7 @@ def _run(verb: "Verb | PlainQuery") -> int:
         with models_in_force(verb), _compiling(verb):
             verb.run()
     except AnsweredError as error:
-        return _complain(error, 1)
+        return _complain(error, error.status)
     except UsageError as error:
         return _fail(verb, error, str(error), 2)
     except AvlmapsError as error:

@@ -17,7 +17,15 @@ class UsageError(Exception):
 
 
 class AnsweredError(Exception):
-    """A verb failed and its answer, which is printed already, says why; exit status 1."""
+    """A verb failed and its answer, which is printed already, says why.
+
+    Attributes:
+        status: exit status.
+    """
+
+    def __init__(self, message: str, status: int = 1) -> None:
+        super().__init__(message)
+        self.status = status
 
 
 _SHOWN = 200

@@ -161,7 +161,7 @@ class RosDriver:
     @property
     def owes(self) -> bool:
         """Whether a goal was sent whose end the robot has not confirmed, so that it may still be driving."""
-        return self._owed is not None
+        return self._owed is not None and self._owed.end is None
 
     def close(self) -> None:
         """End the connection; a goal that is not over is called off first, and else left to the guard."""

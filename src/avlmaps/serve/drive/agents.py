@@ -47,7 +47,8 @@ def drive_agent_server(service: DriveService) -> Server[Any]:
     dispatcher = service.dispatcher
 
     async def plan(wanted: PlanRequest) -> dict[str, Any]:
-        return await service.ordered(lambda: dispatcher.plan(wanted.words, wanted.program, _AGENT))
+        begun = dispatcher.begun
+        return await service.ordered(lambda: dispatcher.plan(wanted.words, wanted.program, _AGENT, begun))
 
     async def confirm(wanted: ConfirmRequest) -> dict[str, Any]:
         return await service.ordered(lambda: dispatcher.confirm(wanted.token, _AGENT))

@@ -140,7 +140,8 @@ def _answered(service: DriveService, endpoint: Endpoint) -> Callable[[Request], 
 
 async def _plan(service: DriveService, request: Request, who: Who) -> Response:
     wanted = await _read(request, PlanRequest)
-    return _json(await service.ordered(lambda: service.dispatcher.plan(wanted.words, wanted.program, who)))
+    begun = service.dispatcher.begun
+    return _json(await service.ordered(lambda: service.dispatcher.plan(wanted.words, wanted.program, who, begun)))
 
 
 async def _confirm(service: DriveService, request: Request, who: Who) -> Response:

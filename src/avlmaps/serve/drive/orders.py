@@ -96,21 +96,30 @@ class Dispatcher:
         if fault := self._machine.fault():
             raise NavigationError(f"The {self._machine.name} cannot be driven: {fault}.")
 
-    def plan(self, words: str, program: str, who: Who) -> dict[str, Any]:
+    @property
+    def begun(self) -> int:
+        """A mark of now, for plans: one that is requested now is void after the next stop or order."""
+        return self._book.cleared
+
+    def plan(self, words: str, program: str, who: Who, begun: int | None = None) -> dict[str, Any]:
         """Plan a command or a program on the map, and return the plan with its token.
 
         Args:
             words: a command; "" where there is a program.
             program: a program; "" where there is a command.
             who: wants it.
+            begun: the mark of when it was requested; that of now by default.
 
         Raises:
             DriveError: there is no plan, and so no token; the sentence says why.
         """
+        begun = self.begun if begun is None else begun
         try:
             with self._preparing:
                 self._require_idle()
                 plan = self._planned(words, program)
+            with self._lock:
+                token = self._book.add(plan, self._clock(), begun)
         except AvlmapsError as error:
             refused = _refusal(error)
             entry = {"who": who.to_json(), "words": words, "program": program}
@@ -120,8 +129,6 @@ class Dispatcher:
             self._log.write("planned", {"who": who.to_json(), **plan.to_json()})
         except NavigationError as error:
             raise _refusal(error) from None
-        with self._lock:
-            token = self._book.add(plan, self._clock())
         self._changed()
         return {**plan.to_json(), "token": token, "expires_in_s": self._book.lifetime_s}
 

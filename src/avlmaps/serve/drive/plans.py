@@ -112,7 +112,12 @@ class Plan:
 
 
 class PlanBook:
-    """Plans by the digests of their tokens; each token is good once, and for a short time. Not safe for threads."""
+    """Plans by the digests of their tokens; each token is good once, and for a short time. Not safe for threads.
+
+    Attributes:
+        lifetime_s: of a token.
+        cleared: how often every plan was forgotten; a plan that was begun before the last time is not added.
+    """
 
     def __init__(self, lifetime_s: float) -> None:
         """Begin empty.
@@ -121,13 +126,28 @@ class PlanBook:
             lifetime_s: of a token.
         """
         self.lifetime_s = lifetime_s
+        self.cleared = 0
         self._waiting: OrderedDict[bytes, tuple[Plan, float]] = OrderedDict()
 
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def add(self, plan: Plan, now_s: float) -> str:
-        """Keep a plan and return its token; the oldest of too many plans goes."""
+    def add(self, plan: Plan, now_s: float, begun: int | None = None) -> str:
+        """Keep a plan and return its token; the oldest of too many plans goes.
+
+        Args:
+            plan: of an order.
+            now_s: the time.
+            begun: what ``cleared`` was when the plan was requested; that of now by default.
+
+        Raises:
+            DriveError: the robot was stopped, or took another order, while the plan was computed.
+        """
+        if begun not in (None, self.cleared):
+            raise DriveError(
+                "The robot was stopped, or took another order, while this plan was computed; plan again.",
+                409, "stopped",
+            )  # fmt: skip
         token = secrets.token_urlsafe(32)
         self._waiting[_digest(token)] = plan, now_s + self.lifetime_s
         while len(self._waiting) > _MOST_PLANS:
@@ -159,7 +179,8 @@ class PlanBook:
         return plan
 
     def clear(self) -> None:
-        """Forget every plan."""
+        """Forget every plan, also those that are still computed."""
+        self.cleared += 1
         self._waiting.clear()
 
 

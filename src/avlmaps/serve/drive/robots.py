@@ -200,14 +200,13 @@ class RosMachine:
         if self._obstacles is None or self._driver is None or version != self._version:
             from avlmaps.navigate.ros import open_ros_driver
 
-            obstacles = obstacles_for(avlmap, self.shape)
-            if self._driver is not None:
-                self._driver.close()
-                self._driver = None
+            obstacles, before = obstacles_for(avlmap, self.shape), self._driver
             kind = "nav2" if self._read.robot == "nav2" else "move_base"
             self._driver = open_ros_driver(
                 kind, self._read.ros, self._frames, obstacles, settings=self._settings, guarded=True
             )
+            if before is not None:  # until here a stop had one that could be used
+                before.close()
             self._obstacles, self._version = obstacles, version
         return self._obstacles
 
