@@ -17,6 +17,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import PICTURE_BYTES, open_regular, read_regular
 from avlmaps.core.npy import load_npy, npy_header
+from avlmaps.recordings.turning import Turn, exif_turn
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _JPEG = b"\xff\xd8"
@@ -144,7 +145,9 @@ def _jpeg_size(content: bytes) -> tuple[int, int] | None:
 
 
 def read_colour(path: Path, camera: Pinhole) -> UInt8[np.ndarray, "h w 3"]:
-    """Read a colour picture as RGB, as the sensor delivered it (no turning by EXIF).
+    """Read a colour picture as RGB, as the sensor delivered it.
+
+    A turn that EXIF requests is heeded only where the turned picture alone has the camera's size.
 
     Raises:
         RecordingError: the file is missing, truncated, no picture or not of the camera's size.
@@ -160,6 +163,8 @@ def decode_colour(path: Path, content: bytes, camera: Pinhole) -> UInt8[np.ndarr
     bgr = decode_picture(content, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if bgr is None:
         raise RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
+    if bgr.shape[:2] != (camera.height, camera.width):
+        bgr = exif_turn(content).applied(bgr)
     _check_size(path, bgr.shape, camera)
     return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
 
@@ -193,7 +198,32 @@ def decode_picture(content: bytes, flags: int) -> np.ndarray | None:
 def _check_outside(path: Path, content: bytes, camera: Pinhole) -> None:
     check_whole(path, content)
     width, height = picture_size(path, content)
+    if (width, height) != (camera.width, camera.height) == (height, width):
+        width, height = exif_turn(content).size(width, height)
     _check_size(path, (height, width), camera)
+
+
+def file_turn(path: Path) -> Turn:
+    """Return how a JPEG's EXIF requests that it be turned; none where there is no such tag, or no such file."""
+    if path.suffix.lower() not in (".jpg", ".jpeg"):
+        return Turn()
+    try:
+        return exif_turn(_head(path))
+    except RecordingError:  # which says more when the picture is read
+        return Turn()
+
+
+def turn_notices(folder: Path, names: Sequence[str]) -> tuple[str, ...]:
+    """Return a notice where a few of the colour files are to be shown turned, or nothing."""
+    spread: list[int] = np.linspace(0, len(names) - 1, _TRIED).round().astype(int).tolist() if len(names) else []
+    turned = {at: turn for at in dict.fromkeys(spread) if (turn := file_turn(folder / names[at]))}
+    if not turned:
+        return ()
+    at, turn = next(iter(turned.items()))
+    return (
+        f"{names[at]} is to be shown {turn.words} (its EXIF), as {len(turned)} of {len(set(spread))} pictures looked "
+        "at; they are read as they are stored, like depth, unless the intrinsics are of the turned size.",
+    )
 
 
 def read_depth(path: Path, camera: Pinhole, units_per_m: float) -> Float32[np.ndarray, "h w"]:

@@ -23,6 +23,8 @@ from avlmaps.recordings.types import Recording
 ENTRY_POINT_GROUP = "avlmaps.formats"
 # A folder of a million files must not be listed to be recognised.
 LOOKED_AT = 2000
+# A sound track that covers a smaller share of the frames is worth a notice.
+_LEAST_SHARED = 0.5
 _HERE = "avlmaps.recordings.formats"
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
 
@@ -77,9 +79,33 @@ class Format:
             raise RecordingError(f"{path} is of the format {self.name}, which has no topics; leave them out.")
         else:
             recording = opener(path, report=report) if self.tells_faults else opener(path)
-        if recording.audio is not None:
-            recording.notices = (*recording.notices, *recording.audio.notices)
+        settle_sound(recording)
         return recording
+
+
+def settle_sound(recording: Recording) -> None:
+    """Hold a recording's sound track against its frames, and add what is worth knowing of it to the notices.
+
+    Raises:
+        RecordingError: not one moment of the track lies among the frames.
+    """
+    track = recording.audio
+    if track is None:
+        return
+    notices = track.notices
+    if len(recording):
+        first_s, last_s = float(recording.stamps_s[0]), float(recording.stamps_s[-1])
+        span = f"from {track.start_s:.2f} to {track.end_s:.2f} s, and the frames from {first_s:.2f} to {last_s:.2f} s"
+        shared_s = min(track.end_s, last_s) - max(track.start_s, first_s)
+        if shared_s < 0.0:
+            raise RecordingError(
+                f"The sound track {track.path.name} of {recording.path} goes {span}, so that no sound has a place; "
+                "give the recording's time at which it begins (audio_start_s of recording.json), another track "
+                "(--audio), or none."
+            )
+        if shared_s < _LEAST_SHARED * (last_s - first_s):
+            notices = (*notices, f"The sound track {track.path.name} goes {span}; the rest has no sound.")
+    recording.notices = (*recording.notices, *notices)
 
 
 def holds(*names: str) -> Callable[[Path], bool]:

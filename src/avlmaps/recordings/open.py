@@ -9,7 +9,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.corrections import Corrections, corrected
-from avlmaps.recordings.known_formats import FORMATS, LOOKED_AT, Format, formats
+from avlmaps.recordings.known_formats import FORMATS, LOOKED_AT, Format, formats, settle_sound
 from avlmaps.recordings.types import Recording
 from avlmaps.recordings.unreadable import why_unreadable
 
@@ -44,7 +44,7 @@ def open_recording(
     recording = found.open(path, topics=topics, more=more)
     if audio is not None:
         recording.audio = AudioTrack.open(Path(audio))
-        recording.notices = (*recording.notices, *recording.audio.notices)
+        settle_sound(recording)
     if corrections:
         recording = corrected(recording, corrections)
         recording.notices = (*recording.notices, f"Read as given: {corrections.words()}.")

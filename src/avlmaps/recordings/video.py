@@ -10,6 +10,7 @@ from jaxtyping import Float64, UInt8
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.images import MOST_PIXELS
 from avlmaps.recordings.media_files import checked_media
+from avlmaps.recordings.turning import Turn, display_turn
 
 
 class VideoFrames:
@@ -19,7 +20,10 @@ class VideoFrames:
         path: the file.
         width: columns.
         height: rows.
-        stamps_s: (n,) seconds from the video's start, in the order they are shown.
+        stamps_s: (n,) seconds from the first frame, in the order they are shown.
+        start_s: when the first frame is shown on the file's clock, on which its sound begins at 0 or later, seconds.
+        turn: how players turn the pictures; they come turned if ``shown`` is set, else as stored.
+        shown: whether they come as players show them.
     """
 
     def __init__(self, path: Path) -> None:
@@ -35,8 +39,16 @@ class VideoFrames:
         if base <= 0.0:
             raise RecordingError(f"{self.path} does not say how fast its clock runs; convert it again.")
         self.stamps_s: Float64[np.ndarray, " n"] = (self._pts - self._pts[0]) * base
+        self.start_s = float(self._pts[0]) * base - (self._container.start_time or 0) / 1e6
+        self.turn, self.shown = self._find_turn(), False
         self._next = -1  # the frame that the decoder gives next; -1 after a seek
         self._decoder: Any = None
+
+    def show(self) -> None:
+        """Let the pictures come as players show them, not as they are stored."""
+        if self.turn and not self.shown:
+            self.shown = True
+            self.width, self.height = self.turn.size(self.width, self.height)
 
     def __len__(self) -> int:
         return len(self.stamps_s)
@@ -56,7 +68,8 @@ class VideoFrames:
                 for frame in self._decoder:
                     if frame.pts is not None and frame.pts >= self._pts[index]:
                         self._next = index + 1
-                        return self._checked(frame.to_ndarray(format="rgb24"), index)
+                        picture = frame.to_ndarray(format="rgb24")
+                        return self._checked(self.turn.applied(picture) if self.shown else picture, index)
             except (FFmpegError, ValueError, MemoryError) as error:
                 raise RecordingError(
                     f"Frame {index} of {self.path} cannot be decoded ({error}); is it damaged?"
@@ -105,6 +118,15 @@ class VideoFrames:
         if not stamps:
             raise RecordingError(f"{self.path} has a video stream without a single frame.")
         return np.unique(np.array(stamps, np.int64))
+
+    def _find_turn(self) -> Turn:
+        from av.error import FFmpegError
+
+        try:
+            self._seek(0)
+            return display_turn(next(self._decoder))
+        except (FFmpegError, StopIteration, ValueError):  # the picture itself will be an error when it is read
+            return Turn()
 
     def _seek(self, index: int) -> None:
         self._container.seek(int(self._pts[index]), stream=self._stream(), backward=True)

@@ -110,6 +110,7 @@ def settle(
         report(Fault(f"{path} has no frame with a usable pose, so there is nothing to map.", path))
     return shots, (
         *notices,
+        *images.turn_notices(path, shots.colour),
         *disagreement,
         *order.notices,
         *walk.notices,

@@ -18,9 +18,10 @@ from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.columns import NAMED_FILE, POSE, named_order, split_header
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names, settle
 from avlmaps.recordings.formats.tables import read_table, text_lines
-from avlmaps.recordings.images import first_picture_size
+from avlmaps.recordings.images import file_turn, first_picture_size
 from avlmaps.recordings.layout import Description
 from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault
+from avlmaps.recordings.turning import Turn
 from avlmaps.recordings.types import Recording
 from avlmaps.recordings.video import VideoFrames
 
@@ -52,6 +53,7 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
     _check_clocks(path, description, found, known)
     shots, notices, start_s, trajectory = _pose_pictures(found, known)
     shots, more = settle(path, shots, report, pose_file=None)
+    first_s = 0.0 if found.stamps_s is None else float(found.stamps_s[0]) - start_s
     audio_start_s = description.audio_start_s - (start_s if description.audio_start_s > _DATE_S else 0.0)
     up = description.up_in_world
     recording = FileRecording(
@@ -61,8 +63,8 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
         shots=shots,
         depth_units=description.depth_units_per_m,
         up_in_world=None if up is None else np.array(up) / np.linalg.norm(up),
-        audio=_open_audio(path, audio_start_s, video),
-        notices=(*notices, *more),
+        audio=_open_audio(path, audio_start_s, video, first_s),
+        notices=(*_turned_notices(video), *notices, *more),
         video=video,
         trajectory=trajectory,
     )
@@ -77,7 +79,8 @@ def _check_sizes(folder: Path, description: Description, found: "_Pictures") -> 
         if files:
             with suppress(RecordingError):  # of files that are missing or damaged, each has a sentence of its own
                 size = first_picture_size(folder, files)
-        if size == (camera.width, camera.height):
+        turn = file_turn(folder / files[0]) if files else Turn()
+        if (camera.width, camera.height) in (size, turn.size(*size)):
             continue
         if name == "depth" and own is None:
             raise RecordingError(
@@ -111,15 +114,34 @@ def _check_clocks(folder: Path, description: Description, found: "_Pictures", kn
         raise RecordingError(f"{folder}: {fault}")
 
 
-def _open_audio(path: Path, start_s: float, video: VideoFrames | None) -> AudioTrack | None:
-    """Open the sound track: a file of its own, else the video's (most have none, which is not a fault)."""
+def _open_audio(path: Path, start_s: float, video: VideoFrames | None, first_s: float) -> AudioTrack | None:
+    """Open the sound track: a file of its own, else the video's (most have none, which is not a fault).
+
+    Args:
+        path: the folder.
+        start_s: when the track begins, as the description says; 0 where it says nothing.
+        video: the pictures, where they are a video.
+        first_s: when the video's first frame was taken, on the recording's clock.
+    """
     file = find_audio(path)
     if file is not None:
         return AudioTrack.open(file, start_s=start_s)
     if video is not None:
         with suppress(NoAudioStreamError):
-            return AudioTrack.open(video.path, start_s=start_s)
+            return AudioTrack.open(video.path, start_s=start_s or first_s - video.start_s)
     return None
+
+
+def _turned_notices(video: VideoFrames | None) -> tuple[str, ...]:
+    """Return a notice where a video is stored otherwise than it is shown, or nothing."""
+    if video is None or not video.turn:
+        return ()
+    if video.shown:
+        return (
+            f"{video.path.name} is to be shown {video.turn.words} (its display matrix); the frames are read so, as "
+            "players do, and depth must fit that.",
+        )
+    return (f"{video.path.name} is to be shown {video.turn.words}; the intrinsics are of the frames as stored.",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +206,10 @@ def _find_video(folder: Path, description: Description) -> VideoFrames | None:
     if file is None or (folder / "rgb").is_dir():
         return None
     video, camera = VideoFrames(file), description.intrinsics.rgb
-    if (video.width, video.height) != (camera.width, camera.height):
+    size = (camera.width, camera.height)
+    if not (video.turn.transpose and size == (video.width, video.height)):
+        video.show()
+    if (video.width, video.height) != size:
         raise RecordingError(
             f"{file} is {video.width}x{video.height}, but {layout.DESCRIPTION} says {camera.width}x{camera.height}; "
             "give the intrinsics of the video's own size."

@@ -5,22 +5,27 @@ bytes, and an AudioInfo on a topic of its own that says how they are coded. That
 samples and an AudioInfo (PortAudio's numbers of formats).
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from itertools import chain
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
-from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.audio import LOWEST_RATE_HZ, AudioTrack
+from avlmaps.core.errors import AudioError, RecordingError
+from avlmaps.recordings.audio import LOWEST_RATE_HZ, AudioTrack, Sound, write_flac
+from avlmaps.recordings.formats.ros_clock import PictureClock
 
 STAMPED = "audio_common_msgs/msg/AudioStamped"
 _PCM = ("wave", "wav", "pcm")
 _HIGHEST_RATE_HZ = 400_000
 _MOST_CHANNELS = 64
 _FLAC_CHANNELS = 8
+GAP_S = 0.1  # less is the difference of two clocks
+COMPRESSED_GAP_S = 1.0
+_SILENT_BLOCK = 1 << 16
 # PortAudio's paFloat32, paInt32, paInt16, paInt8, paUInt8: the field that holds the samples, their type and full scale.
 _SAMPLES = {
     1: ("float32_data", "<f4", 1.0),
@@ -63,49 +68,213 @@ class Pcm:
         return cls(rate_hz, channels)
 
 
+@dataclass(frozen=True, slots=True)
+class SoundTopic:
+    """The sound messages of a bag; they are read twice: for their times, and for what they hold.
+
+    Attributes:
+        name: of the topic, for sentences.
+        messages: gives (receive time in ns, AudioData, AudioDataStamped or AudioStamped) from the first on.
+        clock: of the pictures.
+    """
+
+    name: str
+    messages: Callable[[], Iterable[tuple[int, Any]]]
+    clock: PictureClock
+
+    def times_s(self) -> tuple[Float[np.ndarray, " n"], tuple[str, ...]]:
+        """Return when each message sounds, seconds of the recording, and the notices about it.
+
+        By the stamps in the messages where they lie among the pictures, else by when they were received.
+        """
+        received: list[int] = []
+        stamps: list[float] = []
+        for received_ns, message in self.messages():
+            received.append(received_ns)
+            header = getattr(message, "header", None)
+            stamps.append(float("nan") if header is None else header.stamp.sec + header.stamp.nanosec * 1e-9)
+        by_stamp = self.clock.of_stamps(np.array(stamps))
+        if len(stamps) and np.isfinite(by_stamp).all() and self.clock.overlaps(by_stamp):
+            return by_stamp, ()
+        return self.clock.of_received(np.array(received) * 1e-9), self.clock.notices(self.name)
+
+
+def silences(
+    times_s: Float[np.ndarray, " n"], lengths_s: Float[np.ndarray, " n"], least_s: float = GAP_S
+) -> tuple[float, Float[np.ndarray, " n"]]:
+    """Return when the first message sounds, and how much silence belongs before each.
+
+    Messages arrive late now and then and the next ones catch up; only what none of the later ones catches up is missing
+    sound. Less than ``least_s`` is left: clocks differ a little.
+
+    Args:
+        times_s: when each message seems to sound.
+        lengths_s: how long each message is.
+        least_s: shortest silence.
+    """
+    before_s = np.concatenate([[0.0], np.cumsum(lengths_s)[:-1]])
+    behind_s = np.minimum.accumulate((times_s - before_s)[::-1])[::-1]
+    silence_s = np.zeros(len(times_s))
+    filled_s = behind_s[0]
+    for at in np.flatnonzero(np.diff(behind_s, prepend=behind_s[0]) > 0.0).tolist():
+        if behind_s[at] - filled_s >= least_s:
+            silence_s[at] = behind_s[at] - filled_s
+            filled_s = behind_s[at]
+    return float(behind_s[0]), silence_s
+
+
+def _gap_notice(topic: str, start_s: float, lengths_s: np.ndarray, silence_s: np.ndarray) -> tuple[str, ...]:
+    gaps = np.flatnonzero(silence_s)
+    if len(gaps) == 0:
+        return ()
+    first = int(gaps[0])
+    at_s = start_s + float(lengths_s[:first].sum())
+    return (
+        f"{len(gaps)} gap(s) in the sound of {topic}, {silence_s.sum():.4g} s together (the first of "
+        f"{silence_s[first]:.3g} s at {at_s:.2f} s), are filled with silence: its messages are missing there.",
+    )
+
+
 def extract_audio(
-    messages: Iterable[tuple[int, Any]], info: Any, topic: str, folder: Path, start_s: float, pcm: Pcm | None = None
+    sound: SoundTopic, info: Any, folder: Path, pcm: Pcm | None = None
 ) -> tuple[AudioTrack | None, tuple[str, ...]]:
     """Write audio messages into a file: samples as FLAC, a compressed stream (MP3 is the package's default) as it is.
 
+    Where messages are missing the file is silent, so that what follows keeps its time.
+
     Args:
-        messages: (receive time in ns, AudioData, AudioDataStamped or AudioStamped).
+        sound: the messages and the clock of the pictures.
         info: the AudioInfo message, or None where the bag has none.
-        topic: for sentences.
         folder: where the file goes.
-        start_s: the recording's start on the clock of the receive times, seconds.
         pcm: says that the messages are plain 16-bit samples, against AudioInfo if need be.
 
     Returns:
-        The track, or None with a sentence that says why there is none.
+        The track, or None with a sentence that says why there is none; and the notices.
 
     Raises:
         RecordingError: nothing says how the samples are coded, or what is said cannot be.
-        AudioError: what was gathered cannot be read as sound.
+        AudioError: what was gathered cannot be read as sound, or cannot be written.
     """
-    rest = iter(messages)
-    first = next(rest, None)
+    first = next(iter(sound.messages()), None)
     if first is None:
-        return None, (f"The sound topic {topic} has no message.",)
-    every, start_s = chain([first], rest), first[0] * 1e-9 - start_s
-    target = folder / "audio.flac"
+        return None, (f"The sound topic {sound.name} has no message.",)
+    times_s, notices = sound.times_s()
     if getattr(first[1], "__msgtype__", "") == STAMPED:
-        _write_samples(every, topic, target)
-        return AudioTrack.open(target, start_s=start_s), ()
+        return _sampled(lambda: _pieces(_messages(sound), sound.name), sound.name, folder, times_s, notices)
     coding = (getattr(info, "coding_format", "") or "").lower()
     if pcm is None and coding in _PCM:
         sample_format = getattr(info, "sample_format", "") or "S16LE"
         if sample_format.upper() != "S16LE":
-            return None, (f"The sound on {topic} is {sample_format}; of plain samples only S16LE is read.",)
-        pcm = Pcm.check_rate(int(info.sample_rate), int(info.channels), f"The AudioInfo of {topic}")
+            return None, (f"The sound on {sound.name} is {sample_format}; of plain samples only S16LE is read.",)
+        pcm = Pcm.check_rate(int(info.sample_rate), int(info.channels), f"The AudioInfo of {sound.name}")
     if pcm is not None:
-        _write_pcm(every, target, pcm)
-        return AudioTrack.open(target, start_s=start_s), ()
-    target = folder / f"audio.{_coding_of(_content(first[1]), coding, topic)}"
-    with target.open("wb") as stream:
-        for _, message in every:
-            stream.write(_content(message))
-    return AudioTrack.open(target, start_s=start_s), ()
+        return _sampled(lambda: _plain(_messages(sound), pcm), sound.name, folder, times_s, notices)
+    suffix = _coding_of(_content(first[1]), coding, sound.name)
+    return _compressed(sound, suffix, folder, times_s, notices)
+
+
+def _messages(sound: SoundTopic) -> Iterator[Any]:
+    return (message for _, message in sound.messages())
+
+
+def _sampled(
+    pieces: Callable[[], Iterator[tuple[Pcm, np.ndarray]]],
+    topic: str,
+    folder: Path,
+    times_s: Float[np.ndarray, " n"],
+    notices: tuple[str, ...],
+) -> tuple[AudioTrack, tuple[str, ...]]:
+    """Write messages of samples, with silence where some are missing."""
+    import soundfile
+
+    lengths_s = np.array([len(samples) / pcm.rate_hz for pcm, samples in pieces()])
+    start_s, silence_s = silences(times_s, lengths_s)
+    target = folder / "audio.flac"
+    every = pieces()
+    pcm, samples = next(every)
+    try:
+        with soundfile.SoundFile(target, "w", pcm.rate_hz, min(pcm.channels, _FLAC_CHANNELS), "PCM_16") as stream:
+            stream.write(samples)
+            for number, (other, more) in enumerate(every, start=1):
+                if other != pcm:
+                    raise RecordingError(
+                        f"The sound on {topic} changes from {pcm.rate_hz} to {other.rate_hz} samples a second, or from "
+                        f"{pcm.channels} to {other.channels} channel(s); give one file instead (--audio FILE)."
+                    )
+                _write_silence(stream, round(silence_s[number] * pcm.rate_hz))
+                stream.write(more)
+    except (soundfile.SoundFileError, AssertionError) as error:  # it asserts that all samples were taken
+        raise _cannot_write(topic, target, error) from None
+    return AudioTrack.open(target, start_s=start_s), (*notices, *_gap_notice(topic, start_s, lengths_s, silence_s))
+
+
+def _write_silence(stream: Any, count: int) -> None:
+    while count > 0:
+        block = np.zeros((min(count, _SILENT_BLOCK), stream.channels), np.int16)
+        stream.write(block)
+        count -= len(block)
+
+
+def _cannot_write(topic: str, target: Path, error: Exception) -> AudioError:
+    reason = str(error).strip().rstrip(".") or "no room"
+    return AudioError(
+        f"The sound of {topic} cannot be written to {target.parent} ({reason}); make room there, choose another folder "
+        "for temporary files (TMPDIR), or leave the sound out (--topics audio=none)."
+    )
+
+
+def _compressed(
+    sound: SoundTopic, suffix: str, folder: Path, times_s: Float[np.ndarray, " n"], notices: tuple[str, ...]
+) -> tuple[AudioTrack, tuple[str, ...]]:
+    """Write a compressed stream; where messages are missing it is cut, and each part decoded to its own place."""
+    interval_s = np.diff(times_s)
+    usual_s = float(np.median(interval_s)) if len(interval_s) else 0.0
+    cuts = np.flatnonzero(interval_s > max(COMPRESSED_GAP_S, 5.0 * usual_s)) + 1
+    parts = [folder / f"part-{number}.{suffix}" for number in range(len(cuts) + 1)]
+    edges = [*cuts.tolist(), len(times_s)]
+    every = _messages(sound)
+    try:
+        done = 0
+        for part, edge in zip(parts, edges, strict=True):
+            with part.open("wb") as stream:
+                for message in islice(every, edge - done):
+                    stream.write(_content(message))
+            done = edge
+    except OSError as error:
+        raise _cannot_write(sound.name, parts[0], error) from None
+    begins = [0, *cuts.tolist()]
+    start_s = float(times_s[0])
+    if len(parts) == 1:
+        return AudioTrack.open(parts[0], start_s=start_s), notices
+    if suffix != "mp3":  # other codings have a head that the later parts lack
+        whole_s = float(interval_s[cuts - 1].sum())
+        raise RecordingError(
+            f"{len(cuts)} gap(s) in the sound of {sound.name} leave out {whole_s:.3g} s, and {suffix} cannot be cut "
+            "there, so that the rest would sound too early; give one file instead (--audio FILE), or leave it out "
+            "(--topics audio=none)."
+        )
+    tracks = [AudioTrack.open(part, start_s=float(times_s[at])) for part, at in zip(parts, begins, strict=True)]
+    return _joined(tracks, sound.name, folder, notices)
+
+
+def _joined(
+    tracks: list[AudioTrack], topic: str, folder: Path, notices: tuple[str, ...]
+) -> tuple[AudioTrack, tuple[str, ...]]:
+    """Write tracks one after the other, each at its time."""
+    target = folder / "audio.flac"
+    rate_hz, start_s = tracks[0].rate_hz, tracks[0].start_s
+    silence_s = np.array([0.0, *(max(b.start_s - a.end_s, 0.0) for a, b in pairwise(tracks))])
+
+    def blocks() -> Iterator[Sound]:
+        for track, gap_s in zip(tracks, silence_s.tolist(), strict=True):
+            for at in range(0, round(gap_s * rate_hz), _SILENT_BLOCK):
+                count = min(_SILENT_BLOCK, round(gap_s * rate_hz) - at)
+                yield Sound(np.zeros(count, np.float32), rate_hz)
+            yield from track.blocks()
+
+    write_flac(target, blocks())
+    lengths_s = np.array([track.duration_s for track in tracks])
+    return AudioTrack.open(target, start_s=start_s), (*notices, *_gap_notice(topic, start_s, lengths_s, silence_s))
 
 
 def _coding_of(beginning: bytes, said: str, topic: str) -> str:
@@ -133,37 +302,17 @@ def _content(message: Any) -> bytes:
     return np.asarray(getattr(message, "audio", message).data, np.uint8).tobytes()
 
 
-def _write_pcm(messages: Iterable[tuple[int, Any]], target: Path, pcm: Pcm) -> None:
-    import soundfile
-
+def _plain(messages: Iterable[Any], pcm: Pcm) -> Iterator[tuple[Pcm, np.ndarray]]:
     rest = b""  # a message may end within a sample
-    with soundfile.SoundFile(target, "w", pcm.rate_hz, min(pcm.channels, _FLAC_CHANNELS), "PCM_16") as stream:
-        for _, message in messages:
-            content = rest + _content(message)
-            whole = len(content) // (2 * pcm.channels) * 2 * pcm.channels
-            stream.write(np.frombuffer(content[:whole], "<i2").reshape(-1, pcm.channels)[:, :_FLAC_CHANNELS])
-            rest = content[whole:]
+    for message in messages:
+        content = rest + _content(message)
+        whole = len(content) // (2 * pcm.channels) * 2 * pcm.channels
+        yield pcm, np.frombuffer(content[:whole], "<i2").reshape(-1, pcm.channels)[:, :_FLAC_CHANNELS]
+        rest = content[whole:]
 
 
-def _write_samples(messages: Iterable[tuple[int, Any]], topic: str, target: Path) -> None:
-    """Write AudioStamped messages, which must all be of one rate and number of channels."""
-    import soundfile
-
-    pieces = _pieces(messages, topic)
-    pcm, samples = next(pieces)
-    with soundfile.SoundFile(target, "w", pcm.rate_hz, min(pcm.channels, _FLAC_CHANNELS), "PCM_16") as stream:
-        stream.write(samples)
-        for other, more in pieces:
-            if other != pcm:
-                raise RecordingError(
-                    f"The sound on {topic} changes from {pcm.rate_hz} to {other.rate_hz} samples a second, or from "
-                    f"{pcm.channels} to {other.channels} channel(s); give one file instead (--audio FILE)."
-                )
-            stream.write(more)
-
-
-def _pieces(messages: Iterable[tuple[int, Any]], topic: str) -> Iterator[tuple[Pcm, np.ndarray]]:
-    for _, message in messages:
+def _pieces(messages: Iterable[Any], topic: str) -> Iterator[tuple[Pcm, np.ndarray]]:
+    for message in messages:
         audio, info = message.audio.audio_data, message.audio.info
         if int(info.format) not in _SAMPLES:
             raise RecordingError(

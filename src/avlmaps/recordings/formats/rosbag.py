@@ -26,7 +26,8 @@ from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.content import add_files, stamp_of
 from avlmaps.recordings.formats import ros_clouds
 from avlmaps.recordings.formats.bag_files import Bag
-from avlmaps.recordings.formats.ros_audio import STAMPED, Pcm, extract_audio
+from avlmaps.recordings.formats.ros_audio import STAMPED, Pcm, SoundTopic, extract_audio
+from avlmaps.recordings.formats.ros_clock import PictureClock
 from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of
 from avlmaps.recordings.formats.ros_motion import base_height, find_motion, is_tf, no_pose, read_tf
 from avlmaps.recordings.formats.ros_transforms import TransformTree
@@ -141,7 +142,8 @@ class RosbagRecording(Recording):
         self._depth_at = [(int(depth_ns[depth[i]]), float(depth_s[depth[i]])) for i in a[rows]]
         self.up_in_world = np.array([0.0, 0.0, 1.0]) if motion.z_is_up else None
         self.base_height = base_height(tree, camera_frame, float(stamps_s[rows[0]]))
-        self.audio, audio_notices = self._read_audio(topics)
+        clock = PictureClock.of(depth_ns[depth][a][rows], stamps_s[rows], self._start_s)
+        self.audio, audio_notices = self._read_audio(topics, clock)
         self.notices = (*notices, *gap_notices(self.stamps_s, "frames"), *audio_notices)
 
     def frame(self, index: int) -> Frame:
@@ -194,7 +196,7 @@ class RosbagRecording(Recording):
         inside = (sorted(file.rglob("*")) if file.is_dir() else [file] for file in self._bag.files)
         return [file for files in inside for file in files if file.is_file()]
 
-    def _read_audio(self, topics: RosTopics) -> tuple[AudioTrack | None, tuple[str, ...]]:
+    def _read_audio(self, topics: RosTopics, clock: PictureClock) -> tuple[AudioTrack | None, tuple[str, ...]]:
         pcm = Pcm.parse_rate(topics.audio_pcm) if topics.audio_pcm else None
         known = self._bag.topics_of(_AUDIO_TYPES)
         found = [topics.audio] if topics.audio else known
@@ -209,7 +211,8 @@ class RosbagRecording(Recording):
         infos = self._bag.topics_of(_AUDIO_INFO_TYPES)
         info = next((message for topic in infos for _, message in self._bag.messages(topic)), None)
         folder = Path(self._folder.name)
-        return extract_audio(self._bag.messages(found[0]), info, found[0], folder, self._start_s, pcm)
+        sound = SoundTopic(found[0], lambda: self._bag.messages(found[0]), clock)
+        return extract_audio(sound, info, folder, pcm)
 
 
 def _image_topics(bag: Bag, topics: RosTopics) -> tuple[str, str]:
