@@ -140,7 +140,7 @@ def extract_audio(
 ) -> tuple[AudioTrack | None, tuple[str, ...]]:
     """Write audio messages into a file: samples as FLAC, a compressed stream (MP3 is the package's default) as it is.
 
-    Where messages are missing the file is silent, so that what follows keeps its time.
+    Where messages are missing the file is silent, so that what follows is still in time.
 
     Args:
         sound: the messages and the clock of the pictures.
