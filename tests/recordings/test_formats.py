@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from avlmaps.recordings.conformance import check, check_damage
@@ -30,4 +29,11 @@ def test_a_damaged_file_is_a_sentence_or_fewer_frames(tmp_path: Path, name: str)
 
 def test_every_format_has_a_writer_of_the_truth() -> None:
     assert {written.format for written in WRITTEN.values()} | {"rosbag"} == {known.name for known in FORMATS}
-    assert np.all([written.truth is not None for written in WRITTEN.values()])
+
+
+def test_the_table_of_the_docs_names_every_format_and_what_is_read_assumed_and_checked() -> None:
+    page = (Path(__file__).parents[2] / "docs/recordings.md").read_text()
+    table = page[page.index("| format | found by |") :].split("\n\n", 1)[0].splitlines()
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table[2:]]
+    assert [row[0].strip("`") for row in rows] == [known.name for known in FORMATS]
+    assert all(len(row) == 6 and all(row) for row in rows)

@@ -34,7 +34,7 @@ _DISTORTION = ("k1", "k2", "k3", "k4", "p1", "p2")
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".JPG", ".PNG")
 _IDLE = (
     "aabb_scale", "applied_transform", "camera_angle_y", "ply_file_path", "frames", "orientation_override",
-    "auto_scale_poses_override", "crop", "train_filenames", "val_filenames", "test_filenames", "is_fisheye",
+    "auto_scale_poses_override", "crop", "train_filenames", "val_filenames", "test_filenames", "scale", "offset",
 )  # fmt: skip
 
 
@@ -53,6 +53,7 @@ class _Camera(msgspec.Struct, frozen=True):
     p2: float = 0.0
     camera_angle_x: float | None = None
     camera_model: str = ""
+    is_fisheye: bool = False
 
 
 class _Frame(_Camera, frozen=True, kw_only=True):
@@ -155,6 +156,8 @@ def _poses(file: Path, frames: list[_Frame], scale: float) -> Float[np.ndarray, 
 def _rig(file: Path, given: _Transforms, frames: list[_Frame], shots: Shots) -> tuple[Rig, tuple[str, ...]]:
     first = frames[0]
     models = {frame.camera_model or given.camera_model for frame in frames}
+    if given.is_fisheye or first.is_fisheye:
+        models = {"fisheye"}
     if odd := sorted(models - set(_PINHOLES)):
         raise RecordingError(
             f"{file} is of the camera model {odd[0]!r}; pinholes are read ({', '.join(_PINHOLES[1:])}), so undistort "
