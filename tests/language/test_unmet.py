@@ -254,3 +254,15 @@ def test_a_word_that_no_step_holds_is_asked_about(command: str) -> None:
 def test_words_that_sound_like_numbers() -> None:
     assert intents("move forward too metres") == (Move(2.0),)
     assert intents("in a quarter of an hour go to the door") == (Wait(900.0), Go(Target(Kind.OBJECT, "door")))
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["turn left, not right", "turn right instead of left", "turn left or right", "no kitchen", "go onto the road",
+     "put as much distance as possible between you and the dog", "go to the kitchen, just kidding",
+     "go to the sofa. forget it"],
+)  # fmt: skip
+def test_the_side_or_the_place_that_is_not_meant_is_not_taken(command: str) -> None:
+    read = read_command(command)
+    meant = {"turn left, not right": Turn(-90.0), "turn right instead of left": Turn(90.0)}.get(command)
+    assert read.stops is not None or read.intents == (meant,)

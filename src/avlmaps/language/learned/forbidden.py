@@ -8,6 +8,7 @@ from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.said import BREAKS, LOOKS, PREPOSITIONS, TURNS, Said, words
 from avlmaps.language.lexer import Token
 
+_HEARD = frozenset({"hear", "heard", "hearing", "comes", "coming", "came", "sound", "noise"})
 _ROUND = frozenset({"left", "right", "clockwise", "counterclockwise", "anticlockwise", "cw", "ccw"})
 _TAKES_SIGN = TURNS | {
     "move", "translate", "forward", "forwards", "back", "drive", "go", "by", "advance", "x", "y", "=", "(", "left",
@@ -24,6 +25,8 @@ def forbidden(tokens: Sequence[Token]) -> Clarify | Refuse | None:
     said = Said(tokens)
     if said.spans("unsafe") or _through(said):
         return Refuse(Reason.HARM)
+    if any(_ends_with(said, end) for _, end in said.spans("cancels")):
+        return Refuse(Reason.NEGATION)
     if said.spans("risks") or said.spans("questions"):
         return Refuse(Reason.QUESTION)
     return _signed(said)
@@ -38,16 +41,24 @@ def is_stop(tokens: Sequence[Token]) -> bool:
     )
 
 
+def _ends_with(said: Said, end: int) -> bool:
+    """Return whether nothing of weight is said from a place on."""
+    rest = [text for at, text in enumerate(said.texts[end:], end) if said.tokens[at].kind != "punct"]
+    return all(
+        text in ("please", "sorry", "robot", "thanks", "ok", "haha", "lol", "it", "that", "all") for text in rest
+    )
+
+
 def _through(said: Said) -> bool:
     """Return whether the robot should drive through what is solid, or into what hurts it or others."""
     lists = words().lists
     for at, text in enumerate(said.texts):
-        if text not in ("through", "thru", "into") or LOOKS & set(said.texts[max(0, at - 2) : at]):
+        if text not in ("through", "thru", "into", "onto") or (LOOKS | _HEARD) & set(said.texts[max(0, at - 4) : at]):
             continue
         noun = [said.texts[i] for i in sorted(said.scope(at + 1, BREAKS | PREPOSITIONS))][:5]
-        if noun[:1] and noun[-1:] and (lists["solid" if text != "into" else "deadly"] & set(noun[-1:])):
+        if noun[:1] and noun[-1:] and (lists["solid" if text[:2] == "th" else "deadly"] & set(noun[-1:])):
             return True
-        if text != "into" and lists["blocked"] & set(noun[:-1]):
+        if text[:2] == "th" and lists["blocked"] & set(noun[:-1]):
             return True
     return False
 

@@ -42,7 +42,19 @@ class Words:
 def words() -> Words:
     """Return the phrases and lists that ship."""
     told = tomllib.loads(files("avlmaps.language").joinpath("claims.toml").read_text(encoding="utf-8"))
-    classes = ("away", "farthest", "nearest", "leaving", "excluded", "choosing", "ways", "unsafe", "risks", "questions")
+    classes = (
+        "away",
+        "farthest",
+        "nearest",
+        "leaving",
+        "excluded",
+        "choosing",
+        "cancels",
+        "ways",
+        "unsafe",
+        "risks",
+        "questions",
+    )
     phrases: dict[str, dict[str, list[tuple[str, ...]]]] = {name: {} for name in classes}
     for name in classes:
         for phrase in expanded(told[name]):

@@ -46,6 +46,8 @@ _NO_SUPERLATIVES = frozenset({
 _ONLY_ORDERS = frozenset({("skip",), ("skipping",), ("avoid",), ("avoiding",), ("exclude",), ("bypass",), ("never",)})
 _ORDINALS = frozenset({"second", "third", "fourth", "fifth", "last", "next", "previous"})
 _NUMBERED = frozenset({"floor", "class", "storey", "story", "level", "hand"})
+_AHEAD = frozenset({"forward", "forwards", "ahead", "straight"})
+_BACKWARDS = frozenset({"backward", "backwards", "reverse", "reversing"})
 _VAGUE = frozenset({"a", "an", "one", "another"})
 _COUNTED = frozenset({"times", "turns", "revolutions", "rotations", "spins", "laps", "rounds", "circles", "loops"})
 
@@ -116,6 +118,9 @@ def _excluded(said: Claimed) -> Clarify | Refuse | None:
     """Return the refusal for what is not meant and is driven to, or is left out though it says which is meant."""
     choosing = {phrase for each in words().phrases["choosing"].values() for phrase in each}
     breaks = BREAKS - {"to", "for", "after", "before"}
+    for at, (before, after) in enumerate(pairwise(said.texts)):
+        if before == "no" and _is_entry(after) and said.names_in({at + 1}):
+            return Refuse(Reason.NEGATION)
     for start, end in said.spans("excluded"):
         phrase = said.texts[start:end]
         if phrase in _ONLY_ORDERS and not said.is_order(start):
@@ -253,7 +258,18 @@ def _amounts(said: Claimed) -> Clarify | None:
 
 def _sides(said: Claimed) -> Clarify | None:
     """Return the question for a reading whose side is the other one than the side that is said."""
-    left, right = ("left" in said.texts, "right" in said.texts)
+    not_meant = frozenset(at for start, end in said.spans("excluded") for at in said.scope(max(start, end - 1)))
+    texts = {text for at, text in enumerate(said.texts) if at not in not_meant}
+    left, right = "left" in texts, "right" in texts
+    if any(pair in (("left", "right"), ("right", "left")) for pair in _either(said.texts)):
+        return Clarify("Left or right?", ("left", "right"))
+    moves = [one.metres for one in said.steps if isinstance(one, Move)]
+    ahead, backwards = _AHEAD & texts, _BACKWARDS & texts
+    turned = (min(moves, default=0.0) > 0 and backwards and not ahead) or (
+        max(moves, default=0.0) < 0 and ahead and not backwards
+    )
+    if turned and not {"back", "around", "round"} & texts:
+        return Clarify("Forward or back? Say it like: move back 1 m.", ("forward", "back"))
     ways = [way for _, way in directions(said.texts)]
     clockwise, counter = ("clockwise" in ways, "counterclockwise" in ways)
     if {"other", "back", "against", "opposite", "o'clock"} & set(said.texts):
@@ -269,6 +285,11 @@ def _sides(said: Claimed) -> Clarify | None:
     if ((left and clockwise and not right) or (right and counter and not left)) and turns and len(said.steps) == 1:
         return Clarify("Left or right? Left is counterclockwise.", ("left", "right"))
     return None
+
+
+def _either(texts: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the words on the two sides of each "or"."""
+    return [(texts[at - 1], texts[at + 1]) for at in range(1, len(texts) - 1) if texts[at] == "or"]
 
 
 def _is_count(tokens: list[Token], at: int) -> bool:
