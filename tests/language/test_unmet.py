@@ -34,7 +34,14 @@ OPPOSITES = (
     "go to the {1} that is not near the {0}", "go to a {1} far away from the {0}", "go as far from the {0} as possible",
     "go to the {1} furthest away from the {0}", "keep away from the {0}", "go anywhere but the {0}",
 )  # fmt: skip
-DELAYS = ("in {} go to the door", "after {} go to the door", "go to the door in {}", "go to the door after {}")
+DELAYS = (
+    "go to the door {} from now",
+    "{} later go to the door",
+    "in {} go to the door",
+    "after {} go to the door",
+    "go to the door in {}",
+    "go to the door after {}",
+)
 FEW = settings(max_examples=12, deadline=None)
 
 
@@ -166,6 +173,20 @@ def test_a_delay_stays_in_its_clause() -> None:
     assert intents("go to the sofa, then turn left in 10 seconds") == (
         Go(Target(Kind.OBJECT, "sofa")), Wait(10.0), Turn(-90.0),
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("command", ["turn left after 2 m", "after 2 m turn left", "in 2 m turn left"])
+def test_a_distance_comes_before_its_turn(command: str) -> None:
+    assert intents(command) == (Move(2.0), Turn(-90.0))
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["drive for 10 seconds", "be at the door within five minutes", "every 5 minutes go to the door",
+     "go to the kitchen in less than a minute"],
+)  # fmt: skip
+def test_a_time_that_is_no_wait_is_asked_about(command: str) -> None:
+    stops(command)
 
 
 @FEW

@@ -8,7 +8,7 @@ Three forms are rewritten, token by token, before a command is read:
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 
 from avlmaps.language import lexer
@@ -126,62 +126,99 @@ def _third(tokens: list[Token], at: int) -> tuple[int, list[Token]]:
     return at, []
 
 
+@dataclass(frozen=True, slots=True)
+class _Ahead:
+    """What is to be done before an order and is said beside it: "in five minutes", "after 2 m", "ten seconds later".
+
+    Attributes:
+        words: the same as an order of its own.
+        end: the token behind it.
+        is_wait: whether it is a time, and no distance.
+    """
+
+    words: tuple[Token, ...]
+    end: int
+    is_wait: bool
+
+
 def _waiting_first(tokens: list[Token], notes: list[str]) -> list[Token]:
-    """Return tokens with "in five minutes" and "after ten seconds" as a wait before the order that they belong to."""
-    starts = [0]
+    """Return tokens with "in five minutes", "after 2 m" as an order of its own before the one that they belong to."""
+    start = 0
     found: list[Token] = []
     at = 0
     while at < len(tokens):
-        token = tokens[at]
-        amount = _delay(tokens, at)
-        if amount is None:
-            if (
-                token.kind == "punct"
-                or token.text in _CUTS
-                or (token.text == "and" and tokens[at + 1 : at + 2] and tokens[at + 1].text in _orders())
-            ):
-                starts.append(len(found) + 1)
-            found.append(token)
+        ahead = _ahead(tokens, at, found[start:])
+        if ahead is None:
+            ends = tokens[at].kind == "punct" or tokens[at].text in _CUTS
+            if ends or (tokens[at].text == "and" and tokens[at + 1 : at + 2] and tokens[at + 1].text in _orders()):
+                start = len(found) + 1
+            found.append(tokens[at])
             at += 1
             continue
-        begin, end = amount
-        clause = found[starts[-1] :]
-        said = " ".join(one.text for one in tokens[at:end])
-        wait = [
-            _word(token, "wait"),
-            *tokens[begin : end if token.text in ("in", "after") else end - 2],
-            _word(token, "then"),
-        ]
-        opens = not [one for one in clause if one.text not in _BEFORE]
-        closes = end == len(tokens) or tokens[end].kind == "punct" or tokens[end].text in ("then", "and")
-        if not (opens and end < len(tokens)) and (not closes or _NO_CLAUSE_END & {one.text for one in clause}):
-            found.append(token)
+        said = " ".join(token.text for token in tokens[at : ahead.end])
+        notes.append(f"'{said}' is read as: {'wait' if ahead.is_wait else 'drive so far'} first.")
+        opens = all(token.text in _BEFORE for token in found[start:])
+        found[start:start] = ahead.words
+        at = ahead.end
+        while opens and at < len(tokens) and tokens[at].text in (",", "then"):
             at += 1
-            continue
-        found[starts[-1] : starts[-1]] = wait
-        if opens:
-            while end < len(tokens) and tokens[end].text in (",", "then"):
-                end += 1
-        notes.append(f"'{said}' is read as: wait first.")
-        at = end
     return found
 
 
-def _delay(tokens: list[Token], at: int) -> tuple[int, int] | None:
-    """Return the time of a delay that begins at a token, and where the delay ends: "in five minutes"."""
-    if tokens[at].text not in ("in", "after"):
+def _ahead(tokens: list[Token], at: int, clause: Sequence[Token]) -> _Ahead | None:
+    """Return what is to be done first and begins at a token, where it opens or closes its clause; else None."""
+    found = _delay(tokens, at) or _way_first(tokens, at, clause)
+    if found is None:
         return None
-    first = at + 1
+    opens = all(token.text in _BEFORE for token in clause)
+    follows = tokens[found.end] if found.end < len(tokens) else None
+    closes = follows is None or follows.kind == "punct" or follows.text in ("then", "and")
+    if opens:
+        return found if follows is not None else None
+    return found if closes and _NO_CLAUSE_END.isdisjoint(token.text for token in clause) else None
+
+
+def _delay(tokens: list[Token], at: int) -> _Ahead | None:
+    """Return the delay that begins at a token: "in five minutes", "after ten seconds", "a minute later"."""
+    first = at + (tokens[at].text in ("in", "after"))
     if tokens[first : first + 1] and tokens[first].text == "a" and tokens[first + 1 : first + 2]:
         first += tokens[first + 1].text in ("quarter", "half", "third")
     ends = [end for end, _ in lexer.duration_at(tokens, first)]
-    if not ends or (
-        tokens[at + 1].text in ("a", "another") and tokens[at + 2].text in ("moment", "second", "sec", "bit")
+    if (
+        not ends
+        or tokens[max(ends) - 1].text in ("moment", "sec")
+        or (tokens[first].text in ("a", "another") and tokens[max(ends) - 1].text == "second")
     ):
         return None
-    end = max(ends)
-    end += end < len(tokens) and tokens[end].text == "time"
-    return (first, end) if end >= len(tokens) or tokens[end].text not in ("of", "ago", "'s") else None
+    stop = end = max(ends)
+    after = [token.text for token in tokens[end : end + 2]]
+    if tokens[at].text not in ("in", "after"):
+        end += 2 if after == ["from", "now"] else after[:1] in (["later"], ["hence"])
+        if end == stop:
+            return None
+    else:
+        end += after[:1] == ["time"]
+        if after[:1] and after[0] in ("of", "ago", "'s"):
+            return None
+    return _Ahead((_word(tokens[at], "wait"), *tokens[first:stop], _word(tokens[at], "then")), end, is_wait=True)
+
+
+def _way_first(tokens: list[Token], at: int, clause: Sequence[Token]) -> _Ahead | None:
+    """Return the distance to drive first that begins at a token: "turn left after 2 m", "in 3 m turn right"."""
+    if tokens[at].text not in ("in", "after"):
+        return None
+    ends = [end for end, _ in lexer.length_at(tokens, at + 1)]
+    rest = [*(token.text for token in clause), *(token.text for token in tokens[max(ends, default=at) : at + 9])]
+    if (
+        not ends
+        or not {"turn", "rotate", "go", "drive", "stop"} & set(rest)
+        or "of" in rest[len(clause) : len(clause) + 1]
+    ):
+        return None
+    if tokens[at].text == "in" and "turn" not in rest:
+        return None
+    move = (_word(tokens[at], "move"), *tokens[at + 1 : max(ends)], _word(tokens[at], "forward"))
+    return _Ahead((*move, _word(tokens[at], "then")), max(ends), is_wait=False)
 
 
 def _looped(tokens: list[Token]) -> list[Token]:

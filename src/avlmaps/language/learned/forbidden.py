@@ -9,6 +9,10 @@ from avlmaps.language.learned.said import BREAKS, LOOKS, PREPOSITIONS, TURNS, Sa
 from avlmaps.language.lexer import Token
 
 _HEARD = frozenset({"hear", "heard", "hearing", "comes", "coming", "came", "sound", "noise"})
+_DRIVES = frozenset({
+    "drive", "move", "roll", "forward", "forwards", "ahead", "straight", "backward", "backwards", "reverse", "left",
+    "right", "rotate", "spin", "turn",
+})  # fmt: skip
 _ROUND = frozenset({"left", "right", "clockwise", "counterclockwise", "anticlockwise", "cw", "ccw"})
 _TAKES_SIGN = TURNS | {
     "move", "translate", "forward", "forwards", "back", "drive", "go", "by", "advance", "x", "y", "=", "(", "left",
@@ -29,7 +33,7 @@ def forbidden(tokens: Sequence[Token]) -> Clarify | Refuse | None:
         return Refuse(Reason.NEGATION)
     if said.spans("risks") or said.spans("questions"):
         return Refuse(Reason.QUESTION)
-    return _signed(said)
+    return _timed(said) or _signed(said)
 
 
 def is_stop(tokens: Sequence[Token]) -> bool:
@@ -61,6 +65,23 @@ def _through(said: Said) -> bool:
         if text[:2] == "th" and lists["blocked"] & set(noun[:-1]):
             return True
     return False
+
+
+def _timed(said: Said) -> Clarify | Refuse | None:
+    """Return the question for a time that is no wait: a deadline, a rhythm, a time to drive for."""
+    tokens = list(said.tokens)
+    for at, text in enumerate(said.texts):
+        ends = [end for end, _ in lexer.duration_at(tokens, at + 1)]
+        if not ends:
+            continue
+        phrase = " ".join(said.texts[at : max(ends)])
+        if text == "within" or said.texts[max(0, at - 2) : at + 1] == ("in", "less", "than"):
+            return Clarify(f"'{phrase}': the robot keeps no deadline. Say only where to go.")
+        if text == "every":
+            return Refuse(Reason.ENDLESS)
+        if text == "for" and at and said.texts[at - 1] in _DRIVES:
+            return Clarify(f"'{phrase}': say how far to drive or to turn, not how long.")
+    return None
 
 
 def _signed(said: Said) -> Clarify | None:
