@@ -76,7 +76,7 @@ def _timed(said: Said) -> Clarify | Refuse | None:
             continue
         phrase = " ".join(said.texts[at : max(ends)])
         if text == "within" or said.texts[max(0, at - 2) : at + 1] == ("in", "less", "than"):
-            return Clarify(f"'{phrase}': the robot keeps no deadline. Say only where to go.")
+            return Clarify(f"'{phrase}': the robot knows no deadline. Say only where to go.")
         if text == "every":
             return Refuse(Reason.ENDLESS)
         if text == "for" and at and said.texts[at - 1] in _DRIVES:
