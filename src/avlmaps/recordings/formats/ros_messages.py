@@ -3,6 +3,7 @@
 Works on messages as `rosbags` deserialises them, of ROS 1 and ROS 2 alike.
 """
 
+import re
 import struct
 from typing import Any
 
@@ -136,25 +137,38 @@ def _rvl(content: bytes, name: str, camera: Pinhole | None) -> np.ndarray:
         raise RecordingError(f"The depth {name} cannot be decoded ({error}); it is cut short or damaged.") from None
 
 
-def camera_of(info: Any, name: str) -> tuple[Pinhole, bool]:
+def is_rectified(topic: str) -> bool:
+    """Return whether an image topic's name says that its images are rectified, as ``image_rect_color`` does."""
+    return bool(re.search(r"(^|[/_])(rect|rectified)(_|/|$)", topic.lower()))
+
+
+def camera_of(info: Any, name: str, rectified: bool = False) -> tuple[Pinhole, bool]:
     """Return the camera of a CameraInfo, and whether it has distortion that a pinhole leaves out.
 
     ROS counts pixel centres as whole numbers; ours lie at +0.5.
+
+    Args:
+        info: the message.
+        name: its topic, for sentences.
+        rectified: whether the images are: they are those of the matrix P, without distortion, not of K.
 
     Raises:
         RecordingError: the calibration is empty, or of no camera.
     """
     k = np.asarray(getattr(info, "k", None) if hasattr(info, "k") else info.K, np.float64)
     d = np.asarray(getattr(info, "d", None) if hasattr(info, "d") else info.D, np.float64)
-    if not (k.shape == (9,) and k[0] > 0 and k[4] > 0 and info.width > 0 and info.height > 0):
+    p = np.asarray(getattr(info, "p", getattr(info, "P", ())) if rectified else (), np.float64)
+    of_p = p.shape == (12,) and p[0] > 0 and p[5] > 0  # drivers that rectify nothing leave P empty
+    fx, fy, cx, cy = (p[0], p[5], p[2], p[6]) if of_p else (k[0], k[4], k[2], k[5])
+    if not (k.shape == (9,) and fx > 0 and fy > 0 and info.width > 0 and info.height > 0):
         raise RecordingError(
             f"The camera calibration {name} is empty (K = {k.tolist()}); name a calibrated camera's topics."
         )
     try:
-        camera = Pinhole(k[0], k[4], k[2] + 0.5, k[5] + 0.5, int(info.width), int(info.height))
+        camera = Pinhole(fx, fy, cx + 0.5, cy + 0.5, int(info.width), int(info.height))
     except ValueError as error:
         raise RecordingError(f"The camera calibration {name} is not a camera: {error}; calibrate it again.") from None
-    return camera, bool(np.abs(d).max(initial=0.0) > 1e-9)
+    return camera, not of_p and bool(np.abs(d).max(initial=0.0) > 1e-9)
 
 
 def pose_of(message: Any) -> Float[np.ndarray, "4 4"]:

@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from itertools import islice
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ from avlmaps.recordings.formats import ros_clouds
 from avlmaps.recordings.formats.bag_files import Bag
 from avlmaps.recordings.formats.ros_audio import STAMPED, Pcm, SoundTopic, extract_audio
 from avlmaps.recordings.formats.ros_clock import PictureClock
-from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of
+from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of, is_rectified
 from avlmaps.recordings.formats.ros_motion import base_height, find_motion, is_tf, no_pose, read_tf
 from avlmaps.recordings.formats.ros_transforms import TransformTree
 from avlmaps.recordings.plausible import plausible_walk
@@ -102,7 +102,8 @@ class RosbagRecording(Recording):
         rgb, depth = rgb_order.index, depth_order.index
         tolerance_s = CLOUD_TOLERANCE_S if self._of_points else PAIRING_TOLERANCE_S
         a, b = associate(depth_s[depth], rgb_s[rgb], tolerance_s)
-        notices = [*self._bag.notices, *rig_notices, *rgb_order.notices, *depth_order.notices]
+        others = () if topics.depth else _other_cameras(self._bag, self._rgb_topic, self._depth_topic)
+        notices = [*self._bag.notices, *others, *rig_notices, *rgb_order.notices, *depth_order.notices]
         if len(a) < len(depth):
             lost, within = len(depth) - len(a), f"{1000 * tolerance_s:.0f} ms"
             notices.append(f"{lost} of {len(depth)} {what} have no colour image within {within}.")
@@ -221,10 +222,9 @@ def _image_topics(bag: Bag, topics: RosTopics) -> tuple[str, str]:
     for topic, known in ((topics.rgb, images), (topics.depth, [*images, *clouds])):
         if topic and topic not in known:
             raise RecordingError(f"{bag.path} has no image topic {topic!r}; its image topics are: {every}.")
-    depth = topics.depth or _pick([t for t in images if "depth" in t.lower()], ("align", "registered"))
-    rgb = topics.rgb or _pick(
-        [t for t in images if t != depth and "depth" not in t.lower()], ("color", "rgb", "colour")
-    )
+    depths = [topics.depth] if topics.depth else [t for t in images if "depth" in t.lower()]
+    colours = [topics.rgb] if topics.rgb else [t for t in images if t not in depths and "depth" not in t.lower()]
+    rgb, depth = _pair(colours, depths)
     depth = depth or next(iter(clouds), "")
     if not depth or not rgb:
         missing, name = ("depth", "depth") if not depth else ("colour", "rgb")
@@ -243,10 +243,40 @@ def _other_topics(bag: Bag) -> str:
     return f" It holds messages of: {', '.join(types[:8])}{' ...' if len(types) > 8 else ''}."
 
 
-def _pick(candidates: list[str], better: tuple[str, ...]) -> str:
-    """Return the topic that speaks most for itself, raw before compressed (the order of the list)."""
-    likely = [topic for topic in candidates if any(word in topic.lower() for word in better)]
-    return next(iter(likely or candidates), "")
+def _pair(colours: list[str], depths: list[str]) -> tuple[str, str]:
+    """Return the colour and the depth topic that belong together: of one namespace, depth registered to colour.
+
+    Raw topics go before compressed ones (the order of the lists).
+    """
+    pairs = [(colour, depth) for depth in depths for colour in colours]
+    if not pairs:
+        return next(iter(colours), ""), next(iter(depths), "")
+
+    def likeliness(pair: tuple[str, str]) -> tuple[int, bool, bool]:
+        registered = any(word in pair[1].lower() for word in ("align", "registered"))
+        coloured = any(word in pair[0].lower() for word in ("color", "rgb", "colour"))
+        return _shared_namespace(*pair), registered, coloured
+
+    return max(pairs, key=likeliness)
+
+
+def _shared_namespace(one: str, other: str) -> int:
+    """Return how many names two topics begin with alike."""
+    names = zip(one.strip("/").split("/"), other.strip("/").split("/"), strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], names))
+
+
+def _other_cameras(bag: Bag, rgb_topic: str, depth_topic: str) -> tuple[str, ...]:
+    """Return a notice where a bag has depth images of other cameras than the chosen one, or nothing."""
+    images = [topic for topic in bag.topics_of(_IMAGE_TYPES) if "depth" in topic.lower()]
+    own = _shared_namespace(rgb_topic, depth_topic)
+    others = [topic for topic in images if _shared_namespace(topic, depth_topic) < max(own, 1)]
+    if not others:
+        return ()
+    return (
+        f"Of several cameras that of {rgb_topic} and {depth_topic} is used; for another name both topics (--topics "
+        f"rgb=... depth={others[0]}).",
+    )
 
 
 def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree) -> tuple[Rig, list[str], str]:
@@ -266,11 +296,10 @@ def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree)
         first = next(iter(bag.messages(info_topic)), None)
         if first is None:
             raise RecordingError(f"{bag.path} has no message on {info_topic}, the calibration of {topic}.")
-        cameras[topic], distorted = camera_of(first[1], info_topic)
+        cameras[topic], distorted = camera_of(first[1], info_topic, is_rectified(topic))
         if distorted:
-            notices.append(
-                f"{topic} has lens distortion, which a pinhole leaves out; rectified images make a better map."
-            )
+            remedy = "its P is empty" if is_rectified(topic) else "rectified images make a better map"
+            notices.append(f"{topic} has lens distortion, which a pinhole leaves out; {remedy}.")
         image = next(iter(bag.messages(topic)), None)
         frames[topic] = (image[1] if image else first[1]).header.frame_id
     if of_points:
