@@ -14,7 +14,6 @@ from avlmaps.maps.fusion.settings import PAPERS_VARIANCE_M2
 from avlmaps.perception.embedded.meanings import Meanings
 from avlmaps.perception.profiles import profile
 from avlmaps.query.factors import FOUND_AT, ROUNDING, HeatSettings
-from avlmaps.query.goals import FOUND_IN_COMPANY, LEAST_TOGETHER
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.recordings.layout import Description
 
@@ -35,13 +34,11 @@ def _claims() -> list[str]:
         f"never below {exp(-GREATEST_EXPONENT):.0e}",
         f"off by more than {MAX_ROTATION_FAULT}",
         "(7-Scenes is off by 2e-4)",  # measured; tests/recordings/test_seven_scenes.py reads such poses
-        f"where the best instance has a confidence of {FOUND_AT} or more",
-        f"their product must reach {LEAST_TOGETHER} at a likely instance",
+        f"where this probability is {FOUND_AT} or more",
         f"instances of confidence {things.least_confidence} or more",
         f"instances of confidence {things.least_in_company} or more count as well",
         f"counts from {things.least_confidence} as before",
-        f"Of one thing in a query of several parts {FOUND_IN_COMPANY} is enough",
-        f"its confidence, and below {FOUND_AT} `found` is false",
+        f"a part is found by itself from {FOUND_AT}",
         f"({Meanings.narrower_share} of their probability counts)",
         f"narrowest name that has a confidence of {FOUND_AT}",
         f"differ by less than {ROUNDING:.0e} are equal",

@@ -36,9 +36,18 @@ def locating(
 
 def test_the_answer_has_the_keys_of_the_contract(heard: AVLMap) -> None:
     answer = heard.ask(Question.of([CHAIR, DOG]), top=1).to_dict()
-    assert list(answer) == ["goals", "found", "probability", "parts", "elapsed_ms", "frame", "level_from_recording"]
+    assert list(answer) == [
+        "goals",
+        "found",
+        "probability",
+        "text",
+        "parts",
+        "elapsed_ms",
+        "frame",
+        "level_from_recording",
+    ]
     (goal,) = answer["goals"]
-    assert list(goal) == ["position", "score", "size", "parts"]
+    assert list(goal) == ["position", "score", "size", "parts", "probability"]
     assert set(goal["parts"]) == {"object", "sound"}
     assert [part["role"] for part in answer["parts"]] == ["primary", "context"]
     assert [part["modality"] for part in answer["parts"]] == ["object", "sound"]

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from query_fakes import UP, furnished_map, keyframes_at, sounds_of
 
 from avlmaps.bench.harness.factors import VoxelHeat
-from avlmaps.core.question import Modality, Part, Role
+from avlmaps.core.errors import QueryError
+from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.factors import NearAnchors, NearThings
@@ -178,44 +179,47 @@ def test_it_is_not_found_where_the_parts_do_not_come_together() -> None:
 
 
 def test_it_is_not_found_where_one_part_is_not() -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([track(0.5, 0.5)], [0.4])))
+    m = AVLMap(furnished_map(sounds=sounds_of([track(0.5, 0.5)], [0.05])))
     heat = m.object("chair", primary=True) * m.sound("dog")
     assert not heat.found
     assert heat.goals()[0].score < 0.5
 
 
-@pytest.mark.parametrize(
-    ("confidence", "sound", "calibrated", "found"),
-    [(0.35, 0.9, True, True), (0.25, 0.9, True, False), (0.35, 0.4, True, False), (0.35, 0.9, False, False),
-     (0.6, 0.9, False, True)],
-)  # fmt: skip
-def test_a_doubtful_thing_is_found_in_the_company_of_what_is_found(
-    confidence: float, sound: float, calibrated: bool, found: bool
-) -> None:
-    """Who queries for the chair near a sound knows that there is one; a probability of .3 is enough then."""
-    m = AVLMap(furnished_map(sounds=sounds_of([track(0.5, 0.5)], [sound])))
-    sure = m.object("chair", primary=True).factors[0]
+def unlikely(m: AVLMap, confidence: float, role: Role = Role.PRIMARY) -> Heatmap:
+    """Return the heat of the chairs, each with another confidence."""
+    sure = m.object("chair", role is Role.PRIMARY).factors[0]
     assert isinstance(sure, NearThings)
-    doubtful = replace(
-        sure, confidence=np.full(len(sure.confidence), confidence, np.float32), found=confidence >= 0.5,
-        calibrated=calibrated, with_uncertain=None,
-    )  # fmt: skip
-    assert Heatmap.of(doubtful).found == (confidence >= 0.5)
-    assert (Heatmap.of(doubtful) * m.sound("dog")).found == found
-    # The same holds where the thing is the context, and the sound is what is sought.
-    near = replace(doubtful, part=replace(doubtful.part, role=Role.CONTEXT), falloff_per_m=0.2)
-    assert (m.sound("dog", primary=True) * Heatmap.of(near)).found == found
+    low = np.full(len(sure.confidence), confidence, np.float32)
+    return Heatmap.of(replace(sure, confidence=low, found=confidence >= 0.5, with_uncertain=None))
+
+
+@pytest.mark.parametrize("confidence", [0.02, 0.05, 0.15])
+def test_company_makes_no_unlikely_thing_found(confidence: float) -> None:
+    """A chair of .05 near a tv that is certain is not found: a robot drove 14 m to one."""
+    m = AVLMap(furnished_map(sounds=sounds_of([track(0.5, 0.5)], [1.0])))
+    for heat in (unlikely(m, confidence) * m.sound("dog"), unlikely(m, confidence) * m.object("table")):
+        assert heat.probability < 0.5 and not heat.found
+        assert heat.goals()[0].probability == heat.probability
 
 
 def test_two_doubtful_things_are_not_found_by_each_other() -> None:
     m = AVLMap(furnished_map())
-    parts = []
-    for role in (Role.PRIMARY, Role.CONTEXT):
-        sure = m.object("chair", role is Role.PRIMARY).factors[0]
-        assert isinstance(sure, NearThings)
-        low = np.full(len(sure.confidence), 0.4, np.float32)
-        parts.append(replace(sure, confidence=low, found=False, calibrated=True, with_uncertain=None))
-    assert not (Heatmap.of(parts[0]) * Heatmap.of(parts[1])).found
+    assert not (unlikely(m, 0.3) * unlikely(m, 0.3, Role.CONTEXT)).found
+
+
+@pytest.mark.parametrize("found_at", [0.0, 0.3, 0.9, 1.0])
+def test_the_limit_of_found_is_a_setting(found_at: float) -> None:
+    m = AVLMap(furnished_map(sounds=sounds_of([track(0.5, 0.5)], [0.9])), QuerySettings(found_at=found_at))
+    for heat in (m.object("chair", primary=True), m.sound("dog"), m.object("chair", primary=True) * m.sound("dog")):
+        assert heat.found == (heat.probability >= found_at)
+    answer = m.ask(Question.of([Part(Modality.OBJECT, "chair"), Part(Modality.SOUND, "dog")]))
+    assert answer.found == (answer.probability >= found_at)
+    assert answer.found == all(part.found for part in answer.parts) or not answer.found
+
+
+def test_a_limit_outside_of_probabilities_is_refused() -> None:
+    with pytest.raises(QueryError, match="between 0 and 1"):
+        QuerySettings(found_at=1.5)
 
 
 @pytest.mark.parametrize("primary", [True, False])

@@ -29,7 +29,7 @@ class SuiteInputs:
         profile: the models that are measured.
         models: other backends than the profile's, ``module=backend[@model]``.
         seed: of what is drawn at random.
-        indexing: what the suites ``indexing`` and ``objects`` are run on; its own defaults if None.
+        indexing: what the suites ``indexing``, ``found`` and ``objects`` are run on; its own defaults if None.
         navigation: what the suite ``navigation`` is run on; its own defaults if None.
     """
 
@@ -48,8 +48,8 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
     """Run a suite and write SUITE.json, SUITE.md, SUITE.png and a CSV file for each table into ``out``.
 
     Args:
-        suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``objects``, ``indexing``
-            or ``navigation``.
+        suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``objects``, ``indexing``,
+            ``found`` or ``navigation``.
         inputs: what it measures on.
         out: folder to write into.
 
@@ -60,6 +60,10 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
         from avlmaps.bench.indexing.suite import run_indexing
 
         return run_indexing(inputs.indexing, out)
+    if suite == "found":
+        from avlmaps.bench.found.suite import run_found
+
+        return run_found(inputs.indexing, out)
     if suite == "navigation":
         from avlmaps.bench.navigation.suite import run_navigation
 

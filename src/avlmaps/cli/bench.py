@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from avlmaps.bench.indexing import IndexingSettings
     from avlmaps.bench.navigation import NavigationSettings
 
-Suite = Literal["words", "language", "sounds", "segmentation", "locate", "frames", "objects", "indexing", "navigation"]
+Suite = Literal[
+    "words", "language", "sounds", "segmentation", "locate", "frames", "objects", "indexing", "found", "navigation"
+]
 Series = Literal["sounds-1", "sounds-2", "sounds-3", "images", "pairs", "commands", "spatial"]
 
 
@@ -71,6 +73,7 @@ class Bench(ModelVerb):
     pixels, without any map.
     objects: positions of objects, in the scenes of indexing, whose maps it shares.
     indexing: the paper's Tables III to V, in twelve held-out homes, in --scenes, or in a recording with objects.json.
+    found: is what is reported as found there? Brier scores and a reliability diagram, in the scenes of indexing.
     navigation: the paper's Tables I, II and VI and its commands, in twelve held-out homes or in --scenes.
     """
 
@@ -103,7 +106,7 @@ class Bench(ModelVerb):
         """Measure, write the tables, print them."""
         from avlmaps.bench.suites import SuiteInputs, run_suite
 
-        indexing = self.indexing_settings() if self.suite in ("indexing", "objects") else None
+        indexing = self.indexing_settings() if self.suite in ("indexing", "found", "objects") else None
         navigation = self.navigation_settings() if self.suite == "navigation" else None
         scenes = () if indexing or navigation else tuple(map(Path, self.scenes))
         models = self.models_chosen

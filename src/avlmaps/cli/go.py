@@ -70,7 +70,7 @@ class Go(ModelVerb):
     start: Annotated[str | None, arg(metavar="X,Y,HEADING")] = None
     """Start of the simulated robot: metres, degrees counter-clockwise from +x. Default: the start of the recording."""
     guess: bool = False
-    """Go to the best guess where the map's confidence is below 0.5."""
+    """Go to the best guess where nothing is found."""
     image: Annotated[Path | None, arg(metavar="FILE")] = None
     """File that "this photo" in the sentence means."""
     sound_clip: Annotated[Path | None, arg(metavar="FILE")] = None
@@ -283,7 +283,8 @@ def failure(answer: dict[str, Any]) -> dict[str, Any] | None:
     if answer["ok"]:
         return None
     if answer["error"] is not None:
-        return error_answer(kind_named(answer["error_type"]), answer["error"])
+        message = answer["error"].replace("let the robot go to the best guess", "go to the best guess with --guess")
+        return error_answer(kind_named(answer["error_type"]), message)
     missed = [goal["name"] or place(goal["goal"]) for goal in answer["subgoals"] if not goal["reached"]]
     message = (
         f"The robot did not reach {len(missed)} of {len(answer['subgoals'])} goals: {', '.join(missed)}."

@@ -162,11 +162,11 @@ def query_lines(answer: dict[str, Any]) -> list[str]:
     lines = [f"query: {parts}"]
     lines += [f"note: {part['note']}" for part in answer["parts"] if part.get("note")]
     rows = [
-        (i, place(goal["position"]), f"{goal['score']:.2f}", " x ".join(f"{side:.2f}" for side in goal["size"]))
+        (i, place(goal["position"]), f"{goal['probability']:.2f}", " x ".join(f"{side:.2f}" for side in goal["size"]))
         for i, goal in enumerate(answer["goals"], start=1)
     ]
     lines += [f"note: {note}" for note in answer.get("notes", [])]
     lines += [f"count: {answer['count']}"] if "count" in answer else []
-    lines.append("found" if answer["found"] else "not found here" + (": the best guesses are" if rows else ""))
-    lines += table_lines(("", f"place ({answer['frame']} frame)", "score", "size in m"), rows) if rows else []
+    lines.append(f"{'found' if answer['found'] else 'not found here'}: {answer['text']}")
+    lines += table_lines(("", f"place ({answer['frame']} frame)", "probability", "size in m"), rows) if rows else []
     return [*lines, f"wrote {answer['plot']}"] if "plot" in answer else lines

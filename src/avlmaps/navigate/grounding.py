@@ -12,7 +12,7 @@ from avlmaps.language.program.vocabulary import Clip, Picture, Place, Target
 from avlmaps.navigate.arguments import kind_of, text_of
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
-from avlmaps.navigate.instances import SURE, Thing, likely, nearest, same_thing, tells_one, things_in
+from avlmaps.navigate.instances import Thing, likely, nearest, same_thing, tells_one, things_in
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 
@@ -22,7 +22,7 @@ class Seeker:
 
     Attributes:
         avlmap: the map.
-        guess: whether to take the best guess where the map's confidence is below 0.5.
+        guess: whether to take the best guess where nothing is found.
         readable: which files a program may load.
         notes: what a person should know: words half understood, guesses.
     """
@@ -130,8 +130,8 @@ class Seeker:
         if isinstance(target, str):
             self._note(heat)
         if not heat.found:
-            sure = f"{things[0].sure:.2f}, below {SURE:.2f}"
-            self.note(f"the map's confidence in {things[0].name} is {sure}; this is its best guess")
+            likely_by = f"{things[0].probability:.2f}, below {heat.found_at:.2f}"
+            self.note(f"the probability of {things[0].name} is {likely_by}; this is the best guess")
         return things, tells_one(heat)
 
     def place_of(self, target: Target) -> Place:
@@ -179,7 +179,7 @@ class Seeker:
 
     def _chosen(self, thing: Thing, of: int) -> Thing:
         place = ", ".join(f"{value:.2f}" for value in self.avlmap.space.world(thing.place))
-        line = f"{thing.name}: at ({place}) m, confidence {thing.sure:.2f}"
+        line = f"{thing.name}: at ({place}) m, probability {thing.probability:.2f}"
         if thing.name and not self._last_line.startswith(line):
             self._last_line = line + (f", one of {of}" if of > 1 else "")
             self._tell(self._last_line)

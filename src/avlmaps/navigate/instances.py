@@ -12,8 +12,6 @@ from avlmaps.query.factors import Factor, NearThings
 from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
 
-# From this confidence on an instance more likely matches the query than not.
-SURE = 0.5
 _MOST_GOALS = 30
 
 
@@ -25,15 +23,17 @@ class Thing:
         name: what it was called; ``""`` for a place that a program gives.
         outline: what it covers of the ground, level frame; a single point where it is not a thing.
         place: where the goal is, level frame, metres.
-        sure: in [0, 1]: the map's confidence; 1 for a place that a program gives.
+        probability: that it is what was meant; 1 for a place that a program gives.
         solid: whether it is a thing with an extent, rather than a place.
+        found: whether that is likely enough, by the map's settings.
     """
 
     name: str
     outline: Outline
     place: Float[np.ndarray, "3"]
-    sure: float = 1.0
+    probability: float = 1.0
     solid: bool = False
+    found: bool = True
 
 
 def describe_query(heat: Heatmap) -> str:
@@ -49,18 +49,20 @@ def tells_one(heat: Heatmap) -> bool:
 
 
 def things_in(heat: Heatmap, guess: bool = False) -> list[Thing]:
-    """Return the distinct things that a heatmap asks for, best first; at least one.
+    """Return the distinct things that a heatmap asks for, best first; at least one, and all of them found.
 
     Args:
         heat: what is sought, and what it is near.
-        guess: take the best guess where the map's confidence is below 0.5, however low it is; where
-            nothing comes together with what it is near, the thing alone.
+        guess: take the best guess where nothing is found, however unlikely it is; where nothing comes together with
+            what it is near, the thing alone.
 
     Raises:
         GoalNotFoundError: there is none.
     """
-    tries = _guesses(heat) if guess else (heat,) if heat.found else ()
-    for tried in tries:
+    if heat.found:
+        found = [goal for goal in heat.goals(_MOST_GOALS) if goal.probability >= heat.found_at]
+        return [_thing(heat, heat.lead, goal) for goal in found]
+    for tried in _guesses(heat) if guess else ():
         goals = tried.goals(_MOST_GOALS)
         if goals:
             return [_thing(tried, tried.lead, goal) for goal in goals]
@@ -69,7 +71,7 @@ def things_in(heat: Heatmap, guess: bool = False) -> list[Thing]:
 
 def _guesses(heat: Heatmap) -> Iterator[Heatmap]:
     """Yield the possible meanings of a heatmap, the highest confidence first."""
-    lead = Heatmap.of(heat.lead)
+    lead = Heatmap.of(heat.lead, heat.found_at)
     yield heat
     yield heat.include_uncertain()
     if len(heat.factors) > 1:
@@ -78,14 +80,14 @@ def _guesses(heat: Heatmap) -> Iterator[Heatmap]:
 
 
 def nearest(things: Sequence[Thing], xy: Float[np.ndarray, "2"]) -> Thing:
-    """Return the thing nearest to a place, of those with a confidence of 0.5 or more; the best where there is none."""
-    sure = [thing for thing in things if thing.sure >= SURE]
-    return min(sure, key=lambda thing: thing.outline.distance_m(xy)) if sure else things[0]
+    """Return the thing nearest to a place, of those that are found; the best where none is."""
+    found = [thing for thing in things if thing.found]
+    return min(found, key=lambda thing: thing.outline.distance_m(xy)) if found else things[0]
 
 
 def likely(things: Sequence[Thing], one: bool) -> Sequence[Thing]:
-    """Return the things that may be meant: the best where one is meant, else those of confidence 0.5 or more."""
-    return things[:1] if one else [thing for thing in things if thing.sure >= SURE] or things[:1]
+    """Return the things that may be meant: the best where one is meant, else those that are found."""
+    return things[:1] if one else [thing for thing in things if thing.found] or things[:1]
 
 
 def same_thing(a: Thing, b: Thing) -> bool:
@@ -96,31 +98,29 @@ def same_thing(a: Thing, b: Thing) -> bool:
 def _thing(heat: Heatmap, lead: Factor, goal: Goal) -> Thing:
     position = np.array(goal.position)
     instance = int(lead.instance[np.argmin(np.linalg.norm(lead.anchors - position, axis=1))])
-    place, sure = heat.space.level(position), goal.score
+    place, found = heat.space.level(position), goal.probability >= heat.found_at
     if not isinstance(lead, NearThings):
-        return Thing(describe_query(heat), Outline.at(place[:2]), place, sure)
+        return Thing(describe_query(heat), Outline.at(place[:2]), place, goal.probability, found=found)
     own = heat.space.level(lead.anchors[lead.instance == instance])
     outline = Outline.round(own[:, :2], heat.space.grid.voxel_size_m)
-    if len(heat.factors) == 1:
-        sure = float(lead.confidence[instance])
-    return Thing(describe_query(heat), outline, place, sure, solid=True)
+    return Thing(describe_query(heat), outline, place, goal.probability, solid=True, found=found)
 
 
 def explain_absence(heat: Heatmap, guess: bool = False) -> str:
-    """Return one sentence on why there is no goal: which phrase, the map's confidence, and what to do."""
-    missing = [factor for factor in heat.factors if not factor.found]
-    if not missing:
-        return (
-            f"{describe_query(heat)} is nowhere in the map: each is there, but they do not come together anywhere; "
-            "name it by something that is nearer to it."
-        )
-    absences = "; ".join(_absence(factor) for factor in missing)
+    """Return one sentence on why there is no goal: which phrase failed, what the best guess is, and what to do."""
+    what, missing = describe_query(heat), [factor for factor in heat.factors if not factor.found]
+    if missing:
+        why = f"is not found in the map: {'; '.join(_absence(factor) for factor in missing)}"
+    else:
+        why = "is not found in the map: each is there, but they do not come together anywhere"
+    best = next(iter(heat.goals(1)), None)
+    if best is None:
+        return f"{what} {why}; say it in other words."
+    place = ", ".join(f"{value:.2f}" for value in best.position)
     advice = "say it in other words" if guess else "say it in other words, or let the robot go to the best guess"
-    return f"{describe_query(heat)} is not found in the map: {absences}; {advice}."
+    return f"{what} {why}. The best guess is at ({place}) m with probability {best.probability:.2f}; {advice}."
 
 
 def _absence(factor: Factor) -> str:
-    what = f"{factor.part.modality} {factor.part.query!r}"
-    best = float(np.max(factor.confidence, initial=0.0)) if isinstance(factor, NearThings) else 0.0
-    note = factor.note or f"its confidence is at best {best:.2f}, below {SURE:.2f}"
-    return f"{what}: {note}".rstrip(".")
+    note = factor.note or f"its confidence is at best {float(np.max(factor.confidence, initial=0.0)):.2f}"
+    return f"{factor.part.modality} {factor.part.query!r}: {note}".rstrip(".")

@@ -37,7 +37,7 @@ class RobotSettings:
     """How a robot takes its skills."""
 
     guess: bool = False
-    """Go to the best guess where the map's confidence is below 0.5."""
+    """Go to the best guess where nothing is found."""
     persist: bool = False
     """Continue with a program where a place is not reached, as the paper's evaluation does, instead of stopping."""
     waits: bool = True
@@ -52,7 +52,7 @@ class Robot:
     """A robot that knows a map and can drive; it implements `avlmaps.language.program.vocabulary.Vocabulary`.
 
     Where a phrase alone says what is meant, skills that stand in relation to the robot (`face`, `move_to_left`,
-    `move_to_object` ...) take the nearest thing of that name with a confidence of 0.5 or more; `move_to`, `get_pos` and
+    `move_to_object` ...) take the nearest thing of that name that is found; `move_to`, `get_pos` and
     `get_contour` take the best. A heatmap of several parts always means its best place.
 
     Attributes:

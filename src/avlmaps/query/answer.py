@@ -19,9 +19,10 @@ class PartAnswer:
     Attributes:
         part: the part.
         peak: its highest heat anywhere: at the map's voxels and at the places that the heat falls from.
-        found: whether the map holds it, by itself.
+        found: whether the map holds it: by itself, or since the whole is found.
         understood: what the encoder could act on.
         note: why it was not found, or what to know; ``""`` for nothing.
+        probability: that the map holds it.
     """
 
     part: Part
@@ -29,6 +30,7 @@ class PartAnswer:
     found: bool
     understood: str = ""
     note: str = ""
+    probability: float = 0.0
 
     def to_dict(self) -> "PartOutcome":
         """Return the part as the command line prints it."""
@@ -40,6 +42,7 @@ class PartAnswer:
             "found": self.found,
             "understood": self.understood,
             "note": self.note,
+            "probability": self.probability,
         }
 
 
@@ -72,14 +75,17 @@ class Answer:
 
     Attributes:
         goals: may hold places even where ``found`` is false: the best guesses, with low scores.
-        found: whether the first goal is likely enough to be right.
+        found: whether the first goal is likely enough to be right: its probability is at least
+            ``QuerySettings.found_at``.
         parts: one for each part of the question.
         elapsed_ms: from the question to the goals.
         heat: the fused heatmap, for plots.
         probability: that the first goal is right, all parts together, in [0, 1]; 0 where there is no goal.
         count: number of likely things, where a sentence asks how many there are.
         notes: one sentence each: how words were read.
-        alternatives: the other questions that a sentence may mean, the likeliest first.
+        alternatives: what is sought by itself, where nothing is found of it near what the query names; the other
+            questions that a sentence may mean, the likeliest first.
+        text: the answer in one sentence: where the first goal is, or which part failed and what the best guess is.
     """
 
     goals: tuple[Goal, ...]
@@ -91,6 +97,7 @@ class Answer:
     count: int | None = None
     notes: tuple[str, ...] = ()
     alternatives: tuple[Alternative, ...] = ()
+    text: str = ""
 
     def to_dict(self) -> "QueryAnswer":
         """Return the answer with the keys of the contract; positions are in the frame that ``frame`` names."""
@@ -98,6 +105,7 @@ class Answer:
             "goals": [goal.to_json() for goal in self.goals],
             "found": self.found,
             "probability": self.probability,
+            "text": self.text,
             "parts": [part.to_dict() for part in self.parts],
             "elapsed_ms": self.elapsed_ms,
             "frame": FRAME,

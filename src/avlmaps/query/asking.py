@@ -10,13 +10,16 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Kind, lexicon
-from avlmaps.core.question import Modality, Part, Question
+from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.perception.protocols import NamedPixelEncoder
 from avlmaps.query.answer import Alternative, Answer, PartAnswer
 from avlmaps.query.factors import Factor, NearAnchors, NearThings
-from avlmaps.query.heatmap import product
+from avlmaps.query.heatmap import Heatmap, product
+from avlmaps.query.wording import absent_text, found_text
 
 if TYPE_CHECKING:
     from avlmaps.core.camera import Pinhole
@@ -118,8 +121,6 @@ class Files:
             ) from None
 
     def _shape(self, picture: str) -> tuple[int, int]:
-        import numpy as np
-
         from avlmaps.query.modalities.image import read_picture
 
         attached = None if self.attachments is None else self.attachments.get(picture)
@@ -161,14 +162,29 @@ def answer_question(avlmap: "AVLMap", question: Question, top: int = 3, files: F
     if top < 1:
         raise AskError(f"At most {top} goals are wanted; the number must be 1 or more.")
     camera = files.camera_of(question)
-    heat = product([avlmap.heat(part, camera, files.attachments) for part in question.parts])
+    heats = [avlmap.heat(part, camera, files.attachments) for part in question.parts]
+    heat = product(heats)
     goals, found = tuple(heat.goals(top)), heat.found
-    parts = [
-        PartAnswer(part, _peak(factor), factor.found, factor.understood, factor.note)
-        for part, factor in zip(question.parts, heat.factors, strict=True)
-    ]
+    parts = tuple(_part_answer(*both, heat) for both in zip(question.parts, heat.factors, strict=True))
+    alone = () if found or len(heats) == 1 else (_alone(question, heats),)
+    text = found_text(question.parts, goals[0]) if found else absent_text(parts, goals, next(iter(alone), None))
     elapsed_ms = 1e3 * (time.perf_counter() - begin)
-    return Answer(goals, found, tuple(parts), elapsed_ms, heat, goals[0].score if goals else 0.0)
+    return Answer(goals, found, parts, elapsed_ms, heat, heat.probability, text=text, alternatives=alone)
+
+
+def _part_answer(part: Part, factor: Factor, whole: Heatmap) -> PartAnswer:
+    """Return the outcome of a part: where the whole is found all its parts are, whatever each is by itself."""
+    own = _probability(factor)
+    if not whole.found or factor.found:
+        return PartAnswer(part, _peak(factor), factor.found, factor.understood, factor.note, own)
+    kept = [one for one in factor.note.split("; ") if part.is_file or one.startswith("understood only")]
+    return PartAnswer(part, _peak(factor), True, factor.understood, "; ".join(kept), max(own, whole.probability))
+
+
+def _alone(question: Question, heats: Sequence[Heatmap]) -> Alternative:
+    """Return what is sought by itself, without what it is near."""
+    part, heat = next(both for both in zip(question.parts, heats, strict=True) if both[0].role is Role.PRIMARY)
+    return Alternative(Question.of([part]), heat.probability, heat.found, tuple(heat.goals(1)))
 
 
 def thing_alone(asked: Asked, avlmap: "AVLMap") -> Question | None:
@@ -206,14 +222,16 @@ def _answer_sentence(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
             )
         answers.append((question, answer_question(avlmap, question, _MOST_COUNTED if counted else asked.top, files)))
     answers.sort(key=lambda one: (one[1].found, one[1].probability), reverse=True)
-    (_, best), others = answers[0], answers[1:]
+    (question, best), others = answers[0], answers[1:]
     alternatives = tuple(Alternative(question, one.probability, one.found, one.goals[:1]) for question, one in others)
+    count = _count(best) if counted else None
     return replace(
         best,
         goals=best.goals[: asked.top],
-        count=_count(best) if counted else None,
+        count=count,
         notes=read.notes,
-        alternatives=alternatives,
+        alternatives=(*best.alternatives, *alternatives),
+        text=found_text(question.parts, best.goals[0], count) if best.found else best.text,
     )
 
 
@@ -230,6 +248,15 @@ def _read(sentence: str, image: str | None, clip: str | None) -> "AskedSentence"
     from avlmaps.language.sentence import Given
 
     return read_question(sentence, Given(image, clip, knows=lambda _: True))
+
+
+def _probability(factor: Factor) -> float:
+    """Return how likely the map holds a part, by itself: the confidence of its best instance or place."""
+    if not factor.is_named:
+        return 0.0
+    if isinstance(factor, NearAnchors):
+        return float((factor.scores * factor.confidence[factor.instance]).max(initial=0.0))
+    return float(np.max(factor.confidence, initial=0.0))
 
 
 def _peak(factor: Factor) -> float:

@@ -16,7 +16,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder
 from avlmaps.perception.room_contents import read_room_contents
 from avlmaps.query import loops
-from avlmaps.query.factors import HeatSettings
+from avlmaps.query.factors import FOUND_AT, HeatSettings
 from avlmaps.query.floor_plan import FloorPlan, storeys
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor, area_names, name_shares
@@ -65,8 +65,14 @@ class QuerySettings:
     """From views to heat."""
     by_colour: bool = True
     """A picture that keypoints cannot locate is guessed by its colours; else by the few keypoints that there are."""
+    found_at: float = FOUND_AT
+    """A query is found where its first goal is right with at least this probability, all parts together; in [0, 1]."""
     seed: int = 0
     """Seed of what is drawn at random when a picture is located."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.found_at <= 1.0:
+            raise QueryError(f"A query cannot be found at a probability of {self.found_at:g}; it lies between 0 and 1.")
 
 
 class AVLMap:
@@ -132,7 +138,8 @@ class AVLMap:
                 settings.heat,
                 voxels.rgb,
                 lambda: self.things_in_rooms,
-            )
+            ),
+            settings.found_at,
         )
 
     def pieces(self, word: str, alone: bool = False) -> Pieces:
@@ -260,9 +267,8 @@ class AVLMap:
         if len(heard):
             self.stored.require_model(Kind.SOUNDS)
             scores = self.stored.profile.sound_encoder().score_words(sound_features(heard), [text])[:, 0]
-        return Heatmap.of(
-            sound_factor(self.space, heard, scores, part, self.settings.sounds, self.settings.heat)
-        )  # fmt: skip
+        factor = sound_factor(self.space, heard, scores, part, self.settings.sounds, self.settings.heat)
+        return Heatmap.of(factor, self.settings.found_at)
 
     def sound_clip(self, clip: str | Path | Sound, primary: bool = False) -> Heatmap:
         """Return the heat of where sounds of the same kind as a clip were heard.
@@ -279,9 +285,8 @@ class AVLMap:
             self.stored.require_model(Kind.SOUNDS)
             encoder = self.stored.profile.sound_encoder()
             scores = encoder.score_sounds(sound_features(heard), encoder.encode(sound))
-        return Heatmap.of(
-            sound_factor(self.space, heard, scores, part, self.settings.sounds, self.settings.heat)
-        )  # fmt: skip
+        factor = sound_factor(self.space, heard, scores, part, self.settings.sounds, self.settings.heat)
+        return Heatmap.of(factor, self.settings.found_at)
 
     def area(self, word: str, primary: bool = False) -> Heatmap:
         """Return the heat of an area, such as a kitchen.
@@ -294,11 +299,10 @@ class AVLMap:
         encoder = self.stored.profile.view_encoder()
         self.stored.require_model(Kind.VIEWS)
         settings = self.settings
-        return Heatmap.of(
-            area_factor(
-                self.space, self.stored.keyframes, encoder, part, settings.areas, settings.heat, self.room_votes
-            )
+        factor = area_factor(
+            self.space, self.stored.keyframes, encoder, part, settings.areas, settings.heat, self.room_votes
         )
+        return Heatmap.of(factor, settings.found_at)
 
     @cached_property
     def room_votes(self) -> Rooms | None:
@@ -367,8 +371,6 @@ class AVLMap:
     ) -> Heatmap:
         """Return the heat of where a picture was taken; if it is not located, of the best guess.
 
-        A guess is ``found`` where it is as likely right as wrong, or likelier.
-
         Args:
             picture: a file, or RGB uint8.
             intrinsics: of the camera that took it; by default the map's own.
@@ -383,7 +385,7 @@ class AVLMap:
         located = self._located(rgb, intrinsics, _GUESS_FROM)
         if located.world_from_camera is None and self.settings.by_colour:
             located = self._guessed_by_colour(rgb, located)
-        return Heatmap.of(image_factor(self.space, located, part, self.settings.heat))
+        return Heatmap.of(image_factor(self.space, located, part, self.settings.heat), self.settings.found_at)
 
     def _guessed_by_colour(self, rgb: UInt8[np.ndarray, "h w 3"], located: "Located") -> "Located":
         from avlmaps.query.photometric import Start

@@ -15,7 +15,8 @@ from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.core.question import Part, Role
 from avlmaps.query.voxel_space import Space
 
-# From this confidence on a part is found: an instance, a sound, a view, the place of a photo.
+# From this probability on a query is found (``QuerySettings.found_at``), and a part of it by itself: an instance, a
+# sound, a view, the place of a photo.
 FOUND_AT = 0.5
 # Scores are products of float32 vectors of unit length. Their last digits depend on the order of summation, which
 # depends on the processor and on how many vectors are multiplied at once; a difference below this means nothing.
@@ -54,6 +55,7 @@ class Factor(ABC):
         understood: what the encoder could act on.
         note: one sentence on why it was not found, or ``""``.
         flat: whether the heat is the same at every height.
+        is_named: whether what was said of it is understood; False where only a colour is ("red elephant").
         regional: whether the heat says in which region a place lies, not how near it is: a thing lies in one region,
             so the mean over its voxels counts (``goals.share_voxels``).
     """
@@ -69,6 +71,7 @@ class Factor(ABC):
     note: str
     flat: bool
     regional: bool = False
+    is_named: bool = True
 
     @abstractmethod
     def heat_and_anchors(
@@ -129,7 +132,7 @@ class NearThings(Factor):
         mask: which voxels are the object; the anchors are their middles, in the same order.
         with_uncertain: makes the same with the instances whose confidence is too low to count in a query for the
         thing alone: the context may select one of them. None where there are no others.
-        calibrated: whether the confidences are probabilities, as those of an encoder of names are.
+        is_named: see ``Factor``.
     """
 
     space: Space
@@ -142,7 +145,7 @@ class NearThings(Factor):
     understood: str = ""
     note: str = ""
     with_uncertain: "Callable[[], NearThings] | None" = None
-    calibrated: bool = False
+    is_named: bool = True
     flat: bool = field(default=False, init=False)
 
     def for_product(self) -> "NearThings":

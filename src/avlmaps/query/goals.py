@@ -17,17 +17,13 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.poses import plain_point
-from avlmaps.query.factors import FOUND_AT, Factor, NearThings, lead_of, product_of
+from avlmaps.query.evidence import Evidence, evidence_of
+from avlmaps.query.factors import Factor, NearThings, lead_of, product_of
+from avlmaps.query.probability import probability_of
 
 if TYPE_CHECKING:
     from avlmaps.query.schema import GoalAnswer
 
-# Where all parts of the query are in the map, but nowhere together by at least this much heat, the whole is not found.
-LEAST_TOGETHER = 0.1
-# Of one thing in a query of several parts ("the chair near this photo") this probability is enough where all else is
-# found: who queries so knows that there is one. On six development homes first goals are right at least as often as not
-# from here on, half of the queries being for things that are not there (docs/experiments.md).
-FOUND_IN_COMPANY = 0.3
 # Two sounds heard at one place are one place to go to.
 SEPARATION_M = 1.0
 # Heat that differs by less is a plateau, whose middle is taken.
@@ -48,12 +44,14 @@ class Goal:
         size: extent of the instance along the axes of the level frame (x and y horizontal, z up), metres. For an
             object its voxels' box; for a sound or an area the box of the places it was heard or seen from.
         parts: heat of each modality there; a second part of a modality is called ``object_2`` and so on.
+        probability: that the goal is right, all parts together.
     """
 
     position: tuple[float, float, float]
     score: float
     size: tuple[float, float, float]
     parts: dict[str, float]
+    probability: float = 0.0
 
     def to_json(self) -> "GoalAnswer":
         """Return the goal as the command line prints it."""
@@ -62,6 +60,7 @@ class Goal:
             "score": self.score,
             "size": list(self.size),
             "parts": dict(self.parts),
+            "probability": self.probability,
         }
 
 
@@ -137,52 +136,24 @@ def _highest(instance: Int[np.ndarray, " m"], heat: Float[np.ndarray, " m"], cou
     return peak
 
 
-def is_found(factors: Sequence[Factor], shares_of: Callable[[], Shares]) -> bool:
-    """Return whether all that was queried is in the map and comes together around a likely instance of the lead.
-
-    Args:
-        factors: of the heat.
-        shares_of: returns ``share_voxels`` of them; called only where it decides.
-    """
-    if len(factors) == 1:
-        return factors[0].found
-    lead = lead_of(factors)
-    context = [factor for factor in factors if factor is not lead and not factor.found]
-    if not context and _is_calibrated(lead):
-        least = FOUND_IN_COMPANY
-    elif lead.found and (not context or (len(context) == 1 and _is_likely_in_company(context[0]))):
-        least = FOUND_AT
-    else:
-        return False
-    likely = np.asarray(lead.confidence) >= least
-    return bool((shares_of().peak[likely] >= LEAST_TOGETHER).any())
-
-
-def _is_calibrated(factor: Factor) -> bool:
-    """Return whether a factor is a thing whose confidences are probabilities."""
-    return isinstance(factor, NearThings) and factor.calibrated
-
-
-def _is_likely_in_company(factor: Factor) -> bool:
-    return _is_calibrated(factor) and float(np.max(factor.confidence, initial=0.0)) >= FOUND_IN_COMPANY
-
-
-def find_goals(factors: Sequence[Factor], shares: Shares, top: int) -> list[Goal]:
-    """Return up to ``top`` goals, best first, by heat times the confidence of the lead's instance."""
-    lead = lead_of(factors)
-    goals: list[Goal] = []
-    taken: list[np.ndarray] = []
+def weigh_goals(factors: Sequence[Factor], shares: Shares, top: int) -> list[tuple[Goal, Evidence]]:
+    """Return up to ``top`` goals, best first by heat times the confidence of the lead's instance, with the evidence."""
+    lead, is_named = lead_of(factors), all(factor.is_named for factor in factors)
     score = np.round(shares.peak * lead.confidence, 3)  # more digits would be noise; of equals the larger leads
     extent = np.bincount(lead.instance, minlength=len(score))
-    for instance in np.lexsort((-extent, -score)):
+    ground: list[Float[np.ndarray, 2]] = []
+    goals: list[tuple[Goal, Evidence]] = []
+    for instance in map(int, np.lexsort((-extent, -score))):
         if len(goals) >= top or score[instance] <= 0.0:
             break
-        position = _position(factors, lead, shares, int(instance))
-        ground = lead.space.level(position)[:2]
-        if lead.flat and any(np.hypot(*(ground - other)) < SEPARATION_M for other in taken):
+        position = _position(factors, lead, shares, instance)
+        xy = lead.space.level(position)[:2]
+        if lead.flat and any(np.hypot(*(xy - other)) < SEPARATION_M for other in ground):
             continue
-        taken.append(ground)
-        goals.append(_goal(factors, lead, int(instance), position, float(score[instance])))
+        ground.append(xy)
+        evidence = evidence_of(factors, instance, position, float(shares.peak[instance]))
+        probability = probability_of(evidence) if is_named else 0.0
+        goals.append((_goal(factors, lead, instance, position, float(score[instance]), probability), evidence))
     return goals
 
 
@@ -216,7 +187,12 @@ def _place_on_thing(lead: NearThings, shares: Shares, instance: int) -> Float[np
 
 
 def _goal(
-    factors: Sequence[Factor], lead: Factor, instance: int, position: Float[np.ndarray, "3"], score: float
+    factors: Sequence[Factor],
+    lead: Factor,
+    instance: int,
+    position: Float[np.ndarray, "3"],
+    score: float,
+    probability: float,
 ) -> Goal:
     extent = np.ptp(lead.space.level(lead.anchors[lead.instance == instance]), axis=0)
     size = extent if lead.flat else extent + lead.space.grid.voxel_size_m
@@ -225,4 +201,4 @@ def _goal(
         name = str(factor.part.modality)
         again = sum(key.split("_")[0] == name for key in parts)
         parts[f"{name}_{again + 1}" if again else name] = float(factor.at(position[None])[0])
-    return Goal(plain_point(position), min(max(score, 0.0), 1.0), plain_point(size), parts)
+    return Goal(plain_point(position), min(max(score, 0.0), 1.0), plain_point(size), parts, probability)

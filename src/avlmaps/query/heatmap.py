@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 
 from avlmaps.core.arrays import Float32
-from avlmaps.query.factors import Factor, lead_of, product_of
-from avlmaps.query.goals import Goal, Shares, find_goals, is_found, share_voxels
+from avlmaps.query.evidence import Evidence
+from avlmaps.query.factors import FOUND_AT, Factor, lead_of, product_of
+from avlmaps.query.goals import Goal, Shares, share_voxels, weigh_goals
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
@@ -24,15 +25,17 @@ class Heatmap:
     Attributes:
         space: the map's voxels.
         factors: the parts of the query, one factor each.
+        found_at: from this probability of the first goal on the query is found.
     """
 
     space: Space
     factors: tuple[Factor, ...]
+    found_at: float = FOUND_AT
 
     @classmethod
-    def of(cls, factor: Factor) -> "Heatmap":
+    def of(cls, factor: Factor, found_at: float = FOUND_AT) -> "Heatmap":
         """Return the heatmap of one thing."""
-        return cls(factor.space, (factor,))
+        return cls(factor.space, (factor,), found_at)
 
     @cached_property
     def values(self) -> Float32[np.ndarray, " n"]:
@@ -45,15 +48,15 @@ class Heatmap:
         if self.space is not other.space:
             raise ValueError("two heatmaps of different maps cannot be multiplied; ask both of the same AVLMap")
         one, two = self._in_company(), other._in_company()
-        return Heatmap(self.space, one.factors + two.factors)
+        return Heatmap(self.space, one.factors + two.factors, max(self.found_at, other.found_at))
 
     def include_uncertain(self) -> "Heatmap":
         """Return the heatmap that includes instances of low confidence: for a caller that must guess."""
-        return product([Heatmap.of(factor.include_uncertain()) for factor in self.factors])
+        return product([Heatmap.of(factor.include_uncertain(), self.found_at) for factor in self.factors])
 
     def _in_company(self) -> "Heatmap":
         """Return the heatmap as it counts in a product; that of several things is one already."""
-        return Heatmap.of(self.factors[0].for_product()) if len(self.factors) == 1 else self
+        return Heatmap.of(self.factors[0].for_product(), self.found_at) if len(self.factors) == 1 else self
 
     def __len__(self) -> int:
         return len(self.space)
@@ -77,14 +80,23 @@ class Heatmap:
     def _shares(self) -> Shares:
         return share_voxels(self.factors, lambda: self.values)
 
+    @cached_property
+    def probability(self) -> float:
+        """How likely the first goal is right, all parts of the query together; 0 where there is none."""
+        return next((goal.probability for goal in self.goals(1)), 0.0)
+
     @property
     def found(self) -> bool:
-        """Whether all parts of the query are in the map and come together somewhere."""
-        return is_found(self.factors, lambda: self._shares)
+        """Whether the first goal is likely enough to be right."""
+        return self.probability >= self.found_at
 
     def goals(self, top: int = 3) -> list[Goal]:
         """Return the best distinct places, best first; fewer where there are fewer, none where there is no heat."""
-        return find_goals(self.factors, self._shares, top)
+        return [goal for goal, _ in self.weighed(top)]
+
+    def weighed(self, top: int = 3) -> list[tuple[Goal, Evidence]]:
+        """Return the goals, each with the evidence that its probability rests on."""
+        return weigh_goals(self.factors, self._shares, top)
 
     @overload
     def plot(self, path: str | Path, *, top: int = 3) -> Path: ...

@@ -34,6 +34,7 @@ class GoalAnswer(TypedDict):
     score: Annotated[float, Meta(ge=0.0, le=1.0, description="heat there times the confidence of the thing there")]
     size: Size
     parts: Annotated[dict[str, float], Meta(description="heat of each part there, by modality")]
+    probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that it is right, all parts together")]
 
 
 class PartOutcome(TypedDict):
@@ -46,6 +47,7 @@ class PartOutcome(TypedDict):
     found: bool
     understood: Annotated[str, Meta(description="the words that the encoder acts on")]
     note: Annotated[str, Meta(description="why it is not found, or empty")]
+    probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that the map holds it")]
 
 
 class AlternativeAnswer(TypedDict):
@@ -63,6 +65,7 @@ class QueryAnswer(TypedDict):
     goals: list[GoalAnswer]
     found: bool
     probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that the first goal is right, all parts together")]
+    text: Annotated[str, Meta(description="the answer in one sentence")]
     parts: list[PartOutcome]
     elapsed_ms: float
     frame: Frame

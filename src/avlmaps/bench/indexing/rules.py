@@ -89,7 +89,7 @@ def area_tasks(evidence: Evidence, rng: np.random.Generator, most: int) -> list[
         for kind in sorted(shown):
             right = [i for i in inside if kind_of[i] == kind]
             wrong = [evidence.box(i) for i in inside if kind_of[i] != kind]
-            apart = min(_between_m(evidence.box(i), other) for i in right for other in wrong)
+            apart = min(between_m(evidence.box(i), other) for i in right for other in wrong)
             if apart >= APART_M:
                 found.append(_task(evidence, TaskKind.AREA, category, kind, right, own, None))
     return numbered(found, rng, most)
@@ -122,7 +122,7 @@ def _task(
     return Task("", kind, evidence.scene, category, context, targets, rivals, place, photo)
 
 
-def _between_m(a: Box, b: Box) -> float:
+def between_m(a: Box, b: Box) -> float:
     """Return the horizontal distance between two boxes."""
     low_a, high_a, low_b, high_b = (np.asarray(v)[:2] for v in (a.low, a.high, b.low, b.high))
     return float(np.linalg.norm(np.maximum(np.maximum(low_a - high_b, low_b - high_a), 0.0)))

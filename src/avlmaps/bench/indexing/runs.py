@@ -31,7 +31,7 @@ PAPER_SIZES: Mapping[TaskKind, int] = {
 }
 _PHOTOS_A_TASK = 12  # tried for each that is wanted
 _MAKING = 3  # raised when tasks are made by other rules
-_QUERYING = 6  # raised when they are queried by other rules
+_QUERYING = 7  # raised when they are queried by other rules
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,12 +176,21 @@ def _in_turn(made: Sequence[Sequence[Task]], kind: TaskKind, sizes: Mapping[Task
 
 
 def _made(todo: _Todo) -> list[Task]:
-    """Record and map a scene, and make its tasks: the same for a seed, whichever are taken."""
-    place = Workplace(todo.job, todo.open_spec)
-    stored, most = place.avlmap.stored, todo.most
-    path = todo.job.folder / f"tasks-{_key(todo.job, _MAKING, stored.info.build_key, most)}.json"
+    return scene_tasks(todo.job, todo.open_spec, todo.most)
+
+
+def scene_tasks(job: SceneJob, open_spec: Callable[[str], Scene], most: int) -> list[Task]:
+    """Record and map a scene, and make its tasks: the same for a seed, whichever are taken.
+
+    Args:
+        job: the scene.
+        open_spec: makes a scene of its name.
+        most: tasks of a table.
+    """
+    place = Workplace(job, open_spec)
+    path = job.folder / f"tasks-{_key(job, _MAKING, place.avlmap.stored.info.build_key, most)}.json"
     if not path.exists():
-        evidence, rng = place.evidence, todo.job.rng
+        evidence, rng = place.evidence, job.rng
         photos = place.photos(_PHOTOS_A_TASK * most)
         tasks = [
             *area_tasks(evidence, rng(1), most),
@@ -192,7 +201,7 @@ def _made(todo: _Todo) -> list[Task]:
         for task in tasks:  # drawn now, while the scene is open
             if task.photo is not None:
                 place.photo_file(task.world_from_photo)
-        save_tasks(TaskSet(todo.job.recorded, (todo.job.spec,), tuple(tasks)), path)
+        save_tasks(TaskSet(job.recorded, (job.spec,), tuple(tasks)), path)
     return list(load_tasks(path).tasks)
 
 

@@ -50,7 +50,7 @@ class Pilot:
         translator: from sentences to programs; None runs the missions' own programs.
         photos: folder of the photos.
         photo_names: the files of a mission's photos, as it names them.
-        guess: whether robots go to the best guess where the map's confidence is below 0.5.
+        guess: whether robots go to the best guess where nothing is found.
         seed: of the benchmark.
     """
 

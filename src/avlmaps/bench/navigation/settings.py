@@ -21,7 +21,7 @@ class NavigationSettings(SceneSettings):
         series: which experiments.
         sequences: of four sounds (at each range), and of an image and two things; pairs are 119 for each 200.
         language: what turns sentences into programs; ``none`` gives robots the programs themselves.
-        guess: whether robots go to the best guess where the map's confidence is below 0.5, as the paper's always do.
+        guess: whether robots go to the best guess where nothing is found, as the paper's always do.
     """
 
     scenes: tuple[str, ...] = DEFAULT_SCENES

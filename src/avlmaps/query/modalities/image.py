@@ -57,7 +57,7 @@ def image_factor(space: Space, located: "Located", part: Part, heat: HeatSetting
     """Return the heat of a picture: one anchor of score 1 at the camera.
 
     Where it was not located, the anchor is at the best guess, if there is one, with the guess's confidence: below 0.5
-    the heat is not "found".
+    it is not found by itself.
     """
     is_located = located.world_from_camera is not None
     pose = located.world_from_camera if is_located else located.guess

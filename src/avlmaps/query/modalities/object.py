@@ -69,6 +69,7 @@ def object_factor(
             + (f" ({encoder.card.note})" if encoder.card.note else "")
         )
     scored = scored_once(feature, encoder, rivals, encoded, settings)
+    is_named = not _is_colour_alone(encoded.understood, part.query)
 
     confident = pieces_of(space, encoder, encoded, scored(1.0), settings, rooms)
 
@@ -83,12 +84,14 @@ def object_factor(
         best = float(pieces.confidence.max(initial=0.0)) if tint else pieces.best
         note = "" if best >= FOUND_AT else _absence(part.query, len(pieces.mask), pieces.won, best)
         if encoded.understood and not _is_whole(encoded.understood, tint.thing if tint else part.query):
-            note = f"understood only {understood!r} of {part.query!r}" + ("; " + note if note else "")
+            half = f"understood only {understood!r} of {part.query!r}"
+            half += "" if is_named else ", and a colour alone is no thing: what has it is a guess"
+            note = half + ("; " + note if note else "")
         falloff, alone = heat.falloff_per_m(part.role), None if with_uncertain else lambda: things(True)
-        found = best >= FOUND_AT
+        found = best >= FOUND_AT and is_named
         return NearThings(
             space, part, falloff, pieces.mask, pieces.instance, pieces.confidence, found, understood, note, alone,
-            isinstance(encoder, NamedPixelEncoder),
+            is_named,
         )  # fmt: skip
 
     alone = things(False)
@@ -118,6 +121,12 @@ def colour_factor(
     note = "" if best >= FOUND_AT else f"nothing of some size is {tint.text}"
     falloff = heat.falloff_per_m(part.role)
     return NearThings(space, part, falloff, mask, instance, confidence, best >= FOUND_AT, tint.text, note)
+
+
+def _is_colour_alone(understood: str, name: str) -> bool:
+    """Return whether an encoder understands of a name that speaks of a thing ("red elephant") nothing but a colour."""
+    said, taken = tint_of(name), tint_of(understood) if understood else None
+    return said is not None and bool(said.thing) and taken is not None and not taken.thing
 
 
 def _is_whole(understood: str, name: str) -> bool:

@@ -1,0 +1,73 @@
+"""The answer of a query in one sentence: where the first goal is, or which part failed and what the best guess is."""
+
+from collections.abc import Sequence
+
+from avlmaps.core.question import Modality, Part, Role
+from avlmaps.query.answer import Alternative, PartAnswer
+from avlmaps.query.goals import Goal
+
+_PHOTO, _CLIP = "the place of the photo", "a sound like the clip"
+
+
+def query_in_words(parts: Sequence[Part]) -> str:
+    """Return a query in words: ``the chair near the sofa in the kitchen``."""
+    lead = next(part for part in parts if part.role is Role.PRIMARY)
+    return " ".join([_named(lead), *(_beside(part) for part in parts if part is not lead)])
+
+
+def found_text(parts: Sequence[Part], goal: Goal, count: int | None = None) -> str:
+    """Return where the first goal of an answer that is found is, and how many there are where that is asked."""
+    what = query_in_words(parts)
+    place = f"{what} is most likely at {_place(goal)}, probability {goal.probability:.2f}"
+    return _sentence(place if count is None else f"counted {count}: {place}")
+
+
+def absent_text(parts: Sequence[PartAnswer], goals: Sequence[Goal], alone: Alternative | None) -> str:
+    """Return which part of a query failed, and the best guess.
+
+    Args:
+        parts: of the answer.
+        goals: its best guesses.
+        alone: the thing by itself, where the query says what it is near.
+    """
+    lead = next(part for part in parts if part.part.role is Role.PRIMARY)
+    missing = [part for part in parts if not part.found]
+    if missing:
+        why = " and ".join(f"no {_bare(part.part)} is found" for part in missing)
+    else:
+        why = (
+            f"no {_bare(lead.part)} is found {' '.join(_beside(one.part) for one in parts if one is not lead)}".rstrip()
+        )
+    if alone is not None and alone.goals and lead.found:
+        goal, what = alone.goals[0], f"the best {_bare(lead.part)}"
+    elif goals:
+        goal, what = goals[0], "the best guess"
+    else:
+        return _sentence(why)
+    return _sentence(f"{why}; {what} is at {_place(goal)}, probability {goal.probability:.2f}")
+
+
+def _bare(part: Part) -> str:
+    """Return the name of a part without an article."""
+    if part.is_file:
+        return (_PHOTO if part.modality is Modality.IMAGE else _CLIP).split(" ", 1)[1]
+    name = part.query.removeprefix("the ").removeprefix("a ").removeprefix("an ")
+    return f"sound of {name}" if part.modality is Modality.SOUND else name
+
+
+def _named(part: Part) -> str:
+    if part.is_file:
+        return _PHOTO if part.modality is Modality.IMAGE else _CLIP
+    return f"the {_bare(part)}"
+
+
+def _beside(part: Part) -> str:
+    return f"{'in' if part.modality is Modality.AREA else 'near'} {_named(part)}"
+
+
+def _place(goal: Goal) -> str:
+    return "(" + ", ".join(f"{value:.2f}" for value in goal.position) + ") m"
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."

@@ -1,0 +1,1 @@
+"""The weights of the probability that a first goal is right, fitted on homes that no table uses."""

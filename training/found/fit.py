@@ -1,0 +1,76 @@
+"""Fitting the weights: a product of logistic functions, each combination drawn towards all combinations together."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import minimize
+from training.found.rows import Row, balanced
+
+from avlmaps.query.probability import FACTORS, factors_of, probability_of
+
+COLUMNS = tuple(name for factor, numbers in FACTORS.items() for name in (f"{factor}_bias", *numbers))
+# Towards 1 for a number, 2 for a bias (most of what is likely passes); then of a combination towards all together.
+_RIDGE, _OWN_RIDGE = 0.3, 3.0
+_START = np.array([2.0 if name.endswith("_bias") else 1.0 for name in COLUMNS])
+_BOUNDS = [(-6.0, 6.0) if name.endswith("_bias") else (0.0, 6.0) for name in COLUMNS]
+Weights = dict[str, dict[str, float]]
+
+
+def fitted(rows: Sequence[Row]) -> Weights:
+    """Return the weights of each combination of several parts, and of all of them (``together``)."""
+    several = [row for row in rows if row.evidence.context]
+    together = _fit(several, _START, _RIDGE)
+    kinds = sorted({row.combination for row in several})
+    own = {kind: _fit([row for row in several if row.combination == kind], together, _OWN_RIDGE) for kind in kinds}
+    return {name: _named(values) for name, values in {"together": together, **own}.items()}
+
+
+def _named(values: np.ndarray) -> dict[str, float]:
+    return {column: round(float(value), 3) for column, value in zip(COLUMNS, values, strict=True)}
+
+
+def _fit(rows: Sequence[Row], towards: np.ndarray, ridge: float) -> np.ndarray:
+    """Return the weights of the largest likelihood, less the ridge times their squared distance from others."""
+    right, weight = np.array([row.right for row in rows], float), balanced(list(rows))
+    designs = [_design(rows, factor) for factor in FACTORS]
+    used = [np.array([factor in factors_of(row.evidence) for row in rows], float) for factor in FACTORS]
+
+    def loss(beta: np.ndarray) -> tuple[float, np.ndarray]:
+        odds = [design @ beta for design in designs]
+        log_p = -sum(on * np.logaddexp(0.0, -z) for on, z in zip(used, odds, strict=True))
+        log_p = np.minimum(log_p, -1e-9)
+        p = np.exp(log_p)
+        lost = -(weight * (right * log_p + (1.0 - right) * np.log1p(-p))).sum()
+        slope = -weight * (right - p) / (1.0 - p)
+        gradient = sum(
+            design.T @ (slope * on / (1.0 + np.exp(z))) for design, on, z in zip(designs, used, odds, strict=True)
+        )
+        apart = beta - towards
+        return float(lost + 0.5 * ridge * apart @ apart), gradient + ridge * apart
+
+    return minimize(loss, towards, jac=True, method="L-BFGS-B", bounds=_BOUNDS).x
+
+
+def _design(rows: Sequence[Row], factor: str) -> np.ndarray:
+    """Return the numbers of a factor in their columns, and 0 elsewhere."""
+    design = np.zeros((len(rows), len(COLUMNS)))
+    design[:, COLUMNS.index(f"{factor}_bias")] = 1.0
+    for name in FACTORS[factor]:
+        design[:, COLUMNS.index(name)] = [getattr(row.evidence, name) for row in rows]
+    return design
+
+
+def probabilities(rows: Sequence[Row], weights: Weights) -> np.ndarray:
+    """Return the probability of each row under some weights."""
+    return np.array([probability_of(row.evidence, weights) for row in rows])
+
+
+def held_out(rows: Sequence[Row]) -> np.ndarray:
+    """Return the probability of each row under the weights that the other scenes give."""
+    scenes = np.array([row.scene for row in rows])
+    out = np.zeros(len(rows))
+    for scene in sorted(set(scenes.tolist())):
+        others = [row for row in rows if row.scene != scene]
+        own = [row for row in rows if row.scene == scene]
+        out[scenes == scene] = probabilities(own, fitted(others))
+    return out

@@ -1,0 +1,86 @@
+"""The rows that the weights are fitted on: one labelled query each, with the evidence for its first goal."""
+
+import csv
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from avlmaps.bench.found.answers import Judged
+from avlmaps.core.question import Modality
+from avlmaps.query.evidence import Evidence
+from avlmaps.query.probability import NUMBERS, combination
+
+ROWS = Path(__file__).parent / "rows.csv"
+_COLUMNS = ("scene", "kind", "words", "answerable", "right", "combination", *NUMBERS)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One query.
+
+    Attributes:
+        scene: where.
+        kind: of the query.
+        words: the query.
+        answerable: whether anything is right.
+        right: whether the first goal is.
+        combination: of what is sought and what it is near.
+        numbers: of the evidence, in the order of ``NUMBERS``.
+    """
+
+    scene: str
+    kind: str
+    words: str
+    answerable: bool
+    right: bool
+    combination: str
+    numbers: tuple[float, ...]
+
+    @classmethod
+    def of(cls, judged: Judged, evidence: Evidence) -> "Row":
+        """Return the row of an answer."""
+        numbers = tuple(round(float(getattr(evidence, name)), 4) for name in NUMBERS)
+        facts = judged.scene, judged.kind, judged.words, judged.answerable, judged.right
+        return cls(*facts, combination(evidence), numbers)
+
+    @property
+    def evidence(self) -> Evidence:
+        """The evidence again."""
+        lead, *near = self.combination.replace(" near ", " and ").split(" and ")
+        return Evidence(
+            Modality(lead), tuple(map(Modality, near)), 1.0 / (1.0 + math.exp(-self.numbers[0])), *self.numbers
+        )
+
+
+def write_rows(rows: Iterable[Row], path: Path = ROWS) -> None:
+    """Write rows as CSV."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow(_COLUMNS)
+        for row in rows:
+            out.writerow(
+                [row.scene, row.kind, row.words, int(row.answerable), int(row.right), row.combination, *row.numbers]
+            )
+
+
+def read_rows(path: Path = ROWS) -> list[Row]:
+    """Read rows that ``write_rows`` wrote."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return [
+            Row(
+                one["scene"], one["kind"], one["words"], one["answerable"] == "1", one["right"] == "1",
+                one["combination"], tuple(float(one[name]) for name in NUMBERS),
+            )
+            for one in csv.DictReader(file)
+        ]  # fmt: skip
+
+
+def balanced(rows: list[Row]) -> np.ndarray:
+    """Return a weight for each row: of each combination, what has an answer and what has none count alike."""
+    key = [(row.combination, row.answerable) for row in rows]
+    count = {one: key.count(one) for one in set(key)}
+    whole = {name: sum(n for (other, _), n in count.items() if other == name) for name, _ in count}
+    return np.array([whole[name] / 2.0 / count[name, answerable] for name, answerable in key])
