@@ -106,7 +106,10 @@ def test_what_is_not_there_is_told_in_one_sentence_with_what_to_do() -> None:
     robot = furnished_robot(sounds=sounds_of([track(5.0, 3.1)], [0.2]))
     with pytest.raises(GoalNotFoundError, match=r"'dog' is not found in the map: sound 'dog': none of the 1 detected"):
         robot.move_to(robot.get_major_map(sound="dog"))
-    with pytest.raises(GoalNotFoundError, match=r"or let the robot go to the best guess\.$"):
+    with pytest.raises(
+        GoalNotFoundError,
+        match=r"probability 0\.[0-4]\d?; say it in other words, or let the robot go to the best guess\.$",
+    ):
         robot.move_to(robot.get_major_map(obj="chair") * robot.get_map(sound="dog"))
     assert robot.moves == []
 
@@ -116,14 +119,14 @@ def test_the_best_guess_is_gone_to_only_when_that_is_asked_for() -> None:
     robot = furnished_robot(settings=RobotSettings(guess=True), sounds=sounds)
     robot.move_to(robot.get_major_map(sound="dog"))
     assert robot.moves[-1].goal[:2] == pytest.approx((5.1, 3.1), abs=0.15)
-    assert any("confidence in 'dog' is" in note for note in robot.seeker.notes)
+    assert any("probability of 'dog' is" in note for note in robot.seeker.notes)
 
 
 def test_a_guess_leaves_out_what_is_nowhere_near() -> None:
     robot = furnished_robot(settings=RobotSettings(guess=True), sounds=sounds_of([track(60.0, 60.0)], [0.9]))
     robot.move_to(robot.get_major_map(obj="chair") * robot.get_map(sound="dog"))
     assert robot.moves[-1].goal[:2] == pytest.approx(BIG_CHAIR, abs=0.06)
-    assert any("this is its best guess" in note for note in robot.seeker.notes)
+    assert any("this is the best guess" in note for note in robot.seeker.notes)
 
 
 def test_things_that_are_never_together_are_told_apart_from_things_that_are_missing() -> None:

@@ -18,6 +18,7 @@ from avlmaps.maps.settings import BuildSettings
 from avlmaps.query.asking import AskError
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.open import open_recording
+from avlmaps.serve.agent_answers import compact, fitting
 from avlmaps.serve.agents import agent_server
 from avlmaps.serve.app import create_app
 from avlmaps.serve.service import Service
@@ -113,12 +114,12 @@ def test_every_front_gives_the_answer_of_the_package(
         "command line": by_command_line(home, query, capsys),
         "shell": by_shell(home, query, capsys, monkeypatch),
         "server": served,
-        "agent": by_agent(home_service, query),
     }
     if "sentence" in query:
         fronts["viewer"] = ViewSession([AVLMap.open(home)]).ask(query["sentence"])[0]["answers"][0]
     for front, answer in fronts.items():
         assert plain(answer) == expected, front
+    assert by_agent(home_service, query) == fitting(compact(expected)), "the same, rounded and cut for an agent"
 
 
 def test_python_counts_and_weighs_all_that_a_sentence_may_mean(opened: AVLMap) -> None:

@@ -1,4 +1,4 @@
-"""Fitting the weights: a product of logistic functions, each combination drawn towards all combinations together."""
+"""Fitting the weights: the likelihood of a product of logistic functions."""
 
 from collections.abc import Sequence
 
@@ -9,29 +9,17 @@ from training.found.rows import Row, balanced
 from avlmaps.query.probability import FACTORS, factors_of, probability_of
 
 COLUMNS = tuple(name for factor, numbers in FACTORS.items() for name in (f"{factor}_bias", *numbers))
-# Towards 1 for a number, 2 for a bias (most of what is likely passes); then of a combination towards all together.
-_RIDGE, _OWN_RIDGE = 0.3, 3.0
+# The ridge draws a number's weight towards 1, and a bias towards 2: most of what is likely passes.
+_RIDGE = 1.0
 _START = np.array([2.0 if name.endswith("_bias") else 1.0 for name in COLUMNS])
 _BOUNDS = [(-6.0, 6.0) if name.endswith("_bias") else (0.0, 6.0) for name in COLUMNS]
-Weights = dict[str, dict[str, float]]
+Weights = dict[str, float]
 
 
 def fitted(rows: Sequence[Row]) -> Weights:
-    """Return the weights of each combination of several parts, and of all of them (``together``)."""
-    several = [row for row in rows if row.evidence.context]
-    together = _fit(several, _START, _RIDGE)
-    kinds = sorted({row.combination for row in several})
-    own = {kind: _fit([row for row in several if row.combination == kind], together, _OWN_RIDGE) for kind in kinds}
-    return {name: _named(values) for name, values in {"together": together, **own}.items()}
-
-
-def _named(values: np.ndarray) -> dict[str, float]:
-    return {column: round(float(value), 3) for column, value in zip(COLUMNS, values, strict=True)}
-
-
-def _fit(rows: Sequence[Row], towards: np.ndarray, ridge: float) -> np.ndarray:
-    """Return the weights of the largest likelihood, less the ridge times their squared distance from others."""
-    right, weight = np.array([row.right for row in rows], float), balanced(list(rows))
+    """Return the weights of the largest likelihood, less the ridge; rows of one part say nothing about them."""
+    rows = [row for row in rows if row.evidence.context]
+    right, weight = np.array([row.right for row in rows], float), balanced(rows)
     designs = [_design(rows, factor) for factor in FACTORS]
     used = [np.array([factor in factors_of(row.evidence) for row in rows], float) for factor in FACTORS]
 
@@ -45,10 +33,11 @@ def _fit(rows: Sequence[Row], towards: np.ndarray, ridge: float) -> np.ndarray:
         gradient = sum(
             design.T @ (slope * on / (1.0 + np.exp(z))) for design, on, z in zip(designs, used, odds, strict=True)
         )
-        apart = beta - towards
-        return float(lost + 0.5 * ridge * apart @ apart), gradient + ridge * apart
+        apart = beta - _START
+        return float(lost + 0.5 * _RIDGE * apart @ apart), gradient + _RIDGE * apart
 
-    return minimize(loss, towards, jac=True, method="L-BFGS-B", bounds=_BOUNDS).x
+    best = minimize(loss, _START, jac=True, method="L-BFGS-B", bounds=_BOUNDS).x
+    return {column: round(float(value), 3) for column, value in zip(COLUMNS, best, strict=True)}
 
 
 def _design(rows: Sequence[Row], factor: str) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from avlmaps.bench.found.answers import Judged
 from avlmaps.core.question import Modality
 from avlmaps.query.evidence import Evidence
-from avlmaps.query.probability import NUMBERS, combination
+from avlmaps.query.probability import NUMBERS
 
 ROWS = Path(__file__).parent / "rows.csv"
 _COLUMNS = ("scene", "kind", "words", "answerable", "right", "combination", *NUMBERS)
@@ -53,6 +53,12 @@ class Row:
         return Evidence(
             Modality(lead), tuple(map(Modality, near)), 1.0 / (1.0 + math.exp(-self.numbers[0])), *self.numbers
         )
+
+
+def combination(evidence: Evidence) -> str:
+    """Return what is sought and the kinds of what it is near: ``sound near object``; ``object`` for one alone."""
+    kinds = sorted(set(evidence.context))
+    return f"{evidence.lead} near {' and '.join(kinds)}" if kinds else str(evidence.lead)
 
 
 def write_rows(rows: Iterable[Row], path: Path = ROWS) -> None:

@@ -3,10 +3,8 @@
     p = s(thing) * s(near and marks) * s(room),   s the logistic function of a weighted sum
 
 so that a goal is likely only where the thing, what it is near and the room all are. The weights (``found.json``) are
-fitted by ``training/found`` on homes that no table uses, half of the queries being for what is not there. Each
-combination of what is sought and what it is near has weights of its own, drawn towards those of all combinations
-together, which serve one that was not measured. A thing, a sound, an area or a photo alone is as likely as the models
-that made it out say: those are calibrated by themselves.
+fitted by ``training/found`` on homes that no table uses, half of the queries being for what is not there. A thing, a
+sound, an area or a photo alone is as likely as the models that made it out say: those are calibrated by themselves.
 """
 
 import json
@@ -22,16 +20,14 @@ NUMBERS = ("thing", "near", "room", "marks")
 """The numbers of the evidence that have a weight."""
 FACTORS = {"thing": ("thing",), "near": ("near", "marks"), "room": ("room",)}
 """The factors of the product, and the numbers that each weighs; the weights have a bias for each as well."""
-Weights = Mapping[str, Mapping[str, float]]
+Weights = Mapping[str, float]
 
 
 def probability_of(evidence: Evidence, given: Weights | None = None) -> float:
     """Return the probability that a goal with this evidence is right, by the weights that ship or those given."""
     if not evidence.context:
         return round(evidence.alone, 3)  # more digits would be noise
-    known = given or weights()
-    own = known.get(combination(evidence)) or known["together"]
-    likely = 1.0
+    own, likely = given or weights(), 1.0
     for factor in factors_of(evidence):
         odds = own[f"{factor}_bias"] + sum(own[name] * getattr(evidence, name) for name in FACTORS[factor])
         likely /= 1.0 + math.exp(-odds)
@@ -44,13 +40,7 @@ def factors_of(evidence: Evidence) -> tuple[str, ...]:
     return ("thing", *near, *(("room",) if Modality.AREA in evidence.context else ()))
 
 
-def combination(evidence: Evidence) -> str:
-    """Return what is sought and the kinds of what it is near: ``sound near object``; ``object`` for one alone."""
-    kinds = sorted(set(evidence.context))
-    return f"{evidence.lead} near {' and '.join(kinds)}" if kinds else str(evidence.lead)
-
-
 @cache
 def weights() -> Weights:
-    """Return the weights of each combination."""
+    """Return the weights that ship."""
     return json.loads(files("avlmaps.query").joinpath("found.json").read_text(encoding="utf-8"))["weights"]
