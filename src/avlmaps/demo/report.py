@@ -306,7 +306,7 @@ def _said(step: "Step") -> str:
         return f"{finding}, and so it is." if not step.ask.truth else f"{finding}, but there is.{guess}"
     goal = step.answer["goals"][0]
     place = ", ".join(f"{value:.1f}" for value in goal["position"])
-    finding = f"First goal at ({place}) m, score {goal['score']:.2f}"
+    finding = f"First goal at ({place}) m, probability {step.answer['probability']:.2f}"
     if step.off_m is None:
         return f"{finding}; but there is none here."
     if step.ask.kind == "clip":

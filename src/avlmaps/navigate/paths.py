@@ -130,6 +130,7 @@ class NearGoal(TypedDict):
 
     position: Position
     score: float
+    probability: Annotated[float, Meta(description="that it is right, all parts together")]
     reachable: bool
     path_m: Annotated[float | None, Meta(description="length of the path from the place")]
     stop: StopAnswer | None
@@ -139,6 +140,7 @@ class NearGoalsAnswer(TypedDict):
     """Goals of a query, those with the shortest path first; with ``found`` false they are guesses."""
 
     found: bool
+    probability: Annotated[float, Meta(description="that the first goal of the query is right")]
     goals: list[NearGoal]
     frame: Frame
 
@@ -170,10 +172,11 @@ def goals_near(finder: PathFinder, answer: Answer, near: Float[np.ndarray, " n"]
             {
                 "position": list(goal.position),
                 "score": goal.score,
+                "probability": goal.probability,
                 "reachable": found is not None,
                 "path_m": None if found is None else found[1].length_m,
                 "stop": stop,
             }
         )
     goals.sort(key=lambda one: (one["path_m"] is None, one["path_m"] or 0.0))
-    return {"found": answer.found, "goals": goals[:top], "frame": FRAME}
+    return {"found": answer.found, "probability": answer.probability, "goals": goals[:top], "frame": FRAME}

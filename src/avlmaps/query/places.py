@@ -169,6 +169,7 @@ class SeenPlace(TypedDict):
 
     position: Position
     score: Annotated[float, Meta(ge=0.0, le=1.0)]
+    probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that it is the thing")]
     last_seen_s: Annotated[float, Meta(description="seconds from the start of the recording")]
     before_end_s: Annotated[float, Meta(description="seconds before the end of the recording")]
 
@@ -208,6 +209,7 @@ def last_seen(avlmap: "AVLMap", thing: str, top: int = 3) -> LastSeenAnswer:
                 {
                     "position": list(goal.position),
                     "score": goal.score,
+                    "probability": goal.probability,
                     "last_seen_s": seen,
                     "before_end_s": max(end_s - seen, 0.0),
                 }

@@ -229,11 +229,11 @@ def _draw_anchors(ax: "Axes", factor: Factor) -> None:
 
 
 def _draw_goals(ax: "Axes", space: Space, goals: Sequence[Goal]) -> None:
-    """Number the goals, and write their positions, in the recording's frame, and scores into the legend."""
+    """Number the goals, and write their positions, in the recording's frame, and probabilities into the legend."""
     for number, goal in enumerate(goals, 1):
         mark(ax, space.level(np.array(goal.position)), str(number), INK)
         position = ", ".join(f"{value:.2f}" for value in goal.position)
-        ax.plot([], [], " ", label=f"{number}: ({position}) m, score {goal.score:.2f}")
+        ax.plot([], [], " ", label=f"{number}: ({position}) m, probability {goal.probability:.2f}")
 
 
 def mark(ax: "Axes", point_level: Float[np.ndarray, "3"], text: str, colour: str) -> None:

@@ -276,11 +276,9 @@ class Panel {
     answers.forEach((answer, k) => {
       const of = this.maps.length > 1 ? `${this.maps[k].name}: ` : "";
       const count = answer.count === undefined ? "" : ` ${answer.count} of them.`;
-      const [first] = answer.goals;
-      const where = first ? ` The best goal is at ${placeText(first.position)}, score ${first.score.toFixed(2)}.` : "";
-      const verdict = answer.found ? "Found." : first ? "Not found here; the best guesses follow." : "Not found here.";
+      const verdict = answer.found ? "Found." : "Not found here.";
       const texts = [made("p", { className: `verdict ${answer.found ? "found" : "lost"}`,
-        textContent: `${of}${verdict}${count}${where}` })];
+        textContent: `${of}${verdict}${count} ${answer.text}` })];
       for (const part of answer.parts) {
         const name = `${part.modality}: ${part.query}`;
         const taken = part.understood && part.understood !== part.query ? `, understood as ${part.understood}` : "";
@@ -315,7 +313,7 @@ class Panel {
     const place = this.toLevel(k, goal.position);
     const button = made("button", { type: "button" },
       made("span", {}, made("span", { className: "number", textContent: i + 1 }), placeText(goal.position)),
-      made("small", { textContent: `score ${goal.score.toFixed(2)}` }));
+      made("small", { textContent: `probability ${goal.probability.toFixed(2)}` }));
     button.addEventListener("click", () => this.viewer.flyTo(place));
     const parts = made("div", { className: "parts" });
     for (const [name, heat] of Object.entries(goal.parts)) {
@@ -414,7 +412,7 @@ class Panel {
       const answer = this.answers?.[k];
       marks.set("goal", 0, (answer?.goals ?? []).map((goal, i) => ({
         place: this.toLevel(k, goal.position), text: String(i + 1), always: true,
-        title: `goal ${i + 1}, score ${goal.score.toFixed(2)}: ` +
+        title: `goal ${i + 1}, probability ${goal.probability.toFixed(2)}: ` +
           Object.entries(goal.parts).map(([name, heat]) => `${name} ${heat.toFixed(2)}`).join(", "),
         onClick: () => this.viewer.flyTo(this.toLevel(k, goal.position)),
       })));
