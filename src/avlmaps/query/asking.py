@@ -173,7 +173,7 @@ def answer_question(avlmap: "AVLMap", question: Question, top: int = 3, files: F
 
 
 def _part_answer(part: Part, factor: Factor, whole: Heatmap) -> PartAnswer:
-    """Return the outcome of a part: where the whole is found all its parts are, whatever each is by itself."""
+    """Return the outcome of a part: where the whole is found all its parts are, however unlikely each is alone."""
     own = _probability(factor)
     if not whole.found or factor.found:
         return PartAnswer(part, _peak(factor), factor.found, factor.understood, factor.note, own)

@@ -16,7 +16,7 @@ def query_in_words(parts: Sequence[Part]) -> str:
 
 
 def found_text(parts: Sequence[Part], goal: Goal, count: int | None = None) -> str:
-    """Return where the first goal of an answer that is found is, and how many there are where that is asked."""
+    """Return where the first goal of an answer that is found is, and how many there are for a count."""
     what = query_in_words(parts)
     place = f"{what} is most likely at {_place(goal)}, probability {goal.probability:.2f}"
     return _sentence(place if count is None else f"counted {count}: {place}")
