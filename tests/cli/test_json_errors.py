@@ -130,3 +130,35 @@ def test_verbs_that_run_compiled_loops_say_so(run, monkeypatch: pytest.MonkeyPat
     }  # fmt: skip
     assert {name for name, verb in VERBS.items() if verb.compiles} == compile_something
     assert not Verb.compiles
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("qurey", "MAP", "sofa"), "there is no verb 'qurey'; did you mean query?"),
+        (("expotr", "MAP"), "did you mean export?"),
+        (("zzz",), "there is no verb 'zzz'. The verbs: demo"),
+        (("query", "MAP", "sofa", "--tpo", "3"), "--tpo, 3; did you mean --top?"),
+        (("go", "MAP", "sofa", "--chat_modl", "x"), "did you mean --chat-model?"),
+        (("export", "MAP", "--otu", "x.ply"), "did you mean --out?"),
+        (("build", "REC", "--out", "M", "--voxel-sise-m=0.1"), "did you mean --voxel-size-m?"),
+        (("query", "MAP", "sofa", "--primary", "objct"), "did you mean object?"),
+        (("go", "MAP", "sofa", "--body", "bas"), "did you mean base?"),
+    ],
+)
+def test_a_misspelt_verb_option_or_value_is_answered_with_what_was_probably_meant(run, words, said: str) -> None:
+    code, out, err = run(*words)
+    assert code == 2 and out == ""
+    assert err.startswith("avlmaps: ") and said in err and "--help" in err
+    code, out, _ = run(*words, "--json")
+    assert code == 2 and said in json.loads(out)["error"]["message"]
+
+
+def test_a_misspelt_map_or_recording_is_answered_with_the_one_beside(built: Path, walk: Path, run) -> None:
+    for words in (("query", built.with_name("rom.avlmap"), "red"), ("things", built.with_name("ROOM.avlmp"))):
+        assert f"did you mean {built}?" in run(*words)[2]
+    assert f"did you mean {walk}?" in run("build", walk.with_name("recc"), "--out", walk.parent / "o.avlmap")[2]
+    code, _, err = run("query", "the red thing", built)
+    assert code == 1 and f"avlmaps query {built} 'the red thing'" in err
+    assert "avlmaps go" in run("go", "turn left", built, "--scene", "house:1")[2]
+    assert "Did you mean colours?" in run("build", walk, "--out", walk.parent / "o.avlmap", "--profile", "colors")[2]

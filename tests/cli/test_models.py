@@ -10,6 +10,7 @@ import pytest
 
 from avlmaps.cli.model_options import models_in_force
 from avlmaps.cli.query import Query
+from avlmaps.core.extras import install_command
 from avlmaps.core.registry import Backend, Kind, find, forget_loaded
 from avlmaps.perception.models.availability import availability, how_to_get, is_here
 from avlmaps.perception.models.published_models import PUBLISHED
@@ -104,8 +105,8 @@ def test_chosen_backends_build_the_map_and_info_tells_them(walk: Path, answer, t
 
 def test_a_missing_package_is_told_with_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Backend, "missing", property(lambda self: self.needs))
-    assert state_of(Kind.PIXELS, "tipsv2") == ("package missing", "pip install 'avlmaps[foundation]'")
-    assert state_of(Kind.SOUNDS, "audioclip") == ("package missing", "pip install 'avlmaps[paper]'")
+    assert state_of(Kind.PIXELS, "tipsv2") == ("package missing", install_command("foundation"))
+    assert state_of(Kind.SOUNDS, "audioclip") == ("package missing", install_command("paper"))
 
 
 LAYOUTS = ("org/name", "org--name", "name")

@@ -21,6 +21,7 @@ import cv2
 import pytest
 
 from avlmaps.cli.shell_lines import LONGEST_LINE, PipedLines
+from avlmaps.core.extras import install_command
 from helpers.raycast import render
 from helpers.room import Room
 from helpers.walked_room import CAMERA
@@ -293,7 +294,7 @@ def test_without_prompt_toolkit_a_terminal_gets_one_sentence_and_a_pipe_works(
     without = "import sys\nsys.modules['prompt_toolkit'] = None\nfrom avlmaps.cli import main\nmain()"
     shell = Terminal(built, state=tmp_path, code=without)
     terminals.append(shell)
-    shell.until(r"pip install 'avlmaps\[shell\]'")
+    shell.until(re.escape(install_command("shell")))
     assert shell.ended() == 1
     done = subprocess.run(
         [sys.executable, "-c", without, "shell", str(built)],

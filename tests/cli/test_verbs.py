@@ -96,7 +96,7 @@ def test_info_names_each_sound_by_what_fits_it_best(built: Path, answer, run) ->
     scores = sound["confidences"]
     assert len(sound["names"]) == len(scores) == 3
     assert scores == sorted(scores, reverse=True) and all(0.0 <= score <= 1.0 for score in scores)
-    assert f"m: {sound['names'][0]} {scores[0]:.2f}" in run("info", built)[1]
+    assert f"m: {sound['names'][0]} {scores[0]:.2f}" in run("info", built, "--verbose")[1]
 
 
 def test_a_map_whose_sound_model_is_not_here_is_described_without_names(
@@ -259,3 +259,15 @@ def test_adding_sounds_without_progress_says_nothing(walk: Path, tmp_path: Path,
     soundfile.write(tmp_path / "clips" / "beep" / "a.wav", beeps(1.0), RATE_HZ)
     assert add_sounds(open_recording(walk), tmp_path / "clips", tmp_path / "out", min_distance_m=0.0, progress=False)
     assert capsys.readouterr() == ("", "")
+
+
+def test_info_and_build_end_with_what_to_do_next_in_three_lines(built: Path, walk: Path, run) -> None:
+    for place, offered in ((built, "query"), (walk, "build")):
+        lines = run("info", place)[1].splitlines()
+        following = [line.removeprefix("next:").split() for line in lines[-3:]]
+        assert lines[-3].startswith("next: ") and all(words[0] == "avlmaps" for words in following)
+        assert following[0][1] == offered and following[-1][:4] == ["avlmaps", "info", str(place), "--verbose"]
+        details = run("info", place, "--verbose")[1].splitlines()
+        assert len(details) > len(lines) - 3 and not [line for line in details if line.startswith("next:")]
+        for words in following:  # each can be run
+            assert run(*words[1:3], "--help")[0] == 0

@@ -5,6 +5,7 @@ Everything runs against a real HTTP server on this machine, garbage and hostilit
 
 import json
 import logging
+import re
 import socket
 import sys
 from collections.abc import Iterator
@@ -28,6 +29,7 @@ from chat_server import (
 )
 
 from avlmaps.core.errors import LanguageError
+from avlmaps.core.extras import install_command
 from avlmaps.language.chat import endpoint
 from avlmaps.language.chat.endpoint import Endpoint
 from avlmaps.language.chat.replay import Message, Request
@@ -359,7 +361,7 @@ def test_without_the_client_the_sentence_says_what_to_install(
     server: ChatServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "openai", None)
-    with pytest.raises(LanguageError, match=r"pip install 'avlmaps\[chat\]'"):
+    with pytest.raises(LanguageError, match=re.escape(install_command("chat"))):
         Endpoint(_settings(server))
 
 

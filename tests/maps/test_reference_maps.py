@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError
+from avlmaps.core.extras import install_command
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.import_reference.convert import ImportSettings, import_reference_map
 from avlmaps.maps.import_reference.places import Cubes, cubes_from_corner, cubes_from_first_base, voxels_filled
@@ -201,7 +203,7 @@ def test_without_h5py_the_sentence_says_what_to_install(tmp_path: Path, monkeypa
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(BackendError) as fault:
         import_reference_map(voxels, tmp_path / "m.avlmap")
-    assert str(fault.value) == "Reading .h5df files needs h5py; get it with: pip install 'avlmaps[paper]'"
+    assert str(fault.value) == f"Reading .h5df files needs h5py; get it with: {install_command('paper')}"
     assert not (tmp_path / "m.avlmap").exists()
 
 
@@ -212,6 +214,6 @@ def test_nothing_but_a_map_is_replaced(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("given", [{"cell_size_m": 0.0}, {"cell_size_m": float("nan")}, {"max_bad_share": 1.5}])
-def test_settings_that_make_no_sense_are_refused(given: dict[str, float]) -> None:
+def test_settings_that_make_no_sense_are_refused(given: dict[str, Any]) -> None:
     with pytest.raises(MapError, match="choose between"):
         ImportSettings(**given)

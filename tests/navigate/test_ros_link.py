@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ from textwrap import dedent
 import pytest
 
 from avlmaps.core.errors import BackendError, NavigationError
+from avlmaps.core.extras import install_command
 from avlmaps.navigate.ros import Frames, RosSettings, open_ros_driver
 from avlmaps.navigate.ros.link import Link, address
 
@@ -50,7 +52,7 @@ def test_a_token_is_not_sent_in_the_clear_nor_with_blanks(url, token):
 
 def test_without_roslibpy_the_extra_is_named(monkeypatch):
     monkeypatch.setattr("avlmaps.navigate.ros.link.find_spec", lambda name: None)
-    with pytest.raises(BackendError, match=r"pip install 'avlmaps\[ros\]'"):
+    with pytest.raises(BackendError, match=re.escape(install_command("ros"))):
         open_ros_driver("nav2", "ws://127.0.0.1:9")
 
 

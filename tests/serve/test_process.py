@@ -25,6 +25,7 @@ from mcp.client.client import Client
 from mcp.client.stdio import StdioServerParameters, stdio_client
 
 from avlmaps.cli import main
+from avlmaps.core.extras import install_command
 from avlmaps.serve.tools import TOOLS
 from helpers.agent_talk import told
 
@@ -195,4 +196,4 @@ def test_a_missing_package_is_one_sentence(
     monkeypatch.setitem(sys.modules, "uvicorn", None)
     code, said = failed(capsys, room, "--port", 0)
     assert code == 1
-    assert "pip install 'avlmaps[serve]'" in said
+    assert install_command("serve") in said

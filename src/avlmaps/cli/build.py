@@ -79,13 +79,15 @@ class Build(ModelVerb):
     """Start again; ignore the stages that a stopped build finished."""
     overwrite: bool = False
     """Replace a finished map at --out that was built from another recording or with other settings."""
+    verbose: bool = False
+    """Print every detail of the map."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Seed of all random choices (visual words, RANSAC)."""
 
     def run(self) -> None:
         """Build the map."""
         answer = build(self)
-        emit(answer, info_lines(answer), self.json)
+        emit(answer, info_lines(answer, verbose=self.verbose), self.json)
 
 
 def build(verb: "Build") -> dict[str, Any]:

@@ -76,7 +76,7 @@ class Go(ModelVerb):
     sound_clip: Annotated[Path | None, arg(metavar="FILE")] = None
     """File that "this recording" in the sentence means."""
     explain: bool = False
-    """Print the readings of the sentence with their costs; the cheapest one counts."""
+    """Print the readings of the sentence with their probabilities; the likeliest one counts."""
     dry_run: bool = False
     """Print the program without driving; neither the map nor a scene is opened."""
     plot: Annotated[Path | None, arg(metavar="FILE")] = None

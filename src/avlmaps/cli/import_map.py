@@ -43,7 +43,7 @@ class ImportMap(ModelVerb):
     def run(self) -> None:
         """Convert it."""
         answer = _imported(self)
-        emit(answer, info_lines(answer), self.json)
+        emit(answer, info_lines(answer, verbose=False), self.json)
 
 
 def _imported(verb: ImportMap) -> dict[str, Any]:

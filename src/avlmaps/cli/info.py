@@ -1,5 +1,6 @@
 """`avlmaps info`: describe a map or a recording, verify it, repair it."""
 
+import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,6 +26,7 @@ DECODED_BY_INFO = 100
 LEAST_ROOM = 0.5
 # Further names of a sound are shown from this score on.
 _LIKELY = 0.1
+_MOST_NAMED = 6  # sounds, without --verbose
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +50,8 @@ class Info(Verb):
     """Recording that the map was built from (--repair)."""
     audio: Annotated[Path | None, arg(metavar="FILE")] = None
     """Sound file that was given to `build --audio`, if any (--repair)."""
+    verbose: bool = False
+    """Print every detail."""
     plot: Annotated[Path | None, arg(metavar="FILE")] = None
     """Draw a top-down view with the path, the sounds, and the names of things and rooms into this picture."""
     reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
@@ -63,7 +67,7 @@ class Info(Verb):
             self.path, self.format, verify=self.verify, plot=self.plot, corrections=given, more=self.more
         )
         answer |= repaired
-        emit(answer, info_lines(answer), self.json)
+        emit(answer, info_lines(answer, verbose=self.verbose), self.json)
 
 
 def describe_path(
@@ -172,14 +176,44 @@ def _describe_recording(recording: "Recording") -> dict[str, Any]:
     }
 
 
-def info_lines(answer: dict[str, Any]) -> list[str]:
-    """Lay out what `build` and `info` report; entries without a layout of their own are printed as they are."""
+def info_lines(answer: dict[str, Any], *, verbose: bool) -> list[str]:
+    """Lay out what `build` and `info` report; entries without a layout of their own are printed as they are.
+
+    Args:
+        answer: of the verb.
+        verbose: print every entry; else what a person decides by, and what to do next.
+    """
+    shown = answer if verbose else {key: value for key, value in answer.items() if key in _BRIEF}
+    layouts = _LAYOUTS if verbose else _LAYOUTS | _BRIEF_LAYOUTS
+    last = {key: shown.get(key) for key in ("plot",)}
+    lines = _entry_lines({key: value for key, value in shown.items() if key not in last}, layouts)
+    return [*lines, *([] if verbose else next_lines(answer)), *_entry_lines(last, layouts)]
+
+
+def next_lines(answer: dict[str, Any]) -> list[str]:
+    """Return what to do next with a map or a recording, in three lines."""
+    path = shlex.quote(str(answer["path"]))
+    if "voxels" in answer:
+        return [
+            f'next: avlmaps query {path} "where is the chair?"',
+            f"      avlmaps view {path}",
+            f"      avlmaps info {path} --verbose   (every detail)",
+        ]
+    out = shlex.quote(f"{Path(answer['path']).stem or 'home'}.avlmap")
+    return [
+        f"next: avlmaps build {path} --out {out}",
+        f"      avlmaps info {path} --verify    (decodes every picture)",
+        f"      avlmaps info {path} --verbose   (every detail)",
+    ]
+
+
+def _entry_lines(entries: dict[str, Any], layouts: dict[str, Callable[[Any], list[str]]]) -> list[str]:
     lines: list[str] = []
-    for key, value in answer.items():
+    for key, value in entries.items():
         if value in (None, [], {}) and key != "sounds":
             continue
-        if key in _LAYOUTS:
-            lines += _LAYOUTS[key](value)
+        if key in layouts:
+            lines += layouts[key](value)
         elif isinstance(value, list) and isinstance(value[0], str):
             lines += [f"{key}:", *[f"  {line}" for line in value]]
         else:
@@ -192,6 +226,24 @@ def _sound_lines(sounds: list[dict[str, Any]]) -> list[str]:
     return [f"sounds: {len(sounds)}", *rows]
 
 
+def _sound_line(sounds: list[dict[str, Any]]) -> list[str]:
+    names = list(dict.fromkeys(sound["names"][0] for sound in sounds if sound.get("names")))
+    more = ", ..." if len(names) > _MOST_NAMED else ""
+    return [f"sounds: {len(sounds)}" + (f" ({', '.join(names[:_MOST_NAMED])}{more})" if names else "")]
+
+
+# What `build` and `info` print without --verbose: what there is, and what may be wrong with it.
+_BRIEF = frozenset({
+    "path", "format", "frames", "bad_frames", "keyframes", "voxels", "sounds", "profile", "bytes", "ground",
+    "elapsed_s", "duration_s", "rgb", "depth", "audio", "topics", "notices", "faults", "repaired", "plot",
+})  # fmt: skip
+_BRIEF_LAYOUTS: dict[str, Callable[[Any], list[str]]] = {
+    "sounds": _sound_line,
+    "bad_frames": lambda count: [f"bad frames: {count}"] if count else [],
+    "ground": lambda ground: ground_lines(ground)[:1],
+    "audio": lambda audio: [f"audio: {audio['file']}, {audio['duration_s']:.1f} s"],
+    "voxels": lambda count: [f"voxels: {count:,}"],
+}
 # How the entries of `info` are laid out, where a plain line would not do.
 _LAYOUTS: dict[str, Callable[[Any], list[str]]] = {
     "sounds": _sound_lines,

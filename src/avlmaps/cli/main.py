@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stderr
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from avlmaps.cli.address_space import require_address_space
@@ -75,7 +76,7 @@ def _main(words: list[str]) -> None:
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # avlmaps reports a truncated picture in its own words
     verb = read_plain_query(words)
     if verb is None:
-        with _usage_in_json() if _wants_json(words) else nullcontext():
+        with _usage(words):
             from avlmaps.cli.verbs import read_command
 
             verb = read_command(words)
@@ -88,18 +89,27 @@ def _wants_json(words: Sequence[str]) -> bool:
 
 
 @contextmanager
-def _usage_in_json() -> Iterator[None]:
-    """Print a command line that cannot be read as a JSON error, too."""
+def _usage(words: Sequence[str]) -> Iterator[None]:
+    """Say in a sentence what was probably meant by a command line that cannot be read; with --json in JSON, too."""
     complaints = io.StringIO()
     try:
         with redirect_stderr(complaints):
             yield
     except SystemExit as stop:
-        sys.stderr.write(complaints.getvalue())
-        if stop.code not in (0, None):
-            from avlmaps.cli.usage import usage_sentence
+        printed = complaints.getvalue()
+        if stop.code in (0, None):
+            sys.stderr.write(printed)
+            raise
+        from avlmaps.cli.usage import meant
+        from avlmaps.cli.verbs import VERBS
 
-            _emit_error("usage", usage_sentence(complaints.getvalue()))
+        sentence = meant(words, printed, VERBS)
+        if "did you mean" in sentence or "there is no verb" in sentence:
+            verb = f"{words[0]} " if words[0] in VERBS else ""
+            printed = f"avlmaps: {printable(sentence)}\nFor all of it: avlmaps {verb}--help\n"
+        sys.stderr.write(printed)
+        if _wants_json(words):
+            _emit_error("usage", sentence)
         raise
 
 
@@ -113,7 +123,7 @@ def _run(verb: "Verb | PlainQuery") -> int:
     except UsageError as error:
         return _fail(verb, error, str(error), 2)
     except AvlmapsError as error:
-        return _fail(verb, error, str(error), 1)
+        return _fail(verb, error, _swapped(verb) or str(error), 1)
     except KeyboardInterrupt as stop:
         if (status := getattr(stop, "status", None)) is not None:  # of a robot that was driving; its answer is printed
             return _complain(stop, status)
@@ -127,6 +137,20 @@ def _run(verb: "Verb | PlainQuery") -> int:
             _emit_error(kind_of(fault), fault_sentence(fault))
         raise
     return 0
+
+
+def _swapped(verb: "Verb | PlainQuery") -> str | None:
+    """Return a sentence where the words of a query or a command stand in the place of its map."""
+    place, words = getattr(verb, "map", None), getattr(verb, "sentence", None)
+    if place is None or not words or place.exists() or not Path(words, "map.json").is_file():
+        return None
+    return f"{words} is the map, and it comes first: avlmaps {_name_of(verb)} {words} {str(place)!r}"
+
+
+def _name_of(verb: "Verb | PlainQuery") -> str:
+    from avlmaps.cli.verbs import VERBS
+
+    return next((name for name, kind in VERBS.items() if isinstance(verb, kind)), "query")
 
 
 def _compiling(verb: "Verb | PlainQuery") -> AbstractContextManager[None]:

@@ -10,6 +10,7 @@ from tyro.conf import Positional, UseAppendAction, arg
 from avlmaps.cli.output import UsageError, emit
 from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.errors import BackendError
+from avlmaps.core.extras import install_command
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ class Serve(ModelVerb):
         except ModuleNotFoundError as fault:
             if (fault.name or "").partition(".")[0] not in _PACKAGES:
                 raise
-            raise BackendError(f"The server needs {fault.name}; get it with: pip install 'avlmaps[serve]'") from None
+            raise BackendError(f"The server needs {fault.name}; get it with: {install_command('serve')}") from None
 
 
 def serve(verb: "Serve") -> None:

@@ -14,6 +14,7 @@ from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, fa
 from avlmaps.cli.shell_session import VERBS, WITH_FILES, Given, Over, Session
 from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.errors import AvlmapsError, BackendError
+from avlmaps.core.extras import install_command
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars, say
 
@@ -132,6 +133,6 @@ def _prompt(session: Session, with_history: bool) -> "Lines":
         from avlmaps.cli.shell_prompt import PromptLines
     except ImportError:
         raise BackendError(
-            "A prompt on a terminal needs prompt-toolkit; get it with: pip install 'avlmaps[shell]', or pipe lines in."
+            f"A prompt on a terminal needs prompt-toolkit; get it with: {install_command('shell')}, or pipe lines in."
         ) from None
     return PromptLines(NameCompleter(("go", *VERBS), WITH_FILES, session.names), with_history)

@@ -201,7 +201,7 @@ class Session:
         if verb.repair or verb.recording is not None:
             raise UsageError("A map is not repaired while it is open; end the shell and run avlmaps info --repair.")
         answer = describe_path(verb.path, verb.format, verify=verb.verify, plot=verb.plot)
-        return Reply(answer, info_lines(answer))
+        return Reply(answer, info_lines(answer, verbose=verb.verbose))
 
     def locate(self, rest: str) -> Reply:
         """Locate a photo."""

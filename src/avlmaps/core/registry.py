@@ -14,6 +14,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from avlmaps.core.errors import BackendError
+from avlmaps.core.extras import install_command
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoints
@@ -74,7 +75,7 @@ class Backend:
     @property
     def how_to_get(self) -> str:
         """The command that installs what is missing."""
-        return f"pip install 'avlmaps[{self.extra}]'" if self.extra else f"pip install {' '.join(self.missing)}"
+        return install_command(self.extra) if self.extra else f"pip install {' '.join(self.missing)}"
 
 
 _EMBEDDED = "avlmaps.perception.embedded"

@@ -6,6 +6,7 @@ from typing import cast
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, find, load
+from avlmaps.core.suggestions import nearest
 from avlmaps.perception.protocols import (
     LocalEncoder,
     Matcher,
@@ -200,7 +201,8 @@ def profile(name: str | Profile) -> Profile:
         _PROFILES.setdefault(name.name, name)
         return name
     if name not in _PROFILES:
-        raise BackendError(f"There is no profile called {name!r}; known are: {', '.join(_PROFILES)}.")
+        close = f" Did you mean {near}?" if (near := nearest(name, _PROFILES)) else ""
+        raise BackendError(f"There is no profile called {name!r}; known are: {', '.join(_PROFILES)}.{close}")
     return _PROFILES[name]
 
 

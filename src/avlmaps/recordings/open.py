@@ -6,6 +6,7 @@ from itertools import islice
 from pathlib import Path
 
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.suggestions import did_you_mean, near_path
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.corrections import Corrections, corrected
@@ -61,10 +62,15 @@ def find_format(path: Path, name: str = "auto") -> Format:
     if name != "auto" and name not in known:  # other packages need not be searched for what is built in
         known = {f.name: f for f in formats()}
     if name != "auto" and name not in known:
-        raise RecordingError(f"There is no recording format called {name!r}; known are: auto, {', '.join(known)}.")
+        raise RecordingError(
+            f"There is no recording format called {name!r}; known are: auto, "
+            f"{', '.join(known)}{did_you_mean(name, known)}"
+        )
     try:
         if not path.exists():
-            raise RecordingError(f"There is nothing at {path}; give the folder or file of a recording.")
+            close = near_path(path)
+            meant = f"did you mean {close}?" if close else "give the folder or file of a recording."
+            raise RecordingError(f"There is nothing at {path}; {meant}")
         found = known[name] if name != "auto" else _recognised(path)
         if found is None:
             raise RecordingError(_unknown(path))

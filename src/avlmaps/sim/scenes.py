@@ -27,6 +27,9 @@ def open_scene(spec: str) -> Scene:
             said) behind it for the families of furniture, and ``:lived-in`` for people, clothes, papers, shower
             curtains and mirrors that reflect; or the path of a file.
 
+    Returns:
+        The scene; the name of a building made by rule is the one that it was opened by.
+
     Raises:
         SceneError: there is no such scene.
     """
@@ -49,7 +52,7 @@ def _made(kind: str, seed: str, *words: str, spec: str) -> Scene:
             f"({', '.join(_FAMILIES)}), and :{_LIVED_IN} behind it for people, clothes and mirrors that reflect"
         )
     families = _FAMILIES[which[0] if which else "all"]
-    scene = _MAKERS[kind](int(seed), families)
+    scene = replace(_MAKERS[kind](int(seed), families), name=spec)  # by which a command opens it again
     if _LIVED_IN not in words:
         return scene
     return replace(lived_in(scene, np.random.default_rng([int(seed), 11]), families), mirrors=True)

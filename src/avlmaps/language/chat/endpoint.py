@@ -18,6 +18,7 @@ from time import monotonic, sleep
 from typing import Any
 
 from avlmaps.core.errors import LanguageError
+from avlmaps.core.extras import install_command
 from avlmaps.language.chat.answer import Answer
 from avlmaps.language.chat.faults import fault_sentence
 from avlmaps.language.chat.protocol import EndpointFault, read_answer, read_error, read_models
@@ -212,7 +213,7 @@ def _client_library() -> tuple[Any, Any]:
     try:
         import openai
     except ImportError:
-        raise LanguageError("The chat models need the openai client: pip install 'avlmaps[chat]'.") from None
+        raise LanguageError(f"The chat models need the openai client: {install_command('chat')}") from None
     return openai, import_module(openai.DefaultHttpxClient.__mro__[1].__module__.partition(".")[0])
 
 

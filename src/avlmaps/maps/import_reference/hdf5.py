@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.errors import BackendError, MapError
+from avlmaps.core.extras import install_command
 
 _MEND = "copy it again, or let the code that wrote it write it again"
 # The errors that h5py raises where the bytes are not as they should be.
@@ -23,7 +24,7 @@ def _h5py() -> Any:
     try:
         return importlib.import_module("h5py")
     except ImportError:
-        raise BackendError("Reading .h5df files needs h5py; get it with: pip install 'avlmaps[paper]'") from None
+        raise BackendError(f"Reading .h5df files needs h5py; get it with: {install_command('paper')}") from None
 
 
 @contextmanager

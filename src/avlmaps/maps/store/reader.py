@@ -13,6 +13,7 @@ from avlmaps.core.camera import Rig
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.poses import FRAME, rotation_to_level
 from avlmaps.core.registry import Kind
+from avlmaps.core.suggestions import near_path
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.integrity import Guard
 from avlmaps.maps.store.array_files import MEND, FileInfo, read_array, verify_file
@@ -145,7 +146,9 @@ def _manifest_content(path: Path) -> bytes:
         )
     if path.is_dir():
         raise MapError(f"{path} is a folder without a map in it (no {MANIFEST}); make one with `avlmaps build`.")
-    raise MapError(f"{path} is not there, or is not a map's folder; make one with `avlmaps build`.")
+    close = near_path(path, lambda beside: (beside / MANIFEST).is_file())
+    meant = f"did you mean {close}?" if close else "make one with `avlmaps build`."
+    raise MapError(f"{path} is not there, or is not a map's folder; {meant}")
 
 
 def profile_of_map(path: Path, info: MapInfo) -> Profile:

@@ -9,6 +9,7 @@ from urllib.parse import urlsplit
 import msgspec
 
 from avlmaps.core.errors import BackendError, NavigationError
+from avlmaps.core.extras import install_command
 from avlmaps.core.network import is_loopback
 from avlmaps.navigate.ros.messages import Incoming, sanitize_line, text_in
 
@@ -65,7 +66,7 @@ class Link:
 
     def _opened(self, headers: dict[str, str], timeout_s: float) -> "Bridge":
         if find_spec("roslibpy") is None:
-            raise BackendError("Driving a ROS robot needs roslibpy; get it with: pip install 'avlmaps[ros]'")
+            raise BackendError(f"Driving a ROS robot needs roslibpy; get it with: {install_command('ros')}")
         try:
             from avlmaps.navigate.ros.wire import Bridge, Listener, start_reactor
 

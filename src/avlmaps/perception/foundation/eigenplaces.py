@@ -23,6 +23,7 @@ from torch import nn
 from torch.nn import functional
 
 from avlmaps.core.errors import BackendError
+from avlmaps.core.extras import install_command
 from avlmaps.perception.foundation.whole_pictures import imagenet_picture, size_with_short_side
 from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.device import select_device, unit_rows
@@ -131,7 +132,7 @@ def backbone_of(state: Mapping[str, torch.Tensor], path: Path, get: str) -> nn.S
         from torchvision.models.vgg import cfgs, make_layers
     except ImportError as fault:
         raise BackendError(
-            "EigenPlaces needs torchvision; get it with: pip install 'avlmaps[foundation]' torchvision"
+            f"EigenPlaces needs torchvision; get it with: {install_command('foundation', 'torchvision')}"
         ) from fault
     if "backbone.28.weight" in state:
         return nn.Sequential(*list(make_layers(cfgs["D"]))[:-2])  # VGG-16 without its last ReLU and pooling

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avlmaps.core.errors import BackendError
+from avlmaps.core.extras import install_command
 from avlmaps.perception.models.settings import model_settings
 from avlmaps.perception.user_folder import user_folder
 
@@ -89,7 +90,7 @@ def _fetched(model: str, wanted: Sequence[str]) -> Path:
     except ImportError as fault:
         raise BackendError(
             f"The model {model} is not here (looked {looked.rstrip(', ')}), and fetching it needs huggingface_hub; get "
-            "that with: pip install 'avlmaps[foundation]'"
+            f"that with: {install_command('foundation')}"
         ) from fault
     try:
         return Path(snapshot_download(model, allow_patterns=list(wanted), local_files_only=settings.offline))

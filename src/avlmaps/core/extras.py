@@ -1,0 +1,48 @@
+"""The command that installs a group of further packages (an extra) for the avlmaps that runs here."""
+
+from functools import cache
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import msgspec
+
+
+class _Source(msgspec.Struct):
+    """Where pip had a package from."""
+
+    url: str = ""
+
+
+def install_command(extra: str, *more: str) -> str:
+    """Return the command that installs an extra: from the clone that avlmaps runs or was installed from, else by name.
+
+    Args:
+        extra: such as ``serve``.
+        more: further packages.
+    """
+    clone = _clone()
+    source = "avlmaps" if clone is None else "." if clone == Path.cwd() else str(clone)
+    return " ".join(["pip install", f"'{source}[{extra}]'", *more])
+
+
+@cache
+def _clone() -> Path | None:
+    """Return the folder of the project that this package came from; None where it came as a package."""
+    beside = Path(__file__).resolve().parents[3]  # src/avlmaps/core/extras.py
+    if _is_project(beside):
+        return beside
+    try:
+        text = distribution("avlmaps").read_text("direct_url.json")  # pip writes it for what is no plain package
+        url = urlsplit(msgspec.json.decode(text or "{}", type=_Source).url)
+    except (PackageNotFoundError, msgspec.DecodeError, ValueError):
+        return None
+    folder = Path(unquote(url.path))
+    return folder if url.scheme == "file" and _is_project(folder) else None
+
+
+def _is_project(folder: Path) -> bool:
+    try:
+        return 'name = "avlmaps"' in (folder / "pyproject.toml").read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return False
