@@ -29,6 +29,10 @@ _SAME = frozenset({
 _TELL = frozenset({"tell", "ask", "order", "command", "instruct"})
 _LET = frozenset({"have", "let", "make"})
 _BEFORE = frozenset({"and", "then", "please", "now", "next", "finally", "also", "first", "ok", "just", "you", "to"})
+_ASKING = frozenset({
+    "someone", "somebody", "anyone", "anybody", "can", "could", "would", "will", "us", "we", "should", "must", "i",
+    "kindly", "better", "want",
+})  # fmt: skip
 _AFTER_SEND = frozenset({
     "to", "into", "over", "down", "up", "towards", "toward", "through", "next", "near", "beside", "behind", "in", "by",
     "at", "back", "out", "onto", "there", "here", "home", "between", "left", "right", "away", "off", "on", "along",
@@ -52,6 +56,8 @@ def _joined(tokens: Sequence[Token]) -> list[Token]:
     """Return tokens with "counter clockwise" as one word, and "sleep(5)" as a wait."""
     found: list[Token] = []
     for token in tokens:
+        if token.text == "wise" and found and found[-1].text == "clock":
+            token = _word(found.pop(), "clockwise")
         if token.text == "clockwise" and found and found[-1].text in ("counter", "anti"):
             token = _word(found.pop(), "counterclockwise")
         elif (token.kind == "number" or token.text == "(") and found and found[-1].text == "sleep":
@@ -88,7 +94,8 @@ def _said_to_it(tokens: list[Token]) -> list[Token]:
     found: list[Token] = []
     at = 0
     while at < len(tokens):
-        end, kept = _third(tokens, at) if _begins(tokens, at) else (at, [])
+        asks = at > 0 and tokens[at - 1].text in _ASKING
+        end, kept = _third(tokens, at) if _begins(tokens, at) or asks else (at, [])
         if end > at:
             found += kept
             at = end

@@ -50,7 +50,26 @@ _NO_NAMES = frozenset({
     "floor", "stand", "store", "park", "position", "sound", "noise", "picture", "photo", "image", "recording", "clip",
     "view", "pass", "block", "range", "board", "trip", "round", "lap", "drive", "corner", "hand", "foot",
 })  # fmt: skip
-_WHO = frozenset({"someone", "somebody", "anyone", "anybody", "person", "people", "a", "the", "of", "on", "sound"})
+_WHO = frozenset(
+    {
+        "playing",
+        "sounding",
+        "going",
+        "off",
+        "noise",
+        "someone",
+        "somebody",
+        "anyone",
+        "anybody",
+        "person",
+        "people",
+        "a",
+        "the",
+        "of",
+        "on",
+        "sound",
+    }
+)
 _WORTH_ASKING = 0.1
 
 

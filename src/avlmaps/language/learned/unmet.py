@@ -19,6 +19,7 @@ from avlmaps.language.intents import (
     Go,
     Inquiry,
     Intent,
+    Kind,
     Move,
     Pick,
     Reason,
@@ -31,10 +32,12 @@ from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.said import BREAKS, DETERMINERS, LOOKS, PREPOSITIONS, Claimed, Said, words
 from avlmaps.language.learned.ways import directions
 from avlmaps.language.lexer import Token
+from avlmaps.language.names import past_forms, sounding_forms
 from avlmaps.perception.embedded.words import is_word
 
 _MOTIONS = frozenset({"go", "drive", "head", "move", "turn", "face", "visit", "come", "do"})
 _ANYTHING = frozenset({"something", "anything", "somewhere", "anywhere", "someplace"})
+_NO_SOUNDS = frozenset({"went", "gone", "going", "snapped", "snapping", "called", "fell", "fallen", "played"})
 _HERE = frozenset({
     "from", "here", "you", "yourself", "robot", "your", "current", "position", "the", "where", "are", "stand", "now",
 })  # fmt: skip
@@ -114,13 +117,18 @@ def _leaving(said: Claimed) -> Clarify | None:
     return None
 
 
+def _no_thing(said: Claimed) -> Refuse | None:
+    """Return the refusal for "no kitchen" that is driven to."""
+    for at, (before, after) in enumerate(pairwise(said.texts)):
+        if before == "no" and _is_entry(after) and said.names_in({at + 1}):
+            return Refuse(Reason.NEGATION)
+    return None
+
+
 def _excluded(said: Claimed) -> Clarify | Refuse | None:
     """Return the refusal for what is not meant and is driven to, or is left out though it says which is meant."""
     choosing = {phrase for each in words().phrases["choosing"].values() for phrase in each}
     breaks = BREAKS - {"to", "for", "after", "before"}
-    for at, (before, after) in enumerate(pairwise(said.texts)):
-        if before == "no" and _is_entry(after) and said.names_in({at + 1}):
-            return Refuse(Reason.NEGATION)
     for start, end in said.spans("excluded"):
         phrase = said.texts[start:end]
         if phrase in _ONLY_ORDERS and not said.is_order(start):
@@ -148,6 +156,8 @@ def _ways(said: Claimed) -> Clarify | None:
     """Return the question for a wall or a path that should be followed and is driven to."""
     for start, end in said.spans("ways"):
         scope = said.scope(end, BREAKS | PREPOSITIONS)
+        if said.texts[start] in words().lists["lines"]:
+            return Clarify("The robot cannot follow a wall or a line. Name the place where it should go.")
         if end == start + 1 and said.texts[end : end + 1] and said.texts[end] not in DETERMINERS:
             continue
         if not words().lists["lines"].intersection(said.texts[at] for at in scope):
@@ -240,6 +250,20 @@ def _unread(said: Claimed) -> Clarify | None:
     return None
 
 
+def _unheard(said: Claimed) -> Clarify | None:
+    """Return the question for a sound that no step uses: "the chair where someone coughed" is not any chair."""
+    kinds = {each.kind for target in said.targets for each in (target, *target.near)}
+    if not kinds.isdisjoint({Kind.SOUND, Kind.CLIP}):
+        return None
+    for at, text in enumerate(said.texts):
+        before = said.texts[max(0, at - 4) : at]
+        rang = text in past_forms() or (text in sounding_forms().values() and before[-1:] in (("was",), ("were",)))
+        if rang and text not in _NO_SOUNDS and at not in said.used and "where" in before:
+            phrase = " ".join(said.texts[max(0, at - 2) : at + 1])
+            return Clarify(f"What is '{phrase}' for? Say it like: the chair near the sound of {text}.")
+    return None
+
+
 def _amounts(said: Claimed) -> Clarify | None:
     """Return the question for a distance, an angle or a time with its unit that no step uses."""
     tokens = list(said.tokens)
@@ -306,12 +330,13 @@ def _has_unit(tokens: list[Token], at: int) -> bool:
 
 
 _RULES: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
-    _away, _picked, _leaving, _excluded, _ways, _superlatives, _nameless, _unread, _amounts, _sides,
+    _away, _picked, _leaving, _no_thing, _excluded, _ways, _superlatives, _nameless, _unread, _unheard, _amounts,
+    _sides,
 )  # fmt: skip
 
 
 _ASKED: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
-    _picked, _excluded, _superlatives, _nameless, _unread, _amounts,
+    _picked, _excluded, _superlatives, _nameless, _unread, _unheard, _amounts,
 )  # fmt: skip
 
 
