@@ -70,7 +70,8 @@ def test_a_signed_angle_asks_which_side(verb: str, angle: int, sign: str) -> Non
 @pytest.mark.parametrize(
     "command",
     ["move forward -2 m", "translate -0.5 m", "move (-1)", "go back -1 m", "forward by minus one metre",
-     "rotate -30 deg, translate -0.5 m", "turn left -90 degrees", "yaw +45 degrees", "stand -2 m left of the sink",
+     "rotate -30 deg, translate -0.5 m", "turn left -90 degrees", "turn ±90 degrees", "yaw +45 degrees",
+     "stand -2 m left of the sink",
      "drive forward, then turn -.5 rad", "go to the sofa, then turn by -90°"],
 )  # fmt: skip
 def test_a_sign_is_never_dropped(command: str) -> None:
@@ -150,7 +151,8 @@ def test_stop_is_stop(said: str) -> None:
     "form",
     ["send the robot to the {}", "bring the robot to the {}", "take the robot to the {}", "tell it to go to the {}",
      "tell the robot to go to the {}", "have the robot drive to the {}", "ask the bot to go to the {}",
-     "put the robot next to the {}", "park the robot by the {}", "please send the machine to the {}", "could someone send the robot to the {}"],
+     "put the robot next to the {}", "park the robot by the {}", "please send the machine to the {}",
+     "could someone send the robot to the {}"],
 )  # fmt: skip
 @FEW
 @given(things)
@@ -202,7 +204,9 @@ def test_a_loop_goes_round_as_often_as_it_says(times: int, head: str) -> None:
 @pytest.mark.parametrize(
     ("said", "way"),
     [("clockwise", Way.CLOCKWISE), ("cw", Way.CLOCKWISE), ("counterclockwise", Way.COUNTERCLOCKWISE),
-     ("anti-clockwise", Way.COUNTERCLOCKWISE), ("counter clockwise", Way.COUNTERCLOCKWISE), ("clock wise", Way.CLOCKWISE), ("", Way.ANY)],
+     ("anti-clockwise", Way.COUNTERCLOCKWISE), ("counter clockwise", Way.COUNTERCLOCKWISE),
+     ("clock wise", Way.CLOCKWISE),
+     ("", Way.ANY)],
 )  # fmt: skip
 def test_a_circle_runs_the_way_round_that_is_said(said: str, way: Way) -> None:
     assert intents(f"go around the table {said}") == (Circle(Target(Kind.OBJECT, "table"), way=way),)
@@ -267,7 +271,8 @@ def test_contexts_of_different_kinds_are_all_kept() -> None:
     "command",
     ["drive past the sink and stop at the second door", "go to something red by the sofa", "goto !kitchen",
      "spin three full revolutions", "wall-follow left for 4 m",
-     "go to the chair near the window, in the bedroom, where someone coughed", "go to the sound with confidence > 0.5", "drive at 2 m/s to the kitchen"],
+     "go to the chair near the window, in the bedroom, where someone coughed",
+     "go to the sound with confidence > 0.5", "drive at 2 m/s to the kitchen"],
 )  # fmt: skip
 def test_a_word_that_no_step_holds_is_asked_about(command: str) -> None:
     stops(command)

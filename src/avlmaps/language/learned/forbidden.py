@@ -90,14 +90,12 @@ def _signed(said: Said) -> Clarify | None:
     for at, text in enumerate(said.texts):
         if text in ("<", ">") and tokens[at].raw == text and lexer.number_at(tokens, at + 1):
             return Clarify(f"What does '{text} {said.texts[at + 1]}' mean? Say only where to go.")
-        if text not in ("minus", "negative", "plus", "-", "+") or not lexer.number_at(tokens, at + 1):
-            continue
-        if text == "-" and said.texts[at - 1 : at] == (".",):
+        if text not in ("minus", "negative", "plus", "-", "+", "±") or not lexer.number_at(tokens, at + 1):
             continue
         if text == "-" and not (at and said.texts[at - 1] in _TAKES_SIGN):
             continue
         end = amount_end(tokens, at + 1)
-        sign = "-" if text in ("minus", "negative", "-") else "+"
+        sign = "-" if text in ("minus", "negative", "-") else text.replace("plus", "+")
         number = " ".join(said.texts[at + 1 : end])
         turns = bool(lexer.angle_at(tokens, at + 1)) or bool(TURNS & set(said.texts[:at]))
         if sign == "+" and not (turns and _ROUND.isdisjoint(said.texts)):
