@@ -12,6 +12,7 @@ from mcp.client.client import Client
 from starlette.testclient import TestClient
 
 from avlmaps.cli import main
+from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Question
 from avlmaps.maps.build import build_map
 from avlmaps.maps.settings import BuildSettings
@@ -32,6 +33,12 @@ SENTENCES = [
     "the chiar in the kitchen",
     "the sound of a doorbell",
     "a zebra",
+    "sofa or armchair",
+    "two chairs",
+    "what is in the kitchen?",
+    "what is next to the table?",
+    "the biggest room",
+    "the last sound",
 ]
 PARTS = [
     {"object": "sofa", "area": "kitchen"},
@@ -130,6 +137,35 @@ def test_python_counts_and_weighs_all_that_a_sentence_may_mean(opened: AVLMap) -
     assert [one["query"] for one in told.get("alternatives", [])]
     assert opened.ask("how many zebras are there").count == 0
     assert "count" not in opened.ask("chair").to_dict()
+
+
+def test_lists_answer_by_what_the_map_lists(opened: AVLMap) -> None:
+    last, first = opened.ask("the last sound"), opened.ask("what did you hear first?")
+    onsets = {sound.position: sound.onset_s for sound in opened.sounds()}
+    assert onsets[last.goals[0].position] == max(onsets.values())
+    assert onsets[first.goals[0].position] == min(onsets.values())
+    rooms = opened.ask("which rooms are there?", 100)
+    assert rooms.count == len(rooms.goals) == len(opened.rooms())
+    large, small = opened.ask("the biggest room", 100).goals, opened.ask("the smallest room", 100).goals
+    assert [goal.name for goal in large] == [goal.name for goal in small][::-1] or len(large) != len(small)
+    things = {(thing.name, thing.position) for thing in opened.things()}
+    for question in ("what is next to the table?", f"what is in the {opened.rooms()[0].name}?"):
+        assert {(goal.name, goal.position) for goal in opened.ask(question, 100).goals} <= things
+
+
+def test_a_number_is_met_or_said_to_be_missed(opened: AVLMap) -> None:
+    count = opened.ask("how many chairs are there").count
+    assert count is not None
+    for number in (2, 3, 40):
+        answer = opened.ask(f"{number} chairs", 1)
+        assert (answer.count, answer.found) == (count, count >= number)
+        assert len(answer.goals) <= number
+
+
+def test_what_is_not_supported_is_said_with_what_is(opened: AVLMap) -> None:
+    for sentence in ("what colour is the sofa?", "why is the sky blue?"):
+        with pytest.raises(QueryError, match="It answers where things"):
+            opened.ask(sentence)
 
 
 NOTHING: list[tuple[Callable[[AVLMap], object], str]] = [

@@ -16,6 +16,7 @@ from avlmaps.language.learned.guard import Guard, kind_of
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.reader import Read, learned_reader
 from avlmaps.language.learned.unmet import unmet_by
+from avlmaps.language.list_questions import SUPPORTED
 from avlmaps.language.names import is_entry, sounds_like
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.word_classes import load_word_classes
@@ -113,7 +114,7 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: Limits) -> AskedSen
         file = lacks_file(sentence.tokens)
         if file is not None:
             raise QueryError(file.question)
-        raise QueryError(f"A map cannot answer this, only where things and sounds are; ask it like: {_EXAMPLE}.")
+        raise QueryError(f"A map cannot answer this. It answers {SUPPORTED}; ask it like: {_EXAMPLE}.")
     use = use_in(sentence.text)
     if reads[0].is_purpose and use is not None:
         return _put_right(_for_use(sentence, use), sentence)

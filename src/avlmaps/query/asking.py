@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from avlmaps.language.questions import AskedSentence
     from avlmaps.query.avlmap import Attachment, AVLMap
 
-# For a count, up to this many instances are taken; those count that score at least this part of the best one.
-_MOST_COUNTED, _AS_LIKELY = 200, 0.5
+# For a count, up to this many instances are taken; those that are found count.
+_MOST_COUNTED = 200
 _EXAMPLE = "the red cabinet near the sound of a dog barking"
 
 
@@ -206,12 +206,37 @@ def thing_alone(asked: Asked, avlmap: "AVLMap") -> Question | None:
 
 
 def _answer_sentence(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
-    from avlmaps.language.intents import Ask
+    from avlmaps.language.list_questions import read_list, said_number
+    from avlmaps.query.lists import answer_list
 
-    read = _read(asked.sentence, asked.image, asked.clip)
-    counted = read.inquiry.ask is Ask.HOW_MANY
+    listed, numbered = read_list(asked.sentence), said_number(asked.sentence)
+    if listed is not None:
+        return answer_list(avlmap, listed, asked.top, lambda words: _answer_words(avlmap, asked, words, files))
+    if numbered is None:
+        return _answer_read(avlmap, asked, files)
+    number, what = numbered
+    answer = _answer_read(avlmap, replace(asked, sentence=f"how many {what} are there", top=_MOST_COUNTED), files)
+    count = answer.count or 0
+    said = f"{count} of the {number} {what} are found" if count < number else f"{count} {what} are found"
+    goals = answer.goals[: min(max(number, 1), _MOST_COUNTED)]
+    return replace(answer, goals=goals, found=count >= number, text=f"{said[:1].upper()}{said[1:]}. {answer.text}")
+
+
+def _answer_words(avlmap: "AVLMap", asked: Asked, words: str, files: Files) -> Answer:
+    """Answer what a question to the lists names: the photo that came along, or a thing, a sound or a room in words."""
+    from avlmaps.language.list_questions import speaks_of_photo
+
+    if asked.image is not None and asked.clip is None and speaks_of_photo(words):
+        photo = Part(Modality.IMAGE, asked.image, is_file=True)
+        return answer_question(avlmap, Question.of([photo]), asked.top, files)
+    return _answer_read(avlmap, replace(asked, sentence=words, primary=None), files)
+
+
+def _answer_read(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
+    """Answer the questions that a sentence is read as; the likeliest counts."""
+    questions, notes, counted = _questions(asked)
     answers: list[tuple[Question, Answer]] = []
-    for question in read.questions:
+    for question in questions:
         if asked.primary is not None:
             question = Question.of(question.parts, asked.primary)
         used = {part.query for part in question.parts if part.is_file}
@@ -224,21 +249,26 @@ def _answer_sentence(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
     answers.sort(key=lambda one: (one[1].found, one[1].probability), reverse=True)
     (question, best), others = answers[0], answers[1:]
     alternatives = tuple(Alternative(question, one.probability, one.found, one.goals[:1]) for question, one in others)
-    count = _count(best) if counted else None
+    count = sum(goal.probability >= avlmap.settings.found_at for goal in best.goals) if counted else None
     return replace(
         best,
         goals=best.goals[: asked.top],
         count=count,
-        notes=read.notes,
+        notes=notes,
         alternatives=(*best.alternatives, *alternatives),
         text=found_text(question.parts, best.goals[0], count) if best.found else best.text,
     )
 
 
-def _count(answer: Answer) -> int:
-    if not answer.found:
-        return 0
-    return sum(goal.score >= _AS_LIKELY * answer.goals[0].score for goal in answer.goals)
+def _questions(asked: Asked) -> tuple[tuple[Question, ...], tuple[str, ...], bool]:
+    """Return the questions that a sentence is read as, how its words were taken, and whether it asks how many."""
+    from avlmaps.language.intents import Ask
+    from avlmaps.language.list_questions import said_alternatives
+
+    read = [_read(words, asked.image, asked.clip) for words in said_alternatives(asked.sentence) or (asked.sentence,)]
+    questions = tuple(dict.fromkeys(question for one in read for question in one.questions))
+    notes = tuple(dict.fromkeys(note for one in read for note in one.notes))
+    return questions, notes, read[0].inquiry.ask is Ask.HOW_MANY
 
 
 @lru_cache(maxsize=512)

@@ -45,6 +45,7 @@ class Goal:
             object its voxels' box; for a sound or an area the box of the places it was heard or seen from.
         parts: heat of each modality there; a second part of a modality is called ``object_2`` and so on.
         probability: that the goal is right, all parts together.
+        name: what is there, for an answer from the lists of a map; ``""`` for others.
     """
 
     position: tuple[float, float, float]
@@ -52,16 +53,20 @@ class Goal:
     size: tuple[float, float, float]
     parts: dict[str, float]
     probability: float = 0.0
+    name: str = ""
 
     def to_json(self) -> "GoalAnswer":
         """Return the goal as the command line prints it."""
-        return {
+        goal: GoalAnswer = {
             "position": list(self.position),
             "score": self.score,
             "size": list(self.size),
             "parts": dict(self.parts),
             "probability": self.probability,
         }
+        if self.name:
+            goal["name"] = self.name
+        return goal
 
 
 @dataclass(frozen=True, slots=True)

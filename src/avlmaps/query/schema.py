@@ -35,6 +35,7 @@ class GoalAnswer(TypedDict):
     size: Size
     parts: Annotated[dict[str, float], Meta(description="heat of each part there, by modality")]
     probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that it is right, all parts together")]
+    name: NotRequired[Annotated[str, Meta(description="what is there, in an answer from the lists of a map")]]
 
 
 class PartOutcome(TypedDict):

@@ -9,6 +9,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Int
 from avlmaps.core.errors import QueryError
+from avlmaps.query.floor_plan import CELL_M
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
@@ -92,6 +93,14 @@ class Whereabouts:
     def _by_storey(self, level: Float[np.ndarray, "m 3"], points: Float[np.ndarray, "m 3"]) -> np.ndarray:
         """Return level x and y, and a third number that puts other storeys farther away than any place of the same."""
         return np.c_[level[:, :2], 1e4 * self.floors_of(points)]
+
+    def areas_m2(self) -> Float[np.ndarray, " r"]:
+        """Return the area of each room's region; none for a map without a floor plan."""
+        if self.field is None:
+            return np.zeros(0)
+        region, plan = self.field.regions(), self.field.plan
+        own = [np.unique(region[plan.cells_of(room.places)]) for room in self.rooms]
+        return np.array([np.isin(region, one[one >= 0]).sum() * CELL_M**2 for one in own], np.float64)
 
     def numbers_of(self, asked: str) -> list[int]:
         """Return the numbers of the rooms that a word names: one by its own name, or all of a kind.

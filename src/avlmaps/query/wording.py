@@ -9,7 +9,7 @@ from avlmaps.query.goals import Goal
 _PHOTO, _CLIP = "the place of the photo", "a sound like the clip"
 
 
-def query_in_words(parts: Sequence[Part]) -> str:
+def in_words(parts: Sequence[Part]) -> str:
     """Return a query in words: ``the chair near the sofa in the kitchen``."""
     lead = next(part for part in parts if part.role is Role.PRIMARY)
     return " ".join([_named(lead), *(_beside(part) for part in parts if part is not lead)])
@@ -17,9 +17,14 @@ def query_in_words(parts: Sequence[Part]) -> str:
 
 def found_text(parts: Sequence[Part], goal: Goal, count: int | None = None) -> str:
     """Return where the first goal of an answer that is found is, and how many there are for a count."""
-    what = query_in_words(parts)
-    place = f"{what} is most likely at {_place(goal)}, probability {goal.probability:.2f}"
-    return _sentence(place if count is None else f"counted {count}: {place}")
+    if count is not None:
+        return f"Counted: {count}. The most likely is at {_place(goal)}, probability {goal.probability:.2f}."
+    return _sentence(f"{in_words(parts)} is most likely at {_place(goal)}, probability {goal.probability:.2f}")
+
+
+def placed(text: str, goal: Goal) -> str:
+    """Return a sentence about a goal, with its place and probability."""
+    return _sentence(f"{text} at {_place(goal)}, probability {goal.probability:.2f}")
 
 
 def absent_text(parts: Sequence[PartAnswer], goals: Sequence[Goal], alone: Alternative | None) -> str:

@@ -1,0 +1,199 @@
+"""Answers from the lists of a map: its rooms by size, its sounds by time, what is in a room or beside a thing."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from avlmaps.core.arrays import Float
+from avlmaps.core.errors import QueryError
+from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.language.list_questions import Listed, ListQuestion
+from avlmaps.query.answer import Answer
+from avlmaps.query.goals import Goal
+from avlmaps.query.whereabouts import NOWHERE, Whereabouts
+from avlmaps.query.wording import in_words, placed
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.contents import Thing
+
+BESIDE_M = 1.0  # from box to box, horizontally
+_MOST_NAMED = 12
+_LEAST_M2 = 1.0  # of a room; less is a corner that views disagree about
+_NO_SIZE = (0.0, 0.0, 0.0)
+
+
+def answer_list(avlmap: "AVLMap", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:
+    """Answer a question from the lists of a map.
+
+    Args:
+        avlmap: the map.
+        question: what is asked.
+        top: most goals.
+        ask: answers what the question names by heat: "the bed", "this photo".
+
+    Raises:
+        QueryError: the map has no such list.
+    """
+    match question.of:
+        case Listed.ROOM_BY_SIZE:
+            goals, text = _rooms_by_size(avlmap, question.first)
+        case Listed.SOUND_BY_TIME:
+            goals, text = _sounds_by_time(avlmap, question.first)
+        case Listed.NAMES:
+            return _names(avlmap, question, top)
+        case Listed.CONTENTS | Listed.BESIDE | Listed.ROOM_OF:
+            return _about(avlmap, question, top, ask)
+    return _answer(avlmap, goals[:top], text)
+
+
+def _answer(
+    avlmap: "AVLMap", goals: Sequence[Goal], text: str, subject: Answer | None = None, count: int | None = None
+) -> Answer:
+    """Return goals as an answer: found, like any other, where the first is likely enough."""
+    probability = goals[0].probability if goals else 0.0
+    found = bool(goals) and probability >= avlmap.settings.found_at
+    parts, heat = ((), None) if subject is None else (subject.parts, subject.heat)
+    return Answer(tuple(goals), found, parts, 0.0, heat, probability, count, text=text)
+
+
+def _rooms_by_size(avlmap: "AVLMap", first: bool) -> tuple[list[Goal], str]:
+    """Return the rooms by the area of their regions, the largest first."""
+    where = Whereabouts.of(avlmap)
+    areas = where.areas_m2()
+    if not len(areas):
+        raise QueryError("The map does not know the sizes of rooms: it has no floor plan, or no model of views.")
+    order = np.argsort(areas if first else -areas, kind="stable")
+    order = [int(number) for number in order if areas[number] >= _LEAST_M2]
+    goals = [_room_goal(where, number) for number in order]
+    if not goals:
+        return [], f"The map shows no room of {_LEAST_M2:g} m² or more."
+    text = f"the {'smallest' if first else 'largest'} room is the {goals[0].name}, {areas[order[0]]:.0f} m²"
+    return goals, placed(text, goals[0])
+
+
+def _room_goal(where: Whereabouts, number: int) -> Goal:
+    room = where.rooms[number]
+    return Goal(room.position, room.confidence, _NO_SIZE, {}, room.confidence, where.names[number])
+
+
+def _sounds_by_time(avlmap: "AVLMap", first: bool) -> tuple[list[Goal], str]:
+    """Return the sounds by their onset, the last first."""
+    sounds = sorted(avlmap.sounds(), key=lambda sound: sound.onset_s if first else -sound.onset_s)
+    if not sounds:
+        return [], "The map holds no sounds."
+    goals = [
+        Goal(sound.position, score, _NO_SIZE, {}, score, sound.names[0] if sound.names else "sound")
+        for sound in sounds
+        for score in [float(sound.confidences[0]) if sound.confidences else 0.0]
+    ]
+    which = "first" if first else "last"
+    return goals, placed(f"the {which} sound is the {goals[0].name} at {sounds[0].onset_s:.1f} s, heard", goals[0])
+
+
+def _names(avlmap: "AVLMap", question: ListQuestion, top: int) -> Answer:
+    """Return all rooms, sounds or things, and how many there are."""
+    if question.name == "rooms":
+        where = Whereabouts.of(avlmap)
+        goals = [_room_goal(where, number) for number in range(len(where.rooms))]
+        named = [room.name for room in where.rooms]
+    elif question.name == "sounds":
+        goals, _ = _sounds_by_time(avlmap, True)
+        named = [goal.name for goal in goals]
+    else:
+        goals = [_thing_goal(thing) for thing in _things(avlmap)]
+        named = [goal.name for goal in goals]
+    text = f"There are {len(named)} {question.name}: {_counted(named)}." if named else f"There are no {question.name}."
+    return _answer(avlmap, goals[:top], text, count=len(named))
+
+
+def _about(avlmap: "AVLMap", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:
+    """Answer what is in a room, or beside a thing, or in which room something is; as likely as that is found."""
+    subject = ask(question.name)
+    if not subject.found:
+        return replace(subject, goals=())
+    if question.of is Listed.ROOM_OF:
+        goals, text = _room_of(avlmap, subject)
+    elif question.of is Listed.CONTENTS:
+        goals, text = _contents(avlmap, question.name)
+    else:
+        goals, text = _beside(avlmap, subject)
+    return _answer(avlmap, goals[:top], text, subject)
+
+
+def _room_of(avlmap: "AVLMap", subject: Answer) -> tuple[list[Goal], str]:
+    where, goal = Whereabouts.of(avlmap), subject.goals[0]
+    number = int(where.rooms_of(np.array([goal.position]))[0])
+    if number == NOWHERE:
+        raise QueryError("The map has no rooms: it was built without a model of views.")
+    room = where.rooms[number]
+    likely = min(goal.probability, room.confidence)
+    inside = Goal(goal.position, likely, goal.size, {}, likely, where.names[number])
+    words = in_words([one.part for one in subject.parts])
+    return [inside], placed(f"{words} is in the {where.names[number]}", inside)
+
+
+def _contents(avlmap: "AVLMap", name: str) -> tuple[list[Goal], str]:
+    where, things = Whereabouts.of(avlmap), _things(avlmap)
+    rooms = [k for k, room in enumerate(where.rooms) if _same_room(room.name, name)]
+    places = np.array([thing.position for thing in things]).reshape(-1, 3)
+    inside = np.isin(where.rooms_of(places), rooms) if rooms else np.zeros(len(things), bool)
+    goals = [_thing_goal(thing) for thing, is_in in zip(things, inside, strict=True) if is_in]
+    if not rooms:
+        return goals, f"The map shows no room that is a {name} as a whole."
+    what = _counted([goal.name for goal in goals]) if goals else "no thing that the map is certain of"
+    return goals, f"In the {name}: {what}."
+
+
+def _beside(avlmap: "AVLMap", subject: Answer) -> tuple[list[Goal], str]:
+    level, things = avlmap.space.level, _things(avlmap)
+    own, size = level(np.array([subject.goals[0].position]))[0], np.array(subject.goals[0].size)
+    near: list[tuple[float, Thing]] = []
+    for thing in things:
+        gap = _gap_m(own, size, level(np.array([thing.position]))[0], np.array(thing.size))
+        same = gap == 0.0 and _overlap(own, size, level(np.array([thing.position]))[0], np.array(thing.size))
+        if gap <= BESIDE_M and not same:
+            near.append((gap, thing))
+    near.sort(key=lambda one: one[0])
+    goals = [_thing_goal(thing) for _, thing in near]
+    words = in_words([one.part for one in subject.parts])
+    what = ", ".join(f"{thing.name} ({gap:.1f} m)" for gap, thing in near[:_MOST_NAMED])
+    return goals, f"Next to {words}: {what or 'no thing that the map is certain of'}."
+
+
+def _gap_m(
+    a: Float[np.ndarray, "3"], size_a: Float[np.ndarray, "3"], b: Float[np.ndarray, "3"], size_b: Float[np.ndarray, "3"]
+) -> float:
+    """Return the horizontal gap between two boxes about their middles, level frame."""
+    apart = np.abs(a - b)[:2] - (size_a + size_b)[:2] / 2.0
+    return float(np.linalg.norm(np.maximum(apart, 0.0)))
+
+
+def _overlap(
+    a: Float[np.ndarray, "3"], size_a: Float[np.ndarray, "3"], b: Float[np.ndarray, "3"], size_b: Float[np.ndarray, "3"]
+) -> bool:
+    """Return whether two boxes are mostly one: each middle lies in the other box."""
+    apart = np.abs(a - b)
+    return bool((apart <= size_a / 2.0).all() and (apart <= size_b / 2.0).all())
+
+
+def _things(avlmap: "AVLMap") -> "list[Thing]":
+    return avlmap.things() if "pixels" in avlmap.stored.info.models else []
+
+
+def _thing_goal(thing: "Thing") -> Goal:
+    confidence = float(thing.confidence)
+    return Goal(thing.position, confidence, thing.size, {}, confidence, thing.name)
+
+
+def _same_room(kind: str, name: str) -> bool:
+    return kind == name or lexicon().is_a(kind, name, Kind.ROOM)
+
+
+def _counted(names: Sequence[str]) -> str:
+    often = Counter(names).most_common()
+    shown = ", ".join(name if count == 1 else f"{name} ({count})" for name, count in often[:_MOST_NAMED])
+    return shown + (f" and {len(often) - _MOST_NAMED} kinds more" if len(often) > _MOST_NAMED else "")

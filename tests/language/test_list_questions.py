@@ -1,0 +1,72 @@
+"""Questions to the lists of a map are read by patterns; all others are left alone."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from avlmaps.language.list_questions import Listed, read_list, said_alternatives, said_number
+
+READ = {
+    "the biggest room": (Listed.ROOM_BY_SIZE, "", False),
+    "What is the largest room in the house?": (Listed.ROOM_BY_SIZE, "", False),
+    "which room is the smallest": (Listed.ROOM_BY_SIZE, "", True),
+    "please show me the smallest room": (Listed.ROOM_BY_SIZE, "", True),
+    "the last sound": (Listed.SOUND_BY_TIME, "", False),
+    "What was the last noise you heard?": (Listed.SOUND_BY_TIME, "", False),
+    "the first sound": (Listed.SOUND_BY_TIME, "", True),
+    "what did you hear last": (Listed.SOUND_BY_TIME, "", False),
+    "what is in the kitchen?": (Listed.CONTENTS, "kitchen", False),
+    "what's in my bedroom": (Listed.CONTENTS, "bedroom", False),
+    "what is in the kichen": (Listed.CONTENTS, "kitchen", False),
+    "what does the bathroom contain?": (Listed.CONTENTS, "bathroom", False),
+    "show me everything in the living room": (Listed.CONTENTS, "living room", False),
+    "what is next to the bed?": (Listed.BESIDE, "bed", False),
+    "can you tell me what is near the sofa": (Listed.BESIDE, "sofa", False),
+    "what stands beside the tv": (Listed.BESIDE, "tv", False),
+    "which room is this photo from?": (Listed.ROOM_OF, "this photo", False),
+    "what room was this picture taken in?": (Listed.ROOM_OF, "this picture", False),
+    "in which room is the sofa?": (Listed.ROOM_OF, "the sofa", False),
+    "which rooms are there?": (Listed.NAMES, "rooms", False),
+    "what sounds were heard?": (Listed.NAMES, "sounds", False),
+    "how many rooms does the house have?": (Listed.NAMES, "rooms", False),
+}
+OTHER = [
+    "the chair near the sofa", "bed", "where is the kitchen", "what is in the fridge?", "how many chairs are there",
+    "where can I sit?", "the sound of a dog", "what is near this photo", "the room near the sound of water",
+    "the biggest chair", "is there a sofa in the kitchen?", "what is the color of the sofa",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", READ)
+def test_a_question_to_the_lists_is_read(text: str) -> None:
+    found = read_list(text)
+    assert found is not None
+    assert (found.of, found.name, found.first) == READ[text]
+    assert found.counts == text.startswith("how many")
+
+
+@pytest.mark.parametrize("text", OTHER)
+def test_all_others_are_left_alone(text: str) -> None:
+    assert read_list(text) is None and said_number(text) is None and said_alternatives(text) == ()
+
+
+@given(st.integers(2, 99), st.sampled_from(["chairs", "red chairs", "chairs in the kitchen", "beds near the window"]))
+def test_numbers_of_things(number: int, what: str) -> None:
+    assert said_number(f"{number} {what}") == said_number(f"where are the {number} {what}?") == (number, what)
+
+
+@given(st.lists(st.sampled_from(["sofa", "armchair", "bed", "table"]), min_size=2, max_size=3, unique=True),
+       st.sampled_from(["", " in the kitchen", " near the sound of a dog"]))  # fmt: skip
+def test_each_alternative_has_the_context(names: list[str], tail: str) -> None:
+    text = " or the ".join(names) + tail
+    assert said_alternatives(f"the {text}") == tuple(f"{name}{tail}" for name in names)
+
+
+def test_numbers_in_words() -> None:
+    assert said_number("two chairs") == said_number("a pair of chairs") == (2, "chairs")
+    assert said_number("two") is None and said_number("2 m") is None
+
+
+@given(st.text(max_size=60))
+def test_no_text_is_too_much(text: str) -> None:
+    read_list(text), said_number(text), said_alternatives(text)
