@@ -23,7 +23,7 @@ SUPPORTED = (
 
 
 class Listed(StrEnum):
-    """What is asked of the lists."""
+    """What is sought of the lists."""
 
     ROOM_BY_SIZE = "room by size"
     SOUND_BY_TIME = "sound by time"
@@ -38,10 +38,10 @@ class ListQuestion:
     """A question to the lists of a map.
 
     Attributes:
-        of: what is asked.
+        of: what is sought.
         name: of the room or the thing; what is listed for ``NAMES``; words for ``ROOM_OF``, as a query has them.
         first: the smallest room or the first sound, instead of the largest and the last.
-        counts: whether only the number is asked.
+        counts: whether only the number is sought.
     """
 
     of: Listed

@@ -31,7 +31,7 @@ def answer_list(avlmap: "AVLMap", question: ListQuestion, top: int, ask: Callabl
 
     Args:
         avlmap: the map.
-        question: what is asked.
+        question: the question.
         top: most goals.
         ask: answers what the question names by heat: "the bed", "this photo".
 
