@@ -26,10 +26,10 @@ FAST := tests/core tests/test_imports.py tests/test_conventions.py tests/query/t
   tests/query/test_pieces.py tests/maps/test_grid.py tests/navigate/test_planner.py tests/perception/test_codes.py \
   tests/perception/test_matching.py tests/language/test_program_run.py tests/cli/test_help.py
 
-.PHONY: help demo test test-fast dist-test test-kernels bounds test-foundation types-foundation test-ros2 python312 lint format pictures docs fuzz bench train lock clean
+.PHONY: help demo test test-fast dist-test test-kernels bounds test-foundation test-ros1 faults-ros1 types-foundation test-ros2 python312 lint format pictures docs fuzz bench train lock clean
 
 help:  ## Show what can be made.
-	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
+	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
 
 $(READY): requirements/lock.txt pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "avlmaps needs Python 3.11 or newer; say which with: make PYTHON=python3.12 ...")'
@@ -62,6 +62,12 @@ test-kernels: $(READY)  ## Run the fast numeric tests as older processors comput
 
 test-foundation: $(TORCH)/.ready  ## Run the tests of the models on torch (in a virtual environment of their own, 1.5 GB).
 	$(TORCH)/bin/python -m pytest -n 2 --dist loadfile tests/foundation
+
+test-ros1: $(READY)  ## Test driving against ROS 1 of Debian and a checkout of rosbridge_suite (ROSBRIDGE=DIR; 10 minutes).
+	AVLMAPS_ROSBRIDGE=$(ROSBRIDGE) $(RUN)/python -m pytest -rs tests/ros1
+
+faults-ros1: $(READY)  ## Break a drive on ROS 1 in 200 random ways (ROSBRIDGE=DIR; an hour): ros1_faults.jsonl.
+	AVLMAPS_ROSBRIDGE=$(ROSBRIDGE) $(RUN)/python tests/ros1/faults.py --cases $(or $(CASES),200) --seed $(or $(SEED),1)
 
 types-foundation: $(TORCH)/.ready  ## Check the types of the models on torch.
 	$(TORCH)/bin/basedpyright -p requirements/pyright-foundation.json

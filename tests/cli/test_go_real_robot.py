@@ -97,6 +97,33 @@ def test_a_robot_that_will_not_stop_is_reported_and_has_its_own_status(go: Start
 
 
 @pytest.mark.parametrize(("ros", "kind"), [(2, "nav2"), (1, "move_base")])
+def test_an_operator_who_takes_over_keeps_the_robot_when_the_program_ends(go: Started, ros: int, kind: str) -> None:
+    with robot_here(ros) as robot:
+        process = go(robot.url, "go to the red thing, then turn left", kind)
+        assert robot.soon(lambda: bool(robot.goals), 60.0)
+        sleep(1.0)
+        robot.operate()
+        out, err = process.communicate(timeout=60)
+        assert process.returncode == 1, err
+        assert "A goal of another client continues" in out
+        sleep(1.0)  # what was still to be cancelled would be by now
+        assert robot.goals["rviz"]["status"] == 1
+        assert robot.moves_on
+
+
+def test_a_goal_that_is_not_given_up_ends_the_command_with_status_3(go: Started) -> None:
+    with robot_here() as robot:
+        robot.does[""] = "stubborn"
+        process = go(robot.url, "go to the red thing", goal_timeout_s=1.0, cancel_timeout_s=0.5)
+        assert robot.soon(lambda: bool(robot.goals), 60.0)
+        robot.moves_on = True
+        out, err = process.communicate(timeout=90)
+    assert process.returncode == 3, err
+    assert json.loads(out)["robot_stopped"] is False
+    assert "may still be driving" in err.splitlines()[-1]
+
+
+@pytest.mark.parametrize(("ros", "kind"), [(2, "nav2"), (1, "move_base")])
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=lambda number: number.name)
 def test_a_process_that_dies_or_stands_still_leaves_no_goal(
     go: Started, number: signal.Signals, ros: int, kind: str

@@ -31,16 +31,31 @@ class _Client(WebSocketServerProtocol):
 
     def onOpen(self):  # noqa: N802
         self.topics: dict[str, str] = {}
+        self.waiting: list[dict[str, Any]] = []  # behind a goal or a call, where the bridge takes one after the other
+        self.at = ""
         self.robot.clients.append(self)
 
     def onMessage(self, payload, isBinary):  # noqa: N802, N803
-        self.robot.take(self, json.loads(payload))
+        message = json.loads(payload)
+        if self.at:
+            self.waiting.append(message)
+            return
+        if self.robot.blocks and message["op"] in ("send_action_goal", "call_service"):
+            self.at = message["id"]
+        self.robot.take(self, message)
+
+    def go_on(self) -> None:
+        self.at = ""
+        while self.waiting and not self.at:
+            self.onMessage(json.dumps(self.waiting.pop(0)).encode(), False)
 
     def onClose(self, wasClean, code, reason):  # noqa: N802, N803
         if self in self.robot.clients:
             self.robot.clients.remove(self)
 
     def tell(self, message: dict[str, Any]) -> None:
+        if self.at and message["op"] in ("action_result", "service_response") and message["id"] == self.at:
+            reactor.callLater(0.0, self.go_on)
         payload = json.dumps(message).encode()
         if self.robot.late_s:
             reactor.callLater(self.robot.late_s, self._send, payload)
@@ -72,6 +87,7 @@ class FakeRobot:
         self.late_s = 0.0  # what it says arrives later by that much
         self.map_every_s = 0.0  # the transform of the map is renewed no more often
         self.answers = True  # its servers answer
+        self.blocks = False  # the bridge takes what a client sends after a goal when that goal is over
         self.headers: dict[str, str] = {}
         self.moves_on = False
 

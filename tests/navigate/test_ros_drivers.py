@@ -362,6 +362,56 @@ def test_a_cancel_that_the_bridge_loses_is_sent_again():
         assert "may still be driving" not in results[0].note
 
 
+def test_nothing_waits_behind_a_goal_where_the_bridge_takes_one_message_after_the_other():
+    with FakeRobot(2, "drive on") as robot, opened(robot) as driver:
+        robot.blocks = True
+        thread, results = in_thread(lambda: driver.go_to(PLACE))
+        assert robot.soon(lambda: len(beats(robot)) >= 2)  # so that no watchdog ends the goal
+        assert not driver._contact.is_unseen_for(5.0)
+        stopped = driver.stop()
+        assert stopped.reached, stopped.note
+        thread.join(20.0)
+        assert "may still be driving" not in results[0].note
+        robot.does[""] = "succeed"
+        assert driver.go_to(PLACE).reached
+
+
+def test_a_behaviour_that_is_absent_blocks_nothing_and_is_not_blamed_on_nav2():
+    with FakeRobot(2) as robot, opened(robot, settings=quick(answer_timeout_s=1.0)) as driver:
+        robot.blocks = True
+        robot.does["/spin"] = "silent"  # the bridge waits for ever for a server that is not there
+        arrival = driver.turn(1.0)
+        assert arrival.reached, arrival.note
+        assert driver.go_to(PLACE).reached
+
+
+def test_a_server_that_refuses_a_cancel_has_not_agreed():
+    """The return code of CancelGoal counts, not that the call was answered."""
+    with FakeRobot(2, "stubborn") as robot, opened(robot, settings=quick(cancel_timeout_s=1.0)) as driver:
+        in_thread(lambda: driver.go_to(PLACE))
+        assert robot.soon(lambda: bool(driver._contact.ear.servers.under_way().get("/navigate_to_pose")))
+        stopped = driver.stop()
+        assert not stopped.reached
+        assert "does not give up its goal" in stopped.note
+
+
+def test_nothing_is_sent_before_what_was_sent_is_known_to_be_over(robot):
+    robot.does[""] = "stubborn"
+    with opened(robot, settings=quick(goal_timeout_s=0.3, cancel_timeout_s=0.6)) as driver:
+        assert "may still be driving" in driver.go_to(PLACE).note
+        assert driver.owes
+        count = len(goals(robot))
+        assert "An earlier goal may still be driving" in driver.go_to(PLACE).note
+        assert "an earlier goal may still" in driver.fault()
+        assert not driver.halt().stopped
+        assert len(goals(robot)) == count
+        for goal in robot.goals.values():
+            goal["does"] = "drive on"
+        robot.does[""] = "succeed"
+        assert driver.go_to(PLACE).reached
+        assert not driver.owes
+
+
 def test_a_robot_that_arrives_without_telling_where_has_not_arrived(robot):
     with opened(robot, settings=quick(pose_max_age_s=1.0)) as driver:
         robot.does[""] = "arrive unseen"

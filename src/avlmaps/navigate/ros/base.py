@@ -156,7 +156,8 @@ class RosDriver:
         if self._contact.stands_still(self.settings.cancel_timeout_s):
             pose = self.pose
             return Halt(True, f"{halt.note}; the robot stands at ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
-        return Halt(False, f"{halt.note}, but the robot is not seen to stand")
+        moved = "a goal of another client drives the robot" if self._others() else "the robot is not seen to stand"
+        return Halt(False, f"{halt.note}, but {moved}")
 
     @property
     def owes(self) -> bool:

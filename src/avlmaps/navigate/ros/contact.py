@@ -47,6 +47,7 @@ class Contact:
         self._opener, self._clock = opener, clock
         self._last: GroundPose | None = None
         self._renewing = threading.Lock()
+        self.ear = Ear(clock)
         self.session, self.ear = self._opened(settings.connect_timeout_s)
         if self.pose_within(settings.pose_timeout_s) is None:
             self.session.close()
@@ -57,6 +58,7 @@ class Contact:
 
     def _opened(self, within_s: float) -> tuple[Session, Ear]:
         ear = Ear(self._clock)
+        ear.tree.take(self.ear.tree.fixed(), static=True)
         return self._opener(ear, within_s), ear
 
     def renew(self, within_s: float | None = None) -> None:

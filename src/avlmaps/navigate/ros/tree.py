@@ -127,6 +127,15 @@ class LiveTree:
         stamps = self._stamps.setdefault(child, _Stamps(stamp_s, now_s - stamp_s))
         return stamps.late_s(stamp_s, now_s)
 
+    def fixed(self) -> list[Transform]:
+        """Return the static transforms; a bridge may hand them to its first client only."""
+        with self._lock:
+            return [
+                Transform(edge.parent, child, edge.parent_from_child, edge.stamp_s)
+                for child, edge in self._edges.items()
+                if edge.static
+            ]
+
     def seen(self, fixed: str, body: str) -> Sighting | None:
         """Return where the body is in the fixed frame; None where no chain of transforms leads there."""
         with self._lock:

@@ -11,7 +11,7 @@ from pathlib import Path
 from time import sleep
 from typing import Any
 
-from field import Field, now
+from ros1_field import Field, now
 
 Outcome = dict[str, Any]
 

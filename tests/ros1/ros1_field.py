@@ -34,7 +34,7 @@ def why_not() -> str:
     if not (Path(checkout) / "rosbridge_server" / "scripts" / "rosbridge_websocket.py").is_file():
         return f"{checkout} is no checkout of rosbridge_suite for ROS 1"
     if shutil.which("roscore") is None:
-        return "ROS 1 is not installed; see tests/ros1/field.py"
+        return "ROS 1 is not installed; see tests/ros1/ros1_field.py"
     needed = "import rospy, actionlib, tf2_ros, move_base_msgs, tornado, autobahn, bson"
     done = subprocess.run([ROS_PYTHON, "-c", needed], capture_output=True, text=True, check=False, env=_plain())
     return done.stderr.strip().splitlines()[-1] if done.returncode else ""
