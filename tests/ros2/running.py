@@ -9,11 +9,15 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import rclpy
+from nav2_msgs.action import NavigateToPose
+from rclpy.action import ActionClient
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
+from unique_identifier_msgs.msg import UUID
 
 HERE = Path(__file__).parent
 
@@ -30,8 +34,8 @@ class Robot:
         self._modes = self.node.create_publisher(String, "simulated/mode", latched)
 
     def __enter__(self) -> "Robot":
-        self.start("body")
-        self.start("nav2")
+        ready = [self._begin(role) for role in ("body", "nav2")]
+        assert self.soon(lambda: all(holds() for holds in ready)), "the robot did not start"
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -41,6 +45,10 @@ class Robot:
         rclpy.try_shutdown()
 
     def start(self, role: str) -> None:
+        assert self.soon(self._begin(role)), f"the {role} did not start"
+
+    def _begin(self, role: str) -> Callable[[], bool]:
+        """Start a process; return what says that it is ready."""
         ready = "up" if role == "body" else "localised"
         before = len(self.rows(ready))
         command = [
@@ -53,7 +61,7 @@ class Robot:
             str(self._hz),
         ]
         self.processes[role] = subprocess.Popen(list(map(str, command)))
-        assert self.soon(lambda: len(self.rows(ready)) > before), f"the {role} did not start"
+        return lambda: len(self.rows(ready)) > before
 
     def end(self, role: str) -> None:
         """Kill a process, as `kill -9` does."""
@@ -86,6 +94,22 @@ class Robot:
         while not holds() and time.monotonic() < until_s:
             time.sleep(0.02)
         return holds()
+
+
+class Operator:
+    """Somebody else, who sends goals in RViz."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot, self.client = robot, ActionClient(robot.node, NavigateToPose, "navigate_to_pose")
+        assert self.client.wait_for_server(10.0)
+
+    def send(self, x_m: float = -30.0) -> str:
+        uuid, goal = uuid4(), NavigateToPose.Goal()
+        goal.pose.pose.position.x = x_m
+        future = self.client.send_goal_async(goal, goal_uuid=UUID(uuid=list(uuid.bytes)))
+        rclpy.spin_until_future_complete(self.robot.node, future, timeout_sec=10.0)
+        assert future.result().accepted
+        return uuid.hex
 
 
 def in_thread(work: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]:

@@ -9,14 +9,16 @@ import argparse
 import json
 import sys
 import time
+from collections import deque
 from contextlib import suppress
 from math import atan2, cos, hypot, pi, sin
 from pathlib import Path
 from threading import Lock
 
 import rclpy
-from geometry_msgs.msg import TransformStamped, Twist
+from geometry_msgs.msg import Point, TransformStamped, Twist
 from nav2_msgs.action import DriveOnHeading, NavigateToPose, Spin
+from nav_msgs.msg import OccupancyGrid
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
@@ -44,17 +46,29 @@ class Log:
 
 
 class Body(Node):
-    """Accelerates with 1 m/s²; the map's correction of odometry comes at its own rate."""
+    """Accelerates with 1 m/s²; the map's correction of odometry comes at its own rate.
+
+    Modes: ``no tf``; ``late`` (transforms arrive 1.5 s after they were made); ``slow map`` (a correction at 2 Hz).
+    """
 
     def __init__(self, log: Log, correction_hz: float) -> None:
         super().__init__("body")
         self.log, self.x, self.y, self.yaw, self.v, self.w = log, 0.0, 0.0, 0.0, 0.0, 0.0
-        self.told, self.told_s, self.tf = Twist(), 0.0, True
+        self.told, self.told_s, self.mode = Twist(), 0.0, ""
         self.create_subscription(Twist, "cmd_vel", self._hear, 1)
         self.create_subscription(String, "simulated/mode", self._mode, LATCHED)
+        self._said: deque[tuple[float, TransformStamped]] = deque()
         self._tf = self.create_publisher(TFMessage, "/tf", 100)
         self._static = self.create_publisher(TFMessage, "/tf_static", LATCHED)
         self._static.publish(TFMessage(transforms=[self._transform("base_link", "laser", 0.2, 0.0, 0.0)]))
+        grid = OccupancyGrid()
+        grid.header.frame_id, grid.info.resolution, grid.info.width, grid.info.height = "map", 0.05, 60, 40
+        grid.info.origin.position.x = grid.info.origin.position.y = -1.0
+        grid.info.origin.orientation.w = 1.0
+        blocked = [100 if 30 <= x < 40 and 15 <= y < 25 else 0 for y in range(40) for x in range(60)]
+        grid.data = blocked  # x 0.5 to 1.0, y -0.25 to 0.25
+        self._map = self.create_publisher(OccupancyGrid, "map", LATCHED)
+        self._map.publish(grid)
         self._last_s, self._ticks, self._every = time.monotonic(), 0, max(1, round(1 / correction_hz / STEP_S))
         self.create_timer(STEP_S, self._tick)
 
@@ -62,7 +76,7 @@ class Body(Node):
         self.told, self.told_s = message, time.monotonic()
 
     def _mode(self, message: String) -> None:
-        self.tf = message.data != "no tf"
+        self.mode = message.data
 
     def _tick(self) -> None:
         now_s = time.monotonic()
@@ -75,14 +89,19 @@ class Body(Node):
         self.yaw = wrapped(self.yaw + self.w * dt)
         if self._ticks % 5 == 0:
             self.log("body", x=self.x, y=self.y, yaw=self.yaw, v=self.v, w=self.w)
-        if not self.tf:
+        if self.mode == "no tf":
             return
         ox, oy, oyaw = ODOM_IN_MAP
         dx, dy, c, s = self.x - ox, self.y - oy, cos(oyaw), sin(oyaw)
         moved = self._transform("odom", "base_link", c * dx + s * dy, -s * dx + c * dy, self.yaw - oyaw)
-        self._tf.publish(TFMessage(transforms=[moved]))
-        if self._ticks % self._every == 0:
-            self._tf.publish(TFMessage(transforms=[self._transform("map", "odom", *ODOM_IN_MAP)]))
+        self._say(moved)
+        if self._ticks % (25 if self.mode == "slow map" else self._every) == 0:
+            self._say(self._transform("map", "odom", *ODOM_IN_MAP))
+        while self._said and now_s - self._said[0][0] >= (1.5 if self.mode == "late" else 0.0):
+            self._tf.publish(TFMessage(transforms=[self._said.popleft()[1]]))
+
+    def _say(self, transform: TransformStamped) -> None:
+        self._said.append((time.monotonic(), transform))
 
     def _transform(self, parent: str, child: str, x: float, y: float, yaw: float) -> TransformStamped:
         message = TransformStamped(child_frame_id=child)
@@ -144,7 +163,8 @@ class Nav2(Node):
     def _do(self, name, kind, handle):
         uuid = bytes(handle.goal_id.uuid).hex()
         self.active[name] = uuid
-        self.log("goal", action=name, id=uuid)
+        sent = handle.request.pose.pose.position if name == "navigate_to_pose" else Point()
+        self.log("goal", action=name, id=uuid, x=sent.x, y=sent.y)
         result, begun = kind.Result(), self.pose
         if self.mode == "abort":
             result.error_code = 208

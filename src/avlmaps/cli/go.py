@@ -62,9 +62,9 @@ class Go(ModelVerb):
     body: Literal["base", "drone"] = "base"
     """Body of the robot: a wheeled base and a drone have other obstacles."""
     robot: Literal["simulated", "nav2", "move_base"] = "simulated"
-    """Robot: a simulated body, or a real robot over rosbridge (pip install 'avlmaps[ros]')."""
+    """Robot: a simulated body, or a real robot over rosbridge (pip install 'avlmaps[ros]') or, nav2, natively."""
     ros: Annotated[str, arg(metavar="URL")] = "ws://localhost:9090"
-    """Address of rosbridge, for --robot nav2 and move_base."""
+    """Address of rosbridge, for --robot nav2 and move_base; "native" joins the ROS 2 network of nav2 by rclpy."""
     ros_frames: Annotated[Path | None, arg(metavar="FILE")] = None
     """JSON file of the robot's frames and settings: namespace, radius, speed, timeouts (docs/robots.md)."""
     start: Annotated[str | None, arg(metavar="X,Y,HEADING")] = None

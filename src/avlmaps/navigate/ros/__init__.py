@@ -1,4 +1,4 @@
-"""Driving real robots: Nav2 (ROS 2) and move_base (ROS 1) over rosbridge. Needs the extra ``ros`` once it connects."""
+"""Driving real robots: Nav2 (ROS 2) and move_base (ROS 1) over rosbridge (extra ``ros``), Nav2 natively too."""
 
 from avlmaps.navigate.ros.base import RosDriver
 from avlmaps.navigate.ros.frames import Frames, GroundTransform

@@ -11,7 +11,7 @@ import msgspec
 from avlmaps.core.errors import BackendError, NavigationError
 from avlmaps.core.extras import install_command
 from avlmaps.core.network import is_loopback
-from avlmaps.navigate.ros.messages import Incoming, sanitize_line, text_in
+from avlmaps.navigate.ros.messages import MOST_BYTES, Incoming, sanitize_line, text_in
 
 if TYPE_CHECKING:
     from avlmaps.navigate.ros.wire import Bridge
@@ -39,7 +39,12 @@ class Link:
     """
 
     def __init__(
-        self, url: str, token: str | None = None, timeout_s: float = 10.0, heard: threading.Condition | None = None
+        self,
+        url: str,
+        token: str | None = None,
+        timeout_s: float = 10.0,
+        heard: threading.Condition | None = None,
+        most_bytes: int = MOST_BYTES,
     ) -> None:
         """Connect.
 
@@ -48,6 +53,7 @@ class Link:
             token: sent as ``Authorization: Bearer``, for a proxy in front of the bridge that asks for it.
             timeout_s: how long to wait for the robot.
             heard: notified by this connection; one of its own by default.
+            most_bytes: a message that is larger ends the connection.
 
         Raises:
             BackendError: roslibpy is not installed.
@@ -62,9 +68,9 @@ class Link:
         self._open = False
         self._listeners: list[Callable[[Incoming], None]] = []
         self._topics: dict[str, Any] = {}
-        self._bridge = self._opened(headers, timeout_s)
+        self._bridge = self._opened(headers, timeout_s, most_bytes)
 
-    def _opened(self, headers: dict[str, str], timeout_s: float) -> "Bridge":
+    def _opened(self, headers: dict[str, str], timeout_s: float, most_bytes: int) -> "Bridge":
         if find_spec("roslibpy") is None:
             raise BackendError(f"Driving a ROS robot needs roslibpy; get it with: {install_command('ros')}")
         try:
@@ -72,7 +78,7 @@ class Link:
 
             start_reactor()
             listener = Listener(self._arrived, self._unreadable, self._stands, self._over)
-            bridge = Bridge(self.url, headers, listener, timeout_s)
+            bridge = Bridge(self.url, headers, listener, timeout_s, most_bytes)
         except RuntimeError as fault:
             raise NavigationError(
                 f"No connection to {self.url} can be made from this process ({sanitize_line(str(fault), 300)}); "

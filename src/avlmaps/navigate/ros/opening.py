@@ -11,16 +11,17 @@ from jaxtyping import Float
 from avlmaps.navigate.ros.base import RosDriver
 from avlmaps.navigate.ros.frames import Frames
 from avlmaps.navigate.ros.guard import Guard, Orders
+from avlmaps.navigate.ros.own_map import on_own_map
 from avlmaps.navigate.ros.plans import Standing
 from avlmaps.navigate.ros.settings import RosSettings
-from avlmaps.navigate.ros.transports import RosKind, session_opener, tasks_of
+from avlmaps.navigate.ros.transports import RosKind, own_grid, session_opener, tasks_of
 
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
     from avlmaps.navigate.planner import Planner
 
 
-class _BridgeDriver(RosDriver):
+class _OpenedDriver(RosDriver):
     kind: ClassVar[RosKind]
 
     def __init__(
@@ -34,10 +35,10 @@ class _BridgeDriver(RosDriver):
         token: str | None = None,
         clock: Callable[[], float] = monotonic,
     ) -> None:
-        """Connect over rosbridge, and wait until the robot reports its pose.
+        """Connect, and wait until the robot reports its pose.
 
         Args:
-            url: of rosbridge, ``ws://host:9090``.
+            url: of rosbridge, ``ws://host:9090``, or ``native``.
             frames: the robot's frames; ``map`` and ``base_link``, lying as the map's level frame, by default.
             settings: names, patience, tolerances.
             standing: moves a goal to where a body can stand; goals are sent as they are without it.
@@ -46,8 +47,8 @@ class _BridgeDriver(RosDriver):
             clock: seconds; replaced in tests.
 
         Raises:
-            NavigationError: there is no bridge, or the robot does not report its pose.
-            BackendError: roslibpy is not installed.
+            NavigationError: nobody answers there, or the robot does not report its pose.
+            BackendError: what the transport needs is not installed.
         """
         settings = settings or RosSettings()
         super().__init__(
@@ -56,13 +57,13 @@ class _BridgeDriver(RosDriver):
         )  # fmt: skip
 
 
-class Nav2Driver(_BridgeDriver):
-    """Drives a robot that runs Nav2, over rosbridge."""
+class Nav2Driver(_OpenedDriver):
+    """Drives a robot that runs Nav2, over rosbridge or natively."""
 
     kind: ClassVar[RosKind] = "nav2"
 
 
-class MoveBaseDriver(_BridgeDriver):
+class MoveBaseDriver(_OpenedDriver):
     """Drives a robot that runs move_base, over rosbridge."""
 
     kind: ClassVar[RosKind] = "move_base"
@@ -79,11 +80,11 @@ def open_ros_driver(
     token: str | None = None,
     guarded: bool = False,
 ) -> RosDriver:
-    """Connect to a robot over rosbridge.
+    """Connect to a robot.
 
     Args:
         kind: what drives it: Nav2 in ROS 2, or move_base in ROS 1.
-        url: ``ws://host:9090``.
+        url: of rosbridge, ``ws://host:9090``; ``native`` for a node of our own in the robot's ROS 2 network.
         frames: the robot's frames, and how they lie to the map.
         obstacles: of the map; a goal that is not free on it is moved to the nearest place from which it can be seen.
         settings: names, patience, tolerances.
@@ -95,13 +96,17 @@ def open_ros_driver(
 
     Raises:
         NavigationError: nobody answers there, or the robot does not know where it is.
-        BackendError: roslibpy is not installed.
+        BackendError: roslibpy, or ROS 2's rclpy, is not installed.
     """
     settings = settings or RosSettings()
     token = token or os.environ.get("AVLMAPS_ROS_TOKEN") or None
     if level_from_world is None and obstacles is not None:
         level_from_world = obstacles.level_from_world
     standing = None if obstacles is None else standable_goal(obstacles, settings.radius_m)
+    if obstacles is not None and settings.map_topic:
+        grid = own_grid(kind, url, settings, token)
+        own = on_own_map(obstacles, grid, frames or Frames())
+        standing = standable_goal(own, 0.0 if grid.is_costmap else settings.radius_m, "the robot's own map")
     driver = {"nav2": Nav2Driver, "move_base": MoveBaseDriver}[kind]
     opened = driver(url, frames, settings, standing=standing, level_from_world=level_from_world, token=token)
     if guarded:
@@ -110,33 +115,35 @@ def open_ros_driver(
     return opened
 
 
-def standable_goal(obstacles: "Obstacles", radius_m: float) -> Standing:
+def standable_goal(obstacles: "Obstacles", radius_m: float, called: str = "the map") -> Standing:
     """Return a function that moves goals to where a body can stand and get to, by a map's obstacles.
 
     Args:
         obstacles: of the map.
         radius_m: of the body.
+        called: name of the map, for notes.
     """
     from avlmaps.navigate.costmap import costmap_of
     from avlmaps.navigate.planner import Planner
 
-    return _Standing(Planner(costmap_of(obstacles, radius_m)))
+    return _Standing(Planner(costmap_of(obstacles, radius_m)), called)
 
 
 class _Standing:
-    def __init__(self, planner: "Planner") -> None:
-        self._planner = planner
+    def __init__(self, planner: "Planner", called: str) -> None:
+        self._planner, self._called = planner, called
 
     def __call__(
         self, start: Float[np.ndarray, "2"], wanted: Float[np.ndarray, "2"]
     ) -> tuple[Float[np.ndarray, "2"], str] | str:
         if self._planner.entry(start) is None:
             return (
-                f"The robot says that it is at ({start[0]:.2f}, {start[1]:.2f}), where the map has no floor to stand "
-                "on; set how its frames lie to the map"
+                f"The robot says that it is at ({start[0]:.2f}, {start[1]:.2f}), where {self._called} has no floor to "
+                "stand on; set how its frames lie to the map"
             )
         stop = self._planner.stop_for(start, wanted)
         if stop is None:
-            return f"No path leads near ({wanted[0]:.2f}, {wanted[1]:.2f}) on the map for a body of that radius"
-        note = f"The place is not free on the map; it was sent {stop.beside_m:.2f} m beside it" if stop.beside_m else ""
+            return f"No path leads near ({wanted[0]:.2f}, {wanted[1]:.2f}) on {self._called} for a body of that radius"
+        beside = f"The place is not free on {self._called}; it was sent {stop.beside_m:.2f} m beside it"
+        note = beside if stop.beside_m else ""
         return stop.xy, note

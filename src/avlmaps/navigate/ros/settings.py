@@ -35,6 +35,8 @@ class RosSettings:
     """Of the robot's actions (``/robot1`` for ``/robot1/navigate_to_pose``)."""
     tf_namespace: str = ""
     """Of its transforms, where they are not on /tf and /tf_static."""
+    map_topic: str = ""
+    """A map or a costmap of the robot (``/map``): on it goals are moved to where the body can stand. Empty: our map."""
     radius_m: float = 0.25
     """Of the body, to find where it can stand on our map; the robot plans with its own distances."""
     goal_timeout_s: float = 300.0
@@ -63,11 +65,12 @@ class RosSettings:
     """For Nav2's straight drives, which need a speed; the robot's own limits still hold."""
 
     def __post_init__(self) -> None:
-        for name in ("namespace", "tf_namespace"):
+        namespace, topic = ("namespace", "robot1"), ("topic", "map")
+        for name, (word, such) in {"namespace": namespace, "tf_namespace": namespace, "map_topic": topic}.items():
             given = getattr(self, name)
             bare = given.strip("/") if isinstance(given, str) else "?"
             if bare and not all(part.isascii() and part.isidentifier() for part in bare.split("/")):
-                raise NavigationError(f"{name} is {given!r}, which is not a ROS namespace; write it as /robot1.")
+                raise NavigationError(f"{name} is {given!r}, which is not a ROS {word}; write it as /{such}.")
             object.__setattr__(self, name, f"/{bare}" if bare else "")
         for name, (least, most) in _RANGES.items():
             value = getattr(self, name)

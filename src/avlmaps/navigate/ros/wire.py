@@ -20,7 +20,7 @@ from twisted.internet import reactor as _reactor
 from twisted.internet.error import ReactorNotRestartable
 from twisted.internet.ssl import optionsForClientTLS
 
-from avlmaps.navigate.ros.messages import MOST_BYTES, Incoming, sanitize_line
+from avlmaps.navigate.ros.messages import Incoming, sanitize_line
 
 reactor: Any = _reactor  # its methods are put on it at run time
 _PING_EVERY_S, _PING_WAIT_S = 5.0, 10.0
@@ -79,14 +79,16 @@ class _Factory(AutobahnRosBridgeClientFactory):
     maxRetries = 0  # noqa: N815 - twisted's name
     noisy = False
 
-    def __init__(self, url: str, headers: Mapping[str, str], listener: Listener, timeout_s: float) -> None:
+    def __init__(
+        self, url: str, headers: Mapping[str, str], listener: Listener, timeout_s: float, most_bytes: int
+    ) -> None:
         super().__init__(url, headers=dict(headers))
         self.listener = listener
         self.timeout_s = timeout_s
         self.close_reason = ""
         self.setProtocolOptions(
-            maxFramePayloadSize=MOST_BYTES,
-            maxMessagePayloadSize=MOST_BYTES,
+            maxFramePayloadSize=most_bytes,
+            maxMessagePayloadSize=most_bytes,
             openHandshakeTimeout=timeout_s,
             closeHandshakeTimeout=1,
             autoPingInterval=_PING_EVERY_S,
@@ -131,9 +133,11 @@ class _Factory(AutobahnRosBridgeClientFactory):
 class Bridge(roslibpy.Ros):
     """roslibpy's connection over the factory above; its topics work on it as on any other."""
 
-    def __init__(self, url: str, headers: Mapping[str, str], listener: Listener, timeout_s: float) -> None:
+    def __init__(
+        self, url: str, headers: Mapping[str, str], listener: Listener, timeout_s: float, most_bytes: int
+    ) -> None:
         """Begin to connect."""
-        self._mine = _Factory(url, headers, listener, timeout_s)
+        self._mine = _Factory(url, headers, listener, timeout_s, most_bytes)
         super().__init__(url)
 
     def connect(self) -> None:

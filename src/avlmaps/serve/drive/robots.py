@@ -1,4 +1,4 @@
-"""The robot that a driving server drives, by its file: a simulated one, or a real one over rosbridge."""
+"""The robot that a driving server drives, by its file: a simulated one, or a real one."""
 
 import hashlib
 from math import radians
@@ -38,7 +38,7 @@ class RobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     action_s: float = 0.2
     """Of a simulated robot: time of one action (0.1 m or 5 degrees), seconds."""
     ros: str = "ws://localhost:9090"
-    """Of a real robot: address of rosbridge."""
+    """Of a real robot: address of rosbridge, or ``native`` for Nav2 by rclpy."""
     ros_frames: str | None = None
     """Of a real robot: file of its frames and settings (docs/robots.md), relative to this file."""
 
@@ -171,7 +171,7 @@ class SimulatedMachine:
 
 
 class RosMachine:
-    """A robot behind rosbridge, with a guard: a second process that cancels its goals when this one dies."""
+    """A real robot, with a guard: a second process that cancels its goals when this one dies."""
 
     is_real = True
 
