@@ -147,7 +147,7 @@ SAME: dict[str, Callable[[], Any]] = {
 # What a person meets first: nothing behind them has such a default.
 OWN = {
     "build.rules", "query.rules", "query.sentence", "demo.out", "bench.out", "bench.indexing.size",
-    "go.language", "go.robot",
+    "go.language", "go.robot", "query.frame", "things.frame", "locate.frame",
 }  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from avlmaps.cli.output import UsageError
+from avlmaps.core.frames import FrameName
 from avlmaps.query.asking import Asked, AskError, Files, ask, thing_alone
 from avlmaps.query.loops import plain_loops
 
@@ -25,6 +26,7 @@ def answered(
     intrinsics: tuple[float, ...] | None = None,
     plot: Path | None = None,
     once: bool = False,
+    frame: FrameName = FrameName.RECORDING,
     **parts: Any,
 ) -> dict[str, Any]:
     """Return the answer to a query.
@@ -38,6 +40,7 @@ def answered(
         intrinsics: fx, fy, cx, cy of the photo's camera, pixels.
         plot: a picture to write.
         once: whether this process answers no other query.
+        frame: of the positions in the answer.
         parts: object, sound, area and primary; see ``Asked``.
 
     Raises:
@@ -54,7 +57,12 @@ def answered(
     except AskError as error:
         raise UsageError(str(error)) from None
     drawn = {} if plot is None or answer.heat is None else {"plot": str(answer.heat.plot(plot, top=top))}
-    return {**answer.to_dict(), **drawn}
+    told: dict[str, Any] = {**answer.to_dict(), **drawn}
+    if frame is FrameName.RECORDING:
+        return told
+    from avlmaps.query.frames import answer_in
+
+    return answer_in(told, frame, avlmap.space.level_from_recording)
 
 
 def _loops(asked: Asked, avlmap: "AVLMap", once: bool) -> "AbstractContextManager[None]":

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, emit, size_of
 from avlmaps.cli.verb import ModelVerb
+from avlmaps.core.frames import FrameName
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
@@ -40,6 +41,8 @@ class Export(ModelVerb):
     """Radius of the robot (.pgm)."""
     height_m: Annotated[float, arg(metavar="METRES")] = 1.5
     """Height of the robot; higher voxels are no obstacles (.pgm)."""
+    frame: Annotated[Literal["recording", "level"] | None, arg(metavar="recording|level")] = None
+    """Frame of the coordinates. Default: recording for .ply and .csv, level for .glb (y up, as GLB has it) and .pgm."""
     overwrite: bool = False
     """Replace a file that exists."""
 
@@ -51,7 +54,9 @@ class Export(ModelVerb):
 
 def export_lines(answer: dict[str, Any]) -> list[str]:
     """Lay out what `export` wrote."""
-    return ["wrote " + ", ".join(f"{name} ({size_of(Path(name).stat().st_size)})" for name in answer["files"])]
+    files = ", ".join(f"{name} ({size_of(Path(name).stat().st_size)})" for name in answer["files"])
+    axes = ", y up" if answer["files"][0].lower().endswith(".glb") and answer["frame"] == "level" else ""
+    return [f"wrote {files}, {answer['frame']} frame{axes}"]
 
 
 def export(verb: Export, opened: "AVLMap | None" = None) -> dict[str, Any]:
@@ -71,6 +76,9 @@ def export(verb: Export, opened: "AVLMap | None" = None) -> dict[str, Any]:
         raise UsageError("--things and --heat both choose colours; give one of them.")
     if (verb.things or verb.heat is not None) and kind not in (".ply", ".glb"):
         raise UsageError(f"--things and --heat colour a .ply or a .glb; {verb.out.name!r} has no colours.")
+    if kind == ".pgm" and verb.frame == FrameName.RECORDING:
+        raise UsageError("An occupancy grid is a floor plan and needs the level frame; leave --frame out.")
+    frame = FrameName(verb.frame or ("level" if kind in (".pgm", ".glb") else "recording"))
     written = [verb.out, *([verb.out.with_suffix(".yaml")] if kind == ".pgm" else [])]
     there = [str(path) for path in written if path.exists()]
     if there and not verb.overwrite:
@@ -79,11 +87,10 @@ def export(verb: Export, opened: "AVLMap | None" = None) -> dict[str, Any]:
     if kind == ".pgm":
         _write_grid(verb, opened)
     elif kind == ".csv":
-        write_table(verb.out, opened.things(least_confidence=verb.least), opened.sounds())
+        write_table(verb.out, opened.things(least_confidence=verb.least), opened.sounds(), opened.space, frame)
     else:
-        _write_voxels(verb, opened, kind)
-    frame = "level" if kind == ".pgm" else "recording"
-    return {"map": str(verb.map), "files": [str(path) for path in written], "frame": frame}
+        _write_voxels(verb, opened, kind, frame)
+    return {"map": str(verb.map), "files": [str(path) for path in written], "frame": str(frame)}
 
 
 def _write_grid(verb: Export, opened: "AVLMap") -> None:
@@ -95,7 +102,7 @@ def _write_grid(verb: Export, opened: "AVLMap") -> None:
     write_occupancy(verb.out, obstacles_for(opened, shape))
 
 
-def _write_voxels(verb: Export, opened: "AVLMap", kind: str) -> None:
+def _write_voxels(verb: Export, opened: "AVLMap", kind: str, frame: FrameName) -> None:
     from avlmaps.query.export import heat_colors, thing_colors, write_glb, write_ply
 
     colors, columns = opened.colors, {}
@@ -106,6 +113,6 @@ def _write_voxels(verb: Export, opened: "AVLMap", kind: str) -> None:
         if heat is not None:
             colors, columns = heat_colors(heat.shown), {"heat": heat.values}
     if kind == ".ply":
-        write_ply(verb.out, opened.points, colors, columns)
+        write_ply(verb.out, opened.points, colors, columns, opened.space, frame)
     else:
-        write_glb(verb.out, opened.stored.voxels.index, opened.space.grid.voxel_size_m, colors)
+        write_glb(verb.out, opened.stored.voxels.index, opened.space.grid.voxel_size_m, colors, opened.space, frame)

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, emit
 from avlmaps.cli.verb import ModelVerb
+from avlmaps.core.frames import FrameName
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -32,14 +33,21 @@ class Locate(ModelVerb):
     intrinsics: Annotated[str | None, arg(metavar="FX,FY,CX,CY")] = None
     """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: the map's own colour camera."""
 
+    frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
+    """Frame of the pose: the recording's own, or the level one (z up)."""
+
     def run(self) -> None:
         """Locate the photo."""
-        answer = locate_photo(self.map, self.image, self.intrinsics)
+        answer = locate_photo(self.map, self.image, self.intrinsics, frame=FrameName(self.frame))
         emit(answer, locate_lines(answer), self.json)
 
 
 def locate_photo(
-    map_path: Path, picture: Path, intrinsics: str | None, opened: "AVLMap | None" = None
+    map_path: Path,
+    picture: Path,
+    intrinsics: str | None,
+    opened: "AVLMap | None" = None,
+    frame: FrameName = FrameName.RECORDING,
 ) -> "LocateAnswer":
     """Locate a photo.
 
@@ -48,18 +56,21 @@ def locate_photo(
         picture: the photo.
         intrinsics: ``fx,fy,cx,cy`` of its camera; None for those of the map's own.
         opened: the map, where it is open already.
+        frame: of the pose.
     """
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.frames import answer_in
     from avlmaps.query.modalities.image import read_picture
     from avlmaps.query.schema import locate_answer
 
     rgb = read_picture(picture)
     given = None if intrinsics is None else camera_of(intrinsics, rgb.shape[1], rgb.shape[0])
-    found = (AVLMap.open(map_path) if opened is None else opened).locate(rgb, given)
+    opened = AVLMap.open(map_path) if opened is None else opened
+    found = opened.locate(rgb, given)
     pose, camera = found.world_from_camera, found.camera
     if pose is not None and given is not None and camera != given:
         say(f"note: the focal length {given.fx:g} does not fit the photo; {camera.fx:.1f} was used.")
-    return locate_answer(found)
+    return answer_in(locate_answer(found), frame, opened.space.level_from_recording)
 
 
 def camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":

@@ -168,5 +168,9 @@ def query_lines(answer: dict[str, Any]) -> list[str]:
     lines += [f"note: {note}" for note in answer.get("notes", [])]
     lines += [f"count: {answer['count']}"] if "count" in answer else []
     lines.append(f"{'found' if answer['found'] else 'not found here'}: {answer['text']}")
-    lines += table_lines(("", f"place ({answer['frame']} frame)", "probability", "size in m"), rows) if rows else []
+    lines += (
+        table_lines(("", f"place ({answer['frame']} frame)", "probability", "size in m (level axes)"), rows)
+        if rows
+        else []
+    )
     return [*lines, f"wrote {answer['plot']}"] if "plot" in answer else lines

@@ -9,6 +9,7 @@ from tyro.conf import Positional, arg
 from avlmaps.cli.locate import numbers_of
 from avlmaps.cli.output import emit, query_lines
 from avlmaps.cli.verb import ModelVerb
+from avlmaps.core.frames import FrameName
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
@@ -47,6 +48,8 @@ class Query(ModelVerb):
     """Rules of scores and heat: ours, or the paper's with any models (docs/paper-models.md)."""
     top: Annotated[int, arg(metavar="N")] = 3
     """Number of goals to print."""
+    frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
+    """Frame of the places: the recording's own, or the level one (z up)."""
     plot: Annotated[Path | None, arg(metavar="FILE")] = None
     """Draw the heat of each part and of the product, with numbered goals, into this picture."""
 
@@ -85,5 +88,5 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
     }
     return answered(
         lambda: opened or AVLMap.open(verb.map, settings), verb.sentence, verb.top, primary=primary,
-        intrinsics=numbers, plot=verb.plot, once=opened is None, **given,
+        intrinsics=numbers, plot=verb.plot, once=opened is None, frame=FrameName(verb.frame), **given,
     )  # fmt: skip

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, emit, place, table_lines
 from avlmaps.cli.verb import ModelVerb
+from avlmaps.core.frames import FrameName
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ class Things(ModelVerb):
     """List these things only, such as: --name chair table."""
     structure: bool = False
     """List walls, floors and ceilings as well."""
+    frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
+    """Frame of the positions: the recording's own, or the level one (z up)."""
     csv: Annotated[Path | None, arg(metavar="FILE")] = None
     """Write things and sounds to a CSV file as well."""
 
@@ -50,24 +53,26 @@ def contents(verb: Things, opened: "AVLMap | None" = None) -> "ContentsAnswer":
     """
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.export import write_table
+    from avlmaps.query.frames import answer_in
 
     if not 0.0 <= verb.least <= 1.0:
         raise UsageError(f"--least takes a confidence from 0 to 1, not {verb.least:g}.")
     opened = AVLMap.open(verb.map) if opened is None else opened
     held = opened.contents(verb.least, verb.name or None, verb.structure)
     if verb.csv is not None:
-        say(f"wrote {write_table(verb.csv, held.things, held.sounds)}")
-    return held.to_json(str(verb.map))
+        say(f"wrote {write_table(verb.csv, held.things, held.sounds, opened.space, FrameName(verb.frame))}")
+    return answer_in(held.to_json(str(verb.map)), FrameName(verb.frame), opened.space.level_from_recording)
 
 
 def contents_lines(answer: "ContentsAnswer") -> list[str]:
     """Lay out what `things` reports: three tables with an empty line between them."""
-    lines = thing_lines(answer["things"])
-    lines += ["", *sound_lines(answer["sounds"])] if answer["sounds"] else []
-    return [*lines, "", *room_lines(answer["rooms"])] if answer["rooms"] else lines
+    frame = answer["frame"]
+    lines = thing_lines(answer["things"], frame)
+    lines += ["", *sound_lines(answer["sounds"], frame)] if answer["sounds"] else []
+    return [*lines, "", *room_lines(answer["rooms"], frame)] if answer["rooms"] else lines
 
 
-def thing_lines(things: "list[ThingAnswer]") -> list[str]:
+def thing_lines(things: "list[ThingAnswer]", frame: str = FrameName.RECORDING) -> list[str]:
     """Lay out things as a table."""
     if not things:
         return ["no things with this confidence; lower --least to list less certain ones"]
@@ -75,10 +80,10 @@ def thing_lines(things: "list[ThingAnswer]") -> list[str]:
         (t["name"], f"{t['confidence']:.2f}", place(t["position"]), " x ".join(f"{side:.2f}" for side in t["size"]))
         for t in things
     ]
-    return table_lines(("thing", "confidence", "position", "size in m"), rows)
+    return table_lines(("thing", "confidence", f"position ({frame} frame)", "size in m (level axes)"), rows)
 
 
-def sound_lines(sounds: "list[SoundAnswer]") -> list[str]:
+def sound_lines(sounds: "list[SoundAnswer]", frame: str = FrameName.RECORDING) -> list[str]:
     """Lay out sounds as a table, in the order of their onset."""
     if not sounds:
         return ["no sounds"]
@@ -87,12 +92,12 @@ def sound_lines(sounds: "list[SoundAnswer]") -> list[str]:
          f"{s['onset_s']:.1f} - {s['offset_s']:.1f} s", place(s["position"]))
         for s in sounds
     ]  # fmt: skip
-    return table_lines(("sound", "time", "position of the robot"), rows)
+    return table_lines(("sound", "time", f"position of the robot ({frame} frame)"), rows)
 
 
-def room_lines(rooms: "list[RoomAnswer]") -> list[str]:
+def room_lines(rooms: "list[RoomAnswer]", frame: str = FrameName.RECORDING) -> list[str]:
     """Lay out rooms as a table, those with most views first."""
     if not rooms:
         return ["no rooms"]
     rows = [(r["name"], f"{r['confidence']:.2f}", place(r["position"]), str(r["views"])) for r in rooms]
-    return table_lines(("room", "confidence", "position", "views"), rows)
+    return table_lines(("room", "confidence", f"position ({frame} frame)", "views"), rows)

@@ -1,7 +1,8 @@
 """Writing a map for other programs: point clouds and meshes (PLY, GLB), occupancy grids (PGM, YAML) and tables (CSV).
 
-Positions are metres in the recording frame. An occupancy grid is a floor plan and needs z up: it is in the level frame,
-which shares the recording frame's origin; the YAML file holds the rotation between the two.
+A file says in which frame its coordinates are, metres: the recording's, or the level one, which shares its origin and
+whose z is up. An occupancy grid is a floor plan and is always level; a GLB file is level by default, and then y is up,
+as viewers of GLB expect.
 """
 
 import csv
@@ -16,10 +17,12 @@ from jaxtyping import Float, Float32, Int, UInt8
 
 from avlmaps.core.errors import BackendError, QueryError
 from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.frames import FrameName
 
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
     from avlmaps.query.contents import SoundEvent, Thing
+    from avlmaps.query.voxel_space import Space
 
 # Gray values of Nav2's map_server for mode "trinary".
 _OCCUPIED, _FREE, _UNKNOWN = 0, 254, 205
@@ -79,19 +82,24 @@ def write_ply(
     points: Float[np.ndarray, "n 3"],
     colors: UInt8[np.ndarray, "n 3"],
     columns: dict[str, np.ndarray] | None = None,
+    space: "Space | None" = None,
+    frame: FrameName = FrameName.RECORDING,
 ) -> Path:
-    """Write a binary PLY point cloud.
+    """Write a binary PLY point cloud; comments in its head name the frame, and turn it into the other one.
 
     Args:
         path: file.
         points: metres, recording frame.
         colors: RGB.
         columns: more numbers for each point (``heat``, ``weight``), written as float32.
+        space: of the map; needed for the level frame.
+        frame: of the coordinates in the file.
 
     Raises:
         QueryError: the file cannot be written.
     """
     columns = columns or {}
+    points = _in_frame(points, space, frame)
     fields = [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1")]
     rows = np.zeros(len(points), np.dtype(fields + [(name, "<f4") for name in columns]))
     for k, axis in enumerate("xyz"):
@@ -102,7 +110,8 @@ def write_ply(
         rows[name] = values
     kinds = {"<f4": "float", "u1": "uchar"}
     described = [f"property {kinds[kind]} {name}" for name, kind in fields] + [f"property float {n}" for n in columns]
-    header = ["ply", "format binary_little_endian 1.0", "comment metres, recording frame",
+    header = ["ply", "format binary_little_endian 1.0", f"comment metres, {frame} frame",
+              *([] if space is None else [f"comment level_from_recording {_matrix_text(space)}"]),
               f"element vertex {len(rows)}", *described, "end_header", ""]  # fmt: skip
     return _write(path, "\n".join(header).encode("ascii") + rows.tobytes())
 
@@ -147,8 +156,18 @@ def write_glb(
     index: Int[np.ndarray, "n 3"],
     voxel_size_m: float,
     colors: UInt8[np.ndarray, "n 3"],
+    space: "Space | None" = None,
+    frame: FrameName = FrameName.RECORDING,
 ) -> Path:
-    """Write the voxels as blocks into a GLB file, recording frame.
+    """Write the voxels as blocks into a GLB file; its ``extras`` name the frame.
+
+    Args:
+        path: file.
+        index: of the voxels.
+        voxel_size_m: their edge.
+        colors: RGB of each.
+        space: of the map; needed for the level frame.
+        frame: level: x of the level frame to the right, its z up along the file's y, its y away along −z.
 
     Raises:
         QueryError: the map is empty, or the file cannot be written.
@@ -159,8 +178,28 @@ def write_glb(
     if not len(index):
         raise QueryError("The map holds no voxels, so that there is no mesh to export.")
     vertices, triangles, shades = voxel_mesh(index, voxel_size_m, colors)
+    if frame is FrameName.LEVEL:
+        level = _in_frame(vertices, space, frame)
+        vertices = np.stack([level[:, 0], level[:, 2], -level[:, 1]], axis=1).astype(np.float32)
     mesh = trimesh.Trimesh(vertices, triangles, vertex_colors=shades, process=False)
-    return _write(path, bytes(export_glb(trimesh.Scene({"map": mesh}))))
+    scene = trimesh.Scene({"map": mesh})
+    scene.metadata["frame"] = "level, y up" if frame is FrameName.LEVEL else str(frame)
+    if space is not None:
+        scene.metadata["level_from_recording"] = space.level_from_recording.round(9).tolist()
+    return _write(path, bytes(export_glb(scene)))
+
+
+def _in_frame(points: Float[np.ndarray, "n 3"], space: "Space | None", frame: FrameName) -> Float[np.ndarray, "n 3"]:
+    """Return points of the recording frame in a frame."""
+    if frame is FrameName.RECORDING:
+        return points
+    if space is None:
+        raise ValueError("points are turned into the level frame by the space of their map")
+    return space.level(np.asarray(points, np.float64))
+
+
+def _matrix_text(space: "Space") -> str:
+    return " ".join(f"{value:.9g}" for value in space.level_from_recording.ravel())
 
 
 def write_occupancy(path: Path, obstacles: "Obstacles") -> tuple[Path, Path]:
@@ -202,25 +241,56 @@ def write_occupancy(path: Path, obstacles: "Obstacles") -> tuple[Path, Path]:
     return path, _write(described, "\n".join(lines).encode("utf-8"))
 
 
-def write_table(path: Path, things: "Iterable[Thing]", sounds: "Iterable[SoundEvent]") -> Path:
-    """Write things and sounds as CSV, one row each; positions are metres, recording frame.
+def write_table(
+    path: Path,
+    things: "Iterable[Thing]",
+    sounds: "Iterable[SoundEvent]",
+    space: "Space | None" = None,
+    frame: FrameName = FrameName.RECORDING,
+) -> Path:
+    """Write things and sounds as CSV, one row each; the column ``frame`` names that of the positions, metres.
+
+    Sizes are along the axes of the level frame in either, as the column ``size_frame`` says.
+
+    Args:
+        path: file.
+        things: rows.
+        sounds: rows.
+        space: of the map; needed for the level frame.
+        frame: of the positions.
 
     Raises:
         QueryError: the file cannot be written.
     """
     columns = ["kind", "name", "confidence", "x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m",
-               "onset_s", "offset_s"]  # fmt: skip
+               "onset_s", "offset_s", "frame", "size_frame"]  # fmt: skip
+
+    def placed(position: tuple[float, float, float]) -> list[float]:
+        return [float(value) for value in _in_frame(np.array([position]), space, frame)[0]]
+
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     for thing in things:
-        numbers = [f"{value:.3f}" for value in (thing.confidence, *thing.position, *thing.size)]
-        writer.writerow(["thing", thing.name, *numbers, "", ""])
+        numbers = [f"{value:.3f}" for value in (thing.confidence, *placed(thing.position), *thing.size)]
+        writer.writerow(["thing", thing.name, *numbers, "", "", str(frame), str(FrameName.LEVEL)])
     for sound in sounds:
         name, confidence = (sound.names[0], f"{sound.confidences[0]:.3f}") if sound.names else ("", "")
-        place = [f"{value:.3f}" for value in sound.position]
+        place = [f"{value:.3f}" for value in placed(sound.position)]
         writer.writerow(
-            ["sound", name, confidence, *place, "", "", "", f"{sound.onset_s:.3f}", f"{sound.offset_s:.3f}"]
+            [
+                "sound",
+                name,
+                confidence,
+                *place,
+                "",
+                "",
+                "",
+                f"{sound.onset_s:.3f}",
+                f"{sound.offset_s:.3f}",
+                str(frame),
+                "",
+            ]
         )
     return _write(path, text.getvalue().encode("utf-8"))
 

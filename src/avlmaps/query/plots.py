@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.frames import FrameName
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import plot_text
 from avlmaps.core.question import Modality
@@ -167,10 +168,12 @@ def draw_ground(ax: "Axes", view: TopDown, space: Space, with_walk: bool = True)
 def _name_axes(ax: "Axes", space: Space) -> None:
     """Name the axes so that their numbers are true.
 
-    Where an axis of the picture is one of the recording's, it carries that name and its numbers; elsewhere it is an
-    axis of the level frame, and arrows show where the recording's axes point.
+    Where both axes of the picture are the recording's, they carry those names and numbers; else they are axes of the
+    level frame, and arrows show where the recording's axes point.
     """
     names = [recording_axis(row) for row in space.level_from_world[:2]]
+    if picture_frame(space) is FrameName.LEVEL:
+        names = [None, None]  # the picture has one frame
     for axis, name, level in zip((ax.xaxis, ax.yaxis), names, "xy", strict=True):
         if name is None:
             axis.set_label_text(f"{level} of the level frame (m)", fontsize=8, color=INK)
@@ -181,6 +184,12 @@ def _name_axes(ax: "Axes", space: Space) -> None:
             axis.set_major_formatter(lambda value, _: f"{-value:g}")
     if None in names:
         _draw_recording_axes(ax, space)
+
+
+def picture_frame(space: Space) -> FrameName:
+    """Return the frame of a top-down picture: the recording's where its axes run along the picture's, else level."""
+    along = [recording_axis(row) for row in space.level_from_world[:2]]
+    return FrameName.LEVEL if None in along else FrameName.RECORDING
 
 
 def recording_axis(direction: Float[np.ndarray, "3"]) -> tuple[str, int] | None:
@@ -229,11 +238,14 @@ def _draw_anchors(ax: "Axes", factor: Factor) -> None:
 
 
 def _draw_goals(ax: "Axes", space: Space, goals: Sequence[Goal]) -> None:
-    """Number the goals, and write their positions, in the recording's frame, and probabilities into the legend."""
+    """Number the goals, and write their positions, in the picture's frame, and probabilities into the legend."""
+    frame = picture_frame(space)
+    named = " (level frame)" if frame is FrameName.LEVEL else ""
     for number, goal in enumerate(goals, 1):
-        mark(ax, space.level(np.array(goal.position)), str(number), INK)
-        position = ", ".join(f"{value:.2f}" for value in goal.position)
-        ax.plot([], [], " ", label=f"{number}: ({position}) m, probability {goal.probability:.2f}")
+        level = space.level(np.array(goal.position))
+        mark(ax, level, str(number), INK)
+        position = ", ".join(f"{value:.2f}" for value in (level if named else goal.position))
+        ax.plot([], [], " ", label=f"{number}: ({position}) m{named}, probability {goal.probability:.2f}")
 
 
 def mark(ax: "Axes", point_level: Float[np.ndarray, "3"], text: str, colour: str) -> None:
