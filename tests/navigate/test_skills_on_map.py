@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import GoalNotFoundError, ProgramError, QueryError
 from avlmaps.core.motion import GroundPose
+from avlmaps.core.question import Modality, Part, Question
 from avlmaps.language.program.vocabulary import Picture, Place
 from avlmaps.maps.grid import GridSpec
 from avlmaps.navigate.file_access import Readable, named_files, offered_by
 from avlmaps.navigate.footprint import Outline, middle_between
 from avlmaps.navigate.skills import Robot, RobotSettings
-from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.voxel_space import Space
 from helpers.kinematic import KinematicDriver
 from query.query_fakes import FakeViews, furnished_map, keyframes_at, sounds_of
@@ -112,6 +113,45 @@ def test_what_is_not_there_is_told_in_one_sentence_with_what_to_do() -> None:
     ):
         robot.move_to(robot.get_major_map(obj="chair") * robot.get_map(sound="dog"))
     assert robot.moves == []
+
+
+SKILLS = {
+    "move_to": lambda robot, what: robot.move_to(what),
+    "move_to_object": lambda robot, what: robot.move_to_object(what),
+    "move_in_between": lambda robot, what: robot.move_in_between(what, "table"),
+    "move_to_left": lambda robot, what: robot.move_to_left(what),
+    "move_behind": lambda robot, what: robot.move_behind(what),
+    "move_north": lambda robot, what: robot.move_north(what),
+    "face": lambda robot, what: robot.face(what),
+    "with_object_on_left": lambda robot, what: robot.with_object_on_left(what),
+    "get_pos": lambda robot, what: robot.get_pos(what),
+    "get_nearest_pos": lambda robot, what: robot.get_nearest_pos(what),
+    "get_max_pos_3d": lambda robot, what: robot.get_max_pos_3d(what),
+    "get_all_pos": lambda robot, what: robot.get_all_pos(what),
+    "get_contour": lambda robot, what: robot.get_contour(what),
+}
+
+
+@pytest.mark.parametrize("skill", SKILLS)
+@pytest.mark.parametrize("score", [0.05, 0.15, 0.95])
+def test_no_skill_takes_what_the_answer_calls_not_found(skill: str, score: float) -> None:
+    robot = furnished_robot(sounds=sounds_of([track(5.0, 3.1)], [score]))
+    answer = robot.asked.ask(Question.of([Part(Modality.OBJECT, "chair"), Part(Modality.SOUND, "dog")]))
+    heat = robot.get_major_map(obj="chair") * robot.get_map(sound="dog")
+    if answer.found:
+        SKILLS[skill](robot, heat)
+    else:
+        with pytest.raises(GoalNotFoundError, match=rf"probability {answer.probability:.2f}; .* best guess"):
+            SKILLS[skill](robot, heat)
+        assert robot.moves == []
+    assert answer.found == (score > 0.9)
+
+
+def test_a_stricter_map_stops_what_another_lets_pass() -> None:
+    strict = furnished_robot()
+    strict = Robot(AVLMap(strict.asked.stored, QuerySettings(found_at=1.0)), strict.driver)
+    with pytest.raises(GoalNotFoundError, match="best guess"):
+        strict.move_to_object("chair")
 
 
 def test_the_best_guess_is_gone_to_only_when_that_is_asked_for() -> None:
