@@ -103,8 +103,7 @@ class Bench:
         if case["drives"] == "taken over":
             field.operate(body["x"] + 20.0, body["y"] + 20.0)
         sleep(case["after_s"])
-        faulted = now()
-        self.break_it(case, client)
+        faulted = self.break_it(case, client)
         sleep(max(0.0, WITHIN_S + 1.0 - (now() - faulted)))
         operated = case["drives"] != "ours"
         verdict = self.judged(case, faulted, beats_before)
@@ -126,40 +125,51 @@ class Bench:
         self.clear(operated, case["fault"])
         return {**case, **verdict, "said": said, "load": round(_load(), 1)}
 
-    def break_it(self, case: dict[str, Any], client: Client) -> None:
-        """Do what the case says, and undo it after its time where it has one."""
-        field, fault, for_s = self.field, case["fault"], case["for_s"]
-        what, _, how = fault.rpartition(" ")
-        guard = next((row["guard"] for row in client.rows() if row["kind"] == "open"), None)
-        if fault == "client and guard kill":
-            _signal(guard, signal.SIGKILL)
-            client.process.kill()
-        elif fault == "bridge and client kill":
-            field.kill("bridge")
-            client.process.kill()
-            sleep(min(for_s, 2.0))
-            field.start("bridge")
-        elif what in ("guard", "client"):
-            _signal(guard if what == "guard" else client.process.pid, _SIGNALS[how])
-            if how == "pause":
-                sleep(for_s)
-                _signal(client.process.pid, signal.SIGCONT)
-        elif what == "body":
+    def break_it(self, case: dict[str, Any], client: Client) -> float:
+        """Do what the case says, and undo it after its time where it has one; return when it was done."""
+        done, field = now(), self.field
+        what, _, how = case["fault"].rpartition(" ")
+        if what == "body":  # the tool that says so takes seconds to start
             field.mode("body", how)
-        elif fault.startswith("way"):
-            field.way(fault.split()[1] + {"delay": f" {case['delay_s']}", "rate": f" {case['rate']}"}.get(how, ""))
-            if how in ("hole", "mute"):
-                sleep(for_s)
-                field.way("open")
+            return next(row["t"] for row in reversed(field.rows()) if row["kind"] == "mode")
+        if what.startswith("way"):
+            self.block_way(case)
+        elif "client" in what or "guard" in what:
+            self.end_program(case, client)
         else:
             field.kill(what, signal.SIGSTOP if how == "pause" else signal.SIGKILL)
-            if how == "kill":
-                return
-            sleep(for_s)
+            if how != "kill":
+                sleep(case["for_s"])
             if how == "pause":
                 field.kill(what, signal.SIGCONT)
-            else:
+            elif how == "restart":
                 field.start(what)
+        return done
+
+    def block_way(self, case: dict[str, Any]) -> None:
+        """Cut, swallow, delay or slow down what goes between the program and the bridge."""
+        how = case["fault"].split()[1]
+        self.field.way(how + {"delay": f" {case['delay_s']}", "rate": f" {case['rate']}"}.get(how, ""))
+        if case["fault"] in ("way hole", "way mute"):
+            sleep(case["for_s"])
+            self.field.way("open")
+
+    def end_program(self, case: dict[str, Any], client: Client) -> None:
+        """Kill, pause or end the program, its guard, or both."""
+        what, _, how = case["fault"].rpartition(" ")
+        guard = next((row["guard"] for row in client.rows() if row["kind"] == "open"), None)
+        if "bridge" in what:
+            self.field.kill("bridge")
+        if "guard" in what:
+            _signal(guard, _SIGNALS[how])
+        if "client" in what:
+            _signal(client.process.pid, _SIGNALS[how])
+        if how == "pause":
+            sleep(case["for_s"])
+            _signal(client.process.pid, signal.SIGCONT)
+        if "bridge" in what:
+            sleep(min(case["for_s"], 2.0))
+            self.field.start("bridge")
 
     def judged(self, case: dict[str, Any], faulted: float, beats_before: int) -> dict[str, Any]:
         field = self.field
@@ -217,13 +227,13 @@ def _load() -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description="Random faults under a drive.")
     parser.add_argument("--cases", type=int, default=200)
-    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--only", type=int, nargs="*", help="numbers of the cases; all of them by default")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("ros1_faults.jsonl"))
     given = parser.parse_args()
     cases: Queue[int] = Queue()
-    for number in range(given.first, given.cases):
+    for number in given.only or range(given.cases):
         cases.put(number)
 
     def work(number: int) -> None:
