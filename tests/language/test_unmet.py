@@ -18,6 +18,7 @@ from avlmaps.language.intents import (
     Repeat,
     Target,
     Turn,
+    VisitEach,
     Wait,
     Way,
 )  # fmt: skip
@@ -133,6 +134,7 @@ def test_a_question_does_not_drive(command: str) -> None:
     "command",
     ["go to my room", "go to her room", "go to the object most likely to bark", "go to the quietest room",
      "go to the darkest corner", "drive along the wall", "follow the wall", "follow the corridor",
+     "go somewhere safe", "go to a safe place", "go to a quiet room", "go to a random room",
      "go to the thing", "go to the chair 2 m left of the table in 3 m", "go to the second nearest chair"],
 )  # fmt: skip
 def test_what_the_map_cannot_know_is_asked(command: str) -> None:
@@ -293,3 +295,7 @@ def test_the_side_or_the_place_that_is_not_meant_is_not_taken(command: str) -> N
     read = read_command(command)
     meant = {"turn left, not right": Turn(-90.0), "turn right instead of left": Turn(90.0)}.get(command)
     assert read.stops is not None or read.intents == (meant,)
+
+
+def test_every_room_is_no_room_without_a_name() -> None:
+    assert intents("go to every room") == (VisitEach(Target(Kind.AREA, "room")),)

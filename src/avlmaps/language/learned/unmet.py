@@ -27,6 +27,7 @@ from avlmaps.language.intents import (
     Side,
     StopAt,
     Turn,
+    VisitEach,
 )  # fmt: skip
 from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.said import BREAKS, DETERMINERS, LOOKS, PREPOSITIONS, Claimed, Said, words
@@ -226,7 +227,16 @@ def _nameless(said: Claimed) -> Clarify | None:
     for before, text in pairwise(said.texts):
         if before in ("to", "towards", "toward", "find", "visit", "near", "approach") and text in _ANYTHING:
             return Clarify(f"Which thing is '{text}'? Name it.")
+    lists = words().lists
+    for at in said.named:  # "a safe place" is no safe
+        after = said.texts[at + 1] if at + 1 < len(said.texts) else ""
+        vague = said.texts[at - 1 : at] in (("somewhere",), ("someplace",), ("anywhere",))
+        if said.texts[at] in lists["states"] and (vague or (after in lists["anyone"] and at + 1 not in said.named)):
+            return Clarify("Which place? Name it, or say what it is near.")
+    every = {one.of for one in said.steps if isinstance(one, VisitEach)}
     for target in said.targets:
+        if target in every:
+            continue
         bare = target.name.split()
         if bare and bare[-1] in words().lists["anyone"] and not target.near and not target.pick and _says_nothing(bare):
             likely = next((w for w in ("likely", "probable", "probably") if w in said.texts), None)
@@ -236,7 +246,9 @@ def _nameless(said: Claimed) -> Clarify | None:
 
 
 def _says_nothing(bare: Sequence[str]) -> bool:
-    return all(word in DETERMINERS or word in ("'s", "robot") or word in words().lists["anyone"] for word in bare)
+    lists, name = words().lists, " ".join(bare)
+    empty = DETERMINERS | lists["anyone"] | lists["states"] | {"'s", "robot"}
+    return all(word in empty for word in bare) and (len(bare) == 1 or not _is_entry(name))
 
 
 def _unread(said: Claimed) -> Clarify | None:
