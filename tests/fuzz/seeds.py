@@ -1,5 +1,6 @@
 """Small inputs that are whole: a recording in each format and a map, for the fuzz campaign to break."""
 
+# pyright: reportMissingImports=false
 import sys
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from test_rosbag import write_bag  # noqa: E402
 
 from avlmaps.maps.build import build_map  # noqa: E402
 from avlmaps.recordings.open import open_recording  # noqa: E402
+from helpers import bag_writers, format_writers  # noqa: E402
 
 PROFILE = build_fakes.register_fakes()
 
@@ -41,6 +43,10 @@ def write_seeds(folder: Path) -> dict[str, Path]:
     for kind in ("ros1", "ros2", "mcap"):
         (folder / kind).mkdir()
         found[kind] = write_bag(folder / kind, kind, sound=True)
+    for name, written in format_writers.WRITTEN.items():
+        if name not in found and written.format == name:
+            found[name] = written.write(folder / f"room_{name}", written.truth())
+    found["foxglove"] = bag_writers.write_foxglove(folder / "foxglove", format_writers.example_truth())
     found["map"] = folder / "walk.avlmap"
     build_map(open_recording(walk), found["map"], PROFILE, build_fakes.SETTINGS, progress=False)
     return found

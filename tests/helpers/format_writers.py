@@ -62,7 +62,8 @@ def picture(path: Path, rgb: np.ndarray) -> None:
 
 
 def encoded(rgb: np.ndarray, suffix: str = ".jpg") -> bytes:
-    return cv2.imencode(suffix, rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes()
+    options = [cv2.IMWRITE_JPEG_QUALITY, 95] if suffix == ".jpg" else []
+    return cv2.imencode(suffix, rgb[..., ::-1], options)[1].tobytes()
 
 
 def units(depth_m: np.ndarray, per_m: float = 1000.0) -> np.ndarray:

@@ -128,7 +128,10 @@ def test_a_map_is_told_from_a_recording(tmp_path: Path):
     [
         (("mav0/imu0/data.csv",), "holds measurements of an IMU and no pictures, from which no map can be built"),
         (("imu0/data.csv", "cam0/data.csv"), "an IMU and cameras without depth, from which no map is built"),
-        (("frame-000000.depth.pgm", "_info.txt"), "unpacked by ScanNet's C++ reader, whose .depth.pgm is not read"),
+        (
+            ("frame-000000.color.jpg", "frame-000000.depth.pgm", "_info.txt"),
+            "unpacked by ScanNet's C++ reader, whose .depth.pgm is not read",
+        ),
         (("images/0.jpg", "sparse/0/cameras.bin"), "is a reconstruction of COLMAP"),
         (("scene_00_0000.depth", "scene_00_0000.png"), "is ICL-NUIM in POV-Ray's own files"),
     ],

@@ -54,7 +54,7 @@ class Bag:
         """Yield (receive time in ns, message) of a topic."""
         connections = self.connections(topic)
         if connections:
-            with self._readable(topic):
+            with self.readable(topic):
                 for connection, received_ns, raw in self._container.messages(connections):
                     yield received_ns, self._container.message(connection, raw)
 
@@ -62,7 +62,7 @@ class Bag:
         """Return the header stamps (s) and receive times (ns) of a topic's messages."""
         stamps_s: list[float] = []
         received: list[int] = []
-        with self._readable(topic):
+        with self.readable(topic):
             for connection, received_ns, raw in self._container.messages(self.connections(topic)):
                 stamps_s.append(self._container.stamp_s(connection, raw))
                 received.append(received_ns)
@@ -70,7 +70,7 @@ class Bag:
 
     def message_at(self, topic: str, received_ns: int, stamp_s: float) -> Any:
         """Return the message of a topic that was received and stamped so."""
-        with self._readable(topic):
+        with self.readable(topic):
             found = self._container.messages(self.connections(topic), received_ns, received_ns + 1)
             for connection, _, raw in found:
                 if abs(self._container.stamp_s(connection, raw) - stamp_s) < 1e-6:
@@ -80,7 +80,7 @@ class Bag:
         )
 
     @contextmanager
-    def _readable(self, topic: str) -> Generator[None]:
+    def readable(self, topic: str) -> Generator[None]:
         """Turn what rosbags, sqlite and decompressors raise over damaged messages into one sentence."""
         try:
             yield

@@ -103,7 +103,9 @@ def _transforms(m: Any, kind: str) -> SimpleNamespace:
             SimpleNamespace(
                 header=_header(t, t.parent_frame_id),
                 child_frame_id=t.child_frame_id,
-                transform=SimpleNamespace(translation=t.translation, rotation=t.rotation),
+                transform=SimpleNamespace(
+                    translation=_numbers(t.translation, "xyz"), rotation=_numbers(t.rotation, "xyzw")
+                ),
             )
             for t in several
         ],
@@ -111,7 +113,12 @@ def _transforms(m: Any, kind: str) -> SimpleNamespace:
 
 
 def _pose(m: Any, kind: str) -> SimpleNamespace:
-    return SimpleNamespace(__msgtype__=kind, header=_header(m, m.frame_id), pose=m.pose)
+    pose = SimpleNamespace(position=_numbers(m.pose.position, "xyz"), orientation=_numbers(m.pose.orientation, "xyzw"))
+    return SimpleNamespace(__msgtype__=kind, header=_header(m, m.frame_id), pose=pose)
+
+
+def _numbers(value: Any, names: str) -> SimpleNamespace:
+    return SimpleNamespace(**{name: float(getattr(value, name)) for name in names})
 
 
 def _cloud(m: Any, kind: str) -> SimpleNamespace:

@@ -100,6 +100,8 @@ class McapFile:
         self._held: OrderedDict[int, bytes] = OrderedDict()
         self._lock = threading.Lock()
         self._stream: BinaryIO = path.open("rb")
+        self._size = self._stream.seek(0, 2)
+        self._stream.seek(0)
         found: dict[int, list[tuple[int, int, int]]] = {}
         try:
             self._read(found)
@@ -128,7 +130,7 @@ class McapFile:
         if op != _HEADER:
             raise self._damaged("it has no header")
         self.profile = _text(content, 0)[0]
-        size = self._stream.seek(0, 2)
+        size = self._size
         self._stream.seek(max(0, size - len(MAGIC) - _FOOTER_BYTES))
         tail = self._stream.read()
         if not tail.endswith(MAGIC) or len(tail) < _FOOTER_BYTES or tail[0] != _FOOTER:
@@ -288,6 +290,8 @@ class McapFile:
     def _bytes(self, at: int, count: int) -> bytes:
         if count > _MOST_CHUNK_BYTES:
             raise self._damaged(f"a record says that it has {count:,} bytes")
+        if not 0 <= at <= self._size:
+            raise self._damaged(f"an offset leads to byte {at:,} of {self._size:,}")
         self._stream.seek(at)
         content = self._stream.read(count)
         if len(content) != count:

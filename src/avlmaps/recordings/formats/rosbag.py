@@ -78,7 +78,13 @@ def open_rosbag(path: Path, topics: Mapping[str, str] | None = None, more: Seque
     for name in topics or {}:
         if name not in known:
             raise RecordingError(f"There is no {name!r} among the topics that can be named: {', '.join(known)}.")
-    return RosbagRecording(Path(path), RosTopics(**(topics or {})), more)
+    try:
+        return RosbagRecording(Path(path), RosTopics(**(topics or {})), more)
+    except AttributeError as error:
+        raise RecordingError(
+            f"A message of {path} lacks a field ({error}); the bag's definition of it is damaged, or of another "
+            "version."
+        ) from error
 
 
 class RosbagRecording(Recording):
@@ -151,15 +157,17 @@ class RosbagRecording(Recording):
         """Read one frame."""
         received_ns, stamp_s = self._rgb_at[index]
         name = f"{self._rgb_topic} at {stamp_s:.3f} s"
-        rgb = colour_of(self._bag.message_at(self._rgb_topic, received_ns, stamp_s), name, self.rig.rgb)
+        with self._bag.readable(self._rgb_topic):
+            rgb = colour_of(self._bag.message_at(self._rgb_topic, received_ns, stamp_s), name, self.rig.rgb)
         received_ns, stamp_s = self._depth_at[index]
         name = f"{self._depth_topic} at {stamp_s:.3f} s"
-        message = self._bag.message_at(self._depth_topic, received_ns, stamp_s)
-        if self._of_points:
-            points = apply(self._camera_from_cloud[index], ros_clouds.points_of(message, name))
-            depth_m = ros_clouds.depth_of_points(points, self.rig.depth)
-        else:
-            depth_m = depth_of(message, name, self.rig.depth)
+        with self._bag.readable(self._depth_topic):
+            message = self._bag.message_at(self._depth_topic, received_ns, stamp_s)
+            if self._of_points:
+                points = apply(self._camera_from_cloud[index], ros_clouds.points_of(message, name))
+                depth_m = ros_clouds.depth_of_points(points, self.rig.depth)
+            else:
+                depth_m = depth_of(message, name, self.rig.depth)
         for picture, camera in ((rgb, self.rig.rgb), (depth_m, self.rig.depth)):
             if picture.shape[:2] != (camera.height, camera.width):
                 raise RecordingError(

@@ -53,6 +53,10 @@ class _Database:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._local = threading.local()
+        try:
+            checked_size(path, SAMPLED_BYTES)
+        except OSError as error:
+            raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None
         wal = path.with_name(path.name + "-wal")
         if wal.is_file() and wal.stat().st_size > 0:
             raise RecordingError(
@@ -74,7 +78,6 @@ class _Database:
     def rows(self, query: str, *values: Any) -> list[tuple[Any, ...]]:
         with self.told():
             if not hasattr(self._local, "connection"):
-                checked_size(self.path, SAMPLED_BYTES)
                 # immutable: nothing is written beside the file, not even a lock.
                 uri = f"{self.path.resolve().as_uri()}?mode=ro&immutable=1"
                 self._local.connection = sqlite3.connect(uri, uri=True)

@@ -18,6 +18,7 @@ from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, settle
 from avlmaps.recordings.formats.tables import read_matrix, read_pose_files
 from avlmaps.recordings.images import first_picture_size
+from avlmaps.recordings.unreadable import why_unreadable
 
 RATE_HZ = 30.0
 _INTRINSICS = "camera-intrinsics.txt"
@@ -39,6 +40,8 @@ def open_seven_scenes(path: Path, report: Report = stop_at_first) -> FileRecordi
     files = set(list_names(path, (*_COLOUR, ".depth.png", ".pose.txt")))
     colour = {name[: -len(_COLOUR[0])]: name for name in sorted(files) if name.endswith(_COLOUR)}
     stems = _whole(colour, files)
+    if not stems and (why := why_unreadable(path)):
+        raise RecordingError(why)
     if not stems:
         raise RecordingError(
             f"{path} holds no frame with its three files (frame-000000.color.jpg or .png, .depth.png, .pose.txt)."
