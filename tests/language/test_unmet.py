@@ -299,3 +299,17 @@ def test_the_side_or_the_place_that_is_not_meant_is_not_taken(command: str) -> N
 
 def test_every_room_is_no_room_without_a_name() -> None:
     assert intents("go to every room") == (VisitEach(Target(Kind.AREA, "room")),)
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["go to the stove, then to the smoke alarm if you can hear it", "go to the door if the light is on",
+     "go to the sofa unless someone is there", "turn left if there is a wall"],
+)  # fmt: skip
+def test_a_condition_is_never_dropped(command: str) -> None:
+    stops(command)
+
+
+@pytest.mark.parametrize("command", ["go to the sofa if you can", "if it is not too much trouble, go to the sofa"])
+def test_manners_are_no_condition(command: str) -> None:
+    assert intents(command) == (Go(Target(Kind.OBJECT, "sofa")),)

@@ -31,6 +31,8 @@ def forbidden(tokens: Sequence[Token]) -> Clarify | Refuse | None:
         return Refuse(Reason.HARM)
     if any(_ends_with(said, end) for _, end in said.spans("cancels")):
         return Refuse(Reason.NEGATION)
+    if any(said.texts[at - 1 : at] not in (("as",), ("even",)) for at, _ in said.spans("conditions")):
+        return Refuse(Reason.CONDITION)
     if said.spans("risks") or said.spans("questions"):
         return Refuse(Reason.QUESTION)
     return _timed(said) or _signed(said)

@@ -50,6 +50,7 @@ def words() -> Words:
         "excluded",
         "choosing",
         "cancels",
+        "conditions",
         "ways",
         "unsafe",
         "risks",
