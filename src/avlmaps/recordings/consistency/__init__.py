@@ -1,0 +1,1 @@
+"""Whether a recording agrees with itself: depth, poses, intrinsics and colour of frames that see the same place."""

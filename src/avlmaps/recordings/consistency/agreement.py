@@ -1,0 +1,159 @@
+"""How well the frames of a sample agree: where points of one frame lie in another, and whether they look alike."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from avlmaps.core import poses
+from avlmaps.core.camera import Rig
+from avlmaps.recordings.consistency.sample import Sample, Surfaces
+
+# A surface is the same where the depths differ by no more than this: that of a depth camera's error.
+SAME_M, SAME_SHARE = 0.03, 0.02
+# A point is seen through where the other frame sees this much farther in all directions around: in floors, in shares.
+BEHIND, BEHIND_SHARE = 2.0, 0.04
+# A pair with fewer points in view says nothing.
+FEWEST_POINTS = 25
+_LEAST_DEPTH_M = 0.02
+# Brightness that varies less, of 255, is noise.
+LEAST_CONTRAST = 6.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Agreement:
+    """Counts of pairs of frames.
+
+    Attributes:
+        points: (p,) points of the one frame that the other has in view, with a depth there.
+        same: (p,) of them on the surface that the other sees.
+        through: (p,) of them in front of what the other sees: it looks through them.
+        hidden: (p,) of them behind it.
+        outside: share of all points that their partner does not have in view.
+        likeness: correlation of brightness of the same points, over all pairs; NaN where nothing varies.
+        alike: (p,) the same of each pair; NaN where too few points have colour, or it hardly varies.
+        textured: points on the same surface that both frames have the colour of.
+        contrast: by how much their brightness varies, of 255.
+    """
+
+    points: Int[np.ndarray, " p"]
+    same: Int[np.ndarray, " p"]
+    through: Int[np.ndarray, " p"]
+    hidden: Int[np.ndarray, " p"]
+    outside: float
+    likeness: float
+    alike: Float[np.ndarray, " p"]
+    textured: int
+    contrast: float
+
+    @property
+    def pairs(self) -> int:
+        """Number of pairs with enough points."""
+        return int((self.points >= FEWEST_POINTS).sum())
+
+    def share(self, counts: Int[np.ndarray, " p"]) -> float:
+        """Return a share of the points of the pairs that count."""
+        used = self.points >= FEWEST_POINTS
+        return float(counts[used].sum() / max(self.points[used].sum(), 1))
+
+    def worst(self, counts: Int[np.ndarray, " p"], quantile: float) -> float:
+        """Return a quantile over pairs of their shares."""
+        used = self.points >= FEWEST_POINTS
+        return float(np.quantile(counts[used] / self.points[used], quantile)) if used.any() else 0.0
+
+    @property
+    def same_share(self) -> float:
+        """Share of points on the surface that the other frame sees."""
+        return self.share(self.same)
+
+    @property
+    def through_share(self) -> float:
+        """Share of points that the other frame looks through."""
+        return self.share(self.through)
+
+
+_NONE = np.zeros(0, np.int64)
+NOTHING = Agreement(_NONE, _NONE, _NONE, _NONE, 0.0, float("nan"), np.zeros(0), 0, 0.0)
+
+
+def compare(
+    sample: Sample, surfaces: Surfaces, world_from_camera: Float[np.ndarray, "f 4 4"], rig: Rig | None = None,
+    scale: float = 1.0, floor_m: float = SAME_M,
+) -> Agreement:  # fmt: skip
+    """Compare the pairs of a sample.
+
+    Args:
+        sample: the pictures.
+        surfaces: of its depth.
+        world_from_camera: poses of the frames.
+        rig: other cameras than the sample's.
+        scale: what its depths are multiplied by.
+        floor_m: by how much depths of one surface may differ however near it is.
+    """
+    rig = rig or sample.rig
+    camera = rig.depth
+    a, b = sample.pairs[:, 0], sample.pairs[:, 1]
+    if len(a) == 0:
+        return NOTHING
+    row, column, there = surfaces.row[a], surfaces.column[a], surfaces.there[a]
+    z = sample.depth_m[a[:, None], row, column].astype(np.float64) * scale
+    x = (column + 0.5 - camera.cx) / camera.fx * z
+    y = (row + 0.5 - camera.cy) / camera.fy * z
+    points = np.stack([x, y, z], axis=-1)
+    b_from_a = poses.inverse(world_from_camera[b]) @ world_from_camera[a]
+    moved = np.einsum("pij,pmj->pmi", b_from_a[:, :3, :3], points) + b_from_a[:, None, :3, 3]
+    far = moved[..., 2]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        u = camera.fx * moved[..., 0] / far + camera.cx
+        v = camera.fy * moved[..., 1] / far + camera.cy
+    inside = there & (far > _LEAST_DEPTH_M) & (u >= 0.0) & (v >= 0.0) & (u < camera.width) & (v < camera.height)
+    at_u, at_v = np.where(inside, u, 0.0).astype(int), np.where(inside, v, 0.0).astype(int)
+    near = surfaces.near_m[b[:, None], at_v, at_u] * scale
+    deep = surfaces.far_m[b[:, None], at_v, at_u] * scale
+    seen = inside & (near > 0.0)
+    same = seen & (far > near - floor_m - SAME_SHARE * far) & (far < deep + floor_m + SAME_SHARE * far)
+    through = seen & (near > far + BEHIND * floor_m + BEHIND_SHARE * far)
+    hidden = seen & (deep < far - BEHIND * floor_m - BEHIND_SHARE * far)
+    outside = 1.0 - float(inside.sum() / max(there.sum(), 1))
+    counts = (seen.sum(axis=1), same.sum(axis=1), through.sum(axis=1), hidden.sum(axis=1))
+    return Agreement(*counts, outside, *_likeness(sample, rig, (a, b), points, moved, same))
+
+
+def _likeness(
+    sample: Sample,
+    rig: Rig,
+    rows: tuple[np.ndarray, np.ndarray],
+    points: Float[np.ndarray, "p m 3"],
+    moved: Float[np.ndarray, "p m 3"],
+    same: np.ndarray,
+) -> tuple[float, Float[np.ndarray, " p"], int, float]:
+    """Return the correlation of brightness of the same points, of each pair, of how many, and how much it varies."""
+    one, ok_one = _looked_up(sample, rig, rows[0], points)
+    two, ok_two = _looked_up(sample, rig, rows[1], moved)
+    used = same & ok_one & ok_two
+    count = used.sum(axis=1)
+    enough = count >= FEWEST_POINTS
+    used &= enough[:, None]
+    total = np.maximum(used.sum(axis=1, keepdims=True), 1)
+    one = np.where(used, one - np.where(used, one, 0.0).sum(axis=1, keepdims=True) / total, 0.0)
+    two = np.where(used, two - np.where(used, two, 0.0).sum(axis=1, keepdims=True) / total, 0.0)
+    power = np.stack([(one * one).sum(axis=1), (two * two).sum(axis=1)])
+    common, varies = (one * two).sum(axis=1), enough & (power > total[:, 0] * LEAST_CONTRAST**2).all(axis=0)
+    alike = np.full(len(one), np.nan)
+    alike[varies] = common[varies] / np.sqrt(power[0, varies] * power[1, varies])
+    textured, spread = int(used.sum()), float(np.sqrt(power[0].sum() * power[1].sum()))
+    likeness = float(common.sum()) / spread if spread > 0.0 else float("nan")
+    return likeness, alike, textured, float(np.sqrt(power.sum(axis=1).min() / max(textured, 1)))
+
+
+def _looked_up(
+    sample: Sample, rig: Rig, frames: np.ndarray, points: Float[np.ndarray, "p m 3"]
+) -> tuple[np.ndarray, np.ndarray]:
+    camera = rig.rgb
+    seen = points @ rig.rgb_from_depth[:3, :3].T + rig.rgb_from_depth[:3, 3]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        u = camera.fx * seen[..., 0] / seen[..., 2] + camera.cx
+        v = camera.fy * seen[..., 1] / seen[..., 2] + camera.cy
+    ok = (seen[..., 2] > _LEAST_DEPTH_M) & (u >= 0.0) & (v >= 0.0) & (u < camera.width) & (v < camera.height)
+    at_u, at_v = np.where(ok, u, 0.0).astype(int), np.where(ok, v, 0.0).astype(int)
+    return sample.grey[frames[:, None], at_v, at_u].astype(np.float64), ok

@@ -1,0 +1,136 @@
+"""A suspect in words: what the recording looks like, and how to read it instead."""
+
+from avlmaps.core.camera import Rig
+from avlmaps.recordings.camera_axes import NAMED
+from avlmaps.recordings.consistency.suspects import UNITS, Suspect, Turn, suspected_rig
+from avlmaps.recordings.corrections import Corrections, GivenCamera, PoseKind
+
+# A camera in a building looks at this much, in the middle of what it sees.
+USUAL_DEPTH_M = (0.4, 7.0)
+_CLOSE = 0.06
+
+
+def cause_of(suspect: Suspect, rig: Rig, stored_unit_m: float, median_m: float, gain: str) -> str:
+    """Return what a recording looks like and what to do about it.
+
+    Args:
+        suspect: with which it agrees.
+        rig: its cameras.
+        stored_unit_m: metres of one unit of its depth as it is read.
+        median_m: middle of its depths, as they are read.
+        gain: how much better the recording agrees, in parentheses.
+    """
+    looks = " and ".join(_looks(suspect, rig, median_m))
+    options, hands = _options(suspect, rig, stored_unit_m, median_m), _by_hand(suspect, median_m)
+    todo: list[str] = []
+    if options:
+        todo.append(f"build again with {options.words()}")
+    if hands:
+        todo.append(hands)
+    return f"{looks[:1].upper()}{looks[1:]} {gain}: {', and '.join(todo)}."
+
+
+def _looks(suspect: Suspect, rig: Rig, median_m: float) -> list[str]:
+    given, said = suspect.given, list[str]()
+    if PoseKind.WXYZ in given.poses:
+        said.append("the quaternions look written w first (wxyz)")
+    if PoseKind.CAMERA_FROM_WORLD in given.poses:
+        said.append("the poses look like camera_from_world")
+    if PoseKind.WORLD_FROM_CAMERA in given.poses:
+        said.append("the poses look like world_from_camera")
+    if given.camera_axes is not None:
+        said.append(f"the poses look like those of {_camera(given.camera_axes)}")
+    if given.pose_delay_s:
+        late = "late" if given.pose_delay_s > 0.0 else "early"
+        said.append(f"the poses look {abs(given.pose_delay_s):.2g} s {late}")
+    if suspect.scale != 1.0:
+        said.append(_scale(suspect.scale, median_m))
+    if suspect.centred:
+        size = f"{2 * rig.depth.cx:.0f}x{2 * rig.depth.cy:.0f}"
+        said.append(f"the intrinsics look like those of a {size} picture, not {rig.depth.width}x{rig.depth.height}")
+    if suspect.swapped:
+        said.append("the numbers of columns and rows in the intrinsics look exchanged")
+    if suspect.focal is not None:
+        said.append(f"the focal length looks like {suspect.focal:.2f} of what is given")
+    if suspect.along_ray:
+        said.append("the depth looks like the distance along the ray, not along the camera's axis")
+    return said + _turned(suspect.turn_colour, suspect.turn_depth)
+
+
+def _camera(axes: str) -> str:
+    names = {"opengl": "an OpenGL camera (y up, z back)", "ros": "a body (x forward)", "opencv": "an OpenCV camera"}
+    return names.get(axes, f"a camera with the axes {axes} (turned pictures, or another convention)")
+
+
+def _turned(colour: Turn | None, depth: Turn | None) -> list[str]:
+    if colour is not None and colour == depth:
+        return [f"the pictures look {colour.words()}"]
+    said = [(f"the {what} pictures look", turn) for what, turn in (("colour", colour), ("depth", depth))]
+    return [f"{what} {turn.words()}" for what, turn in said if turn is not None]
+
+
+def _scale(scale: float, median_m: float) -> str:
+    """Return whether depth or positions are out of scale, as far as usual depths say it."""
+    times = f"{max(scale, 1.0 / scale):.3g} times too {'small' if scale > 1.0 else 'large'}"
+    if _is_depth(scale, median_m):
+        return f"the depth looks {times}"
+    other = f"{max(scale, 1.0 / scale):.3g} times too {'large' if scale > 1.0 else 'small'}"
+    if _is_positions(scale, median_m):
+        return f"the positions look {other} (poses of one camera alone have no scale)"
+    return f"the depth looks {times}, or the positions {other}"
+
+
+def _usual(median_m: float) -> bool:
+    return USUAL_DEPTH_M[0] <= median_m <= USUAL_DEPTH_M[1]
+
+
+def _is_unit(scale: float) -> bool:
+    return any(abs(scale / unit - 1.0) < _CLOSE for unit in UNITS)
+
+
+def _is_depth(scale: float, median_m: float) -> bool:
+    return _is_unit(scale) and _usual(scale * median_m) and not _usual(median_m)
+
+
+def _is_positions(scale: float, median_m: float) -> bool:
+    return not _is_unit(scale) or (_usual(median_m) and not _usual(scale * median_m))
+
+
+def _options(suspect: Suspect, rig: Rig, stored_unit_m: float, median_m: float) -> Corrections:
+    cameras: tuple[GivenCamera, ...] = ()
+    if suspect.centred and rig.registered:
+        size = (round(2 * rig.rgb.cx), round(2 * rig.rgb.cy))
+        cameras = (GivenCamera(rig.rgb.fx, rig.rgb.fy, rig.rgb.cx, rig.rgb.cy, size),)
+    elif suspect.centred or suspect.swapped or suspect.focal is not None:
+        other = suspected_rig(rig, suspect) or rig
+        both = (other.rgb,) if rig.registered else (other.rgb, other.depth)
+        cameras = tuple(GivenCamera(camera.fx, camera.fy, camera.cx, camera.cy) for camera in both)
+    depth = suspect.scale != 1.0 and not _is_positions(suspect.scale, median_m)
+    return Corrections(
+        depth_unit_m=stored_unit_m * suspect.scale if depth else None,
+        intrinsics=cameras,
+        poses=suspect.given.poses,
+        camera_axes=_named(suspect.given.camera_axes),
+        pose_delay_s=suspect.given.pose_delay_s,
+    )
+
+
+def _named(axes: str | None) -> str | None:
+    return next((name for name, letters in NAMED.items() if letters == axes), axes)
+
+
+def _by_hand(suspect: Suspect, median_m: float) -> str:
+    """Return what no option does."""
+    todo: list[str] = []
+    if suspect.scale != 1.0 and not _is_depth(suspect.scale, median_m):
+        alone = _is_positions(suspect.scale, median_m)
+        todo.append(f"{'' if alone else 'or '}multiply the positions by {1.0 / suspect.scale:.3g}")
+    if suspect.turn_colour is not None and suspect.turn_depth is not None:
+        todo.append("turn the pictures as the poses have them")
+    elif suspect.turn_colour is not None:
+        todo.append("turn the colour pictures as the depth is")
+    elif suspect.turn_depth is not None:
+        todo.append("turn the depth pictures as the colour is")
+    if suspect.along_ray:
+        todo.append("write the depth along the camera's axis (z)")
+    return ", ".join(todo)

@@ -1,0 +1,243 @@
+"""A few frames of a recording at low resolution, and which of them see the same place: what the check looks at."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int
+
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.poses import rotation_angle_rad
+from avlmaps.recordings.types import Recording
+
+WIDTH = 128
+POINTS = 320
+PAIRS = 30  # that follow in time, at most
+# How far a camera moves between the frames of a pair: degrees and metres count alike where both are one such step.
+STEP_RAD = np.radians(12.0)
+STEP_M = 0.35
+STEPS = (0.5, 1.2)
+REVISITS = 6
+JUMPS = 4
+# A step this many times the usual one is a jump that is looked at.
+JUMP_RATIO = 4.0
+# A neighbourhood whose depths differ by more is an edge, of which no point is taken.
+_SMOOTH = 0.06
+# Of a pixel and its neighbours, with a depth.
+_FEWEST_AROUND = 4
+# A pair is compared at most this much later where the poses hardly move: the clock then says that they should.
+_LATEST_SHARE = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Frames at low resolution, and pairs of them.
+
+    Attributes:
+        index: (f,) numbers of the frames in the recording.
+        stamps_s: (f,) when.
+        world_from_camera: (f, 4, 4) poses as they are read.
+        depth_m: (f, h, w) z-depth, 0 where there is none.
+        grey: (f, hc, wc) brightness, 0 to 255.
+        rig: the cameras at these sizes.
+        pairs: (p, 2) rows of frames that should see the same place, the earlier first.
+        follows: (p,) whether the frames of a pair follow one another in time; the others are where a walk returns.
+    """
+
+    index: Int[np.ndarray, " f"]
+    stamps_s: Float[np.ndarray, " f"]
+    world_from_camera: Float[np.ndarray, "f 4 4"]
+    depth_m: Float32[np.ndarray, "f h w"]
+    grey: Float32[np.ndarray, "f hc wc"]
+    rig: Rig
+    pairs: Int[np.ndarray, "p 2"]
+    follows: Bool[np.ndarray, " p"]
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def only(self, chosen: Bool[np.ndarray, " p"] | Int[np.ndarray, " k"]) -> "Sample":
+        """Return the same pictures with some of the pairs."""
+        return replace(self, pairs=self.pairs[chosen], follows=self.follows[chosen])
+
+
+def draw_sample(recording: Recording) -> Sample:
+    """Choose frames by their poses and read them; frames that cannot be read are left out.
+
+    Raises:
+        RecordingError: none of them can be read.
+    """
+    pairs, follows = choose_pairs(recording.world_from_camera, recording.stamps_s)
+    index = np.unique(pairs) if len(pairs) else np.arange(min(len(recording), 1))
+    rig = _small_rig(recording.rig)
+    read: list[int] = []
+    depth: list[np.ndarray] = []
+    grey: list[np.ndarray] = []
+    fault: RecordingError | None = None
+    for number in index.tolist():
+        try:
+            frame = recording.frame(number)
+        except RecordingError as error:
+            fault = error
+            continue
+        read.append(number)
+        depth.append(_nearest(frame.depth_m, rig.depth))
+        grey.append(_brightness(frame.rgb, rig.rgb))
+    if not read:
+        raise fault or RecordingError(f"{recording.path} has no frame; there is nothing to check.")
+    kept = np.isin(pairs, read).all(axis=1)
+    return Sample(
+        index=np.array(read),
+        stamps_s=recording.stamps_s[read],
+        world_from_camera=recording.world_from_camera[read],
+        depth_m=np.stack(depth),
+        grey=np.stack(grey),
+        rig=rig,
+        pairs=np.searchsorted(np.array(read), pairs[kept]),
+        follows=follows[kept],
+    )
+
+
+def choose_pairs(
+    pose: Float[np.ndarray, "n 4 4"], stamps_s: Float[np.ndarray, " n"]
+) -> tuple[Int[np.ndarray, "p 2"], Bool[np.ndarray, " p"]]:
+    """Return pairs of frames that should see the same place, and which of them follow one another in time.
+
+    These are pairs after a step and across jumps; the others are where a walk returns.
+    """
+    n = len(pose)
+    if n < 2:
+        return np.zeros((0, 2), np.int64), np.zeros(0, bool)
+    found: dict[tuple[int, int], None] = {}
+    latest = max(2, round(_LATEST_SHARE * n))
+    for a in _spread(n - 1):
+        if len(found) >= PAIRS:
+            break
+        moved = steps_between(pose[a], pose[a + 1 : a + 1 + 4 * latest])
+        for wanted in STEPS:
+            far = np.flatnonzero(moved >= wanted)
+            found[a, a + 1 + (int(far[0]) if len(far) else min(latest, len(moved)) - 1)] = None
+    step = steps_between_all(pose)
+    odd = np.flatnonzero(step > JUMP_RATIO * max(float(np.median(step)), 0.02))
+    for at in odd[np.argsort(-step[odd], kind="stable")][:JUMPS].tolist():
+        found[at, at + 1] = None
+    after = sorted(found)
+    back = [pair for pair in _revisits(pose, stamps_s) if pair not in found]
+    return np.array([*after, *back], np.int64).reshape(-1, 2), np.arange(len(after) + len(back)) < len(after)
+
+
+def _spread(n: int) -> list[int]:
+    """Return numbers below n, each far from those before it: the middle of the largest gap, again and again."""
+    order: dict[int, None] = {}
+    parts = 1
+    while len(order) < min(n, PAIRS):
+        order |= dict.fromkeys(((2 * np.arange(parts) + 1) * n // (2 * parts)).tolist())
+        parts *= 2
+    return list(order)
+
+
+def _revisits(pose: Float[np.ndarray, "n 4 4"], stamps_s: Float[np.ndarray, " n"]) -> list[tuple[int, int]]:
+    """Return pairs far apart in time whose cameras are at nearly one place and look nearly one way."""
+    rows = np.unique(np.linspace(0, len(pose) - 1, min(len(pose), 120)).round().astype(int))
+    few, at_s = pose[rows], stamps_s[rows]
+    apart = np.array([steps_between(one, few) for one in few])
+    late_s = at_s[None, :] - at_s[:, None]
+    score = np.where((apart < 3.0) & (late_s > 0.2 * (at_s[-1] - at_s[0])), late_s, 0.0)
+    found: list[tuple[int, int]] = []
+    for _ in range(REVISITS):
+        a, b = (int(i) for i in np.unravel_index(int(np.argmax(score)), score.shape))
+        if score[a, b] <= 0.0:
+            break
+        found.append((int(rows[a]), int(rows[b])))
+        near = max(1, len(rows) // (2 * REVISITS))
+        score[max(0, a - near) : a + near + 1] = 0.0
+    return found
+
+
+def steps_between(one: Float[np.ndarray, "4 4"], others: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, " n"]:
+    """Return how far cameras are from one, in steps."""
+    away_m = np.linalg.norm(others[:, :3, 3] - one[:3, 3], axis=1)
+    return away_m / STEP_M + rotation_angle_rad(np.broadcast_to(one, others.shape), others) / STEP_RAD
+
+
+def steps_between_all(pose: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, " m"]:
+    """Return how far each camera is from the one before, in steps."""
+    away_m = np.linalg.norm(np.diff(pose[:, :3, 3], axis=0), axis=1)
+    return away_m / STEP_M + rotation_angle_rad(pose[:-1], pose[1:]) / STEP_RAD
+
+
+def _small_rig(rig: Rig) -> Rig:
+    return Rig(_small(rig.rgb), _small(rig.depth), rig.rgb_from_depth)
+
+
+def _small(camera: Pinhole) -> Pinhole:
+    width = min(WIDTH, camera.width)
+    return camera.resized(width, max(1, round(camera.height * width / camera.width)))
+
+
+def _nearest(depth_m: Float32[np.ndarray, "h w"], camera: Pinhole) -> Float32[np.ndarray, "hs ws"]:
+    row = ((np.arange(camera.height) + 0.5) * depth_m.shape[0] / camera.height).astype(int)
+    column = ((np.arange(camera.width) + 0.5) * depth_m.shape[1] / camera.width).astype(int)
+    return depth_m[row[:, None], column]
+
+
+def _brightness(rgb: np.ndarray, camera: Pinhole) -> Float32[np.ndarray, "hs ws"]:
+    import cv2
+
+    small = cv2.resize(rgb, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
+    return cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)
+
+
+@dataclass(frozen=True, slots=True)
+class Surfaces:
+    """What is needed of each depth picture, computed once.
+
+    Attributes:
+        near_m: (f, h, w) least depth of the 3x3 pixels around, 0 where one of them has none.
+        far_m: (f, h, w) greatest depth there.
+        row: (f, m) pixels on smooth surface.
+        column: (f, m) theirs.
+        there: (f, m) whether there is such a pixel.
+    """
+
+    near_m: Float32[np.ndarray, "f h w"]
+    far_m: Float32[np.ndarray, "f h w"]
+    row: Int[np.ndarray, "f m"]
+    column: Int[np.ndarray, "f m"]
+    there: Bool[np.ndarray, "f m"]
+
+    @staticmethod
+    def of(depth_m: Float32[np.ndarray, "f h w"], points: int = POINTS) -> "Surfaces":
+        """Find smooth pixels, evenly spread, at most so many a frame."""
+        near, far = _around(depth_m)
+        count = len(depth_m)
+        row, column = np.zeros((count, points), np.int64), np.zeros((count, points), np.int64)
+        there = np.zeros((count, points), bool)
+        for f in range(count):
+            v, u = np.nonzero((near[f] > 0.0) & (depth_m[f] > 0.0) & (far[f] - near[f] < _SMOOTH * near[f]))
+            if len(v) == 0:
+                continue
+            chosen = np.unique(np.linspace(0, len(v) - 1, min(points, len(v))).round().astype(int))
+            row[f, : len(chosen)], column[f, : len(chosen)] = v[chosen], u[chosen]
+            there[f, : len(chosen)] = True
+        return Surfaces(near, far, row, column, there)
+
+
+def _around(depth_m: Float32[np.ndarray, "f h w"]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and greatest depth of each 3x3 pixels; 0 where too few have one, and at the edge."""
+    near, far = np.zeros_like(depth_m), np.zeros_like(depth_m)
+    height, width = depth_m.shape[1:]
+    if min(height, width) < 3:
+        return near, far
+    low, high = np.full((len(depth_m), height - 2, width - 2), np.inf, np.float32), np.zeros(1, np.float32)
+    count = np.zeros(low.shape, np.uint8)
+    for i in (-1, 0, 1):
+        for j in (-1, 0, 1):
+            one = depth_m[:, 1 + i : height - 1 + i, 1 + j : width - 1 + j]
+            low = np.minimum(low, np.where(one > 0.0, one, np.inf))
+            high = np.maximum(high, one)
+            count += one > 0.0
+    enough = count >= _FEWEST_AROUND
+    near[:, 1:-1, 1:-1] = np.where(enough, low, 0.0)
+    far[:, 1:-1, 1:-1] = np.where(enough, high, 0.0)
+    return near, far

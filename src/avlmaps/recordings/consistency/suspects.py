@@ -1,0 +1,287 @@
+"""The usual mistakes of recordings, tried one after the other on a sample: which of them makes it agree with itself."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.recordings.camera_axes import NAMED, all_axes
+from avlmaps.recordings.consistency.agreement import NOTHING, SAME_M, Agreement, compare
+from avlmaps.recordings.consistency.sample import Sample, Surfaces
+from avlmaps.recordings.corrections import NONE, Corrections, PoseKind, reread_poses
+
+# Poses of the sample's frames at their stamps plus a delay; None where the trajectory does not reach.
+PoseAt = Callable[[float], Float[np.ndarray, "f 4 4"] | None]
+# A frame of usual size has its depths compared with `SAME_M`; of a scene of another size it is this share.
+_FLOOR_SHARE = SAME_M / 2.5
+UNITS = (0.5, 2.0, 0.25, 4.0, 0.2, 5.0, 0.1, 10.0, 0.01, 100.0, 0.001, 1000.0)
+_SCALES = (0.8, 1.25, 0.63, 1.6, 0.4, 2.5, *UNITS)
+_TWICE_SCALES = UNITS[:8]
+_FOCAL = (0.5, 0.67, 0.8, 0.9, 1.12, 1.25, 1.5, 2.0)
+_DELAYS_S = tuple(sign * step / 20.0 for step in range(1, 21) for sign in (1.0, -1.0))
+_POSES: tuple[tuple[PoseKind, ...], ...] = (
+    (PoseKind.CAMERA_FROM_WORLD,),
+    (PoseKind.WXYZ,),
+    (PoseKind.WXYZ, PoseKind.CAMERA_FROM_WORLD),
+)
+# Of the points that the sample has, a suspect must compare this share to be preferred.
+_LEAST_COMPARED = 0.15
+# And this share of those that are compared as the recording is.
+_OF_AS_IT_IS = 0.5
+_CLEARLY = 0.02
+_PAIRS, _POINTS = 20, 128
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """How pictures are turned before they fit: mirrored from left to right, then turned by quarters to the left."""
+
+    mirror: bool
+    quarters: int
+
+    def __call__(self, pictures: Float[np.ndarray, "f h w"]) -> Float[np.ndarray, "f h w"]:
+        """Turn pictures; a quarter is stretched to the size that they had."""
+        import cv2
+
+        turned = np.rot90(pictures[:, :, ::-1] if self.mirror else pictures, self.quarters, axes=(1, 2))
+        size = (pictures.shape[2], pictures.shape[1])
+        if turned.shape == pictures.shape:
+            return np.ascontiguousarray(turned)
+        turned = np.ascontiguousarray(turned)
+        return np.stack([cv2.resize(one, size, interpolation=cv2.INTER_NEAREST) for one in turned])
+
+    def words(self) -> str:
+        """Return what was done to the pictures."""
+        if not self.mirror:
+            return {1: "turned by 90 degrees", 2: "upside down (turned by 180 degrees)", 3: "turned by 90 degrees"}[
+                self.quarters
+            ]
+        return {0: "mirrored", 1: "transposed", 2: "mirrored from top to bottom", 3: "transposed"}[self.quarters]
+
+
+TURNS = tuple(Turn(mirror, quarters) for mirror, quarters in product((False, True), range(4)) if mirror or quarters)
+
+
+@dataclass(frozen=True, slots=True)
+class Suspect:
+    """One mistake, or several at once.
+
+    Attributes:
+        given: what of it the options of the command line undo.
+        scale: what the depth is multiplied by, beside.
+        focal: what the focal lengths are multiplied by; None: nothing.
+        centred: whether the principal point is put into the middle, with the focal length in proportion.
+        swapped: whether the numbers of columns and rows are exchanged.
+        turn_colour: how colour pictures are turned.
+        turn_depth: how depth pictures are turned.
+        along_ray: whether the depth is the distance along the ray.
+    """
+
+    given: Corrections = Corrections()
+    scale: float = 1.0
+    focal: float | None = None
+    centred: bool = False
+    swapped: bool = False
+    turn_colour: Turn | None = None
+    turn_depth: Turn | None = None
+    along_ray: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A suspect and how well the sample agrees with it."""
+
+    suspect: Suspect
+    agreement: Agreement
+    score: float
+
+
+class Trials:
+    """Tries suspects on one sample."""
+
+    def __init__(self, sample: Sample, pose_at: PoseAt, given: Corrections = NONE) -> None:
+        """Begin.
+
+        Args:
+            sample: that does not agree as it is.
+            pose_at: the uncorrected poses at other times.
+            given: what was corrected already; suspects replace what they name.
+        """
+        few = np.unique(np.linspace(0, len(sample.pairs) - 1, min(_PAIRS, len(sample.pairs))).round().astype(int))
+        self.sample, self._pose_at, self.given = sample.only(few), pose_at, given
+        self._depth: dict[tuple[Turn | None, bool], tuple[np.ndarray, Surfaces]] = {}
+        self._delayed: dict[float, np.ndarray | None] = {}
+        usual = sample.depth_m[sample.depth_m > 0.0]
+        self._median_m = float(np.median(usual)) if len(usual) else 1.0
+        self._points = max(int(self._measured(Suspect())[1].there[self.sample.pairs[:, 0]].sum()), 1)
+        self._compared = int(_LEAST_COMPARED * self._points)
+        self._compared = max(self._compared, int(_OF_AS_IT_IS * self.run(Suspect()).agreement.points.sum()))
+
+    def run(self, suspect: Suspect) -> Trial:
+        """Return how well the sample agrees with a suspect; a score of 0 where it cannot be tried."""
+        sample, given = self.sample, suspect.given.over(self.given)
+        delay_s = given.pose_delay_s or 0.0
+        if delay_s not in self._delayed:
+            self._delayed[delay_s] = self._pose_at(delay_s)
+        pose = self._delayed[delay_s]
+        depth_m, surfaces = self._measured(suspect)
+        grey = sample.grey if suspect.turn_colour is None else suspect.turn_colour(sample.grey)
+        rig = suspected_rig(sample.rig, suspect)
+        if rig is None or pose is None:
+            return Trial(suspect, NOTHING, 0.0)
+        sample = replace(sample, depth_m=depth_m, grey=grey)
+        floor_m = _FLOOR_SHARE * self._median_m * suspect.scale
+        found = compare(sample, surfaces, reread_poses(pose, given), rig, suspect.scale, floor_m)
+        return Trial(suspect, found, self._score(found))
+
+    def _measured(self, suspect: Suspect) -> tuple[np.ndarray, Surfaces]:
+        """Return the depth pictures of a suspect before they are scaled, and their surfaces."""
+        key = (suspect.turn_depth, suspect.along_ray)
+        if key not in self._depth:
+            depth_m = self.sample.depth_m
+            if suspect.turn_depth is not None:
+                depth_m = suspect.turn_depth(depth_m)
+            if suspect.along_ray:
+                length = np.linalg.norm(self.sample.rig.depth.rays(), axis=2)
+                depth_m = (depth_m / length).astype(np.float32)
+            self._depth[key] = depth_m, Surfaces.of(depth_m, _POINTS)
+        return self._depth[key]
+
+    def _score(self, found: Agreement) -> float:
+        """Return the share of points on one surface, times the likeness of their colour as far as that varies."""
+        compared = max(int(found.points.sum()), self._compared, 1)
+        score = float(found.same.sum()) / compared
+        if np.isfinite(found.likeness) and found.textured > 0.05 * self._points:
+            score *= 0.5 + 0.5 * max(found.likeness, 0.0)
+        return score
+
+
+def suspected_rig(rig: Rig, suspect: Suspect) -> Rig | None:
+    """Return the cameras of a suspect, None where there are none."""
+    if suspect.focal is None and not suspect.centred and not suspect.swapped:
+        return rig
+
+    def other(camera: Pinhole) -> Pinhole:
+        fx, fy, cx, cy = camera.fx, camera.fy, camera.cx, camera.cy
+        if suspect.swapped:
+            fx, fy, cx, cy = fy, fx, cy, cx
+        if suspect.centred:
+            fx, fy = fx * camera.width / (2.0 * cx), fy * camera.height / (2.0 * cy)
+            cx, cy = camera.width / 2.0, camera.height / 2.0
+        factor = suspect.focal or 1.0
+        return Pinhole(fx * factor, fy * factor, cx, cy, camera.width, camera.height)
+
+    try:
+        return Rig(other(rig.rgb), other(rig.depth), rig.rgb_from_depth)
+    except (ValueError, ZeroDivisionError):
+        return None
+
+
+def find_cause(trials: Trials, enough: Callable[[Trial], bool]) -> Trial | None:
+    """Return the simplest suspect with which the sample agrees, None where no one does.
+
+    Args:
+        trials: of the sample.
+        enough: whether a sample agrees.
+    """
+    single = [trials.run(suspect) for suspect in (*_undone(trials.given), *_single())]
+    # a delay, scale or focal length between the steps that were tried may fit where none of the steps does
+    single += [_refined(trials, max(kind, key=lambda trial: trial.score)) for kind in _by_kind(single)]
+    best = _best([trial for trial in single if enough(trial)])
+    if best is not None:
+        return _refined(trials, best)
+    posed = [trials.run(suspect) for suspect in _posed()]
+    best = _best([trial for trial in posed if enough(trial)])
+    if best is not None:
+        return best
+    # two mistakes of different kinds: what helped most of how poses are read, with each scale and camera
+    poses = [trial for trial in single if trial.suspect.given and not trial.suspect.given.pose_delay_s]
+    helped = sorted([*poses, *posed], key=lambda trial: -trial.score)[:3]
+    others = (*(Suspect(scale=scale) for scale in _TWICE_SCALES), *_intrinsics())
+    twice = [trials.run(_with(trial.suspect, other)) for trial in helped for other in others]
+    return _best([trial for trial in twice if enough(trial)])
+
+
+def _by_kind(tried: list[Trial]) -> list[list[Trial]]:
+    """Return the delays, the scales and the focal lengths among what was tried."""
+    delays = [trial for trial in tried if trial.suspect.given.pose_delay_s]
+    scales = [trial for trial in tried if trial.suspect.scale != 1.0]
+    return [delays, scales, [trial for trial in tried if trial.suspect.focal is not None]]
+
+
+def _best(trials: list[Trial]) -> Trial | None:
+    """Return the first of those that are hardly worse than the best."""
+    if not trials:
+        return None
+    most = max(trial.score for trial in trials)
+    return next(trial for trial in trials if trial.score >= most - _CLEARLY)
+
+
+def _undone(given: Corrections) -> Iterator[Suspect]:
+    if given.poses:
+        yield Suspect(Corrections(poses=(PoseKind.WORLD_FROM_CAMERA,)))
+    if given.camera_axes is not None:
+        yield Suspect(Corrections(camera_axes="opencv"))
+
+
+def _single() -> Iterator[Suspect]:
+    yield from (Suspect(Corrections(poses=kinds)) for kinds in _POSES)
+    yield from (Suspect(Corrections(camera_axes=name)) for name in NAMED if name != "opencv")
+    yield from _scales()
+    yield from _intrinsics()
+    yield from _delays()
+    yield from (Suspect(Corrections(camera_axes=axes)) for axes in all_axes() if axes not in NAMED.values())
+    yield Suspect(along_ray=True)
+    yield from (Suspect(turn_colour=turn) for turn in TURNS)
+    yield from (Suspect(turn_depth=turn) for turn in TURNS)
+    yield from (Suspect(turn_colour=turn, turn_depth=turn) for turn in TURNS)
+
+
+def _posed() -> Iterator[Suspect]:
+    for kinds, axes in product(_POSES, all_axes()):
+        yield Suspect(Corrections(poses=kinds, camera_axes=axes))
+
+
+def _scales() -> Iterator[Suspect]:
+    yield from (Suspect(scale=scale) for scale in _SCALES)
+
+
+def _delays() -> Iterator[Suspect]:
+    yield from (Suspect(Corrections(pose_delay_s=delay_s)) for delay_s in _DELAYS_S)
+
+
+def _intrinsics() -> Iterator[Suspect]:
+    yield Suspect(centred=True)
+    yield Suspect(swapped=True)
+    yield from (Suspect(focal=factor) for factor in _FOCAL)
+
+
+def _with(a: Suspect, b: Suspect) -> Suspect:
+    """Return both mistakes at once, those of the second where both name one."""
+    return Suspect(
+        given=b.given.over(a.given),
+        scale=a.scale if b.scale == 1.0 else b.scale,
+        focal=b.focal or a.focal,
+        centred=a.centred or b.centred,
+        swapped=a.swapped or b.swapped,
+        turn_colour=a.turn_colour,
+        turn_depth=a.turn_depth,
+        along_ray=a.along_ray,
+    )
+
+
+def _refined(trials: Trials, best: Trial) -> Trial:
+    """Return a delay, scale or focal length between the steps that were tried."""
+    suspect = best.suspect
+    tried: list[Suspect] = []
+    if suspect.given.pose_delay_s:
+        around_s = suspect.given.pose_delay_s + np.arange(-4, 5) / 100.0
+        tried = [replace(suspect, given=replace(suspect.given, pose_delay_s=round(float(s), 3))) for s in around_s]
+    elif suspect.scale != 1.0 and suspect.scale not in UNITS:
+        tried = [replace(suspect, scale=float(suspect.scale * factor)) for factor in np.geomspace(0.8, 1.25, 13)]
+    elif suspect.focal is not None:
+        tried = [replace(suspect, focal=float(suspect.focal * factor)) for factor in np.geomspace(0.88, 1.14, 9)]
+    return max([best, *map(trials.run, tried)], key=lambda trial: trial.score)
