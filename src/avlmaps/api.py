@@ -4,6 +4,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from avlmaps.maps.settings import BuildSettings
     from avlmaps.perception.profiles import Profile
     from avlmaps.query.avlmap import AVLMap
@@ -16,6 +18,7 @@ def build_map(
     profile: "str | Profile" = "embedded",
     settings: "BuildSettings | None" = None,
     *,
+    allow: "Sequence[str]" = (),
     resume: bool = True,
     overwrite: bool = False,
     progress: bool = True,
@@ -30,12 +33,13 @@ def build_map(
         path: folder of the map, by custom ``NAME.avlmap``.
         profile: which models perceive: ``embedded``, ``foundation``, ``paper`` or one of your own.
         settings: everything else about the build; the defaults if None.
+        allow: names of reasons for which a recording that contradicts itself is not refused (``--allow``).
         resume: continue with what a stopped build had finished; otherwise begin again.
         overwrite: replace a finished map there that came from another recording, or with other settings.
         progress: show progress bars on standard error.
 
     Raises:
-        RecordingError: the recording cannot be opened, or too many of its frames cannot be read.
+        RecordingError: the recording cannot be opened, contradicts itself, or too many frames cannot be read.
         MapError: the folder is not a place for a map, holds another map, or cannot be written.
         BackendError: the profile is not known, or a package for it is missing.
     """
@@ -46,7 +50,7 @@ def build_map(
 
     opened = open_recording(recording) if isinstance(recording, str | Path) else recording
     stored = build(
-        opened, path, profile, settings or DEFAULTS, resume=resume, overwrite=overwrite, progress=progress
+        opened, path, profile, settings or DEFAULTS, allow=allow, resume=resume, overwrite=overwrite, progress=progress
     )  # fmt: skip
     return AVLMap(stored)
 

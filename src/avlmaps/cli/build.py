@@ -71,6 +71,10 @@ class Build(ModelVerb):
     camera_height_m: Annotated[float | None, arg(aliases=("--floor-height",), metavar="METRES")] = None
     """Height of the depth camera over the floor in the first frame, metres. Default: found from the frames; give it
     where `build` reports the floor with a low confidence."""
+    allow: Annotated[
+        tuple[Literal["geometry", "colour", "depth", "intrinsics", "motion"], ...], arg(metavar="REASON ...")
+    ] = ()
+    """Build a map although the recording contradicts itself, for these reasons; the error names its reason."""
     sensor: Literal["auto", "kinect", "realsense", "perfect", "none"] = "auto"
     """Depth camera; its error decides which depths are used. auto measures it; none uses all, as the paper does."""
     resume: bool = False
@@ -130,6 +134,7 @@ def build(verb: "Build") -> dict[str, Any]:
         used,
         build_settings(verb.rules, settings),
         cache=cache,
+        allow=verb.allow,
         resume=not verb.fresh,
         overwrite=verb.overwrite,
     )

@@ -3,6 +3,7 @@
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -94,7 +95,38 @@ def describe_path(
         for fault in faults:
             say(f"fault: {fault}")
         raise
-    return {**_describe_recording(recording), "faults": faults}
+    return {**_describe_recording(recording), "consistency": _consistency(recording), "faults": faults}
+
+
+def _consistency(recording: "Recording") -> dict[str, Any] | None:
+    """Check a recording against itself, on a sample; None where none of the sample can be read."""
+    from avlmaps.recordings.consistency.check import check_recording
+
+    try:
+        verdict = check_recording(recording)
+    except AvlmapsError:
+        return None
+    numbers = {name: getattr(verdict, name) for name in ("agreeing", "seen_through", "likeness", "median_depth_m")}
+    return {
+        "verdict": verdict.grade.value,
+        "frames": verdict.frames,
+        "pairs": verdict.pairs,
+        **{name: round(value, 4) if isfinite(value) else None for name, value in numbers.items()},
+        "findings": [
+            {"reason": finding.reason.value, "verdict": finding.grade.value, "sentence": str(finding)}
+            for finding in verdict.findings
+        ],
+    }
+
+
+def _consistency_lines(found: dict[str, Any]) -> list[str]:
+    numbers = [
+        f"{found['pairs']} pairs of frames see the same place",
+        *([f"{found['agreeing']:.1%} of their points agree"] if found["agreeing"] is not None else []),
+        *([f"brightness correlates by {found['likeness']:.2f}"] if found["likeness"] is not None else []),
+    ]
+    lines = [f"consistency: {found['verdict']} ({', '.join(numbers)})"]
+    return lines + [f"  {one['verdict']} ({one['reason']}): {one['sentence']}" for one in found["findings"]]
 
 
 def repair(verb: "Info") -> dict[str, Any]:
@@ -247,6 +279,7 @@ _BRIEF_LAYOUTS: dict[str, Callable[[Any], list[str]]] = {
 # How the entries of `info` are laid out, where a plain line would not do.
 _LAYOUTS: dict[str, Callable[[Any], list[str]]] = {
     "sounds": _sound_lines,
+    "consistency": _consistency_lines,
     "topics": lambda topics: ["topics:", *[f"  {use}: {topic}" for use, topic in topics.items()]],
     "plot": lambda path: [f"wrote {path}"],
     "ground": ground_lines,

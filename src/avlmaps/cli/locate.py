@@ -70,7 +70,7 @@ def locate_photo(
     pose, camera = found.world_from_camera, found.camera
     if pose is not None and given is not None and camera != given:
         say(f"note: the focal length {given.fx:g} does not fit the photo; {camera.fx:.1f} was used.")
-    return answer_in(locate_answer(found), frame, opened.space.level_from_recording)
+    return answer_in(locate_answer(found, opened.stored.info.doubts), frame, opened.space.level_from_recording)
 
 
 def camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":
@@ -96,8 +96,8 @@ def numbers_of(intrinsics: str) -> tuple[float, float, float, float]:
 
 def locate_lines(answer: "LocateAnswer") -> list[str]:
     """Lay out the answer of `locate`."""
-    pose = answer["world_from_camera"]
+    pose, notes = answer["world_from_camera"], [f"note: {note}" for note in answer.get("notes", [])]
     if pose is None:
-        return [f"not located: {answer['inliers']} points agree, too few to fix a place"]
+        return [*notes, f"not located: {answer['inliers']} points agree, too few to fix a place"]
     rows = ["  " + " ".join(f"{value:9.4f}" for value in row) for row in pose]
-    return [f"located, {answer['inliers']} points agree; world_from_camera (frame: {answer['frame']}):", *rows]
+    return [*notes, f"located, {answer['inliers']} points agree; world_from_camera (frame: {answer['frame']}):", *rows]

@@ -67,7 +67,7 @@ def contents(verb: Things, opened: "AVLMap | None" = None) -> "ContentsAnswer":
 def contents_lines(answer: "ContentsAnswer") -> list[str]:
     """Lay out what `things` reports: three tables with an empty line between them."""
     frame = answer["frame"]
-    lines = thing_lines(answer["things"], frame)
+    lines = [f"note: {note}" for note in answer.get("notes", [])] + thing_lines(answer["things"], frame)
     lines += ["", *sound_lines(answer["sounds"], frame)] if answer["sounds"] else []
     return [*lines, "", *room_lines(answer["rooms"], frame)] if answer["rooms"] else lines
 

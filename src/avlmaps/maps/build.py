@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avlmaps.core.progress import silence_progress
+from avlmaps.maps.doubts import checked
 from avlmaps.maps.keyframes.stage import describe_keyframes
 from avlmaps.maps.partial_maps import build_part, merge_parts
 from avlmaps.maps.plan import claim, make_plan, require_unchanged
@@ -28,6 +29,7 @@ def build_map(
     *,
     cache: CacheSettings = DEFAULT_CACHE,
     parts: Sequence[Path | str] = (),
+    allow: Sequence[str] = (),
     resume: bool = True,
     overwrite: bool = False,
     progress: bool = True,
@@ -44,19 +46,21 @@ def build_map(
         settings: all that can be chosen.
         cache: whether features are stored, so that another build of the same frames encodes nothing again.
         parts: folders of ``build_part`` from other machines; their frames are not fused again.
+        allow: names of reasons for which the recording is not refused (``recordings.consistency.verdict.Reason``).
         resume: continue with what a stopped build had finished; otherwise begin again.
         overwrite: replace a finished map there that came from another recording, or with other settings.
         progress: show how far it is on standard error.
 
     Raises:
         MapError: the folder is something else, holds another map, is in use or cannot be written.
-        RecordingError: too many frames cannot be read, or none has depth.
+        RecordingError: too many frames cannot be read, none has depth, or the recording contradicts itself.
         BackendError: the profile is not known, or a package for it is missing.
     """
     stamp = recording.change_stamp()
     plan = make_plan(recording, Path(path), with_cache(profile_of(profile), cache), settings)
     with silence_progress(not progress), lock_folder(plan.path):
         if claim(plan, resume, overwrite) is None:
+            plan = checked(plan, allow)
             up = find_up(plan)
             plan, floor = find_floor(plan, up)
             sensor = identify_sensor(plan)

@@ -35,6 +35,7 @@ class Plan:
         models: the models' cards, by module.
         key: hash of all ingredients; two builds with one key make one map.
         fusion_key: hash of those that the sums over frames depend on.
+        doubts: what is odd about the recording, one sentence each.
     """
 
     recording: Recording
@@ -44,6 +45,7 @@ class Plan:
     models: dict[str, ModelInfo]
     key: str
     fusion_key: str
+    doubts: tuple[str, ...] = ()
 
     def folder(self, stage: str, key: str) -> Path:
         """Return where a stage stores what it finished, one folder for each key."""

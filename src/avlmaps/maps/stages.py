@@ -13,6 +13,7 @@ import numpy as np
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
+from avlmaps.maps.doubts import carving_doubts
 from avlmaps.maps.encoding import strip_folder
 from avlmaps.maps.fusion.cleaning import clean
 from avlmaps.maps.fusion.sensor_choice import find_sensor
@@ -264,6 +265,7 @@ def _manifest(
     timings: Timings,
 ) -> MapInfo:
     bad = sorted((frame for part in parts for frame in part.info.bad_frames), key=lambda frame: frame.index)
+    doubts = (*plan.doubts, *carving_doubts(merged.removed, len(content.voxels)))
     return MapInfo(
         avlmaps_version=__version__,
         build_key=plan.key,
@@ -286,7 +288,8 @@ def _manifest(
         ),
         bounding_box_m=Box.of(content.voxels.index, plan.settings.voxel_size_m),
         bad_frames=tuple(bad),
-        notices=tuple(_notices(plan, up, ground, len(bad))),
+        notices=(*doubts, *_notices(plan, up, ground, len(bad))),
+        doubts=doubts,
         timings=timings,
     )
 

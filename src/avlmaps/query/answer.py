@@ -82,7 +82,7 @@ class Answer:
         heat: the fused heatmap, for plots.
         probability: that the first goal is right, all parts together, in [0, 1]; 0 where there is no goal.
         count: number of likely things, where a sentence asks how many there are.
-        notes: one sentence each: how words were read.
+        notes: one sentence each: how words were read, and why the map may be wrong.
         alternatives: what is sought by itself, where nothing is found of it near what the query names; the other
             questions that a sentence may mean, the likeliest first.
         text: the answer in one sentence: where the first goal is, or which part failed and what the best guess is.

@@ -169,7 +169,10 @@ def answer_question(avlmap: "AVLMap", question: Question, top: int = 3, files: F
     alone = () if found or len(heats) == 1 else (_alone(question, heats),)
     text = found_text(question.parts, goals[0]) if found else absent_text(parts, goals, next(iter(alone), None))
     elapsed_ms = 1e3 * (time.perf_counter() - begin)
-    return Answer(goals, found, parts, elapsed_ms, heat, heat.probability, text=text, alternatives=alone)
+    doubts = avlmap.stored.info.doubts
+    return Answer(
+        goals, found, parts, elapsed_ms, heat, heat.probability, text=text, alternatives=alone, notes=doubts
+    )
 
 
 def _part_answer(part: Part, factor: Factor, whole: Heatmap) -> PartAnswer:
@@ -254,7 +257,7 @@ def _answer_read(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
         best,
         goals=best.goals[: asked.top],
         count=count,
-        notes=notes,
+        notes=(*notes, *best.notes),
         alternatives=(*best.alternatives, *alternatives),
         text=found_text(question.parts, best.goals[0], count) if best.found else best.text,
     )

@@ -201,7 +201,8 @@ class AVLMap:
 
         models = self.stored.info.models
         things = self.things(names, least_confidence, structure) if "pixels" in models else []
-        return Contents(things, self.sounds(), self.rooms() if "views" in models else [])
+        rooms = self.rooms() if "views" in models else []
+        return Contents(things, self.sounds(), rooms, self.stored.info.doubts)
 
     def sounds(self, most_names: int = 3) -> list["SoundEvent"]:
         """Return the sounds of the map in the order of their onset; see ``contents.find_sounds``."""

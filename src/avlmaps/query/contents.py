@@ -144,21 +144,26 @@ class Contents:
         things: most confident first.
         sounds: in the order of their onset.
         rooms: those with most views first.
+        doubts: why the map may be wrong, one sentence each.
     """
 
     things: list[Thing]
     sounds: list[SoundEvent]
     rooms: list[Room]
+    doubts: tuple[str, ...] = ()
 
     def to_json(self, name: str) -> "ContentsAnswer":
         """Return the contents as ``avlmaps things --json`` prints them, under a name for the map."""
-        return {
+        answer: ContentsAnswer = {
             "map": name,
             "frame": FRAME,
             "things": [thing.to_json() for thing in self.things],
             "sounds": [sound.to_json() for sound in self.sounds],
             "rooms": [room.to_json() for room in self.rooms],
         }
+        if self.doubts:
+            answer["notes"] = list(self.doubts)
+        return answer
 
 
 def find_things(

@@ -5,6 +5,7 @@ OpenAPI document and the schemas of its agent tools from the same types. Positio
 ``frame`` names.
 """
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
 
 from msgspec import Meta
@@ -25,6 +26,7 @@ Matrix = Annotated[
     Meta(min_length=4, max_length=4, description="4x4 transform, row by row"),
 ]
 Frame = Annotated[str, Meta(description="the frame of the positions: recording")]
+Notes = Annotated[list[str], Meta(description="why the map may be wrong, one sentence each")]
 
 
 class GoalAnswer(TypedDict):
@@ -71,7 +73,7 @@ class QueryAnswer(TypedDict):
     elapsed_ms: float
     frame: Frame
     level_from_recording: Matrix | None
-    notes: NotRequired[Annotated[list[str], Meta(description="how words of the sentence were read")]]
+    notes: NotRequired[Annotated[list[str], Meta(description="how words were read; why the map may be wrong")]]
     count: NotRequired[Annotated[int, Meta(description="the number of things, for a sentence such as 'how many'")]]
     alternatives: NotRequired[
         Annotated[list[AlternativeAnswer], Meta(description="the other things that the sentence may mean")]
@@ -118,6 +120,7 @@ class ContentsAnswer(TypedDict):
     things: list[ThingAnswer]
     sounds: list[SoundAnswer]
     rooms: list[RoomAnswer]
+    notes: NotRequired[Notes]
 
 
 class LocateAnswer(TypedDict):
@@ -132,6 +135,7 @@ class LocateAnswer(TypedDict):
         list[float], Meta(min_length=4, max_length=4, description="fx, fy, cx, cy that the pose holds for, pixels")
     ]
     elapsed_ms: float
+    notes: NotRequired[Notes]
 
 
 class ErrorDetail(TypedDict):
@@ -147,10 +151,10 @@ class ErrorAnswer(TypedDict):
     error: ErrorDetail
 
 
-def locate_answer(located: "Located") -> LocateAnswer:
-    """Return the answer about a photo."""
+def locate_answer(located: "Located", doubts: Sequence[str] = ()) -> LocateAnswer:
+    """Return the answer about a photo, with what is doubtful about the map."""
     pose, camera = located.world_from_camera, located.camera
-    return {
+    answer: LocateAnswer = {
         "world_from_camera": None if pose is None else [[float(value) for value in row] for row in pose],
         "inliers": int(located.inliers),
         "reference": located.reference_stamp_s,
@@ -159,3 +163,6 @@ def locate_answer(located: "Located") -> LocateAnswer:
         "intrinsics": [camera.fx, camera.fy, camera.cx, camera.cy],
         "elapsed_ms": located.elapsed_ms,
     }
+    if doubts:
+        answer["notes"] = list(doubts)
+    return answer

@@ -1,7 +1,7 @@
 """The work of each request: from a request's values to its answer, in a thread of a lane."""
 
 from dataclasses import dataclass, field
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict, TypeVar
 
 import msgspec
 import numpy as np
@@ -16,6 +16,7 @@ from avlmaps.query.schema import (
     ContentsAnswer,
     Frame,
     LocateAnswer,
+    Notes,
     QueryAnswer,
     RoomAnswer,
     SoundAnswer,
@@ -104,6 +105,7 @@ class ThingsAnswer(TypedDict):
     map: str
     frame: Frame
     things: list[ThingAnswer]
+    notes: NotRequired[Notes]
 
 
 class SoundsAnswer(TypedDict):
@@ -112,6 +114,7 @@ class SoundsAnswer(TypedDict):
     map: str
     frame: Frame
     sounds: list[SoundAnswer]
+    notes: NotRequired[Notes]
 
 
 class RoomsAnswer(TypedDict):
@@ -120,6 +123,7 @@ class RoomsAnswer(TypedDict):
     map: str
     frame: Frame
     rooms: list[RoomAnswer]
+    notes: NotRequired[Notes]
 
 
 def list_maps(shelf: Shelf) -> MapsAnswer:
@@ -153,13 +157,24 @@ def describe_map(task: Task, query: NoQuery) -> dict[str, Any]:
 
 def list_contents(task: Task, query: ThingsQuery) -> ContentsAnswer:
     """Return what ``avlmaps things --json`` prints."""
-    return {
+    answer: ContentsAnswer = {
         "map": task.map.name,
         "frame": FRAME,
         "things": list_things(task, query)["things"],
         "sounds": list_sounds(task, NoQuery())["sounds"],
         "rooms": list_rooms(task, RoomsQuery())["rooms"],
     }
+    return _noted(task, answer)
+
+
+Noted = TypeVar("Noted", ContentsAnswer, ThingsAnswer, SoundsAnswer, RoomsAnswer)
+
+
+def _noted(task: Task, answer: Noted) -> Noted:
+    """Add what is doubtful about the map to an answer."""
+    if doubts := task.map.avlmap.stored.info.doubts:
+        answer["notes"] = [without_folders(doubt) for doubt in doubts]
+    return answer
 
 
 def list_things(task: Task, query: ThingsQuery) -> ThingsAnswer:
@@ -173,14 +188,14 @@ def list_things(task: Task, query: ThingsQuery) -> ThingsAnswer:
         return [thing.to_json() for thing in avlmap.things(names, query.least, query.structure, watch=task.watch.step)]
 
     key = ("things", query.least, tuple(query.name), query.structure)
-    return {"map": task.map.name, "frame": FRAME, "things": task.map.once(key, found)}
+    return _noted(task, ThingsAnswer(map=task.map.name, frame=FRAME, things=task.map.once(key, found)))
 
 
 def list_sounds(task: Task, query: NoQuery) -> SoundsAnswer:
     """Return the sounds of a map."""
     del query
     sounds = task.map.once("sounds", lambda: [sound.to_json() for sound in task.map.avlmap.sounds()])
-    return {"map": task.map.name, "frame": FRAME, "sounds": sounds}
+    return _noted(task, SoundsAnswer(map=task.map.name, frame=FRAME, sounds=sounds))
 
 
 def list_rooms(task: Task, query: RoomsQuery) -> RoomsAnswer:
@@ -191,7 +206,7 @@ def list_rooms(task: Task, query: RoomsQuery) -> RoomsAnswer:
         return [room.to_json() for room in avlmap.rooms()] if "views" in avlmap.stored.info.models else []
 
     rooms = [room for room in task.map.once("rooms", found) if room["confidence"] >= query.least]
-    return {"map": task.map.name, "frame": FRAME, "rooms": rooms}
+    return _noted(task, RoomsAnswer(map=task.map.name, frame=FRAME, rooms=rooms))
 
 
 def sound_clip(task: Task, query: NoQuery) -> File:
@@ -244,7 +259,7 @@ def locate(task: Task, query: LocateQuery) -> LocateAnswer:
     camera = camera_of(query.intrinsics, photo)
     task.watch.step("locating")
     try:
-        return locate_answer(task.map.avlmap.locate(photo, camera))
+        return locate_answer(task.map.avlmap.locate(photo, camera), task.map.avlmap.stored.info.doubts)
     except QueryError as error:
         raise QueryError(str(error).replace("say which: --intrinsics fx", "send its intrinsics, fx")) from None
 

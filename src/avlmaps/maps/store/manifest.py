@@ -283,6 +283,7 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
         bounding_box_m: where the voxels are.
         bad_frames: frames that were left out because they could not be read.
         notices: a sentence for each thing worth knowing.
+        doubts: those of them that say why the map may be wrong; every answer repeats them.
         files: every file, by what it holds (``voxels/feature``); nothing else in the folder is part of the map.
         bytes: size of all files.
         timings: when it was built and how long it took; the only part that differs when a build is repeated.
@@ -306,6 +307,7 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
     bounding_box_m: Box
     bad_frames: tuple[BadFrame, ...] = ()
     notices: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
     files: dict[str, FileInfo] = {}
     bytes: int = 0
     timings: Timings

@@ -8,6 +8,11 @@ from avlmaps.recordings.corrections import Corrections, GivenCamera, PoseKind
 # A camera in a building looks at this much, in the middle of what it sees.
 USUAL_DEPTH_M = (0.4, 7.0)
 _CLOSE = 0.06
+_KINDS = {
+    PoseKind.WXYZ: "the quaternions look written w first (wxyz)",
+    PoseKind.CAMERA_FROM_WORLD: "the poses look like camera_from_world",
+    PoseKind.WORLD_FROM_CAMERA: "the poses look like world_from_camera",
+}
 
 
 def cause_of(suspect: Suspect, rig: Rig, stored_unit_m: float, median_m: float, gain: str) -> str:
@@ -31,13 +36,8 @@ def cause_of(suspect: Suspect, rig: Rig, stored_unit_m: float, median_m: float, 
 
 
 def _looks(suspect: Suspect, rig: Rig, median_m: float) -> list[str]:
-    given, said = suspect.given, list[str]()
-    if PoseKind.WXYZ in given.poses:
-        said.append("the quaternions look written w first (wxyz)")
-    if PoseKind.CAMERA_FROM_WORLD in given.poses:
-        said.append("the poses look like camera_from_world")
-    if PoseKind.WORLD_FROM_CAMERA in given.poses:
-        said.append("the poses look like world_from_camera")
+    given = suspect.given
+    said = [_KINDS[kind] for kind in given.poses]
     if given.camera_axes is not None:
         said.append(f"the poses look like those of {_camera(given.camera_axes)}")
     if given.pose_delay_s:

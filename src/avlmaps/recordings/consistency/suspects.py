@@ -50,8 +50,10 @@ class Turn:
         size = (pictures.shape[2], pictures.shape[1])
         if turned.shape == pictures.shape:
             return np.ascontiguousarray(turned)
-        turned = np.ascontiguousarray(turned)
-        return np.stack([cv2.resize(one, size, interpolation=cv2.INTER_NEAREST) for one in turned])
+        resized = np.empty_like(pictures)
+        for target, one in zip(resized, np.ascontiguousarray(turned), strict=True):
+            target[:] = cv2.resize(one, size, interpolation=cv2.INTER_NEAREST)
+        return resized
 
     def words(self) -> str:
         """Return what was done to the pictures."""
@@ -80,7 +82,7 @@ class Suspect:
         along_ray: whether the depth is the distance along the ray.
     """
 
-    given: Corrections = Corrections()
+    given: Corrections = NONE
     scale: float = 1.0
     focal: float | None = None
     centred: bool = False

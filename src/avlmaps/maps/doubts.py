@@ -1,0 +1,63 @@
+"""The check of the recording at the beginning of a build: what cannot be is refused, what is odd stays with the map."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.progress import say
+from avlmaps.maps.plan import Plan
+from avlmaps.maps.store.manifest import Removed
+from avlmaps.recordings.consistency.check import check_recording
+from avlmaps.recordings.consistency.verdict import Reason
+from avlmaps.recordings.types import Recording
+
+# Share of the voxels that frames see through: 0 to 1 % in right recordings, 8 % with the drift of wheels.
+MOST_SEEN_THROUGH = 0.15
+
+
+def checked(plan: Plan, allowed: Sequence[str]) -> Plan:
+    """Return the plan with what is doubtful about its recording, each of which is said.
+
+    Args:
+        plan: of the build.
+        allowed: reasons that forbid no map.
+
+    Raises:
+        RecordingError: the recording cannot be right, or a reason has no such name.
+    """
+    doubts = tuple(_doubts(plan.recording, allowed))
+    for doubt in doubts:
+        say(f"note: {doubt}")
+    return replace(plan, doubts=doubts)
+
+
+def _doubts(recording: Recording, allowed: Sequence[str]) -> Iterator[str]:
+    known = [reason.value for reason in Reason]
+    for name in allowed:
+        if name not in known:
+            raise RecordingError(f"There is nothing called {name!r} to allow; known are: {', '.join(known)}.")
+    try:
+        verdict = check_recording(recording)
+    except RecordingError:  # no frame of the sample can be read; how many may be lost is decided later
+        return
+    refused = verdict.refused(tuple(allowed))
+    if refused is not None:
+        raise RecordingError(
+            f"{recording.path} cannot be right. {refused} To build it as it is: --allow {refused.reason.value}."
+        )
+    yield from verdict.sentences()
+
+
+def carving_doubts(removed: Removed, voxels: int) -> Iterator[str]:
+    """Yield a sentence where too much of a map was seen through.
+
+    Args:
+        removed: voxels that were no surface.
+        voxels: that are.
+    """
+    share = removed.seen_through / max(removed.seen_through + voxels, 1)
+    if share > MOST_SEEN_THROUGH:
+        yield (
+            f"{share:.0%} of the voxels were seen through by other frames and removed, where right recordings have up "
+            "to 8 %: the poses drift far, or much was moved. Check the poses."
+        )
