@@ -12,6 +12,7 @@ from avlmaps.api import build_map
 from avlmaps.bench.indexing import IndexingSettings
 from avlmaps.bench.navigation import NavigationSettings
 from avlmaps.cli.bench import Indexing, Navigation
+from avlmaps.cli.build import Build
 from avlmaps.cli.go import Chat
 from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.verb import ModelVerb, Verb
@@ -30,6 +31,7 @@ from avlmaps.query.asking import Asked
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.rules import Rules
 from avlmaps.recordings.add_sounds import add_sounds
+from avlmaps.recordings.consistency.verdict import Reason
 from avlmaps.recordings.open import open_recording
 from avlmaps.serve.drive.robots import RobotFile
 from avlmaps.serve.settings import ServeSettings
@@ -219,6 +221,11 @@ def test_chat_options_leave_it_to_the_settings() -> None:
     assert set(defaults(Chat).values()) == {None}
     assert {name.removeprefix("chat_") for name in defaults(Chat)} == {"model", "url", "replay"}
     assert {"model", "base_url", "replay"} <= set(defaults(ChatSettings))
+
+
+def test_every_reason_can_be_allowed() -> None:
+    kinds = get_args(get_type_hints(Build)["allow"])
+    assert words(kinds[0]) == {reason.value for reason in Reason}
 
 
 def test_options_of_reading_leave_it_to_the_recording() -> None:

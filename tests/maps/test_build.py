@@ -187,13 +187,13 @@ def test_the_first_bad_frame_stops_a_strict_build_with_its_own_sentence(tmp_path
 def test_a_stopped_build_reads_no_finished_frame_again(tmp_path: Path) -> None:
     walk, read = Walk(20), []
 
-    def frame_until_the_third_14(index: int):  # the first two look for the ground and at the depth's error
+    def frame_until_the_last_14(index: int):  # the check, the ground and the depth's error are looked at before
         read.append(index)
-        if index == 14 and read.count(14) == 3:
+        if index == 14 and read[-5:] == [10, 11, 12, 13, 14] and read.count(14) > 2:
             raise KeyboardInterrupt
         return Walk.frame(walk, index)
 
-    walk.frame = frame_until_the_third_14
+    walk.frame = frame_until_the_last_14
     with pytest.raises(KeyboardInterrupt):
         build(walk, tmp_path / "a")
     walk.frame = lambda index: read.append(index) or Walk.frame(walk, index)
@@ -215,7 +215,7 @@ def test_without_resume_all_is_done_anew(tmp_path: Path) -> None:
     walk, read = Walk(20), []
     walk.frame = lambda index: read.append(index) or Walk.frame(walk, index)
     build(walk, path, resume=False)
-    assert read[:20] == list(range(20))
+    assert any(read[i : i + 20] == list(range(20)) for i in range(len(read)))
 
 
 def test_a_damaged_part_is_made_again(tmp_path: Path) -> None:
@@ -439,7 +439,8 @@ def test_a_recording_that_is_written_while_it_is_mapped_makes_no_map(tmp_path: P
 
 def test_changed_content_of_the_same_size_is_another_recording_to_a_build(tmp_path: Path) -> None:
     walk = write_folder(tmp_path / "walk")
-    first = build_map(open_recording(walk), tmp_path / "map", PROFILE, SETTINGS, progress=False)
+    allow = ["geometry"]  # its floor is no plane of one world
+    first = build_map(open_recording(walk), tmp_path / "map", PROFILE, SETTINGS, progress=False, allow=allow)
     build_map(open_recording(walk), tmp_path / "map", PROFILE, SETTINGS, progress=False)  # finished already
     file = walk / "depth/000002.png"
     size = file.stat().st_size
@@ -448,7 +449,9 @@ def test_changed_content_of_the_same_size_is_another_recording_to_a_build(tmp_pa
         stream.write(bytes(max(0, size - file.stat().st_size)))
     with pytest.raises(MapError, match=r"is a finished map already, of walk \(another recording, or it has changed\)"):
         build_map(open_recording(walk), tmp_path / "map", PROFILE, SETTINGS, progress=False)
-    again = build_map(open_recording(walk), tmp_path / "map", PROFILE, SETTINGS, progress=False, overwrite=True)
+    again = build_map(
+        open_recording(walk), tmp_path / "map", PROFILE, SETTINGS, progress=False, overwrite=True, allow=["geometry"]
+    )
     assert not np.array_equal(first.info.counts.voxels, again.info.counts.voxels)
 
 

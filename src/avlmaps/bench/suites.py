@@ -24,7 +24,7 @@ class SuiteInputs:
     Attributes:
         sounds: folder of clips with an index.csv, for the suites of sound.
         clips: the same, for ``sounds``: clips that are queried by name, dry and in rooms.
-        scenes: recordings with poses, for ``locate``.
+        scenes: recordings with poses, for ``locate`` and ``recordings``.
         nyuv2: folder of labelled frames, for ``frames``.
         profile: the models that are measured.
         models: other backends than the profile's, ``module=backend[@model]``.
@@ -48,8 +48,8 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
     """Run a suite and write SUITE.json, SUITE.md, SUITE.png and a CSV file for each table into ``out``.
 
     Args:
-        suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``objects``, ``indexing``,
-            ``found`` or ``navigation``.
+        suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``recordings``,
+            ``objects``, ``indexing``, ``found`` or ``navigation``.
         inputs: what it measures on.
         out: folder to write into.
 
@@ -74,7 +74,12 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
         from avlmaps.bench.objects import run_objects
 
         return run_objects(inputs.indexing, out)
-    tables = _SUITES[suite](inputs)
+    if suite == "recordings":
+        from avlmaps.bench.recordings.suite import run
+
+        tables = run(inputs.scenes, out, inputs.seed)
+    else:
+        tables = _SUITES[suite](inputs)
     sources = (inputs.sounds, inputs.clips, inputs.nyuv2, *inputs.scenes)
     answer = {
         "suite": suite,

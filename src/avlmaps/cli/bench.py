@@ -14,7 +14,17 @@ if TYPE_CHECKING:
     from avlmaps.bench.navigation import NavigationSettings
 
 Suite = Literal[
-    "words", "language", "sounds", "segmentation", "locate", "frames", "objects", "indexing", "found", "navigation"
+    "words",
+    "language",
+    "sounds",
+    "segmentation",
+    "locate",
+    "frames",
+    "recordings",
+    "objects",
+    "indexing",
+    "found",
+    "navigation",
 ]
 Series = Literal["sounds-1", "sounds-2", "sounds-3", "images", "pairs", "commands", "spatial"]
 
@@ -71,6 +81,8 @@ class Bench(ModelVerb):
     locate: needs --scenes, recordings with poses; half of the frames become the map, the others are located.
     frames: needs --nyuv2, labelled frames of NYU Depth V2 or of your own camera (docs/guides/train-eyes.md); kinds of
     pixels, without any map.
+    recordings: mistakes of recordings (poses, units, axes, clocks, pictures) and right ones, and what is said of each;
+    takes --scenes, recordings of a real camera.
     objects: positions of objects, in the scenes of indexing, whose maps it shares.
     indexing: the paper's Tables III to V, in twelve held-out homes, in --scenes, or in a recording with objects.json.
     found: is what is reported as found there? Brier scores and a reliability diagram, in the scenes of indexing.
@@ -86,7 +98,7 @@ class Bench(ModelVerb):
     clips: Annotated[Path | None, arg(metavar="DIR")] = None
     """Folder of clips with an index.csv: queries each by name, dry and in simulated rooms (sounds)."""
     scenes: Annotated[tuple[str, ...], arg(metavar="SCENE ...")] = ()
-    """Recordings with poses (locate); names of scenes such as house:1000000:held-out (the others)."""
+    """Recordings with poses (locate, recordings); names of scenes such as house:1000000:held-out (the others)."""
     nyuv2: Annotated[Path | None, arg(metavar="DIR")] = None
     """Folder of labelled frames (frames.csv, NAME.color.jpg, NAME.depth.png, NAME.label.png, camera.json)."""
     profile: Annotated[str, arg(metavar="PROFILE")] = "embedded"

@@ -2,10 +2,15 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
+
+import msgspec
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.progress import say
-from avlmaps.maps.plan import Plan
+from avlmaps.maps.partial_maps import BUILD_VERSION
+from avlmaps.maps.plan import Computed, Plan, stage
+from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.manifest import Removed
 from avlmaps.recordings.consistency.check import check_recording
 from avlmaps.recordings.consistency.verdict import Reason
@@ -13,6 +18,10 @@ from avlmaps.recordings.types import Recording
 
 # Share of the voxels that frames see through: 0 to 1 % in right recordings, 8 % with the drift of wheels.
 MOST_SEEN_THROUGH = 0.15
+
+
+class _Doubts(msgspec.Struct):
+    sentences: tuple[str, ...]
 
 
 def checked(plan: Plan, allowed: Sequence[str]) -> Plan:
@@ -25,17 +34,22 @@ def checked(plan: Plan, allowed: Sequence[str]) -> Plan:
     Raises:
         RecordingError: the recording cannot be right, or a reason has no such name.
     """
-    doubts = tuple(_doubts(plan.recording, allowed))
+    known = [reason.value for reason in Reason]
+    for name in allowed:
+        if name not in known:
+            raise RecordingError(f"There is nothing called {name!r} to allow; known are: {', '.join(known)}.")
+    key = key_of("doubts", BUILD_VERSION, plan.recording.fingerprint, sorted(allowed))
+
+    def compute(_: Path) -> Computed[_Doubts]:
+        return Computed(_Doubts(tuple(_doubts(plan.recording, allowed))))
+
+    doubts = stage(plan, "doubts", key, _Doubts, compute).facts.sentences
     for doubt in doubts:
         say(f"note: {doubt}")
     return replace(plan, doubts=doubts)
 
 
 def _doubts(recording: Recording, allowed: Sequence[str]) -> Iterator[str]:
-    known = [reason.value for reason in Reason]
-    for name in allowed:
-        if name not in known:
-            raise RecordingError(f"There is nothing called {name!r} to allow; known are: {', '.join(known)}.")
     try:
         verdict = check_recording(recording)
     except RecordingError:  # no frame of the sample can be read; how many may be lost is decided later

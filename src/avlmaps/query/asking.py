@@ -170,9 +170,7 @@ def answer_question(avlmap: "AVLMap", question: Question, top: int = 3, files: F
     text = found_text(question.parts, goals[0]) if found else absent_text(parts, goals, next(iter(alone), None))
     elapsed_ms = 1e3 * (time.perf_counter() - begin)
     doubts = avlmap.stored.info.doubts
-    return Answer(
-        goals, found, parts, elapsed_ms, heat, heat.probability, text=text, alternatives=alone, notes=doubts
-    )
+    return Answer(goals, found, parts, elapsed_ms, heat, heat.probability, text=text, alternatives=alone, notes=doubts)
 
 
 def _part_answer(part: Part, factor: Factor, whole: Heatmap) -> PartAnswer:

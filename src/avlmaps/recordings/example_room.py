@@ -4,6 +4,7 @@ The room is 6 x 4 x 2.6 m with three boxes, z up, metres. No two walls, boxes or
 that is mirrored, shuffled or of other channels differs from the right one.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -19,6 +20,7 @@ _BOXES = np.array([
     [[1.0, 0.0, 0.0], [1.6, 0.5, 1.8]],
 ])  # fmt: skip
 _BOX_COLOURS = np.array([(150.0, 100.0, 60.0), (180.0, 40.0, 40.0), (60.0, 90.0, 170.0)])
+_MORE_COLOUR = np.array([90.0, 70.0, 120.0])
 # Walls across x, walls across y, floor, ceiling.
 _ROOM_COLOURS = np.array([(205.0, 160.0, 150.0), (150.0, 200.0, 165.0), (120.0, 110.0, 100.0), (235.0, 235.0, 215.0)])
 _TEXTURE = 30.0  # contrast, of 255
@@ -62,10 +64,10 @@ def example_truth(
     rig = Rig(rgb, depth or rgb)
     stamps_s = np.arange(frames) / rate_hz
     poses = np.stack([_pose(i) for i in range(frames)])
-    depths = tuple(_see(rig.depth, pose)[1] for pose in poses)
+    depths = tuple(see(rig.depth, pose)[1] for pose in poses)
     for picture in depths:
         picture[:2, :3] = 0.0  # a corner where nothing was measured
-    return Truth(rig, stamps_s, poses, tuple(_see(rgb, pose)[0] for pose in poses), depths)
+    return Truth(rig, stamps_s, poses, tuple(see(rgb, pose)[0] for pose in poses), depths)
 
 
 def _pose(index: int) -> Float[np.ndarray, "4 4"]:
@@ -79,8 +81,16 @@ def _pose(index: int) -> Float[np.ndarray, "4 4"]:
     return pose
 
 
-def _see(camera: Pinhole, pose: Float[np.ndarray, "4 4"]) -> tuple[Any, Any]:
-    """Cast one ray a pixel; return colour (uint8) and z-depth (float32, metres)."""
+def see(
+    camera: Pinhole, pose: Float[np.ndarray, "4 4"], more: Sequence[Float[np.ndarray, "2 3"]] = ()
+) -> tuple[Any, Any]:
+    """Cast one ray a pixel; return colour (uint8) and z-depth (float32, metres).
+
+    Args:
+        camera: that sees.
+        pose: its world_from_camera.
+        more: lowest and highest corner of further boxes, such as a person who passes.
+    """
     rays: Any = camera.rays() @ pose[:3, :3].T
     eye: Any = pose[:3, 3]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -88,7 +98,8 @@ def _see(camera: Pinhole, pose: Float[np.ndarray, "4 4"]) -> tuple[Any, Any]:
     depth: Any = walls.min(axis=-1)
     axis: Any = walls.argmin(axis=-1)
     colour = _ROOM_COLOURS[np.where(axis < 2, axis, np.where(rays[..., 2] < 0.0, 2, 3))]
-    for (low, high), own in zip(_BOXES, _BOX_COLOURS, strict=True):
+    colours = (*_BOX_COLOURS, *[_MORE_COLOUR] * len(more))
+    for (low, high), own in zip((*_BOXES, *more), colours, strict=True):
         with np.errstate(divide="ignore", invalid="ignore"):
             a, b = (low - eye) / rays, (high - eye) / rays
         near: Any = np.minimum(a, b)

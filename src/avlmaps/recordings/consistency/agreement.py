@@ -13,6 +13,8 @@ from avlmaps.recordings.consistency.sample import Sample, Surfaces
 SAME_M, SAME_SHARE = 0.03, 0.02
 # A point is seen through where the other frame sees this much farther in all directions around: in floors, in shares.
 BEHIND, BEHIND_SHARE = 2.0, 0.04
+# Pairs from apart have the drift of what lies between them as well.
+APART_SAME_M = 0.06
 # A pair with fewer points in view says nothing.
 FEWEST_POINTS = 25
 _LEAST_DEPTH_M = 0.02
@@ -29,6 +31,7 @@ class Agreement:
         same: (p,) of them on the surface that the other sees.
         through: (p,) of them in front of what the other sees: it looks through them.
         hidden: (p,) of them behind it.
+        off: (p,) median difference of depths there, as a share of the depth; NaN of a pair with too few points.
         outside: share of all points that their partner does not have in view.
         likeness: correlation of brightness of the same points, over all pairs; NaN where nothing varies.
         alike: (p,) the same of each pair; NaN where too few points have colour, or it hardly varies.
@@ -40,6 +43,7 @@ class Agreement:
     same: Int[np.ndarray, " p"]
     through: Int[np.ndarray, " p"]
     hidden: Int[np.ndarray, " p"]
+    off: Float[np.ndarray, " p"]
     outside: float
     likeness: float
     alike: Float[np.ndarray, " p"]
@@ -73,7 +77,7 @@ class Agreement:
 
 
 _NONE = np.zeros(0, np.int64)
-NOTHING = Agreement(_NONE, _NONE, _NONE, _NONE, 0.0, float("nan"), np.zeros(0), 0, 0.0)
+NOTHING = Agreement(_NONE, _NONE, _NONE, _NONE, np.zeros(0), 0.0, float("nan"), np.zeros(0), 0, 0.0)
 
 
 def compare(
@@ -116,7 +120,19 @@ def compare(
     hidden = seen & (deep < far - BEHIND * floor_m - BEHIND_SHARE * far)
     outside = 1.0 - float(inside.sum() / max(there.sum(), 1))
     counts = (seen.sum(axis=1), same.sum(axis=1), through.sum(axis=1), hidden.sum(axis=1))
-    return Agreement(*counts, outside, *_likeness(sample, rig, (a, b), points, moved, same))
+    measured = sample.depth_m[b[:, None], at_v, at_u] * scale
+    return Agreement(*counts, _off(measured, far, seen), outside, *_likeness(sample, rig, (a, b), points, moved, same))
+
+
+def _off(measured: Float[np.ndarray, "p m"], expected: Float[np.ndarray, "p m"], seen: np.ndarray) -> np.ndarray:
+    usable = seen & (measured > 0.0)
+    usable &= (usable.sum(axis=1) >= FEWEST_POINTS)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(usable, np.abs(measured - expected) / expected, np.nan)
+    off = np.full(len(share), np.nan)
+    rows = usable.any(axis=1)
+    off[rows] = np.nanmedian(share[rows], axis=1)
+    return off
 
 
 def _likeness(

@@ -23,7 +23,7 @@ def cause_of(suspect: Suspect, rig: Rig, stored_unit_m: float, median_m: float, 
         rig: its cameras.
         stored_unit_m: metres of one unit of its depth as it is read.
         median_m: middle of its depths, as they are read.
-        gain: how much better the recording agrees, in parentheses.
+        gain: how much better the recording agrees, in parentheses, or nothing.
     """
     looks = " and ".join(_looks(suspect, rig, median_m))
     options, hands = _options(suspect, rig, stored_unit_m, median_m), _by_hand(suspect, median_m)
@@ -32,7 +32,8 @@ def cause_of(suspect: Suspect, rig: Rig, stored_unit_m: float, median_m: float, 
         todo.append(f"build again with {options.words()}")
     if hands:
         todo.append(hands)
-    return f"{looks[:1].upper()}{looks[1:]} {gain}: {', and '.join(todo)}."
+    gain = f" {gain}" if gain else ""
+    return f"{looks[:1].upper()}{looks[1:]}{gain}: {', '.join(todo)}."
 
 
 def _looks(suspect: Suspect, rig: Rig, median_m: float) -> list[str]:

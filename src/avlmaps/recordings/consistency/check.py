@@ -6,16 +6,23 @@ surface and a likeness of 0.87 at least; docs/recordings.md has the figures.
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.timeline import Trajectory
-from avlmaps.recordings.consistency.agreement import FEWEST_POINTS, LEAST_CONTRAST, Agreement, compare
+from avlmaps.recordings.consistency.agreement import (
+    APART_SAME_M,
+    FEWEST_POINTS,
+    LEAST_CONTRAST,
+    Agreement,
+    compare,
+)
 from avlmaps.recordings.consistency.causes import cause_of
-from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample
+from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_pairs, draw_sample
 from avlmaps.recordings.consistency.single_frames import of_colour, of_depth, of_intrinsics, of_motion
-from avlmaps.recordings.consistency.suspects import PoseAt, Trial, Trials, find_cause
+from avlmaps.recordings.consistency.suspects import PoseAt, Trial, Trials, find_cause, find_closer
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason, Verdict
 from avlmaps.recordings.corrections import NONE, CorrectedRecording, uncorrected
 from avlmaps.recordings.types import Recording
@@ -23,9 +30,16 @@ from avlmaps.recordings.types import Recording
 # Share of points on the surface that the other frame sees.
 LEAST_AGREEING = 0.94
 IMPOSSIBLE_AGREEING = 0.70
+# Where people walk by, fewer points agree, but those that do agree well: by a share of their depth.
+LEAST_WITH_PEOPLE, MOST_OFF = 0.80, 0.01
+# Of pairs that look one way from apart, which have the drift of a walk as well.
+LEAST_AGREEING_APART = 0.75
 # Share of pairs that do not agree at all, although the others do: jumps, exchanged frames.
 BAD_PAIR = 0.6
+BAD_OFF = 0.03
 MOST_BAD_PAIRS = 0.08
+# Pairs that are looked at more closely, since the poses may jump between them.
+MOST_JUMPS = 3
 # Correlation of the brightness of the same points, of all pairs and of a pair that is not one.
 LEAST_LIKENESS = 0.75
 BAD_LIKENESS = 0.4
@@ -46,6 +60,7 @@ def check_recording(recording: Recording) -> Verdict:
     sample = draw_sample(recording)
     surfaces = Surfaces.of(sample.depth_m)
     after = compare(sample.only(sample.follows), surfaces, sample.world_from_camera)
+    apart = compare(sample.only(~sample.follows), surfaces, sample.world_from_camera, floor_m=APART_SAME_M)
     known = sample.depth_m[sample.depth_m > 0.0]
     median_m = float(np.median(known)) if known.size else float("nan")
     findings = [
@@ -53,7 +68,7 @@ def check_recording(recording: Recording) -> Verdict:
         *of_depth(sample, median_m),
         *of_colour(sample, surfaces),
         *of_motion(recording, after, _can_be_judged(after)),
-        *_of_agreement(recording, sample, after, median_m),
+        *_of_agreement(recording, sample, _Found(after, apart), median_m),
     ]
     order = (Grade.IMPOSSIBLE, Grade.SUSPICIOUS)
     checked = _can_be_judged(after)
@@ -68,17 +83,35 @@ def check_recording(recording: Recording) -> Verdict:
     )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """How pairs agree that follow one another, and pairs from apart."""
+
+    after: Agreement
+    apart: Agreement
+
+
 def _can_be_judged(found: Agreement) -> bool:
     return found.pairs >= FEWEST_PAIRS and int(found.points.sum()) >= FEWEST_IN_ALL
 
 
-def agrees(found: Agreement) -> bool:
-    """Return whether pairs agree as those of right recordings do."""
-    if not _can_be_judged(found):
+def _geometry_agrees(found: Agreement) -> bool:
+    """Return whether nearly all points agree, or most of them do so well that the others are what moved meanwhile."""
+    if _bad_pairs(found) > MOST_BAD_PAIRS * found.pairs:
         return False
+    known = found.off[np.isfinite(found.off)]
+    moved = found.same_share >= LEAST_WITH_PEOPLE and float(np.median(known)) <= MOST_OFF
+    return found.same_share >= LEAST_AGREEING or moved
+
+
+def _apart_agrees(found: Agreement) -> bool:
+    return not _can_be_judged(found) or found.same_share >= LEAST_AGREEING_APART
+
+
+def _bad_pairs(found: Agreement) -> int:
+    """Return how many pairs hardly agree, not for somebody who stands before a part of the picture."""
     used = found.points >= FEWEST_POINTS
-    bad = float((found.same[used] < BAD_PAIR * found.points[used]).mean())
-    return found.same_share >= LEAST_AGREEING and bad <= MOST_BAD_PAIRS and not _unlike(found)
+    return int(((found.same < BAD_PAIR * found.points) & (found.off > BAD_OFF))[used].sum())
 
 
 def _unlike(found: Agreement) -> bool:
@@ -89,41 +122,83 @@ def _unlike(found: Agreement) -> bool:
     return found.likeness < LEAST_LIKENESS or (bad >= 2 and bad > MOST_BAD_PAIRS * np.isfinite(found.alike).sum())
 
 
-def _of_agreement(recording: Recording, sample: Sample, found: Agreement, median_m: float) -> Iterator[Finding]:
-    if not _can_be_judged(found) or agrees(found):
-        return
-    used = found.points >= FEWEST_POINTS
-    share = found.same[used] / found.points[used]
-    bad = int((share < BAD_PAIR).sum())
-    if found.same_share < LEAST_AGREEING or bad > MOST_BAD_PAIRS * used.sum():
-        grade = Grade.IMPOSSIBLE if found.same_share < IMPOSSIBLE_AGREEING else Grade.SUSPICIOUS
+def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m: float) -> Iterator[Finding]:
+    after, apart = found.after, found.apart
+    if _can_be_judged(after) and not _geometry_agrees(after):
+        grade = Grade.IMPOSSIBLE if after.same_share < IMPOSSIBLE_AGREEING else Grade.SUSPICIOUS
         sentence = (
-            f"Frames that should see the same place do not agree: of the points of one frame {found.same_share:.0%} "
-            f"lie on the surface that another sees, and {found.through_share:.1%} are seen through ({found.pairs} "
+            f"Frames that should see the same place do not agree: of the points of one frame {after.same_share:.0%} "
+            f"lie on the surface that another sees, and {after.through_share:.1%} are seen through ({after.pairs} "
             "pairs of frames)."
         )
-        others = float(np.median(share[share >= BAD_PAIR])) if bad < len(share) else 0.0
-        yield Finding(Reason.GEOMETRY, grade, sentence, _remedy(recording, sample, found, median_m, bad, others))
-        return
-    grade = Grade.IMPOSSIBLE if found.likeness < IMPOSSIBLE_LIKENESS else Grade.SUSPICIOUS
-    bad = int((found.alike < BAD_LIKENESS).sum())
-    sentence = (
-        "The colour pictures do not show what the depth pictures show: the brightness of the same points in two "
-        f"frames correlates by {found.likeness:.2f} where right recordings have 0.9 and more, and hardly at all in "
-        f"{bad} of {int(np.isfinite(found.alike).sum())} pairs."
-    )
-    other = "Check that colour and depth of a frame belong together (order of names, clock, intrinsics of colour)."
-    yield Finding(Reason.COLOUR, grade, sentence, _cause(recording, sample, found, median_m) or other)
+        cause = _cause(recording, sample, found, median_m)
+        yield Finding(Reason.GEOMETRY, grade, sentence, cause or _other_cause(recording, sample, after))
+    elif not _apart_agrees(apart):
+        sentence = (
+            f"Frames that look at the same place from apart do not agree: {apart.same_share:.0%} of their points lie "
+            f"on one surface, and {apart.through_share:.1%} are seen through ({apart.pairs} pairs of frames)."
+        )
+        other = "The poses drift, depth and positions have different scales, or much was moved; check them."
+        cause = _cause(recording, sample, found, median_m)
+        yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, cause or other)
+    elif _can_be_judged(after) and (closer := find_closer(_trials(recording, sample))) is not None:
+        then = _off(_Found(closer.agreement, closer.apart))
+        sentence = (
+            f"The depths of the same points in two frames differ by {_off(found):.1%}, and by {then:.1%} if the "
+            "recording is read in another way."
+        )
+        yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, _words(recording, closer, median_m, ""))
+    elif jump := _jump(recording, sample, after):
+        yield jump
+    elif _can_be_judged(after) and _unlike(after):
+        grade = Grade.IMPOSSIBLE if after.likeness < IMPOSSIBLE_LIKENESS else Grade.SUSPICIOUS
+        sentence = (
+            "The colour pictures do not show what the depth pictures show: the brightness of the same points in two "
+            f"frames correlates by {after.likeness:.2f} where right recordings have 0.9 and more, and hardly at all in "
+            f"{int((after.alike < BAD_LIKENESS).sum())} of {int(np.isfinite(after.alike).sum())} pairs."
+        )
+        other = "Check that colour and depth of a frame belong together (order of names, clock, intrinsics of colour)."
+        yield Finding(Reason.COLOUR, grade, sentence, _cause(recording, sample, found, median_m) or other)
 
 
-def _remedy(recording: Recording, sample: Sample, found: Agreement, median_m: float, bad: int, others: float) -> str:
-    cause = _cause(recording, sample, found, median_m)
-    if cause:
-        return cause
-    if 0 < bad <= 0.4 * found.pairs and others > LEAST_AGREEING:
-        pairs = sample.only(sample.follows).pairs
-        row = int(np.argmin(np.where(found.points >= FEWEST_POINTS, found.same / np.maximum(found.points, 1), 1.0)))
-        a, b = (recording.name(int(sample.index[i])) for i in pairs[row])
+def _off(found: _Found) -> float:
+    return float(np.nanmean(np.concatenate([found.after.off, found.apart.off])))
+
+
+def _jump(recording: Recording, sample: Sample, after: Agreement) -> Finding | None:
+    """Return a finding where a pair does not agree, no pair across the same place does, and those beside do."""
+    share = np.where(after.points >= 2 * FEWEST_POINTS, after.same / np.maximum(after.points, 1), 1.0)
+    pairs = sample.index[sample.only(sample.follows).pairs]
+    for row in np.argsort(share, kind="stable")[:MOST_JUMPS].tolist():
+        a, b = (int(number) for number in pairs[row])
+        if share[row] >= BAD_PAIR:
+            break
+        if a < 1 or b > len(recording) - 2:
+            continue
+        across = np.array([(a - 1, b), (a, b), (a, b + 1), (a - 1, b + 1), (a - 1, a), (b, b + 1)])
+        near = draw_pairs(recording, across, np.arange(len(across)) < 4)
+        surfaces = Surfaces.of(near.depth_m)
+        over, beside = (
+            compare(near.only(kind), surfaces, near.world_from_camera) for kind in (near.follows, ~near.follows)
+        )
+        seen = _can_be_judged(over) and _can_be_judged(beside)
+        if seen and over.same_share < BAD_PAIR and beside.same_share > LEAST_AGREEING:
+            sentence = (
+                f"Frames {recording.name(a)} and {recording.name(b)} do not agree ({over.same_share:.0%} of the points "
+                f"on one surface), although the frames before and after do ({beside.same_share:.0%})."
+            )
+            remedy = "The poses jump there, or tracking began again: cut the recording there, or fix the poses."
+            return Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, remedy)
+    return None
+
+
+def _other_cause(recording: Recording, sample: Sample, after: Agreement) -> str:
+    used = after.points >= FEWEST_POINTS
+    share = np.where(used, after.same / np.maximum(after.points, 1), np.nan)
+    bad, others = _bad_pairs(after), share[share >= BAD_PAIR]
+    if 0 < bad <= 0.4 * after.pairs and len(others) and float(np.median(others)) > LEAST_AGREEING:
+        pair = sample.only(sample.follows).pairs[int(np.nanargmin(share))]
+        a, b = (recording.name(int(sample.index[i])) for i in pair)
         return (
             f"{bad} of the pairs are far off, the others are right: the poses jump, or frames are exchanged, for "
             f"example between {a} and {b}. Cut the recording there, or fix the order or the poses."
@@ -131,30 +206,47 @@ def _remedy(recording: Recording, sample: Sample, found: Agreement, median_m: fl
     return "No usual mistake explains it; check the poses, the depth and the intrinsics, and that they belong together."
 
 
-def _cause(recording: Recording, sample: Sample, found: Agreement, median_m: float) -> str:
+def _cause(recording: Recording, sample: Sample, found: _Found, median_m: float) -> str:
     """Return what makes the recording agree with itself, or nothing."""
+    best = find_cause(_trials(recording, sample), lambda trial: _explains(trial, found))
+    return "" if best is None else _words(recording, best, median_m, _gain(found, best))
+
+
+def _trials(recording: Recording, sample: Sample) -> Trials:
     given = recording.given if isinstance(recording, CorrectedRecording) else NONE
-    trials = Trials(sample.only(sample.follows), pose_at(recording, sample), given)
-    best = find_cause(trials, lambda trial: _explains(trial, found))
-    if best is None:
-        return ""
-    better = best.agreement
-    if found.same_share < LEAST_AGREEING:
-        gain = f"(seen through {found.through_share:.1%} -> {better.through_share:.1%}, "
-        gain += f"agreeing {found.same_share:.0%} -> {better.same_share:.0%})"
-    else:
-        gain = f"(correlation {found.likeness:.2f} -> {better.likeness:.2f})"
+    return Trials(sample, pose_at(recording, sample), given)
+
+
+def _words(recording: Recording, best: Trial, median_m: float, gain: str) -> str:
     return cause_of(best.suspect, recording.rig, recording.stored_depth_unit_m, median_m, gain)
 
 
-def _explains(trial: Trial, before: Agreement) -> bool:
+def _gain(found: _Found, best: Trial) -> str:
+    """Return how much better it agrees, in parentheses."""
+    for before, after, right in (
+        (found.after, best.agreement, _geometry_agrees(found.after)),
+        (found.apart, best.apart, _apart_agrees(found.apart)),
+    ):
+        if not right:
+            return (
+                f"(seen through {before.through_share:.1%} -> {after.through_share:.1%}, "
+                f"agreeing {before.same_share:.0%} -> {after.same_share:.0%})"
+            )
+    return f"(correlation {found.after.likeness:.2f} -> {best.agreement.likeness:.2f})"
+
+
+def _explains(trial: Trial, found: _Found) -> bool:
     """Return whether a suspect makes the pairs agree, clearly better than they did."""
-    found = trial.agreement
-    if not agrees(found) or trial.score < LEAST_AGREEING * 0.9:
+    after, apart = trial.agreement, trial.apart
+    if not _can_be_judged(after) or not _geometry_agrees(after) or not _apart_agrees(apart) or _unlike(after):
         return False
-    if before.same_share < LEAST_AGREEING:
-        return found.same_share > before.same_share + 0.5 * (1.0 - before.same_share)
-    return found.likeness > before.likeness + 0.1 or not agrees(before)
+    if trial.score < LEAST_AGREEING * 0.9:
+        return False
+    if not _geometry_agrees(found.after):
+        return after.same_share > found.after.same_share + 0.5 * (1.0 - found.after.same_share)
+    if not _apart_agrees(found.apart):
+        return _can_be_judged(apart) and apart.same_share > 0.5 * (1.0 + found.apart.same_share)
+    return True
 
 
 def pose_at(recording: Recording, sample: Sample) -> PoseAt:

@@ -17,7 +17,9 @@ PAIRS = 30  # that follow in time, at most
 STEP_RAD = np.radians(12.0)
 STEP_M = 0.35
 STEPS = (0.5, 1.2)
-REVISITS = 6
+# Of the pairs that look one way from apart: this far apart, as long as poses say so.
+APART = 12
+APART_M, APART_RAD = 0.7, np.radians(25.0)
 JUMPS = 4
 # A step this many times the usual one is a jump that is looked at.
 JUMP_RATIO = 4.0
@@ -41,7 +43,7 @@ class Sample:
         grey: (f, hc, wc) brightness, 0 to 255.
         rig: the cameras at these sizes.
         pairs: (p, 2) rows of frames that should see the same place, the earlier first.
-        follows: (p,) whether the frames of a pair follow one another in time; the others are where a walk returns.
+        follows: (p,) whether the frames of a pair follow one another; the others look at one place from apart.
     """
 
     index: Int[np.ndarray, " f"]
@@ -67,7 +69,20 @@ def draw_sample(recording: Recording) -> Sample:
     Raises:
         RecordingError: none of them can be read.
     """
-    pairs, follows = choose_pairs(recording.world_from_camera, recording.stamps_s)
+    return draw_pairs(recording, *choose_pairs(recording.world_from_camera))
+
+
+def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Bool[np.ndarray, " p"]) -> Sample:
+    """Read the frames of pairs; those with a frame that cannot be read are left out.
+
+    Args:
+        recording: of the frames.
+        pairs: numbers of frames.
+        follows: whether those of a pair follow one another.
+
+    Raises:
+        RecordingError: none of them can be read.
+    """
     index = np.unique(pairs) if len(pairs) else np.arange(min(len(recording), 1))
     rig = _small_rig(recording.rig)
     read: list[int] = []
@@ -98,12 +113,10 @@ def draw_sample(recording: Recording) -> Sample:
     )
 
 
-def choose_pairs(
-    pose: Float[np.ndarray, "n 4 4"], stamps_s: Float[np.ndarray, " n"]
-) -> tuple[Int[np.ndarray, "p 2"], Bool[np.ndarray, " p"]]:
+def choose_pairs(pose: Float[np.ndarray, "n 4 4"]) -> tuple[Int[np.ndarray, "p 2"], Bool[np.ndarray, " p"]]:
     """Return pairs of frames that should see the same place, and which of them follow one another in time.
 
-    These are pairs after a step and across jumps; the others are where a walk returns.
+    These are pairs after a step and across jumps; the others look one way from places apart.
     """
     n = len(pose)
     if n < 2:
@@ -122,8 +135,8 @@ def choose_pairs(
     for at in odd[np.argsort(-step[odd], kind="stable")][:JUMPS].tolist():
         found[at, at + 1] = None
     after = sorted(found)
-    back = [pair for pair in _revisits(pose, stamps_s) if pair not in found]
-    return np.array([*after, *back], np.int64).reshape(-1, 2), np.arange(len(after) + len(back)) < len(after)
+    apart = [pair for pair in _apart(pose) if pair not in found]
+    return np.array([*after, *apart], np.int64).reshape(-1, 2), np.arange(len(after) + len(apart)) < len(after)
 
 
 def _spread(n: int) -> list[int]:
@@ -136,21 +149,26 @@ def _spread(n: int) -> list[int]:
     return list(order)
 
 
-def _revisits(pose: Float[np.ndarray, "n 4 4"], stamps_s: Float[np.ndarray, " n"]) -> list[tuple[int, int]]:
-    """Return pairs far apart in time whose cameras are at nearly one place and look nearly one way."""
-    rows = np.unique(np.linspace(0, len(pose) - 1, min(len(pose), 120)).round().astype(int))
-    few, at_s = pose[rows], stamps_s[rows]
-    apart = np.array([steps_between(one, few) for one in few])
-    late_s = at_s[None, :] - at_s[:, None]
-    score = np.where((apart < 3.0) & (late_s > 0.2 * (at_s[-1] - at_s[0])), late_s, 0.0)
+def _apart(pose: Float[np.ndarray, "n 4 4"]) -> list[tuple[int, int]]:
+    """Return pairs whose cameras look nearly one way from places apart: there the scale of positions shows."""
+    rows = np.unique(np.linspace(0, len(pose) - 1, min(len(pose), 150)).round().astype(int))
+    few = pose[rows]
+    away_m = np.linalg.norm(few[:, None, :3, 3] - few[None, :, :3, 3], axis=-1)
+    ahead = few[:, :3, 2] @ few[:, :3, 2].T
+    upright = few[:, :3, 1] @ few[:, :3, 1].T
+    least = np.cos(APART_RAD)
+    with np.errstate(divide="ignore"):
+        off = np.abs(np.log(away_m / APART_M))
+    off[(ahead < least) | (upright < least) | np.tri(len(rows), dtype=bool)] = np.inf
+    off += 0.2 * np.abs(np.subtract.outer(rows, rows)) / len(pose)  # of pairs as far apart, the sooner ones
     found: list[tuple[int, int]] = []
-    for _ in range(REVISITS):
-        a, b = (int(i) for i in np.unravel_index(int(np.argmax(score)), score.shape))
-        if score[a, b] <= 0.0:
+    near = max(1, len(rows) // (3 * APART))
+    for _ in range(APART):
+        a, b = (int(i) for i in np.unravel_index(int(np.argmin(off)), off.shape))
+        if not np.isfinite(off[a, b]):
             break
         found.append((int(rows[a]), int(rows[b])))
-        near = max(1, len(rows) // (2 * REVISITS))
-        score[max(0, a - near) : a + near + 1] = 0.0
+        off[max(0, a - near) : a + near + 1] = np.inf
     return found
 
 

@@ -9,14 +9,14 @@ from jaxtyping import Float
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.recordings.camera_axes import NAMED, all_axes
-from avlmaps.recordings.consistency.agreement import NOTHING, SAME_M, Agreement, compare
+from avlmaps.recordings.consistency.agreement import APART_SAME_M, NOTHING, SAME_M, Agreement, compare
 from avlmaps.recordings.consistency.sample import Sample, Surfaces
 from avlmaps.recordings.corrections import NONE, Corrections, PoseKind, reread_poses
 
 # Poses of the sample's frames at their stamps plus a delay; None where the trajectory does not reach.
 PoseAt = Callable[[float], Float[np.ndarray, "f 4 4"] | None]
 # A frame of usual size has its depths compared with `SAME_M`; of a scene of another size it is this share.
-_FLOOR_SHARE = SAME_M / 2.5
+_FLOOR_SHARE, _APART_FLOOR_SHARE = SAME_M / 2.5, APART_SAME_M / 2.5
 UNITS = (0.5, 2.0, 0.25, 4.0, 0.2, 5.0, 0.1, 10.0, 0.01, 100.0, 0.001, 1000.0)
 _SCALES = (0.8, 1.25, 0.63, 1.6, 0.4, 2.5, *UNITS)
 _TWICE_SCALES = UNITS[:8]
@@ -32,7 +32,14 @@ _LEAST_COMPARED = 0.15
 # And this share of those that are compared as the recording is.
 _OF_AS_IT_IS = 0.5
 _CLEARLY = 0.02
-_PAIRS, _POINTS = 20, 128
+_AS_GOOD = 1.15
+# A scale, delay or focal length explains a recording that agrees where it leaves this share of the differences, in this
+# share of the pairs; smaller differences are noise.
+_LEAST_GAIN, _MOST_BETTER, _LEAST_OFF = 0.5, 0.8, 0.006
+# Between the steps that are tried, the gain is greater.
+_LEAST_STEP = 0.7
+_FEWEST_PAIRS = 6
+_PAIRS, _POINTS = 14, 128
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,11 +101,23 @@ class Suspect:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A suspect and how well the sample agrees with it."""
+    """A suspect, how well frames agree with it that follow one another or look from apart, and one number of both."""
 
     suspect: Suspect
     agreement: Agreement
+    apart: Agreement
     score: float
+
+    @property
+    def offs(self) -> Float[np.ndarray, " p"]:
+        """Differences of depths of each pair."""
+        return np.concatenate([self.agreement.off, self.apart.off])
+
+    @property
+    def off(self) -> float:
+        """Their mean; infinite without any."""
+        known = self.offs[np.isfinite(self.offs)]
+        return float(known.mean()) if len(known) else float("inf")
 
 
 class Trials:
@@ -112,15 +131,16 @@ class Trials:
             pose_at: the uncorrected poses at other times.
             given: what was corrected already; suspects replace what they name.
         """
-        few = np.unique(np.linspace(0, len(sample.pairs) - 1, min(_PAIRS, len(sample.pairs))).round().astype(int))
-        self.sample, self._pose_at, self.given = sample.only(few), pose_at, given
+        few = [_some(np.flatnonzero(kind)) for kind in (sample.follows, ~sample.follows)]
+        self.sample, self._pose_at, self.given = sample.only(np.concatenate(few)), pose_at, given
         self._depth: dict[tuple[Turn | None, bool], tuple[np.ndarray, Surfaces]] = {}
         self._delayed: dict[float, np.ndarray | None] = {}
         usual = sample.depth_m[sample.depth_m > 0.0]
         self._median_m = float(np.median(usual)) if len(usual) else 1.0
+        self._compared = 0
         self._points = max(int(self._measured(Suspect())[1].there[self.sample.pairs[:, 0]].sum()), 1)
         self._compared = int(_LEAST_COMPARED * self._points)
-        self._compared = max(self._compared, int(_OF_AS_IT_IS * self.run(Suspect()).agreement.points.sum()))
+        self._compared = max(self._compared, int(_OF_AS_IT_IS * self._seen(self.run(Suspect()))))
 
     def run(self, suspect: Suspect) -> Trial:
         """Return how well the sample agrees with a suspect; a score of 0 where it cannot be tried."""
@@ -133,11 +153,16 @@ class Trials:
         grey = sample.grey if suspect.turn_colour is None else suspect.turn_colour(sample.grey)
         rig = suspected_rig(sample.rig, suspect)
         if rig is None or pose is None:
-            return Trial(suspect, NOTHING, 0.0)
+            return Trial(suspect, NOTHING, NOTHING, 0.0)
         sample = replace(sample, depth_m=depth_m, grey=grey)
-        floor_m = _FLOOR_SHARE * self._median_m * suspect.scale
-        found = compare(sample, surfaces, reread_poses(pose, given), rig, suspect.scale, floor_m)
-        return Trial(suspect, found, self._score(found))
+        median_m, scale, pose = self._median_m * suspect.scale, suspect.scale, reread_poses(pose, given)
+        after = compare(sample.only(sample.follows), surfaces, pose, rig, scale, _FLOOR_SHARE * median_m)
+        apart = compare(sample.only(~sample.follows), surfaces, pose, rig, scale, _APART_FLOOR_SHARE * median_m)
+        return Trial(suspect, after, apart, self._score(after, apart))
+
+    @staticmethod
+    def _seen(trial: Trial) -> int:
+        return int(trial.agreement.points.sum() + trial.apart.points.sum())
 
     def _measured(self, suspect: Suspect) -> tuple[np.ndarray, Surfaces]:
         """Return the depth pictures of a suspect before they are scaled, and their surfaces."""
@@ -152,13 +177,17 @@ class Trials:
             self._depth[key] = depth_m, Surfaces.of(depth_m, _POINTS)
         return self._depth[key]
 
-    def _score(self, found: Agreement) -> float:
+    def _score(self, found: Agreement, apart: Agreement) -> float:
         """Return the share of points on one surface, times the likeness of their colour as far as that varies."""
-        compared = max(int(found.points.sum()), self._compared, 1)
-        score = float(found.same.sum()) / compared
+        compared = max(int(found.points.sum() + apart.points.sum()), self._compared, 1)
+        score = float(found.same.sum() + apart.same.sum()) / compared
         if np.isfinite(found.likeness) and found.textured > 0.05 * self._points:
             score *= 0.5 + 0.5 * max(found.likeness, 0.0)
         return score
+
+
+def _some(rows: np.ndarray) -> np.ndarray:
+    return rows[np.unique(np.linspace(0, len(rows) - 1, min(_PAIRS, len(rows))).round().astype(int))]
 
 
 def suspected_rig(rig: Rig, suspect: Suspect) -> Rig | None:
@@ -180,6 +209,32 @@ def suspected_rig(rig: Rig, suspect: Suspect) -> Rig | None:
         return Rig(other(rig.rgb), other(rig.depth), rig.rgb_from_depth)
     except (ValueError, ZeroDivisionError):
         return None
+
+
+def find_closer(trials: Trials) -> Trial | None:
+    """Return the scale, delay or focal length with which depths differ clearly less, None where there is none.
+
+    With a slow camera, points stay within the tolerance of a surface whatever is wrong; their differences still show
+    it, and people who walk by do not change that.
+    """
+    as_it_is = trials.run(Suspect())
+    if not _LEAST_OFF < as_it_is.off < float("inf"):
+        return None
+    closer = [trial for trial in map(trials.run, (*_scales(), *_delays(), *_focal())) if _is_closer(trial, as_it_is)]
+    if not closer:
+        return None
+    best = _refined(trials, min(closer, key=lambda trial: trial.off))
+    return best if best.off < _LEAST_GAIN * as_it_is.off else None
+
+
+def _is_closer(trial: Trial, as_it_is: Trial) -> bool:
+    """Return whether depths differ clearly less, in most of the pairs."""
+    before, after = as_it_is.offs, trial.offs
+    both = np.isfinite(before) & np.isfinite(after) if len(before) == len(after) else np.zeros(0, bool)
+    if both.sum() < max(_FEWEST_PAIRS, 0.6 * np.isfinite(before).sum()):
+        return False
+    better = float((after[both] < before[both]).mean())
+    return better >= _MOST_BETTER and float(after[both].mean()) < _LEAST_STEP * float(before[both].mean())
 
 
 def find_cause(trials: Trials, enough: Callable[[Trial], bool]) -> Trial | None:
@@ -258,6 +313,10 @@ def _delays() -> Iterator[Suspect]:
 def _intrinsics() -> Iterator[Suspect]:
     yield Suspect(centred=True)
     yield Suspect(swapped=True)
+    yield from _focal()
+
+
+def _focal() -> Iterator[Suspect]:
     yield from (Suspect(focal=factor) for factor in _FOCAL)
 
 
@@ -276,14 +335,18 @@ def _with(a: Suspect, b: Suspect) -> Suspect:
 
 
 def _refined(trials: Trials, best: Trial) -> Trial:
-    """Return a delay, scale or focal length between the steps that were tried."""
-    suspect = best.suspect
-    tried: list[Suspect] = []
+    """Return the delay, scale or focal length near the best at which depths differ least."""
+    suspect, tried = best.suspect, list[Suspect]()
     if suspect.given.pose_delay_s:
         around_s = suspect.given.pose_delay_s + np.arange(-4, 5) / 100.0
         tried = [replace(suspect, given=replace(suspect.given, pose_delay_s=round(float(s), 3))) for s in around_s]
-    elif suspect.scale != 1.0 and suspect.scale not in UNITS:
-        tried = [replace(suspect, scale=float(suspect.scale * factor)) for factor in np.geomspace(0.8, 1.25, 13)]
+    elif suspect.scale != 1.0:
+        fine = np.geomspace(0.8, 1.25, 9) * suspect.scale
+        tried = [replace(suspect, scale=float(scale)) for scale in (*_SCALES, *fine.tolist())]
     elif suspect.focal is not None:
         tried = [replace(suspect, focal=float(suspect.focal * factor)) for factor in np.geomspace(0.88, 1.14, 9)]
-    return max([best, *map(trials.run, tried)], key=lambda trial: trial.score)
+    found = [best, *(trial for trial in map(trials.run, tried) if trial.score >= best.score - _CLEARLY)]
+    least = min(found, key=lambda trial: trial.off)
+    # a usual unit rather than one beside it that fits hardly better
+    usual = [trial for trial in found if trial.suspect.scale in UNITS and trial.off <= _AS_GOOD * least.off]
+    return min(usual, key=lambda trial: trial.off) if usual else least

@@ -1,0 +1,141 @@
+"""A recording against itself: right ones pass, wrong ones are named, and what is named puts them right."""
+
+import re
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from avlmaps.bench.recordings.drafts import Draft, RoomWalk
+from avlmaps.bench.recordings.outcomes import Judge, Outcome
+from avlmaps.bench.recordings.situations import situations
+from avlmaps.cli.reading_options import Reading
+from avlmaps.cli.usage import CONFIG
+from avlmaps.core import poses
+from avlmaps.core.camera import Pinhole
+from avlmaps.recordings.camera_axes import opencv_from_axes
+from avlmaps.recordings.consistency.check import check_recording
+from avlmaps.recordings.consistency.sample import choose_pairs
+from avlmaps.recordings.consistency.verdict import Grade, Reason, Verdict
+from avlmaps.recordings.corrections import Corrections
+from avlmaps.recordings.open import open_recording
+
+CAMERA = Pinhole(60.0, 60.0, 40.0, 30.0, 80, 60)
+
+
+@pytest.fixture(scope="module")
+def right() -> Draft:
+    return RoomWalk("room", seed=51, frames=30).draft(CAMERA)
+
+
+def verdict(draft: Draft, folder: Path, given: Corrections | None = None) -> Verdict:
+    path = folder / "walk"
+    if not path.exists():
+        draft.write(path)
+    return check_recording(open_recording(path, corrections=given))
+
+
+def options_in(sentence: str) -> Corrections:
+    """Return what the options in a sentence say, read as the command line reads them."""
+    import tyro
+
+    words = re.search(r"build again with (--[^:]*?)(?:, (?:or|multiply|turn|write)|\.$|\. )", sentence + " ")
+    assert words, sentence
+    return tyro.cli(Reading, args=shlex.split(words[1]), config=CONFIG).corrections()
+
+
+@pytest.mark.parametrize(
+    "walk",
+    [
+        RoomWalk("people and noise", seed=53, frames=30, people=3, noise=0.0019),
+        RoomWalk("a moved chair, holes", seed=54, frames=30, moved_chair=True, holes=0.3),
+        RoomWalk("drift and flicker", seed=55, frames=30, drift=0.008, flicker=0.3),
+        RoomWalk("slow", seed=56, frames=60, rate_hz=30.0, turn_rad_s=0.2),
+    ],
+    ids=lambda walk: walk.name,
+)
+def test_a_right_recording_passes_without_a_word(walk: RoomWalk, tmp_path: Path) -> None:
+    found = verdict(walk.draft(CAMERA), tmp_path)
+    assert found.grade is Grade.FINE and not found.sentences()
+    assert found.agreeing > 0.8 and found.pairs >= 8
+
+
+def axes(name: str) -> np.ndarray:
+    turn = np.eye(4)
+    turn[:3, :3] = opencv_from_axes(name)
+    return turn
+
+
+WRONG = {
+    "camera_from_world": lambda d: replace(d, poses=poses.inverse(d.poses)),
+    "wxyz and inverse": lambda d: replace(d, poses=poses.inverse(d.poses), quaternion_roll=1),
+    "OpenGL": lambda d: replace(d, poses=d.poses @ axes("opengl")),
+    "rolled by 90 degrees": lambda d: replace(d, poses=d.poses @ axes("DLF")),
+    "late": lambda d: replace(d, pose_stamps_s=d.pose_stamps_s + 0.37),
+    "depth ten times": lambda d: replace(d, units_per_m=100.0),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_the_remedy_that_is_named_puts_the_recording_right(name: str, right: Draft, tmp_path: Path) -> None:
+    wrong = WRONG[name](right)
+    found = verdict(wrong, tmp_path)
+    assert found.grade is not Grade.FINE
+    geometry = next(f for f in found.findings if f.reason is Reason.GEOMETRY)
+    again = verdict(wrong, tmp_path, options_in(geometry.remedy))
+    assert again.grade is Grade.FINE, (geometry.remedy, again.sentences())
+
+
+def test_a_wrong_option_is_found_out(right: Draft, tmp_path: Path) -> None:
+    found = verdict(right, tmp_path, Corrections(camera_axes="opengl", depth_unit_m=0.001))
+    assert found.grade is Grade.IMPOSSIBLE
+    assert "--camera-axes opencv" in found.findings[0].remedy
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("colour mirrored", Reason.COLOUR),
+        ("depth constant", Reason.DEPTH),
+        ("principal point at the corner", Reason.INTRINSICS),
+        ("poses jump by 0.5 m", Reason.GEOMETRY),
+        ("positions x0.5", Reason.GEOMETRY),
+    ],
+)
+def test_a_mistake_is_named(name: str, reason: Reason, right: Draft, tmp_path: Path) -> None:
+    situation = next(one for one in situations() if one.name == name)
+    found = verdict(situation.change(right, right, np.random.default_rng(0)), tmp_path)
+    assert reason in {finding.reason for finding in found.findings}
+    assert re.search(situation.cause, " ".join(found.sentences()))
+
+
+def test_one_frame_and_none_that_overlaps_say_nothing(right: Draft, tmp_path: Path) -> None:
+    rows = np.array([0])
+    one = replace(
+        right, rgb=right.rgb[:1], depth=right.depth[:1], poses=right.poses[rows],
+        stamps_s=right.stamps_s[rows], pose_stamps_s=right.pose_stamps_s[rows],
+    )  # fmt: skip
+    found = verdict(one, tmp_path)
+    assert found.grade is Grade.FINE and found.pairs == 0 and np.isnan(found.agreeing)
+
+
+@pytest.mark.parametrize("count", [2, 3, 7, 200, 5000])
+def test_pairs_are_of_the_recording_in_the_order_of_time(count: int) -> None:
+    pose = np.tile(np.eye(4), (count, 1, 1))
+    pose[:, 0, 3] = np.linspace(0.0, 0.05 * count, count)
+    pairs, follows = choose_pairs(pose)
+    assert len(pairs) == len(follows) and 1 <= len(pairs) <= 60
+    assert (pairs[:, 0] < pairs[:, 1]).all() and pairs.min() >= 0 and pairs.max() < count
+    assert len({tuple(pair) for pair in pairs.tolist()}) == len(pairs)
+
+
+def test_the_bench_knows_a_right_map_from_a_wrong_one(right: Draft) -> None:
+    """A world that is turned and moved holds the same map; colours of other frames do not."""
+    judge = Judge(right)
+    turn = poses.from_quaternion(np.array([[3.0, -1.0, 2.0]]), np.array([[0.1, 0.2, 0.3, 0.9]]))[0]
+    moved = next(one for one in situations() if one.name == "OpenGL camera in a y-up world")
+    same = replace(moved, change=lambda d, o, g: replace(d, poses=turn @ d.poses))
+    assert judge.judge(same, right, 0).outcome is Outcome.RIGHT
+    assert judge.judge(moved, right, 0).outcome is Outcome.REFUSED
