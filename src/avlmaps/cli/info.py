@@ -267,7 +267,8 @@ def _sound_line(sounds: list[dict[str, Any]]) -> list[str]:
 # What `build` and `info` print without --verbose: what there is, and what may be wrong with it.
 _BRIEF = frozenset({
     "path", "format", "frames", "bad_frames", "keyframes", "voxels", "sounds", "profile", "bytes", "ground",
-    "elapsed_s", "duration_s", "rgb", "depth", "audio", "topics", "notices", "faults", "repaired", "plot",
+    "elapsed_s", "duration_s", "rgb", "depth", "audio", "topics", "consistency", "notices", "faults", "repaired",
+    "plot",
 })  # fmt: skip
 _BRIEF_LAYOUTS: dict[str, Callable[[Any], list[str]]] = {
     "sounds": _sound_line,

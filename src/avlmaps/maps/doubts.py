@@ -22,6 +22,7 @@ MOST_SEEN_THROUGH = 0.15
 
 class _Doubts(msgspec.Struct):
     sentences: tuple[str, ...]
+    whole: bool
 
 
 def checked(plan: Plan, allowed: Sequence[str]) -> Plan:
@@ -41,25 +42,26 @@ def checked(plan: Plan, allowed: Sequence[str]) -> Plan:
     key = key_of("doubts", BUILD_VERSION, plan.recording.fingerprint, sorted(allowed))
 
     def compute(_: Path) -> Computed[_Doubts]:
-        return Computed(_Doubts(tuple(_doubts(plan.recording, allowed))))
+        return Computed(_doubts(plan.recording, allowed))
 
-    doubts = stage(plan, "doubts", key, _Doubts, compute).facts.sentences
+    # A frame that could not be read then may be readable now.
+    doubts = stage(plan, "doubts", key, _Doubts, compute, usable=lambda facts: facts.whole).facts.sentences
     for doubt in doubts:
         say(f"note: {doubt}")
     return replace(plan, doubts=doubts)
 
 
-def _doubts(recording: Recording, allowed: Sequence[str]) -> Iterator[str]:
+def _doubts(recording: Recording, allowed: Sequence[str]) -> _Doubts:
     try:
         verdict = check_recording(recording)
     except RecordingError:  # no frame of the sample can be read; how many may be lost is decided later
-        return
+        return _Doubts((), whole=False)
     refused = verdict.refused(tuple(allowed))
     if refused is not None:
         raise RecordingError(
             f"{recording.path} cannot be right. {refused} To build it as it is: --allow {refused.reason.value}."
         )
-    yield from verdict.sentences()
+    return _Doubts(verdict.sentences(), whole=not verdict.unread)
 
 
 def carving_doubts(removed: Removed, voxels: int) -> Iterator[str]:

@@ -16,6 +16,7 @@ from avlmaps.recordings.example_room import see
 from avlmaps.recordings.types import Recording
 
 Picture = Any  # uint8 h w 3, or uint16 h w
+_WIDTH = 160
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,14 +52,15 @@ class Draft:
 
     @staticmethod
     def of(recording: Recording, name: str, index: Sequence[int]) -> "Draft":
-        """Take frames of a recording."""
+        """Take frames of a recording; of large pictures a part of the pixels."""
         frames = [recording.frame(i) for i in index]
+        step = max(1, recording.rig.depth.width // _WIDTH)
         stamps_s = np.array([frame.stamp_s for frame in frames]) - frames[0].stamp_s
         return Draft(
             name=name,
-            rig=recording.rig,
-            rgb=tuple(frame.rgb for frame in frames),
-            depth=tuple(_millimetres(frame.depth_m) for frame in frames),
+            rig=_thinned(recording.rig, step),
+            rgb=tuple(_thinned_colour(frame.rgb, step) for frame in frames),
+            depth=tuple(_millimetres(frame.depth_m[::step, ::step]) for frame in frames),
             poses=np.stack([frame.world_from_camera for frame in frames]),
             stamps_s=stamps_s,
             pose_stamps_s=stamps_s,
@@ -86,6 +88,21 @@ class Draft:
         }
         _write(path / "recording.json", [json.dumps(described)])
         return path
+
+
+def _thinned(rig: Rig, step: int) -> Rig:
+    """Return the cameras of pictures of which every so many pixels are taken; of colour they are averaged."""
+    d, rgb = rig.depth, rig.rgb
+    size = (-(-d.width // step), -(-d.height // step))
+    depth = Pinhole(d.fx / step, d.fy / step, (d.cx - 0.5) / step + 0.5, (d.cy - 0.5) / step + 0.5, *size)
+    return Rig(rgb.resized(rgb.width // step, rgb.height // step), depth, rig.rgb_from_depth) if step > 1 else rig
+
+
+def _thinned_colour(rgb: Picture, step: int) -> Picture:
+    import cv2
+
+    size = (rgb.shape[1] // step, rgb.shape[0] // step)
+    return cv2.resize(rgb, size, interpolation=cv2.INTER_AREA) if step > 1 else rgb
 
 
 def camera_numbers(camera: Pinhole) -> dict[str, float]:

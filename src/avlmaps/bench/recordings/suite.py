@@ -104,7 +104,7 @@ def _dense(path: Path, name: str) -> Draft:
 
 
 def _windows(path: Path) -> Iterator[Draft]:
-    """Yield stretches of a walk, in steps of one to twelve frames, at the depth camera's half size."""
+    """Yield stretches of a walk, in steps of one to twelve frames."""
     recording = open_recording(path)
     for step in (1, 2, 3, 5, 8, 12):
         for first in np.linspace(0, len(recording) - _WINDOW * step, 2).round().astype(int).tolist():

@@ -80,6 +80,7 @@ def check_recording(recording: Recording) -> Verdict:
         likeness=after.likeness,
         median_depth_m=median_m,
         findings=tuple(sorted(findings, key=lambda finding: order.index(finding.grade))),
+        unread=sample.unread,
     )
 
 

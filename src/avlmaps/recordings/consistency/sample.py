@@ -44,6 +44,7 @@ class Sample:
         rig: the cameras at these sizes.
         pairs: (p, 2) rows of frames that should see the same place, the earlier first.
         follows: (p,) whether the frames of a pair follow one another; the others look at one place from apart.
+        unread: number of frames of the sample that could not be read.
     """
 
     index: Int[np.ndarray, " f"]
@@ -54,6 +55,7 @@ class Sample:
     rig: Rig
     pairs: Int[np.ndarray, "p 2"]
     follows: Bool[np.ndarray, " p"]
+    unread: int = 0
 
     def __len__(self) -> int:
         return len(self.index)
@@ -110,6 +112,7 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
         rig=rig,
         pairs=np.searchsorted(np.array(read), pairs[kept]),
         follows=follows[kept],
+        unread=len(index) - len(read),
     )
 
 

@@ -54,6 +54,7 @@ class Verdict:
         likeness: correlation of the brightness of the same points; NaN where nothing varies.
         median_depth_m: of the pixels with a depth; NaN without any.
         findings: what is wrong, the gravest first.
+        unread: number of frames of the sample that could not be read.
     """
 
     frames: int
@@ -63,6 +64,7 @@ class Verdict:
     likeness: float
     median_depth_m: float
     findings: tuple[Finding, ...] = ()
+    unread: int = 0
 
     @property
     def grade(self) -> Grade:
