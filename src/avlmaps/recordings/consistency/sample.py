@@ -229,7 +229,7 @@ class Surfaces:
 
     @staticmethod
     def of(depth_m: Float32[np.ndarray, "f h w"], points: int = POINTS) -> "Surfaces":
-        """Find smooth pixels, evenly spread, at most so many a frame."""
+        """Find smooth pixels, evenly spread, up to a number in each frame."""
         near, far = _around(depth_m)
         count = len(depth_m)
         row, column = np.zeros((count, points), np.int64), np.zeros((count, points), np.int64)
