@@ -214,7 +214,7 @@ def suspected_rig(rig: Rig, suspect: Suspect) -> Rig | None:
 def find_closer(trials: Trials) -> Trial | None:
     """Return the scale, delay or focal length with which depths differ clearly less, None where there is none.
 
-    With a slow camera, points stay within the tolerance of a surface with any of these mistakes; their differences still show
+    With a slow camera, points stay within the tolerance of a surface in spite of such a mistake; their differences show
     it, and people who walk by do not change that.
     """
     as_it_is = trials.run(Suspect())
