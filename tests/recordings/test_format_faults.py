@@ -20,7 +20,7 @@ from helpers.bag_writers import BAGS, split_ros1
 from helpers.format_writers import HALF_TURN, WRITTEN, numbers, write_icl_nuim, write_nerfstudio
 
 
-def _edit(name: str, change: Callable[[dict[str, Any]], None]) -> Callable[[Path], None]:
+def _edit(name: str, change: Callable[[dict[str, Any]], Any]) -> Callable[[Path], Any]:
     def edited(path: Path) -> None:
         content = json.loads((path / name).read_text())
         change(content)
@@ -29,11 +29,11 @@ def _edit(name: str, change: Callable[[dict[str, Any]], None]) -> Callable[[Path
     return edited
 
 
-def _replace(name: str, old: str, new: str) -> Callable[[Path], None]:
+def _replace(name: str, old: str, new: str) -> Callable[[Path], Any]:
     return lambda path: (path / name).write_text((path / name).read_text().replace(old, new)) and None
 
 
-def _sql(*words: Any) -> Callable[[Path], None]:
+def _sql(*words: Any) -> Callable[[Path], Any]:
     def run(path: Path) -> None:
         with sqlite3.connect(path) as database:
             database.execute(*words)
@@ -42,7 +42,7 @@ def _sql(*words: Any) -> Callable[[Path], None]:
     return run
 
 
-def _calibration(change: Callable[[bytes], bytes]) -> Callable[[Path], None]:
+def _calibration(change: Callable[[bytes], bytes]) -> Callable[[Path], Any]:
     def run(path: Path) -> None:
         with sqlite3.connect(path) as database:
             (blob,) = database.execute("SELECT calibration FROM Data").fetchone()
