@@ -1,15 +1,17 @@
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from avlmaps.bench.locate import MapOfPictures, map_of
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.maps.keyframes.describe import stack_keyframes
 from avlmaps.perception.profiles import profile
+from avlmaps.query.focal import camera_of_35mm, focal_35mm_of
 from avlmaps.query.locate import Located, LocateSettings, alike, locate, nearest
 from helpers.picture_room import CAMERA, Room, RoomWalk, looking, painting
 
@@ -84,14 +86,15 @@ def test_a_photo_of_another_size_is_taken_for_the_maps_own_camera(stored: MapOfP
     assert_at(locate(stored, large, None, rng()), PHOTO_FROM)
 
 
-def test_a_photo_of_another_shape_needs_intrinsics(stored: MapOfPictures, photo: np.ndarray) -> None:
+def test_a_photo_of_another_shape_is_taken_for_one_of_another_camera(stored: MapOfPictures, photo: np.ndarray) -> None:
+    middle = np.ascontiguousarray(photo[:, 70:250])
+    found = locate(stored, middle, None, rng())
+    assert_at(found, PHOTO_FROM, cm=5.0, deg=2.0)
+    assert found.focal_from == "photo" and "its middle is taken for the axis" in found.notes[-1]
+
+
+def test_a_photo_of_another_shape_has_its_intrinsics(stored: MapOfPictures, photo: np.ndarray) -> None:
     upright = np.ascontiguousarray(photo[:, 70:250])
-    with pytest.raises(QueryError) as caught:
-        locate(stored, upright, None, rng())
-    assert str(caught.value) == (
-        "The picture is 180x240 and the map's own camera 320x240, so another camera took it; "
-        "say which: --intrinsics fx,fy,cx,cy."
-    )
     cropped = Pinhole(CAMERA.fx, CAMERA.fy, CAMERA.cx - 70.0, CAMERA.cy, 180, 240)
     assert_at(locate(stored, upright, cropped, rng()), PHOTO_FROM)
 
@@ -106,6 +109,48 @@ def test_a_focal_length_that_does_not_fit_is_found_out(stored: MapOfPictures, ph
     found = locate(stored, photo, replace(CAMERA, fx=CAMERA.fx * factor, fy=CAMERA.fy * factor), rng())
     assert_at(found, PHOTO_FROM, cm=3.0)
     assert found.camera.fx == pytest.approx(CAMERA.fx, rel=0.01)
+
+
+@pytest.mark.parametrize("zoom", [1.06, 1.13, 1.25])
+@pytest.mark.parametrize("noted_mm", [None, 30.0])
+def test_a_photo_of_a_longer_lens_is_located_with_its_own_focal_length(
+    stored: MapOfPictures, zoom: float, noted_mm: float | None
+) -> None:
+    longer = replace(CAMERA, fx=CAMERA.fx * zoom, fy=CAMERA.fy * zoom)
+    found = locate(stored, WALK.room.render(PHOTO_FROM, longer)[0], None, rng(), focal_35mm=noted_mm)
+    assert_at(found, PHOTO_FROM, cm=5.0, deg=2.0)
+    assert found.camera.fx == pytest.approx(longer.fx, rel=0.03) and found.focal_from == "photo"
+    assert found.uncertainty is not None and found.uncertainty.place_m < 0.15
+    assert "The focal length was found with the pose" in found.notes[0]
+
+
+def test_the_maps_own_camera_is_not_doubted_without_reason(stored: MapOfPictures, photo: np.ndarray) -> None:
+    found = locate(stored, photo, None, rng())
+    assert found.camera == CAMERA and found.focal_from == "map" and found.notes == () and found.uncertainty is None
+
+
+def test_a_place_that_the_points_do_not_fix_is_not_given(stored: MapOfPictures) -> None:
+    longer = replace(CAMERA, fx=CAMERA.fx * 1.2, fy=CAMERA.fy * 1.2)
+    photo = WALK.room.render(PHOTO_FROM, longer)[0]
+    found = locate(stored, photo, None, rng(), LocateSettings(max_place_error_m=1e-6))
+    assert found.world_from_camera is None and found.score < 0.5
+    assert "is not known, and its" in found.notes[0] and "--intrinsics" in found.notes[0]
+
+
+@pytest.mark.parametrize(("noted", "read"), [(26, 26.0), (None, None), (0, None), (4000, None)])
+def test_the_focal_length_in_exif_is_read(tmp_path: Path, noted: int | None, read: float | None) -> None:
+    exif = Image.Exif()
+    if noted is not None:
+        exif.get_ifd(0x8769)[0xA405] = noted
+    Image.new("RGB", (40, 30)).save(tmp_path / "a.jpg", exif=exif)
+    assert focal_35mm_of(tmp_path / "a.jpg") == read
+    (tmp_path / "b.jpg").write_bytes(b"no picture")
+    assert focal_35mm_of(tmp_path / "b.jpg") is None and focal_35mm_of(tmp_path / "nothing.jpg") is None
+
+
+def test_a_lens_of_35_mm_sees_what_it_sees_on_film() -> None:
+    camera = camera_of_35mm(36.0, 3600, 2400)
+    assert camera.fx == pytest.approx(3600.0) and (camera.cx, camera.cy) == (1800.0, 1200.0)
 
 
 def test_the_focal_length_is_kept_where_the_caller_is_sure(stored: MapOfPictures, photo: np.ndarray) -> None:

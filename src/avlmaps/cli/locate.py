@@ -31,8 +31,8 @@ class Locate(ModelVerb):
     image: Annotated[Positional[Path], arg(metavar="PHOTO")]
     """Photo to locate."""
     intrinsics: Annotated[str | None, arg(metavar="FX,FY,CX,CY")] = None
-    """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: the map's own colour camera."""
-
+    """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: by its EXIF, else the map's own colour camera,
+    with another focal length where that fits clearly better."""
     frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
     """Frame of the pose: the recording's own, or the level one (z up)."""
 
@@ -59,6 +59,7 @@ def locate_photo(
         frame: of the pose.
     """
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.focal import focal_35mm_of
     from avlmaps.query.frames import answer_in
     from avlmaps.query.modalities.image import read_picture
     from avlmaps.query.schema import locate_answer
@@ -66,7 +67,7 @@ def locate_photo(
     rgb = read_picture(picture)
     given = None if intrinsics is None else camera_of(intrinsics, rgb.shape[1], rgb.shape[0])
     opened = AVLMap.open(map_path) if opened is None else opened
-    found = opened.locate(rgb, given)
+    found = opened.locate(rgb, given, None if given is not None else focal_35mm_of(picture))
     pose, camera = found.world_from_camera, found.camera
     if pose is not None and given is not None and camera != given:
         say(f"note: the focal length {given.fx:g} does not fit the photo; {camera.fx:.1f} was used.")
@@ -98,6 +99,7 @@ def locate_lines(answer: "LocateAnswer") -> list[str]:
     """Lay out the answer of `locate`."""
     pose, notes = answer["world_from_camera"], [f"note: {note}" for note in answer.get("notes", [])]
     if pose is None:
-        return [*notes, f"not located: {answer['inliers']} points agree, too few to fix a place"]
+        few = f"not located: {answer['inliers']} points agree, too few to fix a place"
+        return [*notes, few]
     rows = ["  " + " ".join(f"{value:9.4f}" for value in row) for row in pose]
     return [*notes, f"located, {answer['inliers']} points agree; world_from_camera (frame: {answer['frame']}):", *rows]

@@ -10,6 +10,9 @@ from avlmaps.core.poses import apply, inverse
 from avlmaps.perception.protocols import Pose
 
 _FEWEST_POINTS = 4
+_SINGULAR = 1e14
+# Where the rotation, the shift and the focal length stand among the unknowns.
+_PARTS = (slice(0, 3), slice(3, 6), slice(6, 7))
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +121,32 @@ def refine_focal(
         log_factor = float(np.clip(log_factor + step[6], -0.5, 0.5))
     factor = float(np.exp(log_factor))
     return replace(camera, fx=camera.fx * factor, fy=camera.fy * factor)
+
+
+def pose_deviation(
+    xy: Float[np.ndarray, "n 2"],
+    points_world: Float[np.ndarray, "n 3"],
+    camera: Pinhole,
+    world_from_camera: Float[np.ndarray, "4 4"],
+) -> tuple[float, float, float]:
+    """Return the standard deviations of a pose whose focal length was estimated with it, from points that agree.
+
+    The inverse of the normal equations of ``refine_focal``, times the variance of the residuals.
+
+    Returns:
+        Of the focal length, as a part of it; of the place, metres; of the direction, radians. Infinite where the
+        points do not fix them.
+    """
+    points = apply(inverse(world_from_camera), points_world)
+    front = points[:, 2] > 0.05
+    focal = np.array([camera.fx, camera.fy])
+    residual, jacobian = _reprojection(xy[front], points[front], focal, (camera.cx, camera.cy))
+    normal = np.einsum("nri,nrj->ij", jacobian, jacobian)
+    if 2 * len(residual) <= len(normal) or np.linalg.cond(normal) > _SINGULAR:
+        return float("inf"), float("inf"), float("inf")
+    covariance = np.linalg.inv(normal) * (residual**2).sum() / (2 * len(residual) - len(normal))
+    angle, place, of_focal = (float(np.trace(covariance[part, part])) for part in _PARTS)
+    return of_focal**0.5, place**0.5, angle**0.5
 
 
 def _reprojection(

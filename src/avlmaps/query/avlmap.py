@@ -18,6 +18,7 @@ from avlmaps.perception.room_contents import read_room_contents
 from avlmaps.query import loops
 from avlmaps.query.factors import FOUND_AT, HeatSettings
 from avlmaps.query.floor_plan import FloorPlan, storeys
+from avlmaps.query.focal import focal_35mm_of
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor, area_names, name_shares
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
@@ -198,8 +199,13 @@ class AVLMap:
             QueryError: ``least_confidence`` lies outside [0, 1], or the pixel encoder does not know a name.
         """
         from avlmaps.query.contents import Contents
+        from avlmaps.query.unknown_names import unknown_note
 
         models = self.stored.info.models
+        for name in (names or ()) if "pixels" in models else ():
+            if not self.knows(name):
+                note = unknown_note(name)
+                raise QueryError(note if note.endswith("?") else f"{note}; name a thing that it knows.")
         things = self.things(names, least_confidence, structure) if "pixels" in models else []
         rooms = self.rooms() if "views" in models else []
         return Contents(things, self.sounds(), rooms, self.stored.info.doubts)
@@ -374,7 +380,7 @@ class AVLMap:
 
         Args:
             picture: a file, or RGB uint8.
-            intrinsics: of the camera that took it; by default the map's own.
+            intrinsics: of the camera that took it; by default by its EXIF, else the map's own.
             primary: whether that place is what is sought.
 
         Raises:
@@ -383,7 +389,8 @@ class AVLMap:
         is_array = isinstance(picture, np.ndarray)
         part = Part(Modality.IMAGE, "a picture" if is_array else str(picture), _role(primary), is_file=True)
         rgb = picture if is_array else read_picture(Path(picture).expanduser())
-        located = self._located(rgb, intrinsics, _GUESS_FROM)
+        focal_35mm = None if is_array or intrinsics is not None else focal_35mm_of(Path(picture).expanduser())
+        located = self._located(rgb, intrinsics, _GUESS_FROM, focal_35mm)
         if located.world_from_camera is None and self.settings.by_colour:
             located = self._guessed_by_colour(rgb, located)
         return Heatmap.of(image_factor(self.space, located, part, self.settings.heat), self.settings.found_at)
@@ -404,12 +411,18 @@ class AVLMap:
         stored = self.stored
         return Panoramas(self.space, stored.voxels.rgb, stored.keyframes)
 
-    def locate(self, rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None = None) -> "Located":
-        """Return the pose of the camera that took a picture, or that it was not located."""
-        return self._located(rgb, intrinsics)
+    def locate(
+        self, rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None = None, focal_35mm: float | None = None
+    ) -> "Located":
+        """Return the pose of the camera that took a picture, or that it was not located; see ``locate.locate``."""
+        return self._located(rgb, intrinsics, focal_35mm=focal_35mm)
 
     def _located(
-        self, rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None, guess_references: int = 0
+        self,
+        rgb: UInt8[np.ndarray, "h w 3"],
+        intrinsics: Pinhole | None,
+        guess_references: int = 0,
+        focal_35mm: float | None = None,
     ) -> "Located":
         from avlmaps.query.locate import LocateSettings, locate
 
@@ -417,7 +430,8 @@ class AVLMap:
         for kind in (Kind.LOCAL, Kind.PLACE):  # an imported map has neither
             self.stored.require_model(kind)
         rng = np.random.default_rng(self.settings.seed)
-        return locate(self.stored, rgb, intrinsics, rng, LocateSettings(guess_references=guess_references))
+        settings = LocateSettings(guess_references=guess_references)
+        return locate(self.stored, rgb, intrinsics, rng, settings, focal_35mm)
 
     def heat(
         self,

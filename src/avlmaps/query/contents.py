@@ -21,7 +21,6 @@ from avlmaps.query.factors import FOUND_AT
 from avlmaps.query.modalities.area import AreaSettings, area_names, modes, pooled_name_shares
 from avlmaps.query.modalities.sound import sound_features
 from avlmaps.query.pieces import Pieces
-from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
@@ -187,16 +186,12 @@ def find_things(
         watch: is given "things", the number of names that were looked for, and of all; what it raises ends the search.
 
     Raises:
-        QueryError: ``least_confidence`` lies outside [0, 1], or the encoder does not know a name.
+        QueryError: ``least_confidence`` lies outside [0, 1].
         BackendError: the map's profile has no pixel encoder.
     """
     if not 0.0 <= least_confidence <= 1.0:
         raise QueryError(f"The least confidence is {least_confidence:g}; it must lie between 0 and 1.")
     encoder = stored.profile.pixel_encoder()
-    for name in names or ():
-        if not encoder.understood(name):
-            note = unknown_note(name)
-            raise QueryError(note if note.endswith("?") else f"{note}; name a thing that it knows.")
     wanted = [name for name in (encoder.vocabulary if names is None else names) if structure or name not in STRUCTURE]
     searches = [*((name, True) for name in wanted), *((name, False) for name in wanted if _is_wide(name, encoder))]
     claims: list[tuple[bool, float, int, str, Int[np.ndarray, " m"]]] = []

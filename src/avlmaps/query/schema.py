@@ -5,6 +5,7 @@ OpenAPI document and the schemas of its agent tools from the same types. Positio
 ``frame`` names.
 """
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
 
@@ -134,6 +135,11 @@ class LocateAnswer(TypedDict):
     intrinsics: Annotated[
         list[float], Meta(min_length=4, max_length=4, description="fx, fy, cx, cy that the pose holds for, pixels")
     ]
+    focal_from: Annotated[str, Meta(description="source of the focal length: map, given, exif, assumed or photo")]
+    position_error_m: Annotated[
+        float | None,
+        Meta(description="three standard deviations of the place, if the focal length was found with it"),
+    ]
     elapsed_ms: float
     notes: NotRequired[Notes]
 
@@ -152,8 +158,8 @@ class ErrorAnswer(TypedDict):
 
 
 def locate_answer(located: "Located", doubts: Sequence[str] = ()) -> LocateAnswer:
-    """Return the answer about a photo, with what is doubtful about the map."""
-    pose, camera = located.world_from_camera, located.camera
+    """Return the answer about a photo, with what is doubtful about the map and the photo's focal length."""
+    pose, camera, error = located.world_from_camera, located.camera, located.uncertainty
     answer: LocateAnswer = {
         "world_from_camera": None if pose is None else [[float(value) for value in row] for row in pose],
         "inliers": int(located.inliers),
@@ -161,8 +167,10 @@ def locate_answer(located: "Located", doubts: Sequence[str] = ()) -> LocateAnswe
         "frame": FRAME,
         "score": located.score,
         "intrinsics": [camera.fx, camera.fy, camera.cx, camera.cy],
+        "focal_from": located.focal_from,
+        "position_error_m": None if error is None or not math.isfinite(error.place_m) else error.place_m,
         "elapsed_ms": located.elapsed_ms,
     }
-    if doubts:
-        answer["notes"] = list(doubts)
+    if notes := [*doubts, *located.notes]:
+        answer["notes"] = notes
     return answer

@@ -6,7 +6,6 @@ from typing import Any, NotRequired, TypedDict, TypeVar
 import msgspec
 import numpy as np
 
-from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME
 from avlmaps.navigate.paths import PathAnswer
 from avlmaps.query.answer import Answer
@@ -258,10 +257,7 @@ def locate(task: Task, query: LocateQuery) -> LocateAnswer:
         raise RequestError("There is no photo; send one as the file 'photo' of a form, or as the body.")
     camera = camera_of(query.intrinsics, photo)
     task.watch.step("locating")
-    try:
-        return locate_answer(task.map.avlmap.locate(photo, camera), task.map.avlmap.stored.info.doubts)
-    except QueryError as error:
-        raise QueryError(str(error).replace("say which: --intrinsics fx", "send its intrinsics, fx")) from None
+    return locate_answer(task.map.avlmap.locate(photo, camera), task.map.avlmap.stored.info.doubts)
 
 
 def place(task: Task, query: PlaceQuery) -> PlaceAnswer:

@@ -65,6 +65,8 @@ def image_factor(space: Space, located: "Located", part: Part, heat: HeatSetting
     found = pose is not None and confidence >= FOUND_AT
     anchors = np.zeros((0, 3)) if pose is None else np.asarray(pose, np.float64)[None, :3, 3]
     note = "" if is_located else f"the picture could not be located ({located.inliers} points agree)"
+    if not is_located and located.notes:
+        note += f"; {located.notes[0][:1].lower()}{located.notes[0][1:].rstrip('.')}"
     if pose is not None and not is_located:
         note += "; the heat is that of the best guess"
     if found and not is_located:
