@@ -25,7 +25,7 @@ _FOCALS_35MM = (4.0, 400.0)
 _STARTS = (0.7, 1.4, 2.0)
 _SETTLED = 0.003
 _ROUNDS = 4
-# Another start is tried where so small a part of the matches agrees, or the focal length moved so far.
+# Another start is tried where so small a part of the matches agrees, or the focal length moved by more than this share.
 _POOR, _FAR = 0.5, 0.15
 
 
@@ -35,7 +35,7 @@ class FocalSearch:
 
     Attributes:
         most: largest factor between it and what replaces it.
-        gain: the agreement must grow by this factor; 0 takes the best whatever it gains.
+        gain: the agreement must grow by this factor; 0 takes the best in any case.
         starts: whether others are tried as well, where points agree badly.
     """
 
