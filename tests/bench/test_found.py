@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.bench.found.answers import Judged
@@ -32,6 +32,7 @@ def held(evidence: Evidence) -> list[SceneObject]:
     return [thing for thing in evidence.objects if thing.category not in ("wall", "floor", "ceiling")]
 
 
+@settings(max_examples=8, deadline=None)
 @given(st.integers(0, 2**32))
 def test_what_has_an_answer_is_there_and_what_has_none_is_not(evidence: Evidence, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -94,5 +95,10 @@ def test_the_table_counts_right_wrong_and_absent_apart(tmp_path: Path) -> None:
     said.append(Judged("home 0", "object", "bed", True, False, 0.7))
     row = next(row for row in kinds_table(said)["rows"] if row[0] == "object")
     assert [str(cell).split(" (")[0] for cell in row[4:]] == ["50.0% of 2", "100.0% of 1", "50.0% of 2"]
+    assert next(row for row in kinds_table(said[:1])["rows"] if row[0] == "object")[4:] == [
+        "100.0% of 1 (20.7 to 100.0)",
+        "",
+        "",
+    ]
     draw_reliability(said, tmp_path / "found.png")
     assert (tmp_path / "found.png").stat().st_size > 5_000

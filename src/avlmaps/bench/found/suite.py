@@ -76,9 +76,7 @@ def kinds_table(answers: Sequence[Judged]) -> Table:
             [one for one in own if one.answerable and not one.right],
             [one for one in own if not one.answerable],
         ):
-            found = sum(one.probability >= FOUND_AT for one in group)
-            share = f"{100.0 * found / len(group):.1f}% of {len(group)} ({in_percent(wilson(found, len(group)))})"
-            cells.append(share if group else "")
+            cells.append(_share_found(group))
         rows.append(cells)
     columns = [
         "query",
@@ -90,6 +88,14 @@ def kinds_table(answers: Sequence[Judged]) -> Table:
         "none there: found",
     ]
     return {"columns": columns, "rows": rows}
+
+
+def _share_found(group: Sequence[Judged]) -> str:
+    """Return how many of some queries are reported as found; nothing of none."""
+    if not group:
+        return ""
+    found = sum(one.probability >= FOUND_AT for one in group)
+    return f"{100.0 * found / len(group):.1f}% of {len(group)} ({in_percent(wilson(found, len(group)))})"
 
 
 def reliability_table(answers: Sequence[Judged]) -> Table:
