@@ -71,12 +71,12 @@ def kinds_table(answers: Sequence[Judged]) -> Table:
         p, right, weight = _numbers(own)
         base = np.average(right, weights=weight)
         cells: list[object] = [kind, len(own), round(brier(p, right, weight), 3), round(float(base * (1 - base)), 3)]
-        for group in (
+        groups = (
             [one for one in own if one.right],
             [one for one in own if one.answerable and not one.right],
             [one for one in own if not one.answerable],
-        ):
-            cells.append(_share_found(group))
+        )
+        cells += map(_share_found, groups)
         rows.append(cells)
     columns = [
         "query",
