@@ -31,6 +31,10 @@ class MapError(AvlmapsError):
     """A map cannot be built, opened or merged: another schema, another profile, a damaged file."""
 
 
+class NoFloorError(MapError):
+    """A map is whole, but holds too little to find a floor to drive on."""
+
+
 class BackendError(AvlmapsError):
     """A model backend is unknown, not installed, or does not fit its module."""
 

@@ -10,7 +10,7 @@ from enum import IntEnum
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int, UInt8
 
-from avlmaps.core.errors import MapError
+from avlmaps.core.errors import MapError, NoFloorError
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Voxels
@@ -154,7 +154,7 @@ def find_obstacles(
     sure = np.asarray(voxels.hits) >= body.min_hits
     index = np.asarray(voxels.index)[sure]
     if len(index) == 0:
-        raise MapError(
+        raise NoFloorError(
             f"None of the map's {len(voxels)} voxels was hit {body.min_hits} times, so that no floor can be found; "
             "lower min_hits or map more frames."
         )

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 MOST_NAMES = 5
 _MOST_VIEWS = 5
 _FAR_M = 1000.0
+FARTHEST_M = 2e6
+"""A place farther away than this, metres, is a mistake; coordinates of requests reach half of it along each axis."""
 
 
 class NameScore(TypedDict):
@@ -89,7 +91,7 @@ def describe_place(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: fl
     Raises:
         QueryError: a number is not finite, or the radius not in (0, 5].
     """
-    if not (np.isfinite(point).all() and np.abs(point).max(initial=0.0) < 1e6):
+    if not (np.isfinite(point).all() and np.abs(point).max(initial=0.0) <= FARTHEST_M):
         raise QueryError("The place is not a point in metres; give finite numbers, such as 1.5,2.0,0.8.")
     if not 0.0 < radius_m <= 5.0:
         raise QueryError(f"The radius is {radius_m:g} m; it must be over 0 and at most 5.")

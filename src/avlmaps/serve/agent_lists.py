@@ -108,7 +108,10 @@ def list_things(task: Task, query: ListThingsQuery) -> dict[str, Any]:
     """
     where = whereabouts(task.map)
     names = _names(query.name)
-    things, rooms = _things(task, ThingsQuery(least=query.least, name=names, structure=query.structure))
+    unknown = [name for name in names if not task.map.avlmap.knows(name)]
+    known = [name for name in names if name not in unknown]
+    wanted_things = ThingsQuery(least=query.least, name=known, structure=query.structure)
+    things, rooms = _things(task, wanted_things) if known or not names else ([], [])
     chosen = list(range(len(things)))
     if query.room is not None:
         wanted = set(where.numbers_of(query.room))
@@ -120,7 +123,6 @@ def list_things(task: Task, query: ListThingsQuery) -> dict[str, Any]:
         away = {k: _away(task.map, things[k], place) for k in chosen if things[k]["position"] != itself}
         chosen = sorted(away, key=lambda k: away[k])
     rows = [_thing_row(things[k], where, rooms[k], away.get(k)) for k in chosen]
-    unknown = [name for name in names if not rows and not task.map.avlmap.knows(name)]
     if unknown:
         about["note"] = unknown_note(unknown[0])
     if not names and len(rows) > query.top:
@@ -199,9 +201,10 @@ def _near(task: Task, near: str | list[float]) -> tuple[Float[np.ndarray, " n"],
     if isinstance(near, list) or not any(letter.isalpha() for letter in near):
         place = place_given(near)
         return place, None, None
-    things = work.list_things(task, ThingsQuery(name=[near]))["things"]
+    known = task.map.avlmap.knows(near)
+    things = work.list_things(task, ThingsQuery(name=[near]))["things"] if known else []
     if not things:
-        why = f": {unknown_note(near)}" if not task.map.avlmap.knows(near) else ""
+        why = "" if known else f": {unknown_note(near)}"
         raise QueryError(f"The map shows no {near[:60]!r} to be near to{why}; give a place as x,y,z, or another name.")
     best = things[0]
     about = {"name": best["name"], "confidence": best["confidence"], "position": best["position"]}

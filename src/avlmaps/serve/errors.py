@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from avlmaps.core.errors import AvlmapsError, LanguageError, NavigationError, QueryError
+from avlmaps.core.errors import AvlmapsError, LanguageError, NavigationError, NoFloorError, QueryError
 from avlmaps.core.printable import printable
 from avlmaps.query.asking import AskError
 from avlmaps.query.schema import ErrorAnswer
@@ -74,6 +74,8 @@ class Privacy:
             return error.status, _answer(error.kind, str(error))
         if isinstance(error, AskError):
             return 400, _answer("usage", str(error))
+        if isinstance(error, NoFloorError):  # the map is whole, and no retry helps
+            return 422, _answer("map", str(error))
         if isinstance(error, AvlmapsError):
             kind = _kind(error)
             # These quote nothing but the client's own words, which may look like a path; others may quote a file.

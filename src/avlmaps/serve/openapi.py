@@ -12,9 +12,10 @@ from avlmaps.serve import tiles
 from avlmaps.serve.operations import OPERATIONS, Operation
 from avlmaps.serve.work import MapsAnswer
 
+_OF_FILES = ("intrinsics",)  # values that only a form with a photo can hold
 _TEMPLATE = "#/components/schemas/{name}"
 _ERRORS = {
-    "400": "The request does not fit.",
+    "400": "The request does not fit this document, or holds neither a sentence nor a part.",
     "401": "The token is missing or wrong.",
     "404": "There is no such map or tile.",
     "413": "The body, the photo or the clip is too large.",
@@ -114,9 +115,10 @@ def _described(one: Operation, method: str, of: dict[Any, Any], components: dict
             "in": "query",
             "required": name in required,
             "description": described.get("description", ""),
-            "schema": {key: value for key, value in described.items() if key != "description"},
+            "schema": {key: value for key, value in _in_form(described).items() if key != "description"},
         }
         for name, described in schema.get("properties", {}).items()
+        if name not in _OF_FILES or not one.files
     ]
     name = one.name if method == one.methods[0] else f"{one.name}By{method.title()}"
     answer = one.answer
@@ -130,19 +132,46 @@ def _described(one: Operation, method: str, of: dict[Any, Any], components: dict
     if one.name == "getTile":
         operation["description"] = (tiles.__doc__ or "").partition("\n\n")[2]
     if method == "POST":
-        operation["requestBody"] = {"required": True, "content": _bodies(one, of, schema)}
+        operation["requestBody"] = {"required": one.body == "photo", "content": _bodies(one, schema)}
     return operation
 
 
-def _bodies(one: Operation, of: dict[Any, Any], schema: dict[str, Any]) -> dict[str, Any]:
+def _bodies(one: Operation, schema: dict[str, Any]) -> dict[str, Any]:
     files = {name: {"type": "string", "contentMediaType": "application/octet-stream"} for name in one.files}
-    form = {"type": "object", "properties": {**schema.get("properties", {}), **files}}
+    values = {name: _in_form(described) for name, described in schema.get("properties", {}).items()}
+    form = {"type": "object", "properties": {**values, **files}, "additionalProperties": False}
+    if one.body == "photo":
+        form["required"] = ["photo"]
+    elif one.name == "ask":
+        form["anyOf"] = [{"required": [name]} for name in ("sentence", "object", "sound", "area", *one.files)]
     bodies: dict[str, Any] = {"multipart/form-data": {"schema": form}}
     if one.body == "form":
-        bodies["application/json"] = {"schema": of[one.query]}
+        plain = {name: value for name, value in schema["properties"].items() if name not in _OF_FILES}
+        bodies["application/json"] = {"schema": {**schema, "properties": plain, **_words_or_parts(one, plain)}}
     else:
         bodies |= {kind: {"schema": {}} for kind in ("image/jpeg", "image/png")}
     return bodies
+
+
+def _words_or_parts(one: Operation, properties: dict[str, Any]) -> dict[str, Any]:
+    """Return the rule of a query without files: a sentence or parts, not both; a picture needs neither."""
+    parts = [name for name in ("object", "sound", "area") if name in properties]
+    null = {"type": "null"}
+    no_parts = dict.fromkeys(parts, null)
+    ways: list[dict[str, Any]] = [
+        {"required": ["sentence"], "properties": {"sentence": {"type": "string", "pattern": "[A-Za-z]"}, **no_parts}}
+    ]
+    ways += [{"required": [name], "properties": {name: {"type": "string"}, "sentence": null}} for name in parts]
+    if one.name == "drawAnswer":
+        ways.append({"properties": {"sentence": {"type": ["null", "string"], "maxLength": 0}, **no_parts}})
+    return {"anyOf": ways}
+
+
+def _in_form(described: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of a value of a form, in which nothing is null: it is left out."""
+    kinds = [kind for kind in described.get("anyOf", []) if kind.get("type") != "null"]
+    plain = {key: value for key, value in described.items() if key not in ("anyOf", "default")}
+    return {**plain, **kinds[0]} if len(kinds) == 1 else described
 
 
 def _numbers(path: str) -> list[tuple[str, dict[str, int]]]:

@@ -18,6 +18,13 @@ Words = Annotated[str, Meta(max_length=MOST_CHARACTERS)]
 Short = Annotated[str, Meta(max_length=200)]
 PHOTO, CLIP = "photo", "clip"
 _COORDINATE = Meta(ge=-1e6, le=1e6)
+# Forms for the OpenAPI document; what does not have them is refused with a sentence of its own.
+_NUMBER = r"-?\d{1,6}(\.\d{1,9})?"
+_PLACE = {"pattern": rf"^{_NUMBER}(,{_NUMBER}){{1,2}}$"}
+_FOCAL, _OFFSET = r"[1-9]\d{0,4}(\.\d{1,9})?", r"\d{1,5}(\.\d{1,9})?"
+_INTRINSICS = {"pattern": f"^{_FOCAL},{_FOCAL},{_OFFSET},{_OFFSET}$"}
+Place = Annotated[str, Meta(max_length=100, extra_json_schema=_PLACE)]
+Intrinsics = Annotated[Short, Meta(extra_json_schema=_INTRINSICS)]
 
 
 class NoQuery(Struct, forbid_unknown_fields=True):
@@ -56,7 +63,7 @@ class AskQuery(Struct, forbid_unknown_fields=True):
     ] = None
     top: Annotated[int, Meta(ge=1, le=100, description="Most goals.")] = 3
     intrinsics: Annotated[
-        Short | None,
+        Intrinsics | None,
         Meta(description="fx,fy,cx,cy of the photo's camera in pixels. Default: the map's own camera."),
     ] = None
 
@@ -74,7 +81,7 @@ class LocateQuery(Struct, forbid_unknown_fields=True):
     """A photo to locate; it comes as the file 'photo' of a form, or as the body itself."""
 
     intrinsics: Annotated[
-        Short | None,
+        Intrinsics | None,
         Meta(description="fx,fy,cx,cy of the photo's camera in pixels. Default: the map's own camera."),
     ] = None
 
@@ -85,7 +92,8 @@ class PlaceQuery(Struct, forbid_unknown_fields=True):
     x: Annotated[float, _COORDINATE]
     y: Annotated[float, _COORDINATE]
     z: Annotated[
-        float | None, Meta(description="Without it, x and y are in the level frame: a place of the floor plan.")
+        Annotated[float, _COORDINATE] | None,
+        Meta(description="Without it, x and y are in the level frame: a place of the floor plan."),
     ] = None
     radius_m: Annotated[float, Meta(gt=0.0, le=5.0, description="Voxels within this distance count.")] = 0.15
 
@@ -93,8 +101,8 @@ class PlaceQuery(Struct, forbid_unknown_fields=True):
 class PathQuery(Struct, forbid_unknown_fields=True, rename={"start": "from", "goal": "to"}):
     """Two places; each is x,y,z in the recording frame, or x,y in the level frame."""
 
-    start: Annotated[str, Meta(max_length=100, description="Where the body starts, such as 1.5,2.0 or 1.5,2.0,0.3.")]
-    goal: Annotated[str, Meta(max_length=100, description="Where it goes; it stops beside what it cannot stand in.")]
+    start: Annotated[Place, Meta(description="Where the body starts, such as 1.5,2.0 or 1.5,2.0,0.3.")]
+    goal: Annotated[Place, Meta(description="Where it goes; it stops beside what it cannot stand in.")]
 
 
 class TilesQuery(Struct, forbid_unknown_fields=True):
@@ -111,11 +119,17 @@ def checked(values: Mapping[str, Any], kind: type[T]) -> T:
     Raises:
         RequestError: a value is missing, unknown, of the wrong type or out of range; the sentence names it.
     """
+    plain = {name: _whole(value) for name, value in values.items()}
     try:
-        request = msgspec.convert(dict(values), kind, strict=True)
+        request = msgspec.convert(plain, kind, strict=True)
     except msgspec.ValidationError as fault:
         raise _unfit(fault) from None
     return _finite(request)
+
+
+def _whole(value: Any) -> Any:
+    """Return 3 for 3.0: JSON does not tell whole numbers of the two kinds apart."""
+    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 2**53 else value
 
 
 def checked_texts(pairs: Iterable[tuple[str, str]], kind: type[T]) -> T:
