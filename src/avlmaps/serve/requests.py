@@ -128,7 +128,7 @@ def checked(values: Mapping[str, Any], kind: type[T]) -> T:
 
 
 def _whole(value: Any) -> Any:
-    """Return 3 for 3.0: JSON does not tell whole numbers of the two kinds apart."""
+    """Return 3 for 3.0: both are one whole number in JSON."""
     return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 2**53 else value
 
 
