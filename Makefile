@@ -26,7 +26,7 @@ FAST := tests/core tests/test_imports.py tests/test_conventions.py tests/query/t
   tests/query/test_pieces.py tests/maps/test_grid.py tests/navigate/test_planner.py tests/perception/test_codes.py \
   tests/perception/test_matching.py tests/language/test_program_run.py tests/cli/test_help.py
 
-.PHONY: help demo test test-fast dist-test test-kernels bounds test-foundation test-ros1 faults-ros1 types-foundation test-ros2 python312 lint format pictures docs fuzz bench train lock clean
+.PHONY: help demo test test-fast dist-test test-kernels bounds test-foundation test-ros1 faults-ros1 types-foundation test-ros2 faults-ros2 python312 lint format pictures docs fuzz bench train lock clean
 
 help:  ## Show what can be made.
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -91,7 +91,10 @@ python312:  ## Say which Python 3.12 `make test-ros2` takes; fail where there is
 	@$(if $(PYTHON312),echo $(PYTHON312),echo "no Python 3.12 was found; say where one is with: make PYTHON312=/path/to/python3.12" >&2; exit 1)
 
 test-ros2: $(ROS2)/.ready  ## Run the tests against real ROS 2 (rclpy from wheels, in a virtual environment of its own, 1 GB).
-	$(ROS2)/bin/python -m pytest tests/ros2
+	$(ROS2)/bin/python -m pytest -n 2 --dist loadgroup tests/ros2
+
+faults-ros2: $(ROS2)/.ready  ## Break a native drive on ROS 2 in 200 random ways (an hour): ros2_faults.jsonl.
+	$(ROS2)/bin/python tests/ros2/faults.py --cases $(or $(CASES),200) --seed $(or $(SEED),1)
 
 # Message packages that the wheels lack are built from definitions of the tests' own, with the wheels' rosidl tools.
 INTERFACES := $(wildcard tests/ros2/interfaces/*) $(wildcard examples/ros2/avlmaps_msgs)

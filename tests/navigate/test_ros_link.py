@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from textwrap import dedent
 
@@ -54,6 +55,15 @@ def test_without_roslibpy_the_extra_is_named(monkeypatch):
     monkeypatch.setattr("avlmaps.navigate.ros.link.find_spec", lambda name: None)
     with pytest.raises(BackendError, match=re.escape(install_command("ros"))):
         open_ros_driver("nav2", "ws://127.0.0.1:9")
+
+
+def test_without_rclpy_one_sentence_says_what_to_source_and_what_does_without():
+    if find_spec("rclpy") is not None:
+        pytest.skip("this Python has rclpy; `make test-ros2` tests it")
+    with pytest.raises(BackendError, match=r"needs ROS 2's rclpy .*setup.bash.*--ros ws://HOST:9090\.$"):
+        open_ros_driver("nav2", "native")
+    with pytest.raises(NavigationError, match="in ROS 1, over rosbridge"):
+        open_ros_driver("move_base", "native")
 
 
 @pytest.mark.parametrize("namespace", ["robot 1", "a//b", "/x/$(y)", "1robot"])

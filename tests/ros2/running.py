@@ -81,7 +81,7 @@ class Robot:
     @property
     def moves(self) -> bool:
         """Whether the body moves, by its own log."""
-        row = self.rows("body")[-1]
+        row = (self.rows("body") or [{"v": 0.0, "w": 0.0}])[-1]
         return abs(row["v"]) > 0.01 or abs(row["w"]) > 0.02
 
     def last_moved_s(self) -> float:

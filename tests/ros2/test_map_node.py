@@ -28,7 +28,7 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.open import open_recording
 from helpers.walked_room import write_walk
 
-pytestmark = pytest.mark.timeout(120)
+pytestmark = [pytest.mark.timeout(240), pytest.mark.xdist_group("one map")]
 
 PACKAGE = Path(__file__).parents[2] / "examples/ros2/avlmaps_ros"
 LIE = GroundTransform(2.0, -1.0, pi / 2)

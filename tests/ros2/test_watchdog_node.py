@@ -10,7 +10,7 @@ import pytest
 import rclpy
 from nav2_msgs.action import NavigateToPose
 from rclpy.action import ActionClient
-from running import Robot
+from running import HERE, Robot
 from std_msgs.msg import String
 from unique_identifier_msgs.msg import UUID
 
@@ -82,3 +82,15 @@ def test_an_operator_who_takes_over_is_left_alone_when_our_heartbeats_end(robot)
     time.sleep(3.0)
     assert robot.moves
     assert not robot.rows("cancel")
+
+
+def test_a_killed_driver_without_a_guard_is_stopped_on_the_robot(robot):
+    process = subprocess.Popen([sys.executable, str(HERE / "program.py"), "--unguarded"], stdout=subprocess.DEVNULL)
+    assert robot.soon(lambda: robot.moves, 40.0)
+    time.sleep(2.5)
+    assert robot.moves  # its heartbeats arrive
+    process.kill()
+    killed_s = time.time()
+    process.wait()
+    assert robot.soon(lambda: not robot.moves, 10.0)
+    assert robot.last_moved_s() - killed_s < 5.0
