@@ -151,3 +151,20 @@ def test_a_stamp_that_never_changes_says_nothing() -> None:
     seen = tree.seen("map", "base")
     assert seen is not None
     assert seen.age_s == 0.0
+
+
+@given(st.floats(0.05, 3.0), st.floats(0.0, 2.0))
+def test_the_stamps_of_a_simulation_run_by_its_own_clock(rate: float, late_s: float) -> None:
+    """A simulator that is slower or faster than the time of day is not a way that is late; a queue before it is."""
+    clock = Clock()
+    tree = LiveTree(clock)
+    for step in range(200):
+        clock.now_s = 100.0 + 0.05 * step
+        simulated_s = 5.0 + rate * 0.05 * step
+        tree.tick(simulated_s)
+        stamp_s = simulated_s - (late_s if step >= 150 else 0.0)
+        tree.take([Transform("map", "base", moved(0.0), stamp_s)], static=False)
+        seen = tree.seen("map", "base")
+        assert seen is not None
+        if step < 150 or (step > 150 and stamp_s > 5.0 + rate * 0.05 * 149):
+            assert abs(seen.age_s - (late_s if step >= 150 else 0.0)) < 1e-6

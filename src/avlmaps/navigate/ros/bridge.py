@@ -9,11 +9,12 @@ import msgspec
 
 from avlmaps.navigate.ros.goals import Goal
 from avlmaps.navigate.ros.link import Link
-from avlmaps.navigate.ros.messages import Text
+from avlmaps.navigate.ros.messages import Clock, Text
 from avlmaps.navigate.ros.session import Ear
 from avlmaps.navigate.ros.settings import RosSettings
 
 _ECHO_EVERY_S = 0.2
+_CLOCK_EVERY_S = 0.1
 
 
 class BridgeSession(ABC):
@@ -26,6 +27,8 @@ class BridgeSession(ABC):
 
     tf_kind: ClassVar[str]
     """The type of /tf."""
+    clock_kind: ClassVar[str]
+    """The type of /clock."""
     text_kind: ClassVar[str]
     """The type of heartbeats and echoes."""
     lists_every_s: ClassVar[float | None]
@@ -54,6 +57,7 @@ class BridgeSession(ABC):
         link, tree = self.link, ear.tree
         link.subscribe(f"{settings.tf_namespace}/tf", self.tf_kind, lambda told: tree.hear(told, static=False))
         link.subscribe(f"{settings.tf_namespace}/tf_static", self.tf_kind, lambda told: tree.hear(told, static=True))
+        link.subscribe("/clock", self.clock_kind, lambda told: tree.tick(_seconds(told)), _CLOCK_EVERY_S)
         link.advertise(self._named("avlmaps/heartbeat"), self.text_kind)
         echo = self._named("avlmaps/echo")
         link.advertise(echo, self.text_kind)
@@ -77,7 +81,9 @@ class BridgeSession(ABC):
     def complaint(self) -> str:
         """The latest complaint of the bridge."""
         complaints = self.link.complaints
-        return complaints[-1] if complaints else ""
+        binary = " (is it launched with bson_only_mode?)" if not complaints else ""
+        unread = f"{self.link.unread} messages came that cannot be read{binary}" if self.link.unread else ""
+        return complaints[-1] if complaints else unread
 
     def ask(self, server: str) -> bool:
         """Return False: this robot's servers list their goals by themselves."""
@@ -131,3 +137,7 @@ class BridgeSession(ABC):
             if goal.end is not None:
                 self._ours.pop(name, None)
                 self._cancelled_s.pop(name, None)
+
+
+def _seconds(message: msgspec.Raw) -> float:
+    return msgspec.json.decode(message, type=Clock).clock.seconds

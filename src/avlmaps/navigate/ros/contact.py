@@ -150,7 +150,8 @@ class Contact:
             queued = "; they arrive late, behind a bridge or a network that is too slow" if late_s > 1.0 else ""
             return f"its transforms are {seen.age_s:.1f} s old{queued}"
         refused = f"; {tree.refused} transforms were NaN or no rotation" if tree.refused else ""
-        return tree.why_not(self.frames.map_frame, self.frames.base_frame) + refused
+        says = f"; {self.session.complaint}" if self.session.complaint else ""
+        return tree.why_not(self.frames.map_frame, self.frames.base_frame) + refused + says
 
     def loss(self) -> str:
         """Return that the connection was lost, and how."""

@@ -96,9 +96,16 @@ class Link:
         """Hand on what answers goals and calls, from now on."""
         self._listeners.append(listener)
 
-    def subscribe(self, topic: str, kind: str, hand_on: Callable[[msgspec.Raw], None]) -> None:
-        """Hand on what is published; a listener raises ``ValueError`` for what it cannot read."""
-        self._topic(topic, kind).subscribe(hand_on)
+    def subscribe(self, topic: str, kind: str, hand_on: Callable[[msgspec.Raw], None], every_s: float = 0.0) -> None:
+        """Hand on what is published; a listener raises ``ValueError`` for what it cannot read.
+
+        Args:
+            topic: its name.
+            kind: its type.
+            hand_on: takes each message.
+            every_s: the bridge leaves out messages that come sooner after another.
+        """
+        self._topic(topic, kind, round(1000.0 * every_s)).subscribe(hand_on)
 
     def advertise(self, topic: str, kind: str) -> None:
         """Announce that something will be published."""
@@ -150,11 +157,13 @@ class Link:
             self.heard.wait_for(lambda: self.lost is not None, 2.0)
             self.lost = self.lost or "it was closed"
 
-    def _topic(self, topic: str, kind: str) -> Any:
+    def _topic(self, topic: str, kind: str, every_ms: int = 0) -> Any:
         import roslibpy
 
         if topic not in self._topics:
-            self._topics[topic] = roslibpy.Topic(self._bridge, topic, kind, reconnect_on_close=False)
+            self._topics[topic] = roslibpy.Topic(
+                self._bridge, topic, kind, throttle_rate=every_ms, reconnect_on_close=False
+            )
         return self._topics[topic]
 
     def _arrived(self, message: Incoming) -> None:

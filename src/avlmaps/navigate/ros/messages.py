@@ -96,6 +96,12 @@ class _Transforms(msgspec.Struct):
     transforms: Annotated[list[msgspec.Raw], msgspec.Meta(max_length=_MOST_TRANSFORMS)]
 
 
+class Clock(msgspec.Struct):
+    """A rosgraph_msgs/Clock: the time of a simulation."""
+
+    clock: _Time
+
+
 class Text(msgspec.Struct):
     """A std_msgs/String."""
 

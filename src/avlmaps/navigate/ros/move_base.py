@@ -42,6 +42,7 @@ class MoveBaseSession(BridgeSession):
     """A connection to move_base."""
 
     tf_kind: ClassVar[str] = "tf2_msgs/TFMessage"
+    clock_kind: ClassVar[str] = "rosgraph_msgs/Clock"
     text_kind: ClassVar[str] = "std_msgs/String"
     lists_every_s: ClassVar[float | None] = 0.2
 

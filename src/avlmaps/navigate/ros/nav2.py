@@ -10,7 +10,7 @@ from avlmaps.navigate.ros.errands import Errands
 from avlmaps.navigate.ros.goals import End, Goal
 from avlmaps.navigate.ros.link import Link
 from avlmaps.navigate.ros.messages import ActionEnd, ActionStates, CancelAnswer, Incoming, sanitize_line, text_in
-from avlmaps.navigate.ros.nav2_tasks import MOVING, NAVIGATE, SPIN, STRAIGHT, why_of
+from avlmaps.navigate.ros.nav2_tasks import ASKED_FOR, MOVING, why_of
 
 _SUCCEEDED, _CANCELLED = 4, 5  # action_msgs/GoalStatus
 _UNDER_WAY = (1, 2, 3)
@@ -24,6 +24,7 @@ class Nav2Session(BridgeSession):
     """A connection to Nav2: topics on one websocket, goals and calls on others (`Errands`)."""
 
     tf_kind: ClassVar[str] = "tf2_msgs/msg/TFMessage"
+    clock_kind: ClassVar[str] = "rosgraph_msgs/msg/Clock"
     text_kind: ClassVar[str] = "std_msgs/msg/String"
     lists_every_s: ClassVar[float | None] = None
 
@@ -33,7 +34,7 @@ class Nav2Session(BridgeSession):
         self._known: dict[str, frozenset[str]] = {}  # goals that a server had listed before ours was sent
         self._agreed_s: dict[str, tuple[float, bool]] = {}
         self._sent = ""
-        for action in (NAVIGATE, SPIN, STRAIGHT):
+        for action in ASKED_FOR:
             server = self._named(action)
             topic = f"{server}/_action/status"
             self.link.subscribe(
@@ -108,12 +109,13 @@ class Nav2Session(BridgeSession):
     def is_idle(self, since_s: float) -> bool | None:
         """Return whether each server that is there has agreed to stop, and lists no goal."""
         servers = [self._named(action) for action in MOVING]
-        answers = [self._agreed_s.get(server, (0.0, False)) for server in servers]
-        fresh = [agreed for at_s, agreed in answers if at_s >= since_s]
-        if not fresh:
+        said = [self._agreed_s[server] for server in servers if server in self._agreed_s]
+        fresh = [agreed for at_s, agreed in said if at_s >= since_s]
+        asked = self.ear.servers.serves(servers[0])
+        if not fresh or asked is None or asked[0] < since_s:
             return None
-        under_way = any(self.ear.servers.under_way().get(server) for server in servers)
-        return not under_way and all(fresh) and answers[0][0] >= since_s
+        under_way = any(self.ear.servers.under_way().get(self._named(action)) for action in ASKED_FOR)
+        return not under_way and all(fresh)
 
     def close(self) -> None:
         """End the connections."""

@@ -8,7 +8,9 @@ from avlmaps.navigate.ros.messages import duration, stamped_pose
 from avlmaps.navigate.ros.tasks import Tasks
 
 NAVIGATE, SPIN, STRAIGHT = "navigate_to_pose", "spin", "drive_on_heading"
-MOVING = (NAVIGATE, "navigate_through_poses", "follow_waypoints", SPIN, STRAIGHT, "backup", "follow_path")
+ASKED_FOR = (NAVIGATE, "navigate_through_poses", "follow_waypoints", SPIN, STRAIGHT)
+"""Nav2's actions that clients use; it uses others for itself."""
+MOVING = (*ASKED_FOR, "backup", "follow_path")
 """Each of Nav2's actions that moves a robot."""
 
 # nav2_msgs' error codes, by the action that sets them: ComputePathToPose 2xx, FollowPath 1xx, behaviours 7xx.

@@ -92,6 +92,7 @@ class LiveTree:
         self._edges: dict[str, _Edge] = {}
         self._stamps: dict[str, _Stamps] = {}
         self._lock = threading.Lock()
+        self._simulated_s: float | None = None
         self.refused = self.overtaken = 0
 
     def hear(self, message: msgspec.Raw, static: bool) -> None:
@@ -121,11 +122,19 @@ class LiveTree:
                 edge = _Edge(parent, transform.parent_from_child, static, stamp_s, now_s, now_s - late_s)
                 self._edges[child] = edge
 
+    def tick(self, simulated_s: float) -> None:
+        """Take in the time of a simulation, by which its stamps run: slower than ours, as a rule, or not at all."""
+        with self._lock:
+            if self._simulated_s is None or simulated_s < self._simulated_s:
+                self._stamps.clear()
+            self._simulated_s = simulated_s
+
     def _late_s(self, child: str, stamp_s: float, now_s: float) -> float:
         if stamp_s == 0.0:
             return 0.0
-        stamps = self._stamps.setdefault(child, _Stamps(stamp_s, now_s - stamp_s))
-        return stamps.late_s(stamp_s, now_s)
+        by_s = now_s if self._simulated_s is None else self._simulated_s
+        stamps = self._stamps.setdefault(child, _Stamps(stamp_s, by_s - stamp_s))
+        return stamps.late_s(stamp_s, by_s)
 
     def fixed(self) -> list[Transform]:
         """Return the static transforms; a bridge may hand them to its first client only."""
