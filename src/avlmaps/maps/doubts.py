@@ -5,9 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import msgspec
+import numpy as np
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.progress import say
+from avlmaps.maps.gravity.given_up import some_frames, up_doubts
 from avlmaps.maps.partial_maps import BUILD_VERSION
 from avlmaps.maps.plan import Computed, Plan, stage
 from avlmaps.maps.store.checkpoints import key_of
@@ -61,7 +63,8 @@ def _doubts(recording: Recording, allowed: Sequence[str]) -> _Doubts:
         raise RecordingError(
             f"{recording.path} cannot be right. {refused} To build it as it is: --allow {refused.reason.value}."
         )
-    return _Doubts(verdict.sentences(), whole=not verdict.unread)
+    tilted = up_doubts(recording, some_frames(recording), np.random.default_rng(0))
+    return _Doubts((*verdict.sentences(), *tilted), whole=not verdict.unread)
 
 
 def carving_doubts(removed: Removed, voxels: int) -> Iterator[str]:

@@ -1,0 +1,64 @@
+"""An up direction that was given is held against the planes, the camera and the walk."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from avlmaps.maps.gravity.given_up import some_frames, up_doubts
+from avlmaps.recordings.open import open_recording
+from avlmaps.recordings.types import Recording
+from helpers.walked_room import write_walk
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    return open_recording(write_walk(tmp_path_factory.mktemp("up") / "rec"))
+
+
+def doubts(recording: Recording, up: tuple[float, float, float] | None) -> tuple[str, ...]:
+    recording.up_in_world = None if up is None else np.array(up) / np.linalg.norm(up)
+    return up_doubts(recording, some_frames(recording), np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("up", [(0, 0, 1), (0.1, 0, 1), None])
+def test_what_is_up_is_not_doubted(walk: Recording, up: tuple[float, float, float] | None) -> None:
+    assert doubts(walk, up) == ()
+
+
+@pytest.mark.parametrize("up", [(0, 1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 1)])
+def test_what_is_not_up_is_said_with_what_is(walk: Recording, up: tuple[float, float, float]) -> None:
+    (said,) = doubts(walk, up)
+    assert "Up is given as" in said and "give --up 0.00,0.00,1.00" in said
+
+
+def test_a_camera_on_its_side_is_believed_where_the_walk_is_level(walk: Recording) -> None:
+    """Its planes say that a wall is a floor, and so does how it is held."""
+    side = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+
+    class OnItsSide(Recording):
+        stamps_s, path, rig, audio, notices = walk.stamps_s, Path("side"), walk.rig, None, ()
+        world_from_camera = walk.world_from_camera @ side
+        up_in_world = np.array([0.0, 0.0, 1.0])
+        fingerprint = ""
+
+        def frame(self, index: int) -> None:
+            raise IndexError(index)
+
+    recording = OnItsSide()
+    turned = [
+        replace(frame, world_from_camera=frame.world_from_camera @ side, depth_m=_turned(frame.depth_m))
+        for frame in some_frames(walk)
+    ]
+    assert np.std(recording.world_from_camera[:, 2, 3]) < 0.05
+    assert up_doubts(recording, iter(turned), np.random.default_rng(0)) == ()
+
+
+def _turned(depth_m: np.ndarray) -> np.ndarray:
+    """Turn the square in the middle with the camera, so that the intrinsics stay."""
+    height, width = depth_m.shape
+    square = depth_m[:, (width - height) // 2 : (width - height) // 2 + height]
+    out = np.zeros_like(depth_m)
+    out[:, (width - height) // 2 : (width - height) // 2 + height] = np.rot90(square)
+    return out
