@@ -12,7 +12,7 @@ from avlmaps.recordings.types import Frame, Recording
 _FRAMES = 16
 # Given and found directions closer than this are one; beside it, a slope or a tilted sensor explains the difference.
 _APART_DEG = 20.0
-# Planes are believed where so large a share of the surface agrees and the camera was held within this angle of them.
+# Planes count where so large a share of the surface agrees and the camera was held within this angle of them.
 _LEAST_SUPPORT, _HELD_DEG = 0.1, 40.0
 # A walk is level: along what is up it spreads less than half as far as along what is not.
 _FLATTER, _STILL_M = 0.5, 0.15
