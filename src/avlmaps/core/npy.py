@@ -1,5 +1,6 @@
 """NPY files, opened by their header first: what it promises must be what the file holds, before memory is taken."""
 
+import errno
 import math
 import tokenize
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ import numpy as np
 from avlmaps.core.files import open_regular
 
 _MOST_DIMENSIONS = 8
+_CANNOT_MAP = {errno.ENODEV, errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EPERM, errno.ENOSYS}
 # The header is a Python literal; what its parser raises is numpy's and Python's own affair.
 _UNREADABLE = (
     ValueError,
@@ -89,7 +91,12 @@ def load_npy(path: Path, limit_bytes: int, *, mapped: bool = False) -> np.ndarra
         header = read_npy_header(stream, size)
         order = "F" if header.fortran else "C"
         if mapped and math.prod(header.shape):
-            return np.memmap(stream, header.dtype, "r", header.offset, header.shape, order)
+            try:
+                return np.memmap(stream, header.dtype, "r", header.offset, header.shape, order)
+            except OSError as error:  # some network drives cannot map files; what is read whole is the same
+                if error.errno not in _CANNOT_MAP:
+                    raise
+                stream.seek(header.offset)
         flat = np.empty(math.prod(header.shape), header.dtype)
         into = cast(BufferedIOBase, stream)
         read = into.readinto(flat.view(np.uint8).data) if flat.size else 0

@@ -140,7 +140,9 @@ def read_array(folder: Path, info: FileInfo, *, verify: bool = False) -> np.ndar
         array = load_npy(path, info.bytes, mapped=info.bytes > SMALL_BYTES)
     except PermissionError as fault:
         raise MapError(f"{path} cannot be read ({fault.strerror}); check its permissions.") from fault
-    except (ValueError, OSError) as fault:
+    except OSError as fault:  # of the system or the drive: the file may be as it was written
+        raise MapError(f"{path} cannot be read ({fault.strerror or fault}); check the drive and the memory.") from fault
+    except ValueError as fault:
         raise MapError(f"{path} is damaged: it is not an array that numpy can read ({fault}); {MEND}.") from fault
     if array.dtype.str != info.dtype or array.shape != info.shape:
         raise MapError(
