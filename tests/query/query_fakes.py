@@ -138,7 +138,7 @@ def fake_map(
         keyframes=keyframes if keyframes is not None else keyframes_at(np.zeros((0, 3))),
         place_state={},
         profile=profile or fake_profile(),
-        info=SimpleNamespace(ground=None),
+        info=SimpleNamespace(ground=None, doubts=()),
         rig=Rig(camera, camera),
         require_model=lambda kind: None,
         clip_path=lambda sound: Path(f"fake.avlmap/{sound}.flac"),

@@ -6,13 +6,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, UInt8
 from avlmaps.core.camera import Rig
-from avlmaps.core.timeline import Trajectory
 from avlmaps.recordings.audio import AudioTrack
+
+if TYPE_CHECKING:
+    from avlmaps.core.timeline import Trajectory
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +127,7 @@ class Recording(ABC):
     notices: tuple[str, ...]
     topics: Mapping[str, str] = MappingProxyType({})
     base_height: "BaseHeight | None" = None
-    trajectory: Trajectory | None = None
+    trajectory: "Trajectory | None" = None
 
     @abstractmethod
     def frame(self, index: int) -> Frame:

@@ -27,6 +27,7 @@ _NEAR_IN_TIME_S = 1.0
 _CENTRE_MARGIN = 0.2
 _FOCAL_RANGE = (0.25, 4.0)
 _MOST_ASPECT = 1.15
+_AS_IF_EXCHANGED = 0.04
 
 
 def of_intrinsics(sample: Sample, recording: Recording) -> Iterator[Finding]:
@@ -51,6 +52,11 @@ def _of_camera(camera: Pinhole, where: str) -> Iterator[Finding]:
         if max(off) > 0.5 and min(camera.cx, camera.cy) > 0.0:
             looks = f"They look like those of a {2 * camera.cx:.0f}x{2 * camera.cy:.0f} picture: "
         yield Finding(Reason.INTRINSICS, grade, sentence, f"{looks}{fit if looks else fit.capitalize()}")
+    w, h = camera.width, camera.height
+    if abs(w - h) > 0.1 * w and max(abs(camera.cx - h / 2), abs(camera.cy - w / 2)) < _AS_IF_EXCHANGED * w:
+        sentence = f"The principal point {where} ({camera.cx:.6g}, {camera.cy:.6g}) is the middle of a {h}x{w} picture."
+        remedy = f"cx and cy look exchanged, or the picture was turned; {fit}"
+        yield Finding(Reason.INTRINSICS, Grade.SUSPICIOUS, sentence, remedy)
     wide = camera.fx / camera.width
     if not _FOCAL_RANGE[0] <= wide <= _FOCAL_RANGE[1]:
         sentence = (
