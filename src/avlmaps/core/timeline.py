@@ -7,9 +7,9 @@ sentence reports it.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
 from avlmaps.core import poses
+from avlmaps.core.arrays import Bool, Float, Int
 
 # Messages of one stream may arrive a little out of order; a step back by more is a clock that was reset.
 MAX_DISORDER_S = 1.0
