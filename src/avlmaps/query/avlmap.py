@@ -18,7 +18,6 @@ from avlmaps.perception.room_contents import read_room_contents
 from avlmaps.query import loops
 from avlmaps.query.factors import FOUND_AT, HeatSettings
 from avlmaps.query.floor_plan import FloorPlan, storeys
-from avlmaps.query.focal import focal_35mm_of
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor, area_names, name_shares
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
@@ -386,6 +385,8 @@ class AVLMap:
         Raises:
             QueryError: the picture is missing, no picture, or does not fit the camera.
         """
+        from avlmaps.query.focal import focal_35mm_of
+
         is_array = isinstance(picture, np.ndarray)
         part = Part(Modality.IMAGE, "a picture" if is_array else str(picture), _role(primary), is_file=True)
         rgb = picture if is_array else read_picture(Path(picture).expanduser())
