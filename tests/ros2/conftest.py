@@ -15,4 +15,5 @@ else:
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
     os.environ["ROS_DOMAIN_ID"] = str(1 + (crc32(run.encode()) + worker) % 100)
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"  # processes that are killed leave shared memory locked
     os.environ.pop("ROS_STATIC_PEERS", None)

@@ -102,6 +102,7 @@ class Operator:
     def __init__(self, robot: Robot) -> None:
         self.robot, self.client = robot, ActionClient(robot.node, NavigateToPose, "navigate_to_pose")
         assert self.client.wait_for_server(10.0)
+        time.sleep(0.5)  # the server must know the client as well, or its first answer is lost
 
     def send(self, x_m: float = -30.0) -> str:
         uuid, goal = uuid4(), NavigateToPose.Goal()

@@ -32,6 +32,7 @@ def test_a_plain_client_drives_it_cancels_it_and_sees_it_stand_when_its_server_d
     heard = []
     robot.node.create_subscription(TFMessage, "/tf", heard.append, 100)
     assert client.wait_for_server(10.0)
+    time.sleep(1.0)  # the server must know the client as well, or its first answer is lost
     goal = NavigateToPose.Goal()
     goal.pose.pose.position.x = 5.0
     handle = finished(robot.node, client.send_goal_async(goal))

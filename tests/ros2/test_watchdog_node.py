@@ -68,7 +68,7 @@ def test_a_goal_whose_heartbeats_end_is_cancelled_and_an_operators_goal_goes_on(
     client.send(operators.bytes)
     assert robot.soon(lambda: robot.moves)
     time.sleep(3.0)
-    assert robot.moves
+    assert robot.soon(lambda: robot.moves, 5.0)
     assert [row["id"] for row in robot.rows("cancelled")] == [uuid.hex]
 
 
@@ -80,7 +80,7 @@ def test_an_operator_who_takes_over_is_left_alone_when_our_heartbeats_end(robot)
     client.send(theirs.bytes)
     assert robot.soon(lambda: bool(robot.rows("replaced")))
     time.sleep(3.0)
-    assert robot.moves
+    assert robot.soon(lambda: robot.moves, 5.0)
     assert not robot.rows("cancel")
 
 
