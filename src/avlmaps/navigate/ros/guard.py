@@ -155,6 +155,8 @@ def main() -> None:
             return
         line += content
     orders = msgspec.json.decode(line, type=Orders)
+    with suppress(ImportError):  # now, since it takes seconds on a busy machine; a native session needs none of it
+        import avlmaps.navigate.ros.wire  # noqa: F401
     left = watch(0, orders.silence_s)
     if left is None:
         return
