@@ -1,7 +1,6 @@
 """The command that installs a group of further packages (an extra) for the avlmaps that runs here."""
 
 from functools import cache
-from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -29,6 +28,8 @@ def install_command(extra: str, *more: str) -> str:
 @cache
 def _clone() -> Path | None:
     """Return the folder of the project that this package came from; None where it came as a package."""
+    from importlib.metadata import PackageNotFoundError, distribution  # slow to load, and errors alone need it
+
     beside = Path(__file__).resolve().parents[3]  # src/avlmaps/core/extras.py
     if _is_project(beside):
         return beside
