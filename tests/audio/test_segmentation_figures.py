@@ -27,7 +27,8 @@ def test_intervals_are_the_textbooks() -> None:
 
 @pytest.mark.shared
 def test_real_sounds_are_found_where_they_are(shared_data: Path) -> None:
-    clips = clips_to_test(shared_data / "data" / "sounds")["folds 4 and 5"][::4]
+    chosen = clips_to_test(shared_data / "data" / "sounds")["folds 4 and 5"]
+    clips = [clip for clip in chosen if clip.name.startswith("esc10/")][::4]
     clean = measure(clips, "none", None, np.random.default_rng(0), SegmentationSettings())
     assert (clean.sounds, clean.found, clean.false_alarms) == (40, 40, 0)
     assert (np.abs([clean.onset_s, clean.offset_s]) < 0.1).mean() > 0.95
