@@ -137,5 +137,5 @@ def test_the_bench_knows_a_right_map_from_a_wrong_one(right: Draft) -> None:
     turn = poses.from_quaternion(np.array([[3.0, -1.0, 2.0]]), np.array([[0.1, 0.2, 0.3, 0.9]]))[0]
     moved = next(one for one in situations() if one.name == "OpenGL camera in a y-up world")
     same = replace(moved, change=lambda d, o, g: replace(d, poses=turn @ d.poses))
-    assert judge.judge(same, right, 0).outcome is Outcome.RIGHT
-    assert judge.judge(moved, right, 0).outcome is Outcome.REFUSED
+    outcomes = [case.outcome for one in (same, moved) if (case := judge.judge(one, right, 0))]
+    assert outcomes == [Outcome.RIGHT, Outcome.REFUSED]

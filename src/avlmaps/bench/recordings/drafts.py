@@ -73,11 +73,11 @@ class Draft:
             for number, picture in enumerate(pictures):
                 write_picture(path / folder / f"{number:06d}.png", picture)
         names = [f"{number:06d},{float(stamp)!r}" for number, stamp in enumerate(self.stamps_s)]
-        _write(path / "frames.csv", ["name,stamp_s", *names])
+        write_lines(path / "frames.csv", ["name,stamp_s", *names])
         quaternion = np.roll(to_quaternion(self.poses), self.quaternion_roll, axis=1)
         rows = np.column_stack([self.pose_stamps_s, self.poses[:, :3, 3], quaternion])
         lines = [",".join(repr(float(value)) for value in row) for row in rows]
-        _write(path / "poses.csv", ["stamp_s,tx,ty,tz,qx,qy,qz,qw", *lines])
+        write_lines(path / "poses.csv", ["stamp_s,tx,ty,tz,qx,qy,qz,qw", *lines])
         cameras = {name: camera_numbers(camera) for name, camera in (("rgb", self.rig.rgb), ("depth", self.rig.depth))}
         between = {"rgb_from_depth": self.rig.rgb_from_depth.tolist()}
         described = {
@@ -86,7 +86,7 @@ class Draft:
             "depth_units_per_m": self.units_per_m,
             **self.keys,
         }
-        _write(path / "recording.json", [json.dumps(described)])
+        write_lines(path / "recording.json", [json.dumps(described)])
         return path
 
 
@@ -120,7 +120,9 @@ def write_picture(path: Path, picture: Picture) -> None:
     path.write_bytes(content.tobytes())
 
 
-def _write(path: Path, lines: Sequence[str]) -> None:
+def write_lines(path: Path, lines: Sequence[str]) -> None:
+    """Write lines of text."""
+    """Write a file of text."""
     write_bytes_atomically(path, ("\n".join(lines) + "\n").encode())
 
 

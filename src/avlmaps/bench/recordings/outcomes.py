@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from avlmaps.bench.recordings.drafts import Draft
+from avlmaps.bench.recordings.formats import FOLDER, Format
 from avlmaps.bench.recordings.situations import Situation
 from avlmaps.core import poses
 from avlmaps.core.arrays import Float
@@ -20,6 +21,8 @@ from avlmaps.recordings.types import Recording
 
 # A point this far from the true surface is wrong: two voxels.
 WRONG_M = 0.1
+# A camera this far from the true one is wrong, although its pictures may show a wall that looks the same there.
+WRONG_CAMERA_M = 0.25
 MOST_WRONG = 0.1
 MOST_COLOUR_ERROR = 12.0
 _FRAMES, _STEP = 12, 5
@@ -47,6 +50,7 @@ class Case:
         group: of the mistake.
         outcome: what came of it.
         said: the sentences.
+        format: that it was written in.
     """
 
     source: str
@@ -54,34 +58,38 @@ class Case:
     group: str
     outcome: Outcome
     said: tuple[str, ...]
+    format: str = FOLDER.name
 
 
 class Judge:
     """Judges recordings that were made of one right draft."""
 
-    def __init__(self, right: Draft) -> None:
+    def __init__(self, right: Draft, form: Format = FOLDER) -> None:
         """Open the right one, to know its usual notices and its surface.
 
         Args:
             right: the draft.
+            form: the format that it and its mistakes are written in.
         """
         from scipy.spatial import KDTree
 
-        self.right = right
+        self.right, self.form = right, form
         with TemporaryDirectory() as folder:
-            opened = open_recording(right.write(Path(folder) / "walk"))
+            opened = open_recording(form.write(right, Path(folder) / "walk"))
             self.usual = frozenset(opened.notices)
             self._tree = KDTree(np.concatenate([_points(opened, i, _CLOUD_STEP) for i in range(len(opened))]))
-            self._poses = {opened.name(i): opened.world_from_camera[i] for i in range(len(opened))}
+            self.poses = {opened.name(i): opened.world_from_camera[i] for i in range(len(opened))}
             self._rgb = {opened.name(i): opened.frame(i).rgb for i in _spread(len(opened))}
             self.verdict = check_recording(opened)
 
-    def judge(self, situation: Situation, other: Draft, seed: int) -> Case:
-        """Make a mistake, read what was written and return the outcome."""
+    def judge(self, situation: Situation, other: Draft, seed: int) -> Case | None:
+        """Make a mistake, read what was written and return the outcome; None where the format cannot hold it."""
         changed = situation.change(self.right, other, np.random.default_rng(seed))
+        if not self.form.holds(changed):
+            return None
         with TemporaryDirectory() as folder:
-            outcome, said = self._outcome(changed.write(Path(folder) / "walk"), situation.cause)
-        return Case(self.right.name, situation.name, situation.group, outcome, said)
+            outcome, said = self._outcome(self.form.write(changed, Path(folder) / "walk"), situation.cause)
+        return Case(self.right.name, situation.name, situation.group, outcome, said, self.form.name)
 
     def _outcome(self, path: Path, cause: str) -> tuple[Outcome, tuple[str, ...]]:
         try:
@@ -99,13 +107,16 @@ class Judge:
         return (Outcome.RIGHT if self.is_right(opened) else Outcome.SILENT), ()
 
     def is_right(self, opened: Recording) -> bool:
-        """Return whether surfaces and colours are those of the right recording, up to a motion of the world."""
-        rows = [i for i in range(len(opened)) if opened.name(i) in self._poses]
+        """Return whether surfaces, cameras and colours are the right recording's, up to a motion of the world."""
+        rows = [i for i in range(len(opened)) if opened.name(i) in self.poses]
         middle = rows[len(rows) // 2]
-        to_true = self._poses[opened.name(middle)] @ poses.inverse(opened.world_from_camera[middle])
+        to_true = self.poses[opened.name(middle)] @ poses.inverse(opened.world_from_camera[middle])
+        there_m = poses.apply(to_true, opened.world_from_camera[rows, :3, 3])
+        true_m = np.stack([self.poses[opened.name(i)][:3, 3] for i in rows])
+        if float((np.linalg.norm(there_m - true_m, axis=1) > WRONG_CAMERA_M).mean()) > MOST_WRONG:
+            return False
         chosen = [rows[i] for i in _spread(len(rows))]
         points = np.concatenate([poses.apply(to_true, _points(opened, i, _STEP)) for i in chosen])
-        away_m, _ = self._tree.query(points, distance_upper_bound=WRONG_M)
         coloured = [i for i in chosen if opened.name(i) in self._rgb]
         errors = [
             float(np.abs(opened.frame(i).rgb.astype(float) - self._rgb[opened.name(i)]).mean())
@@ -113,7 +124,12 @@ class Judge:
             if opened.frame(i).rgb.shape == self._rgb[opened.name(i)].shape
         ]
         wrong_colour = len(errors) > 0 and float(np.mean(errors)) > MOST_COLOUR_ERROR
-        return float((~np.isfinite(away_m)).mean()) <= MOST_WRONG and not wrong_colour
+        return self.is_surface(points) and not wrong_colour
+
+    def is_surface(self, points: Float[np.ndarray, "k 3"]) -> bool:
+        """Return whether nearly all points, in the right recording's world, lie on its surface."""
+        away_m, _ = self._tree.query(points, distance_upper_bound=WRONG_M)
+        return float((~np.isfinite(away_m)).mean()) <= MOST_WRONG
 
 
 def right_case(draft: Draft) -> tuple[Case, Verdict | None]:

@@ -10,6 +10,7 @@ import numpy as np
 from avlmaps.bench.harness.intervals import in_percent, wilson
 from avlmaps.bench.output import Table
 from avlmaps.bench.recordings.drafts import Draft, RoomWalk
+from avlmaps.bench.recordings.formats import FOLDER, FORMATS, TUM_CAMERA, Format
 from avlmaps.bench.recordings.outcomes import Case, Judge, Outcome, right_case
 from avlmaps.bench.recordings.situations import situations
 from avlmaps.core.progress import progress
@@ -65,19 +66,26 @@ def run(
         windows = list(_windows(path))
         if len(windows) > 1:
             sources.append((replace(windows[1], name=path.name), windows[-1]))
-    known = situations()
-    cases: list[Case] = []
-    for right, other in sources:
-        judge = Judge(right)
-        cases += [judge.judge(situation, other, seed) for situation in progress(known, right.name, total=len(known))]
+    cases = [case for right, other in sources for case in _cases(right, other, FOLDER, seed)]
+    camera = TUM_CAMERA.resized(*SIZE)
+    room, other = RoomWalk("room", seed=13).draft(camera), RoomWalk("room, other", seed=14).draft(camera)
+    in_formats = [case for form in FORMATS for case in _cases(room, other, form, seed)]
     rights = [*[room.draft() for room in ROOMS], *[_whole(path) for path in rendered]]
     rights += [window for path in scenes for window in _windows(path)]
     return {
         "mistakes by source": _counts(cases, [right.name for right, _ in sources]),
         "mistakes by kind": _counts(cases, list(dict.fromkeys(case.group for case in cases)), by="group"),
+        "mistakes by format": _counts(in_formats, [form.name for form in FORMATS], by="format"),
         "right recordings": _rights(rights),
-        "every mistake": _listed(cases),
+        "every mistake": _listed([*cases, *in_formats]),
     }
+
+
+def _cases(right: Draft, other: Draft, form: Format, seed: int) -> list[Case]:
+    """Make every mistake that a format can hold."""
+    judge, known = Judge(right, form), situations()
+    told = progress(known, f"{right.name}, {form.name}", total=len(known))
+    return [case for situation in told if (case := judge.judge(situation, other, seed)) is not None]
 
 
 def _rendered(folder: Path, spec: str, sensor: SensorName, drift: bool) -> Path:
@@ -136,5 +144,8 @@ def _rights(drafts: Sequence[Draft]) -> Table:
 
 
 def _listed(cases: Sequence[Case]) -> Table:
-    rows = [[case.source, case.group, case.situation, case.outcome.value, " ".join(case.said)] for case in cases]
-    return {"columns": ["source", "kind", "mistake", "outcome", "said"], "rows": rows}
+    rows = [
+        [case.source, case.format, case.group, case.situation, case.outcome.value, " ".join(case.said)]
+        for case in cases
+    ]
+    return {"columns": ["source", "format", "kind", "mistake", "outcome", "said"], "rows": rows}
