@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import sleep
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -17,7 +18,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "navigate"))
 
 from ros_bridge import FakeRobot
 
+from avlmaps.cli.go import Go, drive
 from avlmaps.core.motion import GroundPose
+from avlmaps.navigate.interrupts import Halt, Interrupted
 
 pytestmark = [pytest.mark.timeout(200), pytest.mark.slow]
 
@@ -177,6 +180,24 @@ def test_a_signal_between_two_goals_leaves_no_goal(go: Started, later_s: float) 
         assert not robot.moves_on
     assert process.returncode == 128 + signal.SIGTERM, err
     assert "robot stands at" in err.splitlines()[-1]
+
+
+@pytest.mark.parametrize("when", ["close", "owes"])
+def test_a_signal_after_the_program_does_not_say_that_no_goal_was_sent(
+    monkeypatch: pytest.MonkeyPatch, when: str
+) -> None:
+    def stop() -> None:
+        raise Interrupted(signal.SIGTERM)
+
+    unseen = Halt(False, "no goal was active, but the robot is not seen to stand")
+    usual = {"halt": lambda: unseen, "close": lambda: None, "owes": lambda: False, "contacts": lambda: None}
+    robot: Any = SimpleNamespace(**usual | {when: stop}, driver=None)
+    monkeypatch.setattr("avlmaps.navigate.instruct.instruct", lambda *_, **__: None)
+    nothing: Any = None
+    with pytest.raises(Interrupted) as stopped:
+        drive(Go(map=Path("room.avlmap"), sentence="turn left"), nothing, robot, nothing, nothing)
+    assert stopped.value.halt is unseen
+    assert stopped.value.status == 3
 
 
 @pytest.mark.parametrize("name", ["/robot1", "/robot2"])

@@ -221,7 +221,7 @@ def test_each_place_that_is_gone_to_ends_with_one_stop() -> None:
 def test_a_place_that_is_not_reached_stops_the_program_unless_it_is_to_go_on() -> None:
     robot = robot_among(GroundPose(0.0, 0.0), a=box(3.0, 0.0))
     driver_of(robot).reaches = False
-    with pytest.raises(NavigationError, match=r"a was not reached: a wall is in the way; the robot stopped 3\.00 m"):
+    with pytest.raises(NavigationError, match=r"a was not reached: a wall is in the way; the robot was 3\.00 m"):
         robot.move_to("a")
     assert not robot.moves[-1].reached
     patient = robot_among(GroundPose(0.0, 0.0), RobotSettings(persist=True), a=box(3.0, 0.0))

@@ -44,6 +44,12 @@ def _plain() -> dict[str, str]:
     return {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
 
 
+def _ours() -> dict[str, str]:
+    """Return the environment of a program of ours."""
+    source = os.environ.get("AVLMAPS_SRC")
+    return {**os.environ, **({"PYTHONPATH": source} if source else {})}
+
+
 def free_port() -> int:
     """Return a port that nobody listens at."""
     with socket.socket() as unused:
@@ -108,15 +114,15 @@ class Field:
             "HOME": str(self.folder),
         }
         self.start("core")
-        self._until(lambda: _answers(self.master), "roscore")
+        self.until(lambda: _answers(self.master), "roscore")
         self.start("body")
         self.start("move_base")
         self.start("bridge")
         self.start("proxy")
         if self.watchdog:
             self.start("watchdog")
-        self._until(lambda: _answers(self.port) and len(self.rows()) > 3, "rosbridge and the body")
-        self._until(lambda: any(row["kind"] == "up" for row in self.rows(self.server_log)), "move_base")
+        self.until(lambda: _answers(self.port) and len(self.rows()) > 3, "rosbridge and the body")
+        self.until(lambda: any(row["kind"] == "up" for row in self.rows(self.server_log)), "move_base")
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -185,10 +191,23 @@ class Field:
             file = self.folder / f"robot{len(self.clients)}.json"
             file.write_text(json.dumps({"settings": settings}))
             words.append(str(file))
-        source = os.environ.get("AVLMAPS_SRC")
-        environment = {**os.environ, **({"PYTHONPATH": source} if source else {})}
-        out = self.folder / f"client{len(self.clients)}.jsonl"
-        client = Client(words, environment, out)
+        return self._client(words)
+
+    def command(self, sentence: str) -> "Client":
+        """Start `avlmaps go` on the map of a room, in the middle of which the body begins."""
+        sys.path.insert(0, str(HERE.parent))
+        from helpers.walked_room import write_walk
+
+        program = [sys.executable, "-c", "from avlmaps.cli import main; main()"]
+        walk, room, file = write_walk(self.folder / "walk"), self.folder / "room.avlmap", self.folder / "room.json"
+        built = [*program, "build", str(walk), "--out", str(room), "--voxel-size-m", "0.1", "--profile", "colours"]
+        subprocess.run(built, check=True, capture_output=True, env=_ours())
+        file.write_text(json.dumps({"map_from_avlmap": {"x_m": -4.4, "y_m": -3.2}}))
+        robot = ["--robot", "move_base", "--ros", self.url, "--ros-frames", str(file), "--json"]
+        return self._client([*program, "go", str(room), sentence, *robot])
+
+    def _client(self, words: list[str]) -> "Client":
+        client = Client(words, _ours(), self.folder / f"client{len(self.clients)}.jsonl")
         self.clients.append(client.process)
         return client
 
@@ -213,7 +232,7 @@ class Field:
 
     def until_moving(self, within_s: float = 40.0) -> None:
         """Wait until the body drives ahead."""
-        self._until(
+        self.until(
             lambda: abs(next(r for r in reversed(self.rows()) if r["kind"] == "body")["v"]) > 0.2, "motion", within_s
         )
 
@@ -224,7 +243,8 @@ class Field:
             sleep(0.05)
         return not self.moves()
 
-    def _until(self, holds: Callable[[], bool], what: str, within_s: float = 60.0) -> None:
+    def until(self, holds: Callable[[], bool], what: str, within_s: float = 60.0) -> None:
+        """Wait until something holds."""
         until_s = monotonic() + within_s
         while not holds():
             if monotonic() > until_s:

@@ -8,10 +8,11 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from threading import Thread
 from time import sleep
 from typing import Any
 
-from ros1_field import Field, now
+from ros1_field import Client, Field, now
 
 Outcome = dict[str, Any]
 
@@ -159,10 +160,8 @@ def operator_takes_over(folder: Path) -> Outcome:
         arrival = client.said("arrival", 20.0)
         exited = client.said("exit", 20.0)
         sleep(3.0)
-        rows = field.rows(field.server_log)
-        ended = [row for row in rows if row["kind"] in ("preempted", "succeeded") and row["id"] == "rviz"]
         return {
-            "operator's goal": "goes on" if not ended and field.moves() else "was ended",
+            "operator's goal": _operators_goal(field),
             "note": arrival and arrival["note"],
             "status": (exited or {}).get("status"),
         }
@@ -177,9 +176,50 @@ def operator_takes_over_and_ours_dies(folder: Path) -> Outcome:
         client.process.kill()
         field.operate(0.0, 20.0)
         sleep(6.0)
-        rows = field.rows(field.server_log)
-        ended = [row for row in rows if row["kind"] in ("preempted", "succeeded") and row["id"] == "rviz"]
-        return {"operator's goal": "goes on" if not ended and field.moves() else "was ended"}
+        return {"operator's goal": _operators_goal(field)}
+
+
+def _operators_goal(field: Field) -> str:
+    rows = field.rows(field.server_log)
+    ended = [row for row in rows if row["kind"] in ("preempted", "succeeded") and row["id"] == "rviz"]
+    return "goes on" if not ended and field.moves() else "was ended"
+
+
+def operator_takes_over_a_command(folder: Path) -> Outcome:
+    """An operator takes over from `avlmaps go`, whose program fails by that; the operator's goal goes on."""
+    with Field(folder) as field:
+        command = field.command("move forward 50 metres, then turn left")
+        field.until_moving(90.0)
+        sleep(1.0)
+        field.operate(0.0, 20.0)
+        return _ended_command(field, command)
+
+
+def operator_takes_over_a_command_and_a_signal_comes(folder: Path) -> Outcome:
+    """As before, and SIGTERM comes as soon as the operator's goal has begun."""
+    with Field(folder) as field:
+        command = field.command("move forward 50 metres, then turn left")
+        field.until_moving(90.0)
+        sleep(1.0)
+        operating = Thread(target=field.operate, args=(0.0, 20.0))
+        operating.start()
+        field.until(
+            lambda: any(row.get("id") == "rviz" for row in field.rows(field.server_log)), "goal of the operator"
+        )
+        command.process.terminate()
+        operating.join()
+        return _ended_command(field, command)
+
+
+def _ended_command(field: Field, command: Client) -> Outcome:
+    status = command.process.wait(60.0)
+    sleep(4.0)  # what was still to be cancelled would be by now
+    return {
+        "operator's goal": _operators_goal(field),
+        "status": status,
+        "answer": command.out.read_text(),
+        "errors": command.out.with_suffix(".err").read_text()[-400:],
+    }
 
 
 def program_killed(folder: Path) -> Outcome:
@@ -197,7 +237,8 @@ SCENARIOS: dict[str, Callable[[Path], Outcome]] = {
     scenario.__name__: scenario
     for scenario in (
         stands_while_it_drives, bridge_restarts, bridge_is_gone, stop_after_a_restart, slow_bridge, server_dies,
-        server_restarts, operator_takes_over, operator_takes_over_and_ours_dies, program_killed,
+        server_restarts, operator_takes_over, operator_takes_over_and_ours_dies, operator_takes_over_a_command,
+        operator_takes_over_a_command_and_a_signal_comes, program_killed,
     )
 }  # fmt: skip
 

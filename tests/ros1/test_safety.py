@@ -22,6 +22,17 @@ LAWS: dict[str, Callable[[dict[str, Any]], bool]] = {
     "server_restarts": lambda saw: saw["noticed after s"] is not None and saw["noticed after s"] < 15.0,
     "operator_takes_over": lambda saw: saw["operator's goal"] == "goes on",
     "operator_takes_over_and_ours_dies": lambda saw: saw["operator's goal"] == "goes on",
+    "operator_takes_over_a_command": lambda saw: (
+        saw["operator's goal"] == "goes on"
+        and saw["status"] == 1
+        and "A goal of another client continues" in saw["answer"]
+    ),
+    "operator_takes_over_a_command_and_a_signal_comes": lambda saw: (
+        saw["operator's goal"] == "goes on"
+        and saw["status"] in (1, 3)
+        and "robot stands" not in saw["errors"]
+        and "no goal was sent" not in saw["errors"]
+    ),
     "program_killed": lambda saw: saw["stands"] and saw["moved on s"] < 5.0,
 }
 

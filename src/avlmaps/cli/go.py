@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from avlmaps.language.translator import Translation, Translator
     from avlmaps.maps.obstacles import Obstacles
     from avlmaps.navigate.driver import Driver
+    from avlmaps.navigate.instruct import Outcome
     from avlmaps.navigate.interrupts import Halt
     from avlmaps.query.avlmap import AVLMap
 
@@ -184,13 +185,33 @@ def drive(
     Raises:
         Interrupted: a signal came; its ``halt`` says how the robot stands.
     """
+    from avlmaps.navigate.interrupts import Interrupted
+
+    try:
+        outcome = _obeyed(verb, avlmap, robot, translator, translation)
+        unconfirmed = {"robot_stopped": False} if robot.owes() else {}
+        if verb.plot is None:
+            return {**outcome.to_json(), **unconfirmed}
+        from avlmaps.navigate.trace_plot import plot_path
+
+        title = f"“{verb.sentence}”"
+        plot_path(verb.plot, avlmap.space, robot.start, outcome.moves, robot.obstacles, robot.contacts(), title)
+        return {**outcome.to_json(), **unconfirmed, "plot": str(verb.plot)}
+    except Interrupted as stop:  # also after the program: goals were sent, and the robot is not watched any more
+        stop.halt = stop.halt or robot.halt()
+        raise
+
+
+def _obeyed(
+    verb: "Go", avlmap: "AVLMap", robot: Ready, translator: "Translator", translation: "Translation"
+) -> "Outcome":
     from avlmaps.navigate.instruct import instruct
     from avlmaps.navigate.interrupts import Interrupted
     from avlmaps.navigate.skills import RobotSettings
 
     settings = RobotSettings(guess=verb.guess)
     try:
-        outcome = instruct(
+        return instruct(
             verb.sentence, avlmap, robot.driver, translator, settings=settings, translation=translation, tell=say
         )
     except Interrupted as stop:
@@ -198,14 +219,6 @@ def drive(
         raise
     finally:
         robot.close()
-    unconfirmed = {"robot_stopped": False} if robot.owes() else {}
-    if verb.plot is not None:
-        from avlmaps.navigate.trace_plot import plot_path
-
-        title = f"“{verb.sentence}”"
-        plot_path(verb.plot, avlmap.space, robot.start, outcome.moves, robot.obstacles, robot.contacts(), title)
-        return {**outcome.to_json(), **unconfirmed, "plot": str(verb.plot)}
-    return {**outcome.to_json(), **unconfirmed}
 
 
 def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":

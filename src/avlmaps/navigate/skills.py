@@ -336,4 +336,4 @@ def _not_reached(move: Move) -> str:
     if move.distance_m is None:
         return f"{move.skill} could not be finished: {why}; the robot looks along {np.rad2deg(move.heading_rad):.0f}°."
     what = move.name or "The place"
-    return f"{what} was not reached: {why}; the robot stopped {move.distance_m:.2f} m from it."
+    return f"{what} was not reached: {why}; the robot was {move.distance_m:.2f} m from it."
