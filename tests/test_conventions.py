@@ -14,6 +14,7 @@ from avlmaps.maps.fusion.settings import PAPERS_VARIANCE_M2
 from avlmaps.perception.embedded.meanings import Meanings
 from avlmaps.perception.profiles import profile
 from avlmaps.query.factors import FOUND_AT, ROUNDING, HeatSettings
+from avlmaps.query.locate import LocateSettings
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.recordings.layout import Description
 
@@ -41,6 +42,7 @@ def _claims() -> list[str]:
         f"a part is found by itself from {FOUND_AT}",
         f"({Meanings.narrower_share} of their probability counts)",
         f"narrowest name that has a confidence of {FOUND_AT}",
+        f"a place that is known to less than {LocateSettings().max_place_error_m} m is not given",
         f"differ by less than {ROUNDING:.0e} are equal",
     ]
 

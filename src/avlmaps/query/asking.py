@@ -24,7 +24,7 @@ from avlmaps.query.wording import absent_text, found_text
 if TYPE_CHECKING:
     from avlmaps.core.camera import Pinhole
     from avlmaps.language.questions import AskedSentence
-    from avlmaps.query.avlmap import Attachment, AVLMap
+    from avlmaps.query.queryable import Attachment, Queryable
 
 # For a count, up to this many instances are taken; those that are found count.
 _MOST_COUNTED = 200
@@ -129,7 +129,7 @@ class Files:
         return (read_picture(Path(picture).expanduser()) if attached is None else np.asarray(attached)).shape[:2]
 
 
-def ask(avlmap: "AVLMap", asked: Asked, files: Files | None = None) -> Answer:
+def ask(avlmap: "Queryable", asked: Asked, files: Files | None = None) -> Answer:
     """Answer a sentence or parts.
 
     Args:
@@ -151,7 +151,7 @@ def ask(avlmap: "AVLMap", asked: Asked, files: Files | None = None) -> Answer:
     return replace(answer, elapsed_ms=1e3 * (time.perf_counter() - begin))
 
 
-def answer_question(avlmap: "AVLMap", question: Question, top: int = 3, files: Files | None = None) -> Answer:
+def answer_question(avlmap: "Queryable", question: Question, top: int = 3, files: Files | None = None) -> Answer:
     """Answer a question whose parts are known.
 
     Raises:
@@ -188,7 +188,7 @@ def _alone(question: Question, heats: Sequence[Heatmap]) -> Alternative:
     return Alternative(Question.of([part]), heat.probability, heat.found, tuple(heat.goals(1)))
 
 
-def thing_alone(asked: Asked, avlmap: "AVLMap") -> Question | None:
+def thing_alone(asked: Asked, avlmap: "Queryable") -> Question | None:
     """Return the question where a query is the name of one thing and nothing else; None for others.
 
     A sentence that is one of the encoder's names is read as the grammar reads it, without loading that. Stairs are a
@@ -206,7 +206,7 @@ def thing_alone(asked: Asked, avlmap: "AVLMap") -> Question | None:
     return Question.of([Part(Modality.OBJECT, asked.sentence)]) if is_name else None
 
 
-def _answer_sentence(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
+def _answer_sentence(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     from avlmaps.language.list_questions import read_list, said_number
     from avlmaps.query.lists import answer_list
 
@@ -223,7 +223,7 @@ def _answer_sentence(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
     return replace(answer, goals=goals, found=count >= number, text=f"{said[:1].upper()}{said[1:]}. {answer.text}")
 
 
-def _answer_words(avlmap: "AVLMap", asked: Asked, words: str, files: Files) -> Answer:
+def _answer_words(avlmap: "Queryable", asked: Asked, words: str, files: Files) -> Answer:
     """Answer what a question to the lists names: the photo that came along, or a thing, a sound or a room in words."""
     from avlmaps.language.list_questions import speaks_of_photo
 
@@ -233,7 +233,7 @@ def _answer_words(avlmap: "AVLMap", asked: Asked, words: str, files: Files) -> A
     return _answer_read(avlmap, replace(asked, sentence=words, primary=None), files)
 
 
-def _answer_read(avlmap: "AVLMap", asked: Asked, files: Files) -> Answer:
+def _answer_read(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     """Answer the questions that a sentence is read as; the likeliest counts."""
     questions, notes, counted = _questions(asked)
     answers: list[tuple[Question, Answer]] = []

@@ -31,6 +31,7 @@ from avlmaps.query.modalities.sound import (
 )
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.pieces import Pieces, object_pieces
+from avlmaps.query.queryable import Attachment
 from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, voting_rows
 from avlmaps.query.things_in_rooms import ThingsInRooms
 from avlmaps.query.voxel_space import Space
@@ -43,9 +44,6 @@ if TYPE_CHECKING:
     from avlmaps.query.contents import Contents, Room, SoundEvent, Thing, Watch
     from avlmaps.query.locate import Located
     from avlmaps.query.photometric import Panoramas
-
-Attachment = UInt8[np.ndarray, "h w 3"] | Sound
-"""A picture or a sound that comes with a question, instead of a file."""
 
 # Keyframes that are matched one by one for a picture that cannot be located: more of them guess no better (measured).
 _GUESS_FROM = 20

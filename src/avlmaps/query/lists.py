@@ -17,8 +17,8 @@ from avlmaps.query.whereabouts import NOWHERE, Whereabouts
 from avlmaps.query.wording import in_words, placed
 
 if TYPE_CHECKING:
-    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Thing
+    from avlmaps.query.queryable import Queryable
 
 BESIDE_M = 1.0  # from box to box, horizontally
 _MOST_NAMED = 12
@@ -26,7 +26,7 @@ _LEAST_M2 = 1.0  # of a room; less is a corner that views disagree about
 _NO_SIZE = (0.0, 0.0, 0.0)
 
 
-def answer_list(avlmap: "AVLMap", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:
+def answer_list(avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:
     """Answer a question from the lists of a map.
 
     Args:
@@ -51,7 +51,7 @@ def answer_list(avlmap: "AVLMap", question: ListQuestion, top: int, ask: Callabl
 
 
 def _answer(
-    avlmap: "AVLMap", goals: Sequence[Goal], text: str, subject: Answer | None = None, count: int | None = None
+    avlmap: "Queryable", goals: Sequence[Goal], text: str, subject: Answer | None = None, count: int | None = None
 ) -> Answer:
     """Return goals as an answer: found, like any other, where the first is likely enough."""
     probability = goals[0].probability if goals else 0.0
@@ -60,7 +60,7 @@ def _answer(
     return Answer(tuple(goals), found, parts, 0.0, heat, probability, count, text=text)
 
 
-def _rooms_by_size(avlmap: "AVLMap", first: bool) -> tuple[list[Goal], str]:
+def _rooms_by_size(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]:
     """Return the rooms by the area of their regions, the largest first."""
     where = Whereabouts.of(avlmap)
     areas = where.areas_m2()
@@ -80,7 +80,7 @@ def _room_goal(where: Whereabouts, number: int) -> Goal:
     return Goal(room.position, room.confidence, _NO_SIZE, {}, room.confidence, where.names[number])
 
 
-def _sounds_by_time(avlmap: "AVLMap", first: bool) -> tuple[list[Goal], str]:
+def _sounds_by_time(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]:
     """Return the sounds by their onset, the last first."""
     sounds = sorted(avlmap.sounds(), key=lambda sound: sound.onset_s if first else -sound.onset_s)
     if not sounds:
@@ -94,7 +94,7 @@ def _sounds_by_time(avlmap: "AVLMap", first: bool) -> tuple[list[Goal], str]:
     return goals, placed(f"the {which} sound is the {goals[0].name} at {sounds[0].onset_s:.1f} s, heard", goals[0])
 
 
-def _names(avlmap: "AVLMap", question: ListQuestion, top: int) -> Answer:
+def _names(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
     """Return all rooms, sounds or things, and how many there are."""
     if question.name == "rooms":
         where = Whereabouts.of(avlmap)
@@ -110,7 +110,7 @@ def _names(avlmap: "AVLMap", question: ListQuestion, top: int) -> Answer:
     return _answer(avlmap, goals[:top], text, count=len(named))
 
 
-def _about(avlmap: "AVLMap", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:
+def _about(avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:
     """Answer what is in a room, or beside a thing, or in which room something is; as likely as that is found."""
     subject = ask(question.name)
     if not subject.found:
@@ -124,7 +124,7 @@ def _about(avlmap: "AVLMap", question: ListQuestion, top: int, ask: Callable[[st
     return _answer(avlmap, goals[:top], text, subject)
 
 
-def _room_of(avlmap: "AVLMap", subject: Answer) -> tuple[list[Goal], str]:
+def _room_of(avlmap: "Queryable", subject: Answer) -> tuple[list[Goal], str]:
     where, goal = Whereabouts.of(avlmap), subject.goals[0]
     number = int(where.rooms_of(np.array([goal.position]))[0])
     if number == NOWHERE:
@@ -136,7 +136,7 @@ def _room_of(avlmap: "AVLMap", subject: Answer) -> tuple[list[Goal], str]:
     return [inside], placed(f"{words} is in the {where.names[number]}", inside)
 
 
-def _contents(avlmap: "AVLMap", name: str) -> tuple[list[Goal], str]:
+def _contents(avlmap: "Queryable", name: str) -> tuple[list[Goal], str]:
     where, things = Whereabouts.of(avlmap), _things(avlmap)
     rooms = [k for k, room in enumerate(where.rooms) if _same_room(room.name, name)]
     places = np.array([thing.position for thing in things]).reshape(-1, 3)
@@ -148,7 +148,7 @@ def _contents(avlmap: "AVLMap", name: str) -> tuple[list[Goal], str]:
     return goals, f"In the {name}: {what}."
 
 
-def _beside(avlmap: "AVLMap", subject: Answer) -> tuple[list[Goal], str]:
+def _beside(avlmap: "Queryable", subject: Answer) -> tuple[list[Goal], str]:
     level, things = avlmap.space.level, _things(avlmap)
     own, size = level(np.array([subject.goals[0].position]))[0], np.array(subject.goals[0].size)
     near: list[tuple[float, Thing]] = []
@@ -180,7 +180,7 @@ def _overlap(
     return bool((apart <= size_a / 2.0).all() and (apart <= size_b / 2.0).all())
 
 
-def _things(avlmap: "AVLMap") -> "list[Thing]":
+def _things(avlmap: "Queryable") -> "list[Thing]":
     return avlmap.things() if "pixels" in avlmap.stored.info.models else []
 
 

@@ -12,9 +12,9 @@ from avlmaps.core.errors import QueryError
 from avlmaps.query.floor_plan import CELL_M
 
 if TYPE_CHECKING:
-    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Room
     from avlmaps.query.floor_plan import FloorPlan
+    from avlmaps.query.queryable import Queryable
     from avlmaps.query.rooms import RoomField
 
 NOWHERE = -1
@@ -36,12 +36,12 @@ class Whereabouts:
 
     rooms: "tuple[Room, ...]"
     names: tuple[str, ...]
-    avlmap: "AVLMap"
+    avlmap: "Queryable"
     plan: "FloorPlan | None"
     field: "RoomField | None"
 
     @classmethod
-    def of(cls, avlmap: "AVLMap") -> "Whereabouts":
+    def of(cls, avlmap: "Queryable") -> "Whereabouts":
         """Find the rooms of a map; none where it has no model of views.
 
         Raises:

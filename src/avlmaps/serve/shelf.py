@@ -20,9 +20,10 @@ from avlmaps.language.questions import parse_sentence
 from avlmaps.maps.integrity import stamp
 from avlmaps.maps.store.manifest_file import MANIFEST
 from avlmaps.maps.store.reader import open_stored
-from avlmaps.query.avlmap import Attachment, AVLMap, QuerySettings
+from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.factors import NearAnchors
 from avlmaps.query.heatmap import Heatmap
+from avlmaps.query.queryable import Attachment
 from avlmaps.serve.errors import RequestError
 from avlmaps.serve.lanes import watch_here
 from avlmaps.serve.settings import Limits, ServeError

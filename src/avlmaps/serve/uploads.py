@@ -15,8 +15,8 @@ from jaxtyping import UInt8
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError, RecordingError
-from avlmaps.query.avlmap import Attachment
 from avlmaps.query.modalities.sound import require_audible
+from avlmaps.query.queryable import Attachment
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.containers import self_contained_suffix
 from avlmaps.recordings.images import check_whole, decode_picture, encoded_size

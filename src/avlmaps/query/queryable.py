@@ -1,0 +1,81 @@
+"""What an answer needs of a map: ``AVLMap`` gives it, and asking, lists and whereabouts know no more of it."""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from avlmaps.core.arrays import UInt8
+from avlmaps.core.camera import Pinhole
+from avlmaps.core.question import Part
+from avlmaps.query.heatmap import Heatmap
+from avlmaps.query.voxel_space import Space
+from avlmaps.recordings.audio import Sound
+
+if TYPE_CHECKING:
+    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.contents import Room, SoundEvent, Thing
+    from avlmaps.query.rooms import RoomField, Rooms
+
+Attachment = UInt8[np.ndarray, "h w 3"] | Sound
+"""A picture or a sound that comes with a question, instead of a file."""
+
+
+class FoundSettings(Protocol):
+    """The part of a map's settings that decides what is found."""
+
+    @property
+    def found_at(self) -> float:
+        """The least probability of a first goal that counts as found, in [0, 1]."""
+        ...
+
+
+class Queryable(Protocol):
+    """A map that gives heat for parts of a question, and lists of what it holds."""
+
+    @property
+    def stored(self) -> "StoredMap":
+        """The map as it lies on the disk."""
+        ...
+
+    @property
+    def settings(self) -> FoundSettings:
+        """How to query."""
+        ...
+
+    @cached_property
+    def space(self) -> Space:
+        """The voxels' places."""
+        ...
+
+    @cached_property
+    def room_votes(self) -> "Rooms | None":
+        """The votes on the kind of room of each place."""
+        ...
+
+    @cached_property
+    def room_field(self) -> "RoomField | None":
+        """How likely each place is each kind of room."""
+        ...
+
+    def heat(
+        self,
+        part: Part,
+        intrinsics: Pinhole | None = None,
+        attachments: Mapping[str, Attachment] | None = None,
+    ) -> Heatmap:
+        """Return the heat of one part of a question."""
+        ...
+
+    def things(self, names: Sequence[str] | None = None, least_confidence: float = 0.5) -> "list[Thing]":
+        """Return the things of the map, most confident first."""
+        ...
+
+    def sounds(self, most_names: int = 3) -> "list[SoundEvent]":
+        """Return the sounds of the map in the order of their onset."""
+        ...
+
+    def rooms(self, least_confidence: float = 0.0) -> "list[Room]":
+        """Return the rooms of the map, those with most views first."""
+        ...
