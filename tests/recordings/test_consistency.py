@@ -22,7 +22,7 @@ from avlmaps.recordings.consistency.verdict import Grade, Reason, Verdict
 from avlmaps.recordings.corrections import Corrections
 from avlmaps.recordings.open import open_recording
 
-CAMERA = Pinhole(60.0, 60.0, 40.0, 30.0, 80, 60)
+CAMERA = Pinhole(48.0, 48.0, 32.0, 24.0, 64, 48)
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def options_in(sentence: str) -> Corrections:
         RoomWalk("people and noise", seed=53, frames=30, people=3, noise=0.0019),
         RoomWalk("a moved chair, holes", seed=54, frames=30, moved_chair=True, holes=0.3),
         RoomWalk("drift and flicker", seed=55, frames=30, drift=0.008, flicker=0.3),
-        RoomWalk("slow", seed=56, frames=60, rate_hz=30.0, turn_rad_s=0.2),
+        RoomWalk("slow", seed=56, frames=40, rate_hz=30.0, turn_rad_s=0.2),
     ],
     ids=lambda walk: walk.name,
 )
@@ -99,8 +99,11 @@ def test_a_wrong_option_is_found_out(right: Draft, tmp_path: Path) -> None:
     [
         ("colour mirrored", Reason.COLOUR),
         ("depth constant", Reason.DEPTH),
+        ("depth of noise", Reason.DEPTH),
+        ("colour 10 frames late", Reason.COLOUR),
         ("principal point at the corner", Reason.INTRINSICS),
         ("poses jump by 0.5 m", Reason.GEOMETRY),
+        ("poses turn by 20 degrees", Reason.GEOMETRY),
         ("positions x0.5", Reason.GEOMETRY),
     ],
 )

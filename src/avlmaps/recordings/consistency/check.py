@@ -10,7 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from avlmaps.core.arrays import Bool
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.timeline import Trajectory
 from avlmaps.recordings.consistency.agreement import (
     APART_SAME_M,
@@ -40,6 +42,11 @@ BAD_OFF = 0.03
 MOST_BAD_PAIRS = 0.08
 # Pairs that are looked at more closely, since the poses may jump between them.
 MOST_JUMPS = 3
+# A step of the poses this many times the usual one, and beyond this, is a jump if fewer points agree across it.
+LEAST_ACROSS_STEP = 0.9
+ODD_STEP, ODD_STEP_M, ODD_STEP_RAD = 4.0, 0.15, np.radians(8.0)
+# Of fewer points than are judged otherwise, hardly any may agree.
+HARDLY_ANY = 0.2
 # Correlation of the brightness of the same points, of all pairs and of a pair that is not one.
 LEAST_LIKENESS = 0.75
 BAD_LIKENESS = 0.4
@@ -65,7 +72,7 @@ def check_recording(recording: Recording) -> Verdict:
     median_m = float(np.median(known)) if known.size else float("nan")
     findings = [
         *of_intrinsics(sample, recording),
-        *of_depth(sample, median_m),
+        *of_depth(sample, surfaces, median_m),
         *of_colour(sample, surfaces),
         *of_motion(recording, after, _can_be_judged(after)),
         *_of_agreement(recording, sample, _Found(after, apart), median_m),
@@ -123,6 +130,11 @@ def _unlike(found: Agreement) -> bool:
     return found.likeness < LEAST_LIKENESS or (bad >= 2 and bad > MOST_BAD_PAIRS * np.isfinite(found.alike).sum())
 
 
+def _most_unlike(after: Agreement, apart: Agreement) -> Agreement | None:
+    """Return the pairs that do not look alike: those that follow one another if they do not, else those from apart."""
+    return next((one for one in (after, apart) if _can_be_judged(one) and _unlike(one)), None)
+
+
 def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m: float) -> Iterator[Finding]:
     after, apart = found.after, found.apart
     if _can_be_judged(after) and not _geometry_agrees(after):
@@ -151,12 +163,13 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
         yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, _words(recording, closer, median_m, ""))
     elif jump := _jump(recording, sample, after):
         yield jump
-    elif _can_be_judged(after) and _unlike(after):
+    elif unlike := _most_unlike(after, apart):
         grade = Grade.IMPOSSIBLE if after.likeness < IMPOSSIBLE_LIKENESS else Grade.SUSPICIOUS
         sentence = (
             "The colour pictures do not show what the depth pictures show: the brightness of the same points in two "
-            f"frames correlates by {after.likeness:.2f} where right recordings have 0.9 and more, and hardly at all in "
-            f"{int((after.alike < BAD_LIKENESS).sum())} of {int(np.isfinite(after.alike).sum())} pairs."
+            f"frames{' from apart' if unlike is apart else ''} correlates by {unlike.likeness:.2f} where right "
+            f"recordings have {'0.85' if unlike is apart else '0.9'} and more, and hardly at all in "
+            f"{int((unlike.alike < BAD_LIKENESS).sum())} of {int(np.isfinite(unlike.alike).sum())} pairs."
         )
         other = "Check that colour and depth of a frame belong together (order of names, clock, intrinsics of colour)."
         yield Finding(Reason.COLOUR, grade, sentence, _cause(recording, sample, found, median_m) or other)
@@ -168,12 +181,15 @@ def _off(found: _Found) -> float:
 
 def _jump(recording: Recording, sample: Sample, after: Agreement) -> Finding | None:
     """Return a finding where a pair does not agree, no pair across the same place does, and those beside do."""
-    share = np.where(after.points >= 2 * FEWEST_POINTS, after.same / np.maximum(after.points, 1), 1.0)
     pairs = sample.index[sample.only(sample.follows).pairs]
-    for row in np.argsort(share, kind="stable")[:MOST_JUMPS].tolist():
+    odd = _odd_steps(recording)
+    share = np.where(after.points >= 2 * FEWEST_POINTS, after.same / np.maximum(after.points, 1), 1.0)
+    most = np.where([odd[a:b].any() for a, b in pairs], LEAST_ACROSS_STEP, BAD_PAIR)
+    rows = np.flatnonzero(share < most)
+    for row in rows[np.argsort(share[rows] - most[rows], kind="stable")][:MOST_JUMPS].tolist():
         a, b = (int(number) for number in pairs[row])
-        if share[row] >= BAD_PAIR:
-            break
+        at = a + int(np.argmax(odd[a:b])) if odd[a:b].any() else a
+        a, b = (at, at + 1) if odd[a:b].any() else (a, b)
         if a < 1 or b > len(recording) - 2:
             continue
         across = np.array([(a - 1, b), (a, b), (a, b + 1), (a - 1, b + 1), (a - 1, a), (b, b + 1)])
@@ -182,8 +198,9 @@ def _jump(recording: Recording, sample: Sample, after: Agreement) -> Finding | N
         over, beside = (
             compare(near.only(kind), surfaces, near.world_from_camera) for kind in (near.follows, ~near.follows)
         )
-        seen = _can_be_judged(over) and _can_be_judged(beside)
-        if seen and over.same_share < BAD_PAIR and beside.same_share > LEAST_AGREEING:
+        few = over.pairs >= FEWEST_PAIRS and over.same_share < HARDLY_ANY
+        seen = (_can_be_judged(over) or few) and _can_be_judged(beside)
+        if seen and over.same_share < most[row] and beside.same_share > max(LEAST_AGREEING, over.same_share + 0.1):
             sentence = (
                 f"Frames {recording.name(a)} and {recording.name(b)} do not agree ({over.same_share:.0%} of the points "
                 f"on one surface), although the frames before and after do ({beside.same_share:.0%})."
@@ -191,6 +208,17 @@ def _jump(recording: Recording, sample: Sample, after: Agreement) -> Finding | N
             remedy = "The poses jump there, or tracking began again: cut the recording there, or fix the poses."
             return Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, remedy)
     return None
+
+
+def _odd_steps(recording: Recording) -> Bool[np.ndarray, " m"]:
+    """Return which steps of the poses are far longer, or turn far more, than the usual one."""
+    pose = recording.world_from_camera
+    if len(pose) < 2:
+        return np.zeros(0, bool)
+    moved_m = np.linalg.norm(np.diff(pose[:, :3, 3], axis=0), axis=1)
+    turned_rad = rotation_angle_rad(pose[:-1], pose[1:])
+    far = moved_m > max(ODD_STEP * float(np.median(moved_m)), ODD_STEP_M)
+    return far | (turned_rad > max(ODD_STEP * float(np.median(turned_rad)), ODD_STEP_RAD))
 
 
 def _other_cause(recording: Recording, sample: Sample, after: Agreement) -> str:
@@ -233,13 +261,17 @@ def _gain(found: _Found, best: Trial) -> str:
                 f"(seen through {before.through_share:.1%} -> {after.through_share:.1%}, "
                 f"agreeing {before.same_share:.0%} -> {after.same_share:.0%})"
             )
-    return f"(correlation {found.after.likeness:.2f} -> {best.agreement.likeness:.2f})"
+    after = _unlike(found.after)
+    before, then = (found.after, best.agreement) if after else (found.apart, best.apart)
+    return f"(correlation {before.likeness:.2f} -> {then.likeness:.2f})"
 
 
 def _explains(trial: Trial, found: _Found) -> bool:
     """Return whether a suspect makes the pairs agree, clearly better than they did."""
     after, apart = trial.agreement, trial.apart
-    if not _can_be_judged(after) or not _geometry_agrees(after) or not _apart_agrees(apart) or _unlike(after):
+    if not _can_be_judged(after) or not _geometry_agrees(after) or not _apart_agrees(apart):
+        return False
+    if _most_unlike(after, apart) is not None:
         return False
     if trial.score < LEAST_AGREEING * 0.9:
         return False

@@ -219,6 +219,7 @@ class Surfaces:
         row: (f, m) pixels on smooth surface.
         column: (f, m) theirs.
         there: (f, m) whether there is such a pixel.
+        smooth_share: of the pixels with depth around, those on smooth surface; NaN without any.
     """
 
     near_m: Float32[np.ndarray, "f h w"]
@@ -226,6 +227,7 @@ class Surfaces:
     row: Int[np.ndarray, "f m"]
     column: Int[np.ndarray, "f m"]
     there: Bool[np.ndarray, "f m"]
+    smooth_share: float
 
     @staticmethod
     def of(depth_m: Float32[np.ndarray, "f h w"], points: int = POINTS) -> "Surfaces":
@@ -234,14 +236,17 @@ class Surfaces:
         count = len(depth_m)
         row, column = np.zeros((count, points), np.int64), np.zeros((count, points), np.int64)
         there = np.zeros((count, points), bool)
+        smooth = 0
         for f in range(count):
             v, u = np.nonzero((near[f] > 0.0) & (depth_m[f] > 0.0) & (far[f] - near[f] < _SMOOTH * near[f]))
+            smooth += len(v)
             if len(v) == 0:
                 continue
             chosen = np.unique(np.linspace(0, len(v) - 1, min(points, len(v))).round().astype(int))
             row[f, : len(chosen)], column[f, : len(chosen)] = v[chosen], u[chosen]
             there[f, : len(chosen)] = True
-        return Surfaces(near, far, row, column, there)
+        known = int(((near > 0.0) & (depth_m > 0.0)).sum())
+        return Surfaces(near, far, row, column, there, smooth / known if known else float("nan"))
 
 
 def _around(depth_m: Float32[np.ndarray, "f h w"]) -> tuple[np.ndarray, np.ndarray]:

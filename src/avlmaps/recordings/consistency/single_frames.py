@@ -15,6 +15,8 @@ SUSPICIOUS_DEPTH_M = (0.3, 9.0)
 IMPOSSIBLE_DEPTH_M = (0.04, 60.0)
 LEAST_DEPTH_SHARE = 0.05
 MOST_EMPTY_FRAMES = 0.25
+# Share of pixels whose neighbours lie on one surface with them: less, or hardly any, is noise.
+LEAST_SMOOTH, IMPOSSIBLE_SMOOTH = 0.3, 0.1
 LEAST_COLOURED = 0.6
 IMPOSSIBLE_COLOURED = 0.05
 # Dark to the eye, and nothing at all.
@@ -70,7 +72,7 @@ def _of_camera(camera: Pinhole, where: str) -> Iterator[Finding]:
         yield Finding(Reason.INTRINSICS, Grade.SUSPICIOUS, sentence, f"Pixels are square in usual cameras; {fit}")
 
 
-def of_depth(sample: Sample, median_m: float) -> Iterator[Finding]:
+def of_depth(sample: Sample, surfaces: Surfaces, median_m: float) -> Iterator[Finding]:
     """Find depth that is missing, of another unit, flat, or frozen."""
     there = sample.depth_m > 0.0
     share = there.mean(axis=(1, 2))
@@ -95,6 +97,12 @@ def of_depth(sample: Sample, median_m: float) -> Iterator[Finding]:
         grade = Grade.IMPOSSIBLE if sure else Grade.SUSPICIOUS
         sentence = f"The depth is {median_m:.3g} m in the middle, where rooms have {low:g} to {high:g} m."
         remedy = "Check its unit: --depth-unit METRES says what one stored unit is (0.001: millimetres)."
+        yield Finding(Reason.DEPTH, grade, sentence, remedy)
+    smooth = surfaces.smooth_share
+    if smooth < LEAST_SMOOTH:
+        grade = Grade.IMPOSSIBLE if smooth < IMPOSSIBLE_SMOOTH else Grade.SUSPICIOUS
+        sentence = f"The depth pictures look like noise: {smooth:.0%} of the pixels lie on a surface with those around."
+        remedy = "Check how the depth pictures are stored (16 bits, order of bytes, no colours, no lossy compression)."
         yield Finding(Reason.DEPTH, grade, sentence, remedy)
     yield from _flat_depth(sample, there)
 
