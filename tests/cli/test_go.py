@@ -139,6 +139,8 @@ def test_a_real_robot_is_driven_over_rosbridge_and_let_go_at_the_end(
     asked: list[tuple[object, ...]] = []
 
     class Far(KinematicDriver):
+        owes = False
+
         def halt(self) -> None:
             asked.append(("halted",))
 

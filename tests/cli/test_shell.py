@@ -86,7 +86,7 @@ def test_an_error_is_one_sentence_and_the_next_line_is_answered(piped, built: Pa
         "locate missing.jpg",
         "sounds --loud",
         "things --least two",
-        "the red cabinet",
+        "the red thing",
     ]
     status, out, err = piped("\n".join(lines), built, "--json")
     assert status == 1
@@ -140,7 +140,7 @@ def test_export_writes_once(piped, built: Path, tmp_path: Path) -> None:
 
 def test_a_plan_is_driven_only_when_it_is_confirmed(piped, built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("avlmaps.sim.scenes.open_scene", lambda spec: scene_of(Room()))
-    lines = "go turn left\nn\ngo turn left\nthe red cabinet\ngo turn left\ny\ngo turn right\nyes\ngo blorfle\n"
+    lines = "go turn left\nn\ngo turn left\nthe red thing\ngo turn left\ny\ngo turn right\nyes\ngo blorfle\n"
     status, out, err = piped(lines, built, "--json", "--scene", "room", "--start", "4.4,3.2,90")
     assert status == 1
     said = objects(out)
@@ -281,7 +281,7 @@ def test_ctrl_c_stops_an_answer_and_not_the_shell(built: Path, tmp_path: Path, t
     shell.until("begun")
     shell.type("\x03")
     shell.until("stopped")
-    shell.type("the red cabinet\r")
+    shell.type("the red thing\r")
     shell.until(r"\nfound")
     shell.type("quit\r")
     assert shell.ended() == 0

@@ -63,5 +63,5 @@ def test_afterwards_everything_is_as_before() -> None:
 
     before = state()
     with pytest.raises(Interrupted), raised_signals():
-        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGTERM)
     assert state() == before
