@@ -8,7 +8,7 @@ import pytest
 from ros1_field import why_not
 from ros1_scenarios import SCENARIOS
 
-pytestmark = [pytest.mark.timeout(240), pytest.mark.slow, pytest.mark.skipif(bool(why_not()), reason=why_not() or "-")]
+pytestmark = [pytest.mark.timeout(600), pytest.mark.slow, pytest.mark.skipif(bool(why_not()), reason=why_not() or "-")]
 
 LAWS: dict[str, Callable[[dict[str, Any]], bool]] = {
     "stands_while_it_drives": lambda saw: saw["moves"] and saw["said to stand"] == [False, False],
