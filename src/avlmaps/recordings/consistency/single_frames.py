@@ -17,6 +17,8 @@ LEAST_DEPTH_SHARE = 0.05
 MOST_EMPTY_FRAMES = 0.25
 # Share of pixels whose neighbours lie on one surface with them: less, or hardly any, is noise.
 LEAST_SMOOTH, IMPOSSIBLE_SMOOTH = 0.3, 0.1
+# In a coarser picture the pixels around one look at other surfaces, which noise cannot be told from.
+FEWEST_COLUMNS = 64
 LEAST_COLOURED = 0.6
 IMPOSSIBLE_COLOURED = 0.05
 # Dark to the eye, and nothing at all.
@@ -99,7 +101,7 @@ def of_depth(sample: Sample, surfaces: Surfaces, median_m: float) -> Iterator[Fi
         remedy = "Check its unit: --depth-unit METRES says what one stored unit is (0.001: millimetres)."
         yield Finding(Reason.DEPTH, grade, sentence, remedy)
     smooth = surfaces.smooth_share
-    if smooth < LEAST_SMOOTH:
+    if smooth < LEAST_SMOOTH and sample.depth_m.shape[2] >= FEWEST_COLUMNS:
         grade = Grade.IMPOSSIBLE if smooth < IMPOSSIBLE_SMOOTH else Grade.SUSPICIOUS
         sentence = f"The depth pictures look like noise: {smooth:.0%} of the pixels lie on a surface with those around."
         remedy = "Check how the depth pictures are stored (16 bits, order of bytes, no colours, no lossy compression)."
