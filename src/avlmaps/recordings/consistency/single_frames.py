@@ -17,7 +17,7 @@ LEAST_DEPTH_SHARE = 0.05
 MOST_EMPTY_FRAMES = 0.25
 # Share of pixels whose neighbours lie on one surface with them: less, or hardly any, is noise.
 LEAST_SMOOTH, IMPOSSIBLE_SMOOTH = 0.3, 0.1
-# In a coarser picture the pixels around one look at other surfaces, which noise cannot be told from.
+# In a coarser picture the pixels around one look at other surfaces, which differ as noise does.
 FEWEST_COLUMNS = 64
 LEAST_COLOURED = 0.6
 IMPOSSIBLE_COLOURED = 0.05
