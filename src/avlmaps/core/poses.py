@@ -40,6 +40,13 @@ def orthonormalize(
     fault = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
     bottom_is_right = np.allclose(world_from_camera[3], (0.0, 0.0, 0.0, 1.0), atol=1e-6)
     if fault > max_fault or np.linalg.det(rotation) < 0.0 or not bottom_is_right:
+        if not bottom_is_right:
+            row = " ".join(f"{value:.4g}" for value in world_from_camera[3])
+            turned = fault <= max_fault and bool(np.allclose(world_from_camera[:, 3], (0.0, 0.0, 0.0, 1.0), atol=1e-6))
+            why = "; it looks written column by column: transpose it" if turned else ""
+            raise RecordingError(
+                f"The pose of {name} is not a rigid transform: its last row is {row}, where 0 0 0 1 belongs{why}."
+            )
         raise RecordingError(
             f"The pose of {name} is not a rigid transform (its rotation is off orthonormal by {fault:.3g}, determinant "
             f"{np.linalg.det(rotation):.3g}; at most {max_fault} passes for rounding); fix it or leave the frame out."

@@ -18,6 +18,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
+from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
@@ -121,6 +122,10 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         rgb_from_depth = np.array(self.intrinsics.rgb_from_depth, np.float64)
         if rgb_from_depth.shape != (4, 4):
             raise ValueError(f"rgb_from_depth has shape {rgb_from_depth.shape}; it must be 4x4")
+        try:
+            poses.orthonormalize(rgb_from_depth, "the depth camera in the colour camera, rgb_from_depth,")
+        except RecordingError as error:
+            raise ValueError(str(error)) from None
         return Rig(rgb, depth, rgb_from_depth)
 
 

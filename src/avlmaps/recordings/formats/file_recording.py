@@ -95,6 +95,9 @@ def settle(
     shots = shots.take(kept)
     if pose_file is not None:
         shots = _orthonormal(shots, report, [pose_file(int(i)) for i in kept])
+    # Names of files; the numbers of a database's nodes have no dot.
+    if twins := sorted(name for name in set(shots.colour) & set(shots.depth) if "." in name):
+        report(Fault(f"{path} names {twins[0]} as colour and as depth; each frame needs a picture of both.", path))
     if fault := date_fault(shots.stamps_s, "frames"):
         report(Fault(f"{path}: {fault}", path))
     disagreement = order_notices(shots.names, shots.stamps_s)

@@ -16,6 +16,7 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.formats.columns import POSE
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, open_audio, settle
 from avlmaps.recordings.formats.intrinsics import fitted
 from avlmaps.recordings.formats.tables import read_table, text_lines
@@ -95,7 +96,7 @@ def _associations(file: Path, report: Report) -> list[tuple[int, str, str]]:
 
 
 def _freiburg(file: Path, report: Report) -> dict[int, Float[np.ndarray, "4 4"]]:
-    table = read_table(file, (8,), report)
+    table = read_table(file, (8,), report, names=POSE)
     usable = np.abs(np.linalg.norm(table.values[:, 4:], axis=1) - 1.0) <= poses.MAX_ROTATION_FAULT
     rows = table.values[usable]
     found = poses.from_quaternion(rows[:, 1:4], rows[:, 4:])

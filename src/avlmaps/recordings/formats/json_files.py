@@ -41,16 +41,28 @@ def parse_json(file: Path, content: bytes, kind: type[T]) -> tuple[T, dict[str, 
         raise RecordingError(f"{file} is not as it should be ({error}); fix the file.") from None
 
 
-def unread_notice(file: Path, present: Mapping[str, Any], known: Collection[str]) -> tuple[str, ...]:
+def unread_notice(
+    file: Path, present: Mapping[str, Any], known: Collection[str], strict: bool = True
+) -> tuple[str, ...]:
     """Return a notice that names the keys of a file that nothing reads, or nothing.
+
+    Args:
+        file: the file, for the sentence.
+        present: its keys.
+        known: those that are read, or say nothing.
+        strict: whether a key about the camera is refused; not where an app writes the file, whose later versions may
+            add some.
 
     Raises:
         RecordingError: one of them is about the camera, the depth or the poses: without it the map may be wrong.
     """
     unread = sorted(present.keys() - set(known))
-    if telling := [key for key in unread if _ABOUT_GEOMETRY.search(key.lower())]:
+    telling = [key for key in unread if _ABOUT_GEOMETRY.search(key.lower())]
+    if telling and strict:
         raise RecordingError(
             f"{file} has the key {telling[0]!r}, which is not read here and may change the map; known are "
             f"{', '.join(sorted(known))}. Write it as one of them, or remove it."
         )
+    if telling:
+        return (f"{file.name} has keys that are not read and may change the map: {', '.join(telling[:8])}.",)
     return (f"{file.name} has keys that are not read: {', '.join(unread[:8])}.",) if unread else ()

@@ -36,6 +36,8 @@ _IDLE = (
     "aabb_scale", "applied_transform", "camera_angle_y", "ply_file_path", "frames", "orientation_override",
     "auto_scale_poses_override", "crop", "train_filenames", "val_filenames", "test_filenames", "scale", "offset",
 )  # fmt: skip
+# Of a frame; other pictures of it (..._path) are not read either.
+_IDLE_OF_FRAME = ("camera_angle_y", "colmap_im_id", "time", "timestamp", "camera_id", "sharpness", "blur_score")
 
 
 class _Camera(msgspec.Struct, frozen=True):
@@ -64,7 +66,7 @@ class _Frame(_Camera, frozen=True, kw_only=True):
 
 class _Transforms(_Camera, frozen=True, kw_only=True):
     frames: list[_Frame]
-    depth_unit_scale_factor: float = _MILLIMETRE
+    depth_unit_scale_factor: float | None = None
     integer_depth_scale: float | None = None
     applied_scale: float = 1.0
 
@@ -82,7 +84,7 @@ def open_nerfstudio(path: Path, report: Report = stop_at_first) -> FileRecording
     file = path / DESCRIPTION
     given, plain = read_json(file, _Transforms)
     known = {name for kind in (_Transforms, _Camera) for name in kind.__struct_fields__}
-    notices = [*unread_notice(file, plain, (*known, *_IDLE)), *_without_clock(given)]
+    notices = [*unread_notice(file, plain, (*known, *_IDLE)), *_unread_of_frames(file, plain), *_without_clock(given)]
     frames = [frame for frame in given.frames if frame.depth_file_path]
     if not frames:
         raise RecordingError(
@@ -114,6 +116,12 @@ def open_nerfstudio(path: Path, report: Report = stop_at_first) -> FileRecording
     )
 
 
+def _unread_of_frames(file: Path, plain: dict[str, Any]) -> tuple[str, ...]:
+    """Return a notice about keys of the frames that nothing reads; one about the camera is refused."""
+    present = {key: None for frame in plain["frames"] for key in frame if not key.endswith("_path")}
+    return unread_notice(file, present, (*_Frame.__struct_fields__, *_IDLE_OF_FRAME))
+
+
 def _without_clock(given: _Transforms) -> list[str]:
     notices = ["The scan has no clock; its frames are taken to be one second apart."]
     if given.applied_scale != 1.0:
@@ -123,7 +131,13 @@ def _without_clock(given: _Transforms) -> list[str]:
 
 def _units_per_m(file: Path, given: _Transforms) -> float:
     """Return the units of a depth PNG in a metre."""
-    metres = given.integer_depth_scale if given.integer_depth_scale is not None else given.depth_unit_scale_factor
+    said = {given.integer_depth_scale, given.depth_unit_scale_factor} - {None}
+    if len(said) > 1:
+        raise RecordingError(
+            f"{file} says twice how long a unit of depth is: integer_depth_scale {given.integer_depth_scale} and "
+            f"depth_unit_scale_factor {given.depth_unit_scale_factor}; keep the right one."
+        )
+    metres = next((value for value in said if value is not None), _MILLIMETRE)
     for name, value in (("a depth unit in metres", metres), ("applied_scale", given.applied_scale)):
         if not (np.isfinite(value) and value > 0.0):
             raise RecordingError(f"{file} says that {name} is {value}; it must be positive.")
@@ -147,16 +161,15 @@ def _poses(file: Path, frames: list[_Frame], scale: float) -> Float[np.ndarray, 
         if len(rows) not in (3, 4) or any(len(row) != 4 for row in rows):
             shape = "x".join(map(str, (len(rows), len(rows[0]) if rows else 0)))
             raise RecordingError(f"{file}: the transform_matrix of {frame.file_path!r} is {shape}; it must be 4x4.")
-        poses[i, :3] = np.array(rows, np.float64)[:3]
         poses[i, 3] = (0.0, 0.0, 0.0, 1.0)
+        poses[i, : len(rows)] = rows
     poses[:, :3, 3] /= scale
     return from_opengl(poses)
 
 
 def _rig(file: Path, given: _Transforms, frames: list[_Frame], shots: Shots) -> tuple[Rig, tuple[str, ...]]:
-    first = frames[0]
     models = {frame.camera_model or given.camera_model for frame in frames}
-    if given.is_fisheye or first.is_fisheye:
+    if any(camera_.is_fisheye for camera_ in (given, *frames)):
         models = {"fisheye"}
     if odd := sorted(models - set(_PINHOLES)):
         raise RecordingError(
@@ -164,10 +177,14 @@ def _rig(file: Path, given: _Transforms, frames: list[_Frame], shots: Shots) -> 
             "the pictures first."
         )
     rgb_size = first_picture_size(file.parent, shots.colour)
-    size = (round(first.w or given.w or rgb_size[0]), round(first.h or given.h or rgb_size[1]))
+    sizes = {(round(f.w or given.w or rgb_size[0]), round(f.h or given.h or rgb_size[1])) for f in frames}
+    if len(sizes) > 1:
+        shown = " and ".join(f"{width}x{height}" for width, height in sorted(sizes)[:2])
+        raise RecordingError(f"{file} has frames of {shown}; the frames of a recording must have one size.")
+    size = sizes.pop()
     numbers = np.array([_numbers(file, frame, given, size) for frame in frames])
     camera, notices = median_camera(file, numbers, *size)
-    if any(abs(getattr(camera_, name)) > 1e-9 for camera_ in (given, first) for name in _DISTORTION):
+    if any(abs(getattr(camera_, name)) > 1e-9 for camera_ in (given, *frames) for name in _DISTORTION):
         more = "The pictures have lens distortion, which a pinhole leaves out; undistorted pictures make a better map."
         notices = (*notices, more)
     depth_size = first_picture_size(file.parent, shots.depth)

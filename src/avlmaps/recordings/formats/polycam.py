@@ -18,11 +18,15 @@ from avlmaps.core.files import DESCRIPTION_BYTES
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, settle
 from avlmaps.recordings.formats.intrinsics import fitted, median_camera, resized_notice
-from avlmaps.recordings.formats.json_files import read_json
+from avlmaps.recordings.formats.json_files import read_json, unread_notice
 from avlmaps.recordings.formats.nerfstudio import INTERVAL_S
 from avlmaps.recordings.formats.phones import UP_IN_WORLD, from_opengl
 from avlmaps.recordings.images import first_picture_size
 
+# What the app writes beside; it says nothing about how the pictures are read.
+_IDLE = (
+    "t_30", "t_31", "t_32", "t_33", "blur_score", "center_depth", "neighbors", "angular_velocity", "manual_keyframe",
+)  # fmt: skip
 _UNITS_S = (1.0, 1e-3, 1e-6, 1e-9)
 # Keyframes of a scan follow one another at such a pace, by which the unit of their stamps is known.
 _LEAST_INTERVAL_S, _MOST_INTERVAL_S = 0.02, 20.0
@@ -85,7 +89,10 @@ def open_polycam(path: Path, report: Report = stop_at_first) -> FileRecording:
     for sentence in notices:
         report(Fault(f"{path}: {sentence}", path, fatal=False))
     files = [frames / cameras / described[stem] for stem in names]
-    found = [read_json(file, _Camera, DESCRIPTION_BYTES)[0] for file in files]
+    read = [read_json(file, _Camera, DESCRIPTION_BYTES) for file in files]
+    found = [camera for camera, _ in read]
+    present = {key: None for _, plain in read for key in plain}
+    notices += unread_notice(files[0], present, (*_Camera.__struct_fields__, *_IDLE), strict=False)
     sure = _by_stem(frames / "confidence", (".png",)) if (frames / "confidence").is_dir() else {}
     shots = Shots(
         names=names,

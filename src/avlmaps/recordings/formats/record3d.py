@@ -11,6 +11,7 @@ left out. The export has ``EXR_RGBD/metadata.json``, ``rgb/N.jpg`` and ``depth/N
 import zipfile
 import zlib
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -26,10 +27,14 @@ from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.exr import read_channel
 from avlmaps.recordings.formats.file_recording import Shots, list_names, open_audio, settle
 from avlmaps.recordings.formats.intrinsics import fitted, median_camera, resized_notice
-from avlmaps.recordings.formats.json_files import parse_json, read_json
+from avlmaps.recordings.formats.json_files import parse_json, read_json, unread_notice
 from avlmaps.recordings.formats.phones import UP_IN_WORLD, from_opengl
 from avlmaps.recordings.formats.stored_recording import StoredRecording
+from avlmaps.recordings.plausible import pace_fault
 
+_FPS = 60.0
+# What the app writes beside; poses do not depend on initPose.
+_IDLE = ("initPose", "cameraType")
 _COLOUR = (".jpg", ".jpeg", ".png")
 
 
@@ -40,7 +45,7 @@ class _Metadata(msgspec.Struct, frozen=True):
     K: list[float] = []
     perFrameIntrinsicCoeffs: list[list[float]] = []  # noqa: N815 - Record3D's names
     frameTimestamps: list[float] = []  # noqa: N815
-    fps: float = 60.0
+    fps: float | None = None
     dw: int = 0
     dh: int = 0
 
@@ -168,7 +173,7 @@ def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording
     files = _Files(inside)
     described, colour_in, depth_in = layout
     file = inside / described
-    given = _metadata(files, file, described)
+    given, plain = _metadata(files, file, described)
     colour = {_number(name): name for name in files.names(colour_in, _COLOUR)}
     depth = {_number(name): name for name in files.names(depth_in, (".depth", ".exr"))}
     numbers = [n for n in range(len(given.poses)) if n in colour and n in depth]
@@ -177,7 +182,7 @@ def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording
             f"{inside} has {len(given.poses)} poses, {len(colour)} colour and {len(depth)} depth pictures, and no "
             "frame with all three; was it recorded with LiDAR?"
         )
-    notices: list[str] = []
+    notices = [*unread_notice(file, plain, (*_Metadata.__struct_fields__, *_IDLE), strict=False)]
     if len(numbers) < max(len(given.poses), len(colour)):
         left = max(len(given.poses), len(colour)) - len(numbers)
         notices.append(f"{left} frame(s) lack one of colour, depth and pose and are left out.")
@@ -186,9 +191,11 @@ def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording
         names=[str(n) for n in numbers],
         colour=[f"{colour_in}/{colour[n]}" for n in numbers],
         depth=[f"{depth_in}/{depth[n]}" for n in numbers],
-        stamps_s=_stamps(given)[numbers],
+        stamps_s=_stamps(file, given, notices)[numbers],
         world_from_camera=_poses(file, given)[numbers],
     )
+    if fault := pace_fault(shots.stamps_s, "frames", 1.0 / _fps(given)):
+        raise RecordingError(f"{file}: {fault}")
     rig, more = _rig(files, file, given, shots)
     shots, settled = settle(path, shots, report, lambda _: file)
     return StoredRecording(
@@ -203,10 +210,10 @@ def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording
     )
 
 
-def _metadata(files: _Files, file: Path, name: str) -> _Metadata:
+def _metadata(files: _Files, file: Path, name: str) -> tuple[_Metadata, dict[str, Any]]:
     if files.path.is_dir():
-        return read_json(file, _Metadata)[0]
-    return parse_json(file, files.read(name, MANIFEST_BYTES), _Metadata)[0]
+        return read_json(file, _Metadata)
+    return parse_json(file, files.read(name, MANIFEST_BYTES), _Metadata)
 
 
 def _number(name: str) -> int:
@@ -214,10 +221,21 @@ def _number(name: str) -> int:
     return int(stem) if stem.isascii() and stem.isdigit() else -1
 
 
-def _stamps(given: _Metadata) -> Float[np.ndarray, " n"]:
-    if len(given.frameTimestamps) >= len(given.poses):
-        return np.array(given.frameTimestamps, np.float64)
-    return np.arange(len(given.poses)) / (given.fps if given.fps > 0.0 else 60.0)
+def _fps(given: _Metadata) -> float:
+    return given.fps if given.fps is not None and given.fps > 0.0 else _FPS
+
+
+def _stamps(file: Path, given: _Metadata, notices: list[str]) -> Float[np.ndarray, " n"]:
+    stamps = given.frameTimestamps
+    if len(stamps) == len(given.poses):
+        return np.array(stamps, np.float64)
+    if stamps:
+        raise RecordingError(
+            f"{file} has {len(stamps)} frameTimestamps for {len(given.poses)} poses, so that it is not known which "
+            "belong together; share it again, or remove the stamps and give fps."
+        )
+    notices.append(f"The recording has no stamps; {_fps(given):g} frames/s are assumed.")
+    return np.arange(len(given.poses)) / _fps(given)
 
 
 def _poses(file: Path, given: _Metadata) -> Float[np.ndarray, "n 4 4"]:
@@ -232,7 +250,12 @@ def _poses(file: Path, given: _Metadata) -> Float[np.ndarray, "n 4 4"]:
 
 
 def _rig(files: _Files, file: Path, given: _Metadata, shots: Shots) -> tuple[Rig, tuple[str, ...]]:
-    per_frame = [row for row in given.perFrameIntrinsicCoeffs if len(row) == 4]
+    per_frame = given.perFrameIntrinsicCoeffs
+    if odd := next((row for row in per_frame if len(row) != 4), None):
+        raise RecordingError(
+            f"{file} has {len(odd)} numbers in a row of perFrameIntrinsicCoeffs, not the four fx fy cx cy; share it "
+            "again."
+        )
     k = given.K
     if not per_frame and len(k) != 9:
         raise RecordingError(f"{file} has no intrinsics (K has {len(k)} numbers, not 9); share it again.")

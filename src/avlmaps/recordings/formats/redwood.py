@@ -1,15 +1,16 @@
 """Redwood and Open3D: ``color/`` (or ``rgb/``, ``image/``), ``depth/`` and a ``trajectory.log``.
 
-Facts of the data: the log has five lines a frame: three whole numbers, the first of which counts the frames, and a
-4x4 camera-to-world matrix (x right, y down, z forward); Redwood's own scenes call it ``NAME-traj.txt``, Open3D's
-reconstruction writes ``scene/trajectory.log``. Depth is in 16-bit millimetres unless ``intrinsic.json`` says
-otherwise (``depth_scale``). That file (Open3D's, the matrix column by column) gives the intrinsics, with the centre
-of the first pixel at (0, 0), so that half a pixel is added; without one the PrimeSense's are taken, as Open3D does.
-Names such as ``00012-000000366849.jpg`` carry a stamp in microseconds; others are counted at 30 frames/s. Up is not
-known.
+Facts of the data: the log has five lines a frame: three whole numbers, the first of which counts the frames (where it
+skips some, those have no pose; Open3D itself does not read it), and a 4x4 camera-to-world matrix (x right, y down, z
+forward); Redwood's own scenes call it ``NAME-traj.txt``, Open3D's reconstruction writes ``scene/trajectory.log``.
+Depth is in 16-bit millimetres unless ``intrinsic.json`` says otherwise (``depth_scale``). That file (Open3D's, the
+matrix column by column) gives the intrinsics, with the centre of the first pixel at (0, 0), so that half a pixel is
+added; without one the PrimeSense's are taken, as Open3D does. Names such as ``00012-000000366849.jpg`` carry a stamp
+in microseconds; others are counted at 30 frames/s. Up is not known.
 """
 
 import os
+import re
 from pathlib import Path
 
 import msgspec
@@ -69,27 +70,23 @@ def open_redwood(path: Path, report: Report = stop_at_first) -> FileRecording:
         what = "trajectory.log" if log is None else f"folder of colour pictures ({', '.join(COLOUR_FOLDERS)})"
         raise RecordingError(f"{path} has no {what}; the recording needs it.")
     colour, depth = list_names(path / folder, (".jpg", ".jpeg", ".png")), list_names(path / "depth", (".png",))
-    pose = _read_log(log, report)
-    whole = min(len(colour), len(depth), len(pose))
-    if whole == 0:
+    ids, pose = _read_log(log, report)
+    if not (colour and depth and len(pose)):
         raise RecordingError(f"{path} has {len(colour)} colour and {len(depth)} depth pictures and {len(pose)} poses.")
-    notices: list[str] = []
-    if not len(colour) == len(depth) == len(pose):
-        notices.append(
-            f"There are {len(colour)} colour pictures, {len(depth)} depth pictures and {len(pose)} poses; they are "
-            f"matched in order, and the first {whole} are used."
-        )
-        report(Fault(f"{path}: {notices[-1]}", log, fatal=False))
-    stamps_s = _stamps(depth[:whole])
+    rows, notices = _matched(path, colour, depth, ids)
+    for sentence in notices:
+        report(Fault(f"{path}: {sentence}", log, fatal=False))
+    colour, depth = [colour[row[0]] for row in rows], [depth[row[1]] for row in rows]
+    stamps_s = _stamps(depth)
     if stamps_s is None:
         notices.append("The recording has no clock; 30 frames/s are assumed.")
-        stamps_s = np.arange(whole) / RATE_HZ
+        stamps_s = np.array([row[3] for row in rows], np.float64) / RATE_HZ
     shots = Shots(
-        names=[name.rsplit(".", 1)[0] for name in colour[:whole]],
-        colour=[f"{folder}/{name}" for name in colour[:whole]],
-        depth=[f"depth/{name}" for name in depth[:whole]],
+        names=[name.rsplit(".", 1)[0] for name in colour],
+        colour=[f"{folder}/{name}" for name in colour],
+        depth=[f"depth/{name}" for name in depth],
         stamps_s=stamps_s,
-        world_from_camera=pose[:whole],
+        world_from_camera=pose[[row[2] for row in rows]],
     )
     rig, units, more = _rig(path, shots)
     shots, settled = settle(path, shots, report, lambda _: log)
@@ -104,20 +101,68 @@ def open_redwood(path: Path, report: Report = stop_at_first) -> FileRecording:
     )
 
 
-def _read_log(file: Path, report: Report) -> Float[np.ndarray, "n 4 4"]:
-    """Read the matrices of a log, which must be whole: after a line that is lost, every pose would be another's."""
+def _matched(
+    path: Path, colour: list[str], depth: list[str], ids: list[int]
+) -> tuple[list[tuple[int, int, int, int]], list[str]]:
+    """Return (row of colour, of depth, of the log, count) of each frame that has all three, and what was assumed.
+
+    Pictures are matched by the numbers that their names begin with, if these differ from one another, else in order.
+    The poses are matched by their own numbers where they skip frames, else in order.
+    """
+    numbered = [_numbers(names) for names in (colour, depth)]
+    if all(numbered) and (len(colour) != len(depth) or set(numbered[0]) & set(numbered[1])):
+        count = {number: at for at, number in enumerate(sorted({*numbered[0], *numbered[1]}))}
+        first = min(count)
+        gone = max(count) - first + 1 - len(count)  # numbers that neither has
+        if gone and len(ids) == len(count) + gone:
+            count = {number: number - first for number in count}
+        of_colour, of_depth = ({count[n]: at for at, n in enumerate(numbers)} for numbers in numbered)
+        how = "by the numbers in their names"
+    else:
+        of_colour, of_depth, how = dict(enumerate(range(len(colour)))), dict(enumerate(range(len(depth)))), "in order"
+    counts = range(1 + max(*of_colour, *of_depth))
+    by_id = len(set(ids)) == len(ids) and ids != list(range(len(ids))) and set(ids) <= set(counts)
+    of_pose = {number: at for at, number in enumerate(ids)} if by_id else dict(enumerate(range(len(ids))))
+    whole = sorted(of_colour.keys() & of_depth.keys() & of_pose.keys())
+    if not whole:
+        raise RecordingError(f"{path} has no frame with all of colour, depth and a pose.")
+    notices: list[str] = []
+    if not len(colour) == len(depth) == len(ids) == len(whole):
+        notices.append(
+            f"There are {len(colour)} colour pictures, {len(depth)} depth pictures and {len(ids)} poses; pictures are "
+            f"matched {how}, poses {'by their numbers in the log' if by_id else 'in order'}, and {len(whole)} frames "
+            "have all three."
+        )
+    elif by_id:
+        notices.append("The poses are not in the order of the pictures; they are matched by their numbers in the log.")
+    return [(of_colour[n], of_depth[n], of_pose[n], n) for n in whole], notices
+
+
+def _numbers(names: list[str]) -> list[int]:
+    """Return the number that each name begins with, or nothing where one has none or two have the same."""
+    found = [re.match(r"\D*(\d+)", name) for name in names]
+    numbers = [int(match.group(1)) for match in found if match]
+    return numbers if len(set(numbers)) == len(names) else []
+
+
+def _read_log(file: Path, report: Report) -> tuple[list[int], Float[np.ndarray, "n 4 4"]]:
+    """Read the numbers and the matrices of a log.
+
+    It must be whole: after a line that is lost, every pose would be another's.
+    """
     lines = list(text_lines(file, report))
     if len(lines) % 5:
         raise RecordingError(
             f"{file} has {len(lines)} lines, but each pose takes five (three whole numbers, then a 4x4 matrix); is it "
             "cut off?"
         )
-    poses = np.full((len(lines) // 5, 4, 4), np.nan)
+    poses, ids = np.full((len(lines) // 5, 4, 4), np.nan), [0] * (len(lines) // 5)
     for at in range(0, len(lines), 5):
         number, text = lines[at]
         try:
             if not (len(text.split()) == 3 and all(word.lstrip("+-").isdigit() for word in text.split())):
                 raise ValueError(text)
+            ids[at // 5] = int(text.split()[0])
             for row in range(4):
                 number, text = lines[at + 1 + row]
                 poses[at // 5, row] = [float(word) for word in text.split()]
@@ -126,7 +171,7 @@ def _read_log(file: Path, report: Report) -> Float[np.ndarray, "n 4 4"]:
             raise RecordingError(
                 f"{file}, line {number}: {text[:40]!r} stands where {wanted} belong; fix it."
             ) from None
-    return poses
+    return ids, poses
 
 
 def _stamps(names: list[str]) -> Float[np.ndarray, " n"] | None:

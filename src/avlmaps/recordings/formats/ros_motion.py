@@ -10,6 +10,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import MAX_ROTATION_FAULT, from_quaternion
 from avlmaps.recordings.faults import stop_at_first
 from avlmaps.recordings.formats.bag_files import Bag
+from avlmaps.recordings.formats.columns import POSE
 from avlmaps.recordings.formats.ros_messages import pose_of
 from avlmaps.recordings.formats.ros_transforms import TransformTree
 from avlmaps.recordings.formats.tables import read_table
@@ -161,9 +162,12 @@ def find_motion(bag: Bag, named: str, camera_frame: str, transforms: TransformTr
 
 
 def _tree_of_file(file: Path, camera_frame: str) -> TransformTree:
-    """Return the tree in which a file of poses (stamp tx ty tz qx qy qz qw, as TUM writes them) moves the camera."""
+    """Return the tree in which a file of poses moves the camera.
+
+    Its columns are stamp tx ty tz qx qy qz qw, as TUM writes them, or what its header says.
+    """
     tree = TransformTree()
-    for row in read_table(file, (8,), stop_at_first, header=True).values:
+    for row in read_table(file, (8,), stop_at_first, names=POSE).values:
         length = float(np.linalg.norm(row[4:]))
         usable = np.isfinite(row).all() and abs(length - 1.0) <= MAX_ROTATION_FAULT
         pose = from_quaternion(row[1:4], row[4:]) if usable else np.full((4, 4), np.nan)

@@ -20,6 +20,7 @@ from avlmaps.recordings.formats.intrinsics import fitted, median_camera
 from avlmaps.recordings.formats.phones import UP_IN_WORLD
 from avlmaps.recordings.formats.tables import read_matrix, read_table, text_lines
 from avlmaps.recordings.images import first_picture_size
+from avlmaps.recordings.plausible import pace_fault
 from avlmaps.recordings.video import VideoFrames
 
 _HEADER = ["timestamp", "frame", "x", "y", "z", "qx", "qy", "qz", "qw"]
@@ -64,6 +65,8 @@ def open_stray_scanner(path: Path, report: Report = stop_at_first) -> FileRecord
         video_frames=numbers.tolist(),
         confidence=[f"confidence/{sure[int(n)]}" for n in numbers] if all(int(n) in sure for n in numbers) else (),
     )
+    if fault := pace_fault(shots.stamps_s, "rows of odometry.csv"):
+        raise RecordingError(f"{path}: {fault}")
     rig, more = _rig(path, rows, video, shots)
     shots, settled = settle(path, shots, report, lambda _: path / "odometry.csv")
     return FileRecording(
