@@ -313,3 +313,69 @@ def test_a_condition_is_never_dropped(command: str) -> None:
 @pytest.mark.parametrize("command", ["go to the sofa if you can", "if it is not too much trouble, go to the sofa"])
 def test_manners_are_no_condition(command: str) -> None:
     assert intents(command) == (Go(Target(Kind.OBJECT, "sofa")),)
+
+
+@FEW
+@given(st.sampled_from(("go outside the {}", "wait outside of my {}", "stand just outside the {}")),
+       st.sampled_from(("kitchen", "bedroom", "office", "bathroom")))  # fmt: skip
+def test_outside_is_not_inside(form: str, room: str) -> None:
+    stops(form.format(room))
+    with pytest.raises(QueryError, match="outside"):
+        read_question(f"where is the chair outside the {room}", Given(knows=lambda _: True))
+
+
+@FEW
+@given(
+    st.sampled_from(("drive through the {}", "roll straight through the {} to the {}", "go through my {}")),
+    things,
+    things,
+)
+def test_a_thing_is_no_way_through(form: str, thing: str, other: str) -> None:
+    stops(form.format(thing, other))
+
+
+@pytest.mark.parametrize("way", ["archway", "revolving door", "double doors", "garden gate", "kitchen", "curtain"])
+def test_an_opening_is_a_way_through(way: str) -> None:
+    assert read_command(f"go through the {way}").stops is None
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["check the hall is empty, else go to the door", "go to the sofa, otherwise to the bed",
+     "assert you are in the hall, else go to the door"],
+)  # fmt: skip
+def test_a_second_choice_is_not_the_first(command: str) -> None:
+    assert isinstance(stops(command).stops, Refuse | Clarify)
+
+
+def test_told_otherwise_is_no_second_choice() -> None:
+    assert read_command("go to the sofa").intents == read_command("I was told otherwise, go to the sofa").intents
+
+
+@pytest.mark.parametrize("command", ["turn ninety degrees negative", "move 2 m minus", "go back minus a metre"])
+def test_a_sign_in_words_is_never_dropped(command: str) -> None:
+    assert isinstance(stops(command).stops, Clarify)
+
+
+@pytest.mark.parametrize("name", ["thing", "object", "item", "stuff"])
+def test_a_name_of_anything_is_asked_about(name: str) -> None:
+    stops(f"go to the {name} next to the lamp")
+
+
+@FEW
+@given(
+    st.sampled_from(("object labelled {}", "object of class {}", "thing that is tagged {}", "item with label {}")),
+    things,
+)
+def test_a_label_is_a_name(form: str, thing: str) -> None:
+    assert intents(f"go to the {form.format(thing)}") == intents(f"go to the {thing}")
+
+
+def test_a_label_of_a_sound_is_a_sound() -> None:
+    assert intents("go to the sound source labelled glass breaking") == intents("go to the sound of glass breaking")
+
+
+@pytest.mark.parametrize("said", ["status of the stove", "the state of the stove", "battery level", "colour of walls"])
+def test_what_a_map_does_not_hold_is_not_answered(said: str) -> None:
+    with pytest.raises(QueryError):
+        read_question(said, Given(knows=lambda _: True))

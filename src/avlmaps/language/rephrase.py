@@ -1,10 +1,11 @@
 """Words of a command in the order and the person that the networks know: what is said of the robot is said to it.
 
-Three forms are rewritten, token by token, before a command is read:
+Four forms are rewritten, token by token, before a command is read:
 
 - what another person should make the robot do: "send the robot to the lab", "tell it to turn left";
 - a time before an order: "in five minutes go to the door", "go to the door in five minutes";
-- a loop as programs have it: "for i in range(3): go to the door".
+- a loop as programs have it: "for i in range(3): go to the door";
+- a label as data sets have it: "the object of class lamp", "the sound labelled glass breaking".
 """
 
 from collections.abc import Sequence
@@ -41,13 +42,18 @@ _AFTER_SEND = frozenset({
 _NO_CLAUSE_END = frozenset(
     {"wait", "waiting", "stay", "heard", "was", "were", "rang", "barked", "pause", "hold", "count"}
 )
+_LABELLED = frozenset({"labelled", "labeled", "tagged", "named", "called", "titled"})
+_LABELS = frozenset({"class", "type", "label", "category", "tag", "name"})
+_SOUNDS = frozenset({"sound", "noise"})
+_ANY = frozenset({"anything", "something", "one"})
+_GENERIC = frozenset({"thing", "object", "item", "instance", "room", "place", "area", "location"}) | _ANY | _SOUNDS
 _CUTS = frozenset({"then", "finally"})
 
 
 def rephrased(tokens: Sequence[Token]) -> tuple[list[Token], list[str]]:
     """Return tokens with these forms rewritten, and one sentence for each that a person should know of."""
     notes: list[str] = []
-    found = _looped(_joined(tokens))
+    found = _unlabelled(_looped(_joined(tokens)))
     found = _said_to_it(found)
     return _waiting_first(found, notes), notes
 
@@ -226,6 +232,42 @@ def _way_first(tokens: list[Token], at: int, clause: Sequence[Token]) -> _Ahead 
         return None
     move = (_word(tokens[at], "move"), *tokens[at + 1 : max(ends)], _word(tokens[at], "forward"))
     return _Ahead((*move, _word(tokens[at], "then")), max(ends), is_wait=False)
+
+
+def _unlabelled(tokens: list[Token]) -> list[Token]:
+    """Return tokens with "the object of class lamp" as "the lamp", "the sound labelled glass breaking" as a sound."""
+    found: list[Token] = []
+    at = 0
+    while at < len(tokens):
+        end = _label_end(tokens, at) if tokens[at].text in _GENERIC else at
+        if end == at or end >= len(tokens) or tokens[end].kind != "word":
+            found.append(tokens[at])
+            at += 1
+            continue
+        if tokens[at].text in _SOUNDS:
+            found += [tokens[at], _word(tokens[at], "of")]
+        elif (
+            tokens[at].text in _ANY
+            and not (found and found[-1].text in _ARTICLES)
+            and tokens[end].text not in _ARTICLES
+        ):
+            found.append(_word(tokens[at], "a"))
+        at = end
+    return found
+
+
+def _label_end(tokens: list[Token], at: int) -> int:
+    """Return where the name begins that is said as a label of the noun at a token; the token itself where none is."""
+    texts = [token.text for token in tokens[at : at + 6]]
+    end = 1 + (texts[1:2] == ["source"])
+    end += 2 if texts[end : end + 2] in (["that", "is"], ["which", "is"]) else 0
+    if set(texts[end : end + 1]) & _LABELLED:
+        return at + end + 1
+    if texts[end : end + 2] in (["classified", "as"], ["known", "as"]):
+        return at + end + 2
+    if texts[end : end + 1] in (["of"], ["with"]) and _LABELS & set(texts[end + 1 : end + 3]):
+        return at + end + (2 if texts[end + 1] in _LABELS else 3)
+    return at
 
 
 def _looped(tokens: list[Token]) -> list[Token]:

@@ -5,10 +5,9 @@ from collections.abc import Sequence
 from avlmaps.language import lexer
 from avlmaps.language.intents import Clarify, Reason, Refuse
 from avlmaps.language.learned.linear import amount_end
-from avlmaps.language.learned.said import BREAKS, LOOKS, PREPOSITIONS, TURNS, Said, words
+from avlmaps.language.learned.said import BREAKS, HEARD, LOOKS, PREPOSITIONS, TURNS, Said, words
 from avlmaps.language.lexer import Token
 
-_HEARD = frozenset({"hear", "heard", "hearing", "comes", "coming", "came", "sound", "noise"})
 _DRIVES = frozenset({
     "drive", "move", "roll", "forward", "forwards", "ahead", "straight", "backward", "backwards", "reverse", "left",
     "right", "rotate", "spin", "turn",
@@ -31,7 +30,8 @@ def forbidden(tokens: Sequence[Token]) -> Clarify | Refuse | None:
         return Refuse(Reason.HARM)
     if any(_ends_with(said, end) for _, end in said.spans("cancels")):
         return Refuse(Reason.NEGATION)
-    if any(said.texts[at - 1 : at] not in (("as",), ("even",)) for at, _ in said.spans("conditions")):
+    conditions = [at for at, _ in said.spans("conditions") if said.texts[at - 1 : at] not in (("as",), ("even",))]
+    if conditions or _alternative(said):
         return Refuse(Reason.CONDITION)
     if said.spans("risks") or said.spans("questions"):
         return Refuse(Reason.QUESTION)
@@ -59,13 +59,23 @@ def _through(said: Said) -> bool:
     """Return whether the robot should drive through what is solid, or into what hurts it or others."""
     lists = words().lists
     for at, text in enumerate(said.texts):
-        if text not in ("through", "thru", "into", "onto") or (LOOKS | _HEARD) & set(said.texts[max(0, at - 4) : at]):
+        if text not in ("through", "thru", "into", "onto") or (LOOKS | HEARD) & set(said.texts[max(0, at - 4) : at]):
             continue
         noun = [said.texts[i] for i in sorted(said.scope(at + 1, BREAKS | PREPOSITIONS))][:5]
         if noun[:1] and noun[-1:] and (lists["solid" if text[:2] == "th" else "deadly"] & set(noun[-1:])):
             return True
         if text[:2] == "th" and lists["blocked"] & set(noun[:-1]):
             return True
+    return False
+
+
+def _alternative(said: Said) -> bool:
+    """Return whether an order holds only where another does not: "check the hall, else go to the door"."""
+    others = words().lists["others"]
+    for at, text in enumerate(said.texts):
+        told = said.texts[max(0, at - 1) : at] in (("told",), ("said",), ("instructed",))
+        if (text == "otherwise" and not told) or (text == "else" and at and said.texts[at - 1] not in others):
+            return bool(said.scope(at + 1)) or any(token.kind == "word" for token in said.tokens[at + 1 :])
     return False
 
 
@@ -92,7 +102,10 @@ def _signed(said: Said) -> Clarify | None:
     for at, text in enumerate(said.texts):
         if text in ("<", ">") and tokens[at].raw == text and lexer.number_at(tokens, at + 1):
             return Clarify(f"What does '{text} {said.texts[at + 1]}' mean? Say only where to go.")
-        if text not in ("minus", "negative", "plus", "-", "+", "±") or not lexer.number_at(tokens, at + 1):
+        behind = any(amount_end(tokens, start) == at for start in range(max(0, at - 4), at))
+        if text in ("negative", "minus") and behind and not lexer.number_at(tokens, at + 1):
+            return Clarify(f"What does the {text} behind the number mean? Say it without a sign.")
+        if text not in ("minus", "negative", "plus", "-", "+", "±") or not _is_number(tokens, at + 1, text):
             continue
         if text == "-" and not (at and said.texts[at - 1] in _TAKES_SIGN):
             continue
@@ -108,3 +121,8 @@ def _signed(said: Said) -> Clarify | None:
         choices = (f"{left} {number}", f"{right} {number}")
         return Clarify(f"What does the sign of {sign}{number} mean? Say {choices[0]} or {choices[1]}.", choices)
     return None
+
+
+def _is_number(tokens: list[Token], at: int, sign: str) -> bool:
+    """Return whether a number begins at a token, or behind a sign in words an amount without one: "minus a metre"."""
+    return bool(lexer.number_at(tokens, at)) or (sign in ("minus", "negative") and lexer.is_amount(tokens, at))

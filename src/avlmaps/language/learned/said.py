@@ -21,6 +21,7 @@ BREAKS = frozenset({
 DETERMINERS = frozenset({"the", "this", "that", "my", "your", "our", "her", "his", "their", "a", "an", "any", "every"})
 PREPOSITIONS = frozenset({"via", "by", "through", "past", "on", "in", "at", "of", "from", "with", "behind"})
 LOOKS = frozenset({"look", "looking", "peek", "see", "stare", "gaze", "glance", "peer", "watch", "face", "facing"})
+HEARD = frozenset({"hear", "heard", "hearing", "comes", "coming", "came", "sound", "noise"})
 TURNS = frozenset({
     "turn", "rotate", "yaw", "spin", "pivot", "rotation", "heading", "theta", "angle", "swing", "twist", "swivel",
 })  # fmt: skip
@@ -48,6 +49,7 @@ def words() -> Words:
         "nearest",
         "leaving",
         "excluded",
+        "outside",
         "choosing",
         "cancels",
         "conditions",

@@ -30,7 +30,7 @@ from avlmaps.language.intents import (
     VisitEach,
 )  # fmt: skip
 from avlmaps.language.learned.linear import amount_end
-from avlmaps.language.learned.said import BREAKS, DETERMINERS, LOOKS, PREPOSITIONS, Claimed, Said, words
+from avlmaps.language.learned.said import BREAKS, DETERMINERS, HEARD, LOOKS, PREPOSITIONS, Claimed, Said, words
 from avlmaps.language.learned.ways import directions
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import past_forms, sounding_forms
@@ -115,6 +115,44 @@ def _leaving(said: Claimed) -> Clarify | None:
         last = {"last", "end"} & set(said.texts[max((*scope, end)) + 1 :][:3])
         if said.names_in(scope) and not last and not LOOKS & set(said.texts[max(0, start - 1) : start]):
             return Clarify(f"'{said.said(start, scope)}': where should the robot go? Name the place.")
+    return None
+
+
+def _outside(said: Claimed) -> Clarify | None:
+    """Return the question for "outside the kitchen": a reading has the kitchen, and no map has a name for outside."""
+    openings = words().lists["openings"]
+    for start, end in said.spans("outside"):
+        scope = said.scope(end, BREAKS | PREPOSITIONS)
+        corridor = any(one.kind is Kind.AREA and one.near for one in said.targets)  # "the hall outside the kitchen"
+        if not corridor and said.names_in(scope) and openings.isdisjoint(said.texts[at] for at in scope):
+            return Clarify(f"'{said.said(start, scope)}': what is there? Name a place or a thing, such as its door.")
+    return None
+
+
+def _through(said: Claimed) -> Clarify | None:
+    """Return the question for a thing to drive through that is no way through: "through the boxes"."""
+    for at, text in enumerate(said.texts):
+        if text not in ("through", "thru") or (LOOKS | HEARD) & set(said.texts[max(0, at - 4) : at]):
+            continue
+        scope = said.scope(at + 1, BREAKS | PREPOSITIONS)
+        inside = {said.texts[i] for i in scope}
+        for target in said.targets:
+            head = target.name.split()[-1:]
+            if target.kind is Kind.OBJECT and set(head) <= inside - words().lists["openings"]:
+                return Clarify(
+                    f"'{said.said(at, scope)}': the robot drives through rooms and doors. Say past it, or name a door."
+                )
+    return None
+
+
+def _qualities(said: Claimed) -> Clarify | None:
+    """Return the question for "the state of the stove": what a thing has, and the map does not hold."""
+    lists = words().lists
+    names = {target.name for target in said.targets if not _is_entry(target.name)}
+    last = {name.split()[-1] for name in names if name}
+    for at, text in enumerate(said.texts):
+        if text in lists["qualities"] and (text in last or said.texts[at + 1 : at + 2] == ("of",)):
+            return Clarify(f"A map does not hold the {text} of things; ask where they are, or how many.")
     return None
 
 
@@ -238,6 +276,12 @@ def _nameless(said: Claimed) -> Clarify | None:
         if target in every:
             continue
         bare = target.name.split()
+        if (
+            len(bare) == 1
+            and bare[0] in lists["things"]
+            and {one.kind for one in target.near} <= {Kind.OBJECT, Kind.AREA}
+        ):
+            return Clarify(f"Which {bare[0]}? Name it.")
         if bare and bare[-1] in words().lists["anyone"] and not target.near and not target.pick and _says_nothing(bare):
             likely = next((w for w in ("likely", "probable", "probably") if w in said.texts), None)
             why = " The map does not know what is likely." if likely else ""
@@ -342,13 +386,13 @@ def _has_unit(tokens: list[Token], at: int) -> bool:
 
 
 _RULES: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
-    _away, _picked, _leaving, _no_thing, _excluded, _ways, _superlatives, _nameless, _unread, _unheard, _amounts,
-    _sides,
+    _away, _picked, _leaving, _outside, _through, _no_thing, _excluded, _ways, _superlatives, _nameless, _unread,
+    _unheard, _amounts, _sides,
 )  # fmt: skip
 
 
 _ASKED: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
-    _picked, _excluded, _superlatives, _nameless, _unread, _unheard, _amounts,
+    _picked, _excluded, _superlatives, _nameless, _unread, _unheard, _amounts, _qualities,
 )  # fmt: skip
 
 
@@ -359,6 +403,8 @@ def unmet_by(tokens: Sequence[Token], inquiry: Inquiry, used: frozenset[int]) ->
     said = Claimed(tokens, tuple(Go(target) for target in inquiry.of), used)
     if _away(said) is not None:
         return "A map finds what is near something, not what is far from it; say what it is near."
+    if _outside(said) is not None:
+        return "A map finds what is in or near something, not what is outside it; say what it is near."
     rules = (rule for rule in _ASKED if inquiry.ask is Ask.WHERE or rule is not _nameless)
     found = next((found for rule in rules if (found := rule(said)) is not None), None)
     if isinstance(found, Refuse):
