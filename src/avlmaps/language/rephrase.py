@@ -46,7 +46,27 @@ _LABELLED = frozenset({"labelled", "labeled", "tagged", "named", "called", "titl
 _LABELS = frozenset({"class", "type", "label", "category", "tag", "name"})
 _SOUNDS = frozenset({"sound", "noise"})
 _ANY = frozenset({"anything", "something", "one"})
-_GENERIC = frozenset({"thing", "object", "item", "instance", "room", "place", "area", "location"}) | _ANY | _SOUNDS
+_GENERIC = (
+    frozenset(
+        {
+            "thing",
+            "object",
+            "item",
+            "instance",
+            "room",
+            "place",
+            "area",
+            "location",
+            "goal",
+            "target",
+            "destination",
+            "waypoint",
+            "landmark",
+        }
+    )
+    | _ANY
+    | _SOUNDS
+)
 _CUTS = frozenset({"then", "finally"})
 
 

@@ -1,6 +1,7 @@
 """Words that no reading of a command could make good: signs of numbers, dangers, walls to drive through, questions."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 from avlmaps.language import lexer
 from avlmaps.language.intents import Clarify, Reason, Refuse
@@ -28,14 +29,14 @@ def forbidden(tokens: Sequence[Token]) -> Clarify | Refuse | None:
     said = Said(tokens)
     if said.spans("unsafe") or _through(said):
         return Refuse(Reason.HARM)
-    if any(_ends_with(said, end) for _, end in said.spans("cancels")):
+    if said.spans("bans") or any(_ends_with(said, end) for _, end in said.spans("cancels")):
         return Refuse(Reason.NEGATION)
     conditions = [at for at, _ in said.spans("conditions") if said.texts[at - 1 : at] not in (("as",), ("even",))]
     if conditions or _alternative(said):
         return Refuse(Reason.CONDITION)
     if said.spans("risks") or said.spans("questions"):
         return Refuse(Reason.QUESTION)
-    return _timed(said) or _signed(said)
+    return _timed(said) or _signed(said) or _scaled(said)
 
 
 def is_stop(tokens: Sequence[Token]) -> bool:
@@ -120,6 +121,24 @@ def _signed(said: Said) -> Clarify | None:
         left, right = ("turn left", "turn right") if turns else ("move back", "move forward")
         choices = (f"{left} {number}", f"{right} {number}")
         return Clarify(f"What does the sign of {sign}{number} mean? Say {choices[0]} or {choices[1]}.", choices)
+    return None
+
+
+def _scaled(said: Said) -> Clarify | None:
+    """Return the question for what another number or side is meant by: "half of 90 degrees", "your other left"."""
+    tokens = list(said.tokens)
+    for start, end in said.spans("scales"):
+        vague = said.texts[end : end + 1] in (
+            ("a",),
+            ("an",),
+            ("the",),
+        )  # "a quarter of an hour" is an amount of its own
+        if not vague and lexer.number_at(tokens, end):
+            phrase = " ".join(said.texts[start : amount_end(tokens, end)])
+            return Clarify(f"How much is '{phrase}'? Say the number alone.")
+    for before, side in pairwise(said.texts):
+        if before in ("other", "wrong") and side in ("left", "right"):
+            return Clarify(f"Is '{before} {side}' left or right?", ("left", "right"))
     return None
 
 

@@ -50,6 +50,8 @@ def words() -> Words:
         "leaving",
         "excluded",
         "outside",
+        "bans",
+        "scales",
         "choosing",
         "cancels",
         "conditions",

@@ -121,7 +121,10 @@ def _leaving(said: Claimed) -> Clarify | None:
 def _outside(said: Claimed) -> Clarify | None:
     """Return the question for "outside the kitchen": a reading has the kitchen, and no map has a name for outside."""
     openings = words().lists["openings"]
+    beside = any(isinstance(one, Beside) for one in said.steps)
     for start, end in said.spans("outside"):
+        if said.texts[start] == "beyond" and beside:
+            continue
         scope = said.scope(end, BREAKS | PREPOSITIONS)
         corridor = any(one.kind is Kind.AREA and one.near for one in said.targets)  # "the hall outside the kitchen"
         if not corridor and said.names_in(scope) and openings.isdisjoint(said.texts[at] for at in scope):
@@ -134,7 +137,7 @@ def _through(said: Claimed) -> Clarify | None:
     for at, text in enumerate(said.texts):
         if text not in ("through", "thru") or (LOOKS | HEARD) & set(said.texts[max(0, at - 4) : at]):
             continue
-        scope = said.scope(at + 1, BREAKS | PREPOSITIONS)
+        scope = said.scope(at + 1, (BREAKS | PREPOSITIONS) - {"of"})
         inside = {said.texts[i] for i in scope}
         for target in said.targets:
             head = target.name.split()[-1:]
@@ -142,6 +145,16 @@ def _through(said: Claimed) -> Clarify | None:
                 return Clarify(
                     f"'{said.said(at, scope)}': the robot drives through rooms and doors. Say past it, or name a door."
                 )
+    return None
+
+
+def _edges(said: Claimed) -> Clarify | None:
+    """Return the question for a place behind a wall or a window: the map ends there."""
+    for one in said.steps:
+        if isinstance(one, Beside) and one.side is Side.BEHIND and one.of.name.split()[-1:]:
+            head = one.of.name.split()[-1]
+            if one.of.kind is Kind.OBJECT and head in words().lists["edges"]:
+                return Clarify(f"What is behind the {head}? Name the room or the thing there.")
     return None
 
 
@@ -386,8 +399,8 @@ def _has_unit(tokens: list[Token], at: int) -> bool:
 
 
 _RULES: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
-    _away, _picked, _leaving, _outside, _through, _no_thing, _excluded, _ways, _superlatives, _nameless, _unread,
-    _unheard, _amounts, _sides,
+    _away, _picked, _leaving, _outside, _through, _edges, _no_thing, _excluded, _ways, _superlatives, _nameless,
+    _unread, _unheard, _amounts, _sides,
 )  # fmt: skip
 
 
