@@ -125,7 +125,7 @@ $(VENV)-docs/.ready: requirements/docs.txt
 	touch $@
 
 fuzz: $(READY)  ## Break 10,000 recordings and maps in seeded ways (a night; goes on where it was stopped): fuzz_out/.
-	$(RUN)/python tests/fuzz/campaign.py --cases $(or $(CASES),10000) --out fuzz_out
+	$(RUN)/python tests/fuzz/campaign.py --cases $(or $(CASES),10000) --wrong $(or $(WRONG),1000) --out fuzz_out
 
 bench: $(READY)  ## Measure speed and accuracy; writes docs/benchmarks.md and the table of the README (two nights).
 	$(RUN)/python benchmarks/report.py

@@ -4,7 +4,8 @@
 
 Case N is the same on every run. Each runs in a process of its own with bounded memory, processor time and patience; the
 verbs are those of the command line. ``fuzz_out/cases.jsonl`` has a line for each case; a stopped campaign goes on from
-there. What is neither exit 0 with a plausible map nor exit 1 with one sentence is a finding.
+there. What is neither exit 0 with a plausible map nor exit 1 with one sentence is a finding. The cases of ``--wrong``
+are well-formed, with the mistakes of ``avlmaps bench recordings``: there a map that is wrong without a word is one.
 """
 
 import argparse
@@ -18,7 +19,9 @@ import tempfile
 import time
 import traceback
 from collections import Counter
+from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout, suppress
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -54,10 +57,11 @@ def run_case(number: int, seeds: dict[str, Path], scratch: Path) -> dict[str, ob
     with tempfile.TemporaryDirectory(dir=scratch) as folder:
         name, done, case = broken(number, seeds, Path(folder))
         begin = time.perf_counter()
-        status, text = _in_child(name, case, Path(folder) / "out.avlmap")
+        out = Path(folder) / "out.avlmap"
+        status, text = in_child(lambda: look_into_map(case) if name == "map" else build(case, out))
         seconds = round(time.perf_counter() - begin, 3)
         text = text.replace(folder, "CASE")
-    verdict = _verdict(status, text)
+    verdict = verdict_of(status, text)
     return {
         "case": number,
         "seed": name,
@@ -69,7 +73,7 @@ def run_case(number: int, seeds: dict[str, Path], scratch: Path) -> dict[str, ob
     }
 
 
-def _verdict(status: int, text: str) -> str:
+def verdict_of(status: int, text: str) -> str:
     if status == 0:
         return "map"
     lines = [line for line in text.splitlines() if line.startswith("avlmaps: ")]
@@ -78,12 +82,13 @@ def _verdict(status: int, text: str) -> str:
     return "finding"
 
 
-def _in_child(name: str, case: Path, out: Path) -> tuple[int, str]:
+def in_child(work: Callable[[], int]) -> tuple[int, str]:
+    """Do work in a child with bounds; return its exit status and what it said or the traceback."""
     read, write = os.pipe()
     child = os.fork()
     if child == 0:
         os.close(read)
-        _child(name, case, out, write)
+        _child(work, write)
     os.close(write)
     alarm = time.monotonic() + PATIENCE_S
     os.set_blocking(read, False)
@@ -107,8 +112,8 @@ def _in_child(name: str, case: Path, out: Path) -> tuple[int, str]:
     return os.waitstatus_to_exitcode(status), text.decode("utf-8", "replace")
 
 
-def _child(name: str, case: Path, out: Path, write: int) -> None:
-    """Run the verbs; never returns."""
+def _child(work: Callable[[], int], write: int) -> None:
+    """Do the work; never returns."""
     status, text = 70, ""
     try:
         used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
@@ -116,7 +121,7 @@ def _child(name: str, case: Path, out: Path, write: int) -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (PROCESSOR_S, PROCESSOR_S + 1))
         said = io.StringIO()
         with redirect_stderr(said), redirect_stdout(io.StringIO()):
-            status = look_into_map(case) if name == "map" else build(case, out)
+            status = work()
         text = said.getvalue()
     except BaseException:  # noqa: BLE001 - a traceback is what is being looked for
         text = traceback.format_exc()
@@ -124,16 +129,16 @@ def _child(name: str, case: Path, out: Path, write: int) -> None:
     os._exit(status)
 
 
-def build(case: Path, out: Path) -> int:
+EVERY_REASON = ("geometry", "colour", "depth", "intrinsics", "motion")
+
+
+def build(case: Path, out: Path, allow: tuple[str, ...] = EVERY_REASON) -> int:
     """Build a map as ``avlmaps build`` does, and look whether it is plausible."""
     from avlmaps.cli.build import Build
     from avlmaps.cli.main import _run
 
-    # The seeds are no walk through one room; `avlmaps bench recordings` has the mistakes that are well-formed.
-    given = Build(
-        recording=case, out=out, profile=PROFILE, feature_cache="off", max_bad_share=0.5,
-        allow=("geometry", "colour", "depth", "intrinsics", "motion"),
-    )  # fmt: skip
+    # The seeds that are broken are no walk through one room, so that every reason is allowed of them.
+    given = Build(recording=case, out=out, profile=PROFILE, feature_cache="off", max_bad_share=0.5, allow=allow)  # type: ignore
     status = _run(given)
     return status or look_into_map(out)
 
@@ -160,10 +165,10 @@ def look_into_map(path: Path) -> int:
 def report(lines: list[dict[str, object]]) -> str:
     """Return the counts by verdict and format, and every finding."""
     counts = Counter((str(line["seed"]), str(line["verdict"])) for line in lines)
-    verdicts = ("map", "sentence", "finding")
-    rows = [f"{'format':10}" + "".join(f"{verdict:>10}" for verdict in verdicts)]
-    rows += [f"{s:10}" + "".join(f"{counts[s, v]:10}" for v in verdicts) for s in sorted({s for s, _ in counts})]
-    rows.append(f"{'all':10}" + "".join(f"{sum(n for (_, w), n in counts.items() if w == v):10}" for v in verdicts))
+    verdicts = ("map", "told", "sentence", "finding")
+    rows = [f"{'format':16}" + "".join(f"{verdict:>10}" for verdict in verdicts)]
+    rows += [f"{s:16}" + "".join(f"{counts[s, v]:10}" for v in verdicts) for s in sorted({s for s, _ in counts})]
+    rows.append(f"{'all':16}" + "".join(f"{sum(n for (_, w), n in counts.items() if w == v):10}" for v in verdicts))
     found = [line for line in lines if line["verdict"] == "finding"]
     rows += [f"case {f['case']} ({f['seed']}: {f['done']}): {str(f['text']).strip()[-300:]}" for f in found]
     return "\n".join(rows)
@@ -174,6 +179,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--cases", type=int, default=10_000)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--wrong", type=int, default=1_000, help="cases that are well-formed and wrong")
     parser.add_argument("--out", type=Path, default=Path("fuzz_out"))
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
@@ -181,15 +187,22 @@ def main() -> None:
     lines = [json.loads(line) for line in log.read_text().splitlines()] if log.is_file() else []
     had = {line["case"] for line in lines}
     with tempfile.TemporaryDirectory() as scratch, log.open("a") as stream:
-        seeds = write_seeds(Path(scratch) / "seeds")
-        for number in range(given.first, given.first + given.cases):
-            if number in had:
+        from mistakes import run_mistake  # it needs this module
+
+        here = Path(scratch)
+        seeds = write_seeds(here / "seeds")
+        cases: list[tuple[int | str, Callable[[], dict[str, object]]]] = [
+            *((n, partial(run_case, n, seeds, here)) for n in range(given.first, given.first + given.cases)),
+            *((f"wrong {n}", partial(run_mistake, n, here)) for n in range(given.wrong)),
+        ]
+        for case, run in cases:
+            if case in had:
                 continue
-            lines.append(run_case(number, seeds, Path(scratch)))
+            lines.append(run())
             stream.write(json.dumps(lines[-1]) + "\n")
             stream.flush()
             if lines[-1]["verdict"] == "finding":
-                sys.stderr.write(f"finding: case {number}\n")
+                sys.stderr.write(f"finding: case {case}\n")
     (given.out / "report.txt").write_text(report(lines) + "\n")
     sys.stdout.write(report(lines) + "\n")
     sys.exit(any(line["verdict"] == "finding" for line in lines))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 _TESTS = Path(__file__).parent.parent
-for _folder in ("recordings", "maps", "fuzz"):
+for _folder in (".", "recordings", "maps", "fuzz"):
     if str(_TESTS / _folder) not in sys.path:
         sys.path.insert(0, str(_TESTS / _folder))
 

@@ -1,4 +1,4 @@
-"""A share of the fuzz campaign: no case ends otherwise than in a plausible map or in one sentence."""
+"""A share of the fuzz campaign: cases end in a plausible map or in one sentence, and no map is wrong without a word."""
 
 import sys
 from pathlib import Path
@@ -11,10 +11,12 @@ if sys.platform == "win32":
 sys.path.insert(0, str(Path(__file__).parent))
 
 from campaign import report, run_case
+from mistakes import run_mistake
 from seeds import write_seeds
 
 CASES = 120
 BLOCKS = 4
+MISTAKES = 10
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +33,13 @@ def test_broken_inputs_end_in_a_plausible_map_or_in_one_sentence(
     lines = [run_case(number, seeds, tmp_path) for number in range(block * each, (block + 1) * each)]
     assert not [line for line in lines if line["verdict"] == "finding"], report(lines)
     assert {"map", "sentence"} <= {str(line["verdict"]) for line in lines}
+
+
+@pytest.mark.slow
+def test_a_wrong_recording_is_refused_or_doubted_or_makes_a_right_map(tmp_path: Path) -> None:
+    lines = [run_mistake(number, tmp_path) for number in range(MISTAKES)]
+    assert not [line for line in lines if line["verdict"] == "finding"], report(lines)
+    assert {"told", "sentence"} <= {str(line["verdict"]) for line in lines}
 
 
 def test_a_change_that_cannot_read_what_another_left_does_not_end_the_campaign(
