@@ -35,7 +35,7 @@ def test_a_package_is_installed_by_its_name(tmp_path: Path, monkeypatch: pytest.
 
     installed = Installed()
     monkeypatch.setattr(extras, "__file__", str(tmp_path / "lib" / "avlmaps" / "core" / "extras.py"))
-    monkeypatch.setattr(extras, "distribution", lambda name: installed)
+    monkeypatch.setattr("importlib.metadata.distribution", lambda name: installed)
     assert extras.install_command("ros", "more") == "pip install 'avlmaps[ros]' more"
     for url in ('{"url": "https://example.org/a.zip"}', '{"url": "file:///nowhere"}', "no json", "[]"):
         installed.url = url

@@ -1,6 +1,7 @@
 """The known name that a misspelt one probably means."""
 
 from collections.abc import Callable, Iterable
+from difflib import get_close_matches
 from itertools import islice
 from pathlib import Path
 
@@ -9,8 +10,6 @@ _MOST_COMPARED = 200
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """Return the known name that is spelt most like one, if any comes close."""
-    from difflib import get_close_matches  # which most runs do without
-
     close = get_close_matches(name[:100], list(known)[:_MOST_COMPARED], n=1)
     return close[0] if close else None
 
