@@ -99,5 +99,5 @@ def _write_recording(path: Path) -> None:
         for index in range(4):
             rgb = np.kron(rng.integers(0, 256, (12, 16, 3)), np.ones((5, 5, 1))).astype(np.uint8)
             pose = np.array([[1, 0, 0, 0.3 * index], [0, 0, 1, 0], [0, -1, 0, 1.2], [0, 0, 0, 1]], float)
-            depth_m = np.full((60, 80), 2.0, np.float32)
+            depth_m = np.linspace(1.8, 2.2, 60, dtype=np.float32)[:, None] * np.ones((1, 80), np.float32)
             writer.add(Frame(index, f"{index:06d}", 0.5 * index, rgb, depth_m, pose, rig))
