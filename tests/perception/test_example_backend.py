@@ -95,9 +95,10 @@ def _write_recording(path: Path) -> None:
 
     rng, camera = np.random.default_rng(0), Pinhole(60.0, 60.0, 40.0, 30.0, 80, 60)
     rig = Rig(camera, camera)
+    wall = np.kron(rng.integers(0, 256, (6, 11, 3)), np.ones((10, 10, 1))).astype(np.uint8)
     with RecordingWriter(path, rig, up_in_world=np.array([0.0, 0.0, 1.0])) as writer:
         for index in range(4):
-            rgb = np.kron(rng.integers(0, 256, (12, 16, 3)), np.ones((5, 5, 1))).astype(np.uint8)
+            rgb = wall[:, 9 * index :][:, :80]  # 0.3 m at a distance of 2 m are 9 pixels
             pose = np.array([[1, 0, 0, 0.3 * index], [0, 0, 1, 0], [0, -1, 0, 1.2], [0, 0, 0, 1]], float)
-            depth_m = np.linspace(1.8, 2.2, 60, dtype=np.float32)[:, None] * np.ones((1, 80), np.float32)
+            depth_m = np.linspace(1.99, 2.01, 60, dtype=np.float32)[:, None] * np.ones((1, 80), np.float32)
             writer.add(Frame(index, f"{index:06d}", 0.5 * index, rgb, depth_m, pose, rig))
