@@ -100,5 +100,5 @@ def _write_recording(path: Path) -> None:
         for index in range(4):
             rgb = wall[:, 9 * index :][:, :80]  # 0.3 m at a distance of 2 m are 9 pixels
             pose = np.array([[1, 0, 0, 0.3 * index], [0, 0, 1, 0], [0, -1, 0, 1.2], [0, 0, 0, 1]], float)
-            depth_m = np.linspace(1.99, 2.01, 60, dtype=np.float32)[:, None] * np.ones((1, 80), np.float32)
+            depth_m = np.linspace(1.9, 2.1, 60, dtype=np.float32)[:, None] * np.ones((1, 80), np.float32)
             writer.add(Frame(index, f"{index:06d}", 0.5 * index, rgb, depth_m, pose, rig))
