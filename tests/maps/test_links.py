@@ -111,3 +111,25 @@ def test_links_are_found_at_any_depth_and_files_are_none(tmp_path: Path, elsewhe
     assert linked_folder(tmp_path / "m") is None and linked_folder(tmp_path / "nothing") is None
     (deep / "link").symlink_to(elsewhere)
     assert linked_folder(tmp_path / "m") == deep / "link"
+
+
+@pytest.mark.parametrize("name", ["sounds/dog.wav", "voxels/game.vox", "keyframes/take-2.jpg", "parts/bolt/m8.stl"])
+def test_a_folder_of_somebody_is_no_place_for_a_map(tmp_path: Path, name: str) -> None:
+    (tmp_path / "own" / name).parent.mkdir(parents=True)
+    (tmp_path / "own" / name).write_text("mine")
+    with pytest.raises(MapError, match=r"is there already and is not a map; give another --out, nothing .* touched"):
+        build_map(Walk(6), tmp_path / "own", PROFILE, SETTINGS, progress=False)
+    assert content(tmp_path / "own") == {name: b"mine"}
+
+
+@pytest.mark.parametrize("writer", ["build", "the same build"])
+def test_a_file_that_somebody_put_into_a_map_stays(copied: Path, writer: str) -> None:
+    own = ("sounds/dog.wav", "keyframes/notes.txt", "parts/bolt/m8.stl", "voxels/old-0123456789abcdeg.npy")
+    for name in own:
+        (copied / name).parent.mkdir(parents=True, exist_ok=True)
+        (copied / name).write_text("mine")
+    (copied / "voxels/old-0123456789abcdef.npy").write_text("of a map before")
+    WRITERS[writer](copied)
+    assert all((copied / name).read_text() == "mine" for name in own)
+    assert not (copied / "voxels/old-0123456789abcdef.npy").exists()
+    open_stored(copied, verify=True)

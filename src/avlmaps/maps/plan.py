@@ -1,6 +1,5 @@
 """The plan of a build, and where it stores what it has finished."""
 
-import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +15,7 @@ from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import Checkpoint, F, find_checkpoint, key_of, load_checkpoint, save_checkpoint
 from avlmaps.maps.store.manifest import MapInfo, ModelInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, parse_manifest, read_manifest
+from avlmaps.maps.store.own_files import remove_stages
 from avlmaps.maps.store.reader import PARTS
 from avlmaps.maps.store.writer import is_map_or_free, sweep
 from avlmaps.perception.profiles import Profile
@@ -152,7 +152,7 @@ def claim(plan: Plan, resume: bool, overwrite: bool) -> MapInfo | None:
         sweep(plan.path, there)
         return there
     if not resume:
-        shutil.rmtree(plan.path / PARTS, ignore_errors=True)
+        remove_stages(plan.path / PARTS)
     return None
 
 
@@ -170,7 +170,7 @@ def require_unchanged(plan: Plan, stamp: str) -> None:
     """
     if plan.recording.change_stamp() == stamp:
         return
-    shutil.rmtree(plan.path / PARTS, ignore_errors=True)
+    remove_stages(plan.path / PARTS)
     raise MapError(
         f"Files of {plan.recording.path} were written while it was mapped, so that the map would be of two recordings; "
         "run the same build again when it is complete."

@@ -3,7 +3,6 @@
 Until ``map.json`` is replaced, in one step, the folder is the old map (or none); from then on it is the new one.
 """
 
-import shutil
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from avlmaps.maps.store.array_validation import array_fields
 from avlmaps.maps.store.lock import LOCK
 from avlmaps.maps.store.manifest import MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, write_manifest
+from avlmaps.maps.store.own_files import is_stored_file, remove_stages, stage_folders
 from avlmaps.maps.store.reader import CLIPS, PARTS, STATE
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 
@@ -84,18 +84,18 @@ def _write_files(path: Path, content: MapContent) -> Iterator[tuple[str, FileInf
 def sweep(path: Path, info: MapInfo) -> None:
     """Remove from a map's folder the parts of its build and the files of maps before it.
 
-    Only the folders that avlmaps makes are looked into, and a file that cannot be removed is left.
+    Only files are removed that avlmaps has named, and one that cannot be removed is left.
     """
     kept = {path / file.path for file in info.files.values()}
     for section in SECTIONS:
         for old in (path / section).iterdir():
-            if old not in kept and old.is_file():
+            if old not in kept and is_stored_file(old):
                 with suppress(OSError):
                     old.unlink()
     for unfinished in path.glob(f".{MANIFEST}.*.partial"):
         with suppress(OSError):
             unfinished.unlink()
-    shutil.rmtree(path / PARTS, ignore_errors=True)
+    remove_stages(path / PARTS)
 
 
 def is_map_or_free(path: Path) -> bool:
@@ -105,4 +105,9 @@ def is_map_or_free(path: Path) -> bool:
     if not path.is_dir():
         return False
     names = {entry.name for entry in path.iterdir()}
-    return bool(names & {MANIFEST, PARTS}) or names <= {LOCK, *SECTIONS}
+    if MANIFEST in names or any(stage_folders(path / PARTS)):
+        return True
+    if not names <= {LOCK, PARTS, *SECTIONS}:
+        return False
+    inside = [entry for name in names & {PARTS, *SECTIONS} for entry in (path / name).glob("*")]
+    return all(is_stored_file(entry) for entry in inside)
