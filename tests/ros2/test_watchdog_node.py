@@ -80,8 +80,9 @@ def test_an_operator_who_takes_over_is_left_alone_when_our_heartbeats_end(robot)
     client.send(theirs.bytes)
     assert robot.soon(lambda: bool(robot.rows("replaced")))
     time.sleep(3.0)
-    assert robot.soon(lambda: robot.moves, 5.0)
-    assert not robot.rows("cancel")
+    # On a busy machine the operator's goal may have been reached by now.
+    assert robot.soon(lambda: robot.moves or bool(robot.rows("succeeded")), 5.0)
+    assert not robot.rows("cancel", "cancelled", "aborted")
 
 
 def test_a_killed_driver_without_a_guard_is_stopped_on_the_robot(robot):
