@@ -25,7 +25,7 @@ from training.sounds.augmentation import (
 )
 from training.sounds.clips import mels_of, read_index, read_samples
 from training.sounds.export import write_onnx
-from training.sounds.fit import encode, share_of_rate, steady_noise, targets
+from training.sounds.fit import blend, encode, share_of_rate, steady_noise, targets
 from training.sounds.kinds import NAMES, RECORDED
 from training.sounds.mixtures import Mixtures, Recipe, of_training, stored_mixtures
 from training.sounds.network import SoundNet
@@ -154,12 +154,7 @@ def fit(mixtures: Mixtures, words: Tensor, settings: Settings, check: Path | Non
         losses.sum().backward()
         optimiser.step()
         keep = min(settings.averaging, (1 + step) / (10 + step))
-        with torch.no_grad():
-            for old, new in zip(average.state_dict().values(), net.state_dict().values(), strict=True):
-                if old.is_floating_point():
-                    old.lerp_(new, 1.0 - keep)
-                else:
-                    old.copy_(new)
+        blend(average, net, keep)
         totals += losses.detach().numpy()
         if (step + 1) % REPORTED == 0:
             said = " ".join(f"{value:.3f}" for value in totals / REPORTED)

@@ -171,7 +171,7 @@ class Learner:
         self._optimiser.zero_grad()
         loss.backward()
         self._optimiser.step()
-        _blend(self.average, self.net, min(s.averaging, (1 + self._step) / (10 + self._step)))
+        blend(self.average, self.net, min(s.averaging, (1 + self._step) / (10 + self._step)))
         self._step += 1
         self._total += loss.item()
 
@@ -249,7 +249,8 @@ def _with_fixed_first_layers(net: SoundNet) -> SoundNet:
 
 
 @torch.no_grad()
-def _blend(average: SoundNet, net: SoundNet, keep: float) -> None:
+def blend(average: SoundNet, net: SoundNet, keep: float) -> None:
+    """Move an average of weights towards a network's, keeping a share of it; counters are copied."""
     for old, new in zip(average.state_dict().values(), net.state_dict().values(), strict=True):
         if old.is_floating_point():
             old.lerp_(new, 1.0 - keep)
