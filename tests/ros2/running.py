@@ -101,14 +101,14 @@ class Operator:
 
     def __init__(self, robot: Robot) -> None:
         self.robot, self.client = robot, ActionClient(robot.node, NavigateToPose, "navigate_to_pose")
-        assert self.client.wait_for_server(10.0)
+        assert self.client.wait_for_server(30.0)
         time.sleep(0.5)  # the server must know the client as well, or its first answer is lost
 
     def send(self, x_m: float = -30.0) -> str:
         uuid, goal = uuid4(), NavigateToPose.Goal()
         goal.pose.pose.position.x = x_m
         future = self.client.send_goal_async(goal, goal_uuid=UUID(uuid=list(uuid.bytes)))
-        rclpy.spin_until_future_complete(self.robot.node, future, timeout_sec=10.0)
+        rclpy.spin_until_future_complete(self.robot.node, future, timeout_sec=30.0)
         assert future.result().accepted
         return uuid.hex
 

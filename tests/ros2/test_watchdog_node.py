@@ -33,14 +33,14 @@ class Client:
         self.robot = robot
         self.client = ActionClient(robot.node, NavigateToPose, "navigate_to_pose")
         self.beats = robot.node.create_publisher(String, "avlmaps/heartbeat", 10)
-        assert self.client.wait_for_server(10.0)
+        assert self.client.wait_for_server(30.0)
         assert robot.soon(lambda: self.beats.get_subscription_count() >= 2)  # the log's and the watchdog's
 
     def send(self, uuid: bytes):
         goal = NavigateToPose.Goal()
         goal.pose.pose.position.x = 30.0
         future = self.client.send_goal_async(goal, goal_uuid=UUID(uuid=list(uuid)))
-        rclpy.spin_until_future_complete(self.robot.node, future, timeout_sec=10.0)
+        rclpy.spin_until_future_complete(self.robot.node, future, timeout_sec=30.0)
         assert future.result().accepted
 
     def beat(self, name: str, seconds: float) -> float:
@@ -60,15 +60,15 @@ def test_a_goal_whose_heartbeats_end_is_cancelled_and_an_operators_goal_goes_on(
     ended_s = client.beat(name, 3.0)
     assert robot.moves
     assert not robot.rows("cancel")
-    assert robot.soon(lambda: bool(robot.rows("cancelled")), 5.0)
-    assert robot.soon(lambda: not robot.moves, 3.0)
-    assert 0.5 < robot.last_moved_s() - ended_s < 4.0
+    assert robot.soon(lambda: bool(robot.rows("cancelled")))
+    assert robot.soon(lambda: not robot.moves)
+    assert 0.5 < robot.last_moved_s() - ended_s < 15.0
 
     operators = uuid4()
     client.send(operators.bytes)
     assert robot.soon(lambda: robot.moves)
     time.sleep(3.0)
-    assert robot.soon(lambda: robot.moves, 5.0)
+    assert robot.soon(lambda: robot.moves)
     assert [row["id"] for row in robot.rows("cancelled")] == [uuid.hex]
 
 
@@ -81,7 +81,7 @@ def test_an_operator_who_takes_over_is_left_alone_when_our_heartbeats_end(robot)
     assert robot.soon(lambda: bool(robot.rows("replaced")))
     time.sleep(3.0)
     # On a busy machine the operator's goal may have been reached by now.
-    assert robot.soon(lambda: robot.moves or bool(robot.rows("succeeded")), 5.0)
+    assert robot.soon(lambda: robot.moves or bool(robot.rows("succeeded")))
     assert not robot.rows("cancel", "cancelled", "aborted")
 
 
@@ -93,5 +93,5 @@ def test_a_killed_driver_without_a_guard_is_stopped_on_the_robot(robot):
     process.kill()
     killed_s = time.time()
     process.wait()
-    assert robot.soon(lambda: not robot.moves, 10.0)
-    assert robot.last_moved_s() - killed_s < 5.0
+    assert robot.soon(lambda: not robot.moves)
+    assert robot.last_moved_s() - killed_s < 15.0
