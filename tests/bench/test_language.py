@@ -12,7 +12,7 @@ REACHED = {
     "controls": (33, 0), "manager": (35, 0), "dictated": (37, 0), "elderly": (34, 1),
     "abroad": (114, 4), "dictation": (114, 6), "guests": (111, 4), "warehouse": (116, 4),
     "ward": (37, 0), "depot": (38, 0), "tenner": (36, 1), "stack": (37, 0),
-    "landlady": (38, 0),
+    "landlady": (38, 0), "signals": (57, 0), "concierge": (57, 0), "director": (55, 0),
 }  # fmt: skip
 
 

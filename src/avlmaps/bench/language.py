@@ -225,7 +225,11 @@ def row_of(name: str, judged: Sequence[Judged]) -> list[str]:
     found = counts(judged)
     driven, rows = dangerous(judged)
     shares = (_share(found[outcome], len(judged)) for outcome in OUTCOMES)
-    return [name, str(len(judged)), *shares, f"{driven} of {rows}" if rows else "-"]
+    return [name, str(len(judged)), *shares, _driven(driven, rows)]
+
+
+def _driven(driven: int, rows: int) -> str:
+    return f"{driven} of {rows}" if rows else "-"
 
 
 def _share(hits: int, count: int) -> str:
@@ -252,7 +256,7 @@ def shipped(name: str) -> list[Row]:
 
 def run() -> dict[str, dict[str, list[Any]]]:
     """Return two tables: counts at the first use of each list, and counts now, when the lists are development lists."""
-    columns = ["list", "sentences", *OUTCOMES]
+    columns = ["list", "sentences", *OUTCOMES, "dangers driven"]
     first, now = [], []
     parts = {"commands": False, "questions": True}
     at_first_use: dict[str, Counter[str]] = {}  # each round met another parser, so they are not added up
@@ -262,15 +266,16 @@ def run() -> dict[str, dict[str, list[Any]]]:
             continue  # sealed, not yet used
         for part, at_first in seal["first use"].items():
             at_first_use.setdefault(f"{seal['round']}, {part}", Counter()).update(at_first)
-            first.append(_counted(f"{name}, {part}", at_first))
+            at_risk = seal.get("dangers at first use") if part == "commands" else None
+            first.append([*_counted(f"{name}, {part}", at_first), _driven(*at_risk) if at_risk else "-"])
         judged = [judge(row) for row in shipped(name)]
         every += judged
         now += [row_of(f"{name}, {part}", these) for part, these in _by_part(judged, parts).items() if these]
-    first += [_counted(name, count) for name, count in at_first_use.items()]
+    first += [[*_counted(name, count), "-"] for name, count in at_first_use.items()]
     now += [row_of(f"all, {part}", these) for part, these in _by_part(every, parts).items()]
     return {
         "blind, at first use": {"columns": columns, "rows": first},
-        "the same lists now (development)": {"columns": [*columns, "dangers driven"], "rows": now},
+        "the same lists now (development)": {"columns": columns, "rows": now},
     }
 
 

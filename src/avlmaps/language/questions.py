@@ -17,7 +17,7 @@ from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.reader import Read, learned_reader
 from avlmaps.language.learned.unmet import unmet_by
 from avlmaps.language.list_questions import SUPPORTED
-from avlmaps.language.names import is_entry, sounds_like
+from avlmaps.language.names import is_entry, is_known, sounds_like
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.word_classes import load_word_classes
 
@@ -30,6 +30,9 @@ _ACTORS = frozenset({
     "i", "we", "one", "you", "he", "she", "they", "to", "us", "someone",
     "somebody", "can", "could", "may", "might", "should",
 })  # fmt: skip
+_MODALS = frozenset({"can", "could", "may", "might", "should", "would", "does", "did", "do", "will"})
+_OWN = dict.fromkeys(("his", "her", "their", "our", "your", "its"), "my")
+_LONGEST_ACTOR = 3  # words of who does it: "an old lady"
 _ARTICLES = frozenset({"the", "a", "an"})
 
 
@@ -116,7 +119,7 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: Limits) -> AskedSen
             raise QueryError(file.question)
         raise QueryError(f"A map cannot answer this. It answers {SUPPORTED}; ask it like: {_EXAMPLE}.")
     use = use_in(sentence.text)
-    if reads[0].is_purpose and use is not None:
+    if use is not None and (reads[0].is_purpose or _names_nothing(reads[0])):
         return _put_right(_for_use(sentence, use), sentence)
     plain = [read for read in reads if isinstance(read.meaning, Inquiry)]
     if reads[0].is_purpose:  # no purpose is said, so that this was none of the readings
@@ -145,10 +148,19 @@ def _likely(reads: Sequence[Read], sentence: Sentence, limits: Limits) -> Inquir
 
 def use_in(text: str) -> str | None:
     """Return the longest purpose that a sentence speaks of and that things are known to serve: "wash my hands"."""
-    words = re.findall(r"[a-z]+", text.lower())
+    words = [_OWN.get(word, word) for word in re.findall(r"[a-z]+", text.lower())]
     doing = [" ".join(words[at:]) + " " for at in range(1, len(words)) if words[at - 1] in _ACTORS]
+    if words[:1] == ["where"] and words[1:2] and words[1] in _MODALS:  # "where might a lady sit down?"
+        doing += [" ".join(words[at:]) + " " for at in range(3, min(len(words), 3 + _LONGEST_ACTOR))]
     uses = load_word_classes().lists["uses"]
     return max((use for use in uses if any(one.startswith(f"{use} ") for one in doing)), key=len, default=None)
+
+
+def _names_nothing(read: Read) -> bool:
+    """Return whether what a reading seeks is no name that is known: "hero wash"."""
+    sought = read.meaning.of if isinstance(read.meaning, Inquiry) else ()
+    named = [one for one in sought if one.kind in (Kind.OBJECT, Kind.AREA)]
+    return bool(named) and not any(is_known(one.name) for one in named)
 
 
 def _for_use(sentence: Sentence, use: str) -> Inquiry:

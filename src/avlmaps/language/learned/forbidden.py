@@ -5,6 +5,7 @@ from itertools import pairwise
 
 from avlmaps.language import lexer
 from avlmaps.language.intents import Clarify, Reason, Refuse
+from avlmaps.language.learned.accounted import circumstance, runs_down
 from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.said import BREAKS, HEARD, LOOKS, PREPOSITIONS, TURNS, Said, words
 from avlmaps.language.lexer import Token
@@ -27,7 +28,7 @@ def forbidden(tokens: Sequence[Token]) -> Clarify | Refuse | None:
     They are signs of numbers, dangers that the robot should not see, walls to drive through, and questions.
     """
     said = Said(tokens)
-    if said.spans("unsafe") or _through(said):
+    if said.spans("unsafe") or _through(said) or runs_down(said):
         return Refuse(Reason.HARM)
     if said.spans("bans") or any(_ends_with(said, end) for _, end in said.spans("cancels")):
         return Refuse(Reason.NEGATION)
@@ -36,7 +37,7 @@ def forbidden(tokens: Sequence[Token]) -> Clarify | Refuse | None:
         return Refuse(Reason.CONDITION)
     if said.spans("risks") or said.spans("questions"):
         return Refuse(Reason.QUESTION)
-    return _timed(said) or _signed(said) or _scaled(said)
+    return circumstance(said) or _timed(said) or _signed(said) or _scaled(said)
 
 
 def is_stop(tokens: Sequence[Token]) -> bool:

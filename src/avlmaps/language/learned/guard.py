@@ -22,6 +22,7 @@ from avlmaps.language.intents import (
     Wait,
     on_targets,
 )  # fmt: skip
+from avlmaps.language.learned.accounted import has_strange_words
 from avlmaps.language.learned.decision import Weighed, is_doubtful
 from avlmaps.language.learned.reader import Read
 from avlmaps.language.learned.unmet import unmet
@@ -146,6 +147,7 @@ def weighed(read: Read, guard: Guard) -> Weighed:
         return Weighed((turned,), read.probability)
     intents = turned
     doubtful = is_doubtful(guard.tokens, read.used, waits=any(isinstance(one, Wait) for one in intents))
+    doubtful = doubtful or has_strange_words(guard.tokens, read.used)
     return Weighed(intents, read.probability, doubtful, tuple(dict.fromkeys(guard.notes)))
 
 

@@ -59,6 +59,8 @@ def words() -> Words:
         "unsafe",
         "risks",
         "questions",
+        "times",
+        "signals",
     )
     phrases: dict[str, dict[str, list[tuple[str, ...]]]] = {name: {} for name in classes}
     for name in classes:

@@ -29,6 +29,7 @@ from avlmaps.language.intents import (
     Turn,
     VisitEach,
 )  # fmt: skip
+from avlmaps.language.learned.accounted import unaccounted
 from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.said import BREAKS, DETERMINERS, HEARD, LOOKS, PREPOSITIONS, Claimed, Said, words
 from avlmaps.language.learned.ways import directions
@@ -149,8 +150,10 @@ def _through(said: Claimed) -> Clarify | None:
 
 
 def _edges(said: Claimed) -> Clarify | None:
-    """Return the question for a place behind a wall or a window: the map ends there."""
+    """Return the question for a place behind a wall or a window: the map ends there; and for the end of a room."""
     for one in said.steps:
+        if isinstance(one, Beside) and one.of.kind is Kind.AREA and ("end", "of") in pairwise(said.texts):
+            return Clarify(f"What is at the end of the {one.of.name}? Name it.")
         if isinstance(one, Beside) and one.side is Side.BEHIND and one.of.name.split()[-1:]:
             head = one.of.name.split()[-1]
             if one.of.kind is Kind.OBJECT and head in words().lists["edges"]:
@@ -400,7 +403,7 @@ def _has_unit(tokens: list[Token], at: int) -> bool:
 
 _RULES: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
     _away, _picked, _leaving, _outside, _through, _edges, _no_thing, _excluded, _ways, _superlatives, _nameless,
-    _unread, _unheard, _amounts, _sides,
+    _unread, _unheard, _amounts, _sides, unaccounted,
 )  # fmt: skip
 
 
@@ -414,6 +417,8 @@ def unmet_by(tokens: Sequence[Token], inquiry: Inquiry, used: frozenset[int]) ->
     if Said(tokens).spans("risks"):
         return "A map cannot judge what is safe or allowed; ask where things and sounds are."
     said = Claimed(tokens, tuple(Go(target) for target in inquiry.of), used)
+    if said.texts[:1] in (("which",), ("what",)) and words().lists["persons"] & set(said.texts[1:3]):
+        return "A map does not know who is where; ask where things are, or where somebody was heard."
     if _away(said) is not None:
         return "A map finds what is near something, not what is far from it; say what it is near."
     if _outside(said) is not None:
