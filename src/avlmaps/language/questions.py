@@ -1,7 +1,7 @@
 """From a sentence to a question for the map: where something is, how many there are, whether there is one."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from avlmaps.core.errors import QueryError
@@ -31,7 +31,7 @@ _ACTORS = frozenset({
     "somebody", "can", "could", "may", "might", "should",
 })  # fmt: skip
 _MODALS = frozenset({"can", "could", "may", "might", "should", "would", "does", "did", "do", "will"})
-_OWN = dict.fromkeys(("his", "her", "their", "our", "your", "its"), "my")
+_OWN: Mapping[str, str] = dict.fromkeys(("his", "her", "their", "our", "your", "its"), "my")
 _LONGEST_ACTOR = 3  # words of who does it: "an old lady"
 _ARTICLES = frozenset({"the", "a", "an"})
 
