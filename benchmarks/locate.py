@@ -16,8 +16,8 @@ from avlmaps.bench.locate import MapOfPictures  # noqa: E402
 from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
 from avlmaps.maps.keyframes.describe import SeenKeyframe, stack_keyframes  # noqa: E402
 from avlmaps.perception.embedded.matching import RATIO, match_mutual  # noqa: E402
+from avlmaps.perception.encoders import Encoders  # noqa: E402
 from avlmaps.perception.pose import estimate_pose  # noqa: E402
-from avlmaps.perception.profiles import profile  # noqa: E402
 from avlmaps.query.locate import alike, locate  # noqa: E402
 
 CAMERA = Pinhole(525.0, 525.0, 320.0, 240.0, 640, 480)
@@ -43,17 +43,17 @@ def picture(wall: np.ndarray, shift_px: int, rng: np.random.Generator) -> np.nda
 
 def made_map(walls: list[np.ndarray], rng: np.random.Generator) -> MapOfPictures:
     """Return a map with one keyframe in front of each wall."""
-    used = profile("embedded")
+    used = Encoders.named("embedded")
     pictures = [picture(wall, 0, rng) for wall in walls]
-    local = [used.local_encoder().encode(rgb) for rgb in pictures]
-    state = used.place_encoder().fit(local[:64], rng)
+    local = [used.local.encode(rgb) for rgb in pictures]
+    state = used.place.fit(local[:64], rng)
     seen = []
     for number, (rgb, one) in enumerate(zip(pictures, local, strict=True)):
         pose = np.eye(4)
         pose[0, 3] = 10.0 * number
         ray = np.column_stack([(one.xy - (CAMERA.cx, CAMERA.cy)) / CAMERA.fx, np.ones(len(one.xy))])
         points = (DEPTH_M * ray + pose[:3, 3]).astype(np.float32)
-        place = used.place_encoder().encode(rgb, one, state)
+        place = used.place.encode(rgb, one, state)
         none = np.zeros(0, np.float32)
         seen.append(SeenKeyframe(float(number), pose, points.mean(axis=0), none, place, one, points, b""))
     return MapOfPictures(stack_keyframes(seen), state, used, Rig(CAMERA, CAMERA))
@@ -95,10 +95,10 @@ def measure(stored: MapOfPictures, photos: list[np.ndarray]) -> dict[str, float]
         taken.setdefault(name, []).append(1e3 * spent)
         return result
 
-    keyframes, used = stored.keyframes, stored.profile
+    keyframes, used = stored.keyframes, stored.encoders
     for rgb in photos:
-        local = timed("RootSIFT", used.local_encoder().encode, rgb)
-        place = timed("VLAD", used.place_encoder().encode, rgb, local, stored.place_state)
+        local = timed("RootSIFT", used.local.encode, rgb)
+        place = timed("VLAD", used.place.encode, rgb, local, stored.place_state)
         best = int(timed("retrieval", alike, keyframes, place, 5)[0])
         rows = slice(keyframes.offsets[best], keyframes.offsets[best + 1])
         other = keyframes.descriptors[rows].astype(np.float32)

@@ -33,7 +33,7 @@ from avlmaps.maps.store.manifest import Box  # noqa: E402
 from avlmaps.maps.store.writer import MapContent, write_map  # noqa: E402
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels  # noqa: E402
 from avlmaps.perception.embedded.codes import features_of  # noqa: E402
-from avlmaps.perception.profiles import profile  # noqa: E402
+from avlmaps.perception.encoders import Encoders  # noqa: E402
 from avlmaps.query.avlmap import AVLMap  # noqa: E402
 from avlmaps.recordings.audio import Sound, write_flac  # noqa: E402
 from avlmaps.recordings.types import Frame, Recording  # noqa: E402
@@ -73,7 +73,7 @@ def made_up_map(path: Path, voxels: int, rng: np.random.Generator) -> Path:
     """Write a map of that many voxels."""
     stored = build_map(_Corner(), path, "embedded", BuildSettings(voxel_size_m=VOXEL_SIZE_M), progress=False)
     index = building(voxels, rng)
-    encoder: Any = profile("embedded").pixel_encoder()
+    encoder: Any = Encoders.named("embedded").pixels
     names = list(encoder.names)
     # Blocks of 1.2 m hold one thing each, the lowest layer is floor.
     block = (index[:, 0] // 24 * 7919 + index[:, 1] // 24 * 104729) % len(THINGS)
@@ -105,7 +105,7 @@ def made_up_map(path: Path, voxels: int, rng: np.random.Generator) -> Path:
 
 def _views(count: int, side_m: float, like: Keyframes, rng: np.random.Generator) -> Keyframes:
     """Return views along a walk; each part of the storey is a room."""
-    encoder: Any = profile("embedded").view_encoder()
+    encoder: Any = Encoders.named("embedded").views
     rooms = np.asarray(encoder.encode_words(list(ROOMS)), np.float32)
     walk = np.abs((np.cumsum(rng.normal(0, 0.4, (count, 2)), axis=0) + side_m / 2) % (2 * side_m) - side_m)
     poses = np.tile(np.eye(4), (count, 1, 1))
@@ -123,7 +123,7 @@ def _views(count: int, side_m: float, like: Keyframes, rng: np.random.Generator)
 
 
 def _sounds(count: int, side_m: float, rng: np.random.Generator) -> HeardSounds:
-    encoder: Any = profile("embedded").sound_encoder()
+    encoder: Any = Encoders.named("embedded").sounds
     features = [
         np.asarray(encoder.encode(Sound(rng.normal(0, 0.1, 32000).astype(np.float32), 16000)), np.float32)
         for _ in range(count)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings
     from avlmaps.navigate.bodies import BodyShape
     from avlmaps.navigate.skills import Robot
+    from avlmaps.perception.encoders import Encoders
     from avlmaps.perception.profiles import Profile, profile
     from avlmaps.query.answer import Answer
     from avlmaps.query.avlmap import AVLMap, QuerySettings
@@ -53,6 +54,7 @@ _HOMES = {
     "BackendError": "avlmaps.core.errors",
     "BodyShape": "avlmaps.navigate.bodies",
     "BuildSettings": "avlmaps.maps.settings",
+    "Encoders": "avlmaps.perception.encoders",
     "Frame": "avlmaps.recordings.types",
     "FrameSettings": "avlmaps.maps.settings",
     "FusionSettings": "avlmaps.maps.settings",
@@ -100,6 +102,7 @@ __all__ = [
     "BackendError",
     "BodyShape",
     "BuildSettings",
+    "Encoders",
     "Frame",
     "FrameSettings",
     "FusionSettings",

@@ -1,5 +1,6 @@
 """The functions of the package's face that join several rooms: from a recording to a map that answers queries."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -7,6 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from avlmaps.maps.settings import BuildSettings
+    from avlmaps.perception.encoders import Encoders
     from avlmaps.perception.profiles import Profile
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.recordings.types import Recording
@@ -18,6 +20,7 @@ def build_map(
     profile: "str | Profile" = "embedded",
     settings: "BuildSettings | None" = None,
     *,
+    encoders: "Encoders | None" = None,
     allow: "Sequence[str]" = (),
     resume: bool = True,
     overwrite: bool = False,
@@ -33,6 +36,7 @@ def build_map(
         path: folder of the map, by custom ``NAME.avlmap``.
         profile: which models perceive: ``embedded``, ``foundation``, ``paper`` or one of your own.
         settings: everything else about the build; the defaults if None.
+        encoders: the models that perceive, instead of a profile: objects or names.
         allow: names of reasons for which a recording that contradicts itself is not refused (``--allow``).
         resume: continue with what a stopped build had finished; otherwise begin again.
         overwrite: replace a finished map there that came from another recording, or with other settings.
@@ -50,17 +54,24 @@ def build_map(
 
     opened = open_recording(recording) if isinstance(recording, str | Path) else recording
     stored = build(
-        opened, path, profile, settings or DEFAULTS, allow=allow, resume=resume, overwrite=overwrite, progress=progress
+        opened, path, encoders or profile, settings or DEFAULTS, allow=allow, resume=resume, overwrite=overwrite, progress=progress
     )  # fmt: skip
-    return AVLMap(stored)
+    return AVLMap(stored if encoders is None else replace(stored, encoders=encoders.over(stored.encoders)))
 
 
-def open_map(path: str | Path) -> "AVLMap":
+def open_map(path: str | Path, *, encoders: "Encoders | None" = None) -> "AVLMap":
     """Open a map's folder; its large arrays stay on disk until they are used.
 
+    Args:
+        path: the folder.
+        encoders: the models to ask with, where the map was made with objects; by default, and for modules that
+            are left out, those that the map names. What needs none (points, colours, places of sounds) is there without.
+
     Raises:
-        MapError: it is not a map, or damaged, or of another schema or profile.
+        MapError: it is not a map, or damaged, or of another schema.
     """
+    from avlmaps.maps.store.reader import open_stored
     from avlmaps.query.avlmap import AVLMap
 
-    return AVLMap.open(path)
+    stored = open_stored(path)
+    return AVLMap(stored if encoders is None else replace(stored, encoders=encoders.over(stored.encoders)))

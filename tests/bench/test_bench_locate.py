@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from avlmaps.bench.locate import COLUMNS, errors_of, foreign_errors, map_of, run
-from avlmaps.perception.profiles import profile
+from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.subset import Subset
 from helpers.picture_room import RoomWalk
@@ -34,7 +34,7 @@ def test_photos_of_other_places_can_be_given() -> None:
 def test_half_of_the_red_kitchen_locates_the_other_half(shared_data: Path) -> None:
     """The issue's figures, in the first half of the walk; `avlmaps bench locate` asks everywhere."""
     recording = open_recording(shared_data / "data" / "redkitchen")
-    stored = map_of(Subset(recording, np.arange(0, 250, 2)), profile("embedded"), np.random.default_rng(0))
+    stored = map_of(Subset(recording, np.arange(0, 250, 2)), Encoders.named("embedded"), np.random.default_rng(0))
     asked = np.arange(1, 250, 12)
     errors = errors_of(stored, recording, asked, 0)
     assert np.median(errors.cm) <= 1.0
@@ -47,7 +47,7 @@ def test_half_of_the_red_kitchen_locates_the_other_half(shared_data: Path) -> No
 @pytest.mark.shared
 def test_the_depth_cameras_intrinsics_do_not_spoil_the_red_kitchen(shared_data: Path) -> None:
     recording = open_recording(shared_data / "data" / "redkitchen")
-    stored = map_of(Subset(recording, np.arange(100, 200, 2)), profile("embedded"), np.random.default_rng(0))
+    stored = map_of(Subset(recording, np.arange(100, 200, 2)), Encoders.named("embedded"), np.random.default_rng(0))
     errors = errors_of(stored, recording, np.arange(105, 196, 10), 0, camera=recording.rig.depth)
     assert np.median(errors.cm) <= 1.5
     assert (errors.cm <= 5.0).all()

@@ -62,7 +62,7 @@ class AskedMap:
     def stored(self):
         encoder = SimpleNamespace(vocabulary=("chair", "bed", "toilet", "wall"), encode_words=codes_of)
         return SimpleNamespace(
-            profile=SimpleNamespace(pixel_encoder=lambda: encoder),
+            encoders=SimpleNamespace(pixels=encoder),
             require_model=lambda kind: None,
             voxels=Features(np.repeat(codes_of(list(self.names)), 512, axis=0)),
         )

@@ -51,7 +51,7 @@ def room_map(walk: Path) -> Path:
 
 def asked(word: str, encoder: object) -> Question | None:
     stored = SimpleNamespace(
-        info=SimpleNamespace(models={"pixels": None}, doubts=()), profile=SimpleNamespace(pixel_encoder=lambda: encoder)
+        info=SimpleNamespace(models={"pixels": None}, doubts=()), encoders=SimpleNamespace(pixels=encoder)
     )
     return thing_alone(Asked(sentence=word), SimpleNamespace(stored=stored))  # pyright: ignore[reportArgumentType]
 

@@ -92,7 +92,7 @@ def test_the_map_is_whole_and_tells_what_it_is(imported: StoredMap, arrays: dict
     counts = stored.info.counts
     assert (counts.frames, counts.keyframes, counts.sounds) == (14, 14, 0)
     assert len(arrays["grid_pos"]) < counts.voxels < 1.2 * len(arrays["grid_pos"])
-    assert stored.profile.name == "paper" and stored.grid.voxel_size_m == CELL_M
+    assert stored.encoders.name == "paper" and stored.grid.voxel_size_m == CELL_M
     assert {kind: (m.id, m.dim, m.checksum) for kind, m in stored.info.models.items()} == {
         "pixels": ("demo_e200.ckpt", 512, ""),
         "views": ("openai/clip-vit-large-patch14", 768, ""),

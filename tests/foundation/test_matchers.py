@@ -27,6 +27,7 @@ from avlmaps.core.registry import Kind, load
 from avlmaps.maps.build import build_map
 from avlmaps.maps.store.reader import open_stored
 from avlmaps.perception.conformance import check
+from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.foundation import aliked, disk
 from avlmaps.perception.foundation.lightglue import LightGlue
 from avlmaps.perception.models.settings import ModelSettings, using_models
@@ -371,7 +372,7 @@ def test_a_keyframe_is_located_where_it_was_taken(
     monkeypatch.setattr(disk, "MAX_KEYPOINTS", 250)
     monkeypatch.setattr(aliked, "MAX_KEYPOINTS", 250)
     walk = RoomWalk(frames=4)
-    stored = map_of(walk, Profile("test", local=local, matcher=matcher, place=place), np.random.default_rng(0))
+    stored = map_of(walk, Encoders("test", local=local, matcher=matcher, place=place), np.random.default_rng(0))
     assert len(stored.keyframes) >= 2 and stored.place_state == {}
     assert len(stored.keyframes.score) == len(stored.keyframes.xy)
     frame = walk.frame(2)

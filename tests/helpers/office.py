@@ -41,7 +41,7 @@ def write_office(folder: Path) -> Path:
     path = folder / "office.avlmap"
     recording = open_recording(write_walk(folder / "rec"))
     stored = build_map(recording, path, "embedded", BuildSettings(VOXEL_M), progress=False)
-    pixels: Any = stored.profile.pixel_encoder()
+    pixels: Any = stored.encoders.pixels
     index, which = _voxels()
     kinds = sorted({*names(), "floor", "wall"})
     likely = np.full((len(kinds), len(pixels.names)), 0.02 / len(pixels.names), np.float32)
@@ -68,7 +68,7 @@ def write_office(folder: Path) -> Path:
     )
     content = MapContent(
         voxels,
-        _keyframes(stored.keyframes, stored.profile.view_encoder()),
+        _keyframes(stored.keyframes, stored.encoders.views),
         stored.place_state,
         stored.sounds,
         path / "sounds",

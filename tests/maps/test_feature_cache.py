@@ -27,8 +27,9 @@ from avlmaps.perception.cache.cached_encoders import (
 )
 from avlmaps.perception.cache.feature_store import CacheSettings, FeatureStore, key_of
 from avlmaps.perception.conformance import check
+from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models.settings import ModelSettings, using_models
-from avlmaps.perception.profiles import Profile, profile
+from avlmaps.perception.profiles import Profile
 from avlmaps.perception.protocols import (
     BatchPixelEncoder,
     FrameSoundEncoder,
@@ -303,23 +304,23 @@ def test_keypoints_come_back_as_they_were(tmp_path: Path, size: tuple[int, int],
 
 
 def test_encoders_keep_their_protocols_whatever_way_they_are_asked(tmp_path: Path) -> None:
-    used = with_cache(profile("embedded"), CacheSettings(tmp_path))
+    used = with_cache(Encoders.named("embedded"), CacheSettings(tmp_path))
     encoders = {
-        BatchPixelEncoder: used.pixel_encoder(),
-        ViewEncoder: used.view_encoder(),
-        SoundEncoder: used.sound_encoder(),
-        LocalEncoder: used.local_encoder(),
-        PlaceEncoder: used.place_encoder(),
+        BatchPixelEncoder: used.pixels,
+        ViewEncoder: used.views,
+        SoundEncoder: used.sounds,
+        LocalEncoder: used.local,
+        PlaceEncoder: used.place,
     }
     for protocol, encoder in encoders.items():
         assert isinstance(encoder, protocol)
         for name in getattr(protocol, "__protocol_attrs__", ()) or dir(protocol):
             if not name.startswith("_"):
                 inspect.getattr_static(encoder, name)  # as isinstance asks from Python 3.12 on
-    assert not isinstance(used.sound_encoder(), FrameSoundEncoder)
-    check(Kind.SOUNDS, used.sound_encoder())
-    check(Kind.VIEWS, used.view_encoder())
-    check(Kind.PLACE, used.place_encoder())
+    assert not isinstance(used.sounds, FrameSoundEncoder)
+    check(Kind.SOUNDS, used.sounds)
+    check(Kind.VIEWS, used.views)
+    check(Kind.PLACE, used.place)
 
 
 def test_an_encoder_of_steps_stays_one(tmp_path: Path) -> None:
@@ -391,8 +392,9 @@ def test_the_bar_says_how_many_came_from_the_cache(
 
 
 def test_the_embedded_profile_is_left_as_it_is() -> None:
-    assert with_cache(profile("embedded"), CacheSettings()) is profile("embedded")
-    assert cache_note(profile("embedded"), Kind.PIXELS) == ""
+    used = Encoders.named("embedded")
+    assert with_cache(used, CacheSettings()) is used
+    assert cache_note(used, Kind.PIXELS) == ""
 
 
 def test_a_stopped_build_goes_on_from_the_cache(torch_like: Profile, tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from avlmaps.maps.keyframes.describe import (
     stack_keyframes,
 )
 from avlmaps.maps.keyframes.keypoint_depth import lift_keypoints, middle_of_view
-from avlmaps.perception.profiles import Profile, profile
+from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.registration import depth_in_colour
 from avlmaps.recordings.types import Frame
@@ -208,7 +208,7 @@ def test_what_is_kept_of_a_keyframe_fits_together() -> None:
     keyframes, state = perceive_keyframes(
         recording,
         chosen,
-        profile("colours"),
+        Encoders.named("colours"),
         np.random.default_rng(0),
         settings=KeyframeSettings(thumbnail_width_px=64),
     )
@@ -231,7 +231,7 @@ def test_what_is_kept_of_a_keyframe_fits_together() -> None:
 def test_a_profile_with_views_gives_area_features_and_one_without_keypoints_none() -> None:
     register(Backend(Kind.VIEWS, "brightness", f"{__name__}:Brightness"))
     frame = RoomWalk().frame(0)
-    seen = describe_keyframe(frame, Profile("bare", views="brightness"), {})
+    seen = describe_keyframe(frame, Encoders("bare", views="brightness"), {})
     keyframes = stack_keyframes([seen, seen])
     np.testing.assert_allclose(keyframes.view, [[frame.rgb.mean(), 1.0]] * 2, rtol=1e-5)
     assert keyframes.place.shape == (2, 0)
@@ -239,7 +239,7 @@ def test_a_profile_with_views_gives_area_features_and_one_without_keypoints_none
 
 
 def test_no_keyframes_are_a_map_without_pictures() -> None:
-    keyframes, _ = perceive_keyframes(RoomWalk(), [], profile("colours"), np.random.default_rng(0))
+    keyframes, _ = perceive_keyframes(RoomWalk(), [], Encoders.named("colours"), np.random.default_rng(0))
     assert len(keyframes) == 0
     assert keyframes.world_from_camera.shape == (0, 4, 4)
     np.testing.assert_array_equal(keyframes.offsets, [0])
@@ -247,11 +247,11 @@ def test_no_keyframes_are_a_map_without_pictures() -> None:
 
 def test_keypoints_that_are_known_already_are_not_looked_for_again() -> None:
     """Resumed and undisturbed builds differ in which keypoints are at hand; the map must not."""
-    recording, used = RoomWalk(), profile("colours")
+    recording, used = RoomWalk(), Encoders.named("colours")
     frame = recording.frame(0)
-    state = used.place_encoder().fit([used.local_encoder().encode(frame.rgb)], np.random.default_rng(0))
+    state = used.place.fit([used.local.encode(frame.rgb)], np.random.default_rng(0))
     fresh = describe_keyframe(frame, used, state)
-    given_them = describe_keyframe(frame, used, state, local=used.local_encoder().encode(frame.rgb))
+    given_them = describe_keyframe(frame, used, state, local=used.local.encode(frame.rgb))
     np.testing.assert_array_equal(fresh.local.descriptors, given_them.local.descriptors)
     np.testing.assert_array_equal(fresh.place, given_them.place)
     np.testing.assert_array_equal(fresh.points_world, given_them.points_world)

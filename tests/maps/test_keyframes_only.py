@@ -16,7 +16,7 @@ from avlmaps.maps.keyframes.describe import KeyframeSettings, select_keyframes
 from avlmaps.maps.partial_maps import encoded_frames, fusion_key
 from avlmaps.maps.settings import FrameSettings
 from avlmaps.perception.cache.feature_store import CacheSettings
-from avlmaps.perception.profiles import Profile, profile
+from avlmaps.perception.encoders import Encoders
 
 register_fakes()
 SEEN: list[int] = []
@@ -31,7 +31,7 @@ class SlowPixels(Pixels):
 
 for name, only in (("every-frame", False), ("keyframes-alone", True)):
     register(Backend(Kind.PIXELS, name, "test_keyframes_only:SlowPixels", keyframes_only=only))
-ALONE, EVERY = (Profile(name=name, pixels=name) for name in ("keyframes-alone", "every-frame"))
+ALONE, EVERY = (Encoders(name, pixels=name) for name in ("keyframes-alone", "every-frame"))
 
 
 @pytest.fixture(autouse=True)
@@ -40,10 +40,10 @@ def nothing_seen() -> None:
 
 
 def test_the_light_profile_is_such_a_one_and_others_are_not() -> None:
-    assert profile("light").keyframes_only
-    assert not profile("embedded").keyframes_only
-    assert not profile("light").choosing({Kind.PIXELS: "colours"}).keyframes_only
-    assert profile("embedded").choosing({Kind.PIXELS: "light"}).keyframes_only
+    assert Encoders.named("light").keyframes_only
+    assert not Encoders.named("embedded").keyframes_only
+    assert not Encoders.named("light", pixels="colours").keyframes_only
+    assert Encoders.named("embedded", pixels="light").keyframes_only
 
 
 def test_only_keyframes_are_encoded_and_every_frame_adds_its_surfaces(tmp_path: Path) -> None:

@@ -199,7 +199,8 @@ def test_what_an_encoder_raises_ends_the_build_with_its_sentence(tmp_path: Path)
         list(encode_frames(Walk(6), [range(6)], Broken()))
 
 
-def test_a_profile_of_ones_own_is_known_after_a_build() -> None:
+def test_a_profile_of_ones_own_is_itself_and_nobody_elses() -> None:
     own = Profile("of-my-own", pixels="fake")
     assert profile(own) is own
-    assert profile("of-my-own") is own
+    with pytest.raises(BackendError, match="no profile called 'of-my-own'"):
+        profile("of-my-own")

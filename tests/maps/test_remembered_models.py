@@ -57,9 +57,9 @@ def test_a_map_opens_with_the_model_that_was_chosen(tmp_path: Path) -> None:
     build_map(Walk(), tmp_path / "map", used_with("chosen@org/large"), SETTINGS)
     stored = open_stored(tmp_path / "map")
     assert stored.info.models["pixels"].backend == "chosen@org/large"
-    assert stored.profile.name == PROFILE
-    assert stored.profile.pixels == "chosen@org/large"
-    assert stored.profile.pixel_encoder().card.id == "org/large"
+    assert stored.encoders.name == PROFILE
+    assert stored.encoders.name_of(Kind.PIXELS) == "chosen@org/large"
+    assert stored.encoders.pixels.card.id == "org/large"
     stored.require_model(Kind.PIXELS)
 
 
@@ -67,7 +67,7 @@ def test_the_default_model_is_remembered_by_name_so_that_it_may_change(tmp_path:
     build_map(Walk(), tmp_path / "map", used_with("chosen"), SETTINGS)
     register(Backend(Kind.PIXELS, "chosen", f"{__name__}:Chosen", model="org/newer"))
     stored = open_stored(tmp_path / "map")
-    assert stored.profile.pixels == "chosen@org/small"
+    assert stored.encoders.name_of(Kind.PIXELS) == "chosen@org/small"
     stored.require_model(Kind.PIXELS)
 
 
@@ -76,8 +76,8 @@ def test_a_profile_may_come_to_hold_other_backends(tmp_path: Path) -> None:
     build_map(Walk(), tmp_path / "map", "changing", SETTINGS)
     register_profile(replace(profile("changing"), pixels="chosen@org/b", views="none-such"))
     stored = open_stored(tmp_path / "map")
-    assert stored.profile.pixels == "chosen@org/a"
-    assert stored.profile.views == "", "a module that the map has no features of is not asked"
+    assert stored.encoders.name_of(Kind.PIXELS) == "chosen@org/a"
+    assert Kind.VIEWS not in stored.encoders, "a module that the map has no features of is not asked"
 
 
 def test_maps_of_earlier_releases_open_unchanged(tmp_path: Path) -> None:
@@ -86,7 +86,7 @@ def test_maps_of_earlier_releases_open_unchanged(tmp_path: Path) -> None:
     assert {kind: model["backend"] for kind, model in told["models"].items()} == {
         kind: "fake" for kind in ("pixels", "local", "place", "sounds")
     }, "a backend without models is written as before"
-    assert open_stored(tmp_path / "map").profile == profile(PROFILE)
+    assert open_stored(tmp_path / "map").encoders == profile(PROFILE).encoders()
 
 
 def test_another_model_of_the_same_name_is_refused_in_one_sentence(tmp_path: Path) -> None:
@@ -122,7 +122,7 @@ def test_a_path_in_a_strangers_map_is_not_followed(tmp_path: Path) -> None:
     build_map(Walk(), tmp_path / "map", used_with("chosen@org/large"), SETTINGS)
     manifest = tmp_path / "map" / "map.json"
     manifest.write_text(signed(manifest.read_text().replace("chosen@org/large", "chosen@../../etc/large")))
-    assert open_stored(tmp_path / "map").profile.pixels == "chosen@large"
+    assert open_stored(tmp_path / "map").encoders.name_of(Kind.PIXELS) == "chosen@large"
 
 
 @given(st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._-]{0,20}(/[A-Za-z0-9][A-Za-z0-9._-]{0,20})?", fullmatch=True))

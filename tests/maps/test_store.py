@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from avlmaps.core.errors import MapError
+from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.registry import Kind
 from avlmaps.maps import integrity
 from avlmaps.maps.build import build_map
@@ -118,7 +118,7 @@ def test_a_map_comes_back_with_all_that_it_is_of(built: Path) -> None:
     assert stored.place_state["centres"].shape == (2, 3)
     assert (stored.rig.rgb, stored.rig.depth) == (RIG.rgb, RIG.depth) and stored.rig.registered
     assert stored.up_in_world.tolist() == [0.0, 0.0, 1.0]
-    assert stored.profile.name == PROFILE and stored.grid.voxel_size_m == 0.05
+    assert stored.encoders.name == PROFILE and stored.grid.voxel_size_m == 0.05
     assert stored.info.models["place"].checksum and stored.info.models["place"].prompts == ("a {}",)
     assert stored.info.settings == SETTINGS.for_profile(0.6)
     for kind in (Kind.PIXELS, Kind.SOUNDS, Kind.LOCAL, Kind.PLACE):
@@ -178,12 +178,18 @@ def test_another_schema_version(copied: Path, version: int, how: str) -> None:
     assert refused(copied) == said
 
 
-def test_another_profile(copied: Path) -> None:
+def test_a_map_of_an_unknown_profile_opens_for_all_that_needs_no_model(copied: Path) -> None:
     edit(copied, lambda content: content.update(profile="hearsay"))
-    said = refused(copied)
-    assert said.startswith(
-        f"{copied}/map.json is of a profile that is not known here. There is no profile called 'hearsay'"
-    )
+    stored = open_stored(copied)
+    assert stored.encoders.name == "hearsay" and len(stored.voxels)
+
+
+def test_a_map_of_an_unknown_backend_says_so_when_it_is_needed(copied: Path) -> None:
+    edit(copied, lambda content: content["models"]["pixels"].update(backend="hearsay"))
+    stored = open_stored(copied)
+    assert len(stored.voxels) > 0
+    with pytest.raises(BackendError, match="no pixels backend called 'hearsay'"):
+        stored.require_model(Kind.PIXELS)
 
 
 def test_another_model(copied: Path) -> None:

@@ -29,7 +29,7 @@ stored = open_stored(sys.argv[2])
 stored.require_model(Kind.PLACE)
 print(json.dumps({
     "target": find(Kind.PLACE, "thumbnail").target,
-    "profile": [stored.profile.name, stored.profile.place, stored.profile.pixels],
+    "profile": [stored.encoders.name, *map(stored.encoders.name_of, (Kind.PLACE, Kind.PIXELS))],
     "model": stored.info.models["place"].id,
     "descriptors": list(stored.keyframes.place.shape),
 }))

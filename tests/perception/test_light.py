@@ -178,7 +178,7 @@ def test_without_the_files_the_sentence_names_the_command(tmp_path: Path) -> Non
         told = availability(find(Kind.PIXELS, "light"))
         assert (told.state, told.note) == ("weights missing", f"{files.HOW_TO_GET} (250 MB)")
         with pytest.raises(BackendError, match="avlmaps profiles --fetch light --from"):
-            profile("light").pixel_encoder()
+            profile("light").encoders().load(Kind.PIXELS)
 
 
 def test_a_folder_of_files_may_be_named_itself(folder: Path, tmp_path: Path) -> None:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.core.errors import BackendError
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
+from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import ModelCard
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -73,18 +73,8 @@ class FakeViews:
         return np.array([[1.0, 0.0] if word == "kitchen" else [0.0, 1.0] for word in words], np.float32)
 
 
-def fake_profile(pixels: Any = None, sounds: Any = None, views: Any = None) -> Any:
-    def required(encoder: Any, kind: str) -> Any:
-        if encoder is None:
-            raise BackendError(f"The profile 'fake' has no {kind} backend; choose another profile (avlmaps profiles).")
-        return encoder
-
-    return SimpleNamespace(
-        name="fake",
-        pixel_encoder=lambda: required(pixels, "pixels"),
-        sound_encoder=lambda: required(sounds, "sounds"),
-        view_encoder=lambda: required(views, "views"),
-    )
+def fake_encoders(pixels: Any = None, sounds: Any = None, views: Any = None) -> Any:
+    return Encoders("fake", pixels=pixels, sounds=sounds, views=views)
 
 
 def voxels_of(index: np.ndarray, feature: np.ndarray) -> Voxels:
@@ -125,7 +115,7 @@ def keyframes_at(places: np.ndarray, view: np.ndarray | None = None) -> Keyframe
 
 
 def fake_map(
-    voxels: Voxels, sounds: HeardSounds | None = None, keyframes: Keyframes | None = None, profile: Any = None
+    voxels: Voxels, sounds: HeardSounds | None = None, keyframes: Keyframes | None = None, encoders: Any = None
 ) -> Any:
     """Return what a query needs of a stored map."""
     camera = Pinhole(100.0, 100.0, 32.0, 24.0, 64, 48)
@@ -137,7 +127,7 @@ def fake_map(
         sounds=sounds or sounds_of([], []),
         keyframes=keyframes if keyframes is not None else keyframes_at(np.zeros((0, 3))),
         place_state={},
-        profile=profile or fake_profile(),
+        encoders=encoders or fake_encoders(),
         info=SimpleNamespace(ground=None, doubts=()),
         rig=Rig(camera, camera),
         require_model=lambda kind: None,
@@ -161,5 +151,5 @@ def furnished_map(**parts: Any) -> Any:
     encoder = FakePixels(tuple(pieces))
     index = np.concatenate([piece for name in pieces for piece in pieces[name]])
     words = np.concatenate([[name] * len(piece) for name in pieces for piece in pieces[name]])
-    profile = fake_profile(encoder, FakeSounds(), parts.pop("views", None))
-    return fake_map(voxels_of(index, encoder.encode_words(list(words))), profile=profile, **parts)
+    encoders = fake_encoders(encoder, FakeSounds(), parts.pop("views", None))
+    return fake_map(voxels_of(index, encoder.encode_words(list(words))), encoders=encoders, **parts)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from query_fakes import fake_map, fake_profile, furnished_map, keyframes_at, sounds_of, voxels_of
+from query_fakes import fake_encoders, fake_map, furnished_map, keyframes_at, sounds_of, voxels_of
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError, BackendError, QueryError
@@ -85,7 +85,7 @@ def test_an_empty_phrase_is_refused(heard: AVLMap, way: str) -> None:
 
 def test_an_empty_map_answers_honestly(monkeypatch: pytest.MonkeyPatch) -> None:
     full = furnished_map()
-    empty = AVLMap(fake_map(voxels_of(np.zeros((0, 3)), np.zeros((0, 4))), profile=full.profile))
+    empty = AVLMap(fake_map(voxels_of(np.zeros((0, 3)), np.zeros((0, 4))), encoders=full.encoders))
     locating(monkeypatch, None, inliers=0)
     picture = np.zeros((48, 64, 3), np.uint8)
     for heat in (empty.object("chair"), empty.sound("dog"), empty.image(picture)):
@@ -237,7 +237,7 @@ def test_a_models_mismatch_is_told_before_anything_is_compared() -> None:
         AVLMap(stored).object("chair")
     with pytest.raises(BackendError, match="another model for sounds"):
         AVLMap(stored).sound("dog")
-    assert fake_profile().name == "fake"
+    assert fake_encoders().name == "fake"
 
 
 def test_a_phrase_that_is_a_whole_text_is_refused() -> None:

@@ -7,8 +7,8 @@ from query_fakes import (
     FakeSounds,
     FakeViews,
     box,
+    fake_encoders,
     fake_map,
-    fake_profile,
     furnished_map,
     keyframes_at,
     sounds_of,
@@ -53,7 +53,7 @@ def test_two_names_of_one_thing_are_one_thing() -> None:
     encoder = FakePixels(("chair", "seat"))
     index = box((0, 0, 0), (6, 6, 8))
     feature = np.tile(encoder.encode_words(["chair"]) * 0.8 + encoder.encode_words(["seat"]) * 0.6, (len(index), 1))
-    things = AVLMap(fake_map(voxels_of(index, feature), profile=fake_profile(encoder))).things(
+    things = AVLMap(fake_map(voxels_of(index, feature), encoders=fake_encoders(encoder))).things(
         ["chair", "chair seat", "seat"], least_confidence=0.0
     )
     assert len(things) == 1
@@ -66,7 +66,7 @@ def test_a_narrower_thing_answers_to_the_wider_name_and_is_listed_by_its_own() -
     for rows, name in ((np.s_[:1600], "office chair"), (np.s_[1600:], "sofa")):
         likely[rows, encoder.names.index(name)] = 0.9
         likely[rows, encoder.names.index("other")] = 0.1
-    stored = fake_map(voxels_of(index, features_of(likely, encoder.codes)), profile=fake_profile(encoder))
+    stored = fake_map(voxels_of(index, features_of(likely, encoder.codes)), encoders=fake_encoders(encoder))
     avlmap = AVLMap(stored)
     chair, exact = (avlmap.object(word, primary=True) for word in ("chair", "office chair"))
     assert chair.found and exact.found
@@ -82,7 +82,7 @@ def test_what_is_surely_a_chair_but_of_no_sure_kind_is_listed_as_a_chair() -> No
     likely = np.zeros((len(index), len(encoder.names)))
     for name, share in (("chair", 0.3), ("office chair", 0.3), ("armchair", 0.3), ("other", 0.1)):
         likely[:, encoder.names.index(name)] = share
-    avlmap = AVLMap(fake_map(voxels_of(index, features_of(likely, encoder.codes)), profile=fake_profile(encoder)))
+    avlmap = AVLMap(fake_map(voxels_of(index, features_of(likely, encoder.codes)), encoders=fake_encoders(encoder)))
     assert (
         avlmap.pieces("chair", alone=True).confidence.max(initial=0.0) < 0.5 < avlmap.pieces("chair").confidence.max()
     )
@@ -122,8 +122,8 @@ def test_rooms_are_keyframes_side_by_side_with_one_name() -> None:
 
 
 def test_an_empty_map_holds_nothing() -> None:
-    profile = fake_profile(FakePixels(("chair",)), FakeSounds(), FakeViews())
-    nothing = AVLMap(fake_map(voxels_of(np.zeros((0, 3), int), np.zeros((0, 2))), profile=profile))
+    encoders = fake_encoders(FakePixels(("chair",)), FakeSounds(), FakeViews())
+    nothing = AVLMap(fake_map(voxels_of(np.zeros((0, 3), int), np.zeros((0, 2))), encoders=encoders))
     assert (nothing.things(), nothing.sounds(), nothing.rooms()) == ([], [], [])
     assert nothing.points.shape == (0, 3)
 

@@ -23,7 +23,7 @@ def kitchen(shared_data) -> AVLMap:
     for index in range(0, len(recording), 20):
         frame = recording.frame(index)
         fused.add(frame, encoder.encode(frame))
-    stored = fake_map(fused.voxels(), profile=SimpleNamespace(pixel_encoder=lambda: encoder))
+    stored = fake_map(fused.voxels(), encoders=SimpleNamespace(pixels=encoder))
     stored.up_in_world = UP / np.linalg.norm(UP)
     return AVLMap(stored)
 

@@ -12,7 +12,7 @@ from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.maps.keyframes.describe import KeyframeSettings, describe_keyframe, stack_keyframes
 from avlmaps.maps.keyframes.stage import concat_keyframes
 from avlmaps.perception.embedded.rootsift import RootSift
-from avlmaps.perception.profiles import profile
+from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
 from avlmaps.query.locate import LocateSettings, locate, locate_features
 from helpers.picture_room import CAMERA, RoomWalk
@@ -50,19 +50,15 @@ class Watching:
 
     def match(self, a: LocalFeatures, b: LocalFeatures) -> np.ndarray:
         self.given.append((a, b))
-        return profile("colours").keypoint_matcher().match(a, b)
+        return Encoders.named("colours").matcher.match(a, b)
 
 
-def profile_of(local: Any, matcher: Any) -> Any:
-    place = profile("colours").place_encoder()
-    return SimpleNamespace(
-        local="fake", place="fake", views="", matcher="fake",
-        local_encoder=lambda: local, place_encoder=lambda: place, keypoint_matcher=lambda: matcher,
-    )  # fmt: skip
+def encoders_of(local: Any, matcher: Any) -> Any:
+    return Encoders(local=local, place="vlad", matcher=matcher)
 
 
 def stored_by(local: Any, matcher: Any) -> MapOfPictures:
-    return map_of(WALK, profile_of(local, matcher), np.random.default_rng(0))
+    return map_of(WALK, encoders_of(local, matcher), np.random.default_rng(0))
 
 
 @pytest.fixture
@@ -95,7 +91,7 @@ def test_keypoints_without_scores_reach_a_matcher_without_any_and_with_the_size_
 def test_a_map_of_pictures_with_and_without_scores_has_none() -> None:
     seen = [
         describe_keyframe(
-            WALK.frame(i), profile_of(Scored(told=i > 0), None), {"centres": np.zeros((64, 128), np.float32)}
+            WALK.frame(i), encoders_of(Scored(told=i > 0), None), {"centres": np.zeros((64, 128), np.float32)}
         )
         for i in range(3)
     ]
@@ -108,7 +104,7 @@ def test_a_map_of_pictures_with_and_without_scores_has_none() -> None:
 
 def test_scores_stay_with_their_keypoints_when_lots_are_joined() -> None:
     seen = [
-        describe_keyframe(WALK.frame(i), profile_of(Scored(), None), {"centres": np.zeros((64, 128), np.float32)})
+        describe_keyframe(WALK.frame(i), encoders_of(Scored(), None), {"centres": np.zeros((64, 128), np.float32)})
         for i in range(3)
     ]
     blank = replace(seen[0], local=LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32)))
@@ -135,9 +131,8 @@ def test_planted_matches_of_few_or_many_keypoints_are_believed_by_the_same_rules
     frame = WALK.frame(4)
     xy = rng.uniform((8, 8), (312, 232), (4 * count, 2)).astype(np.float32)
     kept = LocalFeatures(xy, np.zeros((len(xy), 4), np.float32))
-    profile_ = profile_of(SimpleNamespace(encode=lambda rgb: kept), Planted())
-    profile_.place = ""
-    seen = describe_keyframe(frame, profile_, {}, KeyframeSettings(max_depth_m=20.0))
+    used = Encoders(local=SimpleNamespace(encode=lambda rgb: kept), matcher=Planted())
+    seen = describe_keyframe(frame, used, {}, KeyframeSettings(max_depth_m=20.0))
     good = np.flatnonzero(np.isfinite(seen.points_world[:, 0]))[:count]
     seen = replace(
         seen,
@@ -145,7 +140,7 @@ def test_planted_matches_of_few_or_many_keypoints_are_believed_by_the_same_rules
         points_world=seen.points_world[good],
         place=np.ones(1, np.float32),
     )
-    stored = MapOfPictures(stack_keyframes([seen]), {}, profile_, WALK.rig)
+    stored = MapOfPictures(stack_keyframes([seen]), {}, used, WALK.rig)
     whole_pixels = np.floor(xy[good]) + 0.5  # as DISK and SuperPoint tell them
     found = locate_features(
         stored,

@@ -10,7 +10,7 @@ from avlmaps.bench.locate import MapOfPictures, map_of
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.maps.keyframes.describe import stack_keyframes
-from avlmaps.perception.profiles import profile
+from avlmaps.perception.encoders import Encoders
 from avlmaps.query.focal import camera_of_35mm, focal_35mm_of
 from avlmaps.query.locate import Located, LocateSettings, alike, locate, nearest
 from helpers.picture_room import CAMERA, Room, RoomWalk, looking, painting
@@ -27,7 +27,7 @@ def rng() -> np.random.Generator:
 
 @pytest.fixture(scope="module")
 def stored() -> MapOfPictures:
-    return map_of(WALK, profile("colours"), rng())
+    return map_of(WALK, Encoders.named("colours"), rng())
 
 
 @pytest.fixture(scope="module")
@@ -162,7 +162,7 @@ def test_the_focal_length_is_kept_where_the_caller_is_sure(stored: MapOfPictures
 def test_the_pose_is_that_of_the_camera_that_took_the_photo() -> None:
     """With a colour camera beside the depth camera, whose poses the recording holds."""
     recording = RoomWalk(frames=8, turn=0.3, rig=Rig(CAMERA, Pinhole(290.0, 290.0, 160.0, 120.0, 320, 240), APART))
-    apart = map_of(recording, profile("colours"), rng())
+    apart = map_of(recording, Encoders.named("colours"), rng())
     frame = recording.frame(5)
     found = locate(apart, frame.rgb, None, rng())
     assert_at(found, frame.world_from_camera @ inverse(APART), cm=1.0)
@@ -211,7 +211,7 @@ def test_a_map_without_any_depth_locates_nothing(stored: MapOfPictures, photo: n
 
 
 def test_one_keyframe_is_enough_for_a_map(stored: MapOfPictures) -> None:
-    single = map_of(RoomWalk(frames=1), profile("colours"), rng())
+    single = map_of(RoomWalk(frames=1), Encoders.named("colours"), rng())
     assert_at(locate(single, WALK.frame(0).rgb, None, rng()), WALK.world_from_camera[0])
 
 

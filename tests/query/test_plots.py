@@ -42,7 +42,7 @@ def test_a_map_is_drawn_with_its_sounds(tmp_path: Path) -> None:
 
 
 def test_an_empty_map_can_be_drawn(tmp_path: Path) -> None:
-    stored = fake_map(voxels_of(np.zeros((0, 3)), np.zeros((0, 4))), profile=furnished_map().profile)
+    stored = fake_map(voxels_of(np.zeros((0, 3)), np.zeros((0, 4))), encoders=furnished_map().encoders)
     assert plot_map(stored, tmp_path / "map.png").is_file()
     assert AVLMap(stored).sound("dog").plot(tmp_path / "dog.png").is_file()
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from query_fakes import FakePixels, FakeSounds, fake_map, fake_profile, keyframes_at, voxels_of
+from query_fakes import FakePixels, FakeSounds, fake_encoders, fake_map, keyframes_at, voxels_of
 from walled_rooms import two_rooms, two_rooms_index
 
 from avlmaps.perception.protocols import ModelCard
@@ -181,8 +181,8 @@ def home(settings: QuerySettings | None = None, door_m: float = 0.8, things: boo
     view[4:] += 0.7 * OpenViews().encode_words(["bedroom"])
     view /= np.linalg.norm(view, axis=1, keepdims=True)
     voxels = voxels_of(np.concatenate([index, bed]), encoder.encode_words(words))
-    profile = fake_profile(encoder, FakeSounds(), OpenViews())
-    return AVLMap(fake_map(voxels, keyframes=keyframes_at(places, view), profile=profile), settings)
+    encoders = fake_encoders(encoder, FakeSounds(), OpenViews())
+    return AVLMap(fake_map(voxels, keyframes=keyframes_at(places, view), encoders=encoders), settings)
 
 
 def test_a_bed_makes_the_bedroom() -> None:
@@ -252,7 +252,7 @@ def test_an_encoder_that_was_tried_out_in_rooms_says_what_its_names_mean() -> No
 
     m = home()
     surveyed = Surveyed(("wall", "bed", "stove"))
-    m.stored.profile.pixel_encoder = lambda: surveyed
+    m.stored.encoders = m.stored.encoders.having(pixels=surveyed)
     right = np.array([[4.5, 1.5, 0.4]])
     assert m.area("bedroom").factors[0].at(right)[0] < home().area("bedroom").factors[0].at(right)[0]
 

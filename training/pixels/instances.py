@@ -96,7 +96,7 @@ def pieces_of(options: Options, number: int) -> Iterator[Pieces]:
         record_scene(scene, recording, settings, seed)
     path = options.work / f"{seed}-{sensor}-{options.name}.avlmap"
     asked = AVLMap(_map_of(open_recording(recording), path, options.model.name))
-    encoder = asked.stored.profile.pixel_encoder()
+    encoder = asked.stored.encoders.pixels
     assert isinstance(encoder, EmbeddedPixels)
     things, feature, space = read_truth(recording).objects, asked.stored.voxels.feature, asked.space
     rivals = Rivals.of(feature, encoder, encoder.vocabulary)

@@ -13,7 +13,7 @@ from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.core.progress import progress
 from avlmaps.maps.keyframes.describe import KeyframeSettings, perceive_keyframes, select_keyframes
 from avlmaps.maps.types import Keyframes
-from avlmaps.perception.profiles import Profile, profile
+from avlmaps.perception.encoders import Encoders
 from avlmaps.query.locate import Located, LocateSettings, locate
 from avlmaps.recordings.subset import Subset
 from avlmaps.recordings.types import Recording
@@ -45,13 +45,13 @@ class MapOfPictures:
     Attributes:
         keyframes: what was seen.
         place_state: what the place encoder learned.
-        profile: whose encoders.
+        encoders: what perceives.
         rig: the cameras.
     """
 
     keyframes: Keyframes
     place_state: dict[str, np.ndarray]
-    profile: Profile
+    encoders: Encoders
     rig: Rig
 
 
@@ -77,7 +77,7 @@ def run(
     steps: Sequence[int] = (2, 10, 50),
     photos: int = 250,
     foreign: Iterable[UInt8[np.ndarray, "h w 3"]] | None = None,
-    used: Profile | None = None,
+    used: Encoders | None = None,
     settings: LocateSettings = _LOCATING,
 ) -> dict[str, Any]:
     """Measure on one recording, once for each density of the map.
@@ -100,7 +100,7 @@ def run(
         Intervals are Wilson's.
     """
     rows: list[list[object]] = []
-    used = used or profile("embedded")
+    used = used or Encoders.named("embedded")
     foreign = None if foreign is None else list(foreign)
     for step in steps:
         kept = np.arange(0, len(recording), step)
@@ -118,7 +118,7 @@ def run(
 
 def map_of(
     recording: Recording,
-    used: Profile,
+    used: Encoders,
     rng: np.random.Generator,
     settings: KeyframeSettings = _KEYFRAMES,
 ) -> MapOfPictures:

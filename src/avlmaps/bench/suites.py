@@ -10,7 +10,8 @@ from avlmaps.bench.harness.provenance import in_words
 from avlmaps.bench.output import BenchError, Table, draw, markdown, write_answer
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.registry import Kind
-from avlmaps.perception.profiles import Profile, choose_models
+from avlmaps.perception.encoders import Encoders
+from avlmaps.perception.profiles import choose_models
 
 if TYPE_CHECKING:
     from avlmaps.bench.indexing import IndexingSettings
@@ -68,7 +69,7 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
         from avlmaps.bench.navigation.suite import run_navigation
 
         return run_navigation(inputs.navigation, out)
-    used = choose_models(inputs.profile, inputs.models)
+    used = choose_models(inputs.profile, inputs.models).encoders()
     weights = _weights(suite, used)
     if suite == "objects":
         from avlmaps.bench.objects import run_objects
@@ -99,7 +100,7 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
 _MEASURED = {"sounds": (Kind.SOUNDS,), "locate": (Kind.LOCAL, Kind.PLACE, Kind.MATCHER), "frames": (Kind.PIXELS,)}
 
 
-def _weights(suite: str, used: Profile) -> dict[str, str]:
+def _weights(suite: str, used: Encoders) -> dict[str, str]:
     """Return the checksums of the models that a suite measures, by module."""
     if suite == "words":
         return {"words": shipped_checksums()["words"]}
@@ -141,7 +142,7 @@ def _locate(inputs: SuiteInputs) -> Mapping[str, Table]:
         if len(recording) < 20:
             raise RecordingError(f"{path} has {len(recording)} frames; half as map and half as photos takes 20.")
         tables[f"photos located in {path.resolve().name}"] = locate.run(
-            recording, inputs.seed, used=choose_models(inputs.profile, inputs.models)
+            recording, inputs.seed, used=choose_models(inputs.profile, inputs.models).encoders()
         )
     return tables
 
@@ -153,11 +154,12 @@ def _frames(inputs: SuiteInputs) -> Mapping[str, Table]:
     if inputs.nyuv2 is None:
         raise BenchError("This suite measures on labelled frames (docs/guides/train-eyes.md); name their folder with "
                          "--nyuv2.")  # fmt: skip
-    used = choose_models(inputs.profile, inputs.models)
-    encoder = used.pixel_encoder()
+    used = choose_models(inputs.profile, inputs.models).encoders()
+    encoder = used.pixels
     if not isinstance(encoder, EmbeddedPixels):
         raise BenchError(
-            f"The suite frames sums probabilities of kinds, which the pixel encoder {used.pixels!r} does not give. "
+            f"The suite frames sums probabilities of kinds, which the pixel encoder {used.name_of(Kind.PIXELS)!r} does "
+            "not give. "
             "Choose the profile embedded, synthetic or trained."
         )
     return run_frames(encoder, inputs.nyuv2)

@@ -14,8 +14,8 @@ from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.reader import StoredMap, describe, open_stored
 from avlmaps.perception.cache.cached_encoders import with_cache
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
-from avlmaps.perception.profiles import Profile
-from avlmaps.perception.profiles import profile as profile_of
+from avlmaps.perception.encoders import Encoders
+from avlmaps.perception.profiles import Profile, encoders_of
 from avlmaps.recordings.types import Recording
 
 __all__ = ["BuildSettings", "CacheSettings", "build_map", "build_part", "describe", "merge_parts", "open_stored"]
@@ -24,7 +24,7 @@ __all__ = ["BuildSettings", "CacheSettings", "build_map", "build_part", "describ
 def build_map(
     recording: Recording,
     path: Path | str,
-    profile: str | Profile = "embedded",
+    profile: str | Profile | Encoders = "embedded",
     settings: BuildSettings = DEFAULTS,
     *,
     cache: CacheSettings = DEFAULT_CACHE,
@@ -42,7 +42,7 @@ def build_map(
     Args:
         recording: from ``open_recording``.
         path: the map's folder, by custom ``NAME.avlmap``.
-        profile: which models perceive: a profile's name, or a profile with others chosen (``Profile.choosing``).
+        profile: which models perceive: encoders, a profile, or a profile's name.
         settings: all that can be chosen.
         cache: whether features are stored, so that another build of the same frames encodes nothing again.
         parts: folders of ``build_part`` from other machines; their frames are not fused again.
@@ -57,7 +57,7 @@ def build_map(
         BackendError: the profile is not known, or a package for it is missing.
     """
     stamp = recording.change_stamp()
-    plan = make_plan(recording, Path(path), with_cache(profile_of(profile), cache), settings)
+    plan = make_plan(recording, Path(path), with_cache(encoders_of(profile), cache), settings)
     with silence_progress(not progress), lock_folder(plan.path):
         if claim(plan, resume, overwrite) is None:
             plan = checked(plan, allow)

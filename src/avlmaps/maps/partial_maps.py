@@ -31,8 +31,8 @@ from avlmaps.maps.store.checkpoints import Checkpoint, find_checkpoint, key_of, 
 from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.perception.cache.cached_encoders import cache_note, with_cache
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
-from avlmaps.perception.profiles import Profile
-from avlmaps.perception.profiles import profile as profile_of
+from avlmaps.perception.encoders import Encoders
+from avlmaps.perception.profiles import Profile, encoders_of
 from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.recordings.types import Recording
 
@@ -86,12 +86,12 @@ class Part:
         return {field.name: arrays[field.name] for field in dataclasses.fields(of)}
 
 
-def pixel_encoder_of(used: Profile) -> PixelEncoder | None:
-    """Return the profile's pixel encoder, None where it has none (the map is then one of surfaces and colours)."""
-    return used.pixel_encoder() if used.pixels else None
+def pixel_encoder_of(used: Encoders) -> PixelEncoder | None:
+    """Return the pixel encoder, None where there is none (the map is then one of surfaces and colours)."""
+    return used.pixels if Kind.PIXELS in used else None
 
 
-def fusion_key(recording: Recording, settings: BuildSettings, used: Profile) -> str:
+def fusion_key(recording: Recording, settings: BuildSettings, used: Encoders) -> str:
     """Return the hash of all that the sums of a frame depend on; parts are only ever added to parts of the same key."""
     encoder = pixel_encoder_of(used)
     card = None if encoder is None else encoder.card
@@ -101,7 +101,7 @@ def fusion_key(recording: Recording, settings: BuildSettings, used: Profile) -> 
     return key_of("fusion", BUILD_VERSION, *basis, *chosen)
 
 
-def encoded_frames(recording: Recording, settings: BuildSettings, used: Profile) -> frozenset[int] | None:
+def encoded_frames(recording: Recording, settings: BuildSettings, used: Encoders) -> frozenset[int] | None:
     """Return the numbers of the frames whose pixels are encoded, None for all.
 
     For a pixel encoder that is given keyframes alone they are those of every ``frames.step``-th frame of the whole
@@ -142,7 +142,7 @@ def build_part(
     start: int,
     stop: int,
     out: Path | str,
-    profile: str | Profile = "embedded",
+    profile: str | Profile | Encoders = "embedded",
     settings: BuildSettings = DEFAULTS,
     cache: CacheSettings = DEFAULT_CACHE,
 ) -> Part:
@@ -160,7 +160,7 @@ def build_part(
     Raises:
         MapError: there are no such frames, or too many of them cannot be read.
     """
-    out, used = Path(out), with_cache(profile_of(profile), cache)
+    out, used = Path(out), with_cache(encoders_of(profile), cache)
     settings = settings.for_profile(used.weight_variance_m2)
     if not 0 <= start < stop <= len(recording):
         raise MapError(f"There are no frames {start} to {stop}; {recording.path} has frames 0 to {len(recording)}.")
@@ -170,7 +170,7 @@ def build_part(
         if part.info.spans != (span,):
             raise MapError(f"{out} holds a part of other frames; give another folder, or remove it first.")
         return part
-    known = attach_estimated_ground(recording, settings) if used.pixels else recording
+    known = attach_estimated_ground(recording, settings) if Kind.PIXELS in used else recording
     fuse_spans(known, [(span, out)], used, settings, find_sensor(recording, settings).model)
     return load_part(out, key)
 
@@ -265,7 +265,7 @@ class Tolerance:
 def fuse_spans(
     recording: Recording,
     jobs: Sequence[tuple[Span, Path]],
-    used: Profile,
+    used: Encoders,
     settings: BuildSettings,
     sensor: SensorModel,
     known_bad: Sequence[BadFrame] = (),
@@ -276,7 +276,7 @@ def fuse_spans(
     Args:
         recording: where the frames are.
         jobs: each stretch, and the folder of its part.
-        used: whose pixel encoder perceives.
+        used: the encoders, of which that of pixels perceives.
         settings: of the build.
         sensor: error of the depths.
         known_bad: frames of other parts that could not be read.

@@ -18,7 +18,7 @@ from avlmaps.maps.store.manifest_file import MANIFEST, parse_manifest, read_mani
 from avlmaps.maps.store.own_files import remove_stages
 from avlmaps.maps.store.reader import PARTS
 from avlmaps.maps.store.writer import is_map_or_free, sweep
-from avlmaps.perception.profiles import Profile
+from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.content import LARGEST_BUDGET_BYTES
 from avlmaps.recordings.types import Recording
 
@@ -40,7 +40,7 @@ class Plan:
 
     recording: Recording
     path: Path
-    used: Profile
+    used: Encoders
     settings: BuildSettings
     models: dict[str, ModelInfo]
     key: str
@@ -103,7 +103,7 @@ def stage(
     return found
 
 
-def make_plan(recording: Recording, path: Path, used: Profile, settings: BuildSettings) -> Plan:
+def make_plan(recording: Recording, path: Path, used: Encoders, settings: BuildSettings) -> Plan:
     """Gather the ingredients and refuse what cannot be built.
 
     Raises:
@@ -115,7 +115,7 @@ def make_plan(recording: Recording, path: Path, used: Profile, settings: BuildSe
     if not is_map_or_free(path):
         raise MapError(f"{path} is there already and is not a map; give another --out, nothing in it was touched.")
     settings = settings.for_profile(used.weight_variance_m2)
-    models = {kind.value: ModelInfo.of(used.chosen(kind), card) for kind, card in used.cards().items()}
+    models = {kind.value: ModelInfo.of(used.sources[kind].chosen, card) for kind, card in used.cards().items()}
     key = key_of("map", BUILD_VERSION, recording.fingerprint, audio_key(recording), used.name, models, settings)
     return Plan(recording, path, used, settings, models, key, fusion_key(recording, settings, used))
 

@@ -13,7 +13,7 @@ from avlmaps.maps.store.array_files import FileInfo, explain_write_errors, refus
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, parse_manifest, read_manifest, write_manifest
-from avlmaps.maps.store.reader import open_stored, profile_of_map
+from avlmaps.maps.store.reader import encoders_of_map, open_stored
 from avlmaps.maps.store.writer import sweep
 from avlmaps.recordings.types import Recording
 
@@ -80,7 +80,7 @@ def repair_map(path: Path | str, recording: Recording | None) -> Repaired:
             f"{len(damaged)} of {len(info.files)} files of {path} are damaged ({some}); give the recording "
             f"{info.recording.name!r} that it was built from: avlmaps info {path} --repair --recording REC"
         )
-    used = profile_of_map(path, info)
+    used = encoders_of_map(info)
     if recording.fingerprint != info.recording.fingerprint:
         raise MapError(
             f"{path} was built from another recording than {recording.path}, or that has changed since; give "

@@ -194,7 +194,7 @@ def merge(plan: Plan, parts: Sequence[Part], sensor: SensorInfo) -> Merged:
 
 def detect_sounds(plan: Plan) -> SoundResult:
     """Find the sounds in the track; none where there is no track, or no model for them."""
-    if plan.recording.audio is None or not plan.used.sounds:
+    if plan.recording.audio is None or Kind.SOUNDS not in plan.used:
         return SoundResult(_silence(plan), plan.path, 0.0)
     settings, model = plan.settings.hearing, plan.models[Kind.SOUNDS.value]
     key = key_of("sounds", BUILD_VERSION, plan.recording.fingerprint, audio_key(plan.recording), settings, model)
@@ -206,7 +206,7 @@ def detect_sounds(plan: Plan) -> SoundResult:
         scratch = folder.with_name("clips.unfinished")
         shutil.rmtree(scratch, ignore_errors=True)
         scratch.mkdir(parents=True)
-        heard = detect_events(plan.recording, plan.used.sound_encoder(), settings, scratch)
+        heard = detect_events(plan.recording, plan.used.sounds, settings, scratch)
         arrays = {name: getattr(heard, name) for name in array_fields(HeardSounds)}
         clips = {f"clips/{number:06d}": scratch / Path(clip).name for number, clip in enumerate(heard.clips)}
         return Computed(_Facts(perf_counter() - begin), arrays, clips)

@@ -1,12 +1,14 @@
 """Profiles: which backend serves which module. A map stores the name of its profile and every model's card."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Any
 
 from avlmaps.core.errors import BackendError
-from avlmaps.core.registry import Kind, find, load
+from avlmaps.core.registry import Kind, find
 from avlmaps.core.suggestions import nearest
+from avlmaps.perception.encoders import GIVEN, MODULES, Encoders
 from avlmaps.perception.protocols import (
     LocalEncoder,
     Matcher,
@@ -20,7 +22,7 @@ from avlmaps.perception.protocols import (
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """A name for a set of backends; ``""`` where a profile has none for a module yet.
+    """A name for a set of backends, each by its name or an object; ``""`` where a profile has none for a module.
 
     Attributes:
         name: the word on the command line.
@@ -36,12 +38,12 @@ class Profile:
     """
 
     name: str
-    pixels: str = ""
-    views: str = ""
-    sounds: str = ""
-    local: str = ""
-    place: str = ""
-    matcher: str = ""
+    pixels: str | object = ""
+    views: str | object = ""
+    sounds: str | object = ""
+    local: str | object = ""
+    place: str | object = ""
+    matcher: str | object = ""
     about: str = ""
     weight_variance_m2: float = 0.6
 
@@ -57,84 +59,62 @@ class Profile:
             if kind is Kind.WORDS:
                 raise BackendError("Words are read by each model's own text encoder; there is none to choose.")
             find(kind, name.partition("@")[0])
-        chosen = {kind.value: name for kind, name in choices.items()}
+        chosen: dict[str, Any] = {kind.value: name for kind, name in choices.items()}
         if Kind.LOCAL in choices and Kind.MATCHER not in choices:
             chosen[Kind.MATCHER.value] = _MATCHER_OF.get(choices[Kind.LOCAL].partition("@")[0], "mutual-ratio")
         return replace(self, **chosen)
 
-    def remembered(self, backends: Mapping[str, str]) -> "Profile":
-        """Return the profile of exactly these backends (``name`` or ``name@model`` by module), as a map names them.
-
-        None of them need be installed until it is used.
-        """
-        perceived = [kind for kind in Kind if kind is not Kind.WORDS]
-        return replace(self, **{kind.value: backends.get(kind.value, "") for kind in perceived})
-
-    def chosen(self, kind: Kind) -> str:
-        """Return a module's backend with its model: ``name@model``, the default one if no other is chosen."""
-        name, _, model = self.backend_name(kind).partition("@")
-        model = model or (find(kind, name).model if name else "")
-        return f"{name}@{model}" if model else name
-
-    def on_torch(self, kind: Kind) -> bool:
-        """Return whether a module's backend is a large model on torch, by the registry."""
-        name = self.backend_name(kind).partition("@")[0]
-        return bool(name) and "torch" in find(kind, name).needs
-
-    def is_slow(self, kind: Kind) -> bool:
-        """Return whether a module's features take longer to make than to store and read, by the registry."""
-        name = self.backend_name(kind).partition("@")[0]
-        return bool(name) and find(kind, name).is_slow
-
-    @property
-    def keyframes_only(self) -> bool:
-        """Whether only keyframes get features of pixels, by the registry: the others add surfaces and colours."""
-        return bool(self.pixels) and find(Kind.PIXELS, self.pixels.partition("@")[0]).keyframes_only
-
     def backend_name(self, kind: Kind) -> str:
-        """Return the name of the backend for a module, ``""`` for none."""
-        return cast(str, getattr(self, kind.value))
+        """Return the name of the backend for a module, ``""`` for none; of an object its class's."""
+        chosen = getattr(self, kind.value)
+        return chosen if isinstance(chosen, str) else GIVEN + type(chosen).__qualname__
 
-    def _require(self, kind: Kind) -> object:
-        name = self.backend_name(kind)
-        if not name:
-            raise BackendError(
-                f"The profile {self.name!r} has no {kind} backend; choose another profile (avlmaps profiles)."
-            )
-        return load(kind, name)
+    def encoders(self) -> Encoders:
+        """Return the profile's encoders; each is loaded when it is first used.
+
+        Raises:
+            BackendError: a backend is not known, or an object lacks a method of its protocol.
+        """
+        chosen = {kind.value: getattr(self, kind.value) for kind in MODULES}
+        return Encoders(self.name, **chosen, weight_variance_m2=self.weight_variance_m2)
 
     def pixel_encoder(self) -> PixelEncoder:
-        """Return the pixel encoder, or raise ``BackendError``."""
-        return cast(PixelEncoder, self._require(Kind.PIXELS))
+        """Return ``encoders().pixels``: the name that it had before."""
+        return self._formerly("pixel_encoder()", Kind.PIXELS)
 
     def view_encoder(self) -> ViewEncoder:
-        """Return the view encoder, or raise ``BackendError``."""
-        return cast(ViewEncoder, self._require(Kind.VIEWS))
+        """Return ``encoders().views``: the name that it had before."""
+        return self._formerly("view_encoder()", Kind.VIEWS)
 
     def sound_encoder(self) -> SoundEncoder:
-        """Return the sound encoder, or raise ``BackendError``."""
-        return cast(SoundEncoder, self._require(Kind.SOUNDS))
+        """Return ``encoders().sounds``: the name that it had before."""
+        return self._formerly("sound_encoder()", Kind.SOUNDS)
 
     def local_encoder(self) -> LocalEncoder:
-        """Return the keypoint encoder, or raise ``BackendError``."""
-        return cast(LocalEncoder, self._require(Kind.LOCAL))
+        """Return ``encoders().local``: the name that it had before."""
+        return self._formerly("local_encoder()", Kind.LOCAL)
 
     def place_encoder(self) -> PlaceEncoder:
-        """Return the place encoder, or raise ``BackendError``."""
-        return cast(PlaceEncoder, self._require(Kind.PLACE))
+        """Return ``encoders().place``: the name that it had before."""
+        return self._formerly("place_encoder()", Kind.PLACE)
 
     def keypoint_matcher(self) -> Matcher:
-        """Return the matcher, or raise ``BackendError``."""
-        return cast(Matcher, self._require(Kind.MATCHER))
+        """Return ``encoders().matcher``: the name that it had before."""
+        return self._formerly("keypoint_matcher()", Kind.MATCHER)
 
     def cards(self) -> dict[Kind, ModelCard]:
-        """Return the card of every model in the profile."""
-        kinds = [kind for kind in Kind if kind is not Kind.WORDS and self.backend_name(kind)]
-        return {kind: self.card(kind) for kind in kinds}
+        """Return ``encoders().cards()``: the name that it had before."""
+        warnings.warn(
+            "Profile.cards() goes in the next release; use Profile.encoders().cards().",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        return self.encoders().cards()
 
-    def card(self, kind: Kind) -> ModelCard:
-        """Return one module's card; no other model is loaded for it. Raises ``BackendError`` where there is none."""
-        return cast(ModelCard, self._require(kind).card)  # pyright: ignore[reportAttributeAccessIssue]
+    def _formerly(self, name: str, kind: Kind) -> Any:
+        instead = f"Profile.encoders().{kind.value}"
+        warnings.warn(f"Profile.{name} goes in the next release; use {instead}.", DeprecationWarning, stacklevel=3)
+        return self.encoders().load(kind)
 
 
 # A matcher's training holds for the keypoints that it was trained on.
@@ -192,18 +172,26 @@ def read_choices(words: Sequence[str]) -> dict[Kind, str]:
 
 
 def profile(name: str | Profile) -> Profile:
-    """Return the profile of that name; one that is given is made known where no other has its name.
+    """Return the profile of that name; one that is given is itself.
 
     Raises:
         BackendError: there is none.
     """
     if isinstance(name, Profile):
-        _PROFILES.setdefault(name.name, name)
         return name
     if name not in _PROFILES:
         close = f" Did you mean {near}?" if (near := nearest(name, _PROFILES)) else ""
         raise BackendError(f"There is no profile called {name!r}; known are: {', '.join(_PROFILES)}.{close}")
     return _PROFILES[name]
+
+
+def encoders_of(chosen: "str | Profile | Encoders") -> Encoders:
+    """Return the encoders of a profile or of its name; encoders are themselves.
+
+    Raises:
+        BackendError: there is no such profile.
+    """
+    return chosen if isinstance(chosen, Encoders) else profile(chosen).encoders()
 
 
 _EMBEDDED = Profile(

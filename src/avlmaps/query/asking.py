@@ -201,7 +201,7 @@ def thing_alone(asked: Asked, avlmap: "Queryable") -> Question | None:
     kinds = {entry.kind for entry in lexicon().senses(asked.sentence)}
     if kinds != {Kind.THING} or "pixels" not in avlmap.stored.info.models:
         return None
-    encoder = avlmap.stored.profile.pixel_encoder()
+    encoder = avlmap.stored.encoders.pixels
     is_name = isinstance(encoder, NamedPixelEncoder) and asked.sentence in encoder.vocabulary
     return Question.of([Part(Modality.OBJECT, asked.sentence)]) if is_name else None
 

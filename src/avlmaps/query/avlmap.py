@@ -117,7 +117,7 @@ class AVLMap:
             BackendError: the map's profile has no pixel encoder.
         """
         part = Part(Modality.OBJECT, word, _role(primary))
-        encoder = self.stored.profile.pixel_encoder()
+        encoder = self.stored.encoders.pixels
         if vocabulary is None and self._rivals is None and loops.is_plain() and isinstance(encoder, NamedPixelEncoder):
             # One question: most voxels have too little of the word to be compared with all others.
             self.stored.require_model(Kind.PIXELS)
@@ -148,7 +148,7 @@ class AVLMap:
             alone: take one of the encoder's names for itself, without the narrower ones that it takes in: then an
                 armchair is no piece of "chair".
         """
-        encoder = self.stored.profile.pixel_encoder()
+        encoder = self.stored.encoders.pixels
         rivals = self._rivals_of(encoder, None)
         if alone and isinstance(encoder, NamedPixelEncoder) and word in encoder.names:
             encoded = EncodedWord.of_name(encoder, word)
@@ -161,7 +161,7 @@ class AVLMap:
 
     def rivals(self) -> Rivals:
         """Return the two words of the encoder's vocabulary closest to each voxel; the first query works them out."""
-        return self._rivals_of(self.stored.profile.pixel_encoder(), None)
+        return self._rivals_of(self.stored.encoders.pixels, None)
 
     def _rivals_of(self, encoder: PixelEncoder, vocabulary: Sequence[str] | None) -> Rivals:
         self.stored.require_model(Kind.PIXELS)
@@ -256,7 +256,7 @@ class AVLMap:
         """Return whether the pixel encoder can look for a phrase: any phrase for an open vocabulary, else its words."""
         from avlmaps.query.synonyms import is_open
 
-        encoder = self.stored.profile.pixel_encoder()
+        encoder = self.stored.encoders.pixels
         return is_open(encoder) or bool(encoder.understood(phrase))
 
     def sound(self, text: str, primary: bool = False) -> Heatmap:
@@ -270,7 +270,7 @@ class AVLMap:
         scores = np.zeros(0)
         if len(heard):
             self.stored.require_model(Kind.SOUNDS)
-            scores = self.stored.profile.sound_encoder().score_words(sound_features(heard), [text])[:, 0]
+            scores = self.stored.encoders.sounds.score_words(sound_features(heard), [text])[:, 0]
         factor = sound_factor(self.space, heard, scores, part, self.settings.sounds, self.settings.heat)
         return Heatmap.of(factor, self.settings.found_at)
 
@@ -287,7 +287,7 @@ class AVLMap:
         scores = np.zeros(0)
         if len(heard):
             self.stored.require_model(Kind.SOUNDS)
-            encoder = self.stored.profile.sound_encoder()
+            encoder = self.stored.encoders.sounds
             scores = encoder.score_sounds(sound_features(heard), encoder.encode(sound))
         factor = sound_factor(self.space, heard, scores, part, self.settings.sounds, self.settings.heat)
         return Heatmap.of(factor, self.settings.found_at)
@@ -300,7 +300,7 @@ class AVLMap:
             BackendError: the map's profile has no view encoder.
         """
         part = Part(Modality.AREA, word, _role(primary))
-        encoder = self.stored.profile.view_encoder()
+        encoder = self.stored.encoders.views
         self.stored.require_model(Kind.VIEWS)
         settings = self.settings
         factor = area_factor(
@@ -335,7 +335,7 @@ class AVLMap:
         votes = self.room_votes
         if votes is None:
             return None
-        encoder = self.stored.profile.view_encoder()
+        encoder = self.stored.encoders.views
         self.stored.require_model(Kind.VIEWS)
         view = np.asarray(self.stored.keyframes.view)
         return votes.field(area_names(encoder), name_shares(view, encoder, self.settings.areas))
@@ -362,7 +362,7 @@ class AVLMap:
         feature = self.stored.voxels.feature
         rows, every = voting_rows(np.asarray(self.stored.voxels.index), len(namer.names) * feature.shape[1])
         area_m2 = every * self.space.grid.voxel_size_m**2
-        encoder = self.stored.profile.pixel_encoder()
+        encoder = self.stored.encoders.pixels
         surveyed = encoder.room_contents if isinstance(encoder, SurveyedEncoder) else None
         contents = surveyed or read_room_contents("avlmaps.perception")
         return NamedVoxels(rows, namer.names, namer.confidences(rows), area_m2, contents)

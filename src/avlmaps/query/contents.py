@@ -191,7 +191,7 @@ def find_things(
     """
     if not 0.0 <= least_confidence <= 1.0:
         raise QueryError(f"The least confidence is {least_confidence:g}; it must lie between 0 and 1.")
-    encoder = stored.profile.pixel_encoder()
+    encoder = stored.encoders.pixels
     wanted = [name for name in (encoder.vocabulary if names is None else names) if structure or name not in STRUCTURE]
     searches = [*((name, True) for name in wanted), *((name, False) for name in wanted if _is_wide(name, encoder))]
     claims: list[tuple[bool, float, int, str, Int[np.ndarray, " m"]]] = []
@@ -248,7 +248,7 @@ def find_sounds(stored: "StoredMap", most_names: int = 3) -> list[SoundEvent]:
     if not len(heard):
         return []
     stored.require_model(Kind.SOUNDS)
-    encoder = stored.profile.sound_encoder()
+    encoder = stored.encoders.sounds
     words = list(encoder.vocabulary)
     scores = encoder.score_words(sound_features(heard), words) if words else np.zeros((len(heard), 0))
     events: list[SoundEvent] = []
@@ -294,7 +294,7 @@ def find_rooms(
     """
     if not len(stored.keyframes):
         return []
-    encoder = stored.profile.view_encoder()
+    encoder = stored.encoders.views
     stored.require_model(Kind.VIEWS)
     names = area_names(encoder)
     places = np.asarray(stored.keyframes.centre, np.float64).reshape(-1, 3)

@@ -10,8 +10,8 @@ from jaxtyping import Bool, Float, Float32, Int, UInt8
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.maps.types import Keyframes
+from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.pose import PoseSettings, estimate_pose
-from avlmaps.perception.profiles import Profile
 from avlmaps.perception.protocols import LocalFeatures
 from avlmaps.query.focal import (
     SEARCH,
@@ -48,8 +48,8 @@ class LocatableMap(Protocol):
         ...
 
     @property
-    def profile(self) -> Profile:
-        """Profile of the encoders that made the keyframes."""
+    def encoders(self) -> Encoders:
+        """The encoders that made the keyframes."""
         ...
 
     @property
@@ -183,8 +183,8 @@ def locate(
     """
     start_s = time.perf_counter()
     camera, source = _camera_of(rgb, camera, stored.rig.rgb, focal_35mm)
-    local = stored.profile.local_encoder().encode(rgb)
-    place = stored.profile.place_encoder().encode(rgb, local, stored.place_state)
+    local = stored.encoders.local.encode(rgb)
+    place = stored.encoders.place.encode(rgb, local, stored.place_state)
     found = locate_features(stored, local, place, camera, rng, settings, source)
     return replace(found, elapsed_ms=1e3 * (time.perf_counter() - start_s))
 
@@ -339,7 +339,7 @@ class _Pairs:
 
 
 def _matched_points(stored: LocatableMap, local: LocalFeatures, references: Int[np.ndarray, " k"]) -> _Pairs:
-    keyframes, matcher = stored.keyframes, stored.profile.keypoint_matcher()
+    keyframes, matcher = stored.keyframes, stored.encoders.matcher
     keypoint, keyframe, points = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros((0, 3), np.float32)]
     for reference in references:
         rows = slice(keyframes.offsets[reference], keyframes.offsets[reference + 1])

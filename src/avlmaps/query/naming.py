@@ -34,7 +34,7 @@ class VoxelNamer:
             MapError: the map was built with another encoder than is installed.
         """
         self._voxels = stored.voxels
-        encoder = stored.profile.pixel_encoder()
+        encoder = stored.encoders.pixels
         stored.require_model(Kind.PIXELS)
         self._named = isinstance(encoder, NamedPixelEncoder)
         self._scale = float(encoder.logit_scale) if isinstance(encoder, ScaledEncoder) and not self._named else None

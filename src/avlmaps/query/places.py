@@ -134,7 +134,7 @@ def _rooms(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[NameScore]:
     stored = avlmap.stored
     if "views" not in stored.info.models or not len(stored.keyframes):
         return []
-    encoder = stored.profile.view_encoder()
+    encoder = stored.encoders.views
     names, field = area_names(encoder), avlmap.room_field
     places = np.asarray(stored.keyframes.centre, np.float64).reshape(-1, 3)
     space = avlmap.space

@@ -62,10 +62,10 @@ def judged_scene(
 
 def judged(place: Workplace, tasks: Sequence[Task]) -> list[Judged]:
     """Return the answers of a scene's map to its labelled queries."""
-    profile = place.avlmap.stored.profile
-    names = [name for name in profile.pixel_encoder().vocabulary if lexicon().find(name, Kind.THING) is not None]
+    encoders = place.avlmap.stored.encoders
+    names = [name for name in encoders.pixels.vocabulary if lexicon().find(name, Kind.THING) is not None]
     sounds = [entry.name for entry in lexicon().entries(Kind.SOUND)] if place.has((Module.SOUNDS,)) else []
-    rooms = area_names(profile.view_encoder()) if place.has((Module.VIEWS,)) else ()
+    rooms = area_names(encoders.views) if place.has((Module.VIEWS,)) else ()
     queries = labelled_queries(place.evidence, tasks, names, sounds, rooms, place.job.rng(7))
     asked = _Asked(place)
     return [asked.judge(query) for query in queries]

@@ -44,8 +44,8 @@ class WeakHearing:
 def alike_keyframe(avlmap: AVLMap, rgb: UInt8[np.ndarray, "h w 3"], name: str, role: Role) -> Heatmap:
     """Return the heat around the place where the keyframe most like a picture was taken."""
     stored = avlmap.stored
-    local = stored.profile.local_encoder().encode(rgb)
-    place = stored.profile.place_encoder().encode(rgb, local, stored.place_state)
+    local = stored.encoders.local.encode(rgb)
+    place = stored.encoders.place.encode(rgb, local, stored.place_state)
     best = int(np.argmax(np.asarray(stored.keyframes.place, np.float32) @ place))
     pose = np.asarray(stored.keyframes.world_from_camera[best], np.float64)
     part = Part(Modality.IMAGE, name, role, is_file=True)

@@ -3,11 +3,11 @@
 from functools import cache
 
 from avlmaps.core.registry import Kind
-from avlmaps.perception.profiles import Profile, profile
+from avlmaps.perception.encoders import Encoders
 
 
-def checksums(used: Profile) -> dict[str, str]:
-    """Return the checksum of every model of a profile, by module. Loads the models: one that is missing raises.
+def checksums(used: Encoders) -> dict[str, str]:
+    """Return the checksum of every model of some encoders, by module. Loads the models: one that is missing raises.
 
     Raises:
         BackendError: a model's package or files are missing.
@@ -21,4 +21,4 @@ def shipped_checksums() -> dict[str, str]:
     from avlmaps.core.registry import load
 
     words = load(Kind.WORDS, "embedded")
-    return {**checksums(profile("embedded")), "words": words.card.checksum}  # pyright: ignore[reportAttributeAccessIssue]
+    return {**checksums(Encoders.named("embedded")), "words": words.card.checksum}  # pyright: ignore[reportAttributeAccessIssue]

@@ -7,7 +7,8 @@ from typing import Literal
 from avlmaps.bench.harness.clips import unheard_rows
 from avlmaps.bench.harness.models import checksums
 from avlmaps.core.errors import AvlmapsError
-from avlmaps.perception.profiles import Profile, choose_models
+from avlmaps.perception.encoders import Encoders
+from avlmaps.perception.profiles import choose_models
 from avlmaps.query.rules import Rules
 from avlmaps.recordings.clips import find_clips
 
@@ -91,13 +92,13 @@ class SceneSettings:
         )  # fmt: skip
 
     @property
-    def used(self) -> Profile:
-        """The profile with the models that were chosen.
+    def used(self) -> Encoders:
+        """The encoders of the profile, with the models that were chosen.
 
         Raises:
             BackendError: there is no such profile or backend.
         """
-        return choose_models(self.profile, self.models)
+        return choose_models(self.profile, self.models).encoders()
 
     def checked(self) -> dict[str, str]:
         """Check everything that is given before anything is recorded; return the models' checksums by module.

@@ -23,7 +23,8 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
-from avlmaps.perception.profiles import Profile, choose_models
+from avlmaps.perception.encoders import Encoders
+from avlmaps.perception.profiles import choose_models
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.modalities.image import read_picture
 from avlmaps.query.rules import Rules, build_settings, query_settings
@@ -62,9 +63,9 @@ class SceneJob:
     rules: Rules = "ours"
 
     @property
-    def used(self) -> Profile:
-        """The profile with the models that were chosen."""
-        return choose_models(self.profile, self.models)
+    def used(self) -> Encoders:
+        """The encoders of the profile, with the models that were chosen."""
+        return choose_models(self.profile, self.models).encoders()
 
     @property
     def map_name(self) -> str:
@@ -215,7 +216,7 @@ class Workplace:
 
     def has(self, kinds: Sequence[Kind]) -> bool:
         """Return whether the map's profile has models for all of these."""
-        return all(self.avlmap.stored.profile.backend_name(kind) for kind in kinds)
+        return all(kind in self.avlmap.stored.encoders for kind in kinds)
 
     def photo(self, world_from_camera: Float[np.ndarray, "4 4"]) -> UInt8[np.ndarray, "h w 3"]:
         """Return the photo taken from a pose, drawn if need be."""

@@ -94,7 +94,7 @@ class QueriedScene:
         def make() -> Heatmap:
             part, _ = self._part(Modality.AREA, task.context, role)
             stored = self.avlmap.stored
-            encoder, heat = stored.profile.view_encoder(), self.avlmap.settings.heat
+            encoder, heat = stored.encoders.views, self.avlmap.settings.heat
             return Heatmap.of(area_factor(self.space, stored.keyframes, encoder, part, PAPER_AREAS, heat))
 
         return self._once(("paper area", task.context, role), make)
@@ -140,7 +140,7 @@ class QueriedScene:
     ) -> Heatmap | None:
         def make() -> Heatmap:
             part, _ = self._part(Modality.AREA, task.context, role)
-            encoder, rows = self.avlmap.stored.profile.view_encoder(), features()
+            encoder, rows = self.avlmap.stored.encoders.views, features()
             _, scores = area_scores(rows, encoder, task.context, self.avlmap.settings.areas)
             heat = np.where(rows.any(axis=1), scores, 0.0).astype(np.float32)
             return Heatmap.of(VoxelHeat(self.space, part, heat, bool((heat >= 0.5).any())))

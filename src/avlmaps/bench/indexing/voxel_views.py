@@ -45,7 +45,7 @@ def view_features(avlmap: AVLMap, recording: Recording) -> Float32[np.ndarray, "
 
 def region_features(avlmap: AVLMap, recording: Recording) -> Float32[np.ndarray, "n d"]:
     """Return for each voxel the mean feature of the regions that showed it, unit length; zero for one never shown."""
-    views, encoder = avlmap.stored.keyframes.view, avlmap.stored.profile.view_encoder()
+    views, encoder = avlmap.stored.keyframes.view, avlmap.stored.encoders.views
 
     def rows(frame: Frame, keyframe: int) -> tuple[Float32[np.ndarray, "r d"], Int[np.ndarray, "h w"]]:
         whole = np.asarray(views[keyframe], np.float32)

@@ -10,7 +10,7 @@ from avlmaps.maps.import_reference.scene import SceneFiles
 from avlmaps.maps.import_reference.tracks import Ears
 from avlmaps.maps.import_reference.voxels_h5 import ReferenceVoxels
 from avlmaps.maps.store.manifest import ModelInfo, RecordingInfo
-from avlmaps.perception.profiles import profile
+from avlmaps.perception.encoders import Encoders
 
 PROFILE = "paper"
 
@@ -92,7 +92,7 @@ class Source:
 
 
 def _unweighed(kind: Kind, dim: int) -> ModelInfo:
-    backend = find(kind, profile(PROFILE).backend_name(kind))
+    backend = find(kind, Encoders.named(PROFILE).name_of(kind))
     return ModelInfo(
         backend=f"{backend.name}@{backend.model}",
         id=backend.model,

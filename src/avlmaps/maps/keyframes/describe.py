@@ -8,9 +8,10 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float16, Float32, Int, Int64, UInt8
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.progress import progress
+from avlmaps.core.registry import Kind
 from avlmaps.maps.keyframes.keypoint_depth import lift_keypoints, middle_of_view
 from avlmaps.maps.types import Keyframes
-from avlmaps.perception.profiles import Profile
+from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import LocalFeatures
 from avlmaps.recordings.types import Frame, Recording
 
@@ -116,7 +117,7 @@ def _apparent_motion(
 def perceive_keyframes(
     recording: Recording,
     indices: Sequence[int] | Int[np.ndarray, " k"],
-    profile: Profile,
+    used: Encoders,
     rng: "np.random.Generator",
     progress: Callable[..., Iterable[int]] = progress,
     settings: KeyframeSettings = KeyframeSettings(),
@@ -126,7 +127,7 @@ def perceive_keyframes(
     Args:
         recording: where the frames are; read one at a time.
         indices: which frames, rising.
-        profile: whose encoders to use.
+        used: the encoders.
         rng: for what the place encoder learns.
         progress: shows how far it is; called as ``avlmaps.core.progress.progress`` is.
         settings: how far keypoints get a 3D point, size of thumbnails.
@@ -134,9 +135,9 @@ def perceive_keyframes(
     Returns:
         The keyframes, and the arrays that the place encoder learned; the map must keep them.
     """
-    place_state, known = learn_places(recording, indices, profile, rng)
+    place_state, known = learn_places(recording, indices, used, rng)
     seen = [
-        describe_keyframe(recording.frame(int(index)), profile, place_state, settings, known.get(int(index)))
+        describe_keyframe(recording.frame(int(index)), used, place_state, settings, known.get(int(index)))
         for index in progress(indices, "seeing", total=len(indices), unit="keyframe")
     ]
     return stack_keyframes(seen), place_state
@@ -145,7 +146,7 @@ def perceive_keyframes(
 def learn_places(
     recording: Recording,
     indices: Sequence[int] | Int[np.ndarray, " k"],
-    profile: Profile,
+    used: Encoders,
     rng: "np.random.Generator",
 ) -> tuple[dict[str, np.ndarray], dict[int, LocalFeatures]]:
     """Let the place encoder learn from keyframes spread over the walk.
@@ -153,13 +154,13 @@ def learn_places(
     Returns:
         What it learned, and the local features of those frames by their number, to save doing them twice.
     """
-    if not profile.local or not profile.place:
+    if Kind.LOCAL not in used or Kind.PLACE not in used:
         return {}, {}
-    encoder = profile.local_encoder()
+    encoder = used.local
     spread = np.unique(np.linspace(0, len(indices) - 1, min(len(indices), LEARN_FROM_KEYFRAMES)).round().astype(int))
     chosen = [int(indices[int(i)]) for i in spread]
     local = {i: encoder.encode(recording.frame(i).rgb) for i in chosen}
-    return profile.place_encoder().fit(list(local.values()), rng), local
+    return used.place.fit(list(local.values()), rng), local
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,8 +171,8 @@ class SeenKeyframe:
         stamp_s: when.
         world_from_camera: pose of the depth camera.
         centre: middle of what was seen, metres, world.
-        view: area feature; empty where the profile has no view encoder.
-        place: place descriptor; empty where the profile has no place encoder.
+        view: area feature; empty without a view encoder.
+        place: place descriptor; empty without a place encoder.
         local: keypoints of the colour picture.
         points_world: their 3D points, metres, NaN where there is no trustworthy depth.
         thumbnail: a JPEG file.
@@ -189,30 +190,30 @@ class SeenKeyframe:
 
 def describe_keyframe(
     frame: Frame,
-    profile: Profile,
+    used: Encoders,
     place_state: dict[str, np.ndarray],
     settings: KeyframeSettings = KeyframeSettings(),
     local: LocalFeatures | None = None,
 ) -> SeenKeyframe:
-    """Run a profile's encoders on one frame.
+    """Run encoders on one frame.
 
     Args:
         frame: the frame.
-        profile: whose encoders; a module that the profile leaves empty gives empty features.
+        used: the encoders; a module without one gives empty features.
         place_state: what the place encoder learned.
         settings: how far keypoints get a 3D point, size of thumbnails.
         local: the frame's keypoints where they are known already.
     """
     if local is None:
-        local = profile.local_encoder().encode(frame.rgb) if profile.local else _no_features()
+        local = used.local.encode(frame.rgb) if Kind.LOCAL in used else _no_features()
     place = np.zeros(0, np.float32)
-    if profile.local and profile.place:
-        place = profile.place_encoder().encode(frame.rgb, local, place_state)
+    if Kind.LOCAL in used and Kind.PLACE in used:
+        place = used.place.encode(frame.rgb, local, place_state)
     return SeenKeyframe(
         stamp_s=frame.stamp_s,
         world_from_camera=frame.world_from_camera,
         centre=middle_of_view(frame),
-        view=profile.view_encoder().encode([frame])[0] if profile.views else np.zeros(0, np.float32),
+        view=used.views.encode([frame])[0] if Kind.VIEWS in used else np.zeros(0, np.float32),
         place=place,
         local=local,
         points_world=lift_keypoints(local.xy, frame, settings.max_depth_m),

@@ -89,7 +89,7 @@ def _look(
 ) -> None:
     """Encode lots of keyframes and store each lot in its folder."""
     left = sum(map(len, lots.values()))
-    blind = replace(plan.used, views="")  # the views are encoded ahead, in batches
+    blind = plan.used.without(Kind.VIEWS)  # the views are encoded ahead, in batches
     with closing(_viewed(plan, good, list(lots.values()))) as viewed:
         ahead = progress(
             viewed, "seeing", total=total, done=total - left, unit="keyframe", note=lambda: _from_store(plan)
@@ -111,8 +111,8 @@ def _look(
 
 def _viewed(plan: Plan, good: Recording, lots: Sequence[Int[np.ndarray, " k"]]) -> Generator[_Viewed]:
     """Yield keyframes with their view features; decoding and encoding each run ahead in a thread."""
-    encoder = plan.used.view_encoder() if plan.used.views else None
-    size = _VIEWS_ON_TORCH if plan.used.on_torch(Kind.VIEWS) else 1
+    encoder = plan.used.views if Kind.VIEWS in plan.used else None
+    size = _VIEWS_ON_TORCH if encoder and plan.used.sources[Kind.VIEWS].on_torch else 1
     frames = ((int(index), good.frame(int(index))) for lot in lots for index in lot)
     with closing(run_ahead(frames, max(2, size))) as decoded:
         yield from run_ahead(_encoded(decoded, list(map(len, lots)), encoder, size), max(2, size))
@@ -132,7 +132,7 @@ def _encoded(
 def _from_store(plan: Plan) -> str:
     """Return how many keyframes the store holds whole: the lowest count of their kinds of features."""
     kinds = (Kind.VIEWS, Kind.LOCAL, Kind.PLACE)
-    notes = [cache_note(plan.used, kind) for kind in kinds if plan.used.backend_name(kind)]
+    notes = [cache_note(plan.used, kind) for kind in kinds]
     return min((words for words in notes if words), key=lambda words: int(words.split()[0]), default="")
 
 

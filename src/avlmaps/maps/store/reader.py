@@ -1,16 +1,17 @@
 """A finished map on the disk, opened: large arrays memory-mapped, everything checked that is cheap to check."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Rig
-from avlmaps.core.errors import BackendError, MapError
+from avlmaps.core.errors import MapError
 from avlmaps.core.poses import FRAME, rotation_to_level
 from avlmaps.core.registry import Kind
 from avlmaps.core.suggestions import near_path
@@ -23,8 +24,11 @@ from avlmaps.maps.store.lock import is_locked
 from avlmaps.maps.store.manifest import GroundInfo, MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, RESTORE, parse_manifest, read_manifest
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
+from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models.names import public_choice, public_name
-from avlmaps.perception.profiles import Profile, profile
+
+if TYPE_CHECKING:
+    from avlmaps.perception.profiles import Profile
 
 PARTS = "parts"
 STATE = "keyframes/state/"
@@ -45,7 +49,7 @@ class StoredMap:
         keyframes: stored pictures.
         place_state: what the place encoder learned from the keyframes.
         sounds: what was heard; ``clip_path`` finds a clip.
-        profile: which models perceived.
+        encoders: which models perceived.
         rig: the recording's cameras.
         guard: watches over the large files; reading voxels or keyframes waits until they are known to be whole.
     """
@@ -58,7 +62,7 @@ class StoredMap:
     keyframes: Keyframes
     place_state: dict[str, np.ndarray]
     sounds: HeardSounds
-    profile: Profile
+    encoders: Encoders
     rig: Rig
     guard: Guard
 
@@ -67,6 +71,14 @@ class StoredMap:
         if name in _GUARDED:
             object.__getattribute__(self, "guard").require_whole()
         return value
+
+    @property
+    def profile(self) -> "Profile":
+        """The names of ``encoders``, as a profile: what they were before."""
+        from avlmaps.perception.profiles import Profile
+
+        warnings.warn("StoredMap.profile goes in the next release; use .encoders.", DeprecationWarning, stacklevel=2)
+        return Profile(self.info.profile, **{kind.value: self.encoders.name_of(kind) for kind in self.encoders})
 
     def clip_path(self, sound: int) -> Path:
         """Return the FLAC file of a sound, by its number in ``sounds``."""
@@ -82,7 +94,7 @@ class StoredMap:
             raise MapError(
                 f"{self.path} was built without a model for {kind.value}; build it with a profile that has one."
             )
-        card = self.profile.card(kind)
+        card = self.encoders.card(kind)
         here = public_name(card.id)
         # An imported map does not know its weights (checksum ""); what is known of them must still agree.
         if (here, card.dim, card.checksum) != (made_by.id, made_by.dim, made_by.checksum or card.checksum):
@@ -105,7 +117,7 @@ def open_stored(path: Path | str, *, verify: bool = False) -> StoredMap:
         verify: compare every file with its checksum, and the voxels with their order.
 
     Raises:
-        MapError: there is no map there, it is half built, of another schema version or profile, or damaged. The
+        MapError: there is no map there, it is half built, of another schema version, or damaged. The
             sentence names the file.
     """
     path = Path(path)
@@ -151,22 +163,14 @@ def _manifest_content(path: Path) -> bytes:
     raise MapError(f"{path} is not there, or is not a map's folder; {meant}")
 
 
-def profile_of_map(path: Path, info: MapInfo) -> Profile:
-    """Return the models that a map was built with, even if the profile of that name holds others by now.
-
-    Raises:
-        MapError: the profile is not known here.
-    """
-    try:
-        return profile(info.profile).remembered(
-            {kind: public_choice(model.backend) for kind, model in info.models.items()}
-        )
-    except BackendError as fault:
-        raise MapError(f"{path / MANIFEST} is of a profile that is not known here. {fault}") from fault
+def encoders_of_map(info: MapInfo) -> Encoders:
+    """Return the encoders that a map was built with; none of them need be known here until it is used."""
+    return Encoders.remembered(
+        info.profile, {kind: public_choice(model.backend) for kind, model in info.models.items()}
+    )
 
 
 def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
-    used_profile = profile_of_map(path, info)
     try:
         grid, rig = GridSpec(info.voxel_size_m), info.rig.rig()
     except ValueError as fault:
@@ -198,7 +202,9 @@ def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
         guard.require_whole()
         check_order(voxels, f"{path}/voxels")
     state = {name.removeprefix(STATE): array for name, array in arrays.items() if name.startswith(STATE)}
-    return StoredMap(path, info, grid, info.up.vector(), voxels, keyframes, state, sounds, used_profile, rig, guard)
+    return StoredMap(
+        path, info, grid, info.up.vector(), voxels, keyframes, state, sounds, encoders_of_map(info), rig, guard
+    )
 
 
 def _of(arrays: Mapping[str, np.ndarray], kind: type, prefix: str) -> dict[str, Any]:

@@ -1,11 +1,11 @@
-"""A profile whose models remember: what one of them has made of a frame or a sound it does not make again.
+"""Encoders that remember: what one of them has made of a frame or a sound it does not make again.
 
 Features of pixels by slow models pass through float16 with the store and without, so that a map is the same, bit by
 bit, in both cases; all others are stored as they are.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
@@ -14,90 +14,86 @@ from jaxtyping import Float32, UInt8
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.perception.cache.feature_store import CacheSettings, FeatureStore, key_of
+from avlmaps.perception.encoders import Encoders, Source
 from avlmaps.perception.models.settings import precision_in_force
-from avlmaps.perception.profiles import Profile
 from avlmaps.perception.protocols import (
     BatchPixelEncoder,
     FrameSoundEncoder,
-    LocalEncoder,
     LocalFeatures,
     PixelEncoder,
-    PlaceEncoder,
-    SoundEncoder,
-    ViewEncoder,
 )
 from avlmaps.perception.user_folder import cache_folder
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CachedProfile(Profile):
-    """A profile with a store of features behind some of its encoders.
+@dataclass(frozen=True, slots=True)
+class CachedSource(Source):
+    """An encoder with a store of features before it.
 
     Attributes:
-        store: where features are stored; None stores none.
-        remembered_kinds: of which modules.
+        real: where the encoder comes from.
+        store: where its features are stored; None stores none.
     """
 
-    store: FeatureStore | None = None
-    remembered_kinds: frozenset[Kind] = frozenset()
+    real: Source
+    store: FeatureStore | None
 
-    def pixel_encoder(self) -> PixelEncoder:
-        """Return the pixel encoder, or raise ``BackendError``."""
-        store, half = self._store_of(Kind.PIXELS), self.is_slow(Kind.PIXELS)
-        encoder = Profile.pixel_encoder(self)
-        return encoder if store is None and not half else CachedPixels(encoder, store, half)
+    def load(self) -> Any:
+        """Return the encoder behind the store."""
+        encoder, store = self.real.load(), self.store
+        if self.kind is Kind.PIXELS:
+            return CachedPixels(encoder, store, self.is_slow)
+        if self.kind is Kind.SOUNDS and isinstance(encoder, FrameSoundEncoder):
+            return CachedFrameSounds(encoder, store)
+        return _CACHED[self.kind](encoder, store)
 
-    def view_encoder(self) -> ViewEncoder:
-        """Return the view encoder, or raise ``BackendError``."""
-        store, encoder = self._store_of(Kind.VIEWS), Profile.view_encoder(self)
-        return encoder if store is None else CachedViews(encoder, store)
+    @property
+    def chosen(self) -> str:
+        """The name of the real one with its model."""
+        return self.real.chosen
 
-    def sound_encoder(self) -> SoundEncoder:
-        """Return the sound encoder, or raise ``BackendError``."""
-        store, encoder = self._store_of(Kind.SOUNDS), Profile.sound_encoder(self)
-        if store is None:
-            return encoder
-        made = CachedFrameSounds if isinstance(encoder, FrameSoundEncoder) else CachedSounds
-        return made(encoder, store)
+    @property
+    def on_torch(self) -> bool:
+        """Whether the real one is a large model on torch."""
+        return self.real.on_torch
 
-    def local_encoder(self) -> LocalEncoder:
-        """Return the keypoint encoder, or raise ``BackendError``."""
-        store, encoder = self._store_of(Kind.LOCAL), Profile.local_encoder(self)
-        return encoder if store is None else CachedKeypoints(encoder, store)
+    @property
+    def is_slow(self) -> bool:
+        """Whether the features of the real one take longer to make than to store and read."""
+        return self.real.is_slow
 
-    def place_encoder(self) -> PlaceEncoder:
-        """Return the place encoder, or raise ``BackendError``."""
-        store, encoder = self._store_of(Kind.PLACE), Profile.place_encoder(self)
-        return encoder if store is None else CachedPlaces(encoder, store)
+    @property
+    def keyframes_only(self) -> bool:
+        """Whether only keyframes are given to it."""
+        return self.real.keyframes_only
 
-    def _store_of(self, kind: Kind) -> FeatureStore | None:
-        return self.store if kind in self.remembered_kinds else None
+    def note(self) -> str:
+        """Return how many features came from the store; ``""`` where none can."""
+        return "" if self.store is None else f"{self.store.found.get(self.kind, 0)} from the cache"
 
 
-def with_cache(used: Profile, settings: CacheSettings) -> Profile:
-    """Return the profile with a store behind its encoders, as the settings say."""
-    kinds = [kind for kind in Kind if kind is not Kind.WORDS and used.backend_name(kind)]
-    slow = frozenset(kind for kind in kinds if used.is_slow(kind))
-    if settings.place == "off":
-        folder, kinds_kept = None, frozenset[Kind]()
-    elif settings.place == "auto":
-        folder, kinds_kept = cache_folder() / "features", slow
-    else:
-        folder, kinds_kept = settings.place, frozenset(kinds)
-    if not kinds_kept and Kind.PIXELS not in slow:
+def with_cache(used: Encoders, settings: CacheSettings) -> Encoders:
+    """Return the encoders with a store before them, as the settings say.
+
+    A matcher's matches are not stored, nor the features of an encoder whose card does not tell it from others.
+    """
+    slow = frozenset(kind for kind in used if used.sources[kind].is_slow)
+    storable = frozenset(kind for kind in used if kind is not Kind.MATCHER and used.sources[kind].may_be_stored)
+    kept = {"off": frozenset[Kind](), "auto": slow}.get(str(settings.place), frozenset(used)) & storable
+    if not kept and Kind.PIXELS not in slow:
         return used
-    store = FeatureStore(folder, 1e9 * settings.limit_gb) if folder is not None and kinds_kept else None
-    same = {field.name: getattr(used, field.name) for field in fields(Profile)}
-    return CachedProfile(**same, store=store, remembered_kinds=kinds_kept)
+    folder = cache_folder() / "features" if isinstance(settings.place, str) else settings.place
+    store = FeatureStore(folder, 1e9 * settings.limit_gb) if kept else None
+    stored = {kind: CachedSource(kind, used.name_of(kind), used.sources[kind], store) for kind in kept}
+    if Kind.PIXELS in slow and Kind.PIXELS not in kept:  # rounded as with the store
+        stored[Kind.PIXELS] = CachedSource(Kind.PIXELS, used.name_of(Kind.PIXELS), used.sources[Kind.PIXELS], None)
+    return Encoders.of(used.name, {**used.sources, **stored}, used.weight_variance_m2)
 
 
-def cache_note(used: Profile, kind: Kind) -> str:
+def cache_note(used: Encoders, kind: Kind) -> str:
     """Return how many features of a module came from the store, for a progress bar; ``""`` where none can."""
-    if not isinstance(used, CachedProfile) or used.store is None or kind not in used.remembered_kinds:
-        return ""
-    return f"{used.store.found.get(kind, 0)} from the cache"
+    return used.sources[kind].note() if kind in used else ""
 
 
 class _Remembering:
@@ -286,6 +282,14 @@ class CachedKeypoints(_Remembering):
         if local.size in ((0, 0), (rgb.shape[1], rgb.shape[0])):
             self._put(key, _as_rows(local))
         return local
+
+
+_CACHED = {
+    Kind.VIEWS: CachedViews,
+    Kind.SOUNDS: CachedSounds,
+    Kind.LOCAL: CachedKeypoints,
+    Kind.PLACE: CachedPlaces,
+}
 
 
 def encode_batch(encoder: PixelEncoder, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:

@@ -1,0 +1,303 @@
+"""The models that perceive, one for each module: objects, or names of the registry.
+
+A name is resolved where encoders are made, and its model is loaded when it is first used: a map opens without it.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, cast
+
+from avlmaps.core.errors import BackendError
+from avlmaps.core.registry import Kind, find, load
+from avlmaps.perception.protocols import (
+    LocalEncoder,
+    Matcher,
+    ModelCard,
+    PixelEncoder,
+    PlaceEncoder,
+    SoundEncoder,
+    ViewEncoder,
+)
+
+GIVEN = "given:"
+MODULES = tuple(kind for kind in Kind if kind is not Kind.WORDS)
+_OWN = "own"
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where the encoder of a module comes from.
+
+    Attributes:
+        kind: the module.
+        name: what a map remembers it by: ``backend`` or ``backend@model``, or ``given:Class`` for an object.
+    """
+
+    kind: Kind
+    name: str
+
+    def load(self) -> Any:
+        """Return the encoder, the same object each time.
+
+        Raises:
+            BackendError: it is unknown, or a package or file that it needs is missing.
+        """
+        if self.name.startswith(GIVEN):
+            raise BackendError(
+                f"The {self.kind} of this map were made by an object of the class "
+                f"{self.name.removeprefix(GIVEN)}, which it does not hold; open it with "
+                f"encoders=avlmaps.Encoders({self.kind}=...)."
+            )
+        return load(self.kind, self.name)
+
+    @property
+    def chosen(self) -> str:
+        """Its name with its model: ``name@model``, the default one if no other is chosen."""
+        name, _, model = self.name.partition("@")
+        model = model or find(self.kind, name).model
+        return f"{name}@{model}" if model else name
+
+    @property
+    def on_torch(self) -> bool:
+        """Whether it is a large model on torch, by the registry."""
+        return "torch" in find(self.kind, self.name.partition("@")[0]).needs
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether its features take longer to make than to store and read, by the registry."""
+        return find(self.kind, self.name.partition("@")[0]).is_slow
+
+    @property
+    def keyframes_only(self) -> bool:
+        """Whether only keyframes are given to it: the other frames add surfaces and colours."""
+        return find(self.kind, self.name.partition("@")[0]).keyframes_only
+
+    @property
+    def may_be_stored(self) -> bool:
+        """Whether its card tells its features from another model's, so that they may be stored under it."""
+        return True
+
+    def note(self) -> str:
+        """Return what a progress bar says of its features; ``""`` for nothing."""
+        return ""
+
+
+@dataclass(frozen=True, slots=True)
+class GivenSource(Source):
+    """An object that was given.
+
+    Attributes:
+        encoder: it.
+        has_card: whether it brought a card of its own.
+    """
+
+    encoder: Any
+    has_card: bool
+
+    @classmethod
+    def of(cls, kind: Kind, encoder: object) -> "GivenSource":
+        """Return the source of an object; what its protocol needs and it does not say is made for it.
+
+        Raises:
+            BackendError: it lacks a method.
+        """
+        from avlmaps.perception.own_encoder import completed
+
+        name = GIVEN + type(encoder).__qualname__.rpartition(".")[2]
+        return cls(kind, name, completed(kind, encoder), hasattr(encoder, "card"))
+
+    def load(self) -> Any:
+        """Return the encoder."""
+        return self.encoder
+
+    @property
+    def chosen(self) -> str:
+        """Its name."""
+        return self.name
+
+    @property
+    def on_torch(self) -> bool:
+        """False: nothing is known of it."""
+        return False
+
+    @property
+    def is_slow(self) -> bool:
+        """False: nothing is known of it."""
+        return False
+
+    @property
+    def keyframes_only(self) -> bool:
+        """Its own word for it, an attribute of this name."""
+        return bool(getattr(self.encoder, "keyframes_only", False))
+
+    @property
+    def may_be_stored(self) -> bool:
+        """Whether it brought a card: one that was made knows its code and numbers, not all that it may read."""
+        return self.has_card
+
+
+@dataclass(frozen=True, slots=True, init=False, repr=False)
+class Encoders:
+    """The models that perceive, by module; ``encoders.pixels`` is the pixel encoder.
+
+    Attributes:
+        name: of the profile that they come from; ``own`` where there is none.
+        sources: where each comes from; a module that is not among them is not perceived.
+        weight_variance_m2: see ``Profile``.
+    """
+
+    name: str
+    sources: Mapping[Kind, Source]
+    weight_variance_m2: float
+
+    def __init__(
+        self,
+        name: str = _OWN,
+        *,
+        pixels: PixelEncoder | object | None = None,
+        views: ViewEncoder | object | None = None,
+        sounds: SoundEncoder | object | None = None,
+        local: LocalEncoder | object | None = None,
+        place: PlaceEncoder | object | None = None,
+        matcher: Matcher | object | None = None,
+        weight_variance_m2: float = 0.6,
+    ) -> None:
+        """Take objects, or names of the registry (``name``, ``name@model``); None and ``""`` perceive nothing.
+
+        Raises:
+            BackendError: an object lacks a method of its protocol.
+        """
+        given = dict(zip(MODULES, (pixels, views, sounds, local, place, matcher), strict=True))
+        self._set(
+            name, {kind: _source(kind, one) for kind, one in given.items() if one not in (None, "")}, weight_variance_m2
+        )
+
+    def _set(self, name: str, sources: Mapping[Kind, Source], weight_variance_m2: float) -> None:
+        for field, value in (("name", name), ("sources", sources), ("weight_variance_m2", weight_variance_m2)):
+            object.__setattr__(self, field, value)
+
+    @classmethod
+    def of(cls, name: str, sources: Mapping[Kind, Source], weight_variance_m2: float = 0.6) -> "Encoders":
+        """Return the encoders of these sources."""
+        made = cls.__new__(cls)
+        made._set(name, dict(sources), weight_variance_m2)
+        return made
+
+    @classmethod
+    def named(cls, profile: str, /, **instead: object) -> "Encoders":
+        """Return the encoders of a profile, with others for some modules.
+
+        Args:
+            profile: its name (``avlmaps profiles``).
+            instead: by module: an object, the name of a backend, or None for none.
+
+        Raises:
+            BackendError: there is no such profile, module or backend, or an object lacks a method of its protocol.
+        """
+        from avlmaps.perception.profiles import profile as profile_named
+
+        return profile_named(profile).encoders().having(**instead)
+
+    @classmethod
+    def remembered(cls, name: str, backends: Mapping[str, str]) -> "Encoders":
+        """Return encoders by the names that a map has for them; none of them need be known before it is used."""
+        kinds = [kind for kind in MODULES if backends.get(kind.value)]
+        return cls.of(name, {kind: Source(kind, backends[kind.value]) for kind in kinds})
+
+    def having(self, **instead: object) -> "Encoders":
+        """Return these encoders with others for some modules; see ``named``."""
+        unknown = set(instead) - {kind.value for kind in MODULES}
+        if unknown:
+            raise BackendError(
+                f"There is no module called {sorted(unknown)[0]!r}; an encoder is one of "
+                f"{', '.join(kind.value for kind in MODULES)}."
+            )
+        sources = {kind: source for kind, source in self.sources.items() if kind.value not in instead}
+        for word, one in instead.items():
+            if one is not None and one != "":
+                sources[Kind(word)] = _source(Kind(word), one)
+        return Encoders.of(self.name, sources, self.weight_variance_m2)
+
+    def over(self, others: "Encoders") -> "Encoders":
+        """Return these encoders, and others for the modules that they leave out."""
+        return Encoders.of(others.name, {**others.sources, **self.sources}, self.weight_variance_m2)
+
+    def without(self, kind: Kind) -> "Encoders":
+        """Return the encoders but for one module's."""
+        return self.having(**{kind.value: None})
+
+    def __contains__(self, kind: object) -> bool:
+        return kind in self.sources
+
+    def __iter__(self) -> Iterator[Kind]:
+        return iter(self.sources)
+
+    def __repr__(self) -> str:
+        return f"Encoders({self.name!r}: {', '.join(f'{kind}={self.sources[kind].name}' for kind in self)})"
+
+    def name_of(self, kind: Kind) -> str:
+        """Return what a map remembers a module's encoder by, ``""`` for none."""
+        return self.sources[kind].name if kind in self.sources else ""
+
+    def load(self, kind: Kind) -> Any:
+        """Return a module's encoder.
+
+        Raises:
+            BackendError: there is none, or it cannot be loaded.
+        """
+        if kind not in self.sources:
+            raise BackendError(
+                f"The profile {self.name!r} has no {kind} backend; choose another profile (avlmaps profiles)."
+            )
+        return self.sources[kind].load()
+
+    @property
+    def pixels(self) -> PixelEncoder:
+        """Features of objects."""
+        return cast(PixelEncoder, self.load(Kind.PIXELS))
+
+    @property
+    def views(self) -> ViewEncoder:
+        """Features of areas."""
+        return cast(ViewEncoder, self.load(Kind.VIEWS))
+
+    @property
+    def sounds(self) -> SoundEncoder:
+        """Features of sounds."""
+        return cast(SoundEncoder, self.load(Kind.SOUNDS))
+
+    @property
+    def local(self) -> LocalEncoder:
+        """Keypoints."""
+        return cast(LocalEncoder, self.load(Kind.LOCAL))
+
+    @property
+    def place(self) -> PlaceEncoder:
+        """Retrieval of places."""
+        return cast(PlaceEncoder, self.load(Kind.PLACE))
+
+    @property
+    def matcher(self) -> Matcher:
+        """Matching of keypoints."""
+        return cast(Matcher, self.load(Kind.MATCHER))
+
+    @property
+    def keyframes_only(self) -> bool:
+        """Whether only keyframes get features of pixels."""
+        return Kind.PIXELS in self and self.sources[Kind.PIXELS].keyframes_only
+
+    def card(self, kind: Kind) -> ModelCard:
+        """Return one module's card; no other model is loaded for it. Raises ``BackendError`` where there is none."""
+        return cast(ModelCard, self.load(kind).card)
+
+    def cards(self) -> dict[Kind, ModelCard]:
+        """Return the card of every model. Loads them."""
+        return {kind: self.card(kind) for kind in MODULES if kind in self}
+
+
+def _source(kind: Kind, one: object) -> Source:
+    """Return the source of a name, which must be known, or of an object."""
+    if isinstance(one, str):
+        find(kind, one.partition("@")[0])
+        return Source(kind, one)
+    return GivenSource.of(kind, one)

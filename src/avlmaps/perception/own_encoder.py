@@ -1,0 +1,168 @@
+"""An encoder that somebody wrote for a script: what its protocol needs and it does not say is made for it.
+
+An encoder of pixels or views needs ``encode_words``, one of sounds ``score_words``; each its ``encode`` where a map is
+to be made with it. A card, a vocabulary and ``understood`` are made.
+"""
+
+import ast
+import dataclasses
+import hashlib
+import inspect
+import textwrap
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from avlmaps.core.errors import AvlmapsError, BackendError
+from avlmaps.core.lexicon import Kind as Entry
+from avlmaps.core.lexicon import lexicon
+from avlmaps.core.registry import Kind
+from avlmaps.perception.protocols import ModelCard
+
+_NEEDED = {
+    Kind.PIXELS: ("encode_words",),
+    Kind.VIEWS: ("encode_words",),
+    Kind.SOUNDS: ("score_words",),
+    Kind.LOCAL: ("encode",),
+    Kind.PLACE: ("fit", "encode"),
+    Kind.MATCHER: ("match",),
+}
+_OF_WORDS = (Kind.PIXELS, Kind.VIEWS)
+_DEEPEST = 4
+
+
+def completed(kind: Kind, encoder: object) -> Any:
+    """Return an encoder of a module with all that its protocol asks for: itself where it has that already.
+
+    Args:
+        kind: the module.
+        encoder: an object with the methods of the module's protocol.
+
+    Raises:
+        BackendError: it is a class, or lacks a method that nobody can make for it.
+    """
+    name = type(encoder).__qualname__
+    if isinstance(encoder, type):
+        raise BackendError(
+            f"The {kind} encoder is the class {encoder.__qualname__}; give an object: {encoder.__qualname__}()."
+        )
+    lacking = [method for method in _NEEDED[kind] if not callable(getattr(encoder, method, None))]
+    if lacking:
+        raise BackendError(
+            f"An encoder of {kind} needs {' and '.join(_NEEDED[kind])}; the {name} that was given has no {lacking[0]} "
+            "(avlmaps.perception.protocols)."
+        )
+    made = _made(kind, encoder)
+    missing = {attribute: value for attribute, value in made.items() if not hasattr(encoder, attribute)}
+    if not hasattr(encoder, "card"):
+        missing["card"] = made_card(kind, encoder)
+    return _Completed(encoder, missing) if missing else encoder
+
+
+class _Completed:
+    """An encoder's own members beside those that were made; ``isinstance`` of its protocols sees both."""
+
+    def __init__(self, encoder: object, made: Mapping[str, Any]) -> None:
+        for name in dir(encoder):
+            with suppress(AttributeError):  # of a property that does not hold yet
+                self.__dict__.update({} if name.startswith("_") else {name: getattr(encoder, name)})
+        self.__dict__.update(made)
+        self._name = type(encoder).__qualname__
+
+    def __repr__(self) -> str:
+        return self._name
+
+
+def _made(kind: Kind, encoder: Any) -> dict[str, Any]:
+    """Return the members of a protocol that can be made for an encoder."""
+    name = type(encoder).__qualname__
+
+    @cache
+    def understood(word: str) -> str:
+        return word if np.any(np.asarray(encoder.encode_words([word]))) else ""
+
+    def refuse(of: str) -> Callable[..., np.ndarray]:
+        def refused(*_: object) -> np.ndarray:
+            raise BackendError(f"The encoder {name} of {kind} has no {of}; it can be asked for words alone.")
+
+        return refused
+
+    if kind is Kind.PIXELS:
+        things = tuple(entry.name for entry in lexicon().entries(Entry.THING) if entry.split == "training")
+        return {"vocabulary": things, "understood": understood, "encode": refuse("encode")}
+    if kind is Kind.VIEWS:
+        return {"encode": refuse("encode")}
+    methods = ("encode", "encode_words", "score_sounds")
+    return {"vocabulary": (), **{of: refuse(of) for of in methods}} if kind is Kind.SOUNDS else {}
+
+
+def made_card(kind: Kind, encoder: Any) -> ModelCard:
+    """Return a card for an encoder without one: its class's name, and a hash of its code and of what it holds."""
+    dim = 0
+    if kind in _OF_WORDS:
+        rows = np.asarray(_words_of(kind, encoder))
+        if rows.ndim != 2 or len(rows) != 1 or rows.shape[1] < 1:
+            raise BackendError(
+                f"encode_words of the {kind} encoder {type(encoder).__qualname__} must give a row for each word, shape "
+                f"(1, d) for one; it gave {rows.shape}."
+            )
+        dim = rows.shape[1]
+    digest = hashlib.sha256()
+    for piece in (type(encoder).__qualname__.encode(), _code(type(encoder)), *_held(encoder, _DEEPEST)):
+        digest.update(hashlib.sha256(piece).digest())
+    note = "its card was made from its code and what it holds; it had none"
+    return ModelCard(type(encoder).__qualname__.rpartition(".")[2], dim, "unknown", digest.hexdigest(), note=note)
+
+
+def _words_of(kind: Kind, encoder: Any) -> Any:
+    try:
+        return encoder.encode_words(["chair"])
+    except AvlmapsError:
+        raise
+    except Exception as fault:
+        raise BackendError(
+            f"encode_words(['chair']) of the {kind} encoder {type(encoder).__qualname__} raised "
+            f"{type(fault).__name__}: {fault}"
+        ) from fault
+
+
+def _code(kind: type) -> bytes:
+    """Return a class's source without comments and layout; nothing where there is none to read."""
+    try:
+        return ast.unparse(ast.parse(textwrap.dedent(inspect.getsource(kind)))).encode()
+    except (OSError, TypeError, SyntaxError):
+        return b""
+
+
+def _held(value: Any, depth: int) -> Iterator[bytes]:
+    """Yield what an object holds: numbers, words, arrays, the weights of a network, and objects within."""
+    value = _opened(value)
+    if isinstance(value, np.ndarray):
+        yield f"{value.dtype} {value.shape}".encode() + np.ascontiguousarray(value).tobytes()
+    elif isinstance(value, str | bytes | int | float | bool | None):
+        yield repr(value).encode()
+    elif depth and isinstance(value, Mapping):
+        for name in sorted(value, key=repr):
+            yield repr(name).encode()
+            yield from _held(value[name], depth - 1)
+    elif depth and isinstance(value, Sequence):
+        for one in value:
+            yield from _held(one, depth - 1)
+    else:
+        yield type(value).__qualname__.encode()
+
+
+def _opened(value: Any) -> Any:
+    """Return an object as the mapping or the array of what it holds; a number, a word or a container as it is."""
+    if isinstance(value, str | bytes | int | float | bool | None | np.ndarray | Mapping | Sequence):
+        return value
+    if callable(getattr(value, "state_dict", None)):
+        return dict(value.state_dict())
+    if callable(getattr(value, "numpy", None)) and callable(getattr(value, "cpu", None)):
+        return value.cpu().numpy()
+    if dataclasses.is_dataclass(value):
+        return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+    return getattr(value, "__dict__", type(value).__qualname__)

@@ -1,0 +1,113 @@
+"""Encoders as a value: names of the registry or objects, and what is made for an object that lacks it."""
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import avlmaps
+from avlmaps.core.errors import BackendError
+from avlmaps.core.registry import Kind
+from avlmaps.perception.encoders import MODULES, Encoders
+from avlmaps.perception.profiles import Profile, profile, profiles
+
+
+class Words:
+    """Three words, an axis each; nothing else of the protocol."""
+
+    def __init__(self, scale: float = 1.0, table: np.ndarray | None = None) -> None:
+        self.scale, self.table = scale, table
+
+    def encode_words(self, words) -> np.ndarray:
+        rows = np.zeros((len(words), 3), np.float32)
+        for row, word in zip(rows, words, strict=True):
+            if word in ("chair", "sofa", "table"):
+                row[("chair", "sofa", "table").index(word)] = 1.0
+        return rows
+
+
+@pytest.mark.parametrize("name", [one.name for one in profiles()])
+def test_a_profile_by_name_has_its_encoders_and_loads_none(name: str) -> None:
+    used = Encoders.named(name)
+    assert used.name == name and used == profile(name).encoders()
+    assert {kind: used.name_of(kind) for kind in MODULES} == {k: profile(name).backend_name(k) for k in MODULES}
+    assert used.weight_variance_m2 == profile(name).weight_variance_m2
+
+
+@given(st.dictionaries(st.sampled_from(MODULES), st.sampled_from(["", None]), max_size=6))
+def test_what_is_put_in_the_place_of_a_module_changes_that_one_alone(instead: dict) -> None:
+    used = Encoders.named("embedded", **{kind.value: one for kind, one in instead.items()})
+    assert set(used) == set(Encoders.named("embedded")) - set(instead)
+    for kind in used:
+        assert used.sources[kind] == Encoders.named("embedded").sources[kind]
+
+
+def test_an_object_needs_no_registry_and_brings_a_vocabulary_and_a_card() -> None:
+    mine = Words()
+    used = Encoders.named("embedded", pixels=mine)
+    assert used.pixels is used.pixels and used.name_of(Kind.PIXELS) == "given:Words"
+    assert (used.pixels.card.id, used.pixels.card.dim) == ("Words", 3) and len(used.pixels.card.checksum) == 64
+    assert "chair" in used.pixels.vocabulary
+    assert (used.pixels.understood("sofa"), used.pixels.understood("moon")) == ("sofa", "")
+    assert isinstance(used.pixels, avlmaps.perception.protocols.PixelEncoder)
+
+
+def test_a_profile_takes_an_object_too() -> None:
+    assert Profile("mine", pixels=Words()).encoders().pixels.card.id == "Words"
+    assert Profile("mine", pixels=Words()).backend_name(Kind.PIXELS) == "given:Words"
+
+
+@given(st.floats(0.1, 9.0), st.floats(0.1, 9.0))
+@settings(max_examples=20)
+def test_a_made_card_tells_encoders_apart_by_what_they_hold(one: float, other: float) -> None:
+    def checksum(scale: float, table: np.ndarray | None = None) -> str:
+        return Encoders(pixels=Words(scale, table)).card(Kind.PIXELS).checksum
+
+    assert checksum(one) == checksum(one)
+    assert (checksum(one) == checksum(other)) == (one == other)
+    assert checksum(one, np.zeros(3)) != checksum(one, np.ones(3))
+
+
+def test_what_an_object_lacks_is_named() -> None:
+    with pytest.raises(BackendError, match=r"An encoder of pixels needs encode_words; the object that was given"):
+        Encoders(pixels=object())
+    with pytest.raises(BackendError, match=r"is the class Words; give an object: Words\(\)"):
+        Encoders(pixels=Words)
+    with pytest.raises(BackendError, match="encoder Words of pixels has no encode"):
+        Encoders(pixels=Words()).pixels.encode(None)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(BackendError, match="no module called 'pixel'"):
+        Encoders.named("embedded", pixel=Words())
+    with pytest.raises(BackendError, match=r"no profile called 'embeded'.*Did you mean embedded"):
+        Encoders.named("embeded")
+    with pytest.raises(BackendError, match="'own' has no views backend"):
+        Encoders(pixels=Words()).load(Kind.VIEWS)
+
+
+def test_words_that_are_no_rows_are_refused() -> None:
+    class Flat(Words):
+        def encode_words(self, words) -> np.ndarray:
+            return np.zeros(3, np.float32)
+
+    class Raising(Words):
+        def encode_words(self, words) -> np.ndarray:
+            raise KeyError("chair")
+
+    with pytest.raises(BackendError, match=r"Flat must give a row for each word, shape \(1, d\) for one; .* \(3,\)"):
+        Encoders(pixels=Flat())
+    with pytest.raises(BackendError, match="Raising raised KeyError"):
+        Encoders(pixels=Raising())
+
+
+def test_encoders_do_not_change() -> None:
+    with pytest.raises(AttributeError):
+        Encoders.named("embedded").name = "other"  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_the_old_names_still_work_and_warn() -> None:
+    with pytest.warns(DeprecationWarning, match=r"Profile\.pixel_encoder\(\) goes in the next release"):
+        assert profile("embedded").pixel_encoder() is Encoders.named("embedded").pixels
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert Encoders.named("colours").pixels.card.dim > 0
