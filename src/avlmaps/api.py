@@ -54,8 +54,15 @@ def build_map(
 
     opened = open_recording(recording) if isinstance(recording, str | Path) else recording
     stored = build(
-        opened, path, encoders or profile, settings or DEFAULTS, allow=allow, resume=resume, overwrite=overwrite, progress=progress
-    )  # fmt: skip
+        opened,
+        path,
+        encoders or profile,
+        settings or DEFAULTS,
+        allow=allow,
+        resume=resume,
+        overwrite=overwrite,
+        progress=progress,
+    )
     return AVLMap(stored if encoders is None else replace(stored, encoders=encoders.over(stored.encoders)))
 
 
@@ -65,7 +72,7 @@ def open_map(path: str | Path, *, encoders: "Encoders | None" = None) -> "AVLMap
     Args:
         path: the folder.
         encoders: the models to ask with, where the map was made with objects; by default, and for modules that
-            are left out, those that the map names. What needs none (points, colours, places of sounds) is there without.
+            are left out, those that the map names. Points, colours and places of sounds need none.
 
     Raises:
         MapError: it is not a map, or damaged, or of another schema.

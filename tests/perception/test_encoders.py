@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import avlmaps
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind
 from avlmaps.perception.encoders import MODULES, Encoders
 from avlmaps.perception.profiles import Profile, profile, profiles
+from avlmaps.perception.protocols import PixelEncoder
 
 
 class Words:
@@ -51,7 +51,7 @@ def test_an_object_needs_no_registry_and_brings_a_vocabulary_and_a_card() -> Non
     assert (used.pixels.card.id, used.pixels.card.dim) == ("Words", 3) and len(used.pixels.card.checksum) == 64
     assert "chair" in used.pixels.vocabulary
     assert (used.pixels.understood("sofa"), used.pixels.understood("moon")) == ("sofa", "")
-    assert isinstance(used.pixels, avlmaps.perception.protocols.PixelEncoder)
+    assert isinstance(used.pixels, PixelEncoder)
 
 
 def test_a_profile_takes_an_object_too() -> None:

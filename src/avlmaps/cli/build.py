@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from avlmaps.perception.cache.feature_store import CacheSettings
-    from avlmaps.perception.profiles import Profile
+    from avlmaps.perception.encoders import Encoders
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,14 +141,14 @@ def build(verb: "Build") -> dict[str, Any]:
     return {**describe_map(stored), "elapsed_s": round(perf_counter() - begin, 3)}
 
 
-def _choose_models(name: str, words: "Sequence[str]") -> "Profile":
+def _choose_models(name: str, words: "Sequence[str]") -> "Encoders":
     from avlmaps.perception.profiles import profile, read_choices
 
     try:
         choices = read_choices(words)
     except ValueError as problem:
         raise UsageError(f"--model {problem}") from None
-    return profile(name).choosing(choices)
+    return profile(name).choosing(choices).encoders()
 
 
 def _cache(place: str, limit_gb: float) -> "CacheSettings":

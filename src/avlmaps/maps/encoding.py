@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Float32
 
 from avlmaps.core.errors import RecordingError
+from avlmaps.maps.perceived import encode_pixels
 from avlmaps.maps.prefetch import run_ahead
 from avlmaps.maps.store.manifest import BadFrame
-from avlmaps.perception.cache.cached_encoders import encode_batch
 from avlmaps.perception.protocols import BatchPixelEncoder, PixelEncoder
 from avlmaps.recordings.types import Frame, Recording
 
@@ -72,7 +72,7 @@ def encode_batches(
         stretch = islice(frames, length)
         while group := _next_group(stretch, size, counts):
             wanted = [frame for frame in group if isinstance(frame, Frame) and counts(frame)]
-            features = iter(encode_batch(encoder, wanted) if wanted else [])
+            features = iter(encode_pixels(encoder, wanted))
             for frame in group:
                 yield frame, (next(features) if counts(frame) else None)
 

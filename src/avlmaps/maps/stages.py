@@ -15,7 +15,9 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.maps.doubts import carving_doubts
 from avlmaps.maps.encoding import strip_folder
+from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.cleaning import clean
+from avlmaps.maps.fusion.free_space import FreeViews
 from avlmaps.maps.fusion.sensor_choice import find_sensor
 from avlmaps.maps.gravity.floor import GroundedRecording
 from avlmaps.maps.gravity.stage import estimate_ground, estimate_up, ground_notices, spread
@@ -35,6 +37,7 @@ from avlmaps.maps.plan import Computed, Plan, audio_key, stage
 from avlmaps.maps.store.array_validation import array_fields, validate_arrays
 from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.manifest import (
+    BadFrame,
     Box,
     Counts,
     GroundInfo,
@@ -174,15 +177,23 @@ class Merged:
 
 def merge(plan: Plan, parts: Sequence[Part], sensor: SensorInfo) -> Merged:
     """Add the parts up to the voxels of the map, and remove those that are no surface."""
-    begin, grid = perf_counter(), GridSpec(plan.settings.voxel_size_m)
-    total = sum_parts(parts, grid)
+    total = sum_parts(parts, GridSpec(plan.settings.voxel_size_m))
+    return surfaces(plan, total, [part.views() for part in parts], sensor)
+
+
+def surfaces(plan: Plan, total: VoxelAccumulator, views: Sequence[FreeViews], sensor: SensorInfo) -> Merged:
+    """Return the voxels of the sums that are a surface.
+
+    Raises:
+        MapError: there is none.
+    """
+    begin, grid = perf_counter(), total.grid
     if len(total) == 0:
         farthest = min(plan.settings.fusion.max_depth_m, sensor.model.farthest_m(grid.voxel_size_m))
         raise MapError(
             f"No pixel of {plan.recording.path} has a depth between {plan.settings.fusion.min_depth_m} and "
             f"{farthest:.4g} m, so that the map would be empty; check the recording's depth scale."
         )
-    views = [part.views() for part in parts]
     kept, removed = clean(total.evidence(), views, plan.recording.rig.depth, grid, sensor.model)
     if not kept.any():
         raise MapError(
@@ -195,7 +206,7 @@ def merge(plan: Plan, parts: Sequence[Part], sensor: SensorInfo) -> Merged:
 def detect_sounds(plan: Plan) -> SoundResult:
     """Find the sounds in the track; none where there is no track, or no model for them."""
     if plan.recording.audio is None or Kind.SOUNDS not in plan.used:
-        return SoundResult(_silence(plan), plan.path, 0.0)
+        return SoundResult(silence(plan), plan.path, 0.0)
     settings, model = plan.settings.hearing, plan.models[Kind.SOUNDS.value]
     key = key_of("sounds", BUILD_VERSION, plan.recording.fingerprint, audio_key(plan.recording), settings, model)
 
@@ -218,7 +229,8 @@ def detect_sounds(plan: Plan) -> SoundResult:
     return SoundResult(sounds, found.folder / "clips", found.facts.elapsed_s)
 
 
-def _silence(plan: Plan) -> HeardSounds:
+def silence(plan: Plan) -> HeardSounds:
+    """Return no sounds, with features as long as the model's."""
     model = plan.models.get(Kind.SOUNDS.value)
     return HeardSounds(
         onset_s=np.zeros(0),
@@ -252,19 +264,22 @@ def write(
     }
     finished = datetime.now(UTC).isoformat(timespec="seconds")
     timings = Timings(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)
-    return write_map(plan.path, content, _manifest(plan, up.up, floor.ground, parts, content, merged, timings))
+    bad = sorted((frame for part in parts for frame in part.info.bad_frames), key=lambda frame: frame.index)
+    fused = sum(part.info.fused for part in parts)
+    return write_map(plan.path, content, manifest_of(plan, up.up, floor.ground, content, merged, timings, fused, bad))
 
 
-def _manifest(
+def manifest_of(
     plan: Plan,
     up: UpInfo,
     ground: GroundInfo,
-    parts: Sequence[Part],
     content: MapContent,
     merged: Merged,
     timings: Timings,
+    fused: int,
+    bad: Sequence[BadFrame] = (),
 ) -> MapInfo:
-    bad = sorted((frame for part in parts for frame in part.info.bad_frames), key=lambda frame: frame.index)
+    """Return the content of ``map.json`` but for its list of files."""
     doubts = (*plan.doubts, *carving_doubts(merged.removed, len(content.voxels)))
     return MapInfo(
         avlmaps_version=__version__,
@@ -281,7 +296,7 @@ def _manifest(
         seed=plan.settings.seed,
         recording=_recording_info(plan.recording),
         counts=Counts(
-            frames=sum(part.info.fused for part in parts),
+            frames=fused,
             keyframes=len(content.keyframes),
             voxels=len(content.voxels),
             sounds=len(content.sounds),

@@ -76,9 +76,24 @@ def keyframes_by_motion(
         if beyond is None:
             chosen.append(count - 1)
             break
-        start = max(last + 1, (last + beyond + 1) // 2)
-        chosen.append(start + int(np.argmin(speed[start : beyond + 1])))
+        chosen.append(_least_moved(last, beyond, speed))
     return np.array(chosen, np.int64)
+
+
+def next_keyframe(
+    stamps_s: Float[np.ndarray, " n"], world_from_camera: Float[np.ndarray, "n 4 4"], settings: KeyframeSettings
+) -> int | None:
+    """Return the keyframe that follows frame 0 as soon as no later frame can change it; None until then."""
+    beyond = _first_beyond(0, stamps_s, world_from_camera, settings)
+    if beyond is None or beyond + 1 >= len(stamps_s):  # how fast a frame moves is known with the one after it
+        return None
+    return _least_moved(0, beyond, _apparent_motion(stamps_s, world_from_camera))
+
+
+def _least_moved(last: int, beyond: int, speed: Float[np.ndarray, " n"]) -> int:
+    """Return the frame that moved least in the second half of the stretch from a keyframe to one beyond its limits."""
+    start = max(last + 1, (last + beyond + 1) // 2)
+    return start + int(np.argmin(speed[start : beyond + 1]))
 
 
 def _first_beyond(

@@ -78,7 +78,8 @@ class StoredMap:
         from avlmaps.perception.profiles import Profile
 
         warnings.warn("StoredMap.profile goes in the next release; use .encoders.", DeprecationWarning, stacklevel=2)
-        return Profile(self.info.profile, **{kind.value: self.encoders.name_of(kind) for kind in self.encoders})
+        names = {kind.value: self.encoders.name_of(kind) for kind in self.encoders}
+        return Profile(self.info.profile, **names)  # pyright: ignore[reportArgumentType]
 
     def clip_path(self, sound: int) -> Path:
         """Return the FLAC file of a sound, by its number in ``sounds``."""

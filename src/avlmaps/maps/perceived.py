@@ -1,0 +1,85 @@
+"""What encoders give, held to their protocols while a map is made: a wrong shape is told before it reaches the map."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from avlmaps.core.arrays import Float32
+from avlmaps.core.errors import AvlmapsError, BackendError
+from avlmaps.perception.cache.cached_encoders import encode_batch
+from avlmaps.perception.protocols import PixelEncoder
+from avlmaps.recordings.types import Frame
+
+_UNIT = 0.02
+
+
+def encode_pixels(encoder: PixelEncoder, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
+    """Return the features of each frame.
+
+    Raises:
+        BackendError: the encoder fails, or gives something else than its protocol says.
+    """
+    if not frames:
+        return []
+    who, names = f"The pixel encoder {encoder.card.id}", ", ".join(frame.name for frame in frames)
+    try:
+        found = encode_batch(encoder, frames)
+    except AvlmapsError:
+        raise
+    except Exception as fault:
+        raise BackendError(f"{who} failed on {names} with {type(fault).__name__}: {fault}") from fault
+    if len(found) != len(frames):
+        raise BackendError(f"{who} gave features of {len(found)} frames for {len(frames)} ({names}).")
+    return [
+        as_grid(features, encoder.card.dim, f"{who} gave", frame) for features, frame in zip(found, frames, strict=True)
+    ]
+
+
+def as_grid(features: Any, dim: int | None, who: str, frame: Frame) -> np.ndarray:
+    """Return features as an array of the right form.
+
+    Args:
+        features: what came.
+        dim: numbers of a feature; None for any.
+        who: the beginning of the sentence.
+        frame: that they are of.
+
+    Raises:
+        BackendError: they have another form.
+    """
+    array = np.asarray(features)
+    wanted = f"float32 of (rows, columns, {'d' if dim is None else dim})"
+    wrong = array.dtype.kind != "f" or array.ndim != 3 or 0 in array.shape
+    if wrong or (dim is not None and array.shape[2] != dim):
+        raise BackendError(f"{who} {array.dtype} of {array.shape} for {frame.name}; features are {wanted}.")
+    return array
+
+
+def require_unit(features: np.ndarray, who: str, frame: Frame) -> None:
+    """Raise ``BackendError`` where features are not finite, or not of unit length or zero."""
+    lengths = np.sqrt(np.einsum("ijk,ijk->ij", features, features, dtype=np.float64))
+    if not np.isfinite(lengths).all():
+        raise BackendError(
+            f"{who} NaN or infinite features for {frame.name} (in {int((~np.isfinite(lengths)).sum())} of "
+            f"{lengths.size} cells); they must be finite, and zero where there is nothing to say."
+        )
+    off = (lengths > _UNIT) & (np.abs(lengths - 1.0) > _UNIT)
+    if off.any():
+        raise BackendError(
+            f"{who} features of length {lengths[off].min():.3g} to {lengths[off].max():.3g} for {frame.name}; each has "
+            "unit length, or is zero: divide it by its length."
+        )
+
+
+def as_rows(found: Any, dim: int, who: str, frame: Frame) -> Float32[np.ndarray, " d"]:
+    """Return the one feature of a picture.
+
+    Raises:
+        BackendError: it has another form, or is not finite.
+    """
+    array = np.asarray(found)
+    row = array.reshape(-1) if array.ndim in (1, 2) else array
+    if array.dtype.kind != "f" or row.shape != (dim,) or not np.isfinite(row).all():
+        raise BackendError(f"{who} gave {array.dtype} of {array.shape} for {frame.name}; it is {dim} finite numbers.")
+    return row.astype(np.float32)

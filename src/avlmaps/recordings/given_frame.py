@@ -1,0 +1,121 @@
+"""A frame out of a program's arrays: what does not fit is refused in a sentence with what is wanted and what came."""
+
+from typing import Any
+
+import numpy as np
+
+from avlmaps.core.arrays import Float, UInt8
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.poses import orthonormalize
+from avlmaps.recordings.types import Frame
+
+# A picture whose middle depth is farther than this was given in millimetres: 0.2 m of them are more.
+_FARTHEST_MIDDLE_M = 200.0
+# One that has no depth beyond this was given in kilometres, or divided twice.
+_NEAREST_FARTHEST_M = 0.02
+
+
+def given_frame(
+    index: int,
+    rgb: UInt8[np.ndarray, "h w 3"],
+    depth_m: Float[np.ndarray, "hd wd"],
+    camera: Pinhole | Rig,
+    world_from_camera: Float[np.ndarray, "4 4"],
+    stamp_s: float,
+) -> Frame:
+    """Return a frame of a program's arrays, which are copied.
+
+    Args:
+        index: its number, for errors.
+        rgb: colour picture.
+        depth_m: z-depth in metres; 0, NaN or infinity where there is none. It covers the same view as the picture, at
+            any resolution, unless the camera is a rig.
+        camera: of the colour picture, or both cameras and how they sit.
+        world_from_camera: 4x4 pose of the depth camera; its rotation is made orthonormal within rounding.
+        stamp_s: seconds.
+
+    Raises:
+        RecordingError: one of them does not fit.
+    """
+    name = f"frame {index}"
+    colours, depths = _colours(name, rgb), _depths(name, depth_m)
+    rig = _rig(name, camera, colours, depths)
+    pose = orthonormalize(_numbers(name, "world_from_camera", world_from_camera).astype(np.float64), name)
+    if not np.isscalar(stamp_s) or isinstance(stamp_s, str | bytes | complex) or not np.isfinite(stamp_s):
+        raise RecordingError(f"stamp_s of {name} must be a finite number of seconds, not {stamp_s!r}.")
+    return Frame(index, name, float(stamp_s), colours, depths, pose, rig)
+
+
+def _numbers(name: str, what: str, given: Any) -> np.ndarray:
+    array = np.asarray(given)
+    if array.dtype.kind not in "fiu":
+        raise RecordingError(
+            f"{what} of {name} must be an array of numbers, not {type(given).__name__} ({array.dtype})."
+        )
+    return array
+
+
+def _colours(name: str, given: Any) -> UInt8[np.ndarray, "h w 3"]:
+    rgb = np.asarray(given)
+    if rgb.ndim != 3 or rgb.shape[2] != 3 or 0 in rgb.shape or rgb.dtype != np.uint8:
+        hint = "; colours from 0 to 1 times 255" if rgb.dtype.kind == "f" else ""
+        hint = "; leave the fourth channel out" if rgb.ndim == 3 and rgb.shape[2] == 4 else hint
+        raise RecordingError(f"rgb of {name} must be uint8 of shape (h, w, 3), not {rgb.dtype} of {rgb.shape}{hint}.")
+    return np.array(rgb, order="C")
+
+
+def _depths(name: str, given: Any) -> Float[np.ndarray, "hd wd"]:
+    depth = _numbers(name, "depth_m", given)
+    if depth.ndim == 3 and depth.shape[2] == 1:
+        depth = depth[:, :, 0]
+    if depth.ndim != 2 or 0 in depth.shape:
+        raise RecordingError(f"depth_m of {name} must have shape (h, w), not {depth.shape}.")
+    if depth.dtype.kind != "f":
+        raise RecordingError(
+            f"depth_m of {name} must be floats in metres, not {depth.dtype} up to {depth.max()}; millimetres are "
+            "divided by 1000.0."
+        )
+    depth = np.array(depth, np.float32, order="C")
+    depth[~np.isfinite(depth)] = 0.0
+    seen = depth[depth != 0.0]
+    if (seen < 0.0).any():
+        raise RecordingError(f"depth_m of {name} holds negative depths, down to {seen.min():.4g} m; 0 says none.")
+    middle_m, farthest_m = (float(np.median(seen)), float(seen.max())) if len(seen) else (1.0, 1.0)
+    if middle_m > _FARTHEST_MIDDLE_M or farthest_m < _NEAREST_FARTHEST_M:
+        raise RecordingError(
+            f"depth_m of {name} must be in metres; its median is {middle_m:,.4g} and its largest {farthest_m:,.4g}"
+            f"{', which looks like millimetres' if middle_m > _FARTHEST_MIDDLE_M else ''}."
+        )
+    return depth
+
+
+def _rig(name: str, camera: Any, rgb: np.ndarray, depth: np.ndarray) -> Rig:
+    (height, width), (depth_height, depth_width) = rgb.shape[:2], depth.shape
+    if isinstance(camera, Rig):
+        wanted = (camera.rgb.width, camera.rgb.height), (camera.depth.width, camera.depth.height)
+        if wanted != ((width, height), (depth_width, depth_height)):
+            raise RecordingError(
+                f"The rig of {name} has pictures of {_size(wanted[0])} and depths of {_size(wanted[1])}; rgb has "
+                f"{_size((width, height))} and depth_m {_size((depth_width, depth_height))}."
+            )
+        return camera
+    if not isinstance(camera, Pinhole):
+        raise RecordingError(
+            f"camera of {name} must be an avlmaps.Pinhole(fx, fy, cx, cy, width, height) or an avlmaps.Rig, not "
+            f"{type(camera).__name__}."
+        )
+    if (camera.width, camera.height) != (width, height):
+        raise RecordingError(
+            f"rgb of {name} has {_size((width, height))} pixels, its camera {_size((camera.width, camera.height))}."
+        )
+    if abs(depth_width * height - depth_height * width) > max(width, height, depth_width, depth_height):
+        raise RecordingError(
+            f"depth_m of {name} has {_size((depth_width, depth_height))} pixels, rgb {_size((width, height))}: not one "
+            "view; give an avlmaps.Rig with both cameras."
+        )
+    return Rig(camera, camera.resized(depth_width, depth_height))
+
+
+def _size(size: tuple[int, int]) -> str:
+    return f"{size[0]}x{size[1]}"
