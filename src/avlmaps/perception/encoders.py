@@ -74,7 +74,7 @@ class Source:
 
     @property
     def may_be_stored(self) -> bool:
-        """Whether its card tells its features from another model's, so that they may be stored under it."""
+        """Whether its card distinguishes its features from another model's, so that they may be stored under it."""
         return True
 
     def note(self) -> str:

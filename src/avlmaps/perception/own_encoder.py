@@ -86,7 +86,7 @@ def _made(kind: Kind, encoder: Any) -> dict[str, Any]:
 
     def refuse(of: str) -> Callable[..., np.ndarray]:
         def refused(*_: object) -> np.ndarray:
-            raise BackendError(f"The encoder {name} of {kind} has no {of}; it can be asked for words alone.")
+            raise BackendError(f"The encoder {name} of {kind} has no {of}; it encodes words alone.")
 
         return refused
 

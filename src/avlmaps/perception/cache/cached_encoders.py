@@ -76,7 +76,7 @@ class CachedSource(Source):
 def with_cache(used: Encoders, settings: CacheSettings) -> Encoders:
     """Return the encoders with a store before them, as the settings say.
 
-    A matcher's matches are not stored, nor the features of an encoder whose card does not tell it from others.
+    A matcher's matches are not stored, nor the features of an encoder whose card does not distinguish it from others.
     """
     slow = frozenset(kind for kind in used if used.sources[kind].is_slow)
     storable = frozenset(kind for kind in used if kind is not Kind.MATCHER and used.sources[kind].may_be_stored)
