@@ -1,4 +1,4 @@
-"""What encoders give, held to their protocols while a map is made: a wrong shape is refused before it reaches the map."""
+"""What encoders give, held to their protocols before it reaches a map."""
 
 from collections.abc import Sequence
 from typing import Any
