@@ -123,7 +123,9 @@ def test_settings_and_shapes_that_are_none_are_refused():
 
 
 class _WordMap:
-    """A map whose voxels are named one by one."""
+    """A map of one storey whose voxels are named one by one."""
+
+    storeys = None
 
     def __init__(self, points, names):
         from avlmaps.maps.grid import GridSpec

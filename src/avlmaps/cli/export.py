@@ -23,6 +23,8 @@ class Export(ModelVerb):
     Example: avlmaps export home.avlmap --out home.glb
     Example: avlmaps export home.avlmap --out sofa.ply --heat "the sofa"
     Example: avlmaps export home.avlmap --out floor.pgm --radius-m 0.3
+
+    A map of several storeys gives an occupancy grid for each: floor-0.pgm is the lowest.
     """
 
     compiles: ClassVar[bool] = True
@@ -41,6 +43,8 @@ class Export(ModelVerb):
     """Radius of the robot (.pgm)."""
     height_m: Annotated[float, arg(metavar="METRES")] = 1.5
     """Height of the robot; higher voxels are no obstacles (.pgm)."""
+    storey: Annotated[int | None, arg(metavar="N")] = None
+    """Storey of the grid, counted from 0, the lowest (.pgm). Default: each in its own file, such as floor-0.pgm."""
     frame: Annotated[Literal["recording", "level"] | None, arg(metavar="recording|level")] = None
     """Frame of the coordinates. Default: recording for .ply and .csv, level for .glb (y up, as GLB has it) and .pgm."""
     overwrite: bool = False
@@ -55,8 +59,10 @@ class Export(ModelVerb):
 def export_lines(answer: dict[str, Any]) -> list[str]:
     """Lay out what `export` wrote."""
     files = ", ".join(f"{name} ({size_of(Path(name).stat().st_size)})" for name in answer["files"])
+    storeys = answer.get("storeys", [])
+    several = [f"one grid for each storey of the map, lowest first: {', '.join(storeys)}"] if len(storeys) > 1 else []
     axes = ", y up" if answer["files"][0].lower().endswith(".glb") and answer["frame"] == "level" else ""
-    return [f"wrote {files}, {answer['frame']} frame{axes}"]
+    return [f"wrote {files}, {answer['frame']} frame{axes}", *several]
 
 
 def export(verb: Export, opened: "AVLMap | None" = None) -> dict[str, Any]:
@@ -78,28 +84,45 @@ def export(verb: Export, opened: "AVLMap | None" = None) -> dict[str, Any]:
         raise UsageError(f"--things and --heat colour a .ply or a .glb; {verb.out.name!r} has no colours.")
     if kind == ".pgm" and verb.frame == FrameName.RECORDING:
         raise UsageError("An occupancy grid is a floor plan and needs the level frame; leave --frame out.")
+    if verb.storey is not None and kind != ".pgm":
+        raise UsageError(f"--storey chooses the storey of an occupancy grid; {verb.out.name!r} holds all of them.")
     frame = FrameName(verb.frame or ("level" if kind in (".pgm", ".glb") else "recording"))
-    written = [verb.out, *([verb.out.with_suffix(".yaml")] if kind == ".pgm" else [])]
-    there = [str(path) for path in written if path.exists()]
-    if there and not verb.overwrite:
-        raise UsageError(f"{' and '.join(there)} exists; give another --out, or replace it with --overwrite.")
-    opened = AVLMap.open(verb.map) if opened is None else opened
     if kind == ".pgm":
-        _write_grid(verb, opened)
-    elif kind == ".csv":
-        write_table(verb.out, opened.things(least_confidence=verb.least), opened.sounds(), opened.space, frame)
+        return _write_grids(verb, AVLMap.open(verb.map) if opened is None else opened)
+    _require_new([verb.out], verb.overwrite)
+    opened = AVLMap.open(verb.map) if opened is None else opened
+    if kind == ".csv":
+        things = opened.things(least_confidence=verb.least)
+        write_table(verb.out, things, opened.sounds(), opened.space, frame, opened.storeys)
     else:
         _write_voxels(verb, opened, kind, frame)
-    return {"map": str(verb.map), "files": [str(path) for path in written], "frame": str(frame)}
+    return {"map": str(verb.map), "files": [str(verb.out)], "frame": str(frame)}
 
 
-def _write_grid(verb: Export, opened: "AVLMap") -> None:
+def _require_new(paths: "list[Path]", overwrite: bool) -> None:
+    there = [str(path) for path in paths if path.exists()]
+    if there and not overwrite:
+        raise UsageError(f"{' and '.join(there)} exists; give another --out, or replace it with --overwrite.")
+
+
+def _write_grids(verb: Export, opened: "AVLMap") -> dict[str, Any]:
+    """Write the occupancy grid of one storey, or of each."""
     from avlmaps.navigate.bodies import BodyShape
     from avlmaps.navigate.costmap import obstacles_for
     from avlmaps.query.export import write_occupancy
 
+    storeys = opened.storeys
+    numbers = [0] if storeys is None else list(range(len(storeys)))
+    several = verb.storey is None and len(numbers) > 1
+    wanted = numbers if verb.storey is None else [verb.storey]
+    named = [verb.out.with_stem(f"{verb.out.stem}-{number}") if several else verb.out for number in wanted]
+    written = [path for grid in named for path in (grid, grid.with_suffix(".yaml"))]
+    _require_new(written, verb.overwrite)
     shape = BodyShape(radius_m=verb.radius_m, height_m=verb.height_m)
-    write_occupancy(verb.out, obstacles_for(opened, shape))
+    for number, path in zip(wanted, named, strict=True):
+        write_occupancy(path, obstacles_for(opened, shape, number))
+    answer = {"map": str(verb.map), "files": [str(path) for path in written], "frame": str(FrameName.LEVEL)}
+    return answer if storeys is None else answer | {"storeys": [storeys[number].name for number in wanted]}
 
 
 def _write_voxels(verb: Export, opened: "AVLMap", kind: str, frame: FrameName) -> None:

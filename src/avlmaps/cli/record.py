@@ -1,6 +1,6 @@
 """`avlmaps record`: record a simulated walk."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -11,7 +11,8 @@ from avlmaps.cli.output import UsageError, emit, place, table_lines
 from avlmaps.cli.verb import Verb
 
 if TYPE_CHECKING:
-    pass
+    from avlmaps.sim.scene import Scene
+    from avlmaps.sim.walk import WalkSettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +54,8 @@ class Record(Verb):
     """Frames per second."""
     max_frames: Annotated[int | None, arg(metavar="N")] = None
     """Use this many frames of a longer walk, spread evenly."""
+    floor: Annotated[int | None, arg(metavar="N")] = None
+    """Walk this floor only, counted from 0, the lowest. Default: every floor that stairs join."""
     semantic: bool = False
     """Write the object of each pixel into semantic/ as well (16-bit PNG: instance + 1, 0 for none)."""
     colour: Literal["png", "jpg"] = "png"
@@ -101,6 +104,7 @@ def record(verb: "Record") -> dict[str, Any]:
         workers=verb.workers,
     )
     scene = open_scene(verb.scene)
+    settings = replace(settings, walk=_walk(verb.floor, scene))
     made = record_scene(scene, verb.out, settings, verb.seed)
     names = [*(thing.name for thing in scene.objects), None]  # an instance of -1 is not an object
     events = [
@@ -126,6 +130,19 @@ def record(verb: "Record") -> dict[str, Any]:
         "floor": made.floor.to_json(),
         "elapsed_s": round(perf_counter() - begin, 3),
     }
+
+
+def _walk(floor: int | None, scene: "Scene") -> "WalkSettings":
+    from avlmaps.sim.free_space import floor_heights
+    from avlmaps.sim.walk import WalkSettings
+
+    if floor is None:
+        return WalkSettings(every_floor=True)
+    heights = floor_heights(scene)
+    if not 0 <= floor < len(heights):
+        has = ", ".join(f"{number} at {height:.2f} m" for number, height in enumerate(heights))
+        raise UsageError(f"{scene.name} has no floor {floor}; its floors are: {has}.")
+    return WalkSettings(floor=floor)
 
 
 def _size(words: str) -> tuple[int, int]:

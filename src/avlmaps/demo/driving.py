@@ -23,6 +23,7 @@ _LEVEL_DEG = 2.0
 _LEAST_FREE, _CAMERA_M = 0.95, 0.05
 _MARGIN_M = 0.05  # a start that is chosen has this much more room than the body needs
 _NEAR_M = 0.5
+_CARRIED_M, _SWAY_M = 0.3, 0.12  # least height of a camera over its floor; how much it differs, off the stairs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,10 +62,10 @@ def robot_in(avlmap: AVLMap, scene: Scene, shape: BodyShape = BASE, start: Groun
     from avlmaps.navigate.driver import MapDriver
     from avlmaps.sim.body import SimulatedBody
 
-    cameras = np.asarray(avlmap.stored.keyframes.world_from_camera)
+    obstacles = obstacles_for(avlmap, shape)
+    cameras = _on_storey(np.asarray(avlmap.stored.keyframes.world_from_camera), obstacles)
     floor = _floor(scene, cameras)
     _require_same_frame(avlmap, scene, cameras, floor)
-    obstacles = obstacles_for(avlmap, shape)
     if start is None:
         room = free_space(scene, shape.radius_m, shape.height_m, floor=floor)
         start = _start_near(cameras, obstacles, room, shape)
@@ -72,6 +73,16 @@ def robot_in(avlmap: AVLMap, scene: Scene, shape: BodyShape = BASE, start: Groun
         scene, start, shape.radius_m, shape.height_m, step_m=shape.step_m, flies_m=shape.flies_m, floor=floor
     )
     return SimulatedRobot(MapDriver(obstacles, body, shape), start, obstacles)
+
+
+def _on_storey(cameras: Float[np.ndarray, "k 4 4"], obstacles: Obstacles) -> Float[np.ndarray, "m 4 4"]:
+    """Return the cameras that were carried over the floor of a storey, those on its stairs left out."""
+    if obstacles.storeys is None or not len(cameras):
+        return cameras
+    height_m = cameras[:, :3, 3] @ obstacles.level_from_world[2]
+    own = obstacles.storeys.of(height_m - _CARRIED_M) == obstacles.storey
+    usual_m = np.median(height_m[own]) if own.any() else 0.0
+    return cameras[own & (np.abs(height_m - usual_m) <= _SWAY_M)]
 
 
 def _floor(scene: Scene, cameras: Float[np.ndarray, "k 4 4"]) -> int | None:

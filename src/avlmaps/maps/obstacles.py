@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Float64, Int, UInt8
 from avlmaps.core.errors import MapError, NoFloorError
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.storeys import Storeys
 from avlmaps.maps.types import Voxels
 
 STRONG_PEAK = 0.3  # share of the most crowded height's excess over the median; the lowest height above it is the floor
@@ -21,6 +22,7 @@ _FAR_CELLS = 2.0**40  # farther off no grid reaches
 _CARRIED_M = (0.1, 2.3)  # heights over the floor at which a camera is carried by who walks on it
 _WALKER_M = 0.25  # radius of who carries it; a larger body is promised no more
 _STRIDE_M = 0.5  # between two places no farther apart it went straight
+_SWAY_M = 0.12  # from the usual height of a camera over its floor; on stairs it is farther off
 _BEYOND_M = 3.0  # a walk farther beyond what was seen is a wrong pose
 SIGHT_M = (1.2, 1.7)  # heights over the floor of a robot's and of a person's eyes: what stands there blocks the view
 
@@ -73,6 +75,8 @@ class Obstacles:
         states: `CellState` of each cell.
         tall: where something stands at the height of eyes (`SIGHT_M`), so that nobody looks over it; None where
             that is not known.
+        storeys: those of the map; None where it has one.
+        storey: the number of the one that this is the grid of.
     """
 
     level_from_world: Float64[np.ndarray, "3 3"]
@@ -81,6 +85,20 @@ class Obstacles:
     floor_m: float
     states: UInt8[np.ndarray, "nx ny"]
     tall: Bool[np.ndarray, "nx ny"] | None = None
+    storeys: Storeys | None = None
+    storey: int = 0
+
+    def elsewhere(self, point_world: Float[np.ndarray, "3"], climbs: bool = False) -> str:
+        """Return why a body on this storey does not come to a place of another one; ``""`` for a place of its own.
+
+        Args:
+            point_world: the place, metres.
+            climbs: whether the body takes stairs.
+        """
+        if self.storeys is None or not np.isfinite(point_world).all():
+            return ""
+        height_m = float(np.asarray(point_world, np.float64) @ self.level_from_world[2])
+        return self.storeys.refusal(self.storey, int(self.storeys.of(np.array([height_m]))[0]), climbs)
 
     def cell_of(self, points_world: Float[np.ndarray, "*n 3"]) -> Int[np.ndarray, "*n 2"]:
         """Return the cell above or below which each point of the world lies; it may be outside of the grid."""
@@ -125,6 +143,8 @@ def find_obstacles(
     cell_size_m: float | None = None,
     ignored: Bool[np.ndarray, " n"] | None = None,
     walked: Float[np.ndarray, "k 3"] | None = None,
+    storeys: Storeys | None = None,
+    storey: int = 0,
 ) -> Obstacles:
     """Draw the grid of a map.
 
@@ -141,6 +161,8 @@ def find_obstacles(
         cell_size_m: edge of a cell; that of a voxel by default, and not smaller (the floor would have holes).
         ignored: voxels of what this body passes through or over; where only such stand, a cell is free.
         walked: where the camera was, world, in the order of time; only places of this storey count.
+        storeys: of the map, where it has more than one; without them the lowest floor is the floor.
+        storey: number of the storey that is drawn. The grids of all storeys have the same cells.
 
     Raises:
         MapError: the map has no voxel with enough hits, or would need too large a grid.
@@ -160,9 +182,10 @@ def find_obstacles(
         )
     level_from_world = rotation_to_level(up_in_world)
     level = grid.centre_of(index) @ level_from_world.T
-    floor_m = floor_height(level[:, 2], grid.voxel_size_m)
+    floor_m = floor_height(level[:, 2], grid.voxel_size_m) if storeys is None else storeys[storey].floor_m
     cell = _cells(level, level_from_world, grid.voxel_size_m, cell_size_m)
-    steps = _strides(walked, level_from_world, floor_m, cell_size_m, cell)
+    flat_only = storeys is not None
+    steps = _strides(walked, level_from_world, floor_m, cell_size_m, cell, flat_only)
     reach = min(body.radius_m, _WALKER_M) / cell_size_m
     ends = np.concatenate([cell.reshape(-1, 2), np.floor(steps - reach), np.floor(steps + reach)]).astype(np.int64)
     low, size = ends.min(axis=0), np.ptp(ends, axis=0) + 1
@@ -173,7 +196,7 @@ def find_obstacles(
     tall = np.zeros(states.shape, bool)
     at_eyes = (height_m >= SIGHT_M[0]) & (height_m <= SIGHT_M[1])
     tall[tuple(np.moveaxis(cell[:, at_eyes] - low, -1, 0))] = True
-    return Obstacles(level_from_world, low * cell_size_m, cell_size_m, floor_m, states, tall)
+    return Obstacles(level_from_world, low * cell_size_m, cell_size_m, floor_m, states, tall, storeys, storey)
 
 
 def _cells(
@@ -190,8 +213,12 @@ def _strides(
     floor_m: float,
     cell_size_m: float,
     seen: Int[np.ndarray, "8 n 2"],
+    flat_only: bool = False,
 ) -> Float[np.ndarray, "m 2"]:
-    """Return places along a walk on a floor, closer to each other than a cell, in units of cells."""
+    """Return places along a walk on a floor, closer to each other than a cell, in units of cells.
+
+    With ``flat_only`` where the camera is higher or lower than usual by more than 0.12 m is left out: it was on stairs.
+    """
     if walked is None or not len(walked):
         return np.zeros((0, 2))
     level = np.asarray(walked, np.float64) @ level_from_world.T
@@ -199,6 +226,8 @@ def _strides(
     beyond = _BEYOND_M / cell_size_m
     near = (at >= seen.min(axis=(0, 1)) - beyond) & (at <= seen.max(axis=(0, 1)) + beyond)
     ours = near.all(axis=1) & (height_m >= _CARRIED_M[0]) & (height_m <= _CARRIED_M[1])  # NaN is none of them
+    if flat_only and ours.any():
+        ours &= np.abs(height_m - np.median(height_m[ours])) <= _SWAY_M
     both = ours[:-1] & ours[1:] & (np.linalg.norm(at[1:] - at[:-1], axis=1) <= _STRIDE_M / cell_size_m)
     part = np.linspace(0.0, 1.0, int(np.ceil(_STRIDE_M / cell_size_m)) + 1)[:, None, None]
     between = (1.0 - part) * at[:-1][both] + part * at[1:][both]

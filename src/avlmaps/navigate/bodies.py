@@ -56,6 +56,8 @@ class BodyShape:
     """Words for what is not an obstacle to it: what the map holds for such a thing is passed over or through."""
     only: tuple[str, ...] | None = None
     """Where given, nothing but these words counts as an obstacle, as VLMaps lists them; unnamed things are passed."""
+    climbs: bool = False
+    """Whether it takes the stairs that a map holds to another storey."""
 
     def __post_init__(self) -> None:
         if not (0.0 < self.radius_m < 10.0 and 0.0 < self.step_m < self.height_m):
@@ -74,5 +76,7 @@ BASE = BodyShape()
 """A wheeled base of the size of those in homes, with a camera on a mast."""
 DRONE = BodyShape(radius_m=0.25, height_m=1.6, flies_m=1.0, ignores=("table",))
 """A small drone at the height of a person's chest: it flies over tables, and what is called a table stops it not."""
+WALKER = BodyShape(radius_m=0.25, height_m=1.8, step_m=0.2, climbs=True)
+"""A person or a legged robot: it takes stairs."""
 SHAPES: Mapping[str, BodyShape] = MappingProxyType({"base": BASE, "drone": DRONE})
 """The shapes by name."""

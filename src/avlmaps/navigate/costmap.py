@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int
 
-from avlmaps.core.errors import NavigationError
+from avlmaps.core.errors import MapError, NavigationError
 from avlmaps.maps.obstacles import Body, CellState, Obstacles, find_obstacles
+from avlmaps.maps.storeys import said_storeys
 from avlmaps.navigate.bodies import BASE, BodyShape
 
 if TYPE_CHECKING:
@@ -122,15 +123,16 @@ class Costmap:
         return held
 
 
-def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE) -> Obstacles:
+def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE, storey: int | None = None) -> Obstacles:
     """Find the obstacles of a body in a map, by its height and by the words that count as obstacles to it.
 
     Args:
         avlmap: the map; queried for the words of the shape.
         shape: of the robot that is to move there.
+        storey: on which it is, counted from 0, the lowest; None for the one where the map's walk began.
 
     Raises:
-        MapError: the map holds too little to find a floor.
+        MapError: the map holds too little to find a floor, or has no such storey.
         QueryError: a word of the shape means nothing to the map's encoder.
         BackendError: the shape has words, and the map's profile has no pixel encoder.
     """
@@ -145,7 +147,22 @@ def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE) -> Obstacles:
         ignored |= ~counting
     body = Body(shape.radius_m, shape.height_m, shape.step_m, flies_m=shape.flies_m)
     walked = np.asarray(stored.keyframes.world_from_camera)[:, :3, 3]
-    return find_obstacles(stored.voxels, stored.grid, stored.up_in_world, body, ignored=ignored, walked=walked)
+    storeys = avlmap.storeys
+    number = storey_of_walk(avlmap) if storey is None else storey
+    if not 0 <= number < (1 if storeys is None else len(storeys)):
+        raise MapError(f"The map has no storey {number}; {said_storeys(storeys)}.")
+    return find_obstacles(
+        stored.voxels, stored.grid, stored.up_in_world, body, ignored=ignored, walked=walked, storeys=storeys,
+        storey=number,
+    )  # fmt: skip
+
+
+def storey_of_walk(avlmap: "AVLMap") -> int:
+    """Return the number of the storey on which the walk of a map began; 0 for a map of one."""
+    cameras = np.asarray(avlmap.stored.keyframes.world_from_camera, np.float64)[:1, :3, 3]
+    if avlmap.storeys is None or not len(cameras):
+        return 0
+    return int(avlmap.storeys.of(avlmap.space.level(cameras)[:, 2])[0])
 
 
 def _voxels_called(avlmap: "AVLMap", word: str) -> Bool[np.ndarray, " n"]:

@@ -158,11 +158,13 @@ class MapDriver:
         """Drive to a place, or as near to it as the robot can stand and see it.
 
         Args:
-            place: in the world, metres; its height does not matter.
+            place: in the world, metres; its height says only which storey it is on.
             face: a place in the world to look at once there.
         """
         goal = self._level(place)
         trip = self._trip()
+        if elsewhere := self.obstacles.elsewhere(place):
+            return self._arrival(trip, False, elsewhere)
         stop, note = None, f"it gave up after {self.settings.most_plans} plans"
         for _ in range(self.settings.most_plans):
             stop = self.planner.stop_for(self._xy, goal)

@@ -1,8 +1,9 @@
 """Paths between two places of a map, for a body: what a robot would plan, without a robot."""
 
 import threading
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, TypedDict
+from typing import TYPE_CHECKING, Annotated, NotRequired, TypedDict
 
 import numpy as np
 from jaxtyping import Float
@@ -10,10 +11,10 @@ from msgspec import Meta
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.poses import FRAME
-from avlmaps.maps.obstacles import CellState, Obstacles
+from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE, BodyShape
-from avlmaps.navigate.costmap import costmap_of, obstacles_for
-from avlmaps.navigate.planner import Planner, Stop, Way
+from avlmaps.navigate.costmap import costmap_of, obstacles_for, storey_of_walk
+from avlmaps.navigate.planner import Planner, Stop
 from avlmaps.query.answer import Answer
 from avlmaps.query.schema import Frame, Position
 
@@ -30,7 +31,10 @@ class StopAnswer(TypedDict):
 
 
 class PathAnswer(TypedDict):
-    """A path over the floor for a robot's body; with ``found`` false there is none."""
+    """A path over the floor for a robot's body; with ``found`` false there is none.
+
+    In a map of several storeys ``storeys`` names those that the path is on, in order.
+    """
 
     found: bool
     points: Annotated[list[Position], Meta(description="corners on the floor, from start to stop")]
@@ -39,61 +43,123 @@ class PathAnswer(TypedDict):
     stop: StopAnswer | None
     note: Annotated[str, Meta(description="why there is none, or empty")]
     frame: Frame
+    storeys: NotRequired[Annotated[list[str], Meta(description="that the path is on; of a map of several")]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spot:
+    """A place on a storey.
+
+    Attributes:
+        xy: level x and y.
+        storey: its number; 0 in a map of one.
+    """
+
+    xy: Float[np.ndarray, "2"]
+    storey: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Route:
+    """A path that may change storeys.
+
+    Attributes:
+        stop: where the body stops for the place that it goes to.
+        points: (n, 3) level frame; between two of them on one storey the height is that of its floor.
+        length_m: along the floors and up or down the stairs.
+        cost: its metres, each weighted by how narrow it is there; a metre of stairs costs 1.
+        storeys: numbers of those that it is on, in order.
+    """
+
+    stop: Stop
+    points: Float[np.ndarray, "n 3"]
+    length_m: float
+    cost: float
+    storeys: tuple[int, ...] = (0,)
 
 
 class PathFinder:
-    """Plans over one map's floor for one body; several threads may share it.
+    """Plans over one map's floors for one body; several threads may share it.
 
     Attributes:
         avlmap: the map.
-        shape: the body.
+        shape: the body; one that climbs goes by the stairs of the map to another storey.
     """
 
     def __init__(self, avlmap: "AVLMap", shape: BodyShape = BASE) -> None:
         self.avlmap = avlmap
         self.shape = shape
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
+        self._planners: dict[int, tuple[Obstacles, Planner]] = {}
 
     @cached_property
-    def obstacles(self) -> Obstacles:
-        """What stands on the floor."""
-        return obstacles_for(self.avlmap, self.shape)
+    def home(self) -> int:
+        """The storey on which the walk of the map began."""
+        return storey_of_walk(self.avlmap)
 
-    @cached_property
-    def planner(self) -> Planner:
-        """The planner."""
-        return Planner(costmap_of(self.obstacles, self.shape.radius_m))
+    def obstacles(self, storey: int) -> Obstacles:
+        """Return what stands on a storey."""
+        return self._planned(storey)[0]
 
-    def level_xy(self, place: Float[np.ndarray, " n"]) -> Float[np.ndarray, "2"]:
-        """Return level x and y of a place.
+    def planner(self, storey: int) -> Planner:
+        """Return the planner of a storey."""
+        return self._planned(storey)[1]
+
+    def _planned(self, storey: int) -> tuple[Obstacles, Planner]:
+        with self._lock:
+            if storey not in self._planners:
+                obstacles = obstacles_for(self.avlmap, self.shape, storey)
+                self._planners[storey] = obstacles, Planner(costmap_of(obstacles, self.shape.radius_m))
+            return self._planners[storey]
+
+    def spot(self, place: Float[np.ndarray, " n"]) -> Spot:
+        """Return level x and y of a place, and its storey.
 
         Args:
-            place: three numbers are a point of the recording frame, two are x and y of the level frame already.
+            place: three numbers are a point of the recording frame; two are x and y of the level frame, on the storey
+                where the walk of the map began.
         """
-        return self.avlmap.space.level(place)[:2] if len(place) == 3 else np.asarray(place, np.float64)
+        if len(place) == 2:
+            return Spot(np.asarray(place, np.float64), self.home)
+        level, storeys = self.avlmap.space.level(place), self.avlmap.storeys
+        return Spot(level[:2], 0 if storeys is None else int(storeys.of(level[2:])[0]))
 
-    def state_at(self, level_xy: Float[np.ndarray, "2"]) -> CellState:
-        """Return whether the floor at a place is free, occupied or unknown."""
-        obstacles = self.obstacles
-        cell = np.floor((level_xy - obstacles.origin_m) / obstacles.cell_size_m)
-        if not (np.all(cell >= 0) and np.all(cell < obstacles.states.shape)):  # NaN is off the grid, too
-            return CellState.UNKNOWN
-        return CellState(int(obstacles.states[tuple(cell.astype(np.int64))]))
-
-    def between(self, start: Float[np.ndarray, "2"], place: Float[np.ndarray, "2"]) -> tuple[Stop, Way] | None:
+    def between(self, start: Spot, place: Spot) -> Route | None:
         """Return where a body that comes from a start stops for a place, and the path to it; None where there is none.
 
-        Args:
-            start: level x and y.
-            place: level x and y.
+        Raises:
+            MapError: the map holds too little to find a floor.
         """
+        storeys = self.avlmap.storeys
+        if storeys is None or start.storey == place.storey:
+            return self._on_one(start, place)
+        stairs = storeys.route(start.storey, place.storey)
+        if stairs is None or not self.shape.climbs:
+            return None
+        legs: list[Route] = []
+        at, step = start, 1 if place.storey > start.storey else -1
+        for flight in stairs:
+            leg = self._on_one(at, Spot(flight.points[0, :2], at.storey))
+            if leg is None:
+                return None
+            legs.append(leg)
+            legs.append(_climb(leg, flight.points, (at.storey, at.storey + step)))
+            at = Spot(flight.points[-1, :2], at.storey + step)
+        last = self._on_one(at, place)
+        return None if last is None else _joined([*legs, last])
+
+    def _on_one(self, start: Spot, place: Spot) -> Route | None:
+        obstacles, planner = self._planned(start.storey)
         with self._lock:  # the planner's own caches are not made for threads
-            stop = self.planner.stop_for(start, place)
-            way = None if stop is None else self.planner.way(start, stop.xy)
-        return None if stop is None or way is None else (stop, way)
+            stop = planner.stop_for(start.xy, place.xy)
+            way = None if stop is None else planner.way(start.xy, stop.xy)
+        if stop is None or way is None:
+            return None
+        points = np.column_stack([way.points, np.full(len(way.points), obstacles.floor_m)])
+        return Route(stop, points, way.length_m, way.cost, (start.storey,))
 
     def answer(self, start: Float[np.ndarray, " n"], place: Float[np.ndarray, " n"]) -> PathAnswer:
-        """Return the path between two places as JSON; see ``level_xy`` for the numbers of a place.
+        """Return the path between two places as JSON; see ``spot`` for the numbers of a place.
 
         Raises:
             NavigationError: a coordinate is not finite.
@@ -101,28 +167,53 @@ class PathFinder:
         """
         if not (np.isfinite(start).all() and np.isfinite(place).all()):
             raise NavigationError("A coordinate is not a finite number; give metres, such as 1.5,2.0.")
-        found = self.between(self.level_xy(start), self.level_xy(place))
+        one, other = self.spot(start), self.spot(place)
+        found, storeys = self.between(one, other), self.avlmap.storeys
         if found is None:
-            holds = self.planner.costmap.holds
-            off = [name for name, at in (("start", start), ("goal", place)) if not holds(self.level_xy(at))]
-            note = f"the {' and the '.join(off)} lies outside of the map" if off else "no free floor leads there"
-            return {"found": False, "points": [], "length_m": None, "cost": None, "stop": None, "note": note,
-                    "frame": FRAME}  # fmt: skip
-        stop, way = found
-        return {
+            note = "" if storeys is None else storeys.refusal(one.storey, other.storey, self.shape.climbs)
+            off = [name for name, at in (("start", one), ("goal", other)) if not self._holds(at)]
+            if off:
+                note = f"the {' and the '.join(off)} lies outside of the map"
+            return {"found": False, "points": [], "length_m": None, "cost": None, "stop": None,
+                    "note": note or "no free floor leads there", "frame": FRAME}  # fmt: skip
+        answer: PathAnswer = {
             "found": True,
-            "points": [self.on_floor(xy) for xy in way.points],
-            "length_m": way.length_m,
-            "cost": way.cost,
-            "stop": {"position": self.on_floor(stop.xy), "beside_m": stop.beside_m, "seen": bool(stop.seen)},
+            "points": [self._world(point) for point in found.points],
+            "length_m": found.length_m,
+            "cost": found.cost,
+            "stop": self.stop_answer(found),
             "note": "",
             "frame": FRAME,
         }
+        if storeys is not None:
+            answer["storeys"] = [storeys[number].name for number in found.storeys]
+        return answer
 
-    def on_floor(self, level_xy: Float[np.ndarray, "2"]) -> list[float]:
-        """Return the point of the floor at a level x and y, recording frame."""
-        point = self.avlmap.space.world(np.append(level_xy, self.obstacles.floor_m))
-        return [float(value) for value in point]
+    def stop_answer(self, route: Route) -> StopAnswer:
+        """Return where a body stops at the end of a route."""
+        at = np.append(route.stop.xy, self.obstacles(route.storeys[-1]).floor_m)
+        return {"position": self._world(at), "beside_m": route.stop.beside_m, "seen": bool(route.stop.seen)}
+
+    def _holds(self, spot: Spot) -> bool:
+        return bool(self.planner(spot.storey).costmap.holds(spot.xy))
+
+    def _world(self, level: Float[np.ndarray, "3"]) -> list[float]:
+        return [float(value) for value in self.avlmap.space.world(level)]
+
+
+def _climb(before: Route, points: Float[np.ndarray, "n 3"], storeys: tuple[int, int]) -> Route:
+    """Return the route from the stop before stairs to their other end."""
+    points = np.concatenate([before.points[-1:], points])
+    length_m = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    return Route(before.stop, points, length_m, length_m, storeys)
+
+
+def _joined(legs: "list[Route]") -> Route:
+    """Return routes one after the other; each begins where the one before ends."""
+    points = np.concatenate([legs[0].points[:1], *(leg.points[1:] for leg in legs)])
+    storeys = tuple(dict.fromkeys(number for leg in legs for number in leg.storeys))
+    length_m = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    return Route(legs[-1].stop, points, length_m, sum(leg.cost for leg in legs), storeys)
 
 
 class NearGoal(TypedDict):
@@ -153,28 +244,25 @@ def goals_near(finder: PathFinder, answer: Answer, near: Float[np.ndarray, " n"]
     Args:
         finder: plans over the map that was queried.
         answer: of the query.
-        near: where the body is; see ``PathFinder.level_xy``.
+        near: where the body is; see ``PathFinder.spot``.
         top: most goals.
 
     Raises:
         MapError: the map holds too little to find a floor.
     """
-    start = finder.level_xy(near)
+    start = finder.spot(near)
     likely = [goal for goal in answer.goals if goal.score >= 0.5 * answer.goals[0].score]
     goals: list[NearGoal] = []
     for goal in likely:
-        found = finder.between(start, finder.level_xy(np.array(goal.position)))
-        stop = None
-        if found is not None:
-            seen = bool(found[0].seen)
-            stop = StopAnswer(position=finder.on_floor(found[0].xy), beside_m=found[0].beside_m, seen=seen)
+        found = finder.between(start, finder.spot(np.array(goal.position)))
+        stop = None if found is None else finder.stop_answer(found)
         goals.append(
             {
                 "position": list(goal.position),
                 "score": goal.score,
                 "probability": goal.probability,
                 "reachable": found is not None,
-                "path_m": None if found is None else found[1].length_m,
+                "path_m": None if found is None else found.length_m,
                 "stop": stop,
             }
         )

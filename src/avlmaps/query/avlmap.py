@@ -40,6 +40,7 @@ from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.maps.storeys import Storeys
     from avlmaps.query.answer import Answer
     from avlmaps.query.contents import Contents, Room, SoundEvent, Thing, Watch
     from avlmaps.query.locate import Located
@@ -307,6 +308,18 @@ class AVLMap:
             self.space, self.stored.keyframes, encoder, part, settings.areas, settings.heat, self.room_votes
         )
         return Heatmap.of(factor, settings.found_at)
+
+    @cached_property
+    def storeys(self) -> "Storeys | None":
+        """The storeys of the map and the stairs between them; None for a map of one storey."""
+        from avlmaps.maps.obstacles import Body
+        from avlmaps.maps.storeys import find_storeys, stayed_on_one
+
+        cameras = self.space.level(np.asarray(self.stored.keyframes.world_from_camera, np.float64)[:, :3, 3])
+        if stayed_on_one(cameras[:, 2]):
+            return None
+        certain = np.asarray(self.stored.voxels.hits) >= Body().min_hits
+        return find_storeys(self.space.level(self.space.centres[certain]), self.space.grid.voxel_size_m, cameras)
 
     @cached_property
     def room_votes(self) -> Rooms | None:

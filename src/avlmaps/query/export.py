@@ -21,6 +21,7 @@ from avlmaps.core.frames import FrameName
 
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
+    from avlmaps.maps.storeys import Storeys
     from avlmaps.query.contents import SoundEvent, Thing
     from avlmaps.query.voxel_space import Space
 
@@ -236,6 +237,8 @@ def write_occupancy(path: Path, obstacles: "Obstacles") -> tuple[Path, Path]:
         f"# Level frame, z up; the floor lies at z = {obstacles.floor_m:.3f} m. level_from_recording: {rotation}",
         "",
     ]
+    if obstacles.storeys is not None:
+        lines.insert(-1, f"# Storey {obstacles.storey} of {len(obstacles.storeys)}, counted from 0, the lowest.")
     described = path.with_suffix(".yaml")
     _write(path, f"P5\n{picture.shape[1]} {picture.shape[0]}\n255\n".encode("ascii") + picture.tobytes())
     return path, _write(described, "\n".join(lines).encode("utf-8"))
@@ -247,6 +250,7 @@ def write_table(
     sounds: "Iterable[SoundEvent]",
     space: "Space | None" = None,
     frame: FrameName = FrameName.RECORDING,
+    storeys: "Storeys | None" = None,
 ) -> Path:
     """Write things and sounds as CSV, one row each; the column ``frame`` names that of the positions, metres.
 
@@ -258,6 +262,7 @@ def write_table(
         sounds: rows.
         space: of the map; needed for the level frame.
         frame: of the positions.
+        storeys: of a map of several; the last column ``storey`` then holds the number, from 0, the lowest.
 
     Raises:
         QueryError: the file cannot be written.
@@ -268,30 +273,23 @@ def write_table(
     def placed(position: tuple[float, float, float]) -> list[float]:
         return [float(value) for value in _in_frame(np.array([position]), space, frame)[0]]
 
+    def on(position: tuple[float, float, float]) -> list[int]:
+        if storeys is None or space is None:
+            return []
+        return storeys.of(space.level(np.array([position]))[:, 2]).tolist()
+
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
+    writer.writerow([*columns, *(() if storeys is None else ("storey",))])
     for thing in things:
         numbers = [f"{value:.3f}" for value in (thing.confidence, *placed(thing.position), *thing.size)]
-        writer.writerow(["thing", thing.name, *numbers, "", "", str(frame), str(FrameName.LEVEL)])
+        level = str(FrameName.LEVEL)
+        writer.writerow(["thing", thing.name, *numbers, "", "", str(frame), level, *on(thing.position)])
     for sound in sounds:
         name, confidence = (sound.names[0], f"{sound.confidences[0]:.3f}") if sound.names else ("", "")
         place = [f"{value:.3f}" for value in placed(sound.position)]
-        writer.writerow(
-            [
-                "sound",
-                name,
-                confidence,
-                *place,
-                "",
-                "",
-                "",
-                f"{sound.onset_s:.3f}",
-                f"{sound.offset_s:.3f}",
-                str(frame),
-                "",
-            ]
-        )
+        times = [f"{sound.onset_s:.3f}", f"{sound.offset_s:.3f}"]
+        writer.writerow(["sound", name, confidence, *place, "", "", "", *times, str(frame), "", *on(sound.position)])
     return _write(path, text.getvalue().encode("utf-8"))
 
 

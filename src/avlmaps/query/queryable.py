@@ -15,6 +15,7 @@ from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.maps.storeys import Storeys
     from avlmaps.query.contents import Room, SoundEvent, Thing
     from avlmaps.query.rooms import RoomField, Rooms
 
@@ -47,6 +48,11 @@ class Queryable(Protocol):
     @cached_property
     def space(self) -> Space:
         """The voxels' places."""
+        ...
+
+    @cached_property
+    def storeys(self) -> "Storeys | None":
+        """The storeys of the map and the stairs between them; None for a map of one storey."""
         ...
 
     @cached_property

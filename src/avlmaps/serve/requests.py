@@ -103,6 +103,9 @@ class PathQuery(Struct, forbid_unknown_fields=True, rename={"start": "from", "go
 
     start: Annotated[Place, Meta(description="Where the body starts, such as 1.5,2.0 or 1.5,2.0,0.3.")]
     goal: Annotated[Place, Meta(description="Where it goes; it stops beside what it cannot stand in.")]
+    stairs: Annotated[
+        bool, Meta(description="For a body that takes stairs, such as a person; a robot on wheels not.")
+    ] = False
 
 
 class TilesQuery(Struct, forbid_unknown_fields=True):

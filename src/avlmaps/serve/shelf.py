@@ -138,6 +138,14 @@ class ServedMap:
         return PathFinder(self.avlmap)
 
     @cached_property
+    def paths_by_stairs(self) -> "PathFinder":
+        """The planner of this map's floors for who takes stairs."""
+        from avlmaps.navigate.bodies import WALKER
+        from avlmaps.navigate.paths import PathFinder
+
+        return PathFinder(self.avlmap, WALKER)
+
+    @cached_property
     def top_down(self) -> "TopDown":
         """The map from above."""
         from avlmaps.query.topdown import TopDown

@@ -272,7 +272,8 @@ def place(task: Task, query: PlaceQuery) -> PlaceAnswer:
 
 def path(task: Task, query: PathQuery) -> PathAnswer:
     """Return the path between two places."""
-    return task.map.paths.answer(place_of(query.start), place_of(query.goal))
+    finder = task.map.paths_by_stairs if query.stairs else task.map.paths
+    return finder.answer(place_of(query.start), place_of(query.goal))
 
 
 def picture(task: Task, query: PictureQuery) -> File:

@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.sim.driving import WalkSettings
-from avlmaps.sim.free_space import FreeSpace, free_space, occupied, reaching_part
+from avlmaps.sim.free_space import FreeSpace, floor_heights, free_space, occupied, reaching_part
 from avlmaps.sim.scene import Scene
 
 LEAST_M2 = 1.0  # a robot that has less room sees one piece of furniture from inside
@@ -18,6 +18,7 @@ _LEVEL = 0.97  # cosine of a normal with an axis
 _DRIVEN_M = 0.5
 _SEEN_M = 4.0
 _RAYS = 48
+_SWAY_M = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +101,35 @@ def floor_coverage(
         driven_share=np.count_nonzero(space.free & (apart_m <= _DRIVEN_M)) / walkable,
         seen_share=np.count_nonzero(space.free & seen) / walkable,
     )
+
+
+def coverage_of_walk(
+    scene: Scene, space: FreeSpace, world_from_camera: Float[np.ndarray, "n 4 4"], fov_deg: float, walk: WalkSettings
+) -> FloorCoverage:
+    """Return how much was driven along and seen of all the floors that a walk went through; see ``floor_coverage``.
+
+    Args:
+        scene: the building.
+        space: the floor that is walked in any case.
+        world_from_camera: of the frames.
+        fov_deg: horizontal field of view.
+        walk: which floors are walked, and the heights of the camera.
+    """
+    if not walk.every_floor:
+        return floor_coverage(scene, space, world_from_camera, fov_deg)
+    eye_m = max(walk.camera_height_m)
+    parts: list[FloorCoverage] = []
+    for number, floor_m in enumerate(floor_heights(scene)):
+        over_m = world_from_camera[:, 2, 3] - floor_m
+        on = (over_m > min(walk.camera_height_m) - _SWAY_M) & (over_m < eye_m + _SWAY_M)
+        if on.any():
+            other = free_space(scene, walk.radius_m, eye_m + 0.15, floor=number)
+            parts.append(floor_coverage(scene, other, world_from_camera[on], fov_deg))
+    if len(parts) < 2:
+        return floor_coverage(scene, space, world_from_camera, fov_deg)
+    weight = np.array([part.walkable_m2 for part in parts])
+    shares = np.array([(part.reached_share, part.driven_share, part.seen_share) for part in parts])
+    return FloorCoverage(parts[0].footprint_m2, float(weight.sum()), *(weight @ shares / weight.sum()).tolist())
 
 
 def _seen(

@@ -27,6 +27,8 @@ class WalkSettings:
         look_around: whether it stops and turns to what did not come into the picture while driving.
         max_frames: thins a longer walk evenly to this number of poses.
         floor: which floor, counted from the lowest; the one with most room where it is not said.
+        every_floor: walk every floor that stairs join to that one, from the lowest, and the stairs between them.
+        stairs_m_s: when it climbs.
     """
 
     rate_hz: float = 10.0
@@ -42,6 +44,8 @@ class WalkSettings:
     look_around: bool = True
     max_frames: int | None = None
     floor: int | None = None
+    every_floor: bool = False
+    stairs_m_s: float = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,11 +70,11 @@ class Tour:
 class _Robot:
     """The robot between two ticks: where along its way it is, where it looks, how fast it turns, what it has seen."""
 
-    def __init__(self, tour: Tour, settings: WalkSettings) -> None:
+    def __init__(self, tour: Tour, settings: WalkSettings, heading_rad: float | None) -> None:
         self.tour, self.settings = tour, settings
         self.along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(tour.path, axis=0), axis=1)))
         self.along_m, self.turn_rad_s = 0.0, 0.0
-        self.heading_rad = self.way_rad()
+        self.heading_rad = self.way_rad() if heading_rad is None else heading_rad
         self.places: list[np.ndarray] = []
         self.headings: list[float] = []
         self.shown = np.zeros(len(tour.target), np.int64)  # ticks that each target was in the picture
@@ -132,10 +136,17 @@ class _Robot:
 
 
 def drive(
-    tour: Tour, settings: WalkSettings, rng: np.random.Generator
+    tour: Tour, settings: WalkSettings, rng: np.random.Generator, heading_rad: float | None = None
 ) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, " n"]]:
-    """Drive along a tour; return the place and the heading at every tick."""
-    robot = _Robot(tour, settings)
+    """Drive along a tour; return the place and the heading at every tick.
+
+    Args:
+        tour: the path and its stops.
+        settings: how the robot is driven.
+        rng: draws how it looks about.
+        heading_rad: at the start; along the path by default.
+    """
+    robot = _Robot(tour, settings, heading_rad)
     period_s, phase = float(rng.uniform(5.0, 8.0)), float(rng.uniform(0, 2 * np.pi))
     for point, targets in zip(tour.stop, tour.purpose, strict=True):
         robot.drive_to(float(robot.along[point]), period_s, phase)

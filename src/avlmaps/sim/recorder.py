@@ -20,7 +20,7 @@ from avlmaps.core.progress import progress, say
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.layout import DESCRIPTION
 from avlmaps.recordings.writer import RecordingWriter
-from avlmaps.sim.coverage import FloorCoverage, floor_coverage, require_floor
+from avlmaps.sim.coverage import FloorCoverage, coverage_of_walk, require_floor
 from avlmaps.sim.hearing import Recorded, ScheduleRule, Sounding, Synthesised, candidates, schedule
 from avlmaps.sim.render import Renderer
 from avlmaps.sim.scene import Scene
@@ -158,7 +158,7 @@ def record_scene(
     for_walk, for_sounds, for_track, for_frames = np.random.default_rng(seed).spawn(4)
     trip = _trip(scene, settings, for_walk)
     soundings = _soundings(scene, settings, trip, for_sounds)
-    floor = floor_coverage(scene, space, trip.world_from_camera, settings.fov_deg)
+    floor = coverage_of_walk(scene, space, trip.world_from_camera, settings.fov_deg, settings.walk)
     clear_unfinished(out)
     origin = f"avlmaps record of {scene.name}, seed {seed}"
     rig = Rig(settings.camera, settings.camera)

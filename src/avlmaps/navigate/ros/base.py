@@ -54,6 +54,7 @@ class RosDriver:
         standing: Standing | None = None,
         level_from_world: Float[np.ndarray, "3 3"] | None = None,
         clock: Callable[[], float] = monotonic,
+        elsewhere: Callable[[Float[np.ndarray, "3"]], str] | None = None,
     ) -> None:
         """Connect, and wait until the robot reports its pose.
 
@@ -63,6 +64,7 @@ class RosDriver:
             standing: moves a goal to where a body can stand; goals are sent as they are without it.
             level_from_world: the map's rotation into its level frame; the identity by default.
             clock: seconds, by which poses age and the loop's own stalls are measured; replaced in tests.
+            elsewhere: says why a place of another storey is not driven to; "" for a place of the robot's own.
 
         Raises:
             NavigationError: nobody answers there, or the robot does not report its pose.
@@ -70,6 +72,7 @@ class RosDriver:
         """
         self.frames, self.settings, self._tasks = tasks.frames, tasks.settings, tasks
         self._standing = standing
+        self._elsewhere = elsewhere
         self._level_from_world = np.eye(3) if level_from_world is None else np.asarray(level_from_world, np.float64)
         self._busy, self._halted, self._closing = threading.Lock(), threading.Event(), threading.Event()
         self._goal: Goal | None = None
@@ -91,6 +94,9 @@ class RosDriver:
 
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
         """Drive to a place, or as near to it as the robot can stand and see it; see `Driver`."""
+        refused = "" if self._elsewhere is None else self._elsewhere(place)
+        if refused:
+            return self._move(lambda _: refused)
         wanted = self._level(place)
         looked_at = None if face is None else self._level(face)
         return self._move(partial(self._plan_to, wanted=wanted, looked_at=looked_at))

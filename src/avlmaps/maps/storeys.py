@@ -1,0 +1,343 @@
+"""The storeys of a map, and the stairs between them, found in its voxels.
+
+A floor is a height at which much surface has headroom and over which the camera was carried; two of them at least
+1.8 m apart are two storeys. Stairs are surface with headroom that climbs from one floor to the next by steps of at most
+0.26 m, wide enough for a person.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from avlmaps.core.arrays import Bool, Float, Int
+
+_APART_M = 1.8  # two floors closer than this are one storey with a step, a landing or stairs
+_BELOW_M = 0.3  # what lies at most this far below a floor belongs to its storey
+_CELL_M = 0.1  # of the columns that surfaces are looked for in, or the voxels' edge where that is more
+_HEADROOM_M = 1.5
+_KNEE_M = 0.5  # what reaches higher over a step stands beside it, and is no next step
+_RISE_M = 0.26  # of a step, the voxels' edge included
+_LEAST_M2, _LEAST_SHARE = 1.0, 0.15  # of a floor; the share is that of the largest
+_CARRIED_M = (0.1, 2.3)  # heights over the floor at which a camera is carried
+_ROUND_M = 0.25  # about a camera lies what it stands over
+_SAME_M = 0.12  # two heights closer than this are one
+_STOOD_SHARE = 0.02  # of the cameras: fewer do not make a storey
+_BORNE_SHARE = 0.02  # of a floor is covered by what stands on it
+_CEILING_M, _CEILING_SHARE = 1.9, 0.2  # a ceiling is no lower, and covers this share of the floor
+_BODY_M = 0.2  # radius of who climbs
+_GAP = 2  # columns that a step may reach: narrow ones are unseen
+_MOST_KEYS = 2**62
+_ORDINALS = ("ground", "first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
+
+
+@dataclass(frozen=True, slots=True)
+class Storey:
+    """A floor and what stands on it; heights are z of the level frame, metres.
+
+    Attributes:
+        number: counted from 0, the lowest of the map.
+        floor_m: height of the floor.
+        ceiling_m: height of the ceiling; None where none is known.
+        low_m: what lies higher than this belongs to the storey,
+        high_m: and lower than this.
+        area_m2: floor with headroom that was seen.
+    """
+
+    number: int
+    floor_m: float
+    ceiling_m: float | None
+    low_m: float
+    high_m: float
+    area_m2: float
+
+    @property
+    def name(self) -> str:
+        """As it is called in Britain: ground floor, first floor, second floor."""
+        return f"{_ORDINALS[self.number] if self.number < len(_ORDINALS) else f'{self.number}th'} floor"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stairs:
+    """A flight, or several with landings, from one storey to the next.
+
+    Attributes:
+        below: number of the lower storey; the upper one is the next.
+        points: (n, 3) path up, level frame, metres; the first lies on the lower floor, the last on the upper one.
+    """
+
+    below: int
+    points: Float[np.ndarray, "n 3"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Storeys:
+    """The storeys of a map, lowest first, and the stairs between them."""
+
+    all: tuple[Storey, ...]
+    stairs: tuple[Stairs, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.all)
+
+    def __getitem__(self, number: int) -> Storey:
+        return self.all[number]
+
+    def of(self, level_z_m: Float[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
+        """Return the number of the storey of each height; what lies below all floors belongs to the lowest."""
+        low = np.array([storey.low_m for storey in self.all[1:]])
+        return np.searchsorted(low, np.asarray(level_z_m, np.float64), side="right").astype(np.int64)
+
+    def route(self, start: int, end: int) -> tuple[Stairs, ...] | None:
+        """Return one stair for each change of storey, in the order they are climbed or descended; None without."""
+        low, high = min(start, end), max(start, end)
+        by_storey = {stairs.below: stairs for stairs in reversed(self.stairs)}
+        if any(number not in by_storey for number in range(low, high)):
+            return None
+        climbed = tuple(by_storey[number] for number in range(low, high))
+        if start <= end:
+            return climbed
+        return tuple(Stairs(one.below, one.points[::-1]) for one in reversed(climbed))
+
+    def refusal(self, start: int, end: int, climbs: bool) -> str:
+        """Return why a body comes from no storey to another, as a part of a sentence; ``""`` where it does."""
+        if start == end:
+            return ""
+        one, other = self.all[start], self.all[end]
+        where = (
+            f"the place is on the {other.name}, whose floor lies at {other.floor_m:.2f} m, and the robot on the "
+            f"{one.name} at {one.floor_m:.2f} m"
+        )
+        if self.route(start, end) is None:
+            return f"{where}; the map holds no stairs between them"
+        return "" if climbs else f"{where}; the robot of this profile does not climb stairs"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Columns:
+    """Occupied cells (i, j, k) as rising numbers: one column after the other, each from below.
+
+    Attributes:
+        keys: (n,) one for each occupied cell.
+        span: extents of the grid, margins included.
+        low: (3,) index of its first cell.
+        cell_m: edges of a cell along x and y, and along z.
+    """
+
+    keys: Int[np.ndarray, " n"]
+    span: tuple[int, int, int]
+    low: Int[np.ndarray, "3"]
+    cell_m: tuple[float, float]
+
+    @classmethod
+    def of(cls, level: Float[np.ndarray, "n 3"], voxel_size_m: float) -> "_Columns | None":
+        """Sort points; None where their extent is too large to number its cells."""
+        wide = max(_CELL_M, voxel_size_m)
+        index = np.floor(level / np.array([wide, wide, voxel_size_m])).astype(np.int64)
+        low = index.min(axis=0) - _GAP - 2
+        span = index.max(axis=0) - low + _GAP + 3
+        if float(np.prod(span.astype(np.float64))) > _MOST_KEYS:
+            return None
+        index -= low
+        keys = np.unique((index[:, 0] * span[1] + index[:, 1]) * span[2] + index[:, 2])
+        return cls(keys, (int(span[0]), int(span[1]), int(span[2])), low, (wide, voxel_size_m))
+
+    def surfaces(self) -> Int[np.ndarray, " m"]:
+        """Return the numbers of the cells with headroom over them."""
+        column = self.keys // self.span[2]
+        room = max(1, int(_HEADROOM_M / self.cell_m[1]))
+        free = np.ones(len(self.keys), bool)
+        free[:-1] = (column[1:] != column[:-1]) | (np.diff(self.keys) > room)
+        return self.keys[free]
+
+    def heights_m(self, keys: Int[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
+        """Return the level z of the middles of cells."""
+        return (keys % self.span[2] + self.low[2] + 0.5) * self.cell_m[1]
+
+    def middles(self, keys: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 3"]:
+        """Return the middles of cells, level frame."""
+        column = keys // self.span[2]
+        xy = (np.stack([column // self.span[1], column % self.span[1]], axis=1) + self.low[:2] + 0.5) * self.cell_m[0]
+        return np.c_[xy, self.heights_m(keys)]
+
+    def under(self, surface: Int[np.ndarray, " m"], cameras: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, " k"]:
+        """Return the height of the surface that each camera was carried over; NaN where none is near.
+
+        Args:
+            surface: numbers of cells with headroom, rising.
+            cameras: level frame, metres.
+        """
+        cell = np.floor(cameras / np.array([self.cell_m[0], self.cell_m[0], self.cell_m[1]])) - self.low
+        reach = int(np.ceil(_ROUND_M / self.cell_m[0]))
+        inside = ((cell[:, :2] >= reach) & (cell[:, :2] < np.array(self.span[:2]) - reach)).all(axis=1)
+        out = np.full((len(cameras), (2 * reach + 1) ** 2), np.nan)
+        i, j, k = cell[inside].astype(np.int64).T
+        k = np.clip(k, 0, self.span[2] - 1)
+        for number, (di, dj) in enumerate(np.ndindex(2 * reach + 1, 2 * reach + 1)):
+            top = ((i + di - reach) * self.span[1] + j + dj - reach) * self.span[2] + k
+            at = np.maximum(np.searchsorted(surface, top, side="right") - 1, 0)
+            down_m = (top - surface[at]) * self.cell_m[1]  # to a surface of another column it is far
+            there = (surface[at] <= top) & (down_m >= _CARRIED_M[0]) & (down_m <= _CARRIED_M[1])
+            there &= surface[at] // self.span[2] == top // self.span[2]
+            out[inside, number] = np.where(there, self.heights_m(surface[at]), np.nan)
+        seen = np.isfinite(out).any(axis=1)
+        out[seen, 0] = np.nanmedian(out[seen], axis=1)
+        return np.where(seen, out[:, 0], np.nan)
+
+    def clear(self, keys: Int[np.ndarray, " m"]) -> Bool[np.ndarray, " m"]:
+        """Return over which cells a body fits, with nothing beside it higher than its knees."""
+        reach = int(np.ceil(_BODY_M / self.cell_m[0]))
+        knee, head = (max(1, round(height / self.cell_m[1])) for height in (_KNEE_M, _HEADROOM_M))
+        out = np.ones(len(keys), bool)
+        for i in range(-reach, reach + 1):
+            for j in range(-reach, reach + 1):
+                if np.hypot(i, j) * self.cell_m[0] <= _BODY_M + 1e-9:
+                    there = keys + (i * self.span[1] + j) * self.span[2]
+                    first = np.searchsorted(self.keys, there + knee)
+                    out &= first == np.searchsorted(self.keys, there + head, side="right")
+        return out
+
+
+def said_storeys(storeys: Storeys | None) -> str:
+    """Return which storeys a map has, as a part of a sentence: "it holds 2 storeys: ground floor (0.02 m), ..."."""
+    if storeys is None:
+        return "it holds one storey"
+    return f"it holds {len(storeys)} storeys: " + ", ".join(f"{one.name} ({one.floor_m:.2f} m)" for one in storeys.all)
+
+
+def find_storeys(
+    level: Float[np.ndarray, "n 3"], voxel_size_m: float, cameras: Float[np.ndarray, "k 3"] | None = None
+) -> Storeys | None:
+    """Find the storeys of a map; None for a map that has one, or that has none at all.
+
+    Args:
+        level: middles of its voxels, level frame, metres.
+        voxel_size_m: their edge.
+        cameras: where its cameras were, level frame; a storey is where one was carried. Without any, a floor is where
+            something stands on it.
+    """
+    cameras_m = np.zeros(0) if cameras is None else np.asarray(cameras, np.float64)[:, 2]
+    if not len(level) or stayed_on_one(cameras_m):
+        return None
+    columns = _Columns.of(level, voxel_size_m)
+    if columns is None:
+        return None
+    surface = columns.surfaces()
+    floors = _floors(columns, surface, np.zeros((0, 3)) if cameras is None else np.asarray(cameras, np.float64))
+    if len(floors) < 2:
+        return None
+    storeys = _storeys(columns, surface, floors, float(level[:, 2].max()))
+    stairs = [one for below in range(len(storeys) - 1) for one in _stairs(columns, surface, storeys, below)]
+    return Storeys(tuple(storeys), tuple(stairs))
+
+
+def stayed_on_one(cameras_m: Float[np.ndarray, " k"]) -> bool:
+    """Return whether cameras differ too little in height to have been on two storeys; without any it is not known."""
+    return bool(len(cameras_m)) and float(np.ptp(cameras_m)) < 0.5 * _APART_M
+
+
+def _floors(
+    columns: _Columns, surface: Int[np.ndarray, " m"], cameras: Float[np.ndarray, "k 3"]
+) -> list[tuple[float, float]]:
+    """Return height and area of the floors, rising: those that most cameras stood over first, the largest first."""
+    height_m, cell_m2 = columns.heights_m(surface), columns.cell_m[0] ** 2
+    layer = surface % columns.span[2]
+    count = np.bincount(layer, minlength=columns.span[2])
+    pairs_m2 = (count + np.append(count[1:], 0)) * cell_m2  # a plane between two layers is split among them
+    before, after = np.append(-1.0, pairs_m2[:-1]), np.append(pairs_m2[1:], -1.0)
+    least = max(_LEAST_M2, _LEAST_SHARE * float(pairs_m2.max()))
+    peaks = np.flatnonzero((pairs_m2 >= least) & (pairs_m2 >= before) & (pairs_m2 > after))
+    known = [(float(np.median(height_m[(layer == at) | (layer == at + 1)])), float(pairs_m2[at])) for at in peaks]
+    under_m = columns.under(surface, cameras)
+    stood = [int(np.count_nonzero(np.abs(under_m - at_m) <= _SAME_M)) for at_m, _ in known]
+    if not sum(stood):
+        stood = [int(not len(cameras) and _bears(columns, floor)) for floor in known]
+    fewest = max(1.0, _STOOD_SHARE * len(cameras))
+    chosen: list[tuple[float, float]] = []
+    for number in sorted(range(len(known)), key=lambda number: (-stood[number], -known[number][1])):
+        apart = all(abs(known[number][0] - other) >= _APART_M for other, _ in chosen)
+        if stood[number] >= fewest and apart:
+            chosen.append(known[number])
+    return sorted(chosen)
+
+
+def _bears(columns: _Columns, floor: tuple[float, float]) -> bool:
+    """Return whether something stands on a level; a ceiling is level and large as well."""
+    all_m = columns.heights_m(columns.keys)
+    over = np.count_nonzero((all_m > floor[0] + _KNEE_M) & (all_m < floor[0] + _HEADROOM_M))
+    layers = (_HEADROOM_M - _KNEE_M) / columns.cell_m[1]
+    return over / layers * columns.cell_m[0] ** 2 >= _BORNE_SHARE * floor[1]
+
+
+def _storeys(
+    columns: _Columns, surface: Int[np.ndarray, " m"], floors: Sequence[tuple[float, float]], top_m: float
+) -> list[Storey]:
+    all_m = columns.heights_m(columns.keys)
+    edges = [-np.inf, *(height - _BELOW_M for height, _ in floors[1:]), np.inf]
+    out: list[Storey] = []
+    for number, (height, m2) in enumerate(floors):
+        upper = floors[number + 1][0] - 0.1 if number + 1 < len(floors) else top_m + 1.0
+        layer = np.floor((all_m[(all_m > height + _CEILING_M) & (all_m < upper)]) / columns.cell_m[1]).astype(np.int64)
+        ceiling = None
+        if len(layer):
+            count = np.bincount(layer - layer.min())
+            if count.max() * columns.cell_m[0] ** 2 >= _CEILING_SHARE * m2:
+                ceiling = float((layer.min() + int(count.argmax()) + 0.5) * columns.cell_m[1])
+        out.append(Storey(number, height, ceiling, float(edges[number]), float(edges[number + 1]), m2))
+    return out
+
+
+def _stairs(columns: _Columns, surface: Int[np.ndarray, " m"], storeys: Sequence[Storey], below: int) -> list[Stairs]:
+    """Return the stairs between a storey and the next: one for each connected slope of steps between their floors."""
+    from scipy.sparse import coo_array, csgraph
+
+    low_m, high_m = storeys[below].floor_m, storeys[below + 1].floor_m
+    z = columns.heights_m(surface)
+    edge = columns.cell_m[1] + 0.5 * _CELL_M
+    between = np.flatnonzero((z > low_m + edge) & (z < high_m - edge))
+    steps = between[columns.clear(surface[between])]
+    kind = np.full(len(surface), -1)
+    kind[steps], kind[np.abs(z - low_m) <= edge], kind[np.abs(z - high_m) <= edge] = 1, 0, 2
+    nodes = surface[kind >= 0]
+    kind, z = kind[kind >= 0], z[kind >= 0]
+    own = np.flatnonzero(kind == 1)
+    rise = int(_RISE_M / columns.cell_m[1] + 1e-6)
+    rows, others, costs = [], [], []
+    for i in range(-_GAP, _GAP + 1):
+        for j in range(-_GAP, _GAP + 1):
+            if i or j:
+                there = nodes[own] + (i * columns.span[1] + j) * columns.span[2]
+                at = np.searchsorted(nodes, there - rise)
+                at = np.minimum(at, len(nodes) - 1)
+                hit = (nodes[at] >= there - rise) & (nodes[at] <= there + rise)
+                rows.append(own[hit])
+                others.append(at[hit])
+                costs.append(np.hypot(np.hypot(i, j) * columns.cell_m[0], z[own[hit]] - z[at[hit]]))
+    row, other, cost = np.concatenate(rows), np.concatenate(others), np.concatenate(costs)
+    if not len(row):
+        return []
+    around = np.bincount(row, minlength=len(nodes)) / ((2 * _GAP + 1) ** 2 - 1)
+    cost *= 3.0 - 2.0 * around[row]  # the middle of a flight is cheaper than its edge
+    graph = coo_array((cost, (row, other)), shape=(len(nodes), len(nodes))).tocsr()
+    graph = graph.maximum(graph.T)
+    # Floors join nothing here: a slope of steps is one by itself.
+    among = graph[own][:, own]
+    count, label = csgraph.connected_components(among, directed=False)
+    touches = [np.zeros(count, bool), np.zeros(count, bool)]
+    of_node = np.full(len(nodes), -1)
+    of_node[own] = label
+    for number, end in enumerate((0, 2)):
+        touches[number][of_node[row[kind[other] == end]]] = True
+    out: list[Stairs] = []
+    for slope in np.flatnonzero(touches[0] & touches[1]).tolist():
+        mine = own[label == slope]
+        ends = other[np.isin(row, mine) & (kind[other] != 1)]
+        inside = np.concatenate([mine, np.unique(ends)])
+        part = graph[inside][:, inside]
+        first, last = (np.flatnonzero(kind[inside] == end) for end in (0, 2))
+        total, before, _ = csgraph.dijkstra(part, indices=first, min_only=True, return_predecessors=True)
+        path = [int(last[np.argmin(total[last])])]
+        while before[path[-1]] >= 0:
+            path.append(int(before[path[-1]]))
+        out.append(Stairs(below, columns.middles(nodes[inside[path[::-1]]])))
+    return out
