@@ -7,6 +7,7 @@ A floor is a height at which much surface has headroom and over which the camera
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -28,6 +29,7 @@ _CEILING_M, _CEILING_SHARE = 1.9, 0.2  # a ceiling is no lower, and covers this 
 _BODY_M = 0.2  # radius of who climbs
 _GAP = 2  # columns that a step may reach: narrow ones are unseen
 _MOST_KEYS = 2**62
+_FOOT, _STEP, _TOP = 0, 1, 2  # where a place lies: on the lower floor, between, on the upper floor
 _ORDINALS = ("ground", "first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 
 
@@ -135,12 +137,13 @@ class _Columns:
         wide = max(_CELL_M, voxel_size_m)
         index = np.floor(level / np.array([wide, wide, voxel_size_m])).astype(np.int64)
         low = index.min(axis=0) - _GAP - 2
-        span = index.max(axis=0) - low + _GAP + 3
-        if float(np.prod(span.astype(np.float64))) > _MOST_KEYS:
+        high = index.max(axis=0) + _GAP + 3
+        span: list[int] = (high - low).tolist()
+        if float(span[0]) * span[1] * span[2] > _MOST_KEYS:
             return None
-        index -= low
-        keys = np.unique((index[:, 0] * span[1] + index[:, 1]) * span[2] + index[:, 2])
-        return cls(keys, (int(span[0]), int(span[1]), int(span[2])), low, (wide, voxel_size_m))
+        index = index - low
+        keys: Int[np.ndarray, " n"] = np.unique((index[:, 0] * span[1] + index[:, 1]) * span[2] + index[:, 2])
+        return cls(keys, (span[0], span[1], span[2]), low, (wide, voxel_size_m))
 
     def surfaces(self) -> Int[np.ndarray, " m"]:
         """Return the numbers of the cells with headroom over them."""
@@ -171,18 +174,19 @@ class _Columns:
         reach = int(np.ceil(_ROUND_M / self.cell_m[0]))
         inside = ((cell[:, :2] >= reach) & (cell[:, :2] < np.array(self.span[:2]) - reach)).all(axis=1)
         out = np.full((len(cameras), (2 * reach + 1) ** 2), np.nan)
-        i, j, k = cell[inside].astype(np.int64).T
+        i, j, k = np.moveaxis(cell[inside].astype(np.int64), -1, 0)
         k = np.clip(k, 0, self.span[2] - 1)
-        for number, (di, dj) in enumerate(np.ndindex(2 * reach + 1, 2 * reach + 1)):
-            top = ((i + di - reach) * self.span[1] + j + dj - reach) * self.span[2] + k
+        for number, (di, dj) in enumerate(product(range(-reach, reach + 1), repeat=2)):
+            top: Int[np.ndarray, " c"] = ((i + di) * self.span[1] + j + dj) * self.span[2] + k
             at = np.maximum(np.searchsorted(surface, top, side="right") - 1, 0)
-            down_m = (top - surface[at]) * self.cell_m[1]  # to a surface of another column it is far
+            down_m = (top - surface[at]) * float(self.cell_m[1])
             there = (surface[at] <= top) & (down_m >= _CARRIED_M[0]) & (down_m <= _CARRIED_M[1])
             there &= surface[at] // self.span[2] == top // self.span[2]
             out[inside, number] = np.where(there, self.heights_m(surface[at]), np.nan)
         seen = np.isfinite(out).any(axis=1)
-        out[seen, 0] = np.nanmedian(out[seen], axis=1)
-        return np.where(seen, out[:, 0], np.nan)
+        under = np.full(len(cameras), np.nan)
+        under[seen] = np.nanmedian(out[seen], axis=1)
+        return under
 
     def clear(self, keys: Int[np.ndarray, " m"]) -> Bool[np.ndarray, " m"]:
         """Return over which cells a body fits, with nothing beside it higher than its knees."""
@@ -266,14 +270,13 @@ def _bears(columns: _Columns, floor: tuple[float, float]) -> bool:
     all_m = columns.heights_m(columns.keys)
     over = np.count_nonzero((all_m > floor[0] + _KNEE_M) & (all_m < floor[0] + _HEADROOM_M))
     layers = (_HEADROOM_M - _KNEE_M) / columns.cell_m[1]
-    return over / layers * columns.cell_m[0] ** 2 >= _BORNE_SHARE * floor[1]
+    return bool(over / layers * columns.cell_m[0] ** 2 >= _BORNE_SHARE * floor[1])
 
 
 def _storeys(
     columns: _Columns, surface: Int[np.ndarray, " m"], floors: Sequence[tuple[float, float]], top_m: float
 ) -> list[Storey]:
     all_m = columns.heights_m(columns.keys)
-    edges = [-np.inf, *(height - _BELOW_M for height, _ in floors[1:]), np.inf]
     out: list[Storey] = []
     for number, (height, m2) in enumerate(floors):
         upper = floors[number + 1][0] - 0.1 if number + 1 < len(floors) else top_m + 1.0
@@ -283,13 +286,18 @@ def _storeys(
             count = np.bincount(layer - layer.min())
             if count.max() * columns.cell_m[0] ** 2 >= _CEILING_SHARE * m2:
                 ceiling = float((layer.min() + int(count.argmax()) + 0.5) * columns.cell_m[1])
-        out.append(Storey(number, height, ceiling, float(edges[number]), float(edges[number + 1]), m2))
+        slab_m = _BELOW_M
+        if ceiling is not None and number + 1 < len(floors):  # what hangs from a ceiling is below it
+            slab_m = min(slab_m, 0.5 * (floors[number + 1][0] - ceiling))
+        low_m = out[-1].high_m if out else -np.inf
+        high_m = floors[number + 1][0] - slab_m if number + 1 < len(floors) else np.inf
+        out.append(Storey(number, height, ceiling, low_m, high_m, m2))
     return out
 
 
 def _stairs(columns: _Columns, surface: Int[np.ndarray, " m"], storeys: Sequence[Storey], below: int) -> list[Stairs]:
     """Return the stairs between a storey and the next: one for each connected slope of steps between their floors."""
-    from scipy.sparse import coo_array, csgraph
+    from scipy.sparse import csgraph, csr_array
 
     low_m, high_m = storeys[below].floor_m, storeys[below + 1].floor_m
     z = columns.heights_m(surface)
@@ -297,47 +305,56 @@ def _stairs(columns: _Columns, surface: Int[np.ndarray, " m"], storeys: Sequence
     between = np.flatnonzero((z > low_m + edge) & (z < high_m - edge))
     steps = between[columns.clear(surface[between])]
     kind = np.full(len(surface), -1)
-    kind[steps], kind[np.abs(z - low_m) <= edge], kind[np.abs(z - high_m) <= edge] = 1, 0, 2
-    nodes = surface[kind >= 0]
-    kind, z = kind[kind >= 0], z[kind >= 0]
-    own = np.flatnonzero(kind == 1)
-    rise = int(_RISE_M / columns.cell_m[1] + 1e-6)
-    rows, others, costs = [], [], []
-    for i in range(-_GAP, _GAP + 1):
-        for j in range(-_GAP, _GAP + 1):
-            if i or j:
-                there = nodes[own] + (i * columns.span[1] + j) * columns.span[2]
-                at = np.searchsorted(nodes, there - rise)
-                at = np.minimum(at, len(nodes) - 1)
-                hit = (nodes[at] >= there - rise) & (nodes[at] <= there + rise)
-                rows.append(own[hit])
-                others.append(at[hit])
-                costs.append(np.hypot(np.hypot(i, j) * columns.cell_m[0], z[own[hit]] - z[at[hit]]))
-    row, other, cost = np.concatenate(rows), np.concatenate(others), np.concatenate(costs)
-    if not len(row):
-        return []
-    around = np.bincount(row, minlength=len(nodes)) / ((2 * _GAP + 1) ** 2 - 1)
-    cost *= 3.0 - 2.0 * around[row]  # the middle of a flight is cheaper than its edge
-    graph = coo_array((cost, (row, other)), shape=(len(nodes), len(nodes))).tocsr()
-    graph = graph.maximum(graph.T)
+    kind[steps], kind[np.abs(z - low_m) <= edge], kind[np.abs(z - high_m) <= edge] = _STEP, _FOOT, _TOP
+    nodes, kind, z = surface[kind >= 0], kind[kind >= 0], z[kind >= 0]
+    one, other, cost = _strides(columns, nodes, z, np.flatnonzero(kind == _STEP))
     # Floors join nothing here: a slope of steps is one by itself.
-    among = graph[own][:, own]
-    count, label = csgraph.connected_components(among, directed=False)
-    touches = [np.zeros(count, bool), np.zeros(count, bool)]
-    of_node = np.full(len(nodes), -1)
-    of_node[own] = label
-    for number, end in enumerate((0, 2)):
-        touches[number][of_node[row[kind[other] == end]]] = True
+    inner = kind[other] == _STEP
+    shape = (len(nodes), len(nodes))
+    _, slope = csgraph.connected_components(csr_array((cost[inner], (one[inner], other[inner])), shape), directed=False)
+    foot, top = (np.unique(slope[one[kind[other] == end]]) for end in (_FOOT, _TOP))
     out: list[Stairs] = []
-    for slope in np.flatnonzero(touches[0] & touches[1]).tolist():
-        mine = own[label == slope]
-        ends = other[np.isin(row, mine) & (kind[other] != 1)]
-        inside = np.concatenate([mine, np.unique(ends)])
-        part = graph[inside][:, inside]
-        first, last = (np.flatnonzero(kind[inside] == end) for end in (0, 2))
-        total, before, _ = csgraph.dijkstra(part, indices=first, min_only=True, return_predecessors=True)
-        path = [int(last[np.argmin(total[last])])]
-        while before[path[-1]] >= 0:
-            path.append(int(before[path[-1]]))
-        out.append(Stairs(below, columns.middles(nodes[inside[path[::-1]]])))
+    for number in foot[np.isin(foot, top)].tolist():
+        mine = slope[one] == number
+        path = _shortest(one[mine], other[mine], cost[mine], kind)
+        out.append(Stairs(below, columns.middles(nodes[path])))
     return out
+
+
+def _strides(
+    columns: _Columns, nodes: Int[np.ndarray, " m"], z_m: Float[np.ndarray, " m"], steps: Int[np.ndarray, " s"]
+) -> tuple[Int[np.ndarray, " e"], Int[np.ndarray, " e"], Float[np.ndarray, " e"]]:
+    """Return for each step the places that a foot reaches from it: pairs of nodes, and what each costs."""
+    rise = int(_RISE_M / columns.cell_m[1] + 1e-6)
+    pairs: list[Int[np.ndarray, "2 e"]] = []
+    for i, j in product(range(-_GAP, _GAP + 1), repeat=2):
+        if i or j:
+            lowest: Int[np.ndarray, " s"] = nodes[steps] + (i * columns.span[1] + j) * columns.span[2] - rise
+            at = np.minimum(np.searchsorted(nodes, lowest), len(nodes) - 1)
+            hit = (nodes[at] >= lowest) & (nodes[at] <= lowest + 2 * rise)
+            pairs.append(np.stack([steps[hit], at[hit]]))
+    one, other = np.concatenate(pairs, axis=1)
+    apart_m = columns.middles(nodes[one])[:, :2] - columns.middles(nodes[other])[:, :2]
+    around = np.bincount(one, minlength=len(nodes)) / len(pairs)
+    cost = np.hypot(np.hypot(apart_m[:, 0], apart_m[:, 1]), z_m[one] - z_m[other])
+    return one, other, cost * (3.0 - 2.0 * around[one])  # the middle of a flight is cheaper than its edge
+
+
+def _shortest(
+    one: Int[np.ndarray, " e"], other: Int[np.ndarray, " e"], cost: Float[np.ndarray, " e"], kind: Int[np.ndarray, " n"]
+) -> list[int]:
+    """Return the nodes of the cheapest path over the steps of one slope, from the lower floor to the upper one."""
+    from scipy.sparse import csgraph, csr_array
+
+    foot, top = (np.flatnonzero(kind[other] == end) for end in (_FOOT, _TOP))
+    feet, source = np.unique(other[foot]), len(kind)  # from one node more there is a step to every foot
+    rows = np.concatenate([one, other[foot], np.full(len(feet), source)])
+    columns = np.concatenate([other, one[foot], feet])
+    values = np.concatenate([cost, cost[foot], np.full(len(feet), 1e-6)])
+    graph = csr_array((values, (rows, columns)), (source + 1, source + 1))
+    total, before = csgraph.dijkstra(graph, indices=source, return_predecessors=True)
+    tops = np.unique(other[top])
+    path = [int(tops[np.argmin(total[tops])])]
+    while before[path[-1]] != source:
+        path.append(int(before[path[-1]]))
+    return path[::-1]

@@ -103,16 +103,19 @@ def _cheapest(
             weights.append(length * 0.5 * (dear[at] + dear[other]) + 1e-9)
     count = len(cells)
     row, column, weight = np.concatenate(rows), np.concatenate(columns), np.concatenate(weights)
-    graph = sparse.coo_matrix((weight, (row, column)), shape=(count, count)).tocsr()
     first = np.flatnonzero((cells[:, 0] == 0) & ends[0][tuple(cells[:, 1:].T)])
     last = np.flatnonzero((cells[:, 0] == len(heights) - 1) & ends[1][tuple(cells[:, 1:].T)])
     if not len(first) or not len(last):
         return None
-    cost, before, _ = csgraph.dijkstra(graph, indices=first, min_only=True, return_predecessors=True)
+    # From one node more there is a step to every place of the lower floor.
+    row, column = np.append(row, np.full(len(first), count)), np.append(column, first)
+    values = np.append(weight, np.full(len(first), 1e-6))
+    graph = sparse.csr_matrix((values, (row, column)), shape=(count + 1, count + 1))
+    cost, before = csgraph.dijkstra(graph, indices=count, return_predecessors=True)
     if not np.isfinite(cost[last]).any():
         return None
     nodes = [int(last[np.argmin(cost[last])])]
-    while before[nodes[-1]] >= 0:
+    while before[nodes[-1]] != count:
         nodes.append(int(before[nodes[-1]]))
     return cells[nodes[::-1]]
 
