@@ -25,7 +25,7 @@ def test_things_prints_a_table(built: Path, run: Callable[..., tuple[int, str, s
     assert "position of the robot" in out
 
 
-@pytest.mark.parametrize("name", ["a.ply", "a.glb", "a.csv", "a.pgm"])
+@pytest.mark.parametrize("name", ["a.ply", "a.glb", "a.csv", "a.pgm", "a.openlex3d"])
 def test_export_writes_each_format(
     built: Path, answer: Callable[..., dict[str, Any]], tmp_path: Path, name: str
 ) -> None:
@@ -46,6 +46,9 @@ def test_export_colours_by_heat(built: Path, answer: Callable[..., dict[str, Any
         (("--out", "a.obj"), ".ply, .glb, .pgm, .csv"),
         (("--out", "a.csv", "--things"), "has no colours"),
         (("--out", "a.ply", "--things", "--heat", "red"), "both choose colours"),
+        (("--out", "a.mcap", "--things"), "leave --things out"),
+        (("--out", "a.openlex3d", "--frame", "level"), "leave --frame out"),
+        (("--out", "a.openlex3d", "--heat", "red"), "has no colours"),
     ],
 )
 def test_export_refuses_what_does_not_fit(

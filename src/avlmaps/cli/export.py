@@ -13,16 +13,20 @@ from avlmaps.core.frames import FrameName
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
 
-_SUFFIXES = (".ply", ".glb", ".pgm", ".csv")
+_SUFFIXES = (".ply", ".glb", ".pgm", ".csv", ".rrd", ".mcap", ".openlex3d")
+# What has layers of its own for heat and things, beside the colours of the voxels.
+_LAYERED = (".rrd", ".mcap")
+_LEVEL = (".pgm", ".glb", *_LAYERED)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Export(ModelVerb):
-    """Write a map for other programs: PLY, GLB, an occupancy grid for Nav2 (PGM and YAML), or CSV.
+    """Write a map for other programs: PLY, GLB, an occupancy grid for Nav2 (PGM and YAML), CSV, Rerun, Foxglove (MCAP).
 
     Example: avlmaps export home.avlmap --out home.glb
     Example: avlmaps export home.avlmap --out sofa.ply --heat "the sofa"
     Example: avlmaps export home.avlmap --out floor.pgm --radius-m 0.3
+    Example: avlmaps export home.avlmap --out home.rrd --heat "the sofa"
 
     A map of several storeys gives an occupancy grid for each: floor-0.pgm is the lowest.
     """
@@ -32,13 +36,14 @@ class Export(ModelVerb):
     map: Annotated[Positional[Path], arg(metavar="MAP")]
     """Map folder (NAME.avlmap)."""
     out: Annotated[Path, arg(metavar="FILE")]
-    """File to write; its suffix chooses the format: .ply points, .glb blocks, .pgm occupancy grid, .csv table."""
+    """File to write; its suffix chooses the format: .ply points, .glb blocks, .pgm occupancy grid, .csv table, .rrd for
+    Rerun (extra rerun), .mcap with Foxglove's schemas (extra foxglove), .openlex3d folder for OpenLex3D's evaluator."""
     things: bool = False
     """Colour voxels by the thing that they belong to (.ply, .glb)."""
     heat: Annotated[str | None, arg(metavar="SENTENCE")] = None
-    """Colour voxels by the heat of a query (.ply, .glb)."""
+    """Colour voxels by the heat of a query (.ply, .glb), or add the heat as a layer (.rrd, .mcap)."""
     least: Annotated[float, arg(metavar="CONFIDENCE")] = 0.5
-    """Use things with at least this confidence, 0 to 1 (.csv, --things)."""
+    """Use things with at least this confidence, 0 to 1 (.csv, .rrd, .mcap, --things)."""
     radius_m: Annotated[float, arg(metavar="METRES")] = 0.2
     """Radius of the robot (.pgm)."""
     height_m: Annotated[float, arg(metavar="METRES")] = 1.5
@@ -46,7 +51,8 @@ class Export(ModelVerb):
     storey: Annotated[int | None, arg(metavar="N")] = None
     """Storey of the grid, counted from 0, the lowest (.pgm). Default: each in its own file, such as floor-0.pgm."""
     frame: Annotated[Literal["recording", "level"] | None, arg(metavar="recording|level")] = None
-    """Frame of the coordinates. Default: recording for .ply and .csv, level for .glb (y up, as GLB has it) and .pgm."""
+    """Frame of the coordinates. Default: recording for .ply, .csv and .openlex3d, level for .glb (y up, as GLB has it),
+    .pgm, .rrd and .mcap."""
     overwrite: bool = False
     """Replace a file that exists."""
 
@@ -76,27 +82,44 @@ def export(verb: Export, opened: "AVLMap | None" = None) -> dict[str, Any]:
     from avlmaps.query.export import write_table
 
     kind = verb.out.suffix.lower()
-    if kind not in _SUFFIXES:
-        raise UsageError(f"--out takes a file that ends in {', '.join(_SUFFIXES)}; {verb.out.name!r} does not.")
-    if verb.things and verb.heat is not None:
-        raise UsageError("--things and --heat both choose colours; give one of them.")
-    if (verb.things or verb.heat is not None) and kind not in (".ply", ".glb"):
-        raise UsageError(f"--things and --heat colour a .ply or a .glb; {verb.out.name!r} has no colours.")
-    if kind == ".pgm" and verb.frame == FrameName.RECORDING:
-        raise UsageError("An occupancy grid is a floor plan and needs the level frame; leave --frame out.")
-    if verb.storey is not None and kind != ".pgm":
-        raise UsageError(f"--storey chooses the storey of an occupancy grid; {verb.out.name!r} holds all of them.")
-    frame = FrameName(verb.frame or ("level" if kind in (".pgm", ".glb") else "recording"))
+    _require_sense(verb, kind)
+    frame = FrameName(verb.frame or ("level" if kind in _LEVEL else "recording"))
     if kind == ".pgm":
         return _write_grids(verb, AVLMap.open(verb.map) if opened is None else opened)
-    _require_new([verb.out], verb.overwrite)
+    written = [verb.out]
+    _require_new(written, verb.overwrite)
     opened = AVLMap.open(verb.map) if opened is None else opened
     if kind == ".csv":
         things = opened.things(least_confidence=verb.least)
         write_table(verb.out, things, opened.sounds(), opened.space, frame, opened.storeys)
+    elif kind in _LAYERED:
+        _write_layers(verb, opened, kind, frame)
+    elif kind == ".openlex3d":
+        from avlmaps.query.export_openlex3d import write_openlex3d
+
+        written = list(write_openlex3d(verb.out, opened))
     else:
         _write_voxels(verb, opened, kind, frame)
-    return {"map": str(verb.map), "files": [str(verb.out)], "frame": str(frame)}
+    return {"map": str(verb.map), "files": [str(path) for path in written], "frame": str(frame)}
+
+
+def _require_sense(verb: Export, kind: str) -> None:
+    """Refuse options that do not fit the format."""
+    name = verb.out.name
+    if kind not in _SUFFIXES:
+        raise UsageError(f"--out takes a file that ends in {', '.join(_SUFFIXES)}; {name!r} does not.")
+    if verb.things and kind in _LAYERED:
+        raise UsageError(f"{name!r} shows things as boxes in any case; leave --things out.")
+    if verb.things and verb.heat is not None:
+        raise UsageError("--things and --heat both choose colours; give one of them.")
+    if (verb.things or verb.heat is not None) and kind not in (".ply", ".glb", *_LAYERED):
+        raise UsageError(f"--things and --heat colour a .ply or a .glb; {name!r} has no colours.")
+    if kind == ".pgm" and verb.frame == FrameName.RECORDING:
+        raise UsageError("An occupancy grid is a floor plan and needs the level frame; leave --frame out.")
+    if kind == ".openlex3d" and verb.frame == FrameName.LEVEL:
+        raise UsageError("OpenLex3D compares with positions of its recordings; leave --frame out.")
+    if verb.storey is not None and kind != ".pgm":
+        raise UsageError(f"--storey chooses the storey of an occupancy grid; {name!r} holds all of them.")
 
 
 def _require_new(paths: "list[Path]", overwrite: bool) -> None:
@@ -139,3 +162,12 @@ def _write_voxels(verb: Export, opened: "AVLMap", kind: str, frame: FrameName) -
         write_ply(verb.out, opened.points, colors, columns, opened.space, frame)
     else:
         write_glb(verb.out, opened.stored.voxels.index, opened.space.grid.voxel_size_m, colors, opened.space, frame)
+
+
+def _write_layers(verb: Export, opened: "AVLMap", kind: str, frame: FrameName) -> None:
+    from avlmaps.query.export_foxglove import write_foxglove
+    from avlmaps.query.export_layers import layers_of
+    from avlmaps.query.export_rerun import write_rerun
+
+    layers = layers_of(opened, frame, verb.heat, verb.least)
+    (write_rerun if kind == ".rrd" else write_foxglove)(verb.out, layers)

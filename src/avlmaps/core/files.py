@@ -155,6 +155,21 @@ def replace_atomically(path: Path) -> Generator[BinaryIO]:
         partial.unlink(missing_ok=True)
 
 
+@contextmanager
+def replacing(path: Path) -> Generator[Path]:
+    """Yield the name of a new file beside one, for a library that writes by name; what it wrote then takes its place.
+
+    The new name has the same suffix. Nothing is left of it where writing fails.
+    """
+    part = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    try:
+        yield part
+        part.replace(path)
+        sync_folder(path.parent)
+    finally:
+        part.unlink(missing_ok=True)
+
+
 def open_new(path: Path) -> BinaryIO:
     """Make a file and open it for writing; what has its name goes, a link without what it points to."""
     path.unlink(missing_ok=True)
