@@ -9,11 +9,15 @@ from typing import Any
 
 import anyio
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from mcp.client.client import Client
+from starlette.testclient import TestClient
 
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.serve.agent_answers import MOST_TOKENS, token_count
+from avlmaps.serve.agent_answers import MOST_TOKENS, fitting, token_count
 from avlmaps.serve.agents import agent_server
+from avlmaps.serve.app import create_app
 from avlmaps.serve.service import Service
 from helpers.agent_talk import texts, told
 from helpers.office import ROOM_M, ROOMS, names, write_office
@@ -202,3 +206,56 @@ def test_things_near_a_place_come_by_distance(service: Service) -> None:
         away = [one["distance_m"] for one in things]
         assert away == sorted(away)
         assert away == pytest.approx([math.dist(one["position"], [6.0, 2.0, 0.5]) for one in things], abs=0.02)
+
+
+_TEXTS = st.text("abc 19", max_size=400)
+_ROWS = st.lists(
+    st.fixed_dictionaries({"name": _TEXTS, "position": st.lists(st.floats(-9, 9), max_size=3)}), max_size=40
+)
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    st.fixed_dictionaries({"rows": _ROWS, "text": _TEXTS, "last": st.fixed_dictionaries({"lines": st.lists(_TEXTS)})}),
+    st.integers(2, 400),
+)
+def test_any_answer_fits_and_says_what_it_lacks(answer: dict[str, Any], places: int) -> None:
+    path = [[float(at), 0.5, 0.25] for at in range(places)]
+    whole = {**answer, "path": path}
+    cut = fitting(whole, 200)
+    assert token_count(json.dumps(cut, separators=(",", ":"))) <= 200
+    assert cut["path"][0] == path[0] and cut["path"][-1] == path[-1]
+    gone = cut.get("left_out", {})
+    assert all(len(whole[key]) == len(cut[key]) + gone.get(key, 0) for key in ("rows", "path"))
+    assert whole["path"] == path, "the answer itself stays as it was"
+
+
+def test_a_program_lists_the_things_of_a_room_near_a_place_by_pages(service: Service) -> None:
+    with TestClient(create_app(service), base_url="http://127.0.0.1:8750") as client:
+
+        def listed(**query: Any) -> Any:
+            answer = client.get("/maps/office/things", params=query)
+            assert answer.status_code == 200, answer.text
+            return answer.json()
+
+        everything = listed()["things"]
+        kitchen = listed(room="kitchen")
+        assert Counter(thing["name"] for thing in kitchen["things"]) == of_kind("kitchen")
+        assert kitchen["total"] == len(kitchen["things"])
+        pages = [listed(top=25, page=page)["things"] for page in range(1, 6)]
+        assert [thing for page in pages for thing in page] == everything
+        place = everything[0]["position"]
+        near = listed(near=",".join(map(str, place)), top=5)["things"]
+        away = sorted(math.dist(thing["position"], place) for thing in everything)
+        assert [thing["distance_m"] for thing in near] == pytest.approx(away[:5], abs=1e-3)
+        named = listed(near=everything[0]["name"], name=[everything[0]["name"]])
+        assert named["near"]["name"] == everything[0]["name"]
+        assert named["near"]["position"] not in [thing["position"] for thing in named["things"]]
+        for query, status in (
+            ({"room": "ballroom"}, 422),
+            ({"near": "1,x"}, 422),
+            ({"page": 99}, 400),
+            ({"top": 0}, 400),
+        ):
+            refused = client.get("/maps/office/things", params=query)
+            assert refused.status_code == status, refused.text

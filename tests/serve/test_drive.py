@@ -15,11 +15,13 @@ from jsonschema import Draft202012Validator, ValidationError
 from mcp.client.client import Client
 from starlette.testclient import TestClient
 
+from avlmaps.serve.agent_answers import MOST_TOKENS, token_count
 from avlmaps.serve.app import create_app
 from avlmaps.serve.drive.agents import drive_agent_server
 from avlmaps.serve.drive.plans import DriveError, Plan, PlanBook
 from avlmaps.serve.service import Service
 from avlmaps.serve.settings import ServeSettings
+from helpers.agent_talk import told
 from helpers.driven_server import START, Driven, driven
 
 BASE = "http://127.0.0.1:8750"
@@ -112,23 +114,30 @@ def test_an_agent_plans_confirms_and_stops_by_tools(drive: Driven, mode: str) ->
                 "stop_robot",
             }
             planned = await client.call_tool("plan_drive", {"words": "turn left"})
-            assert planned.structured_content is not None and drive.machine.motions == 0
+            made = told(planned)
+            assert drive.machine.motions == 0
             wrong = await client.call_tool("confirm_drive", {"token": "none"})
             assert wrong.is_error and drive.machine.motions == 0
-            begun = await client.call_tool("confirm_drive", {"token": planned.structured_content["token"]})
-            assert not begun.is_error and begun.structured_content is not None
-            assert begun.structured_content["order"] == planned.structured_content["order"]
+            begun = await client.call_tool("confirm_drive", {"token": made["token"]})
+            assert told(begun)["order"] == made["order"]
             with anyio.fail_after(30):
-                while (await client.call_tool("robot_status", {})).structured_content["state"] != "idle":  # pyright: ignore[reportOptionalSubscript]
+                while told(await client.call_tool("robot_status", {}))["state"] != "idle":
                     await anyio.sleep(0.01)
             assert drive.machine.motions == 1
-            again = await client.call_tool("confirm_drive", {"token": planned.structured_content["token"]})
+            again = await client.call_tool("confirm_drive", {"token": made["token"]})
             assert again.is_error, "a token is good once"
             stopped = await client.call_tool("stop_robot", {"nonsense": 1})
-            assert stopped.structured_content is not None and stopped.structured_content["stopped"] is True
+            assert told(stopped)["stopped"] is True
 
     anyio.run(conversation)
     assert drive.events == ["planned", "refused", "confirmed", "ended", "refused", "stop"]
+
+
+def test_an_agents_program_is_short_enough_to_be_shown(client: TestClient, drive: Driven) -> None:
+    long = "robot.turn_left(90)\n" * 400
+    result = call(client, "/drive/mcp", "tools/call", name="plan_drive", arguments={"program": long})
+    assert result["isError"] is True
+    assert "plan it in parts" in result["content"][0]["text"]
 
 
 def test_a_stop_is_accepted_with_a_body_of_any_size(client: TestClient, drive: Driven) -> None:
@@ -402,16 +411,24 @@ def test_agents_plan_confirm_and_stop_by_tools_of_their_own(client: TestClient, 
     def tool(name: str, **arguments: Any) -> dict[str, Any]:
         return call(client, "/drive/mcp", "tools/call", name=name, arguments=arguments)
 
+    def answer(name: str, **arguments: Any) -> dict[str, Any]:
+        result = tool(name, **arguments)
+        assert not result.get("isError") and "structuredContent" not in result
+        (content,) = result["content"]
+        assert token_count(content["text"]) <= MOST_TOKENS
+        return json.loads(content["text"])
+
+    assert token_count(json.dumps(list(tools.values()), separators=(",", ":"))) <= 400
     refused = tool("plan_drive", words="gabble gabble the")
     assert refused["isError"] is True and "token" not in json.loads(refused["content"][0]["text"])
-    planned = tool("plan_drive", words="turn left")["structuredContent"]
+    planned = answer("plan_drive", words="turn left")
     assert drive.machine.motions == 0
     assert tool("confirm_drive", token="x", velocity=1.0)["isError"] is True
-    assert tool("confirm_drive", token=planned["token"])["structuredContent"]["state"] == "driving"
+    assert answer("confirm_drive", token=planned["token"])["state"] == "driving"
     idle(client)
     assert drive.machine.motions == 1
-    assert tool("stop_robot", nonsense=[1, 2])["structuredContent"]["stopped"] is True
-    assert tool("robot_status")["structuredContent"]["state"] == "idle"
+    assert answer("stop_robot", nonsense=[1, 2])["stopped"] is True
+    assert answer("robot_status")["state"] == "idle"
     assert {entry["who"]["by"] for entry in drive.entries} == {"mcp"}
 
 

@@ -5,10 +5,12 @@ other signs. That is a little more than tokenizers of language models count (cl1
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from typing import Any
 
 import msgspec
+import numpy as np
 
 MOST_TOKENS = 800
 """Of one answer, unless its client wants more."""
@@ -17,7 +19,7 @@ _DECIMALS = 2
 _EXACT = {"world_from_camera": 4}  # decimals of a pose: 0.01 in a rotation is half a degree
 # What speaks of machines, or of how an answer is drawn.
 _LEFT_OUT = frozenset({"level_from_recording", "elapsed_ms", "color", "voxels", "hits", "clip", "intrinsics", "views"})
-_LEFT_OUT_KEY = "left_out"
+_LEFT_OUT_KEY, _CUT = "left_out", " ..."
 
 
 def token_count(text: str) -> int:
@@ -41,24 +43,53 @@ def compact(answer: Any, decimals: int = _DECIMALS, left_out: frozenset[str] = _
 
 
 def fitting(answer: dict[str, Any], most: int = MOST_TOKENS) -> dict[str, Any]:
-    """Return an answer of at most some tokens: the longest lists lose their ends, and ``left_out`` says how many.
+    """Return an answer of at most some tokens; ``left_out`` says how many entries of which lists are missing.
+
+    The longest list loses its end, wherever it stands in the answer; a path loses places between its ends, and where
+    no list is left the longest text is cut.
 
     Args:
         answer: as ``compact`` makes it.
         most: tokens.
     """
-    answer = dict(answer)
+    answer = deepcopy(answer)
+    gone: dict[str, int] = {}
     while _size(answer) > most:
-        lists = [key for key, value in answer.items() if isinstance(value, list) and len(value) > 1]
-        if not lists:
+        key, rows = max(_lists(answer), key=lambda one: _size(one[1]), default=("", []))
+        if not rows:
             break
-        key = max(lists, key=lambda one: _size(answer[one]))
-        rows = answer[key]
-        gone = max(1, len(rows) // 8)
-        answer[key] = rows[:-gone]
-        before = answer.get(_LEFT_OUT_KEY, {})
-        answer[_LEFT_OUT_KEY] = {**before, key: before.get(key, 0) + gone}
+        cut = max(1, len(rows) // 8)
+        if key.rpartition(".")[2] == "path":
+            kept = np.unique(np.linspace(0, len(rows) - 1, len(rows) - cut).round().astype(int))
+            rows[:] = [rows[at] for at in kept.tolist()]
+        else:
+            del rows[-cut:]
+        gone[key] = gone.get(key, 0) + cut
+        answer[_LEFT_OUT_KEY] = gone
+    while _size(answer) > most:
+        where, key = max(_texts(answer), key=lambda one: len(one[0][one[1]]))
+        where[key] = where[key][: len(where[key]) * 3 // 4].removesuffix(_CUT) + _CUT
     return answer
+
+
+def _lists(answer: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, list[Any]]]:
+    """Yield the lists of an answer that can lose an entry, with their keys: ``last.lines``."""
+    for key, value in answer.items():
+        if isinstance(value, dict):
+            yield from _lists(value, f"{path}{key}.")
+        elif isinstance(value, list) and len(value) > (2 if key == "path" else 1):
+            yield f"{path}{key}", value
+
+
+def _texts(answer: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
+    """Yield where the texts of an answer stand."""
+    for key, value in answer.items():
+        rows = value if isinstance(value, list) else [value]
+        for one in rows:
+            if isinstance(one, dict):
+                yield from _texts(one)
+        if isinstance(value, str):
+            yield answer, key
 
 
 def _size(value: Any) -> int:

@@ -1,6 +1,5 @@
 """What a building holds, as a path of small answers for agents: building, floors, rooms, and the things of a room."""
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 from typing import Annotated, Any
@@ -9,15 +8,14 @@ import numpy as np
 from jaxtyping import Float
 from msgspec import Meta, Struct
 
-from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME
-from avlmaps.query.schema import SoundAnswer, ThingAnswer
+from avlmaps.query.schema import SoundAnswer
 from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.whereabouts import Whereabouts
 from avlmaps.serve import work
 from avlmaps.serve.errors import RequestError
-from avlmaps.serve.requests import NoQuery, ThingsQuery, Words, place_of
-from avlmaps.serve.shelf import ServedMap
+from avlmaps.serve.requests import NoQuery, ThingsQuery, Words
+from avlmaps.serve.selection import Selected, page_of, selected, things_with_rooms, whereabouts
 from avlmaps.serve.work import Task
 
 Confidence = Annotated[float, Meta(ge=0.0, le=1.0)]
@@ -68,19 +66,13 @@ class MapQuery(Struct, forbid_unknown_fields=True):
     picture: bool = False
 
 
-def whereabouts(served: ServedMap) -> Whereabouts:
-    """Return the floors and rooms of a map, found once."""
-    return served.once("whereabouts", lambda: Whereabouts.of(served.avlmap))
-
-
 def describe_building(task: Task, query: MapQuery) -> dict[str, Any]:
     """Return the floors with their rooms, and how many things of each name there are."""
     del query
     avlmap, where = task.map.avlmap, whereabouts(task.map)
-    things, thing_rooms = _things(task, ThingsQuery())
+    things = work.list_things(task, ThingsQuery())["things"]
     floors = where.floors_of(_places([room.position for room in where.rooms]))
     thing_floors = where.floors_of(_places([thing["position"] for thing in things]))
-    del thing_rooms
     level = avlmap.space.level(avlmap.points) if len(avlmap.space) else np.zeros((1, 3))
     return {
         "map": task.map.name,
@@ -110,19 +102,10 @@ def list_things(task: Task, query: ListThingsQuery) -> dict[str, Any]:
     names = _names(query.name)
     unknown = [name for name in names if not task.map.avlmap.knows(name)]
     known = [name for name in names if name not in unknown]
-    wanted_things = ThingsQuery(least=query.least, name=known, structure=query.structure)
-    things, rooms = _things(task, wanted_things) if known or not names else ([], [])
-    chosen = list(range(len(things)))
-    if query.room is not None:
-        wanted = set(where.numbers_of(query.room))
-        chosen = [k for k in chosen if rooms[k] in wanted]
-    about: dict[str, Any] = {}
-    away: dict[int, float] = {}
-    if query.near is not None:
-        place, about["near"], itself = _near(task, query.near)
-        away = {k: _away(task.map, things[k], place) for k in chosen if things[k]["position"] != itself}
-        chosen = sorted(away, key=lambda k: away[k])
-    rows = [_thing_row(things[k], where, rooms[k], away.get(k)) for k in chosen]
+    wanted = ThingsQuery(least=query.least, name=known, structure=query.structure)
+    chosen, near = selected(task, wanted, query.room, query.near) if known or not names else ([], None)
+    about: dict[str, Any] = {"near": near}
+    rows = [_thing_row(one, where) for one in chosen]
     if unknown:
         about["note"] = unknown_note(unknown[0])
     if not names and len(rows) > query.top:
@@ -133,8 +116,7 @@ def list_things(task: Task, query: ListThingsQuery) -> dict[str, Any]:
 def list_rooms(task: Task, query: ListRoomsQuery) -> dict[str, Any]:
     """Return the rooms of a floor, each with the number of things in it; a page of them."""
     where = whereabouts(task.map)
-    _, thing_rooms = _things(task, ThingsQuery())
-    count = Counter(thing_rooms)
+    count = Counter(one.room for one in things_with_rooms(task, ThingsQuery()))
     floors = where.floors_of(_places([room.position for room in where.rooms]))
     if query.floor is not None and not 0 <= query.floor < where.floor_count:
         raise RequestError(f"There is no floor {query.floor}; the map has {where.floor_count}, counted from 0.")
@@ -177,62 +159,21 @@ def list_sounds(task: Task, query: ListSoundsQuery) -> dict[str, Any]:
     return _paged(task, "sounds", rows, query.top, query.page)
 
 
-def _things(task: Task, query: ThingsQuery) -> tuple[list[ThingAnswer], list[int]]:
-    """Return things, and the number of each one's room."""
-    things = work.list_things(task, query)["things"]
-    key = ("rooms of things", query.least, tuple(query.name), query.structure)
-    places = _places([thing["position"] for thing in things])
-    return things, task.map.once(key, lambda: whereabouts(task.map).rooms_of(places).tolist())
-
-
-def _thing_row(thing: ThingAnswer, where: Whereabouts, room: int, away_m: float | None) -> dict[str, Any]:
+def _thing_row(one: Selected, where: Whereabouts) -> dict[str, Any]:
     return {
-        "name": thing["name"],
-        "confidence": thing["confidence"],
-        "position": thing["position"],
-        "size": thing["size"],
-        "room": where.names[room] if room >= 0 else None,
-        "distance_m": away_m,
+        "name": one.thing["name"],
+        "confidence": one.thing["confidence"],
+        "position": one.thing["position"],
+        "size": one.thing["size"],
+        "room": where.names[one.room] if one.room >= 0 else None,
+        "distance_m": one.away_m,
     }
 
 
-def _near(task: Task, near: str | list[float]) -> tuple[Float[np.ndarray, " n"], Any, list[float] | None]:
-    """Return the place that is meant, how the answer names it, and the position of the thing itself if it is one."""
-    if isinstance(near, list) or not any(letter.isalpha() for letter in near):
-        place = place_given(near)
-        return place, None, None
-    known = task.map.avlmap.knows(near)
-    things = work.list_things(task, ThingsQuery(name=[near]))["things"] if known else []
-    if not things:
-        why = "" if known else f": {unknown_note(near)}"
-        raise QueryError(f"The map shows no {near[:60]!r} to be near to{why}; give a place as x,y,z, or another name.")
-    best = things[0]
-    about = {"name": best["name"], "confidence": best["confidence"], "position": best["position"]}
-    return np.array(best["position"]), about, best["position"]
-
-
-def place_given(place: str | list[float]) -> Float[np.ndarray, " n"]:
-    """Return the numbers of a place that comes as a text or as a list.
-
-    Raises:
-        QueryError: they are no two or three numbers.
-    """
-    return place_of(place if isinstance(place, str) else ",".join(str(value) for value in place))
-
-
-def _away(served: ServedMap, thing: ThingAnswer, place: Float[np.ndarray, " n"]) -> float:
-    """Return how far a thing's position lies from a place: in space, or level where the place has no height."""
-    point, level = np.array(thing["position"]), served.avlmap.space.level
-    return math.dist(point, place) if len(place) == 3 else math.dist(level(point)[:2], place)
-
-
 def _paged(task: Task, key: str, rows: list[dict[str, Any]], top: int, page: int) -> dict[str, Any]:
-    pages = max(1, math.ceil(len(rows) / top))
-    if page > pages:
-        raise RequestError(f"There is no page {page}; there are {pages} of {top}, for {len(rows)} {key}.")
+    shown, pages = page_of(rows, top, page, key)
     paging = {"page": page, "pages": pages} if pages > 1 else {}
-    return {"map": task.map.name, "frame": FRAME, "total": len(rows), **paging,
-            key: rows[(page - 1) * top : page * top]}  # fmt: skip
+    return {"map": task.map.name, "frame": FRAME, "total": len(rows), **paging, key: shown}
 
 
 def _kinds(rows: Sequence[Any]) -> dict[str, int]:

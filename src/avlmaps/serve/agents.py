@@ -194,24 +194,29 @@ def _described(service: Service, tool: AgentTool) -> mcp.Tool:
 
 
 def input_schema(tool: AgentTool, maps: Sequence[str]) -> dict[str, Any]:
-    """Return the schema of a tool's arguments: its request, and which map, in few words.
+    """Return the schema of a tool's arguments: its request, and which map, in few words."""
+    brief = brief_schema(tool.query)
+    which: dict[str, Any] = {"type": "string"}
+    brief["properties"]["map"] = which | ({"enum": list(maps)} if len(maps) <= _MOST_ENUM else {})
+    required = [*brief.get("required", []), *(["map"] if len(maps) > 1 else [])]
+    return brief | ({"required": required} if required else {})
+
+
+def brief_schema(query: type[msgspec.Struct]) -> dict[str, Any]:
+    """Return the schema of a request in few words.
 
     Each tool's description is read by a language model before every conversation; so it holds no titles, and no null.
     """
-    (schema,), components = msgspec.json.schema_components([tool.query], ref_template="#/$defs/{name}")
+    (schema,), components = msgspec.json.schema_components([query], ref_template="#/$defs/{name}")
     whole = components[schema["$ref"].rpartition("/")[2]]
-    properties = {name: _brief(one) for name, one in whole["properties"].items()}
-    which: dict[str, Any] = {"type": "string"}
-    properties["map"] = which | ({"enum": list(maps)} if len(maps) <= _MOST_ENUM else {})
-    required = [*whole.get("required", []), *(["map"] if len(maps) > 1 else [])]
-    brief = {"type": "object", "properties": properties}
-    return brief | ({"required": required} if required else {})
+    brief = {"type": "object", "properties": {name: _brief(one) for name, one in whole["properties"].items()}}
+    return brief | ({"required": whole["required"]} if whole.get("required") else {})
 
 
 def _brief(schema: dict[str, Any]) -> dict[str, Any]:
     """Return the schema of an argument without null, empty defaults and limits that nobody reaches by chance."""
     schema = {key: value for key, value in schema.items() if key not in _WORDLESS}
-    if schema.get("default") in (None, False, [], 1):
+    if schema.get("default") in (None, False, [], 1, ""):
         schema.pop("default", None)  # which an agent expects
     kinds = [
         {key: value for key, value in one.items() if key not in _WORDLESS}

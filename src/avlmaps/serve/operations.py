@@ -10,6 +10,7 @@ from avlmaps.query.schema import ContentsAnswer, LocateAnswer, QueryAnswer
 from avlmaps.serve import work
 from avlmaps.serve.requests import (
     AskQuery,
+    ListedThingsQuery,
     LocateQuery,
     NoQuery,
     PathQuery,
@@ -19,6 +20,7 @@ from avlmaps.serve.requests import (
     ThingsQuery,
     TilesQuery,
 )
+from avlmaps.serve.selection import list_selected
 from avlmaps.serve.tiles import TilesAnswer
 
 
@@ -61,8 +63,8 @@ OPERATIONS = (
     Operation("describeMap", "", "Describe a map, as `avlmaps info` does.", NoQuery, dict, work.describe_map, "slow"),
     Operation("listContents", "/contents", "List things, sounds and rooms, as `avlmaps things` does.",
               ThingsQuery, ContentsAnswer, work.list_contents, "slow"),
-    Operation("listThings", "/things", "List the things of a map.",
-              ThingsQuery, work.ThingsAnswer, work.list_things, "slow"),
+    Operation("listThings", "/things", "List the things of a map, of a room, or near a place; a page of them.",
+              ListedThingsQuery, work.ListedThingsAnswer, list_selected, "slow"),
     Operation("listSounds", "/sounds", "List the sounds of a map.",
               NoQuery, work.SoundsAnswer, work.list_sounds, "slow"),
     Operation("getSound", "/sounds/{sound:count}/clip", "Return the clip of a sound, counted from 0.",

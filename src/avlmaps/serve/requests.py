@@ -39,6 +39,19 @@ class ThingsQuery(Struct, forbid_unknown_fields=True):
     structure: Annotated[bool, Meta(description="List walls, floors and ceilings as well.")] = False
 
 
+class ListedThingsQuery(ThingsQuery, forbid_unknown_fields=True):
+    """Which things are listed, in which order, and how many at once."""
+
+    room: Annotated[Words | None, Meta(description="List the things of this room, or of all rooms of a kind.")] = None
+    near: Annotated[
+        Words | None, Meta(description="x,y,z, level x,y, or the name of a thing: the nearest to it come first.")
+    ] = None
+    top: Annotated[
+        Annotated[int, Meta(ge=1, le=10_000)] | None, Meta(description="Most things of a page. Default: all.")
+    ] = None
+    page: Annotated[int, Meta(ge=1, le=10_000, description="Which page, counted from 1.")] = 1
+
+
 class RoomsQuery(Struct, forbid_unknown_fields=True):
     """Which rooms are listed."""
 

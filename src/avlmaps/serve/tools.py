@@ -18,11 +18,11 @@ from avlmaps.serve.agent_lists import (
     ListThingsQuery,
     MapQuery,
     Place,
-    place_given,
 )
 from avlmaps.serve.errors import RequestError
 from avlmaps.serve.pictures import small_picture
 from avlmaps.serve.requests import AskQuery, LocateQuery, PlaceQuery, Short, Words
+from avlmaps.serve.selection import place_given
 from avlmaps.serve.uploads import Uploads
 from avlmaps.serve.work import Task
 

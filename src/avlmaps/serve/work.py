@@ -107,6 +107,26 @@ class ThingsAnswer(TypedDict):
     notes: NotRequired[Notes]
 
 
+class ListedThing(ThingAnswer):
+    """A thing, with its room and its distance where those are queried."""
+
+    room: NotRequired[str | None]
+    distance_m: NotRequired[float]
+
+
+class ListedThingsAnswer(TypedDict):
+    """A page of the things that are meant, most confident or nearest first."""
+
+    map: str
+    frame: Frame
+    things: list[ListedThing]
+    total: NotRequired[int]
+    page: NotRequired[int]
+    pages: NotRequired[int]
+    near: NotRequired[dict[str, Any]]
+    notes: NotRequired[Notes]
+
+
 class SoundsAnswer(TypedDict):
     """Sounds of a map in the order of their onset."""
 

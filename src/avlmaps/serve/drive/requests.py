@@ -7,7 +7,7 @@ from msgspec import Meta, Struct
 from avlmaps.language.commands import MOST_CHARACTERS
 
 Words = Annotated[str, Meta(max_length=MOST_CHARACTERS, description="A command, such as 'go to the sofa'.")]
-Program = Annotated[str, Meta(max_length=20_000, description="A program of the robot's skills, instead of a command.")]
+Program = Annotated[str, Meta(max_length=20_000, description="Skills as a program, instead of a command.")]
 Token = Annotated[str, Meta(min_length=1, max_length=200, description="The token of the plan that is confirmed.")]
 
 
