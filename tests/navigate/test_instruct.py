@@ -85,6 +85,18 @@ def test_the_outcome_is_the_contract_of_the_command_line() -> None:
     assert answer["path_m"] == pytest.approx(np.hypot(*np.subtract(outcome.subgoals[0].stop[:2], (3, 2))), abs=0.01)
 
 
+def test_what_is_doubtful_about_the_map_is_told_once_before_anything_moves() -> None:
+    asked = AVLMap(furnished_map())
+    asked.stored.info.doubts = ("The poses drift.",)
+    lines: list[str] = []
+    planned = Translation('robot.move_to_object("chair")', ("The poses drift.", "a chair is meant"))
+    outcome = instruct(
+        "x", asked, KinematicDriver(GroundPose(3.0, 2.0)), Scripted(), translation=planned, tell=lines.append
+    )
+    assert outcome.ok and outcome.notes == ("The poses drift.", "a chair is meant")
+    assert lines[0] == "note: The poses drift." and lines.count(lines[0]) == 1
+
+
 def test_what_is_not_understood_is_an_error_before_anything_moves() -> None:
     driver = KinematicDriver(GroundPose(3.0, 2.0))
     with pytest.raises(LanguageError):

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import soundfile
 from jsonschema import Draft202012Validator
+from PIL import Image
 from starlette.testclient import TestClient
 
 from avlmaps.cli.info import describe_path
@@ -386,3 +387,13 @@ def test_a_further_application_stands_behind_the_same_guard(
     assert client.get("/drive/state").status_code == 401
     assert client.get("/drive/state", headers={"authorization": "Bearer a-token-of-some-length"}).text == "driving"
     assert client.get("/mcp", headers={"authorization": "Bearer a-token-of-some-length"}).status_code == 404
+
+
+def test_the_focal_length_of_an_uploaded_photo_is_that_of_its_exif(client: TestClient, photo: bytes) -> None:
+    exif, stream = Image.Exif(), io.BytesIO()
+    exif.get_ifd(0x8769)[0xA405] = 36
+    Image.open(io.BytesIO(photo)).save(stream, "JPEG", exif=exif, quality=98)
+    noted = client.post("/maps/room/locate", files={"photo": stream.getvalue()}).json()
+    given = {"intrinsics": "160,160,120,90"}
+    sure = client.post("/maps/room/locate", files={"photo": stream.getvalue()}, data=given).json()
+    assert noted["focal_from"] in ("exif", "photo") and sure["focal_from"] == "given"

@@ -100,10 +100,10 @@ def describe_path(
 
 def _consistency(recording: "Recording") -> dict[str, Any] | None:
     """Check a recording against itself, on a sample; None where none of the sample can be read."""
-    from avlmaps.recordings.consistency.check import check_recording
+    from avlmaps.maps.doubts import judge
 
     try:
-        verdict = check_recording(recording)
+        verdict = judge(recording)
     except AvlmapsError:
         return None
     numbers = {name: getattr(verdict, name) for name in ("agreeing", "seen_through", "likeness", "median_depth_m")}

@@ -15,7 +15,7 @@ from avlmaps.maps.plan import Computed, Plan, stage
 from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.manifest import Removed
 from avlmaps.recordings.consistency.check import check_recording
-from avlmaps.recordings.consistency.verdict import Reason
+from avlmaps.recordings.consistency.verdict import Reason, Verdict
 from avlmaps.recordings.types import Recording
 
 # Share of the voxels that frames see through: 0 to 1 % in right recordings, 8 % with the drift of wheels.
@@ -55,7 +55,7 @@ def checked(plan: Plan, allowed: Sequence[str]) -> Plan:
 
 def _doubts(recording: Recording, allowed: Sequence[str]) -> _Doubts:
     try:
-        verdict = check_recording(recording)
+        verdict = judge(recording)
     except RecordingError:  # no frame of the sample can be read; how many may be lost is decided later
         return _Doubts((), whole=False)
     refused = verdict.refused(tuple(allowed))
@@ -63,8 +63,20 @@ def _doubts(recording: Recording, allowed: Sequence[str]) -> _Doubts:
         raise RecordingError(
             f"{recording.path} cannot be right. {refused} To build it as it is: --allow {refused.reason.value}."
         )
+    return _Doubts(verdict.sentences(), whole=not verdict.unread)
+
+
+def judge(recording: Recording) -> Verdict:
+    """Check a recording against itself, and the up direction that was given against what it shows.
+
+    Raises:
+        RecordingError: it has no frame that can be read.
+    """
+    verdict = check_recording(recording)
+    if verdict.refused(()) is not None:  # with such poses nothing is level
+        return verdict
     tilted = up_doubts(recording, some_frames(recording), np.random.default_rng(0))
-    return _Doubts((*verdict.sentences(), *tilted), whole=not verdict.unread)
+    return replace(verdict, findings=(*verdict.findings, *tilted))
 
 
 def carving_doubts(removed: Removed, voxels: int) -> Iterator[str]:

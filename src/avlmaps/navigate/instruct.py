@@ -55,7 +55,8 @@ class Outcome:
     Attributes:
         command: what was said.
         programs: what ran, in order; more than one where the translator had to try again.
-        notes: what a person should know: how a part was understood, where the map's confidence is low.
+        notes: what a person should know: why the map may be wrong, how a part was understood, where the map's
+            confidence is low.
         done: every step, a failed one too.
         moves: every movement.
         error: why it was not obeyed to its end, one sentence; None where it was.
@@ -158,6 +159,8 @@ def instruct(
     translation = translation or translator.program_for(command)
     robot = Robot(avlmap, driver, settings, readable or offered_by(command), lambda line: tell(f"  {line}"), pause)
     run = _Run(command, translator, robot, budget, tell)
+    for doubt in avlmap.stored.info.doubts:
+        run.note(doubt)
     run.through(translation)
     run.judge()
     error, error_type = (None, None) if run.last is None else (run.last.error, run.last.error_type)
@@ -230,5 +233,6 @@ class _Run:
                 self.note(f"{what}: the nearest place where the robot could stop is {move.distance_m:.2f} m from it")
 
     def note(self, note: str) -> None:
-        self.notes.append(note)
-        self.tell(f"note: {note}")
+        if note not in self.notes:  # a plan carries those of its rehearsal
+            self.notes.append(note)
+            self.tell(f"note: {note}")

@@ -31,7 +31,7 @@ from avlmaps.query.modalities.sound import (
 )
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.pieces import Pieces, object_pieces
-from avlmaps.query.queryable import Attachment
+from avlmaps.query.queryable import Attachment, Photo
 from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, voting_rows
 from avlmaps.query.things_in_rooms import ThingsInRooms
 from avlmaps.query.voxel_space import Space
@@ -382,14 +382,14 @@ class AVLMap:
 
     def image(
         self,
-        picture: str | Path | UInt8[np.ndarray, "h w 3"],
+        picture: str | Path | Photo | UInt8[np.ndarray, "h w 3"],
         intrinsics: Pinhole | None = None,
         primary: bool = False,
     ) -> Heatmap:
         """Return the heat of where a picture was taken; if it is not located, of the best guess.
 
         Args:
-            picture: a file, or RGB uint8.
+            picture: a file, or RGB uint8, or that with what its EXIF says.
             intrinsics: of the camera that took it; by default by its EXIF, else the map's own.
             primary: whether that place is what is sought.
 
@@ -398,11 +398,14 @@ class AVLMap:
         """
         from avlmaps.query.focal import focal_35mm_of
 
-        is_array = isinstance(picture, np.ndarray)
-        part = Part(Modality.IMAGE, "a picture" if is_array else str(picture), _role(primary), is_file=True)
-        rgb = picture if is_array else read_picture(Path(picture).expanduser())
-        focal_35mm = None if is_array or intrinsics is not None else focal_35mm_of(Path(picture).expanduser())
-        located = self._located(rgb, intrinsics, _GUESS_FROM, focal_35mm)
+        called = "a picture"
+        if isinstance(picture, np.ndarray):
+            picture = Photo(picture)
+        elif not isinstance(picture, Photo):
+            called, path = str(picture), Path(picture).expanduser()
+            picture = Photo(read_picture(path), None if intrinsics is not None else focal_35mm_of(path))
+        part, rgb = Part(Modality.IMAGE, called, _role(primary), is_file=True), picture.rgb
+        located = self._located(rgb, intrinsics, _GUESS_FROM, picture.focal_35mm)
         if located.world_from_camera is None and self.settings.by_colour:
             located = self._guessed_by_colour(rgb, located)
         return Heatmap.of(image_factor(self.space, located, part, self.settings.heat), self.settings.found_at)
@@ -469,7 +472,7 @@ class AVLMap:
         attached, primary = attachments.get(part.query), part.role is Role.PRIMARY
         if isinstance(attached, Sound) and part.modality is Modality.SOUND:
             return self.sound_clip(attached, primary)
-        if isinstance(attached, np.ndarray) and part.modality is Modality.IMAGE:
+        if isinstance(attached, np.ndarray | Photo) and part.modality is Modality.IMAGE:
             return self.image(attached, intrinsics, primary)
         what = "photo" if part.modality is Modality.IMAGE else "clip"
         raise QueryError(f"The question speaks of a {what} that did not come with it; attach one.")
@@ -495,7 +498,7 @@ class AVLMap:
                 or a question, whose parts are known. Without it the parts are those that are named below.
             top: number of goals at most.
             intrinsics: of the camera that took the question's pictures: a camera, or fx, fy, cx, cy in pixels; by
-                default the map's own.
+                default of its EXIF, else the map's own.
             attachments: pictures and sounds by the name that the parts have for them. Where given, no file is opened: a
                 part of a file that is not among them is an error.
             object: instead of a sentence, the name of an object.

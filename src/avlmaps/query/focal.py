@@ -5,6 +5,7 @@ from others. How well the points fix both is known from the same equations, and 
 """
 
 from dataclasses import dataclass, replace
+from io import BytesIO
 from pathlib import Path
 from typing import Literal
 
@@ -67,12 +68,16 @@ class Uncertainty:
     angle_rad: float
 
 
-def focal_35mm_of(path: Path) -> float | None:
-    """Return the focal length for 35 mm film that a photo's EXIF notes, mm; None where it has none that can be."""
+def focal_35mm_of(photo: Path | bytes) -> float | None:
+    """Return the focal length for 35 mm film that a photo's EXIF notes, mm; None where it has none that can be.
+
+    Args:
+        photo: a file, or what is in it.
+    """
     from PIL import Image
 
     try:
-        with Image.open(path) as picture:
+        with Image.open(BytesIO(photo) if isinstance(photo, bytes) else photo) as picture:
             noted = float(picture.getexif().get_ifd(_EXIF_IFD).get(_FOCAL_35MM, 0))
     except (OSError, ValueError, TypeError, SyntaxError, ZeroDivisionError):
         return None

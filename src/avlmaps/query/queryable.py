@@ -1,6 +1,7 @@
 """What an answer needs of a map: ``AVLMap`` gives it, and asking, lists and whereabouts know no more of it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
@@ -19,7 +20,21 @@ if TYPE_CHECKING:
     from avlmaps.query.contents import Room, SoundEvent, Thing
     from avlmaps.query.rooms import RoomField, Rooms
 
-Attachment = UInt8[np.ndarray, "h w 3"] | Sound
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Photo:
+    """A picture that came without a file of its own.
+
+    Attributes:
+        rgb: its pixels.
+        focal_35mm: the focal length for 35 mm film in its EXIF, mm; None where it has none.
+    """
+
+    rgb: UInt8[np.ndarray, "h w 3"]
+    focal_35mm: float | None = None
+
+
+Attachment = UInt8[np.ndarray, "h w 3"] | Photo | Sound
 """A picture or a sound that comes with a question, instead of a file."""
 
 

@@ -15,8 +15,9 @@ from jaxtyping import UInt8
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError, RecordingError
+from avlmaps.query.focal import focal_35mm_of
 from avlmaps.query.modalities.sound import require_audible
-from avlmaps.query.queryable import Attachment
+from avlmaps.query.queryable import Attachment, Photo
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.containers import self_contained_suffix
 from avlmaps.recordings.images import check_whole, decode_picture, encoded_size
@@ -47,7 +48,7 @@ class Uploads:
         """
         found: dict[str, Attachment] = {}
         if self.photo is not None:
-            found[PHOTO] = decode_photo(self.photo, limits)
+            found[PHOTO] = Photo(decode_photo(self.photo, limits), focal_35mm_of(self.photo))
         if self.clip is not None:
             found[CLIP] = decode_clip(self.clip, limits)
         return found

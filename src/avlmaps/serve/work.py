@@ -11,6 +11,7 @@ from avlmaps.navigate.paths import PathAnswer
 from avlmaps.query.answer import Answer
 from avlmaps.query.description import map_answer
 from avlmaps.query.places import PlaceAnswer, column_point, describe_place
+from avlmaps.query.queryable import Photo
 from avlmaps.query.schema import (
     ContentsAnswer,
     Frame,
@@ -273,11 +274,12 @@ def ask(task: Task, query: AskQuery) -> QueryAnswer:
 def locate(task: Task, query: LocateQuery) -> LocateAnswer:
     """Return what ``avlmaps locate --json`` prints."""
     photo = task.uploads.attachments(task.limits).get(PHOTO)
-    if not isinstance(photo, np.ndarray):
+    if not isinstance(photo, Photo):
         raise RequestError("There is no photo; send one as the file 'photo' of a form, or as the body.")
-    camera = camera_of(query.intrinsics, photo)
+    camera = camera_of(query.intrinsics, photo.rgb)
     task.watch.step("locating")
-    return locate_answer(task.map.avlmap.locate(photo, camera), task.map.avlmap.stored.info.doubts)
+    found = task.map.avlmap.locate(photo.rgb, camera, None if camera is not None else photo.focal_35mm)
+    return locate_answer(found, task.map.avlmap.stored.info.doubts)
 
 
 def place(task: Task, query: PlaceQuery) -> PlaceAnswer:

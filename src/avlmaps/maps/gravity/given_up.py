@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.maps.gravity.up import find_up
+from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason
 from avlmaps.recordings.types import Frame, Recording
 
 _FRAMES = 16
@@ -18,8 +19,8 @@ _LEAST_SUPPORT, _HELD_DEG = 0.1, 40.0
 _FLATTER, _STILL_M = 0.5, 0.15
 
 
-def up_doubts(recording: Recording, frames: Iterator[Frame], rng: np.random.Generator) -> tuple[str, ...]:
-    """Return a sentence where the up direction of a recording is not that of what it shows, or nothing.
+def up_doubts(recording: Recording, frames: Iterator[Frame], rng: np.random.Generator) -> tuple[Finding, ...]:
+    """Return a finding where the up direction of a recording is not that of what it shows, or nothing.
 
     A camera that is mounted on its side shows walls where floors are expected; then the walk decides: nobody walks
     up and down as far as along.
@@ -45,10 +46,11 @@ def up_doubts(recording: Recording, frames: Iterator[Frame], rng: np.random.Gene
     if max(along_given_m, along_found_m) > _STILL_M and along_found_m > _FLATTER * along_given_m:
         return ()
     said, is_so = (_words(up) for up in (given, found.direction))
-    return (
+    sentence = (
         f"Up is given as {said}, but {found.support:.0%} of the surface in view is level along {is_so}, {apart:.0f} "
-        f"degrees away, and so was the camera held; give --up {is_so}, or fix the poses.",
+        "degrees away, and so was the camera held."
     )
+    return (Finding(Reason.UP, Grade.SUSPICIOUS, sentence, f"Give --up {is_so}, or fix the poses."),)
 
 
 def some_frames(recording: Recording) -> Iterator[Frame]:

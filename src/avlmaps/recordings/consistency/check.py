@@ -77,7 +77,6 @@ def check_recording(recording: Recording) -> Verdict:
         *of_motion(recording, after, _can_be_judged(after)),
         *_of_agreement(recording, sample, _Found(after, apart), median_m),
     ]
-    order = (Grade.IMPOSSIBLE, Grade.SUSPICIOUS)
     checked = _can_be_judged(after)
     return Verdict(
         frames=len(sample),
@@ -86,7 +85,7 @@ def check_recording(recording: Recording) -> Verdict:
         seen_through=after.through_share if checked else float("nan"),
         likeness=after.likeness,
         median_depth_m=median_m,
-        findings=tuple(sorted(findings, key=lambda finding: order.index(finding.grade))),
+        findings=tuple(findings),
         unread=sample.unread,
     )
 

@@ -20,6 +20,7 @@ class Reason(StrEnum):
     DEPTH = "depth"
     INTRINSICS = "intrinsics"
     MOTION = "motion"
+    UP = "up"
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +66,12 @@ class Verdict:
     median_depth_m: float
     findings: tuple[Finding, ...] = ()
     unread: int = 0
+
+    def __post_init__(self) -> None:
+        """Put the gravest finding first."""
+        order = (Grade.IMPOSSIBLE, Grade.SUSPICIOUS)
+        findings = sorted(self.findings, key=lambda finding: order.index(finding.grade))
+        object.__setattr__(self, "findings", tuple(findings))
 
     @property
     def grade(self) -> Grade:
