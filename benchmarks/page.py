@@ -12,6 +12,7 @@ from avlmaps.bench.output import table_markdown
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURES, PAGE, README = ROOT / "docs" / "benchmarks.json", ROOT / "docs" / "benchmarks.md", ROOT / "README.md"
+RECORDINGS = ROOT / "docs" / "recordings.md"
 BEGIN, END = "<!-- figures: begin (python benchmarks/report.py --page) -->", "<!-- figures: end -->"
 NOT_YET = "not measured yet"
 
@@ -67,6 +68,10 @@ ENTRIES = (
         "Tables called cross-validation were written with the weights, by networks that were not trained on the fold.",
     ),
     Entry("segmentation", "Sounds in a track", "avlmaps bench segmentation --sounds SOUNDS --out OUT", 0.3),
+    Entry(
+        "recordings", "Recordings that cannot be right", "avlmaps bench recordings --scenes RECORDING --out OUT", 0.2,
+        "[What is compared](recordings.md#a-recording-against-itself).",
+    ),
     Entry("locate", "Position of a photo", "avlmaps bench locate --scenes RECORDING --out OUT", 0.2),
     Entry("house", "Objects of an artist's house", "avlmaps bench objects --scenes HOUSE --out OUT", 0.3),
     Entry("objects", "Objects of twelve held-out homes", "avlmaps bench objects --out OUT", 1.0),
@@ -258,8 +263,28 @@ def _filled(form: str, columns: list[str], row: list[Any]) -> str:
     return re.sub(r"\{([^}]+)\}", cell, form)
 
 
+def recordings_tables(measured: Mapping[str, Any]) -> str:
+    """Return what docs/recordings.md shows of the suite `recordings`: counts by source and format, and the cost."""
+    found = measured.get("recordings")
+    if found is None:
+        return NOT_YET
+    tables = found["answer"]["tables"]
+    shown = [table_markdown(tables[name]) for name in ("mistakes by source", "mistakes by format")]
+    right, cost = tables["right recordings"], tables["cost"]
+    outcome = right["columns"].index("outcome")
+    silent = sum(row[outcome] == "right" for row in right["rows"])
+    fields = dict(zip(cost["columns"], cost["rows"][0], strict=True))
+    last = (
+        f"Of {len(right['rows'])} right recordings {silent} got no word. The check takes {fields['share %']} % of the "
+        f"processor time of a build ({fields['check, processor s']} of {fields['whole build, processor s']} s, "
+        f"{fields['frames']} frames). [Every recording, and what nothing was said of](benchmarks.md"
+        f"#recordings-that-cannot-be-right); measured on {found['date']}.\n"
+    )
+    return "\n".join([*shown, last]).rstrip()
+
+
 def with_figures(readme: str, table: str) -> str:
-    """Return the README with the table between its markers.
+    """Return a page, such as the README, with the table between its markers.
 
     Raises:
         ValueError: the markers are not there.
@@ -267,5 +292,5 @@ def with_figures(readme: str, table: str) -> str:
     before, begin, rest = readme.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:
-        raise ValueError(f"README.md lacks {BEGIN} ... {END}")
+        raise ValueError(f"The page lacks {BEGIN} ... {END}")
     return f"{before}{BEGIN}\n{table}\n{END}{after}"

@@ -1,4 +1,4 @@
-"""Run every benchmark into docs/benchmarks.json; write docs/benchmarks.md and the README's table from it.
+"""Run every benchmark into docs/benchmarks.json; write docs/benchmarks.md and the tables of two other pages from it.
 
     python benchmarks/report.py --sounds SOUNDS --recording RECORDING --house HOUSE
     python benchmarks/report.py --only words sounds --sounds SOUNDS
@@ -27,7 +27,20 @@ sys.path.insert(0, str(HERE))
 from avlmaps.bench.harness.models import shipped_checksums  # noqa: E402
 from avlmaps.core.files import write_bytes_atomically  # noqa: E402
 from avlmaps.core.version import __version__  # noqa: E402
-from page import ENTRIES, FIGURES, PAGE, README, Entry, page, read_figures, readme_table, stale, with_figures  # noqa: E402
+from page import (  # noqa: E402
+    ENTRIES,
+    FIGURES,
+    PAGE,
+    README,
+    RECORDINGS,
+    Entry,
+    page,
+    read_figures,
+    readme_table,
+    recordings_tables,
+    stale,
+    with_figures,
+)
 
 SHARED = HERE.parents[1] / "shared"
 
@@ -69,7 +82,12 @@ def write(found: dict[str, Any]) -> None:
 def rendered(found: dict[str, Any]) -> dict[Path, str]:
     """Return the text of every file that follows from the figures."""
     readme = README.read_text(encoding="utf-8")
-    return {PAGE: page(found, shipped_checksums()), README: with_figures(readme, readme_table(found))}
+    recordings = RECORDINGS.read_text(encoding="utf-8")
+    return {
+        PAGE: page(found, shipped_checksums()),
+        README: with_figures(readme, readme_table(found)),
+        RECORDINGS: with_figures(recordings, recordings_tables(found)),
+    }
 
 
 def arguments() -> argparse.Namespace:

@@ -21,9 +21,11 @@ from page import (  # noqa: E402 - benchmarks is not a package
     PAGE,
     README,
     README_FIGURES,
+    RECORDINGS,
     page,
     read_figures,
     readme_table,
+    recordings_tables,
     stale,
     with_figures,
 )
@@ -40,6 +42,12 @@ def test_the_readme_shows_the_figures_that_were_measured():
     readme = README.read_text(encoding="utf-8")
     assert readme == with_figures(readme, readme_table(MEASURED)), "python benchmarks/report.py --page"
     assert len(README_FIGURES) <= 10
+
+
+def test_the_page_of_recordings_shows_the_figures_that_were_measured():
+    shown = RECORDINGS.read_text(encoding="utf-8")
+    assert shown == with_figures(shown, recordings_tables(MEASURED)), "python benchmarks/report.py --page"
+    assert ("silent wrong" in recordings_tables(MEASURED)) == ("recordings" in MEASURED)
 
 
 def test_a_figure_typed_into_the_readme_by_hand_is_noticed():

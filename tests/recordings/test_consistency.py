@@ -105,6 +105,11 @@ def test_a_wrong_option_is_found_out(right: Draft, tmp_path: Path) -> None:
         ("poses jump by 0.5 m", Reason.GEOMETRY),
         ("poses turn by 20 degrees", Reason.GEOMETRY),
         ("positions x0.5", Reason.GEOMETRY),
+        ("two neighbours exchanged", Reason.GEOMETRY),
+        ("principal point off by a sixteenth", Reason.GEOMETRY),
+        ("half of the pictures BGR", Reason.COLOUR),
+        ("colour camera 0.3 m beside", Reason.COLOUR),
+        ("colour shifted by a sixteenth", Reason.COLOUR),
     ],
 )
 def test_a_mistake_is_named(name: str, reason: Reason, right: Draft, tmp_path: Path) -> None:
@@ -121,7 +126,32 @@ def test_one_frame_and_none_that_overlaps_say_nothing(right: Draft, tmp_path: Pa
         stamps_s=right.stamps_s[rows], pose_stamps_s=right.pose_stamps_s[rows],
     )  # fmt: skip
     found = verdict(one, tmp_path)
-    assert found.grade is Grade.FINE and found.pairs == 0 and np.isnan(found.agreeing)
+    assert found.grade is Grade.UNCHECKED and found.pairs == 0 and np.isnan(found.agreeing)
+    assert not found.sentences() and "there is one frame" in found.unchecked[0]
+
+
+def test_frames_that_see_nothing_in_common_are_not_called_fine(tmp_path: Path) -> None:
+    sparse = RoomWalk("keyframes", seed=52, frames=4, rate_hz=0.2, turn_rad_s=0.3).draft(CAMERA)
+    found = verdict(sparse, tmp_path)
+    assert found.grade is Grade.UNCHECKED and not found.sentences()
+    assert "hardly any two frames see the same place" in found.unchecked[0]
+
+
+SPOTS = {
+    "stands and turns evenly": (RoomWalk("turn", seed=57, frames=30, round_rad_s=0.0, even=True), {"scale", "clock"}),
+    "hardly moves": (RoomWalk("still", seed=58, frames=30, round_rad_s=0.02, turn_rad_s=0.02, noise=0.0019, even=True),
+                     {"scale", "clock", "focal"}),
+    "walks": (RoomWalk("walk", seed=51, frames=30), set[str]()),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SPOTS)
+def test_what_would_not_show_is_said(name: str, tmp_path: Path) -> None:
+    walk, spots = SPOTS[name]
+    found = verdict(walk.draft(CAMERA), tmp_path)
+    assert found.grade is Grade.FINE and not found.sentences()
+    said = " ".join(found.unchecked)
+    assert {spot for spot in ("scale", "clock", "focal", "axis") if spot in said} == spots
 
 
 @pytest.mark.parametrize("count", [2, 3, 7, 200, 5000])

@@ -116,6 +116,7 @@ def _consistency(recording: "Recording") -> dict[str, Any] | None:
             {"reason": finding.reason.value, "verdict": finding.grade.value, "sentence": str(finding)}
             for finding in verdict.findings
         ],
+        "unchecked": list(verdict.unchecked),
     }
 
 
@@ -126,7 +127,8 @@ def _consistency_lines(found: dict[str, Any]) -> list[str]:
         *([f"brightness correlates by {found['likeness']:.2f}"] if found["likeness"] is not None else []),
     ]
     lines = [f"consistency: {found['verdict']} ({', '.join(numbers)})"]
-    return lines + [f"  {one['verdict']} ({one['reason']}): {one['sentence']}" for one in found["findings"]]
+    lines += [f"  {one['verdict']} ({one['reason']}): {one['sentence']}" for one in found["findings"]]
+    return lines + [f"  {sentence}" for sentence in found["unchecked"]]
 
 
 def repair(verb: "Info") -> dict[str, Any]:

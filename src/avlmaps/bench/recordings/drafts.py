@@ -121,7 +121,6 @@ def write_picture(path: Path, picture: Picture) -> None:
 
 
 def write_lines(path: Path, lines: Sequence[str]) -> None:
-    """Write lines of text."""
     """Write a file of text."""
     write_bytes_atomically(path, ("\n".join(lines) + "\n").encode())
 
@@ -140,6 +139,8 @@ class RoomWalk:
         frames: how many.
         rate_hz: frames a second.
         turn_rad_s: how fast the camera turns.
+        round_rad_s: how fast it goes round the middle of the room; 0: it stands.
+        even: whether it turns evenly, and looks as far down all the time.
         people: how many people walk about.
         moved_chair: whether a chair stands elsewhere in the second half.
         noise: of depth, in shares of the square of the distance in metres: a Kinect has 0.0019 or so.
@@ -153,6 +154,8 @@ class RoomWalk:
     frames: int = 40
     rate_hz: float = 5.0
     turn_rad_s: float = 0.7
+    round_rad_s: float = 0.25
+    even: bool = False
     people: int = 0
     moved_chair: bool = False
     noise: float = 0.0
@@ -180,10 +183,10 @@ class RoomWalk:
     def _path(self, stamps_s: Float[np.ndarray, " n"], rng: np.random.Generator) -> Float[np.ndarray, "n 4 4"]:
         """Return poses on an ellipse in the middle of the room; the camera looks about, and a little down."""
         start, nod, sway = rng.uniform(0.0, 2.0 * np.pi, 3)
-        round_rad = start + 0.25 * stamps_s
-        swing = 0.35 * np.sin(rng.uniform(0.7, 1.6) * stamps_s + sway)
+        round_rad = start + self.round_rad_s * stamps_s
+        swing = (not self.even) * 0.35 * np.sin(rng.uniform(0.7, 1.6) * stamps_s + sway)
         heading = rng.uniform(0.0, 2.0 * np.pi) + self.turn_rad_s * stamps_s + swing
-        down = 0.25 + 0.12 * np.sin(0.9 * stamps_s + nod)
+        down = 0.25 + (not self.even) * 0.12 * np.sin(0.9 * stamps_s + nod)
         forward = np.stack([np.cos(heading) * np.cos(down), np.sin(heading) * np.cos(down), -np.sin(down)], axis=1)
         right = np.stack([np.sin(heading), -np.cos(heading), np.zeros_like(heading)], axis=1)
         poses = np.tile(np.eye(4), (len(stamps_s), 1, 1))

@@ -26,6 +26,16 @@ WRONG_CAMERA_M = 0.25
 MOST_WRONG = 0.1
 MOST_COLOUR_ERROR = 12.0
 _FRAMES, _STEP = 12, 5
+# What `info` says that cannot be checked, where a mistake of a group would not show.
+_UNCHECKED = {
+    "poses": r"Poses|clock of the poses|Jumps of the poses",
+    "scale": r"Poses|scale of positions",
+    "depth": r"Poses|measured along|colour lies on depth",
+    "colour": r"Poses|colour lies on depth",
+    "pictures": r"Poses",
+    "intrinsics": r"Poses|focal length|colour lies on depth",
+    "clock": r"Poses|clock of the poses",
+}
 _CLOUD_STEP = 3
 
 
@@ -37,6 +47,7 @@ class Outcome(StrEnum):
     NOTICED = "notice without the cause"
     REFUSED = "refused, cause named"
     REFUSED_PLAIN = "refused"
+    UNCHECKED = "unchecked, info says so"  # the map would be wrong, and `info` names what cannot be checked
     SILENT = "silent wrong"
 
 
@@ -88,23 +99,26 @@ class Judge:
         if not self.form.holds(changed):
             return None
         with TemporaryDirectory() as folder:
-            outcome, said = self._outcome(self.form.write(changed, Path(folder) / "walk"), situation.cause)
+            outcome, said = self._outcome(self.form.write(changed, Path(folder) / "walk"), situation)
         return Case(self.right.name, situation.name, situation.group, outcome, said, self.form.name)
 
-    def _outcome(self, path: Path, cause: str) -> tuple[Outcome, tuple[str, ...]]:
+    def _outcome(self, path: Path, situation: Situation) -> tuple[Outcome, tuple[str, ...]]:
         try:
             opened = open_recording(path)
             verdict = check_recording(opened)
         except AvlmapsError as error:
-            return (Outcome.REFUSED if re.search(cause, str(error)) else Outcome.REFUSED_PLAIN), (str(error),)
+            return (Outcome.REFUSED if re.search(situation.cause, str(error)) else Outcome.REFUSED_PLAIN), (str(error),)
         notices = tuple(notice for notice in opened.notices if notice not in self.usual)
         said = (*verdict.sentences(), *notices)
-        named = re.search(cause, " ".join(said)) is not None
+        named = re.search(situation.cause, " ".join(said)) is not None
         if verdict.refused(()) is not None:
             return (Outcome.REFUSED if named else Outcome.REFUSED_PLAIN), said
         if said:
             return (Outcome.NAMED if named else Outcome.NOTICED), said
-        return (Outcome.RIGHT if self.is_right(opened) else Outcome.SILENT), ()
+        if self.is_right(opened):
+            return Outcome.RIGHT, ()
+        told = re.search(_UNCHECKED[situation.group], " ".join(verdict.unchecked)) is not None
+        return (Outcome.UNCHECKED, verdict.unchecked) if told else (Outcome.SILENT, ())
 
     def is_right(self, opened: Recording) -> bool:
         """Return whether surfaces, cameras and colours are the right recording's, up to a motion of the world."""

@@ -71,6 +71,8 @@ def _of_poses() -> Iterator[Situation]:
         "noise of 5 cm and 3 degrees", group, lambda d, o, g: replace(d, poses=_noisy(d.poses, g)), geometry
     )
     yield Situation("pictures of 10 frames exchanged", group, _exchanged, geometry)
+    yield Situation("two neighbours exchanged", group, _neighbours(1, 0), "exchanged")
+    yield Situation("three neighbours exchanged", group, _neighbours(1, 2, 0), "exchanged")
 
 
 def _transposed(written: np.ndarray) -> np.ndarray:
@@ -98,6 +100,17 @@ def _exchanged(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
     chosen = rng.choice(len(draft), 10, replace=False)
     order[chosen] = np.roll(order[chosen], 1)
     return _reordered(draft, order, colour=True, depth=True)
+
+
+def _neighbours(*order: int, colour: bool = True, depth: bool = True) -> Change:
+    """Put neighbours near the middle into another order."""
+
+    def changed(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
+        rows, first = np.arange(len(draft)), int(rng.integers(len(draft) // 3, 2 * len(draft) // 3))
+        rows[first : first + len(order)] = first + np.array(order)
+        return _reordered(draft, rows, colour=colour, depth=depth)
+
+    return changed
 
 
 def _reordered(draft: Draft, order: np.ndarray, *, colour: bool, depth: bool) -> Draft:
@@ -165,6 +178,13 @@ def _of_depth() -> Iterator[Situation]:
     yield Situation(
         "depth shifted by a sixteenth", group, _on_depth(lambda d: np.roll(d, d.shape[1] // 16, axis=1)), depth
     )
+    yield Situation(
+        "depth shifted downwards by a sixteenth",
+        group,
+        _on_depth(lambda d: np.roll(d, d.shape[1] // 16, axis=0)),
+        depth,
+    )
+    yield Situation("depth of two neighbours exchanged", group, _neighbours(1, 0, colour=False), "exchanged|depth")
     yield Situation("no depth in half of the frames", group, _half_empty, "no depth")
     yield Situation("depth froze", group, _frozen, depth)
 
@@ -215,6 +235,17 @@ def _of_colour() -> Iterator[Situation]:
         colour,
     )
     yield Situation("colour of one shade", group, _on_colour(lambda c: np.full_like(c, 128)), "of one colour")
+    yield Situation("half of the pictures BGR", group, _bgr(lambda i, n, g: g.random() < 0.5), "BGR")
+    yield Situation("every fifth picture BGR", group, _bgr(lambda i, n, g: i % 5 == 0), "BGR")
+    yield Situation("the second half BGR", group, _bgr(lambda i, n, g: i > n // 2), "BGR")
+    yield Situation(
+        "colour shifted by a sixteenth", group, _on_colour(lambda c: np.roll(c, c.shape[1] // 16, axis=1)), "colour"
+    )
+    yield Situation("colour of two neighbours exchanged", group, _neighbours(1, 0, depth=False), "exchanged|colour")
+    yield Situation(
+        "colour 3 frames late", group,
+        lambda d, o, g: _reordered(d, np.minimum(np.arange(len(d)) + 3, len(d) - 1), colour=True, depth=False), colour,
+    )  # fmt: skip
     yield Situation("colour black", group, _on_colour(lambda c: np.zeros_like(c)), "black")
     yield Situation("colour dark", group, _on_colour(lambda c: (c * 0.03).astype(np.uint8)), "dark|one colour|black")
     yield Situation(
@@ -223,6 +254,16 @@ def _of_colour() -> Iterator[Situation]:
         lambda d, o, g: _reordered(d, np.minimum(np.arange(len(d)) + 10, len(d) - 1), colour=True, depth=False),
         colour,
     )
+
+
+def _bgr(chosen: Callable[[int, int, np.random.Generator], bool]) -> Change:
+    """Exchange red and blue in some of the pictures."""
+
+    def changed(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
+        count = len(draft)
+        return replace(draft, rgb=tuple(c[..., ::-1] if chosen(i, count, rng) else c for i, c in enumerate(draft.rgb)))
+
+    return changed
 
 
 def _of_pictures() -> Iterator[Situation]:
@@ -285,6 +326,18 @@ def _of_intrinsics() -> Iterator[Situation]:
     yield Situation(
         "focal length of depth x0.5", group, _on_cameras(lambda c: _camera(c, 0.5), colour=False), "do not agree|focal"
     )
+    yield Situation("colour camera 0.3 m beside", group, _mounted(0.3, 0.0, 0.0), "rgb_from_depth")
+    yield Situation("colour camera 0.15 m above", group, _mounted(0.0, 0.15, 0.0), "rgb_from_depth")
+    yield Situation(
+        "principal point off by a sixteenth", group, _on_cameras(lambda c: _camera(c, 1.0, 1.125)), "princip"
+    )
+
+
+def _mounted(*by_m: float) -> Change:
+    """Say that the colour camera is elsewhere."""
+    moved = np.eye(4)
+    moved[:3, 3] = by_m
+    return lambda d, o, g: replace(d, rig=Rig(d.rig.rgb, d.rig.depth, d.rig.rgb_from_depth @ moved))
 
 
 def _camera(camera: Pinhole, focal: float, x: float = 1.0, y: float = 1.0) -> Pinhole:

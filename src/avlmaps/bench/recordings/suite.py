@@ -1,19 +1,25 @@
 """The suite `recordings`: situations on three sources with counts of outcomes, and right recordings without a word."""
 
+import os
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from avlmaps.bench.harness.intervals import in_percent, wilson
-from avlmaps.bench.output import Table
+from avlmaps.bench.output import Table, as_csv
 from avlmaps.bench.recordings.drafts import Draft, RoomWalk
 from avlmaps.bench.recordings.formats import FOLDER, FORMATS, TUM_CAMERA, Format
 from avlmaps.bench.recordings.outcomes import Case, Judge, Outcome, right_case
 from avlmaps.bench.recordings.situations import situations
+from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.progress import progress
+from avlmaps.maps.build import build_map
+from avlmaps.perception.cache.feature_store import CacheSettings
+from avlmaps.recordings.consistency.check import check_recording
 from avlmaps.recordings.open import open_recording
 from avlmaps.sim.recorder import RecordSettings, record_scene
 from avlmaps.sim.scenes import open_scene
@@ -47,6 +53,22 @@ ROOMS = (
 )
 
 
+# Changed: a usual walk, and three on which some mistakes cannot show.
+WALKS = (
+    RoomWalk("room", seed=11),
+    RoomWalk("room, even turn in one place", seed=15, round_rad_s=0.0, even=True),
+    RoomWalk(
+        "room, hardly any motion and noise of a Kinect",
+        seed=16,
+        round_rad_s=0.02,
+        turn_rad_s=0.05,
+        noise=0.0019,
+        even=True,
+    ),
+    RoomWalk("room, keyframes without overlap", seed=17, frames=4, rate_hz=0.2, turn_rad_s=0.3),
+)
+
+
 def run(
     scenes: Sequence[Path], out: Path, seed: int = 0, homes: Sequence[tuple[str, SensorName, bool]] = HOMES
 ) -> dict[str, Table]:
@@ -59,7 +81,8 @@ def run(
         homes: scenes, their sensors, and whether their poses drift.
     """
     rendered = [_rendered(out / "homes", *home) for home in homes]
-    sources = [(RoomWalk("room", seed=11).draft(), RoomWalk("room, other", seed=12).draft())]
+    other = RoomWalk("room, other", seed=12).draft()
+    sources = [(walk.draft(), other) for walk in WALKS]
     if len(rendered) > 1:
         sources.append((_dense(rendered[0], "home"), _dense(rendered[1], "other home")))
     for path in scenes[:1]:
@@ -70,15 +93,21 @@ def run(
     camera = TUM_CAMERA.resized(*SIZE)
     room, other = RoomWalk("room", seed=13).draft(camera), RoomWalk("room, other", seed=14).draft(camera)
     in_formats = [case for form in FORMATS for case in _cases(room, other, form, seed)]
+    every = _listed([*cases, *in_formats])
+    write_bytes_atomically(out / "recordings-every-mistake.csv", as_csv(every).encode())
     rights = [*[room.draft() for room in ROOMS], *[_whole(path) for path in rendered]]
     rights += [window for path in scenes for window in _windows(path)]
     return {
         "mistakes by source": _counts(cases, [right.name for right, _ in sources]),
         "mistakes by kind": _counts(cases, list(dict.fromkeys(case.group for case in cases)), by="group"),
         "mistakes by format": _counts(in_formats, [form.name for form in FORMATS], by="format"),
+        "without a word": _listed([case for case in (*cases, *in_formats) if case.outcome in _WITHOUT_A_WORD]),
         "right recordings": _rights(rights),
-        "every mistake": _listed([*cases, *in_formats]),
+        "cost": _cost(rendered, out),
     }
+
+
+_WITHOUT_A_WORD = (Outcome.RIGHT, Outcome.UNCHECKED, Outcome.SILENT)
 
 
 def _cases(right: Draft, other: Draft, form: Format, seed: int) -> list[Case]:
@@ -141,6 +170,34 @@ def _rights(drafts: Sequence[Draft]) -> Table:
         rows.append([draft.name, str(len(draft)), *numbers, case.outcome.value, " ".join(case.said)])
     columns = ["recording", "frames", "agreeing", "seen through", "likeness", "outcome", "said"]
     return {"columns": columns, "rows": rows}
+
+
+def _cost(paths: Sequence[Path], out: Path) -> Table:
+    """Return how much processor time the check takes of a build with the embedded encoders."""
+    columns = ["recording", "frames", "check, processor s", "whole build, processor s", "share %"]
+    return {"columns": columns, "rows": [_cost_of(path, out) for path in paths[:1]]}
+
+
+def _cost_of(path: Path, out: Path) -> list[str | int]:
+    recording, cache = open_recording(path), CacheSettings(place="off")
+    check_s = _processor_s(lambda: check_recording(recording))
+    with TemporaryDirectory(dir=out) as folder:
+        place = Path(folder) / "home.avlmap"
+        build_s = _processor_s(lambda: build_map(recording, place, cache=cache, progress=False))
+    share = f"{100.0 * check_s / build_s:.1f}"
+    return [path.name, len(recording), f"{check_s:.2f}", f"{build_s:.1f}", share]
+
+
+def _processor_s(work: Callable[[], object]) -> float:
+    """Return the processor time of this process and its children for some work."""
+
+    def spent() -> float:
+        times = os.times()
+        return times.user + times.system + times.children_user + times.children_system
+
+    begin = spent()
+    work()
+    return spent() - begin
 
 
 def _listed(cases: Sequence[Case]) -> Table:

@@ -53,6 +53,10 @@ def _looks(suspect: Suspect, rig: Rig, median_m: float) -> list[str]:
         said.append("the numbers of columns and rows in the intrinsics look exchanged")
     if suspect.focal is not None:
         said.append(f"the focal length looks like {suspect.focal:.2f} of what is given")
+    if any(suspect.off_centre):
+        parts = zip(suspect.off_centre, (rig.rgb.width, rig.rgb.height), "xy", strict=True)
+        by = " and ".join(f"{share * size:+.0f} pixels in {axis}" for share, size, axis in parts if share)
+        said.append(f"the principal point looks {by} off")
     if suspect.along_ray:
         said.append("the depth looks like the distance along the ray, not along the camera's axis")
     return said + _turned(suspect.turn_colour, suspect.turn_depth)
@@ -102,7 +106,7 @@ def _options(suspect: Suspect, rig: Rig, stored_unit_m: float, median_m: float) 
     if suspect.centred and rig.registered:
         size = (round(2 * rig.rgb.cx), round(2 * rig.rgb.cy))
         cameras = (GivenCamera(rig.rgb.fx, rig.rgb.fy, rig.rgb.cx, rig.rgb.cy, size),)
-    elif suspect.centred or suspect.swapped or suspect.focal is not None:
+    elif suspect.centred or suspect.swapped or suspect.focal is not None or any(suspect.off_centre):
         other = suspected_rig(rig, suspect) or rig
         both = (other.rgb,) if rig.registered else (other.rgb, other.depth)
         cameras = tuple(GivenCamera(camera.fx, camera.fy, camera.cx, camera.cy) for camera in both)

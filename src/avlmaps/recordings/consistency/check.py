@@ -10,50 +10,32 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from avlmaps.core.arrays import Bool
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.timeline import Trajectory
-from avlmaps.recordings.consistency.agreement import (
-    APART_SAME_M,
-    FEWEST_POINTS,
-    LEAST_CONTRAST,
-    Agreement,
-    compare,
-)
+from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS, Agreement, compare
+from avlmaps.recordings.consistency.blind_spots import blind_spots
 from avlmaps.recordings.consistency.causes import cause_of
-from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_pairs, draw_sample
+from avlmaps.recordings.consistency.edges import Edges, Shift, find_edges, shift_of
+from avlmaps.recordings.consistency.jumps import find_exchanged, find_jump
+from avlmaps.recordings.consistency.limits import (
+    BAD_LIKENESS,
+    BAD_PAIR,
+    IMPOSSIBLE_AGREEING,
+    IMPOSSIBLE_LIKENESS,
+    LEAST_AGREEING,
+    apart_agrees,
+    bad_pairs,
+    can_be_judged,
+    geometry_agrees,
+    opposite_pairs,
+    unlike,
+)
+from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample
 from avlmaps.recordings.consistency.single_frames import of_colour, of_depth, of_intrinsics, of_motion
 from avlmaps.recordings.consistency.suspects import PoseAt, Trial, Trials, find_cause, find_closer
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason, Verdict
 from avlmaps.recordings.corrections import NONE, CorrectedRecording, uncorrected
 from avlmaps.recordings.types import Recording
-
-# Share of points on the surface that the other frame sees.
-LEAST_AGREEING = 0.94
-IMPOSSIBLE_AGREEING = 0.70
-# Where people walk by, fewer points agree, but those that do agree well: by a share of their depth.
-LEAST_WITH_PEOPLE, MOST_OFF = 0.80, 0.01
-# Of pairs that look one way from apart, which have the drift of a walk as well.
-LEAST_AGREEING_APART = 0.75
-# Share of pairs that do not agree at all, although the others do: jumps, exchanged frames.
-BAD_PAIR = 0.6
-BAD_OFF = 0.03
-MOST_BAD_PAIRS = 0.08
-# Pairs that are looked at more closely, since the poses may jump between them.
-MOST_JUMPS = 3
-# A step of the poses this many times the usual one, and beyond this, is a jump if fewer points agree across it.
-LEAST_ACROSS_STEP = 0.9
-ODD_STEP, ODD_STEP_M, ODD_STEP_RAD = 4.0, 0.15, np.radians(8.0)
-# Of fewer points than are judged otherwise, hardly any may agree.
-HARDLY_ANY = 0.2
-# Correlation of the brightness of the same points, of all pairs and of a pair that is not one.
-LEAST_LIKENESS = 0.75
-BAD_LIKENESS = 0.4
-IMPOSSIBLE_LIKENESS = 0.3
-# Nothing is said of a recording with fewer pairs or points.
-FEWEST_PAIRS = 2
-FEWEST_IN_ALL = 150
 
 
 def check_recording(recording: Recording) -> Verdict:
@@ -68,16 +50,17 @@ def check_recording(recording: Recording) -> Verdict:
     surfaces = Surfaces.of(sample.depth_m)
     after = compare(sample.only(sample.follows), surfaces, sample.world_from_camera)
     apart = compare(sample.only(~sample.follows), surfaces, sample.world_from_camera, floor_m=APART_SAME_M)
+    found = _Found(after, apart, find_edges(sample), compare(sample.of_tint(), surfaces, sample.world_from_camera))
     known = sample.depth_m[sample.depth_m > 0.0]
     median_m = float(np.median(known)) if known.size else float("nan")
     findings = [
         *of_intrinsics(sample, recording),
         *of_depth(sample, surfaces, median_m),
         *of_colour(sample, surfaces),
-        *of_motion(recording, after, _can_be_judged(after)),
-        *_of_agreement(recording, sample, _Found(after, apart), median_m),
+        *of_motion(recording, after, can_be_judged(after)),
+        *_of_agreement(recording, sample, found, median_m),
     ]
-    checked = _can_be_judged(after)
+    checked = can_be_judged(after)
     return Verdict(
         frames=len(sample),
         pairs=after.pairs,
@@ -87,56 +70,28 @@ def check_recording(recording: Recording) -> Verdict:
         median_depth_m=median_m,
         findings=tuple(findings),
         unread=sample.unread,
+        unchecked=blind_spots(recording, after, _trials(recording, sample), found.edges) if not findings else (),
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
-    """How pairs agree that follow one another, and pairs from apart."""
+    """How pairs agree that follow one another, and from apart; colour at edges of depth; red less blue of pairs."""
 
     after: Agreement
     apart: Agreement
-
-
-def _can_be_judged(found: Agreement) -> bool:
-    return found.pairs >= FEWEST_PAIRS and int(found.points.sum()) >= FEWEST_IN_ALL
-
-
-def _geometry_agrees(found: Agreement) -> bool:
-    """Return whether nearly all points agree, or most of them do so well that the others are what moved meanwhile."""
-    if _bad_pairs(found) > MOST_BAD_PAIRS * found.pairs:
-        return False
-    known = found.off[np.isfinite(found.off)]
-    moved = found.same_share >= LEAST_WITH_PEOPLE and float(np.median(known)) <= MOST_OFF
-    return found.same_share >= LEAST_AGREEING or moved
-
-
-def _apart_agrees(found: Agreement) -> bool:
-    return not _can_be_judged(found) or found.same_share >= LEAST_AGREEING_APART
-
-
-def _bad_pairs(found: Agreement) -> int:
-    """Return how many pairs hardly agree, not for somebody who stands before a part of the picture."""
-    used = found.points >= FEWEST_POINTS
-    return int(((found.same < BAD_PAIR * found.points) & (found.off > BAD_OFF))[used].sum())
-
-
-def _unlike(found: Agreement) -> bool:
-    """Return whether the same points do not look alike, in all or in several pairs."""
-    if not np.isfinite(found.likeness) or found.textured < FEWEST_IN_ALL or found.contrast < LEAST_CONTRAST:
-        return False
-    bad = int((found.alike < BAD_LIKENESS).sum())
-    return found.likeness < LEAST_LIKENESS or (bad >= 2 and bad > MOST_BAD_PAIRS * np.isfinite(found.alike).sum())
+    edges: Edges
+    tint: Agreement
 
 
 def _most_unlike(after: Agreement, apart: Agreement) -> Agreement | None:
     """Return the pairs that do not look alike: those that follow one another if they do not, else those from apart."""
-    return next((one for one in (after, apart) if _can_be_judged(one) and _unlike(one)), None)
+    return next((one for one in (after, apart) if can_be_judged(one) and unlike(one)), None)
 
 
 def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m: float) -> Iterator[Finding]:
     after, apart = found.after, found.apart
-    if _can_be_judged(after) and not _geometry_agrees(after):
+    if can_be_judged(after) and not geometry_agrees(after):
         grade = Grade.IMPOSSIBLE if after.same_share < IMPOSSIBLE_AGREEING else Grade.SUSPICIOUS
         sentence = (
             f"Frames that should see the same place do not agree: of the points of one frame {after.same_share:.0%} "
@@ -145,7 +100,7 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
         )
         cause = _cause(recording, sample, found, median_m)
         yield Finding(Reason.GEOMETRY, grade, sentence, cause or _other_cause(recording, sample, after))
-    elif not _apart_agrees(apart):
+    elif not apart_agrees(apart):
         sentence = (
             f"Frames that look at the same place from apart do not agree: {apart.same_share:.0%} of their points lie "
             f"on one surface, and {apart.through_share:.1%} are seen through ({apart.pairs} pairs of frames)."
@@ -153,77 +108,68 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
         other = "The poses drift, depth and positions have different scales, or much was moved; check them."
         cause = _cause(recording, sample, found, median_m)
         yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, cause or other)
-    elif _can_be_judged(after) and (closer := find_closer(_trials(recording, sample))) is not None:
-        then = _off(_Found(closer.agreement, closer.apart))
+    elif can_be_judged(after) and (closer := find_closer(_trials(recording, sample))) is not None:
+        then = _off(closer.agreement, closer.apart)
         sentence = (
-            f"The depths of the same points in two frames differ by {_off(found):.1%}, and by {then:.1%} if the "
+            f"The depths of the same points in two frames differ by {_off(after, apart):.1%}, and by {then:.1%} if the "
             "recording is read in another way."
         )
         yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, _words(recording, closer, median_m, ""))
-    elif jump := _jump(recording, sample, after):
-        yield jump
-    elif unlike := _most_unlike(after, apart):
+    elif misplaced := find_exchanged(recording, sample, after) or find_jump(recording, sample, after):
+        yield misplaced
+    elif differing := _most_unlike(after, apart):
         grade = Grade.IMPOSSIBLE if after.likeness < IMPOSSIBLE_LIKENESS else Grade.SUSPICIOUS
         sentence = (
             "The colour pictures do not show what the depth pictures show: the brightness of the same points in two "
-            f"frames{' from apart' if unlike is apart else ''} correlates by {unlike.likeness:.2f} where right "
-            f"recordings have {'0.85' if unlike is apart else '0.9'} and more, and hardly at all in "
-            f"{int((unlike.alike < BAD_LIKENESS).sum())} of {int(np.isfinite(unlike.alike).sum())} pairs."
+            f"frames{' from apart' if differing is apart else ''} correlates by {differing.likeness:.2f} where right "
+            f"recordings have {'0.85' if differing is apart else '0.9'} and more, and hardly at all in "
+            f"{int((differing.alike < BAD_LIKENESS).sum())} of {int(np.isfinite(differing.alike).sum())} pairs."
         )
         other = "Check that colour and depth of a frame belong together (order of names, clock, intrinsics of colour)."
-        yield Finding(Reason.COLOUR, grade, sentence, _cause(recording, sample, found, median_m) or other)
-
-
-def _off(found: _Found) -> float:
-    return float(np.nanmean(np.concatenate([found.after.off, found.apart.off])))
-
-
-def _jump(recording: Recording, sample: Sample, after: Agreement) -> Finding | None:
-    """Return a finding where a pair does not agree, no pair across the same place does, and those beside do."""
-    pairs = sample.index[sample.only(sample.follows).pairs]
-    odd = _odd_steps(recording)
-    share = np.where(after.points >= 2 * FEWEST_POINTS, after.same / np.maximum(after.points, 1), 1.0)
-    most = np.where([odd[a:b].any() for a, b in pairs], LEAST_ACROSS_STEP, BAD_PAIR)
-    rows = np.flatnonzero(share < most)
-    for row in rows[np.argsort(share[rows] - most[rows], kind="stable")][:MOST_JUMPS].tolist():
-        a, b = (int(number) for number in pairs[row])
-        at = a + int(np.argmax(odd[a:b])) if odd[a:b].any() else a
-        a, b = (at, at + 1) if odd[a:b].any() else (a, b)
-        if a < 1 or b > len(recording) - 2:
-            continue
-        across = np.array([(a - 1, b), (a, b), (a, b + 1), (a - 1, b + 1), (a - 1, a), (b, b + 1)])
-        near = draw_pairs(recording, across, np.arange(len(across)) < 4)
-        surfaces = Surfaces.of(near.depth_m)
-        over, beside = (
-            compare(near.only(kind), surfaces, near.world_from_camera) for kind in (near.follows, ~near.follows)
+        shift = shift_of(found.edges, sample)
+        where = "" if shift is None else " ".join(_shift_words(shift, recording))
+        yield Finding(Reason.COLOUR, grade, sentence, _cause(recording, sample, found, median_m) or where or other)
+    elif opposite := opposite_pairs(found.tint):
+        sentence = (
+            f"Red and blue of the same points are exchanged in {opposite} of "
+            f"{int(np.isfinite(found.tint.alike).sum())} pairs of frames: some colour pictures are RGB, others BGR."
         )
-        few = over.pairs >= FEWEST_PAIRS and over.same_share < HARDLY_ANY
-        seen = (_can_be_judged(over) or few) and _can_be_judged(beside)
-        if seen and over.same_share < most[row] and beside.same_share > max(LEAST_AGREEING, over.same_share + 0.1):
-            sentence = (
-                f"Frames {recording.name(a)} and {recording.name(b)} do not agree ({over.same_share:.0%} of the points "
-                f"on one surface), although the frames before and after do ({beside.same_share:.0%})."
-            )
-            remedy = "The poses jump there, or tracking began again: cut the recording there, or fix the poses."
-            return Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, remedy)
-    return None
+        yield Finding(Reason.COLOUR, Grade.SUSPICIOUS, sentence, "Write all pictures in one order of channels.")
+    elif shift := shift_of(found.edges, sample):
+        yield Finding(Reason.COLOUR, Grade.SUSPICIOUS, *_shift_words(shift, recording))
 
 
-def _odd_steps(recording: Recording) -> Bool[np.ndarray, " m"]:
-    """Return which steps of the poses are far longer, or turn far more, than the usual one."""
-    pose = recording.world_from_camera
-    if len(pose) < 2:
-        return np.zeros(0, bool)
-    moved_m = np.linalg.norm(np.diff(pose[:, :3, 3], axis=0), axis=1)
-    turned_rad = rotation_angle_rad(pose[:-1], pose[1:])
-    far = moved_m > max(ODD_STEP * float(np.median(moved_m)), ODD_STEP_M)
-    return far | (turned_rad > max(ODD_STEP * float(np.median(turned_rad)), ODD_STEP_RAD))
+def _shift_words(shift: Shift, recording: Recording) -> tuple[str, str]:
+    """Return what is wrong where edges of colour lie beside those of depth, and what to do."""
+    width = recording.rig.rgb.width
+    parts = ((shift.columns * width, "to the right", "to the left"), (shift.rows * width, "below", "above"))
+    where = " and ".join(f"{abs(px):.0f} pixels {more if px > 0.0 else less}" for px, more, less in parts if px)
+    sentence = (
+        f"The edges of colour do not lie on those of depth, but {where} (gradient of colour {shift.gradient:.2f} "
+        f"there, {shift.here:.2f} where depth has them, in standard deviations)."
+    )
+    if shift.metres is not None:
+        x_m, y_m = shift.metres
+        return sentence, (
+            f"The colour camera looks {np.hypot(x_m, y_m):.2g} m beside where rgb_from_depth has it (x {x_m:+.2f}, y "
+            f"{y_m:+.2f} m in its axes); correct rgb_from_depth, or register the depth to colour."
+        )
+    return sentence, (
+        "Colour and depth look shifted against each other, or taken at different moments; check the order and the "
+        "clock of the pictures, rgb_from_depth and the principal points."
+    )
+
+
+def _off(after: Agreement, apart: Agreement) -> float:
+    return float(np.nanmean(np.concatenate([after.off, apart.off])))
 
 
 def _other_cause(recording: Recording, sample: Sample, after: Agreement) -> str:
+    if (exchanged := find_exchanged(recording, sample, after)) is not None:
+        return str(exchanged)
     used = after.points >= FEWEST_POINTS
     share = np.where(used, after.same / np.maximum(after.points, 1), np.nan)
-    bad, others = _bad_pairs(after), share[share >= BAD_PAIR]
+    bad, others = bad_pairs(after), share[share >= BAD_PAIR]
     if 0 < bad <= 0.4 * after.pairs and len(others) and float(np.median(others)) > LEAST_AGREEING:
         pair = sample.only(sample.follows).pairs[int(np.nanargmin(share))]
         a, b = (recording.name(int(sample.index[i])) for i in pair)
@@ -252,15 +198,15 @@ def _words(recording: Recording, best: Trial, median_m: float, gain: str) -> str
 def _gain(found: _Found, best: Trial) -> str:
     """Return how much better it agrees, in parentheses."""
     for before, after, right in (
-        (found.after, best.agreement, _geometry_agrees(found.after)),
-        (found.apart, best.apart, _apart_agrees(found.apart)),
+        (found.after, best.agreement, geometry_agrees(found.after)),
+        (found.apart, best.apart, apart_agrees(found.apart)),
     ):
         if not right:
             return (
                 f"(seen through {before.through_share:.1%} -> {after.through_share:.1%}, "
                 f"agreeing {before.same_share:.0%} -> {after.same_share:.0%})"
             )
-    after = _unlike(found.after)
+    after = unlike(found.after)
     before, then = (found.after, best.agreement) if after else (found.apart, best.apart)
     return f"(correlation {before.likeness:.2f} -> {then.likeness:.2f})"
 
@@ -268,16 +214,16 @@ def _gain(found: _Found, best: Trial) -> str:
 def _explains(trial: Trial, found: _Found) -> bool:
     """Return whether a suspect makes the pairs agree, clearly better than they did."""
     after, apart = trial.agreement, trial.apart
-    if not _can_be_judged(after) or not _geometry_agrees(after) or not _apart_agrees(apart):
+    if not can_be_judged(after) or not geometry_agrees(after) or not apart_agrees(apart):
         return False
     if _most_unlike(after, apart) is not None:
         return False
     if trial.score < LEAST_AGREEING * 0.9:
         return False
-    if not _geometry_agrees(found.after):
+    if not geometry_agrees(found.after):
         return after.same_share > found.after.same_share + 0.5 * (1.0 - found.after.same_share)
-    if not _apart_agrees(found.apart):
-        return _can_be_judged(apart) and apart.same_share > 0.5 * (1.0 + found.apart.same_share)
+    if not apart_agrees(found.apart):
+        return can_be_judged(apart) and apart.same_share > 0.5 * (1.0 + found.apart.same_share)
     return True
 
 

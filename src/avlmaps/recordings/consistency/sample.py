@@ -41,6 +41,7 @@ class Sample:
         world_from_camera: (f, 4, 4) poses as they are read.
         depth_m: (f, h, w) z-depth, 0 where there is none.
         grey: (f, hc, wc) brightness, 0 to 255.
+        tint: (f, hc, wc) red less blue, -255 to 255.
         rig: the cameras at these sizes.
         pairs: (p, 2) rows of frames that should see the same place, the earlier first.
         follows: (p,) whether the frames of a pair follow one another; the others look at one place from apart.
@@ -52,6 +53,7 @@ class Sample:
     world_from_camera: Float[np.ndarray, "f 4 4"]
     depth_m: Float32[np.ndarray, "f h w"]
     grey: Float32[np.ndarray, "f hc wc"]
+    tint: Float32[np.ndarray, "f hc wc"]
     rig: Rig
     pairs: Int[np.ndarray, "p 2"]
     follows: Bool[np.ndarray, " p"]
@@ -63,6 +65,10 @@ class Sample:
     def only(self, chosen: Bool[np.ndarray, " p"] | Int[np.ndarray, " k"]) -> "Sample":
         """Return the same pictures with some of the pairs."""
         return replace(self, pairs=self.pairs[chosen], follows=self.follows[chosen])
+
+    def of_tint(self) -> "Sample":
+        """Return the same frames with red less blue for brightness."""
+        return replace(self, grey=self.tint)
 
 
 def draw_sample(recording: Recording) -> Sample:
@@ -90,6 +96,7 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
     read: list[int] = []
     depth: list[np.ndarray] = []
     grey: list[np.ndarray] = []
+    tint: list[np.ndarray] = []
     fault: RecordingError | None = None
     for number in index.tolist():
         try:
@@ -99,7 +106,9 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
             continue
         read.append(number)
         depth.append(_nearest(frame.depth_m, rig.depth))
-        grey.append(_brightness(frame.rgb, rig.rgb))
+        bright, warm = _colour(frame.rgb, rig.rgb)
+        grey.append(bright)
+        tint.append(warm)
     if not read:
         raise fault or RecordingError(f"{recording.path} has no frame; there is nothing to check.")
     kept = np.isin(pairs, read).all(axis=1)
@@ -109,6 +118,7 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
         world_from_camera=recording.world_from_camera[read],
         depth_m=np.stack(depth),
         grey=np.stack(grey),
+        tint=np.stack(tint),
         rig=rig,
         pairs=np.searchsorted(np.array(read), pairs[kept]),
         follows=follows[kept],
@@ -202,11 +212,13 @@ def _nearest(depth_m: Float32[np.ndarray, "h w"], camera: Pinhole) -> Float32[np
     return depth_m[row[:, None], column]
 
 
-def _brightness(rgb: np.ndarray, camera: Pinhole) -> Float32[np.ndarray, "hs ws"]:
+def _colour(rgb: np.ndarray, camera: Pinhole) -> tuple[Float32[np.ndarray, "hs ws"], Float32[np.ndarray, "hs ws"]]:
+    """Return the brightness of a picture, and its red less its blue."""
     import cv2
 
     small = cv2.resize(rgb, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
-    return cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)
+    colours = small.astype(np.float32)
+    return cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32), colours[..., 0] - colours[..., 2]
 
 
 @dataclass(frozen=True, slots=True)

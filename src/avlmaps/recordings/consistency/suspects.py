@@ -20,6 +20,7 @@ _FLOOR_SHARE, _APART_FLOOR_SHARE = SAME_M / 2.5, APART_SAME_M / 2.5
 UNITS = (0.5, 2.0, 0.25, 4.0, 0.2, 5.0, 0.1, 10.0, 0.01, 100.0, 0.001, 1000.0)
 _SCALES = (0.8, 1.25, 0.63, 1.6, 0.4, 2.5, *UNITS)
 _TWICE_SCALES = UNITS[:8]
+_OFF_CENTRE, _BESIDE_CENTRE = (-0.12, -0.06, 0.06, 0.12), (-0.03, 0.0, 0.03)
 _FOCAL = (0.5, 0.67, 0.8, 0.9, 1.12, 1.25, 1.5, 2.0)
 _DELAYS_S = tuple(sign * step / 20.0 for step in range(1, 21) for sign in (1.0, -1.0))
 _POSES: tuple[tuple[PoseKind, ...], ...] = (
@@ -82,6 +83,7 @@ class Suspect:
         given: what of it the options of the command line undo.
         scale: what the depth is multiplied by, beside.
         focal: what the focal lengths are multiplied by; None: nothing.
+        off_centre: by how much the principal point lies to the right and below, as shares of the picture.
         centred: whether the principal point is put into the middle, with the focal length in proportion.
         swapped: whether the numbers of columns and rows are exchanged.
         turn_colour: how colour pictures are turned.
@@ -92,6 +94,7 @@ class Suspect:
     given: Corrections = NONE
     scale: float = 1.0
     focal: float | None = None
+    off_centre: tuple[float, float] = (0.0, 0.0)
     centred: bool = False
     swapped: bool = False
     turn_colour: Turn | None = None
@@ -192,7 +195,7 @@ def _some(rows: np.ndarray) -> np.ndarray:
 
 def suspected_rig(rig: Rig, suspect: Suspect) -> Rig | None:
     """Return the cameras of a suspect, None where there are none."""
-    if suspect.focal is None and not suspect.centred and not suspect.swapped:
+    if suspect.focal is None and not suspect.centred and not suspect.swapped and not any(suspect.off_centre):
         return rig
 
     def other(camera: Pinhole) -> Pinhole:
@@ -203,6 +206,7 @@ def suspected_rig(rig: Rig, suspect: Suspect) -> Rig | None:
             fx, fy = fx * camera.width / (2.0 * cx), fy * camera.height / (2.0 * cy)
             cx, cy = camera.width / 2.0, camera.height / 2.0
         factor = suspect.focal or 1.0
+        cx, cy = cx - suspect.off_centre[0] * camera.width, cy - suspect.off_centre[1] * camera.height
         return Pinhole(fx * factor, fy * factor, cx, cy, camera.width, camera.height)
 
     try:
@@ -220,16 +224,22 @@ def find_closer(trials: Trials) -> Trial | None:
     as_it_is = trials.run(Suspect())
     if not _LEAST_OFF < as_it_is.off < float("inf"):
         return None
-    closer = [trial for trial in map(trials.run, (*_scales(), *_delays(), *_focal())) if _is_closer(trial, as_it_is)]
+    tried = map(trials.run, (*_scales(), *_delays(), *_focal(), *_centres()))
+    closer = [trial for trial in tried if _is_less_off(trial, as_it_is)]
     if not closer:
         return None
     best = _refined(trials, min(closer, key=lambda trial: trial.off))
-    return best if best.off < _LEAST_GAIN * as_it_is.off else None
+    return best if is_closer(best, as_it_is) else None
 
 
-def _is_closer(trial: Trial, as_it_is: Trial) -> bool:
+def is_closer(trial: Trial, than: Trial) -> bool:
+    """Return whether depths differ by less than half with one reading, so that the other is doubted."""
+    return _LEAST_OFF < than.off < float("inf") and trial.off < _LEAST_GAIN * than.off and _is_less_off(trial, than)
+
+
+def _is_less_off(trial: Trial, than: Trial) -> bool:
     """Return whether depths differ clearly less, in most of the pairs."""
-    before, after = as_it_is.offs, trial.offs
+    before, after = than.offs, trial.offs
     both = np.isfinite(before) & np.isfinite(after) if len(before) == len(after) else np.zeros(0, bool)
     if both.sum() < max(_FEWEST_PAIRS, 0.6 * np.isfinite(before).sum()):
         return False
@@ -320,12 +330,19 @@ def _focal() -> Iterator[Suspect]:
     yield from (Suspect(focal=factor) for factor in _FOCAL)
 
 
+def _centres() -> Iterator[Suspect]:
+    """Yield principal points beside the given one."""
+    for by in _OFF_CENTRE:
+        yield from (Suspect(off_centre=(by, 0.0)), Suspect(off_centre=(0.0, by)))
+
+
 def _with(a: Suspect, b: Suspect) -> Suspect:
     """Return both mistakes at once, those of the second where both name one."""
     return Suspect(
         given=b.given.over(a.given),
         scale=a.scale if b.scale == 1.0 else b.scale,
         focal=b.focal or a.focal,
+        off_centre=b.off_centre if any(b.off_centre) else a.off_centre,
         centred=a.centred or b.centred,
         swapped=a.swapped or b.swapped,
         turn_colour=a.turn_colour,
@@ -345,6 +362,9 @@ def _refined(trials: Trials, best: Trial) -> Trial:
         tried = [replace(suspect, scale=float(scale)) for scale in (*_SCALES, *fine.tolist())]
     elif suspect.focal is not None:
         tried = [replace(suspect, focal=float(suspect.focal * factor)) for factor in np.geomspace(0.88, 1.14, 9)]
+    elif any(suspect.off_centre):
+        at_x, at_y = suspect.off_centre
+        tried = [replace(suspect, off_centre=(at_x + x, at_y + y)) for x, y in product(_BESIDE_CENTRE, repeat=2)]
     found = [best, *(trial for trial in map(trials.run, tried) if trial.score >= best.score - _CLEARLY)]
     least = min(found, key=lambda trial: trial.off)
     # a usual unit rather than one beside it that fits hardly better

@@ -3,11 +3,14 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 
 class Grade(StrEnum):
     """How a recording stands after the check."""
 
     FINE = "fine"
+    UNCHECKED = "unchecked"
     SUSPICIOUS = "suspicious"
     IMPOSSIBLE = "impossible"
 
@@ -56,6 +59,7 @@ class Verdict:
         median_depth_m: of the pixels with a depth; NaN without any.
         findings: what is wrong, the gravest first.
         unread: number of frames of the sample that could not be read.
+        unchecked: what could be wrong without showing, and why, one sentence each, where there are no findings.
     """
 
     frames: int
@@ -66,6 +70,7 @@ class Verdict:
     median_depth_m: float
     findings: tuple[Finding, ...] = ()
     unread: int = 0
+    unchecked: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Put the gravest finding first."""
@@ -75,9 +80,10 @@ class Verdict:
 
     @property
     def grade(self) -> Grade:
-        """The gravest grade of the findings."""
-        grades = {finding.grade for finding in self.findings}
-        return next((grade for grade in (Grade.IMPOSSIBLE, Grade.SUSPICIOUS) if grade in grades), Grade.FINE)
+        """The gravest grade of the findings; without any, whether frames could be compared at all."""
+        if self.findings:
+            return self.findings[0].grade
+        return Grade.UNCHECKED if np.isnan(self.agreeing) else Grade.FINE
 
     def sentences(self) -> tuple[str, ...]:
         """Return a sentence or two for each finding."""

@@ -1,0 +1,111 @@
+"""What could be wrong with a recording that agrees with itself, and would not show: tried by making it wrong."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from avlmaps.core.arrays import Bool
+from avlmaps.core.poses import rotation_angle_rad
+from avlmaps.recordings.consistency.agreement import Agreement
+from avlmaps.recordings.consistency.edges import Edges
+from avlmaps.recordings.consistency.limits import apart_agrees, can_be_judged, geometry_agrees
+from avlmaps.recordings.consistency.suspects import Suspect, Trial, Trials, is_closer
+from avlmaps.recordings.corrections import Corrections
+from avlmaps.recordings.types import Recording
+
+# Mistakes that are made to see whether they would show: twice, half, a moment.
+_FACTOR, _FOCAL, _DELAY_S = 2.0, 1.25, 0.3
+# A step that turns the camera by more than this share of its view leaves nothing that both frames see.
+_NO_OVERLAP = 0.9
+
+
+def blind_spots(recording: Recording, found: Agreement, trials: Trials, edges: Edges) -> tuple[str, ...]:
+    """Return what cannot be checked in a recording of which nothing is wrong, and why, one sentence each.
+
+    Args:
+        recording: that agrees with itself.
+        found: pairs of its frames that follow one another.
+        trials: of its sample.
+        edges: of its colour and depth.
+    """
+    if not can_be_judged(found):
+        return (_nothing(recording, found),)
+    return tuple(_spots(recording, trials, edges))
+
+
+def _nothing(recording: Recording, found: Agreement) -> str:
+    if len(recording) == 1:
+        why = "there is one frame"
+    elif found.outside > 0.0:
+        why = f"hardly any two frames see the same place ({found.outside:.0%} of the points of one lie "
+        why += "outside of the other's view)"
+    else:
+        why = "too few pixels have a depth on smooth surface"
+    return f"Poses, depth, colour, intrinsics and clocks cannot be checked here, because {why}."
+
+
+def _spots(recording: Recording, trials: Trials, edges: Edges) -> Iterator[str]:
+    as_it_is = trials.run(Suspect())
+
+    def shows(*suspects: Suspect) -> bool:
+        return all(_would_show(as_it_is, trials.run(suspect)) for suspect in suspects)
+
+    places = recording.world_from_camera[:, :3, 3]
+    across_m = float(np.linalg.norm(np.ptp(places, axis=0)))
+    if not shows(Suspect(scale=_FACTOR), Suspect(scale=1.0 / _FACTOR)):
+        yield (
+            "The scale of positions against depth cannot be checked here, because the camera moved within "
+            f"{across_m:.2g} m, and between frames that see the same place hardly: positions twice as far apart would "
+            "not show."
+        )
+    late, early = (Suspect(Corrections(pose_delay_s=s)) for s in (_DELAY_S, -_DELAY_S))
+    if not shows(late, early):
+        yield (
+            "The clock of the poses cannot be checked here, because the camera moves evenly or hardly at all: poses "
+            f"that are {_DELAY_S:g} s late would not show."
+        )
+    if not shows(Suspect(focal=_FOCAL), Suspect(focal=1.0 / _FOCAL)):
+        yield (
+            "The focal length cannot be checked here, because the camera hardly turns between frames that see the same "
+            f"place: one {_FOCAL:g} times as long would not show."
+        )
+    if not shows(Suspect(along_ray=True)):
+        yield (
+            "Whether depth is measured along the camera's axis cannot be checked here, because the camera hardly turns "
+            "or sees a narrow angle: distances along the ray would not show."
+        )
+    if not edges.would_show:
+        yield (
+            "Whether colour lies on depth cannot be checked here, because too few edges are seen in both: colour that "
+            "lies a sixteenth of the picture beside would not show."
+        )
+    yield from _of_gaps(recording)
+
+
+def _would_show(as_it_is: Trial, wrong: Trial) -> bool:
+    """Return whether a recording that is wrong in one way would not pass for right."""
+    if not can_be_judged(wrong.agreement):
+        return wrong.agreement.pairs > 0
+    if not geometry_agrees(wrong.agreement) or not apart_agrees(wrong.apart):
+        return True
+    return is_closer(as_it_is, wrong)
+
+
+def _of_gaps(recording: Recording) -> Iterator[str]:
+    """Yield a sentence where frames that follow one another see nothing in common, so that the poses may jump there."""
+    blind = _steps_without_overlap(recording)
+    if not blind.any():
+        return
+    at = int(np.argmax(blind))
+    yield (
+        f"Jumps of the poses cannot be checked at {int(blind.sum())} of {len(blind)} steps, because the camera turns "
+        f"there by more than it sees, as between {recording.name(at)} and {recording.name(at + 1)}."
+    )
+
+
+def _steps_without_overlap(recording: Recording) -> Bool[np.ndarray, " m"]:
+    pose, camera = recording.world_from_camera, recording.rig.depth
+    view_rad = 2.0 * np.arctan(0.5 * camera.width / camera.fx)
+    if len(pose) < 2:
+        return np.zeros(0, bool)
+    return rotation_angle_rad(pose[:-1], pose[1:]) > _NO_OVERLAP * view_rad

@@ -1,0 +1,134 @@
+"""What is wrong at one place of a recording that agrees elsewhere: a jump of the poses, frames that are exchanged."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from avlmaps.core.arrays import Bool
+from avlmaps.core.poses import rotation_angle_rad
+from avlmaps.recordings.consistency.agreement import FEWEST_POINTS, Agreement, compare
+from avlmaps.recordings.consistency.limits import (
+    BAD_PAIR,
+    FEWEST_PAIRS,
+    HARDLY_ANY,
+    LEAST_AGREEING,
+    LEAST_LIKENESS,
+    can_be_judged,
+)
+from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_pairs
+from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason
+from avlmaps.recordings.types import Recording
+
+# Pairs that are looked at more closely, since the poses may jump between them or their frames be exchanged.
+MOST_JUMPS = 3
+# A step of the poses this many times the usual one, and beyond this, is a jump if fewer points agree across it.
+LEAST_ACROSS_STEP = 0.9
+ODD_STEP, ODD_STEP_M, ODD_STEP_RAD = 4.0, 0.15, np.radians(8.0)
+# Pairs of frames that are exchanged agree less than this, and all of them agree in another order.
+_EXCHANGED, _PUT_RIGHT, _COLOUR_RIGHT = 0.85, 0.15, 0.3
+# This many neighbours may be in another order, among others that are not.
+_IN_A_ROW, _BESIDE = 3, 2
+
+
+def find_jump(recording: Recording, sample: Sample, after: Agreement) -> Finding | None:
+    """Return a finding where a pair does not agree, no pair across the same place does, and those beside do."""
+    pairs = sample.index[sample.only(sample.follows).pairs]
+    odd = _odd_steps(recording)
+    share = np.where(after.points >= 2 * FEWEST_POINTS, after.same / np.maximum(after.points, 1), 1.0)
+    most = np.where([odd[a:b].any() for a, b in pairs], LEAST_ACROSS_STEP, BAD_PAIR)
+    rows = np.flatnonzero(share < most)
+    for row in rows[np.argsort(share[rows] - most[rows], kind="stable")][:MOST_JUMPS].tolist():
+        a, b = (int(number) for number in pairs[row])
+        at = a + int(np.argmax(odd[a:b])) if odd[a:b].any() else a
+        a, b = (at, at + 1) if odd[a:b].any() else (a, b)
+        if a < 1 or b > len(recording) - 2:
+            continue
+        across = np.array([(a - 1, b), (a, b), (a, b + 1), (a - 1, b + 1), (a - 1, a), (b, b + 1)])
+        near = draw_pairs(recording, across, np.arange(len(across)) < 4)
+        surfaces = Surfaces.of(near.depth_m)
+        over, beside = (
+            compare(near.only(kind), surfaces, near.world_from_camera) for kind in (near.follows, ~near.follows)
+        )
+        few = over.pairs >= FEWEST_PAIRS and over.same_share < HARDLY_ANY
+        seen = (can_be_judged(over) or few) and can_be_judged(beside)
+        if seen and over.same_share < most[row] and beside.same_share > max(LEAST_AGREEING, over.same_share + 0.1):
+            sentence = (
+                f"Frames {recording.name(a)} and {recording.name(b)} do not agree ({over.same_share:.0%} of the points "
+                f"on one surface), although the frames before and after do ({beside.same_share:.0%})."
+            )
+            remedy = "The poses jump there, or tracking began again: cut the recording there, or fix the poses."
+            return Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, remedy)
+    return None
+
+
+def _odd_steps(recording: Recording) -> Bool[np.ndarray, " m"]:
+    """Return which steps of the poses are far longer, or turn far more, than the usual one."""
+    pose = recording.world_from_camera
+    if len(pose) < 2:
+        return np.zeros(0, bool)
+    moved_m = np.linalg.norm(np.diff(pose[:, :3, 3], axis=0), axis=1)
+    turned_rad = rotation_angle_rad(pose[:-1], pose[1:])
+    far = moved_m > max(ODD_STEP * float(np.median(moved_m)), ODD_STEP_M)
+    return far | (turned_rad > max(ODD_STEP * float(np.median(turned_rad)), ODD_STEP_RAD))
+
+
+def find_exchanged(recording: Recording, sample: Sample, after: Agreement) -> Finding | None:
+    """Return a finding where pictures of neighbours agree in another order, and do not as they are."""
+    enough = after.points >= 2 * FEWEST_POINTS
+    same = np.where(enough, after.same / np.maximum(after.points, 1), 1.0)
+    for reason, share, what in (
+        (Reason.GEOMETRY, same, "pictures"),
+        (Reason.COLOUR, np.where(enough & np.isfinite(after.alike), after.alike, 1.0), "colour pictures"),
+    ):
+        if order := _exchanged_near(recording, sample, share, colour=reason is Reason.COLOUR):
+            names = ", ".join(recording.name(number) for number in order)
+            sentence = f"The {what} of the frames {names} do not agree with those beside, and do in another order."
+            remedy = "They are exchanged: put them in the order in which they were taken."
+            return Finding(reason, Grade.SUSPICIOUS, sentence, remedy)
+    return None
+
+
+def _exchanged_near(
+    recording: Recording, sample: Sample, share: Float[np.ndarray, " p"], *, colour: bool
+) -> list[int] | None:
+    """Return frames that are exchanged, near the pairs that agree least."""
+    worst = np.argsort(share, kind="stable")[:MOST_JUMPS]
+    pairs = sample.index[sample.only(sample.follows).pairs[worst[share[worst] < _EXCHANGED]]]
+    for first in dict.fromkeys(max(0, frame - _IN_A_ROW + 1) for frame in pairs.ravel().tolist()):
+        low, high = max(0, first - _BESIDE), min(len(recording), first + 2 * _IN_A_ROW - 1 + _BESIDE)
+        near = np.array([(a, b) for a in range(low, high) for b in range(a + 1, min(high, a + 3))])
+        if order := _better_order(draw_pairs(recording, near, np.ones(len(near), bool)), colour=colour):
+            return order
+    return None
+
+
+def _better_order(near: Sample, *, colour: bool) -> list[int] | None:
+    """Return the frames that agree with their neighbours in another order only."""
+    surfaces = Surfaces.of(near.depth_m)
+    for rows in _orders(len(near)):
+        moved = np.flatnonzero(rows != np.arange(len(near)))
+        touched = near.only(np.isin(near.pairs, moved).sum(axis=1) == 1)
+        other = replace(touched, grey=touched.grey[rows]) if colour else touched
+        poses = near.world_from_camera if colour else near.world_from_camera[rows]
+        before, after = compare(touched, surfaces, near.world_from_camera), compare(other, surfaces, poses)
+        if not can_be_judged(before) or not can_be_judged(after) or before.pairs < 2 * len(moved) - 1:
+            continue
+        least = LEAST_LIKENESS if colour else LEAST_AGREEING
+        now, then = (one.likeness if colour else one.same_share for one in (before, after))
+        if now < _EXCHANGED and then > max(least, now + (_COLOUR_RIGHT if colour else _PUT_RIGHT)):
+            return near.index[moved].tolist()
+    return None
+
+
+def _orders(count: int) -> Iterator[Int[np.ndarray, " n"]]:
+    """Yield orders of some frames in which two or three neighbours are exchanged, the simplest first."""
+    for many in range(2, _IN_A_ROW + 1):
+        for first in range(1, count - many):
+            for order in permutations(range(many)):
+                if order[0] != 0 and order[-1] != many - 1:
+                    rows = np.arange(count)
+                    rows[first : first + many] = first + np.array(order)
+                    yield rows
