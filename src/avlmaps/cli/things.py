@@ -12,6 +12,8 @@ from avlmaps.core.frames import FrameName
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.schema import ContentsAnswer, RoomAnswer, SoundAnswer, ThingAnswer
 
@@ -60,7 +62,8 @@ def contents(verb: Things, opened: "AVLMap | None" = None) -> "ContentsAnswer":
     opened = AVLMap.open(verb.map) if opened is None else opened
     held = opened.contents(verb.least, verb.name or None, verb.structure)
     if verb.csv is not None:
-        say(f"wrote {write_table(verb.csv, held.things, held.sounds, opened.space, FrameName(verb.frame))}")
+        frame = FrameName(verb.frame)
+        say(f"wrote {write_table(verb.csv, held.things, held.sounds, opened.space, frame, opened.storeys)}")
     return answer_in(held.to_json(str(verb.map)), FrameName(verb.frame), opened.space.level_from_recording)
 
 
@@ -80,7 +83,8 @@ def thing_lines(things: "list[ThingAnswer]", frame: str = FrameName.RECORDING) -
         (t["name"], f"{t['confidence']:.2f}", place(t["position"]), " x ".join(f"{side:.2f}" for side in t["size"]))
         for t in things
     ]
-    return table_lines(("thing", "confidence", f"position ({frame} frame)", "size in m (level axes)"), rows)
+    head = ("thing", "confidence", f"position ({frame} frame)", "size in m (level axes)")
+    return _with_storeys(head, rows, [t.get("storey") for t in things])
 
 
 def sound_lines(sounds: "list[SoundAnswer]", frame: str = FrameName.RECORDING) -> list[str]:
@@ -92,7 +96,8 @@ def sound_lines(sounds: "list[SoundAnswer]", frame: str = FrameName.RECORDING) -
          f"{s['onset_s']:.1f} - {s['offset_s']:.1f} s", place(s["position"]))
         for s in sounds
     ]  # fmt: skip
-    return table_lines(("sound", "time", f"position of the robot ({frame} frame)"), rows)
+    head = ("sound", "time", f"position of the robot ({frame} frame)")
+    return _with_storeys(head, rows, [s.get("storey") for s in sounds])
 
 
 def room_lines(rooms: "list[RoomAnswer]", frame: str = FrameName.RECORDING) -> list[str]:
@@ -100,4 +105,13 @@ def room_lines(rooms: "list[RoomAnswer]", frame: str = FrameName.RECORDING) -> l
     if not rooms:
         return ["no rooms"]
     rows = [(r["name"], f"{r['confidence']:.2f}", place(r["position"]), str(r["views"])) for r in rooms]
-    return table_lines(("room", "confidence", f"position ({frame} frame)", "views"), rows)
+    head = ("room", "confidence", f"position ({frame} frame)", "views")
+    return _with_storeys(head, rows, [r.get("storey") for r in rooms])
+
+
+def _with_storeys(head: "Sequence[str]", rows: "Sequence[Sequence[str]]", storeys: "Sequence[int | None]") -> list[str]:
+    """Lay out a table; in a map of several storeys with that of each row, counted from 0, the lowest."""
+    if None in storeys:
+        return table_lines(head, rows)
+    numbered = [(*row, str(storey)) for row, storey in zip(rows, storeys, strict=True)]
+    return table_lines((*head, "storey"), numbered)

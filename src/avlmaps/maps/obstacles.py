@@ -97,8 +97,7 @@ class Obstacles:
         """
         if self.storeys is None or not np.isfinite(point_world).all():
             return ""
-        height_m = float(np.asarray(point_world, np.float64) @ self.level_from_world[2])
-        return self.storeys.refusal(self.storey, int(self.storeys.of(np.array([height_m]))[0]), climbs)
+        return self.storeys.refusal(self.storey, int(self.storeys.of_places(point_world)[0]), climbs)
 
     def cell_of(self, points_world: Float[np.ndarray, "*n 3"]) -> Int[np.ndarray, "*n 2"]:
         """Return the cell above or below which each point of the world lies; it may be outside of the grid."""

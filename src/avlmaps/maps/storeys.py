@@ -74,10 +74,17 @@ class Stairs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Storeys:
-    """The storeys of a map, lowest first, and the stairs between them."""
+    """The storeys of a map, and the stairs between them.
+
+    Attributes:
+        all: lowest first.
+        stairs: those that the map holds.
+        up: unit vector in the recording frame, along which heights are.
+    """
 
     all: tuple[Storey, ...]
     stairs: tuple[Stairs, ...] = ()
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
     def __len__(self) -> int:
         return len(self.all)
@@ -89,6 +96,10 @@ class Storeys:
         """Return the number of the storey of each height; what lies below all floors belongs to the lowest."""
         low = np.array([storey.low_m for storey in self.all[1:]])
         return np.searchsorted(low, np.asarray(level_z_m, np.float64), side="right").astype(np.int64)
+
+    def of_places(self, places: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
+        """Return the number of the storey of each place, recording frame, metres."""
+        return self.of(np.asarray(places, np.float64).reshape(-1, 3) @ np.array(self.up))
 
     def route(self, start: int, end: int) -> tuple[Stairs, ...] | None:
         """Return one stair for each change of storey, in the order they are climbed or descended; None without."""

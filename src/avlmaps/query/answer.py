@@ -3,12 +3,15 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from avlmaps.core.poses import FRAME
 from avlmaps.core.question import Part, Question
 from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
 
 if TYPE_CHECKING:
+    from avlmaps.maps.storeys import Storeys
     from avlmaps.query.schema import AlternativeAnswer, PartOutcome, QueryAnswer
 
 
@@ -85,6 +88,7 @@ class Answer:
         notes: one sentence each: how words were read, and why the map may be wrong.
         alternatives: what is sought by itself, where nothing is found of it near what the query names; the other
             questions that a sentence may mean, the likeliest first.
+        storeys: of a map of several.
         text: the answer in one sentence: where the first goal is, or which part failed and what the best guess is.
     """
 
@@ -98,6 +102,7 @@ class Answer:
     notes: tuple[str, ...] = ()
     alternatives: tuple[Alternative, ...] = ()
     text: str = ""
+    storeys: "Storeys | None" = field(default=None, repr=False, compare=False)
 
     def to_dict(self) -> "QueryAnswer":
         """Return the answer with the keys of the contract; positions are in the frame that ``frame`` names."""
@@ -111,6 +116,9 @@ class Answer:
             "frame": FRAME,
             "level_from_recording": None if self.heat is None else self.heat.space.level_from_recording.tolist(),
         }
+        if self.storeys is not None:
+            for goal in answer["goals"]:
+                goal["storey"] = int(self.storeys.of_places(np.array(goal["position"]))[0])
         if self.count is not None:
             answer["count"] = self.count
         if self.notes:

@@ -24,6 +24,7 @@ from avlmaps.query.wording import absent_text, found_text
 if TYPE_CHECKING:
     from avlmaps.core.camera import Pinhole
     from avlmaps.language.questions import AskedSentence
+    from avlmaps.maps.storeys import Storeys
     from avlmaps.query.queryable import Attachment, Queryable
 
 # For a count, up to this many instances are taken; those that are found count.
@@ -141,14 +142,43 @@ def ask(avlmap: "Queryable", asked: Asked, files: Files | None = None) -> Answer
         AskError: the sentence does not speak of a file that was given, or intrinsics come without a photo.
         QueryError: the sentence is not understood, or a part of it cannot be used.
     """
+    from avlmaps.language.storey_words import asks_how_many_storeys, said_storeys
+
     begin, files = time.perf_counter(), files or Files()
+    said = said_storeys(asked.sentence)
+    if asks_how_many_storeys(asked.sentence):
+        from avlmaps.query.on_storeys import how_many
+
+        answer = how_many(avlmap)
+    elif said:
+        from avlmaps.query.on_storeys import answer_on_storey
+
+        answer = answer_on_storey(
+            avlmap, said, asked.top, lambda rest, top: _ask(avlmap, replace(asked, sentence=rest, top=top), files)
+        )
+    else:
+        answer = _ask(avlmap, asked, files)
+    return on_storey(replace(answer, elapsed_ms=1e3 * (time.perf_counter() - begin)), avlmap.storeys)
+
+
+def on_storey(answer: Answer, storeys: "Storeys | None") -> Answer:
+    """Return an answer of a map of several storeys with the storey of each goal, and that of the first in its text."""
+    if storeys is None:
+        return answer
+    text = answer.text
+    if answer.found and answer.goals and answer.parts and answer.count is None:
+        name = storeys[int(storeys.of_places(np.array(answer.goals[0].position))[0])].name
+        text = text if name in text else f"{text} It is on the {name}."
+    return replace(answer, storeys=storeys, text=text)
+
+
+def _ask(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     question = thing_alone(asked, avlmap)
     if question is None and asked.parts and not asked.sentence.strip():
         question = Question.of(asked.parts, asked.primary)
     if question is not None:
         return answer_question(avlmap, question, asked.top, files)
-    answer = _answer_sentence(avlmap, asked, files)
-    return replace(answer, elapsed_ms=1e3 * (time.perf_counter() - begin))
+    return _answer_sentence(avlmap, asked, files)
 
 
 def answer_question(avlmap: "Queryable", question: Question, top: int = 3, files: Files | None = None) -> Answer:

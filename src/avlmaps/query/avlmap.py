@@ -206,7 +206,7 @@ class AVLMap:
                 raise QueryError(note if note.endswith("?") else f"{note}; name a thing that it knows.")
         things = self.things(names, least_confidence, structure) if "pixels" in models else []
         rooms = self.rooms() if "views" in models else []
-        return Contents(things, self.sounds(), rooms, self.stored.info.doubts)
+        return Contents(things, self.sounds(), rooms, self.stored.info.doubts, self.storeys)
 
     def sounds(self, most_names: int = 3) -> list["SoundEvent"]:
         """Return the sounds of the map in the order of their onset; see ``contents.find_sounds``."""
@@ -319,7 +319,10 @@ class AVLMap:
         if stayed_on_one(cameras[:, 2]):
             return None
         certain = np.asarray(self.stored.voxels.hits) >= Body().min_hits
-        return find_storeys(self.space.level(self.space.centres[certain]), self.space.grid.voxel_size_m, cameras)
+        level = self.space.level(self.space.centres[certain])
+        found = find_storeys(level, self.space.grid.voxel_size_m, cameras)
+        x, y, z = self.space.level_from_world[2].tolist()
+        return None if found is None else replace(found, up=(x, y, z))
 
     @cached_property
     def room_votes(self) -> Rooms | None:
@@ -512,13 +515,13 @@ class AVLMap:
             AskError: there is nothing to ask, both a sentence and parts, or a file that the sentence does not speak of.
             QueryError: the sentence is not understood, or a part of the query cannot be used.
         """
-        from avlmaps.query.asking import Asked, AskError, Files, answer_question, ask
+        from avlmaps.query.asking import Asked, AskError, Files, answer_question, ask, on_storey
 
         files = Files(intrinsics, attachments)
         if isinstance(question, Question):
             if any(part is not None for part in (object, sound, area, image, clip, primary)):
                 raise AskError("A question holds its parts already; give a sentence or parts instead.")
-            return answer_question(self, question, top, files)
+            return on_storey(answer_question(self, question, top, files), self.storeys)
         photo, recording = (None if file is None else str(file) for file in (image, clip))
         sought = None if primary is None else Modality(primary)
         asked = Asked(

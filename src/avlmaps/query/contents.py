@@ -25,6 +25,7 @@ from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.maps.storeys import Storeys
     from avlmaps.query.rooms import RoomField
     from avlmaps.query.schema import ContentsAnswer, RoomAnswer, SoundAnswer, ThingAnswer
 
@@ -144,12 +145,14 @@ class Contents:
         sounds: in the order of their onset.
         rooms: those with most views first.
         doubts: why the map may be wrong, one sentence each.
+        storeys: of a map of several.
     """
 
     things: list[Thing]
     sounds: list[SoundEvent]
     rooms: list[Room]
     doubts: tuple[str, ...] = ()
+    storeys: "Storeys | None" = None
 
     def to_json(self, name: str) -> "ContentsAnswer":
         """Return the contents as ``avlmaps things --json`` prints them, under a name for the map."""
@@ -160,6 +163,9 @@ class Contents:
             "sounds": [sound.to_json() for sound in self.sounds],
             "rooms": [room.to_json() for room in self.rooms],
         }
+        if self.storeys is not None:
+            for row in (*answer["things"], *answer["sounds"], *answer["rooms"]):
+                row["storey"] = int(self.storeys.of_places(np.array(row["position"]))[0])
         if self.doubts:
             answer["notes"] = list(self.doubts)
         return answer

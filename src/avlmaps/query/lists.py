@@ -104,9 +104,9 @@ def _names(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
         goals, _ = _sounds_by_time(avlmap, True)
         named = [goal.name for goal in goals]
     else:
-        goals = [_thing_goal(thing) for thing in _things(avlmap)]
+        goals = contents_of(avlmap)
         named = [goal.name for goal in goals]
-    text = f"There are {len(named)} {question.name}: {_counted(named)}." if named else f"There are no {question.name}."
+    text = f"There are {len(named)} {question.name}: {counted(named)}." if named else f"There are no {question.name}."
     return _answer(avlmap, goals[:top], text, count=len(named))
 
 
@@ -144,7 +144,7 @@ def _contents(avlmap: "Queryable", name: str) -> tuple[list[Goal], str]:
     goals = [_thing_goal(thing) for thing, is_in in zip(things, inside, strict=True) if is_in]
     if not rooms:
         return goals, f"The map shows no room that is a {name} as a whole."
-    what = _counted([goal.name for goal in goals]) if goals else "no thing that the map is certain of"
+    what = counted([goal.name for goal in goals]) if goals else "no thing that the map is certain of"
     return goals, f"In the {name}: {what}."
 
 
@@ -180,6 +180,11 @@ def _overlap(
     return bool((apart <= size_a / 2.0).all() and (apart <= size_b / 2.0).all())
 
 
+def contents_of(avlmap: "Queryable") -> list[Goal]:
+    """Return all things of a map as goals, the most confident first."""
+    return [_thing_goal(thing) for thing in _things(avlmap)]
+
+
 def _things(avlmap: "Queryable") -> "list[Thing]":
     return avlmap.things() if "pixels" in avlmap.stored.info.models else []
 
@@ -193,7 +198,8 @@ def _same_room(kind: str, name: str) -> bool:
     return kind == name or lexicon().is_a(kind, name, Kind.ROOM)
 
 
-def _counted(names: Sequence[str]) -> str:
+def counted(names: Sequence[str]) -> str:
+    """Return names, the most frequent first, each with how often it occurs: ``chair (4), sofa``."""
     often = Counter(names).most_common()
     shown = ", ".join(name if count == 1 else f"{name} ({count})" for name, count in often[:_MOST_NAMED])
     return shown + (f" and {len(often) - _MOST_NAMED} kinds more" if len(often) > _MOST_NAMED else "")

@@ -27,6 +27,7 @@ Matrix = Annotated[
     Meta(min_length=4, max_length=4, description="4x4 transform, row by row"),
 ]
 Frame = Annotated[str, Meta(description="the frame of the positions: recording")]
+Storey = Annotated[int, Meta(description="of a map of several: counted from 0, the lowest")]
 Notes = Annotated[list[str], Meta(description="why the map may be wrong, one sentence each")]
 
 
@@ -39,6 +40,7 @@ class GoalAnswer(TypedDict):
     parts: Annotated[dict[str, float], Meta(description="heat of each part there, by modality")]
     probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that it is right, all parts together")]
     name: NotRequired[Annotated[str, Meta(description="what is there, in an answer from the lists of a map")]]
+    storey: NotRequired[Storey]
 
 
 class PartOutcome(TypedDict):
@@ -91,6 +93,7 @@ class ThingAnswer(TypedDict):
     size: Size
     color: Annotated[list[int], Meta(min_length=3, max_length=3, description="mean RGB, 0 to 255")]
     voxels: int
+    storey: NotRequired[Storey]
 
 
 class SoundAnswer(TypedDict):
@@ -102,6 +105,7 @@ class SoundAnswer(TypedDict):
     offset_s: float
     position: Position
     clip: Annotated[str, Meta(description="file name of the clip")]
+    storey: NotRequired[Storey]
 
 
 class RoomAnswer(TypedDict):
@@ -111,6 +115,7 @@ class RoomAnswer(TypedDict):
     confidence: Unit
     position: Position
     views: Annotated[int, Meta(description="number of keyframes that show it")]
+    storey: NotRequired[Storey]
 
 
 class ContentsAnswer(TypedDict):

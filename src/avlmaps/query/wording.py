@@ -18,13 +18,13 @@ def in_words(parts: Sequence[Part]) -> str:
 def found_text(parts: Sequence[Part], goal: Goal, count: int | None = None) -> str:
     """Return where the first goal of an answer that is found is, and how many there are for a count."""
     if count is not None:
-        return f"Counted: {count}. The most likely is at {_place(goal)}, probability {goal.probability:.2f}."
-    return _sentence(f"{in_words(parts)} is most likely at {_place(goal)}, probability {goal.probability:.2f}")
+        return f"Counted: {count}. The most likely is at {place_of(goal)}, probability {goal.probability:.2f}."
+    return _sentence(f"{in_words(parts)} is most likely at {place_of(goal)}, probability {goal.probability:.2f}")
 
 
 def placed(text: str, goal: Goal) -> str:
     """Return a sentence about a goal, with its place and probability."""
-    return _sentence(f"{text} at {_place(goal)}, probability {goal.probability:.2f}")
+    return _sentence(f"{text} at {place_of(goal)}, probability {goal.probability:.2f}")
 
 
 def absent_text(parts: Sequence[PartAnswer], goals: Sequence[Goal], alone: Alternative | None) -> str:
@@ -49,7 +49,7 @@ def absent_text(parts: Sequence[PartAnswer], goals: Sequence[Goal], alone: Alter
         goal, what = goals[0], "the best guess"
     else:
         return _sentence(why)
-    return _sentence(f"{why}; {what} is at {_place(goal)}, probability {goal.probability:.2f}")
+    return _sentence(f"{why}; {what} is at {place_of(goal)}, probability {goal.probability:.2f}")
 
 
 def _bare(part: Part) -> str:
@@ -70,7 +70,8 @@ def _beside(part: Part) -> str:
     return f"{'in' if part.modality is Modality.AREA else 'near'} {_named(part)}"
 
 
-def _place(goal: Goal) -> str:
+def place_of(goal: Goal) -> str:
+    """Return the place of a goal in words, metres."""
     return "(" + ", ".join(f"{value:.2f}" for value in goal.position) + ") m"
 
 
