@@ -121,7 +121,7 @@ def _which(whole: Answer, storeys: Storeys | None) -> Answer:
 
 
 def _numbers(word: SaidStorey, count: int) -> tuple[list[int], str]:
-    """Return the numbers of the storeys that words mean in a map of so many, and how they were taken."""
+    """Return the numbers of the storeys that words mean in a map with this number of them, and how they were taken."""
     every = list(range(count))
     if word.above is not None:
         chosen = every[1:] if word.above else every[:-1]
