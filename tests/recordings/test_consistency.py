@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from avlmaps.bench.recordings.drafts import Draft, RoomWalk
 from avlmaps.bench.recordings.outcomes import Judge, Outcome
@@ -17,7 +19,8 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.recordings.camera_axes import opencv_from_axes
 from avlmaps.recordings.consistency.check import check_recording
-from avlmaps.recordings.consistency.sample import choose_pairs
+from avlmaps.recordings.consistency.edges import find_edges, shift_of
+from avlmaps.recordings.consistency.sample import Sample, choose_pairs, draw_sample
 from avlmaps.recordings.consistency.verdict import Grade, Reason, Verdict
 from avlmaps.recordings.corrections import Corrections
 from avlmaps.recordings.open import open_recording
@@ -152,6 +155,25 @@ def test_what_would_not_show_is_said(name: str, tmp_path: Path) -> None:
     assert found.grade is Grade.FINE and not found.sentences()
     said = " ".join(found.unchecked)
     assert {spot for spot in ("scale", "clock", "focal", "axis") if spot in said} == spots
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Sample:
+    wide = Pinhole(96.0, 96.0, 64.0, 48.0, 128, 96)
+    walk = RoomWalk("edges", seed=59, frames=20, people=2).draft(wide)
+    return draw_sample(open_recording(walk.write(tmp_path_factory.mktemp("edges") / "walk")))
+
+
+@given(st.integers(-16, 16), st.integers(-16, 16))
+@settings(max_examples=12, deadline=None)
+def test_edges_of_colour_are_found_where_they_were_moved_to(drawn: Sample, x: int, y: int) -> None:
+    moved = replace(drawn, grey=np.roll(drawn.grey, (y, x), axis=(1, 2)))
+    found = shift_of(find_edges(moved), moved)
+    if np.hypot(x, y) <= 1.0:
+        assert found is None
+    elif np.hypot(x, y) >= 8.0:
+        assert found is not None
+        assert np.hypot(found.columns * 128 - x, found.rows * 128 - y) <= 3.0
 
 
 @pytest.mark.parametrize("count", [2, 3, 7, 200, 5000])

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import re
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -65,11 +66,23 @@ def _row(cells: Sequence[object]) -> str:
     return "| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |"
 
 
+_ROW_IN, _COLUMNS = 0.26, 80  # height of a line in the picture, inches; characters of one
+
+
+def _wrapped(cell: object) -> str:
+    return textwrap.fill(str(cell), _COLUMNS)
+
+
+def _lines(row: Sequence[str]) -> int:
+    return max(cell.count("\n") + 1 for cell in row)
+
+
 def draw(tables: Mapping[str, Table], path: Path) -> None:
     """Draw tables as a picture, to be pasted where Markdown is not shown."""
     from matplotlib.figure import Figure
 
-    heights = [0.35 * (len(table["rows"]) + 1) + 0.6 for table in tables.values()]
+    wrapped = {name: [[_wrapped(cell) for cell in row] for row in table["rows"]] for name, table in tables.items()}
+    heights = [_ROW_IN * (1 + sum(map(_lines, rows))) + 0.6 for rows in wrapped.values()]
     figure = Figure(figsize=(12, sum(heights)))
     panes = figure.subplots(len(tables), 1, height_ratios=heights, squeeze=False)[:, 0]
     for axes, (name, table) in zip(panes, tables.items(), strict=True):
@@ -77,7 +90,7 @@ def draw(tables: Mapping[str, Table], path: Path) -> None:
         axes.set_title(name, loc="left", fontsize=11, fontweight="bold")
         if not table["rows"]:
             continue
-        cells = [[str(cell) for cell in row] for row in table["rows"]]
+        cells = wrapped[name]
         columns = [str(column) for column in table["columns"]]
         drawn = axes.table(cells, colLabels=columns, loc="upper left", cellLoc="left")
         drawn.auto_set_font_size(False)
@@ -87,4 +100,6 @@ def draw(tables: Mapping[str, Table], path: Path) -> None:
             cell.set_edgecolor("#dddddd")
             if row == 0:
                 cell.set_text_props(fontweight="bold")
+            else:
+                cell.set_height(cell.get_height() * _lines(cells[row - 1]))
     figure.savefig(path, dpi=110, bbox_inches="tight")
