@@ -1,6 +1,7 @@
 """What encoders give, held to their protocols before it reaches a map."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -23,17 +24,24 @@ def encode_pixels(encoder: PixelEncoder, frames: Sequence[Frame]) -> list[Float3
     if not frames:
         return []
     who, names = f"The pixel encoder {encoder.card.id}", ", ".join(frame.name for frame in frames)
-    try:
+    with perceiving(who, names):
         found = encode_batch(encoder, frames)
-    except AvlmapsError:
-        raise
-    except Exception as fault:
-        raise BackendError(f"{who} failed on {names} with {type(fault).__name__}: {fault}") from fault
     if len(found) != len(frames):
         raise BackendError(f"{who} gave features of {len(found)} frames for {len(frames)} ({names}).")
     return [
         as_grid(features, encoder.card.dim, f"{who} gave", frame) for features, frame in zip(found, frames, strict=True)
     ]
+
+
+@contextmanager
+def perceiving(who: str, what: str) -> Generator[None]:
+    """Turn whatever an encoder raises into a ``BackendError`` that names it and what it looked at."""
+    try:
+        yield
+    except AvlmapsError:
+        raise
+    except Exception as fault:
+        raise BackendError(f"{who} failed on {what} with {type(fault).__name__}: {fault}") from fault
 
 
 def as_grid(features: Any, dim: int | None, who: str, frame: Frame) -> np.ndarray:
@@ -72,7 +80,7 @@ def require_unit(features: np.ndarray, who: str, frame: Frame) -> None:
         )
 
 
-def as_rows(found: Any, dim: int, who: str, frame: Frame) -> Float32[np.ndarray, " d"]:
+def as_row(found: Any, dim: int, who: str, frame: Frame) -> Float32[np.ndarray, " d"]:
     """Return the one feature of a picture.
 
     Raises:

@@ -89,6 +89,16 @@ class BatchPixelEncoder(PixelEncoder, Protocol):
 
 
 @runtime_checkable
+class GroundReader(Protocol):
+    """A pixel encoder that looks better where ``frame.ground`` is known: a growing map waits with it for the floor."""
+
+    @property
+    def reads_ground(self) -> bool:
+        """True."""
+        ...
+
+
+@runtime_checkable
 class NamedPixelEncoder(PixelEncoder, Protocol):
     """A pixel encoder that distinguishes a closed set of names and can say how likely each of them is.
 

@@ -172,10 +172,14 @@ def learn_places(
     if Kind.LOCAL not in used or Kind.PLACE not in used:
         return {}, {}
     encoder = used.local
-    spread = np.unique(np.linspace(0, len(indices) - 1, min(len(indices), LEARN_FROM_KEYFRAMES)).round().astype(int))
-    chosen = [int(indices[int(i)]) for i in spread]
+    chosen = [int(indices[int(i)]) for i in learn_from(len(indices))]
     local = {i: encoder.encode(recording.frame(i).rgb) for i in chosen}
     return used.place.fit(list(local.values()), rng), local
+
+
+def learn_from(keyframes: int) -> Int[np.ndarray, " k"]:
+    """Return the numbers of the keyframes that places are learnt from: up to 64, spread evenly."""
+    return np.unique(np.linspace(0, keyframes - 1, min(keyframes, LEARN_FROM_KEYFRAMES)).round().astype(int))
 
 
 @dataclass(frozen=True, slots=True)

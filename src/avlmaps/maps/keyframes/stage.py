@@ -25,7 +25,7 @@ from avlmaps.perception.protocols import LocalFeatures, ViewEncoder
 from avlmaps.recordings.subset import Subset
 from avlmaps.recordings.types import Frame, Recording
 
-_RANDOMNESS = 2  # number of the stage as a source of randomness (gravity has 1)
+RANDOMNESS = 2  # number of the stage as a source of randomness (gravity has 1)
 _VIEWS_ON_TORCH = 16  # number of views that go through a large model at once
 _Viewed = tuple[int, Frame, Float32[np.ndarray, " dv"]]
 
@@ -70,7 +70,7 @@ def _learn(
 
     def compute(_: Path) -> Computed[_Facts]:
         begin = perf_counter()
-        state, keypoints = learn_places(good, chosen, plan.used, plan.rng(_RANDOMNESS))
+        state, keypoints = learn_places(good, chosen, plan.used, plan.rng(RANDOMNESS))
         local.update(keypoints)
         return Computed(_Facts(perf_counter() - begin), state)
 

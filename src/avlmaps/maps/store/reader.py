@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from avlmaps.perception.profiles import Profile
 
 PARTS = "parts"
+GIVEN_FEATURES = "given:features"  # backend of features that came without an encoder
 STATE = "keyframes/state/"
 CLIPS = "sounds/clips/"
 _GUARDED = frozenset({"voxels", "keyframes", "sounds", "place_state"})
@@ -97,6 +98,8 @@ class StoredMap:
             )
         card = self.encoders.card(kind)
         here = public_name(card.id)
+        if made_by.backend == GIVEN_FEATURES and card.dim == made_by.dim:
+            return
         # An imported map does not know its weights (checksum ""); what is known of them must still agree.
         if (here, card.dim, card.checksum) != (made_by.id, made_by.dim, made_by.checksum or card.checksum):
             instead = f"use avlmaps {self.info.avlmaps_version}"

@@ -24,6 +24,8 @@ class NamedEncoder:
         words: the word encoder whose space the features live in; the embedded one if None.
     """
 
+    reads_ground = True
+
     def __init__(self, names: str, network: SceneNetwork | PairedNetworks, words: WordEncoder | None) -> None:
         self._network = network
         self._words = cast(WordEncoder, load(Kind.WORDS, "embedded")) if words is None else words

@@ -1,0 +1,145 @@
+"""Keyframes of a walk that still goes on: chosen as in a build, each looked at once, as soon as it is decided."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from avlmaps.core.arrays import Float32, UInt8
+from avlmaps.core.registry import Kind
+from avlmaps.maps.keyframes.describe import (
+    KeyframeSettings,
+    SeenKeyframe,
+    describe_keyframe,
+    keyframes_by_motion,
+    learn_from,
+    next_keyframe,
+    stack_keyframes,
+)
+from avlmaps.maps.perceived import as_row, perceiving
+from avlmaps.maps.types import Keyframes
+from avlmaps.perception.encoders import Encoders
+from avlmaps.recordings.types import Frame
+
+# What places are learnt from grows by this much before they are learnt anew for a question.
+_GROWN = 1.25
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """A keyframe without its place, and its picture (PNG) for that."""
+
+    index: int
+    keyframe: SeenKeyframe
+    picture: bytes
+
+
+class GrowingKeyframes:
+    """Takes frames in the order of time and stores what a map keeps of the keyframes among them."""
+
+    def __init__(self, used: Encoders, settings: KeyframeSettings) -> None:
+        """Begin without frames.
+
+        Args:
+            used: the encoders; that of pixels is not called.
+            settings: when a frame becomes a keyframe.
+        """
+        self._used, self._settings = used, settings
+        self._decided: list[_Seen] = []
+        self._maybe: dict[int, _Seen] = {}
+        self._recent: list[Frame] = []
+        self._state: dict[str, np.ndarray] = {}
+        self._learnt_from = 0
+        self._places: dict[int, Float32[np.ndarray, " d"]] = {}
+
+    @property
+    def undecided(self) -> list[Frame]:
+        """The frames since the last keyframe, that one left out."""
+        return self._recent[1:]
+
+    def add(self, frame: Frame) -> Iterator[Frame]:
+        """Take the next frame; yield each frame that is decided to be a keyframe, after it was looked at.
+
+        Raises:
+            BackendError: an encoder gives something else than its protocol says; that keyframe is left out.
+        """
+        self._recent.append(frame)
+        if len(self._recent) == 1 and not self._decided:
+            self._decided.append(self._look(frame))
+            yield frame
+        while (index := self._next()) is not None:
+            decided, self._recent = self._recent[index], self._recent[index:]
+            known = self._maybe.pop(decided.index, None)
+            self._maybe.clear()
+            self._decided.append(known or self._look(decided))
+            yield decided
+
+    def _next(self) -> int | None:
+        if len(self._recent) < 3:
+            return None
+        return next_keyframe(*_path(self._recent), self._settings)
+
+    def last(self) -> list[Frame]:
+        """Return the frames that would be keyframes if no other came."""
+        if len(self._recent) < 2:
+            return []
+        return [self._recent[index] for index in keyframes_by_motion(*_path(self._recent), self._settings)[1:]]
+
+    def keyframes(self, rng: np.random.Generator, *, final: bool) -> tuple[Keyframes, dict[str, np.ndarray]]:
+        """Return the keyframes as if no other frame came, and what places are known by.
+
+        Args:
+            rng: for what the place encoder learns.
+            final: learn places anew, as a build does; else only where a quarter has come since.
+
+        Raises:
+            BackendError: an encoder gives something else than its protocol says.
+        """
+        for frame in self.last():
+            if frame.index not in self._maybe:
+                self._maybe[frame.index] = self._look(frame)
+        seen = [*self._decided, *(self._maybe[frame.index] for frame in self.last())]
+        places = self._placed(seen, rng, final) if Kind.PLACE in self._used and Kind.LOCAL in self._used else None
+        whole = [one.keyframe for one in seen]
+        if places is not None:
+            whole = [replace(one, place=place) for one, place in zip(whole, places, strict=True)]
+        return stack_keyframes(whole), self._state
+
+    def _placed(self, seen: list[_Seen], rng: np.random.Generator, final: bool) -> list[Float32[np.ndarray, " d"]]:
+        """Return the descriptor of each keyframe's place; learnt anew, all are encoded again."""
+        encoder, count = self._used.place, len(seen)
+        if (final and count != self._learnt_from) or count >= _GROWN * max(self._learnt_from, 1):
+            with perceiving(f"The place encoder {encoder.card.id}", "the keyframes"):
+                self._state = encoder.fit([seen[int(at)].keyframe.local for at in learn_from(count)], rng)
+            self._learnt_from = count
+            if self._state:
+                self._places.clear()
+        for one in seen:
+            if one.index not in self._places:
+                with perceiving(f"The place encoder {encoder.card.id}", f"frame {one.index}"):
+                    found = encoder.encode(_picture(one.picture), one.keyframe.local, self._state)
+                self._places[one.index] = np.asarray(found, np.float32)
+        return [self._places[one.index] for one in seen]
+
+    def _look(self, frame: Frame) -> _Seen:
+        with perceiving("An encoder of keyframes", frame.name):
+            seen = describe_keyframe(frame, self._used.without(Kind.PLACE), {}, self._settings)
+        if Kind.VIEWS in self._used:
+            card = self._used.card(Kind.VIEWS)
+            seen = replace(seen, view=as_row(seen.view, card.dim, f"The view encoder {card.id}", frame))
+        if Kind.PLACE not in self._used:
+            return _Seen(frame.index, seen, b"")
+        _, picture = cv2.imencode(".png", frame.rgb, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+        return _Seen(frame.index, seen, picture.tobytes())
+
+
+def _path(frames: list[Frame]) -> tuple[np.ndarray, np.ndarray]:
+    return np.array([frame.stamp_s for frame in frames]), np.stack([frame.world_from_camera for frame in frames])
+
+
+def _picture(file: bytes) -> UInt8[np.ndarray, "h w 3"]:
+    """Return the picture of a PNG file that was written of RGB as if it were BGR: the same numbers again."""
+    picture = cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    return picture
