@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from avlmaps.query.modalities.area import AreaSettings
     from avlmaps.query.modalities.sound import SoundSettings
     from avlmaps.query.object_settings import ObjectSettings
+    from avlmaps.query.voxel_map import VoxelMap
     from avlmaps.recordings.audio import Sound
     from avlmaps.recordings.open import open_recording
     from avlmaps.recordings.types import Frame, Recording
@@ -85,6 +86,7 @@ _HOMES = {
     "SoundEvent": "avlmaps.query.contents",
     "SoundSettings": "avlmaps.query.modalities.sound",
     "Thing": "avlmaps.query.contents",
+    "VoxelMap": "avlmaps.query.voxel_map",
     "build_map": "avlmaps.api",
     "open_map": "avlmaps.api",
     "open_recording": "avlmaps.recordings.open",
@@ -133,6 +135,7 @@ __all__ = [
     "SoundEvent",
     "SoundSettings",
     "Thing",
+    "VoxelMap",
     "__version__",
     "build_map",
     "open_map",

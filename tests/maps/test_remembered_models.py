@@ -16,6 +16,7 @@ from avlmaps.core.registry import Backend, Kind, forget_loaded, register
 from avlmaps.maps.build import build_map
 from avlmaps.maps.store.manifest import ModelInfo
 from avlmaps.maps.store.reader import open_stored
+from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models.names import public_choice, public_name
 from avlmaps.perception.profiles import Profile, profile, register_profile
 from helpers.signing import signed
@@ -86,7 +87,7 @@ def test_maps_of_earlier_releases_open_unchanged(tmp_path: Path) -> None:
     assert {kind: model["backend"] for kind, model in told["models"].items()} == {
         kind: "fake" for kind in ("pixels", "local", "place", "sounds")
     }, "a backend without models is written as before"
-    assert open_stored(tmp_path / "map").encoders == profile(PROFILE).encoders()
+    assert open_stored(tmp_path / "map").encoders == Encoders.named(PROFILE)
 
 
 def test_another_model_of_the_same_name_is_refused_in_one_sentence(tmp_path: Path) -> None:

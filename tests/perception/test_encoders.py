@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind
-from avlmaps.perception.encoders import MODULES, Encoders
-from avlmaps.perception.profiles import Profile, profile, profiles
+from avlmaps.perception.encoders import Encoders, encoders_of
+from avlmaps.perception.profiles import MODULES, Profile, profile, profiles
 from avlmaps.perception.protocols import PixelEncoder
 
 
@@ -31,7 +31,7 @@ class Words:
 @pytest.mark.parametrize("name", [one.name for one in profiles()])
 def test_a_profile_by_name_has_its_encoders_and_loads_none(name: str) -> None:
     used = Encoders.named(name)
-    assert used.name == name and used == profile(name).encoders()
+    assert used.name == name and used == encoders_of(profile(name))
     assert {kind: used.name_of(kind) for kind in MODULES} == {k: profile(name).backend_name(k) for k in MODULES}
     assert used.weight_variance_m2 == profile(name).weight_variance_m2
 
@@ -55,7 +55,7 @@ def test_an_object_needs_no_registry_and_brings_a_vocabulary_and_a_card() -> Non
 
 
 def test_a_profile_takes_an_object_too() -> None:
-    assert Profile("mine", pixels=Words()).encoders().pixels.card.id == "Words"
+    assert Encoders.named(Profile("mine", pixels=Words())).pixels.card.id == "Words"
     assert Profile("mine", pixels=Words()).backend_name(Kind.PIXELS) == "given:Words"
 
 

@@ -22,7 +22,6 @@ from avlmaps.perception.light.tower import interpolation
 from avlmaps.perception.light.views import LightViews
 from avlmaps.perception.models.availability import availability
 from avlmaps.perception.models.settings import ModelSettings, using_models
-from avlmaps.perception.profiles import profile
 from helpers.light_files import KNOWN, PATCH, write_light, write_manifest
 
 
@@ -178,7 +177,7 @@ def test_without_the_files_the_sentence_names_the_command(tmp_path: Path) -> Non
         told = availability(find(Kind.PIXELS, "light"))
         assert (told.state, told.note) == ("weights missing", f"{files.HOW_TO_GET} (250 MB)")
         with pytest.raises(BackendError, match="avlmaps profiles --fetch light --from"):
-            profile("light").encoders().load(Kind.PIXELS)
+            Encoders.named("light").load(Kind.PIXELS)
 
 
 def test_a_folder_of_files_may_be_named_itself(folder: Path, tmp_path: Path) -> None:

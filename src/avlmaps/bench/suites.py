@@ -10,7 +10,7 @@ from avlmaps.bench.harness.provenance import in_words
 from avlmaps.bench.output import BenchError, Table, draw, markdown, write_answer
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.registry import Kind
-from avlmaps.perception.encoders import Encoders
+from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import choose_models
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
         from avlmaps.bench.navigation.suite import run_navigation
 
         return run_navigation(inputs.navigation, out)
-    used = choose_models(inputs.profile, inputs.models).encoders()
+    used = encoders_of(choose_models(inputs.profile, inputs.models))
     weights = _weights(suite, used)
     if suite == "objects":
         from avlmaps.bench.objects import run_objects
@@ -142,7 +142,7 @@ def _locate(inputs: SuiteInputs) -> Mapping[str, Table]:
         if len(recording) < 20:
             raise RecordingError(f"{path} has {len(recording)} frames; half as map and half as photos takes 20.")
         tables[f"photos located in {path.resolve().name}"] = locate.run(
-            recording, inputs.seed, used=choose_models(inputs.profile, inputs.models).encoders()
+            recording, inputs.seed, used=encoders_of(choose_models(inputs.profile, inputs.models))
         )
     return tables
 
@@ -154,7 +154,7 @@ def _frames(inputs: SuiteInputs) -> Mapping[str, Table]:
     if inputs.nyuv2 is None:
         raise BenchError("This suite measures on labelled frames (docs/guides/train-eyes.md); name their folder with "
                          "--nyuv2.")  # fmt: skip
-    used = choose_models(inputs.profile, inputs.models).encoders()
+    used = encoders_of(choose_models(inputs.profile, inputs.models))
     encoder = used.pixels
     if not isinstance(encoder, EmbeddedPixels):
         raise BenchError(

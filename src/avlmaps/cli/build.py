@@ -142,13 +142,14 @@ def build(verb: "Build") -> dict[str, Any]:
 
 
 def _choose_models(name: str, words: "Sequence[str]") -> "Encoders":
+    from avlmaps.perception.encoders import encoders_of
     from avlmaps.perception.profiles import profile, read_choices
 
     try:
         choices = read_choices(words)
     except ValueError as problem:
         raise UsageError(f"--model {problem}") from None
-    return profile(name).choosing(choices).encoders()
+    return encoders_of(profile(name).choosing(choices))
 
 
 def _cache(place: str, limit_gb: float) -> "CacheSettings":

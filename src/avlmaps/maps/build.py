@@ -14,8 +14,8 @@ from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.reader import StoredMap, describe, open_stored
 from avlmaps.perception.cache.cached_encoders import with_cache
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
-from avlmaps.perception.encoders import Encoders
-from avlmaps.perception.profiles import Profile, encoders_of
+from avlmaps.perception.encoders import Encoders, encoders_of
+from avlmaps.perception.profiles import Profile
 from avlmaps.recordings.types import Recording
 
 __all__ = ["BuildSettings", "CacheSettings", "build_map", "build_part", "describe", "merge_parts", "open_stored"]

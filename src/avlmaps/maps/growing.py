@@ -100,8 +100,8 @@ class GrowingMap:
 
         Args:
             frame: later than the last one, of the same cameras.
-            features: of its pixels, (rows, columns, d) covering the picture evenly, each of unit length or zero, instead
-                of the encoder's.
+            features: of its pixels, (rows, columns, d) covering the picture evenly, each of unit length or zero;
+                instead of the encoder's.
 
         Raises:
             RecordingError: it is not later, or has other cameras.
@@ -162,8 +162,8 @@ class GrowingMap:
         last_s = self.last_stamp_s
         if last_s is not None and not frame.stamp_s > last_s:
             raise RecordingError(
-                f"stamp_s of {frame.name} is {frame.stamp_s:g} s, not after the last frame's {last_s:g} s; add frames in "
-                "the order of time."
+                f"stamp_s of {frame.name} is {frame.stamp_s:g} s, not after the last frame's {last_s:g} s; add frames "
+                "in the order of time."
             )
         rig = self._walk.rig_or(frame.rig)
         if not same_rig(frame.rig, rig):
@@ -249,7 +249,9 @@ class GrowingMap:
     def _empty(self, sensor: SensorInfo) -> VoxelAccumulator:
         if self._dim is None and Kind.PIXELS in self.used:
             self._dim = self.used.card(Kind.PIXELS).dim
-        return VoxelAccumulator(GridSpec(self.settings.voxel_size_m), self._dim or 0, self.settings.fusion, sensor.model)
+        return VoxelAccumulator(
+            GridSpec(self.settings.voxel_size_m), self._dim or 0, self.settings.fusion, sensor.model
+        )
 
     def _upright(self) -> tuple[UpInfo, GroundInfo]:
         return self._upright_of(self._walk.held())[:2]

@@ -31,8 +31,8 @@ from avlmaps.maps.store.checkpoints import Checkpoint, find_checkpoint, key_of, 
 from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.perception.cache.cached_encoders import cache_note, with_cache
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
-from avlmaps.perception.encoders import Encoders
-from avlmaps.perception.profiles import Profile, encoders_of
+from avlmaps.perception.encoders import Encoders, encoders_of
+from avlmaps.perception.profiles import Profile
 from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.recordings.types import Recording
 

@@ -7,7 +7,7 @@ import numpy as np
 from avlmaps.core.arrays import Float16, Float32, Float64, Int32, Int64, UInt8
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Voxels:
     """Occupied voxels, sorted by index (x, then y, then z).
 
@@ -30,8 +30,11 @@ class Voxels:
     def __len__(self) -> int:
         return len(self.index)
 
+    def __repr__(self) -> str:
+        return f"Voxels({len(self):,} with features of {self.feature.shape[1]} numbers)"
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, repr=False)
 class Keyframes:
     """Chosen frames, in the order of time. Ragged arrays: keyframe k has rows ``offsets[k]:offsets[k + 1]``.
 
@@ -67,8 +70,11 @@ class Keyframes:
     def __len__(self) -> int:
         return len(self.stamp_s)
 
+    def __repr__(self) -> str:
+        return f"Keyframes({len(self)} with {len(self.xy):,} keypoints)"
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, repr=False)
 class HeardSounds:
     """Sounds in the order of their onset. Ragged: sound i has rows ``track_offsets[i]:track_offsets[i + 1]`` and so on.
 
@@ -92,3 +98,6 @@ class HeardSounds:
 
     def __len__(self) -> int:
         return len(self.onset_s)
+
+    def __repr__(self) -> str:
+        return f"HeardSounds({len(self)})"

@@ -9,6 +9,7 @@ from typing import Any, cast
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, find, load
+from avlmaps.perception.profiles import GIVEN, MODULES, Profile, no_backend, profile
 from avlmaps.perception.protocols import (
     LocalEncoder,
     Matcher,
@@ -19,8 +20,6 @@ from avlmaps.perception.protocols import (
     ViewEncoder,
 )
 
-GIVEN = "given:"
-MODULES = tuple(kind for kind in Kind if kind is not Kind.WORDS)
 _OWN = "own"
 
 
@@ -184,19 +183,17 @@ class Encoders:
         return made
 
     @classmethod
-    def named(cls, profile: str, /, **instead: object) -> "Encoders":
+    def named(cls, profile: str | Profile, /, **instead: object) -> "Encoders":
         """Return the encoders of a profile, with others for some modules.
 
         Args:
-            profile: its name (``avlmaps profiles``).
+            profile: it, or its name (``avlmaps profiles``).
             instead: by module: an object, the name of a backend, or None for none.
 
         Raises:
             BackendError: there is no such profile, module or backend, or an object lacks a method of its protocol.
         """
-        from avlmaps.perception.profiles import profile as profile_named
-
-        return profile_named(profile).encoders().having(**instead)
+        return encoders_of(profile).having(**instead)
 
     @classmethod
     def remembered(cls, name: str, backends: Mapping[str, str]) -> "Encoders":
@@ -246,9 +243,7 @@ class Encoders:
             BackendError: there is none, or it cannot be loaded.
         """
         if kind not in self.sources:
-            raise BackendError(
-                f"The profile {self.name!r} has no {kind} backend; choose another profile (avlmaps profiles)."
-            )
+            raise BackendError(no_backend(self.name, kind))
         return self.sources[kind].load()
 
     @property
@@ -293,6 +288,19 @@ class Encoders:
     def cards(self) -> dict[Kind, ModelCard]:
         """Return the card of every model. Loads them."""
         return {kind: self.card(kind) for kind in MODULES if kind in self}
+
+
+def encoders_of(chosen: str | Profile | Encoders) -> Encoders:
+    """Return the encoders of a profile or of its name; encoders are themselves.
+
+    Raises:
+        BackendError: there is no such profile or backend, or an object lacks a method of its protocol.
+    """
+    if isinstance(chosen, Encoders):
+        return chosen
+    used = profile(chosen)
+    given = {kind.value: getattr(used, kind.value) for kind in MODULES}
+    return Encoders(used.name, **given, weight_variance_m2=used.weight_variance_m2)
 
 
 def _source(kind: Kind, one: object) -> Source:

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from avlmaps.core.errors import BackendError
-from avlmaps.core.registry import Kind, find
+from avlmaps.core.registry import Kind, find, load
 from avlmaps.core.suggestions import nearest
-from avlmaps.perception.encoders import GIVEN, MODULES, Encoders
 from avlmaps.perception.protocols import (
     LocalEncoder,
     Matcher,
@@ -18,6 +17,9 @@ from avlmaps.perception.protocols import (
     SoundEncoder,
     ViewEncoder,
 )
+
+GIVEN = "given:"
+MODULES = tuple(kind for kind in Kind if kind is not Kind.WORDS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,52 +71,56 @@ class Profile:
         chosen = getattr(self, kind.value)
         return chosen if isinstance(chosen, str) else GIVEN + type(chosen).__qualname__
 
-    def encoders(self) -> Encoders:
-        """Return the profile's encoders; each is loaded when it is first used.
-
-        Raises:
-            BackendError: a backend is not known, or an object lacks a method of its protocol.
-        """
-        chosen = {kind.value: getattr(self, kind.value) for kind in MODULES}
-        return Encoders(self.name, **chosen, weight_variance_m2=self.weight_variance_m2)
-
     def pixel_encoder(self) -> PixelEncoder:
-        """Return ``encoders().pixels``: the name that it had before."""
+        """Return ``Encoders.named(name).pixels``: the name that it had before."""
         return self._formerly("pixel_encoder()", Kind.PIXELS)
 
     def view_encoder(self) -> ViewEncoder:
-        """Return ``encoders().views``: the name that it had before."""
+        """Return ``Encoders.named(name).views``: the name that it had before."""
         return self._formerly("view_encoder()", Kind.VIEWS)
 
     def sound_encoder(self) -> SoundEncoder:
-        """Return ``encoders().sounds``: the name that it had before."""
+        """Return ``Encoders.named(name).sounds``: the name that it had before."""
         return self._formerly("sound_encoder()", Kind.SOUNDS)
 
     def local_encoder(self) -> LocalEncoder:
-        """Return ``encoders().local``: the name that it had before."""
+        """Return ``Encoders.named(name).local``: the name that it had before."""
         return self._formerly("local_encoder()", Kind.LOCAL)
 
     def place_encoder(self) -> PlaceEncoder:
-        """Return ``encoders().place``: the name that it had before."""
+        """Return ``Encoders.named(name).place``: the name that it had before."""
         return self._formerly("place_encoder()", Kind.PLACE)
 
     def keypoint_matcher(self) -> Matcher:
-        """Return ``encoders().matcher``: the name that it had before."""
+        """Return ``Encoders.named(name).matcher``: the name that it had before."""
         return self._formerly("keypoint_matcher()", Kind.MATCHER)
 
     def cards(self) -> dict[Kind, ModelCard]:
-        """Return ``encoders().cards()``: the name that it had before."""
-        warnings.warn(
-            "Profile.cards() goes in the next release; use Profile.encoders().cards().",
-            DeprecationWarning,
-            stacklevel=2,
-        )
-        return self.encoders().cards()
+        """Return the card of every model: the name of ``Encoders.named(name).cards()`` before."""
+        _warn("cards()", "cards()")
+        return {kind: self._load(kind).card for kind in MODULES if getattr(self, kind.value)}
 
     def _formerly(self, name: str, kind: Kind) -> Any:
-        instead = f"Profile.encoders().{kind.value}"
-        warnings.warn(f"Profile.{name} goes in the next release; use {instead}.", DeprecationWarning, stacklevel=3)
-        return self.encoders().load(kind)
+        _warn(name, kind.value)
+        return self._load(kind)
+
+    def _load(self, kind: Kind) -> Any:
+        chosen = getattr(self, kind.value)
+        if chosen and not isinstance(chosen, str):
+            return chosen
+        if not chosen:
+            raise BackendError(no_backend(self.name, kind))
+        return load(kind, chosen)
+
+
+def _warn(old: str, new: str) -> None:
+    instead = f"avlmaps.Encoders.named(...).{new}"
+    warnings.warn(f"Profile.{old} goes in the next release; use {instead}.", DeprecationWarning, stacklevel=4)
+
+
+def no_backend(profile: str, kind: Kind) -> str:
+    """Return the sentence of a module that a profile leaves out."""
+    return f"The profile {profile!r} has no {kind} backend; choose another profile (avlmaps profiles)."
 
 
 # A matcher's training holds for the keypoints that it was trained on.
@@ -183,15 +189,6 @@ def profile(name: str | Profile) -> Profile:
         close = f" Did you mean {near}?" if (near := nearest(name, _PROFILES)) else ""
         raise BackendError(f"There is no profile called {name!r}; known are: {', '.join(_PROFILES)}.{close}")
     return _PROFILES[name]
-
-
-def encoders_of(chosen: "str | Profile | Encoders") -> Encoders:
-    """Return the encoders of a profile or of its name; encoders are themselves.
-
-    Raises:
-        BackendError: there is no such profile.
-    """
-    return chosen if isinstance(chosen, Encoders) else profile(chosen).encoders()
 
 
 _EMBEDDED = Profile(

@@ -72,7 +72,7 @@ class Alternative:
         return {"query": parts, "probability": self.probability, "found": self.found, "goals": goals}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Answer:
     """Goals, best first, and whether they match the query.
 
@@ -103,6 +103,11 @@ class Answer:
     alternatives: tuple[Alternative, ...] = ()
     text: str = ""
     storeys: "Storeys | None" = field(default=None, repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        counted = "" if self.count is None else f", count={self.count}"
+        said = f"found={self.found}, probability={self.probability:.2f}{counted}, {len(self.goals)} goals"
+        return f"Answer({said}: {self.text!r})"
 
     def to_dict(self) -> "QueryAnswer":
         """Return the answer with the keys of the contract; positions are in the frame that ``frame`` names."""

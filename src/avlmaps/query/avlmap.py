@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, UInt8
+from avlmaps.core.arrays import Float, Float16, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError, QueryError
 from avlmaps.core.question import Modality, Part, Question, Role
@@ -222,13 +222,23 @@ class AVLMap:
 
     @property
     def points(self) -> Float[np.ndarray, "n 3"]:
-        """The middles of the voxels, metres, recording frame."""
-        return self.space.centres
+        """The middles of the voxels, metres, recording frame; worked out once, read-only."""
+        return _read_only(self.space.centres)
 
     @property
     def colors(self) -> UInt8[np.ndarray, "n 3"]:
-        """RGB of the voxels."""
-        return np.asarray(self.stored.voxels.rgb)
+        """RGB of the voxels; read-only, not copied from the disk."""
+        return _read_only(self.stored.voxels.rgb)
+
+    @property
+    def features(self) -> Float16[np.ndarray, "n d"]:
+        """Features of the voxels, of unit length or zero; read-only, not copied from the disk."""
+        return _read_only(self.stored.voxels.feature)
+
+    @property
+    def voxel_index(self) -> Int32[np.ndarray, "n 3"]:
+        """Which voxels: voxel i covers [i·s, (i+1)·s) along each axis; read-only, not copied from the disk."""
+        return _read_only(self.stored.voxels.index)
 
     def to_open3d(self) -> "Any":
         """Return the voxels as an ``open3d.geometry.PointCloud``.
@@ -399,16 +409,10 @@ class AVLMap:
         Raises:
             QueryError: the picture is missing, no picture, or does not fit the camera.
         """
-        from avlmaps.query.focal import focal_35mm_of
-
-        called = "a picture"
-        if isinstance(picture, np.ndarray):
-            picture = Photo(picture)
-        elif not isinstance(picture, Photo):
-            called, path = str(picture), Path(picture).expanduser()
-            picture = Photo(read_picture(path), None if intrinsics is not None else focal_35mm_of(path))
-        part, rgb = Part(Modality.IMAGE, called, _role(primary), is_file=True), picture.rgb
-        located = self._located(rgb, intrinsics, _GUESS_FROM, picture.focal_35mm)
+        called = str(picture) if isinstance(picture, str | Path) else "a picture"
+        part, photo = Part(Modality.IMAGE, called, _role(primary), is_file=True), _photo(picture, intrinsics)
+        rgb = photo.rgb
+        located = self._located(rgb, intrinsics, _GUESS_FROM, photo.focal_35mm)
         if located.world_from_camera is None and self.settings.by_colour:
             located = self._guessed_by_colour(rgb, located)
         return Heatmap.of(image_factor(self.space, located, part, self.settings.heat), self.settings.found_at)
@@ -430,10 +434,24 @@ class AVLMap:
         return Panoramas(self.space, stored.voxels.rgb, stored.keyframes)
 
     def locate(
-        self, rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None = None, focal_35mm: float | None = None
+        self,
+        picture: str | Path | UInt8[np.ndarray, "h w 3"],
+        intrinsics: Pinhole | None = None,
+        focal_35mm: float | None = None,
     ) -> "Located":
-        """Return the pose of the camera that took a picture, or that it was not located; see ``locate.locate``."""
-        return self._located(rgb, intrinsics, focal_35mm=focal_35mm)
+        """Return the pose of the camera that took a picture, or that it was not located; see ``locate.locate``.
+
+        Args:
+            picture: a file, or RGB uint8.
+            intrinsics: of the camera that took it; by default by a file's EXIF, else the map's own.
+            focal_35mm: of that camera, as if for 35 mm film; by default by a file's EXIF.
+
+        Raises:
+            QueryError: the picture is missing, no picture, or does not fit the camera.
+        """
+        photo = _photo(picture, intrinsics)
+        focal_35mm = photo.focal_35mm if focal_35mm is None else focal_35mm
+        return self._located(photo.rgb, intrinsics, focal_35mm=focal_35mm)
 
     def _located(
         self,
@@ -529,6 +547,25 @@ class AVLMap:
             top=top,
         )  # fmt: skip
         return ask(self, asked, files)
+
+
+def _photo(picture: "str | Path | Photo | UInt8[np.ndarray, 'h w 3']", intrinsics: Pinhole | None) -> "Photo":
+    """Return a picture, with the focal length of its file's EXIF where it counts."""
+    if isinstance(picture, Photo):
+        return picture
+    if not isinstance(picture, str | Path):
+        return Photo(np.asarray(picture))
+    from avlmaps.query.focal import focal_35mm_of
+
+    path = Path(picture).expanduser()
+    return Photo(read_picture(path), None if intrinsics is not None else focal_35mm_of(path))
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
+    """Return a view of an array that cannot be written."""
+    view = np.asarray(array)[:]
+    view.flags.writeable = False
+    return view
 
 
 def _role(primary: bool) -> Role:

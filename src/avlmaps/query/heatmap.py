@@ -4,23 +4,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from avlmaps.core.arrays import Float32
+from avlmaps.core.arrays import Float, Float32
 from avlmaps.query.evidence import Evidence
 from avlmaps.query.factors import FOUND_AT, Factor, lead_of, product_of
 from avlmaps.query.goals import Goal, Shares, share_voxels, weigh_goals
+from avlmaps.query.heat import Heat
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True, eq=False)
-class Heatmap:
-    """Heat in [0, 1] of every occupied voxel; ``a * b`` fuses two.
+@dataclass(frozen=True, eq=False, repr=False)
+class Heatmap(Heat):
+    """Heat in [0, 1] of every occupied voxel; ``a * b`` fuses two, ``0.7 * a + 0.3 * b`` weighs them.
+
+    ``np.asarray(heat)`` is in the order of the map's ``points``; ``heat.at(points)`` is the heat anywhere.
 
     Attributes:
         space: the map's voxels.
@@ -38,15 +41,18 @@ class Heatmap:
         return cls(factor.space, (factor,), found_at)
 
     @cached_property
-    def values(self) -> Float32[np.ndarray, " n"]:
+    def values(self) -> Float32[np.ndarray, " n"]:  # pyright: ignore[reportIncompatibleMethodOverride, reportIncompatibleVariableOverride]
         """The product of the factors' heat, computed when it is first used."""
         return product_of(self.factors)
 
-    def __mul__(self, other: "Heatmap") -> "Heatmap":
-        if not isinstance(other, Heatmap):  # pyright: ignore[reportUnnecessaryIsInstance] - Python passes anything
-            return NotImplemented
-        if self.space is not other.space:
-            raise ValueError("two heatmaps of different maps cannot be multiplied; ask both of the same AVLMap")
+    @overload
+    def __mul__(self, other: "Heatmap") -> "Heatmap": ...
+    @overload
+    def __mul__(self, other: object) -> Any: ...
+    def __mul__(self, other: object) -> Any:
+        if not isinstance(other, Heatmap):
+            return Heat.__mul__(self, other)
+        self._require_same(other, "multiplied")
         one, two = self._in_company(), other._in_company()
         return Heatmap(self.space, one.factors + two.factors, max(self.found_at, other.found_at))
 
@@ -58,8 +64,20 @@ class Heatmap:
         """Return the heatmap as it counts in a product; that of several things is one already."""
         return Heatmap.of(self.factors[0].for_product(), self.found_at) if len(self.factors) == 1 else self
 
-    def __len__(self) -> int:
-        return len(self.space)
+    @property
+    def _terms(self) -> "tuple[tuple[float, Heat], ...]":
+        return ((1.0, self),)
+
+    def _at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
+        heat = np.ones(len(points_world))
+        for factor in self.factors:
+            heat *= factor.at(points_world)
+        return heat
+
+    @property
+    def name(self) -> str:
+        """What was queried: ``chair * dog bark``."""
+        return " * ".join(factor.part.query for factor in self.factors)
 
     @property
     def peak(self) -> float:

@@ -112,7 +112,7 @@ class LocateSettings:
     """Tolerances of the pose."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Located:
     """The answer.
 
@@ -145,6 +145,12 @@ class Located:
     focal_from: FocalSource = "map"
     uncertainty: Uncertainty | None = None
     centred: bool = False
+
+    def __repr__(self) -> str:
+        place = "nowhere"
+        if self.world_from_camera is not None:
+            place = "({:.2f}, {:.2f}, {:.2f}) m".format(*self.world_from_camera[:3, 3])
+        return f"Located({place}, score {self.score:.2f}, {self.inliers} points agree)"
 
     @property
     def notes(self) -> tuple[str, ...]:

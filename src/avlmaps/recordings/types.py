@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, UInt8
-from avlmaps.core.camera import Rig
+from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.recordings.audio import AudioTrack
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class BaseHeight:
     on_floor: bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Frame:
     """One moment of the camera.
 
@@ -89,6 +89,15 @@ class Frame:
             )
         if self.world_from_camera.shape != (4, 4):
             raise ValueError(f"world_from_camera has shape {self.world_from_camera.shape}; it must be (4, 4)")
+
+    @property
+    def camera(self) -> Pinhole | Rig:
+        """The camera of the colour picture where depth is registered to it, else both cameras."""
+        return self.rig.rgb if self.rig.registered else self.rig
+
+    def __repr__(self) -> str:
+        height, width = self.rgb.shape[:2]
+        return f"Frame({self.name!r} at {self.stamp_s:.2f} s: {width}x{height}, depth {np.mean(self.valid):.0%})"
 
     @property
     def valid(self) -> Bool[np.ndarray, "hd wd"]:
@@ -178,6 +187,15 @@ class Recording(ABC):
 
     def __len__(self) -> int:
         return len(self.stamps_s)
+
+    def __iter__(self) -> Iterator[Frame]:
+        return self.frames()
+
+    def __repr__(self) -> str:
+        size = f"{self.rig.rgb.width}x{self.rig.rgb.height}"
+        sound = "" if self.audio is None else ", with sound"
+        name = f"{type(self).__name__}({self.path.name!r}"
+        return f"{name}: {len(self)} frames of {size}, {self.duration_s:.1f} s, format {self.format}{sound})"
 
     def frames(self, start: int = 0, stop: int | None = None, step: int = 1) -> Iterator[Frame]:
         """Read frames one at a time."""

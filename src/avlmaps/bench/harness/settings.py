@@ -7,7 +7,7 @@ from typing import Literal
 from avlmaps.bench.harness.clips import unheard_rows
 from avlmaps.bench.harness.models import checksums
 from avlmaps.core.errors import AvlmapsError
-from avlmaps.perception.encoders import Encoders
+from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import choose_models
 from avlmaps.query.rules import Rules
 from avlmaps.recordings.clips import find_clips
@@ -98,7 +98,7 @@ class SceneSettings:
         Raises:
             BackendError: there is no such profile or backend.
         """
-        return choose_models(self.profile, self.models).encoders()
+        return encoders_of(choose_models(self.profile, self.models))
 
     def checked(self) -> dict[str, str]:
         """Check everything that is given before anything is recorded; return the models' checksums by module.

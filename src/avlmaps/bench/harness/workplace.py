@@ -23,7 +23,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
-from avlmaps.perception.encoders import Encoders
+from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import choose_models
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.modalities.image import read_picture
@@ -65,7 +65,7 @@ class SceneJob:
     @property
     def used(self) -> Encoders:
         """The encoders of the profile, with the models that were chosen."""
-        return choose_models(self.profile, self.models).encoders()
+        return encoders_of(choose_models(self.profile, self.models))
 
     @property
     def map_name(self) -> str:

@@ -37,7 +37,7 @@ CLIPS = "sounds/clips/"
 _GUARDED = frozenset({"voxels", "keyframes", "sounds", "place_state"})
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class StoredMap:
     """An opened map. It reads nothing of its large arrays until they are used.
 
@@ -72,6 +72,9 @@ class StoredMap:
         if name in _GUARDED:
             object.__getattribute__(self, "guard").require_whole()
         return value
+
+    def __repr__(self) -> str:
+        return f"StoredMap({self.path.name!r}: {self.info.counts.voxels:,} voxels)"
 
     @property
     def profile(self) -> "Profile":

@@ -1,0 +1,184 @@
+"""A map in memory that takes one frame after the other and can be queried at any time."""
+
+from dataclasses import replace
+from pathlib import Path
+from threading import RLock
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from avlmaps.core.arrays import Float, Float16, Int32, UInt8
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import MapError
+from avlmaps.maps.growing import GrowingMap
+from avlmaps.maps.settings import BuildSettings
+from avlmaps.perception.encoders import Encoders, encoders_of
+from avlmaps.perception.profiles import Profile
+from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.recordings.given_frame import given_frame
+
+if TYPE_CHECKING:
+    from avlmaps.query.answer import Answer
+    from avlmaps.query.contents import Thing
+    from avlmaps.query.heatmap import Heatmap
+    from avlmaps.query.locate import Located
+
+_STEP_S = 0.1
+
+
+class VoxelMap:
+    """A map in memory: ``add`` frames, ``ask``, ``save``. It is the map that ``build_map`` makes of the same frames.
+
+    Up, the floor and the depth camera's error are found in the first 60 frames, or in fewer at the first question; of a
+    longer walk, up and the floor again each time it has doubled. A map of more frames than that can hence differ a
+    little from a build's where the encoder looks at the height over the floor. It holds no sounds. A question after
+    new frames works out the voxels anew; threads may add and ask.
+    """
+
+    def __init__(
+        self,
+        voxel_size_m: float = 0.05,
+        encoders: "Encoders | Profile | str | None" = None,
+        *,
+        up_in_world: Float[np.ndarray, "3"] | None = None,
+        settings: BuildSettings | None = None,
+        query: QuerySettings | None = None,
+    ) -> None:
+        """Begin an empty map.
+
+        Args:
+            voxel_size_m: edge of a voxel, metres.
+            encoders: the models that perceive; those of the profile ``embedded`` if None; ``Encoders()`` has none.
+            up_in_world: the direction that is up in the world of the poses; None finds it in the frames.
+            settings: everything else about the map, as of ``build_map``; its voxel size does not count.
+            query: how to query.
+
+        Raises:
+            MapError: the voxel size or up is none.
+            BackendError: there is no such profile.
+        """
+        if not np.isscalar(voxel_size_m) or isinstance(voxel_size_m, str | bytes | bool):
+            raise MapError(f"voxel_size_m must be a number of metres, not {voxel_size_m!r}.")
+        chosen = replace(settings or BuildSettings(), voxel_size_m=float(voxel_size_m))
+        used = encoders_of("embedded" if encoders is None else encoders)
+        self._growing = GrowingMap(chosen, used, _direction(up_in_world))
+        self._query = query
+        self._map: AVLMap | None = None
+        self._lock = RLock()
+
+    def add(
+        self,
+        rgb: UInt8[np.ndarray, "h w 3"],
+        depth_m: Float[np.ndarray, "hd wd"],
+        camera: Pinhole | Rig,
+        world_from_camera: Float[np.ndarray, "4 4"],
+        stamp_s: float | None = None,
+        *,
+        features: Float[np.ndarray, "hf wf d"] | None = None,
+    ) -> None:
+        """Add a frame. What is refused leaves the map as it was.
+
+        Args:
+            rgb: colour picture.
+            depth_m: z-depth in metres; 0, NaN or infinity where there is none.
+            camera: of the colour picture, whose view the depth shares; or a rig of both cameras.
+            world_from_camera: 4x4 pose of the depth camera (OpenCV axes), metres.
+            stamp_s: seconds, rising from frame to frame; by default 0.1 s after the one before.
+            features: of the pixels, covering the picture evenly at any resolution, each of unit length or zero, instead
+                of the encoder's.
+
+        Raises:
+            RecordingError: an array, the camera, the pose or the stamp is not what it must be.
+            BackendError: so are the features, or what the encoder gave.
+        """
+        with self._lock:
+            index, last_s = self._growing.next_index, self._growing.last_stamp_s
+            if stamp_s is None:
+                stamp_s = 0.0 if last_s is None else last_s + _STEP_S
+            frame = given_frame(index, rgb, depth_m, camera, world_from_camera, stamp_s)
+            self._growing.add(frame, features)
+            self._map = None
+
+    @property
+    def map(self) -> AVLMap:
+        """The map of the frames that came, to be queried in every way; later frames do not change it.
+
+        Raises:
+            MapError: no frame came, or none has a depth within the limits.
+        """
+        with self._lock:
+            if self._map is None:
+                self._map = AVLMap(self._growing.stored(), self._query)
+            return self._map
+
+    def ask(self, question: Any = "", *args: Any, **parts: Any) -> "Answer":
+        """Answer a query; see ``AVLMap.ask``."""
+        return self.map.ask(question, *args, **parts)
+
+    def object(self, word: str, primary: bool = False) -> "Heatmap":
+        """Return the heat of an object; see ``AVLMap.object``."""
+        return self.map.object(word, primary)
+
+    def area(self, word: str, primary: bool = False) -> "Heatmap":
+        """Return the heat of an area; see ``AVLMap.area``."""
+        return self.map.area(word, primary)
+
+    def things(self) -> "list[Thing]":
+        """Return the things of the map, most confident first; see ``AVLMap.things``."""
+        return self.map.things()
+
+    def locate(
+        self, picture: "str | Path | UInt8[np.ndarray, 'h w 3']", intrinsics: Pinhole | None = None
+    ) -> "Located":
+        """Return where a picture was taken; see ``AVLMap.locate``."""
+        return self.map.locate(picture, intrinsics)
+
+    @property
+    def points(self) -> Float[np.ndarray, "n 3"]:
+        """The middles of the voxels, metres, the world of the poses; read-only."""
+        return self.map.points
+
+    @property
+    def colors(self) -> UInt8[np.ndarray, "n 3"]:
+        """RGB of the voxels; read-only."""
+        return self.map.colors
+
+    @property
+    def features(self) -> Float16[np.ndarray, "n d"]:
+        """The features of the voxels; read-only."""
+        return self.map.features
+
+    @property
+    def voxel_index(self) -> Int32[np.ndarray, "n 3"]:
+        """Which voxels; read-only."""
+        return self.map.voxel_index
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> AVLMap:
+        """Write the map into a folder, by custom ``NAME.avlmap``, and open it; frames can be added on.
+
+        Args:
+            path: the folder.
+            overwrite: replace a map that is there.
+
+        Raises:
+            MapError: there is nothing to write, the folder is something else or a map, or it cannot be written.
+        """
+        with self._lock:
+            return AVLMap(self._growing.save(Path(path), overwrite=overwrite), self._query)
+
+    def __len__(self) -> int:
+        """Return how many frames are in the map."""
+        return len(self._growing)
+
+    def __repr__(self) -> str:
+        used = self._growing.used
+        return f"VoxelMap({len(self)} frames, voxels of {self._growing.settings.voxel_size_m:g} m, {used!r})"
+
+
+def _direction(up_in_world: Any) -> Float[np.ndarray, "3"] | None:
+    if up_in_world is None:
+        return None
+    up = np.asarray(up_in_world)
+    if up.shape != (3,) or up.dtype.kind not in "fiu" or not np.isfinite(up).all() or not np.linalg.norm(up) > 0.0:
+        raise MapError(f"up_in_world must be a direction x, y, z, such as (0, 0, 1); not {up_in_world!r}.")
+    return up / np.linalg.norm(up)
