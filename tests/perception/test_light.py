@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, find, forget_loaded, load
 from avlmaps.perception.conformance import check, example_frame, example_sound
+from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.light import bundle as files
 from avlmaps.perception.light.mel import log_mel
 from avlmaps.perception.light.pixels import LightPixels

@@ -144,7 +144,7 @@ def _some(names: Sequence[str]) -> str:
     return ", ".join(names[:_SHOWN]) + (" ..." if len(names) > _SHOWN else "")
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class FileRecording(Recording):
     """Frames whose pictures are files, read on demand.
 

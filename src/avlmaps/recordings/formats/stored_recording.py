@@ -29,7 +29,7 @@ class Pictures(Protocol):
         ...
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class StoredRecording(Recording):
     """Frames whose pictures are unpacked on demand.
 
