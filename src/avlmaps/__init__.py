@@ -1,5 +1,15 @@
 """Audio-Visual-Language Maps: what a robot saw and heard, as one 3D map that can be queried.
 
+    m = avlmaps.build_map("REC", "home.avlmap")      # or avlmaps.open_map("home.avlmap")
+    m.ask("where can I sit?").text                   # also .goals, .count, .alternatives, .to_dict()
+    heat = 0.7 * m.object("chair") + 0.3 * m.sound("dog bark")
+    heat.max(), heat.at(points), m.points, m.features
+
+    live = avlmaps.VoxelMap(encoders=avlmaps.Encoders.named("embedded", pixels=MyEncoder()))
+    for frame in avlmaps.open_recording("REC"):
+        live.add(frame.rgb, frame.depth_m, frame.camera, frame.world_from_camera, frame.stamp_s)
+    live.ask("the chair"), live.save("home.avlmap")
+
 Importing the package loads nothing heavy; each public name is imported when it is first used.
 """
 

@@ -124,7 +124,7 @@ class GrowingMap:
         """Return the map of the frames that came, in memory.
 
         Args:
-            final: learn places anew, as a build does.
+            final: learn places again, as a build does.
 
         Raises:
             MapError: no frame came, or none has a depth within the limits.
@@ -343,8 +343,8 @@ class _Walk(Recording):
         return np.stack(self.poses)
 
     def frame(self, index: int) -> Frame:
-        """Refuse: frames are not kept."""
-        raise RecordingError(f"Frame {index} is not kept by a growing map.")
+        """Refuse: frames are not stored."""
+        raise RecordingError(f"Frame {index} is not stored by a growing map.")
 
     @property
     def fingerprint(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]

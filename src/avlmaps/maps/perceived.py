@@ -35,7 +35,7 @@ def encode_pixels(encoder: PixelEncoder, frames: Sequence[Frame]) -> list[Float3
 
 @contextmanager
 def perceiving(who: str, what: str) -> Generator[None]:
-    """Turn whatever an encoder raises into a ``BackendError`` that names it and what it looked at."""
+    """Turn any error of an encoder into a ``BackendError`` that names it and what it looked at."""
     try:
         yield
     except AvlmapsError:

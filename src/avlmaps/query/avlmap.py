@@ -222,7 +222,7 @@ class AVLMap:
 
     @property
     def points(self) -> Float[np.ndarray, "n 3"]:
-        """The middles of the voxels, metres, recording frame; worked out once, read-only."""
+        """The middles of the voxels, metres, recording frame; computed once, read-only."""
         return _read_only(self.space.centres)
 
     @property

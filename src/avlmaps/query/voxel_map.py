@@ -32,7 +32,7 @@ class VoxelMap:
     Up, the floor and the depth camera's error are found in the first 60 frames, or in fewer at the first question; of a
     longer walk, up and the floor again each time it has doubled. A map of more frames than that can hence differ a
     little from a build's where the encoder looks at the height over the floor. It holds no sounds. A question after
-    new frames works out the voxels anew; threads may add and ask.
+    new frames computes the voxels again; threads may add and ask.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Keyframes of a walk that still goes on: chosen as in a build, each looked at once, as soon as it is decided."""
+"""Keyframes of a walk that is not over: chosen as in a build, each looked at once, as soon as it is decided."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.types import Frame
 
-# What places are learnt from grows by this much before they are learnt anew for a question.
+# What places are learnt from grows by this much before they are learnt again for a question.
 _GROWN = 1.25
 
 
@@ -36,7 +36,7 @@ class _Seen:
 
 
 class GrowingKeyframes:
-    """Takes frames in the order of time and stores what a map keeps of the keyframes among them."""
+    """Takes frames in the order of time and stores what a map holds of the keyframes among them."""
 
     def __init__(self, used: Encoders, settings: KeyframeSettings) -> None:
         """Begin without frames.
@@ -91,7 +91,7 @@ class GrowingKeyframes:
 
         Args:
             rng: for what the place encoder learns.
-            final: learn places anew, as a build does; else only where a quarter has come since.
+            final: learn places again, as a build does; else only where a quarter has come since.
 
         Raises:
             BackendError: an encoder gives something else than its protocol says.
@@ -107,7 +107,7 @@ class GrowingKeyframes:
         return stack_keyframes(whole), self._state
 
     def _placed(self, seen: list[_Seen], rng: np.random.Generator, final: bool) -> list[Float32[np.ndarray, " d"]]:
-        """Return the descriptor of each keyframe's place; learnt anew, all are encoded again."""
+        """Return the descriptor of each keyframe's place; learnt again, all are encoded again."""
         encoder, count = self._used.place, len(seen)
         if (final and count != self._learnt_from) or count >= _GROWN * max(self._learnt_from, 1):
             with perceiving(f"The place encoder {encoder.card.id}", "the keyframes"):
