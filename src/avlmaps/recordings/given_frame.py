@@ -1,5 +1,6 @@
 """A frame out of a program's arrays: what does not fit is refused in a sentence with what is wanted and what came."""
 
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -42,9 +43,13 @@ def given_frame(
     colours, depths = _colours(name, rgb), _depths(name, depth_m)
     rig = _rig(name, camera, colours, depths)
     pose = orthonormalize(_numbers(name, "world_from_camera", world_from_camera).astype(np.float64), name)
-    if not np.isscalar(stamp_s) or isinstance(stamp_s, str | bytes | complex) or not np.isfinite(stamp_s):
+    if not _is_finite(stamp_s):
         raise RecordingError(f"stamp_s of {name} must be a finite number of seconds, not {stamp_s!r}.")
     return Frame(index, name, float(stamp_s), colours, depths, pose, rig)
+
+
+def _is_finite(given: object) -> bool:
+    return isinstance(given, Real) and bool(np.isfinite(float(given)))
 
 
 def _numbers(name: str, what: str, given: Any) -> np.ndarray:
