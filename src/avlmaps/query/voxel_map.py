@@ -58,7 +58,7 @@ class VoxelMap:
             MapError: the voxel size or up is none.
             BackendError: there is no such profile.
         """
-        if not _is_number(voxel_size_m):
+        if not isinstance(voxel_size_m, Real):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise MapError(f"voxel_size_m must be a number of metres, not {voxel_size_m!r}.")
         chosen = replace(settings or BuildSettings(), voxel_size_m=float(voxel_size_m))
         used = encoders_of("embedded" if encoders is None else encoders)
@@ -174,10 +174,6 @@ class VoxelMap:
     def __repr__(self) -> str:
         used = self._growing.used
         return f"VoxelMap({len(self)} frames, voxels of {self._growing.settings.voxel_size_m:g} m, {used!r})"
-
-
-def _is_number(given: object) -> bool:
-    return isinstance(given, Real) and not isinstance(given, bool)
 
 
 def _direction(up_in_world: Any) -> Float[np.ndarray, "3"] | None:
