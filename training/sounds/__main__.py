@@ -1,8 +1,9 @@
-"""Make the weights and the figures of the embedded sound encoder: ``python -m training.sounds --help``."""
+"""Make weights and figures of the embedded sound encoder: ``python -m training.sounds --help``."""
 
 import argparse
 import json
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,13 @@ from typing import Any
 import numpy as np
 import torch
 from training.sounds import calibrate
-from training.sounds.augmentation import Augmentation
-from training.sounds.clips import Corpus, read_corpus
-from training.sounds.crossvalidate import Answers, Networks, example_bank, hear_held_out
+from training.sounds.clips import Clip, read_corpus
+from training.sounds.crossvalidate import TESTED, Answers, Networks, example_bank, hear_held_out
 from training.sounds.export import write_onnx
 from training.sounds.figures import all_tables
-from training.sounds.fit import EncodeWords, Settings
+from training.sounds.fit import EncodeWords
 from training.sounds.kinds import KINDS, NAMES, TEMPLATES
+from training.sounds.upper import Settings
 
 from avlmaps.core.progress import say
 from avlmaps.perception.embedded.sound_calibration import evidence_for
@@ -25,18 +26,9 @@ from avlmaps.perception.embedded.words import EmbeddedWords
 ROOT = Path(__file__).resolve().parents[2]
 WEIGHTS = Path("src/avlmaps/perception/embedded/weights")
 FIGURES = Path("src/avlmaps/bench/data/sounds_crossvalidation.json")
-_ROUND = Settings(recorded=44, synthetic=20, rate=2e-3, averaging=0.99, evenness=0.75)
-ONWARDS = (
-    replace(_ROUND, steps=1400, augmentation=Augmentation(segmented=0.0)),
-    replace(_ROUND, steps=1200, falling=0.9, seed=1),
-)
-SCRATCH = (
-    Settings(steps=600, averaging=0.99, seed=5, augmentation=Augmentation(segmented=0.0)),
-    Settings(steps=500, rate=2e-3, averaging=0.99, falling=0.9, seed=6),
-)
 NOTE = (
-    "A small closed-set encoder: ten kinds learnt from about 32 recordings each, forty from one to eight, the others "
-    "from synthetic sounds alone, which carry less well; other sounds can be taught."
+    "A small closed-set encoder: ten kinds learnt from about 32 recordings each, forty from about 26, the others from "
+    "synthetic sounds alone, which carry less well; other sounds can be taught."
 )
 
 
@@ -47,39 +39,32 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "sounds", help="folder of the networks")
     parser.add_argument("--out", type=Path, default=ROOT, help="the checkout to write weights and figures into")
     parser.add_argument("--start", type=Path, default=ROOT / WEIGHTS / "sounds.onnx", help="weights to continue from")
-    parser.add_argument("--steps", type=int, help="of each round, instead of its own")
-    parser.add_argument("--each", type=int, default=16, help="synthetic sounds of a kind")
+    parser.add_argument("--steps", type=int, default=Settings.steps, help="of each network")
+    parser.add_argument("--each", type=int, default=8, help="synthetic sounds of a kind")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
     corpus = read_corpus(arguments.sounds, arguments.work, arguments.each)
     words = EmbeddedWords()
-    onwards = tuple(replace(each, steps=arguments.steps or each.steps) for each in ONWARDS)
-    networks = Networks(corpus, words.encode, onwards, SCRATCH, arguments.start, arguments.work)
+    settings = Settings(steps=arguments.steps)
+    networks = Networks(corpus, words.encode, settings, arguments.start, arguments.work)
 
     answers = hear_held_out(corpus, networks, calibrate.prototypes(words.encode))
     constants = fitted_constants(answers, words.encode)
     learnt = Counter(NAMES[clip.kind] for clip in corpus.clips if clip.may_ship)
     tables = all_tables(answers, learnt, words.encode, constants)
-    final = networks.of_fold(0)
-    bank, kinds = example_bank(final, corpus.examples())
-    weights = arguments.out / WEIGHTS
-    weights.mkdir(parents=True, exist_ok=True)
+    write_edition(arguments.out / WEIGHTS, networks, 0, words, constants, arguments.each)
+    write_edition(arguments.work / f"without-{TESTED}", networks, TESTED, words, constants, arguments.each)
     (arguments.out / FIGURES).parent.mkdir(parents=True, exist_ok=True)
-    write_onnx([final], weights / "sounds.onnx")
-    np.save(weights / "sounds.npy", bank.astype(np.float16))
-    per_kind = np.bincount(kinds, minlength=len(NAMES)).tolist()
-    write_json(weights / "sounds.json", notes(corpus, words, constants, arguments.each, per_kind))
-    settings = {"onwards": [asdict(each) for each in onwards], "scratch": [asdict(each) for each in SCRATCH]}
-    about = {**settings, "words": words.card.checksum}
+    about = {"settings": asdict(settings), "words": words.card.checksum}
     write_json(arguments.out / FIGURES, {"about": about, "tables": tables})
     say(json.dumps(tables, indent=1))
 
 
 def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.Calibration:
     """Fit every constant in turn, on clips as they are and the same clips in a room."""
-    known, strangers = answers.known, answers.strangers
+    known, strangers = answers.household, answers.strangers
     heard = calibrate.joined([known.dry, known.wet])
-    kinds, nets = np.tile(known.kinds, 2), np.concatenate([known.nets, known.nets + 10])
+    kinds, rooms = np.tile(known.kinds, 2), np.repeat([0, 1], len(known.kinds))
     evidence = evidence_for(heard.cosines, heard.typical)
     c = replace(calibrate.START, temperature=calibrate.fit_temperature(evidence, kinds))
     c = calibrate.fit_phrases(encode, c)
@@ -89,15 +74,28 @@ def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.Calibra
     c = calibrate.fit_taught(answers.lessons(3), c)
     left = [k for k in range(calibrate.RECORDED_COUNT) if k not in answers.without]
     c = calibrate.fit_word(heard, kinds, [(unknown, left)], encode, c)
-    return calibrate.fit_pairs(heard, kinds, nets, c)
+    return calibrate.fit_pairs(heard, kinds, rooms, c)
+
+
+def write_edition(
+    folder: Path, networks: Networks, fold: int, words: EmbeddedWords, c: calibrate.Calibration, each: int
+) -> None:
+    """Write what ``EmbeddedSounds`` reads: a network that learnt nothing from a fold (0 for none), examples, notes."""
+    folder.mkdir(parents=True, exist_ok=True)
+    net = networks.of_fold(fold)
+    bank, kinds = example_bank(net, networks.corpus.examples(fold))
+    write_onnx([net], folder / "sounds.onnx")
+    np.save(folder / "sounds.npy", bank.astype(np.float16))
+    learnt = [clip for clip in networks.corpus.clips if clip.may_ship and clip.fold != fold]
+    examples = np.bincount(kinds, minlength=len(NAMES)).tolist()
+    write_json(folder / "sounds.json", notes(learnt, words, c, each, examples))
 
 
 def notes(
-    corpus: Corpus, words: EmbeddedWords, c: calibrate.Calibration, each: int, examples: list[int]
+    learnt: Sequence[Clip], words: EmbeddedWords, c: calibrate.Calibration, each: int, examples: Sequence[int]
 ) -> dict[str, Any]:
-    """Return the notes that ship beside the network."""
-    shipped = [clip for clip in corpus.clips if clip.may_ship]
-    counts = Counter(NAMES[clip.kind] for clip in shipped)
+    """Return the notes that ship beside a network: of the clips that it learnt from, constants, examples of a kind."""
+    counts = Counter(NAMES[clip.kind] for clip in learnt)
     kinds = [
         {
             "name": name,
@@ -109,13 +107,13 @@ def notes(
         for k, (name, called) in enumerate(KINDS.items())
     ]
     return {
-        "id": "avlmaps/sounds-3",
+        "id": "avlmaps/sounds-4",
         "dim": words.card.dim,
         "words": words.card.checksum,
         "templates": list(TEMPLATES),
         "note": NOTE,
         "calibration": asdict(c),
-        "sources": sorted({clip.source for clip in shipped}),
+        "sources": sorted({clip.source for clip in learnt}),
         "kinds": kinds,
     }
 

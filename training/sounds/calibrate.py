@@ -204,11 +204,11 @@ def pair_features(heard: Evidence, c: Calibration) -> np.ndarray:
     return np.stack([heard.features @ heard.features.T, direction @ direction.T], axis=2)
 
 
-def fit_pairs(heard: Evidence, kinds: np.ndarray, folds: np.ndarray, c: Calibration) -> Calibration:
-    """Fit the question by a clip on pairs of held-out clips of one fold, which one network was trained on."""
+def fit_pairs(heard: Evidence, kinds: np.ndarray, rooms: np.ndarray, c: Calibration) -> Calibration:
+    """Fit the question by a clip on pairs of held-out clips in one room."""
     pairs = pair_features(heard, c)
     first, second = np.triu_indices(len(kinds), 1)
-    together = folds[first] == folds[second]
+    together = rooms[first] == rooms[second]
     first, second = first[together], second[together]
     beta = fit_logistic(pairs[first, second], (kinds[first] == kinds[second]).astype(float))
     return replace(c, pair=(float(beta[0]), float(beta[1]), float(beta[2])))

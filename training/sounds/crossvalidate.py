@@ -1,4 +1,4 @@
-"""Train on three folds, listen to the fourth: what the encoder makes of recordings it never learnt from."""
+"""Learn from three folds, listen to the fourth: what the encoder makes of recordings it never learnt from."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,16 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from training.sounds.augmentation import augmented, fluctuations
+from training.sounds.augmentation import heard
 from training.sounds.calibrate import Evidence, Lesson, evidence_of, joined, lessons
-from training.sounds.clips import FOLDS, Corpus, Examples, mels_of, read_samples
+from training.sounds.clips import Corpus, Examples, mels_of, read_samples
 from training.sounds.export import opened_norms, read_onnx
-from training.sounds.fit import EncodeWords, Settings, encode, fit, fit_folds, targets, turned
+from training.sounds.fit import EncodeWords, encode, targets
 from training.sounds.kinds import ESC10, NAMES
 from training.sounds.network import SoundNet
+from training.sounds.upper import Settings, fit_upper, stored_maps
 
 from avlmaps.bench.sound_clips import room_response
-from avlmaps.core.progress import progress, say
+from avlmaps.core.progress import progress
 from avlmaps.perception.embedded import logmel
 
 # Kinds that one network is fitted without, neither recorded nor synthetic: strangers, and what teaching is tried on.
@@ -23,79 +24,50 @@ LEFT_OUT = (
     "door knock", "can opening", "car horn", "toilet flush", "keyboard typing", "laughing", "siren", "vacuum cleaner",
     "alarm clock", "coughing",
 )  # fmt: skip
-LEFT_OUT_FOLD = 5
+TESTED = 5  # the fold whose clips test; the edition before heard none of its household clips
+HEARD = 4  # the fold of which it heard them
 BANK_EACH = 4  # synthetic examples of a kind without recordings
 ROOM_S = 0.6
 
 
 @dataclass(frozen=True, slots=True)
 class Networks:
-    """Fits networks, or takes those that were fitted before from the work folder.
+    """Fits the upper part of networks, or takes those that were fitted before from the work folder.
 
     Attributes:
         corpus: what they learn from.
         encode_words: the word encoder.
-        rounds: of networks that continue from ``start``; each round continues where the one before it ended.
-        scratch: rounds of the network that starts from scratch.
-        start: weights that were shipped before, trained on ESC-10 (every fold) and synthetic sounds alone.
+        settings: how they are fitted.
+        start: the weights of the edition before, whose lower blocks they share.
         work: folder of the networks.
     """
 
     corpus: Corpus
     encode_words: EncodeWords
-    rounds: tuple[Settings, ...]
-    scratch: tuple[Settings, ...]
+    settings: Settings
     start: Path
     work: Path
 
     def of_fold(self, fold: int) -> SoundNet:
-        """Return the network that was not trained on the household clips of a fold (0: one that was trained on all)."""
-        missing = [f for f in (*FOLDS, 0) if not self._file(f).exists()]
-        if missing:  # all at once: they share the lower half of the network
-            words = targets(self.encode_words)
-            nets = dict.fromkeys(missing, self._opened())
-            for settings in self.rounds:
-                nets = fit_folds(self.corpus.examples(), words, settings, nets)
-            for f, net in nets.items():
-                self._store(self._file(f), net, words)
-        return self._read(self._file(fold))
+        """Return the network that learnt nothing from the clips of a fold (0: one that learnt from all)."""
+        return self._fitted(f"without-{fold}" if fold else "all", fold, ())
 
     def stranger(self) -> SoundNet:
-        """Return the network that starts from scratch, without one fold of anything and without some kinds at all."""
-        file = self.work / "stranger.pt"
-        if not file.exists():
-            words = targets(self.encode_words)
-            examples = self.corpus.examples(LEFT_OUT_FOLD, tuple(map(NAMES.index, LEFT_OUT)))
-            first, *others = self.scratch
-            net = fit(examples, words, first, "stranger")
-            for settings in others:
-                net = fit(examples, words, settings, "stranger", net)
-            self._store(file, net, words)
-        return self._read(file)
+        """Return the network without the tested fold and without some kinds; its upper part starts at random."""
+        return self._fitted("stranger", TESTED, tuple(map(NAMES.index, LEFT_OUT)))
 
-    def _file(self, fold: int) -> Path:
-        return self.work / (f"fold{fold}.pt" if fold else "all.pt")
+    def _fitted(self, name: str, fold: int, without: Sequence[int]) -> SoundNet:
+        file, net = self.work / f"{name}.pt", self._opened()
+        if not file.exists():
+            lessons = stored_maps(self.corpus, net, self.settings, self.work)
+            fitted = fit_upper(net, lessons, targets(self.encode_words), self.settings, fold, without)
+            torch.save(fitted.state_dict(), file)
+        net.load_state_dict(torch.load(file, weights_only=True))
+        return net.eval()
 
     def _opened(self) -> SoundNet:
-        generator = torch.Generator().manual_seed(1)
-        power = torch.from_numpy(self.corpus.mels[::8])
-        noise = fluctuations(len(power), generator)
-        return opened_norms(read_onnx(self.start), augmented(power, noise, self.rounds[0].augmentation, generator)[0])
-
-    def _store(self, file: Path, net: SoundNet, words: torch.Tensor) -> None:
         self.work.mkdir(parents=True, exist_ok=True)
-        torch.save({"targets": words, "state": net.state_dict()}, file)
-
-    def _read(self, file: Path) -> SoundNet:
-        words = targets(self.encode_words)
-        kept = torch.load(file, weights_only=True)
-        state = kept["state"]
-        net = SoundNet(state["head.weight"].shape[0], state["stem.weight"].shape[0])
-        net.load_state_dict(state)
-        if not torch.allclose(kept["targets"], words, atol=1e-6):
-            say(f"{file.name}: turning the features into the space of other words")
-            net = turned(net, kept["targets"], words)
-        return net.eval()
+        return opened_norms(read_onnx(self.start), heard(torch.from_numpy(self.corpus.mels[::8])))
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,21 +78,17 @@ class Held:
         dry: evidence of the clips as they are.
         wet: of the same clips 4 m away in a simulated room of RT60 ``ROOM_S``.
         kinds: the right kind of each.
-        nets: a number for the network that encoded it.
         sources: the recording that each was cut from.
     """
 
     dry: Evidence
     wet: Evidence
     kinds: np.ndarray
-    nets: np.ndarray
     sources: np.ndarray
 
     def at(self, chosen: np.ndarray) -> "Held":
         """Return some of the clips."""
-        return Held(
-            self.dry.at(chosen), self.wet.at(chosen), self.kinds[chosen], self.nets[chosen], self.sources[chosen]
-        )
+        return Held(self.dry.at(chosen), self.wet.at(chosen), self.kinds[chosen], self.sources[chosen])
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,9 +96,9 @@ class Answers:
     """The results of the cross-validation.
 
     Attributes:
-        household: every clip of ESC-50, by the network of its fold.
-        peers: every clip of one fold of kinds that the network which started from scratch without it was fitted to.
-        strangers: every clip of the kinds that this network was fitted without.
+        household: the clips of ESC-50 of the tested fold, by the network without it.
+        peers: those of them whose kinds the network that knows strangers was fitted to, by that network.
+        strangers: clips of the kinds that it was fitted without, of all folds that the edition before did not hear.
         without: those kinds.
     """
 
@@ -138,16 +106,6 @@ class Answers:
     peers: Held
     strangers: Held
     without: tuple[int, ...]
-
-    @property
-    def ten(self) -> Held:
-        """The ESC-10 clips among the peers."""
-        return self.peers.at(self.peers.kinds < len(ESC10))
-
-    @property
-    def known(self) -> Held:
-        """All clips of kinds that their network was fitted to."""
-        return held_together([self.household, self.ten])
 
     def lessons(self, clips: int) -> list[Lesson]:
         """Teach each kind left out from some clips; the peers and the other strangers are what it is not."""
@@ -158,7 +116,7 @@ class Answers:
 def held_together(parts: Sequence[Held]) -> Held:
     """Return the clips of several one after another."""
     dry, wet = (joined([getattr(part, name) for part in parts]) for name in ("dry", "wet"))
-    return Held(dry, wet, *(np.concatenate([getattr(p, name) for p in parts]) for name in ("kinds", "nets", "sources")))
+    return Held(dry, wet, *(np.concatenate([getattr(p, name) for p in parts]) for name in ("kinds", "sources")))
 
 
 def example_bank(net: SoundNet, examples: Examples) -> tuple[np.ndarray, np.ndarray]:
@@ -173,29 +131,21 @@ def example_bank(net: SoundNet, examples: Examples) -> tuple[np.ndarray, np.ndar
 
 
 def hear_held_out(corpus: Corpus, networks: Networks, aims: np.ndarray) -> Answers:
-    """Encode every clip by a network that was not trained on its recording."""
-    household = corpus.kinds >= len(ESC10)
-    wet = wet_mels(corpus, household | (corpus.folds == LEFT_OUT_FOLD), networks.work)
+    """Encode the tested household clips and the strangers, by networks that learnt nothing from them."""
+    without = tuple(map(NAMES.index, LEFT_OUT))
+    strange = np.isin(corpus.kinds, without) & (corpus.folds != HEARD)
+    tested = (corpus.kinds >= len(ESC10)) & (corpus.folds == TESTED)
+    wet = wet_mels(corpus, tested | strange, networks.work)
     sources = np.array([clip.source for clip in corpus.clips])
 
-    def held(
-        chosen: np.ndarray, net: SoundNet, bank: tuple[np.ndarray, np.ndarray], number: int, without: Sequence[int] = ()
-    ) -> Held:
-        dry, echoing = (evidence_of(encode(net, m[chosen]), aims, *bank, without) for m in (corpus.mels, wet))
-        count = int(chosen.sum())
-        return Held(dry, echoing, corpus.kinds[chosen], np.full(count, number), sources[chosen])
+    def held(chosen: np.ndarray, net: SoundNet, left: Sequence[int] = ()) -> Held:
+        bank = example_bank(net, corpus.examples(TESTED, left))
+        dry, echoing = (evidence_of(encode(net, m[chosen]), aims, *bank, left) for m in (corpus.mels, wet))
+        return Held(dry, echoing, corpus.kinds[chosen], sources[chosen])
 
-    parts = []
-    for fold in FOLDS:
-        net = networks.of_fold(fold)
-        bank = example_bank(net, corpus.examples(fold))
-        parts.append(held(household & (corpus.folds == fold), net, bank, fold))
-    net, without = networks.stranger(), tuple(map(NAMES.index, LEFT_OUT))
-    bank = example_bank(net, corpus.examples(LEFT_OUT_FOLD, without))
-    strange = np.isin(corpus.kinds, without)
-    peers = held(~strange & (corpus.folds == LEFT_OUT_FOLD), net, bank, 0, without)
-    strangers = held(strange, net, bank, 0, without)
-    return Answers(held_together(parts), peers, strangers, without)
+    net = networks.stranger()
+    peers, strangers = (held(chosen, net, without) for chosen in (tested & ~strange, strange))
+    return Answers(held(tested, networks.of_fold(TESTED)), peers, strangers, without)
 
 
 def wet_mels(corpus: Corpus, rows: np.ndarray, cache: Path) -> np.ndarray:

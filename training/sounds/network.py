@@ -36,12 +36,12 @@ class SoundNet(nn.Module):
         self.head = nn.Linear(12 * width, dim)
 
     def lower(self, x: Tensor) -> Tensor:
-        """Return the maps (n, 2 width, 16, 56) of the first layer and the first block."""
-        return self.blocks[0](functional.relu(self.stem_norm(self.stem(x))))
+        """Return the maps (n, 4 width, 8, 28) of the first layer and all blocks but the last."""
+        return self.blocks[:-1](functional.relu(self.stem_norm(self.stem(x))))
 
     def pooled(self, maps: Tensor) -> Tensor:
         """Return the mean and the highest over time of the mean over bands (n, 12 width), from those maps."""
-        y = self.blocks[1:](maps).float().mean(dim=2)
+        y = self.blocks[-1](maps).float().mean(dim=2)
         return torch.cat([y.mean(dim=2), y.amax(dim=2)], dim=1)
 
     def upper(self, maps: Tensor) -> Tensor:

@@ -78,11 +78,23 @@ class EmbeddedSounds:
     Args:
         words: the word encoder whose space the features live in; the embedded one if None.
         folder: the profile folder with the taught sounds; the user's own if None.
+        weights: the folder of ``sounds.onnx``, ``sounds.json`` and ``sounds.npy``; those that ship if None.
+
+    Raises:
+        BackendError: the folder lacks one of these files.
     """
 
-    def __init__(self, words: WordEncoder | None = None, folder: Path | None = None) -> None:
-        weights = files("avlmaps.perception.embedded") / "weights"
-        network, notes, examples = ((weights / f"sounds.{end}").read_bytes() for end in ("onnx", "json", "npy"))
+    def __init__(
+        self, words: WordEncoder | None = None, folder: Path | None = None, weights: Path | None = None
+    ) -> None:
+        place = files("avlmaps.perception.embedded") / "weights" if weights is None else weights
+        parts = [place / f"sounds.{end}" for end in ("onnx", "json", "npy")]
+        missing = [part.name for part in parts if not part.is_file()]
+        if missing:
+            raise BackendError(
+                f"{place} holds no {' and no '.join(missing)}; python -m training.sounds writes all three."
+            )
+        network, notes, examples = (part.read_bytes() for part in parts)
         self._network = network
         self._folder = folder
         about = json.loads(notes)

@@ -1,0 +1,218 @@
+"""Fit the last block and the last layer of a network again, on maps of its lower blocks.
+
+The lower blocks stay as they are. So their maps of every sound, as it is and in new circumstances, are made once, and
+each network that is fitted reads them: one without a fold, one without some kinds, one with everything.
+"""
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import torch
+import torch.nn.functional as functional
+from torch import Tensor
+from training.sounds.augmentation import Augmentation, augmented, heard
+from training.sounds.clips import Corpus
+from training.sounds.fit import blend, share_of_rate, steady_noise
+from training.sounds.network import Block, SoundNet
+
+from avlmaps.core.progress import progress, say
+
+BATCH = 64
+REPORTED = 100  # steps between two lines of progress
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How the upper part is fitted.
+
+    Attributes:
+        steps: batches.
+        recorded: batches of recorded clips in new circumstances whose maps are made.
+        synthetic: the same of synthetic sounds.
+        made: synthetic sounds in a batch.
+        clean: share of the recorded ones that are clips as they are.
+        evenness: 0 draws a kind as often as it has maps, 1 every kind as often.
+        temperature: of the softmax over kinds.
+        smoothing: share of the target that is spread over all kinds.
+        rate: highest learning rate.
+        falling: share of the steps over which it falls to zero.
+        decay: weight decay.
+        averaging: constant of the moving average of the weights, which is the result.
+        seed: of everything.
+    """
+
+    steps: int = 600
+    recorded: int = 160
+    synthetic: int = 50
+    made: int = 19
+    clean: float = 0.15
+    evenness: float = 0.75
+    temperature: float = 0.07
+    smoothing: float = 0.05
+    rate: float = 1.5e-3
+    falling: float = 0.8
+    decay: float = 2e-2
+    averaging: float = 0.99
+    seed: int = 11
+    augmentation: Augmentation = field(default_factory=lambda: Augmentation(reverberation=0.6))
+
+
+@dataclass(frozen=True, slots=True)
+class Mapped:
+    """Maps of sounds, each of one clip or of two that are mixed.
+
+    Attributes:
+        maps: under the last block (n, channels, bands, frames), in half precision.
+        kinds: of both clips (n, 2); the same twice where there is one.
+        folds: of both clips (n, 2); 0 for a synthetic sound.
+        share: of the second clip (n,).
+        may: whether weights that ship may learn from it (n,).
+    """
+
+    maps: np.ndarray
+    kinds: np.ndarray
+    folds: np.ndarray
+    share: np.ndarray
+    may: np.ndarray
+
+    def rows(self, fold: int, without: Sequence[int]) -> np.ndarray:
+        """Return the sounds that may teach and hold nothing of a fold (0 for none) and of some kinds."""
+        kept_out = ((self.folds == fold) & (fold > 0)) | np.isin(self.kinds, without)
+        return np.flatnonzero(self.may & ~kept_out.any(axis=1))
+
+
+@dataclass(frozen=True, slots=True)
+class Lessons:
+    """What is learnt from: recorded clips and synthetic sounds, as they are and in new circumstances."""
+
+    recorded: tuple[Mapped, Mapped]
+    synthetic: tuple[Mapped, Mapped]
+
+
+@torch.no_grad()
+def stored_maps(corpus: Corpus, net: SoundNet, settings: Settings, work: Path) -> Lessons:
+    """Return the maps of all sounds, made first where the work folder does not hold them."""
+    made, every = np.zeros(len(corpus.synthetic), int), np.ones(len(corpus.synthetic), bool)
+    may = np.array([clip.may_ship for clip in corpus.clips])
+    given = (
+        ("recorded", corpus.mels, corpus.kinds, corpus.folds, may, settings.recorded),
+        ("synthetic", corpus.synthetic, corpus.synthetic_kinds, made, every, settings.synthetic),
+    )
+    pairs = []
+    for number, (label, mels, kinds, folds, may, batches) in enumerate(given):
+        clean, changed, rows = (work / f"{label}-{end}" for end in ("clean.npy", "changed.npy", "changed.npz"))
+        if not clean.exists():
+            parts = [_maps(net, heard(torch.from_numpy(mels[i : i + 32]))) for i in range(0, len(mels), 32)]
+            np.save(clean, np.concatenate(parts))
+        if not rows.exists():
+            maps, places, share = _in_new_circumstances(net, mels, kinds, batches, settings, settings.seed + number)
+            np.save(changed, maps)
+            np.savez(rows, rows=places, share=share)
+        with np.load(rows) as held:
+            places, share = held["rows"], held["share"]
+        itself = np.arange(len(mels))[:, None].repeat(2, axis=1)
+        pairs.append((
+            Mapped(np.load(clean, mmap_mode="r"), kinds[itself], folds[itself], np.zeros(len(mels), np.float32), may),
+            Mapped(np.load(changed, mmap_mode="r"), kinds[places], folds[places], share, may[places].all(axis=1)),
+        ))  # fmt: skip
+    return Lessons(*pairs)
+
+
+def _maps(net: SoundNet, x: Tensor) -> np.ndarray:
+    return net.lower(x.to(memory_format=torch.channels_last)).contiguous().numpy().astype(np.float16)
+
+
+def _in_new_circumstances(
+    net: SoundNet, mels: np.ndarray, kinds: np.ndarray, batches: int, settings: Settings, seed: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Draw clips, kinds about alike, and return their maps, which clips each holds, and the second's share."""
+    rng, generator = np.random.default_rng(seed), torch.Generator().manual_seed(seed)
+    present, counts = np.unique(kinds, return_counts=True)
+    of_kind = [np.flatnonzero(kinds == kind) for kind in present]
+    chance = counts ** (1.0 - settings.evenness) / (counts ** (1.0 - settings.evenness)).sum()
+    maps, rows, shares = [], [], []
+    for _ in progress(range(batches), "in rooms and noise", unit="batch"):
+        first = np.array([rng.choice(of_kind[kind]) for kind in rng.choice(len(of_kind), size=BATCH, p=chance)])
+        noise = steady_noise(BATCH, generator)
+        x, other, share = augmented(torch.from_numpy(mels[first]), noise, settings.augmentation, generator)
+        maps.append(_maps(net, x))
+        rows.append(np.stack([first, np.where(share.numpy() > 0.0, first[other.numpy()], first)], axis=1))
+        shares.append(share.numpy())
+    return np.concatenate(maps), np.concatenate(rows), np.concatenate(shares)
+
+
+class _Drawer:
+    """Draws maps of one sort, kinds about alike: some of clips as they are, the others in new circumstances."""
+
+    def __init__(self, pair: tuple[Mapped, Mapped], fold: int, without: Sequence[int], s: Settings) -> None:
+        self._pair = pair
+        self._rows = [each.rows(fold, without) for each in pair]
+        self._chance = []
+        for each, rows in zip(pair, self._rows, strict=True):
+            kinds = each.kinds[rows, 0]
+            weight = np.bincount(kinds)[kinds] ** -s.evenness
+            self._chance.append(weight / weight.sum())
+        self._clean = s.clean
+
+    def draw(self, count: int, rng: np.random.Generator) -> list[tuple[np.ndarray, np.ndarray, float]]:
+        """Return maps, the kinds of their two sounds, and the second one's share."""
+        drawn = []
+        clean = int(rng.binomial(count, self._clean))
+        parts = zip(self._pair, self._rows, self._chance, (clean, count - clean), strict=True)
+        for each, rows, chance, number in parts:
+            at = rows[rng.choice(len(rows), size=number, p=chance)]
+            drawn += [(each.maps[i], each.kinds[i], float(each.share[i])) for i in at]
+        return drawn
+
+
+def fit_upper(
+    start: SoundNet, lessons: Lessons, words: Tensor, settings: Settings, fold: int = 0, without: Sequence[int] = ()
+) -> SoundNet:
+    """Return the averaged network.
+
+    Args:
+        start: the network to continue from, its norms open; where kinds are left out, its upper part starts at random.
+        lessons: what is learnt from.
+        words: targets (templates, kinds, dim).
+        settings: how.
+        fold: what to learn nothing from; 0 for none.
+        without: kinds to learn nothing of.
+    """
+    torch.manual_seed(settings.seed)
+    rng, s = np.random.default_rng(settings.seed), settings
+    net = copy.deepcopy(start)
+    if without:
+        inputs, outputs = net.blocks[-1].first.in_channels, net.blocks[-1].first.out_channels  # pyright: ignore
+        net.blocks[-1], net.head = Block(inputs, outputs), torch.nn.Linear(net.head.in_features, net.head.out_features)
+    net = net.train()
+    average = copy.deepcopy(net).eval()
+    learnt = [*net.blocks[-1].parameters(), *net.head.parameters()]
+    optimiser = torch.optim.AdamW(learnt, lr=s.rate, weight_decay=s.decay)
+    recorded = _Drawer(lessons.recorded, fold, without, s)
+    made = _Drawer(lessons.synthetic, 0, without, s)
+    known = np.setdiff1d(np.arange(words.shape[1]), without)
+    total = 0.0
+    for step in range(s.steps):
+        for group in optimiser.param_groups:
+            group["lr"] = s.rate * share_of_rate(step, s.steps, s.falling)
+        drawn = recorded.draw(BATCH - s.made, rng) + made.draw(s.made, rng)
+        maps = torch.from_numpy(np.stack([m for m, _, _ in drawn]).astype(np.float32))
+        kinds = torch.from_numpy(np.stack([k for _, k, _ in drawn]))
+        share = torch.tensor([each for _, _, each in drawn])[:, None]
+        aim = functional.one_hot(kinds, words.shape[1])
+        aim = (aim[:, 0] * (1.0 - share) + aim[:, 1] * share)[:, known]
+        vectors = net.upper(maps.to(memory_format=torch.channels_last))
+        logits = vectors @ words[int(rng.integers(len(words)))][known].T / s.temperature
+        loss = functional.cross_entropy(logits, aim, label_smoothing=s.smoothing)
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        blend(average, net, min(s.averaging, (1 + step) / (10 + step)))
+        total += loss.item()
+        if (step + 1) % REPORTED == 0:
+            say(f"without fold {fold}: step {step + 1}/{s.steps} loss {total / REPORTED:.3f}")
+            total = 0.0
+    return average
