@@ -1,6 +1,7 @@
 """Fit a network to what a published network says of mixtures, and to the words of what they hold.
 
-``python -m training.sounds.distil --without 5`` fits without one fold and prints how that fold is named.
+``python -m training.sounds.distil --without 5`` fits without one fold and prints how that fold is named. A run that was
+interrupted continues from its last ``REPORTED`` steps; its losses are in ``build/sounds/distilled-*.csv``.
 """
 
 import argparse
@@ -93,10 +94,10 @@ class Student(SoundNet):
 class Heard:
     """Draws batches of mixtures, each in new circumstances."""
 
-    def __init__(self, mixtures: Mixtures, settings: Settings) -> None:
+    def __init__(self, mixtures: Mixtures, settings: Settings, step: int = 0) -> None:
         self._m, self._s = mixtures, settings
-        self._rng = np.random.default_rng(settings.seed)
-        self._generator = torch.Generator().manual_seed(settings.seed)
+        self._rng = np.random.default_rng([settings.seed, step])
+        self._generator = torch.Generator().manual_seed(settings.seed + step)
         scale = mixtures.features.std(axis=0) + 1e-3
         self._features = torch.from_numpy((mixtures.features - mixtures.features.mean(axis=0)) / scale)
         self._probabilities = torch.sigmoid(torch.from_numpy(mixtures.logits))
@@ -131,15 +132,23 @@ def fit(mixtures: Mixtures, words: Tensor, settings: Settings, check: Path | Non
         mixtures: what it learns from.
         words: targets (templates, kinds, dim).
         settings: how.
-        check: where to store the averaged weights while it goes; nowhere if None.
+        check: where to store all that is needed to continue, with the losses in a CSV file beside it; nowhere if None.
     """
     torch.manual_seed(settings.seed)
-    drawn = Heard(mixtures, settings)
     net = Student(words.shape[2], settings.width, mixtures.logits.shape[1], mixtures.features.shape[1]).train()
     average = copy.deepcopy(net).eval()
     optimiser = torch.optim.AdamW(net.parameters(), lr=settings.rate, weight_decay=settings.decay)
-    s, totals = settings, np.zeros(3)
-    for step in range(settings.steps):
+    parts = {"net": net, "average": average, "optimiser": optimiser}
+    first = 0
+    if check is not None and check.exists():
+        held = torch.load(check, weights_only=True)
+        first = int(held["step"])
+        for name, part in parts.items():
+            part.load_state_dict(held[name])
+        torch.manual_seed(settings.seed + first)
+    drawn = Heard(mixtures, settings, first)
+    s, totals, since = settings, np.zeros(3), first
+    for step in range(first, settings.steps):
         for group in optimiser.param_groups:
             group["lr"] = settings.rate * share_of_rate(step, settings.steps, 0.8)
         x, aim, probabilities, features = drawn.draw()
@@ -156,12 +165,14 @@ def fit(mixtures: Mixtures, words: Tensor, settings: Settings, check: Path | Non
         keep = min(settings.averaging, (1 + step) / (10 + step))
         blend(average, net, keep)
         totals += losses.detach().numpy()
-        if (step + 1) % REPORTED == 0:
-            said = " ".join(f"{value:.3f}" for value in totals / REPORTED)
-            say(f"step {step + 1}/{settings.steps} kinds, names, features: {said}")
-            totals[:] = 0.0
+        if (step + 1) % REPORTED == 0 or step + 1 == s.steps:
+            mean = [f"{value:.3f}" for value in totals / (step + 1 - since)]
+            say(f"step {step + 1}/{settings.steps} kinds, names, features: {' '.join(mean)}")
+            totals[:], since = 0.0, step + 1
             if check is not None:
-                torch.save(average.state_dict(), check)
+                torch.save({"step": step + 1, **{name: part.state_dict() for name, part in parts.items()}}, check)
+                with check.with_suffix(".csv").open("a", encoding="utf-8") as curve:
+                    curve.write(",".join([str(step + 1), *mean]) + "\n")
     return average
 
 
@@ -204,7 +215,6 @@ def main() -> None:
     name = f"distilled-{arguments.width}-{arguments.steps}-{arguments.without}"
     settings = Settings(steps=arguments.steps, width=arguments.width)
     student = fit(mixtures, words, settings, arguments.work / f"{name}.pt")
-    torch.save(student.state_dict(), arguments.work / f"{name}.pt")
     write_onnx([student], arguments.work / f"{name}.onnx")
     if not arguments.without:
         return
