@@ -10,6 +10,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from avlmaps.maps.fusion.sensor_choice import find_sensor
 from avlmaps.maps.gravity.stage import estimate_ground, estimate_up
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.integrity import Guard
-from avlmaps.maps.keyframes.growing import GrowingKeyframes
+from avlmaps.maps.keyframes.growing import GrowingKeyframes, SeenOnce
 from avlmaps.maps.keyframes.stage import RANDOMNESS
 from avlmaps.maps.partial_maps import BUILD_VERSION
 from avlmaps.maps.perceived import as_grid, encode_pixels, require_unit
@@ -45,6 +46,9 @@ from avlmaps.recordings.types import Frame, Ground, Recording
 # Features of waiting frames take no more memory than this.
 _MOST_WAITING_BYTES = 5e8
 _HERE = Path("memory")
+# Findings of the floor and up within these are one.
+_SAME_FLOOR_M = 0.05
+_SAME_UP = 0.9994  # cosine of 2 degrees
 _Waiting = tuple[Frame, np.ndarray | None]
 
 
@@ -78,6 +82,8 @@ class GrowingMap:
         self._free: FreeViewCollector | None = None
         self._keyframes = GrowingKeyframes(used, self.settings.keyframes)
         self._dim: int | None = None
+        self._rehearsed: dict[int, tuple[Ground, np.ndarray]] | None = None
+        self._rehearsal = _Rehearsal()
         self._begin_s = perf_counter()
 
     def __len__(self) -> int:
@@ -95,7 +101,7 @@ class GrowingMap:
         last = self._waiting[-1][0].stamp_s if self._waiting else None
         return last if last is not None else (self._walk.stamps[-1] if self._walk.stamps else None)
 
-    def add(self, frame: Frame, features: np.ndarray | None = None) -> None:
+    def add(self, frame: Frame, features: Any = None) -> None:
         """Add a frame. What is wrong with it leaves the map as it was.
 
         Args:
@@ -132,6 +138,8 @@ class GrowingMap:
         """
         if not len(self):
             raise MapError("The map has no frame yet; add one.")
+        if self._sensor is None:  # the frames wait on, so that a question changes nothing
+            return self._rehearse().stored(final=final)
         self._settle()
         plan = self._plan()
         with silence_progress(True):
@@ -181,10 +189,29 @@ class GrowingMap:
         encoder = self.used.pixels
         return self._ground is not None or not (isinstance(encoder, GroundReader) and encoder.reads_ground)
 
+    def _rehearse(self) -> "GrowingMap":
+        """Return a map of the frames that wait, as if no other came; what encoders made of them is used again."""
+        other = GrowingMap(self.settings, self.used, self._given_up)
+        other._rehearsed, other._dim = self._rehearsal.features, self._dim
+        other._keyframes.share(self._rehearsal.looks)
+        other._left_out = list(self._left_out)
+        other._waiting = list(self._waiting)
+        for frame, _ in self._waiting:
+            other._walk.spread(frame, self.settings.gravity.frames)
+        other._settle()
+        return other
+
     def _encoded(self, frame: Frame) -> np.ndarray:
-        encoder = self.used.pixels
-        (features,) = encode_pixels(encoder, [replace(frame, ground=self._ground)])
-        return self._checked(features, f"The pixel encoder {encoder.card.id} gave", frame)
+        encoder, ground = self.used.pixels, self._ground
+        if self._rehearsed is not None and ground is not None and frame.index in self._rehearsed:
+            then, known = self._rehearsed[frame.index]
+            if _alike(then, ground, frame):
+                return known
+        (features,) = encode_pixels(encoder, [replace(frame, ground=ground)])
+        grid = self._checked(features, f"The pixel encoder {encoder.card.id} gave", frame)
+        if self._rehearsed is not None and ground is not None:
+            self._rehearsed[frame.index] = ground, grid
+        return grid
 
     def _checked(self, features: object, who: str, frame: Frame) -> np.ndarray:
         if self._dim is None:
@@ -204,6 +231,7 @@ class GrowingMap:
             if self._sensor is None:
                 held = self._walk.held()
                 self._sensor, self._ground = find_sensor(held, self.settings), self._upright_of(held)[2]
+                self._rehearsal = _Rehearsal()
             elif self._walk.has_doubled:
                 self._ground = self._upright_of(self._walk.held())[2]
             faults: list[BackendError] = []
@@ -294,6 +322,21 @@ class GrowingMap:
         return content, manifest_of(plan, up, ground, content, merged, timings, len(self._walk), left_out)
 
 
+class _Rehearsal:
+    """What encoders made of frames that wait, for questions before the map is settled."""
+
+    def __init__(self) -> None:
+        self.features: dict[int, tuple[Ground, np.ndarray]] = {}
+        self.looks: dict[int, SeenOnce] = {}
+
+
+def _alike(one: Ground, other: Ground, frame: Frame) -> bool:
+    """Return whether two findings of up and the floor are so near that an encoder sees the same."""
+    pose = frame.world_from_camera
+    apart_m = abs(one.camera_height_m(pose) - other.camera_height_m(pose))
+    return apart_m <= _SAME_FLOOR_M and float(one.up_in_world @ other.up_in_world) >= _SAME_UP
+
+
 class _Walk(Recording):
     """The frames of a growing map as a recording: all stamps and poses, and some frames spread over them."""
 
@@ -307,14 +350,12 @@ class _Walk(Recording):
         self._digest = hashlib.sha256()
 
     def rig_or(self, other: Rig) -> Rig:
-        """Return the cameras of the first frame, or of one that comes to be the first."""
-        if not self._held:
-            self.rig = other
-        return self.rig
+        """Return the cameras of the first frame, or of the one that is to be it."""
+        return self.rig if self._held else other
 
     def spread(self, frame: Frame, most: int) -> None:
         """Hold a frame if it is one of those spread over the walk, fewer than ``most`` of them."""
-        self.has_doubled = False
+        self.has_doubled, self.rig = False, self.rig_or(frame.rig)
         if self._came % self._stride == 0:
             if len(self._held) >= most:
                 self._stride, self._held, self.has_doubled = 2 * self._stride, self._held[::2], True

@@ -34,11 +34,11 @@ class Heat(ABC):
     @abstractmethod
     def _terms(self) -> "tuple[tuple[float, Heat], ...]": ...
 
-    def at(self, points_world: Float[np.ndarray, "*m 3"]) -> Float[np.ndarray, "*m"]:
+    def at(self, points_world: Any) -> Float[np.ndarray, "*m"]:
         """Return the heat at any points.
 
         Args:
-            points_world: one point, or an array of them; metres, recording frame.
+            points_world: one point, or an array (..., 3) of them; metres, recording frame.
 
         Raises:
             QueryError: they are no points.

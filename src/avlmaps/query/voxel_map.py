@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float16, Int32, UInt8
-from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import MapError
 from avlmaps.maps.growing import GrowingMap
 from avlmaps.maps.settings import BuildSettings
@@ -30,18 +30,18 @@ _STEP_S = 0.1
 class VoxelMap:
     """A map in memory: ``add`` frames, ``ask``, ``save``. It is the map that ``build_map`` makes of the same frames.
 
-    Up, the floor and the depth camera's error are found in the first 60 frames, or in fewer at the first question; of a
-    longer walk, up and the floor again each time it has doubled. A map of more frames than that can hence differ a
-    little from a build's where the encoder looks at the height over the floor. It holds no sounds. A question after
-    new frames computes the voxels again; threads may add and ask.
+    Up, the floor and the depth camera's error are found in the first 60 frames, which are fused then; of a longer walk,
+    up and the floor again each time it has doubled. A map of more frames than that can hence differ a little from a
+    build's. A question before changes nothing of that, but fuses those frames again. A question after new frames
+    computes the voxels again. The map holds no sounds. Threads may add and ask.
     """
 
     def __init__(
         self,
-        voxel_size_m: float = 0.05,
+        voxel_size_m: Any = 0.05,
         encoders: "Encoders | Profile | str | None" = None,
         *,
-        up_in_world: Float[np.ndarray, "3"] | None = None,
+        up_in_world: Any = None,
         settings: BuildSettings | None = None,
         query: QuerySettings | None = None,
     ) -> None:
@@ -58,7 +58,7 @@ class VoxelMap:
             MapError: the voxel size or up is none.
             BackendError: there is no such profile.
         """
-        if not isinstance(voxel_size_m, Real):  # pyright: ignore[reportUnnecessaryIsInstance]
+        if not isinstance(voxel_size_m, Real):
             raise MapError(f"voxel_size_m must be a number of metres, not {voxel_size_m!r}.")
         chosen = replace(settings or BuildSettings(), voxel_size_m=float(voxel_size_m))
         used = encoders_of("embedded" if encoders is None else encoders)
@@ -69,24 +69,24 @@ class VoxelMap:
 
     def add(
         self,
-        rgb: UInt8[np.ndarray, "h w 3"],
-        depth_m: Float[np.ndarray, "hd wd"],
-        camera: Pinhole | Rig,
-        world_from_camera: Float[np.ndarray, "4 4"],
-        stamp_s: float | None = None,
+        rgb: Any,
+        depth_m: Any,
+        camera: Any,
+        world_from_camera: Any,
+        stamp_s: Any = None,
         *,
-        features: Float[np.ndarray, "hf wf d"] | None = None,
+        features: Any = None,
     ) -> None:
         """Add a frame. What is refused leaves the map as it was.
 
         Args:
-            rgb: colour picture.
-            depth_m: z-depth in metres; 0, NaN or infinity where there is none.
-            camera: of the colour picture, whose view the depth shares; or a rig of both cameras.
+            rgb: colour picture, (h, w, 3) uint8.
+            depth_m: z-depth in metres, (hd, wd) floats; 0, NaN or infinity where there is none.
+            camera: a ``Pinhole`` of the colour picture, whose view the depth shares; or a ``Rig`` of both cameras.
             world_from_camera: 4x4 pose of the depth camera (OpenCV axes), metres.
             stamp_s: seconds, rising from frame to frame; by default 0.1 s after the one before.
-            features: of the pixels, covering the picture evenly at any resolution, each of unit length or zero, instead
-                of the encoder's.
+            features: of the pixels, (hf, wf, d), covering the picture evenly at any resolution, each of unit length or
+                zero; instead of the encoder's.
 
         Raises:
             RecordingError: an array, the camera, the pose or the stamp is not what it must be.

@@ -19,20 +19,20 @@ _NEAREST_FARTHEST_M = 0.02
 
 def given_frame(
     index: int,
-    rgb: UInt8[np.ndarray, "h w 3"],
-    depth_m: Float[np.ndarray, "hd wd"],
-    camera: Pinhole | Rig,
-    world_from_camera: Float[np.ndarray, "4 4"],
-    stamp_s: float,
+    rgb: Any,
+    depth_m: Any,
+    camera: Any,
+    world_from_camera: Any,
+    stamp_s: Any,
 ) -> Frame:
     """Return a frame of a program's arrays, which are copied.
 
     Args:
         index: its number, for errors.
-        rgb: colour picture.
-        depth_m: z-depth in metres; 0, NaN or infinity where there is none. It covers the same view as the picture, at
-            any resolution, unless the camera is a rig.
-        camera: of the colour picture, or both cameras and how they sit.
+        rgb: colour picture, (h, w, 3) uint8.
+        depth_m: z-depth in metres, (hd, wd); 0, NaN or infinity where there is none. It covers the same view as the
+            picture, at any resolution, unless the camera is a rig.
+        camera: a ``Pinhole`` of the colour picture, or a ``Rig`` of both cameras.
         world_from_camera: 4x4 pose of the depth camera; its rotation is made orthonormal within rounding.
         stamp_s: seconds.
 

@@ -27,7 +27,7 @@ _GROWN = 1.25
 
 
 @dataclass(frozen=True, slots=True)
-class _Seen:
+class SeenOnce:
     """A keyframe without its place, and its picture (PNG) for that."""
 
     index: int
@@ -46,12 +46,17 @@ class GrowingKeyframes:
             settings: when a frame becomes a keyframe.
         """
         self._used, self._settings = used, settings
-        self._decided: list[_Seen] = []
-        self._maybe: dict[int, _Seen] = {}
+        self._decided: list[SeenOnce] = []
+        self._maybe: dict[int, SeenOnce] = {}
         self._recent: list[Frame] = []
+        self._looks: dict[int, SeenOnce] | None = None
         self._state: dict[str, np.ndarray] = {}
-        self._learnt_from = 0
+        self._learnt_from: list[int] = []
         self._places: dict[int, Float32[np.ndarray, " d"]] = {}
+
+    def share(self, looks: "dict[int, SeenOnce]") -> None:
+        """Take keyframes that were looked at before, by their number, and add those that are looked at."""
+        self._looks = looks
 
     @property
     def undecided(self) -> list[Frame]:
@@ -106,13 +111,14 @@ class GrowingKeyframes:
             whole = [replace(one, place=place) for one, place in zip(whole, places, strict=True)]
         return stack_keyframes(whole), self._state
 
-    def _placed(self, seen: list[_Seen], rng: np.random.Generator, final: bool) -> list[Float32[np.ndarray, " d"]]:
+    def _placed(self, seen: list[SeenOnce], rng: np.random.Generator, final: bool) -> list[Float32[np.ndarray, " d"]]:
         """Return the descriptor of each keyframe's place; learnt again, all are encoded again."""
-        encoder, count = self._used.place, len(seen)
-        if (final and count != self._learnt_from) or count >= _GROWN * max(self._learnt_from, 1):
+        encoder, numbers = self._used.place, [one.index for one in seen]
+        few = not self._learnt_from or len(seen) >= _GROWN * len(self._learnt_from)
+        if few or (final and numbers != self._learnt_from):
             with perceiving(f"The place encoder {encoder.card.id}", "the keyframes"):
-                self._state = encoder.fit([seen[int(at)].keyframe.local for at in learn_from(count)], rng)
-            self._learnt_from = count
+                self._state = encoder.fit([seen[int(at)].keyframe.local for at in learn_from(len(seen))], rng)
+            self._learnt_from = numbers
             if self._state:
                 self._places.clear()
         for one in seen:
@@ -122,16 +128,23 @@ class GrowingKeyframes:
                 self._places[one.index] = np.asarray(found, np.float32)
         return [self._places[one.index] for one in seen]
 
-    def _look(self, frame: Frame) -> _Seen:
+    def _look(self, frame: Frame) -> SeenOnce:
+        if self._looks is None:
+            return self._looked(frame)
+        if frame.index not in self._looks:
+            self._looks[frame.index] = self._looked(frame)
+        return self._looks[frame.index]
+
+    def _looked(self, frame: Frame) -> SeenOnce:
         with perceiving("An encoder of keyframes", frame.name):
             seen = describe_keyframe(frame, self._used.without(Kind.PLACE), {}, self._settings)
         if Kind.VIEWS in self._used:
             card = self._used.card(Kind.VIEWS)
             seen = replace(seen, view=as_row(seen.view, card.dim, f"The view encoder {card.id}", frame))
         if Kind.PLACE not in self._used:
-            return _Seen(frame.index, seen, b"")
+            return SeenOnce(frame.index, seen, b"")
         _, picture = cv2.imencode(".png", frame.rgb, [cv2.IMWRITE_PNG_COMPRESSION, 1])
-        return _Seen(frame.index, seen, picture.tobytes())
+        return SeenOnce(frame.index, seen, picture.tobytes())
 
 
 def _path(frames: list[Frame]) -> tuple[np.ndarray, np.ndarray]:

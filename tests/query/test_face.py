@@ -1,0 +1,312 @@
+"""The lines that a person types: each is tried on one small map, and the examples run on it."""
+
+import runpy
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as some
+
+import avlmaps
+from avlmaps.core.errors import AvlmapsError, BackendError, MapError, QueryError, RecordingError
+from avlmaps.recordings.memory import MemoryRecording
+from helpers.walked_room import CAMERA, write_walk
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
+COARSE = avlmaps.BuildSettings(voxel_size_m=0.1)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording of six frames with a sound, and its map."""
+    folder = tmp_path_factory.mktemp("face")
+    whole = avlmaps.open_recording(write_walk(folder / "whole"))
+    with avlmaps.RecordingWriter(folder / "rec", whole.rig, up_in_world=whole.up_in_world) as writer:
+        for frame in whole.frames(step=4):
+            writer.add(frame)
+        writer.set_audio(whole.audio.read())
+    avlmaps.build_map(folder / "rec", folder / "home.avlmap", settings=COARSE, progress=False)
+    cv2.imwrite(str(folder / "photo.png"), np.ascontiguousarray(whole.frame(8).rgb[:, :, ::-1]))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def m(folder: Path) -> avlmaps.AVLMap:
+    return avlmaps.open_map(folder / "home.avlmap")
+
+
+def test_a_sentence_is_answered_with_count_notes_and_alternatives(m: avlmaps.AVLMap) -> None:
+    answer = m.ask("where can I sit?")
+    assert {one.to_dict()["query"] for one in answer.alternatives} >= {"chair"} or answer.parts[0].part.query == "chair"
+    assert isinstance(answer.notes, tuple) and answer.count is None
+    assert answer.to_dict()["text"] == answer.text
+    assert m.ask("how many chairs are there?").count is not None
+
+
+def test_heat_is_an_array_and_has_arithmetic(m: avlmaps.AVLMap) -> None:
+    chair, sound = m.object("chair"), m.sound("dog bark")
+    heat = 0.7 * chair + 0.3 * sound
+    expected = 0.7 * np.asarray(chair) + 0.3 * np.asarray(sound)
+    np.testing.assert_allclose(np.asarray(heat), expected, atol=1e-6)
+    assert heat.max() == pytest.approx(expected.max(), abs=1e-6) and heat.min() >= 0.0
+    assert np.asarray(heat).shape == (len(m.points),) and np.asarray(heat, np.float64).dtype == np.float64
+    np.testing.assert_allclose(heat.at(m.points[::50]), np.asarray(heat)[::50], atol=1e-4)
+    assert heat.at((0.0, 0.0, 0.0)).shape == () and heat.at(np.zeros((2, 4, 3))).shape == (2, 4)
+    assert repr(heat) == f"Blend('0.7 * chair + 0.3 * dog bark', {len(heat):,} voxels)"
+
+
+@given(a=st.floats(-3, 3, width=32), b=st.floats(0.25, 3, width=32))
+@settings(max_examples=15)
+def test_arithmetic_of_heat_is_that_of_its_arrays(m: avlmaps.AVLMap, a: float, b: float) -> None:
+    one, two = m.object("sofa"), m.object("table")
+    x, y = np.asarray(one), np.asarray(two)
+    for heat, array in (
+        (a * one - two / b, a * x - y / b),
+        (np.float32(a) * one + sum([one, two]), a * x + x + y),
+        ((a * one + two) * b, (a * x + y) * b),
+        (-one, -x),
+        (np.ones(len(x)) * one, x),
+    ):
+        np.testing.assert_allclose(np.asarray(heat), array, atol=1e-4)
+    np.testing.assert_array_equal(one > 0.5, x > 0.5)
+    product = np.asarray((a * one) * two)
+    np.testing.assert_allclose(product, a * np.asarray(one * two), atol=1e-4)
+
+
+def test_heat_of_two_maps_does_not_mix(m: avlmaps.AVLMap) -> None:
+    other = avlmaps.AVLMap(m.stored)
+    with pytest.raises(ValueError, match="different maps cannot be added"):
+        m.object("chair") + other.object("chair")
+    with pytest.raises(TypeError):
+        m.object("chair") * "sofa"
+
+
+@pytest.mark.parametrize("points", [np.zeros((3, 2)), "here", np.full((1, 3), np.nan), 1.0])
+def test_what_is_no_point_is_refused(m: avlmaps.AVLMap, points: object) -> None:
+    with pytest.raises(QueryError, match=r"Points are finite x, y, z in metres"):
+        m.object("chair").at(points)  # pyright: ignore[reportArgumentType]
+
+
+def test_arrays_are_read_only_and_not_copied(m: avlmaps.AVLMap) -> None:
+    count = m.stored.info.counts.voxels
+    shapes = {"points": (count, 3), "colors": (count, 3), "voxel_index": (count, 3)}
+    for name in ("points", "colors", "voxel_index", "features"):
+        array = getattr(m, name)
+        assert isinstance(array, np.ndarray) and array.shape == shapes.get(name, array.shape) and len(array) == count
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+    for name, field in (("colors", "rgb"), ("features", "feature"), ("voxel_index", "index")):
+        assert np.shares_memory(getattr(m, name), getattr(m.stored.voxels, field))
+    np.testing.assert_allclose(m.points, (m.voxel_index + 0.5) * 0.1)
+
+
+def test_frames_of_a_recording_come_one_by_one(folder: Path) -> None:
+    recording = avlmaps.open_recording(folder / "rec")
+    frames = list(recording)
+    assert len(frames) == len(recording) == 6
+    for frame in frames:
+        assert frame.rgb.shape == (180, 240, 3) and frame.depth_m.shape == (180, 240)
+        assert frame.world_from_camera.shape == (4, 4) and isinstance(frame.camera, avlmaps.Pinhole)
+
+
+def test_a_photo_is_located_by_its_file(m: avlmaps.AVLMap, folder: Path) -> None:
+    by_file = m.locate(folder / "photo.png")
+    by_array = m.locate(cv2.imread(str(folder / "photo.png"))[:, :, ::-1])
+    assert by_file.inliers == by_array.inliers and len(repr(by_file)) < 100
+    with pytest.raises(QueryError, match="is not there"):
+        m.locate("nowhere.png")
+
+
+def test_what_python_prints_is_short(m: avlmaps.AVLMap, folder: Path) -> None:
+    recording = avlmaps.open_recording(folder / "rec")
+    parts = [m, m.stored, m.stored.voxels, m.stored.keyframes, m.stored.sounds, recording, recording.frame(0)]
+    values = [m.object("chair"), m.ask("the chair"), avlmaps.Encoders.named("embedded"), avlmaps.VoxelMap()]
+    for thing in (*parts, *values):
+        assert len(repr(thing)) < 260 and "array(" not in repr(thing), repr(thing)
+
+
+def test_help_names_what_a_newcomer_needs() -> None:
+    import pydoc
+
+    text = pydoc.plain(pydoc.render_doc(avlmaps))
+    for word in ("open_map", "VoxelMap", "Encoders", "m.ask(", "build_map"):
+        assert word in text
+
+
+# A map in memory
+
+
+def add(live: avlmaps.VoxelMap, frame: avlmaps.Frame, **parts: object) -> None:
+    live.add(frame.rgb, frame.depth_m, frame.camera, frame.world_from_camera, frame.stamp_s, **parts)  # pyright: ignore
+
+
+def test_a_map_of_frames_one_by_one_is_the_built_one(folder: Path, tmp_path: Path) -> None:
+    recording = avlmaps.open_recording(folder / "rec")
+    frames = list(recording)
+    built = avlmaps.build_map(MemoryRecording(frames), tmp_path / "built", settings=COARSE, progress=False)
+    live = avlmaps.VoxelMap(voxel_size_m=0.1)
+    for frame in frames:
+        add(live, frame)
+    np.testing.assert_array_equal(live.voxel_index, built.voxel_index)
+    np.testing.assert_allclose(live.features.astype(float), built.features.astype(float), atol=5e-3)
+    np.testing.assert_allclose(live.colors.astype(int), built.colors, atol=1)
+    np.testing.assert_allclose(live.map.stored.up_in_world, built.stored.up_in_world, atol=1e-9)
+    saved = live.save(tmp_path / "live.avlmap")
+    assert saved.ask("the sofa").probability == pytest.approx(built.ask("the sofa").probability, abs=0.02)
+    assert live.ask("the sofa").found == saved.ask("the sofa").found
+
+
+class Hues:
+    """The direction of a colour, which is near the direction of its name; six lines, no card, no registry."""
+
+    vocabulary = ("red", "green", "blue")
+
+    def encode(self, frame: avlmaps.Frame) -> np.ndarray:
+        rgb = frame.rgb[::4, ::4].astype(np.float32) + 1.0
+        return rgb / np.linalg.norm(rgb, axis=2, keepdims=True)
+
+    def encode_words(self, words: list[str]) -> np.ndarray:
+        return np.array([[w == "red", w == "green", w == "blue"] for w in words], np.float32)
+
+
+def test_a_map_of_an_object_opens_without_it_and_says_what_needs_it(folder: Path, tmp_path: Path) -> None:
+    mine = avlmaps.Encoders.named("colours", pixels=Hues())
+    built = avlmaps.build_map(folder / "rec", tmp_path / "m", settings=COARSE, encoders=mine, progress=False)
+    assert built.object("red").peak > 0.0
+    opened = avlmaps.open_map(tmp_path / "m")
+    assert len(opened.points) == len(opened.colors) == len(built.points)
+    assert len(opened.sounds()) == 1 and opened.sound("alarm clock") is not None
+    assert opened.locate(folder / "photo.png").inliers >= 0
+    with pytest.raises(BackendError, match=r"an object of the class Hues.*encoders=avlmaps\.Encoders\(pixels=\.\.\.\)"):
+        opened.object("red")
+    again = avlmaps.open_map(tmp_path / "m", encoders=avlmaps.Encoders(pixels=Hues()))
+    np.testing.assert_allclose(np.asarray(again.object("red")), np.asarray(built.object("red")))
+    assert [one.names for one in again.sounds()] == [one.names for one in built.sounds()]
+
+
+def test_raw_features_are_queried_by_words_of_ones_own(folder: Path, tmp_path: Path) -> None:
+    live = avlmaps.VoxelMap(0.1, avlmaps.Encoders())
+    for frame in avlmaps.open_recording(folder / "rec"):
+        add(live, frame, features=Hues().encode(frame))
+    assert live.features.shape[1] == 3
+    with pytest.raises(BackendError, match="no pixels backend"):
+        live.ask("red")
+    live.save(tmp_path / "raw")
+    worded = avlmaps.open_map(tmp_path / "raw", encoders=avlmaps.Encoders(pixels=Hues()))
+    assert worded.object("red").peak > 0.0
+
+
+@pytest.fixture
+def frame(folder: Path) -> avlmaps.Frame:
+    return avlmaps.open_recording(folder / "rec").frame(0)
+
+
+BAD_FRAMES = {
+    "rgb of floats": (dict(rgb=np.zeros((180, 240, 3))), r"rgb .* must be uint8 of shape \(h, w, 3\), not float64"),
+    "rgb without channels": (dict(rgb=np.zeros((180, 240), np.uint8)), r"not uint8 of \(180, 240\)"),
+    "rgba": (dict(rgb=np.zeros((180, 240, 4), np.uint8)), "leave the fourth channel out"),
+    "millimetres": (dict(depth_m=np.full((180, 240), 1200.0)), r"must be in metres; its median is 1,200"),
+    "whole numbers": (dict(depth_m=np.full((180, 240), 1200, np.uint16)), r"not uint16 up to 1200; millimetres"),
+    "kilometres": (dict(depth_m=np.full((180, 240), 0.002)), r"must be in metres; .* largest 0.002"),
+    "negative depth": (dict(depth_m=np.full((180, 240), -1.0)), "negative depths, down to -1 m"),
+    "depth of three axes": (dict(depth_m=np.zeros((180, 240, 3))), r"shape \(h, w\), not \(180, 240, 3\)"),
+    "depth on its side": (dict(depth_m=np.ones((240, 180))), "180x240 pixels, rgb 240x180: not one view"),
+    "words for depth": (dict(depth_m="far"), "depth_m .* must be an array of numbers, not str"),
+    "a matrix for a camera": (dict(camera=np.eye(3)), r"must be an avlmaps.Pinhole.* not ndarray"),
+    "a camera of another size": (dict(camera=CAMERA.resized(320, 240)), "rgb .* 240x180 pixels, its camera 320x240"),
+    "a pose that mirrors": (dict(world_from_camera=np.diag([1.0, 1, -1, 1])), "not a rigid transform"),
+    "a pose that stretches": (dict(world_from_camera=np.diag([2.0, 2, 2, 1])), "not a rigid transform"),
+    "a pose of three rows": (dict(world_from_camera=np.eye(4)[:3]), r"has shape \(3, 4\); it must be 4x4"),
+    "a pose of nothing": (dict(world_from_camera=np.full((4, 4), np.nan)), "NaN or infinity"),
+    "a stamp that is none": (dict(stamp_s=np.nan), "stamp_s .* must be a finite number of seconds"),
+    "a stamp in words": (dict(stamp_s="now"), "stamp_s .* must be a finite number of seconds"),
+    "features of two axes": (dict(features=np.ones((4, 3), np.float32)), r"given are float32 of \(4, 3\)"),
+    "features of other length": (dict(features=np.ones((2, 2, 5), np.float32)), r"\(rows, columns, 3\)"),
+    "features without end": (dict(features=np.full((2, 2, 3), np.inf, np.float32)), "NaN or infinite features"),
+    "features that are long": (dict(features=np.full((2, 2, 3), 2.0, np.float32)), r"length 3.46 to 3.46"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD_FRAMES)
+def test_bad_input_gets_a_sentence_and_costs_nothing(frame: avlmaps.Frame, kind: str) -> None:
+    live = avlmaps.VoxelMap(0.1, avlmaps.Encoders(pixels=Hues()))
+    add(live, frame)
+    before = len(live.points)
+    good = dict(
+        rgb=frame.rgb,
+        depth_m=frame.depth_m,
+        camera=frame.camera,
+        world_from_camera=frame.world_from_camera,
+        stamp_s=9.0,
+    )
+    wrong, said = BAD_FRAMES[kind]
+    with pytest.raises((RecordingError, BackendError), match=said):
+        live.add(**{**good, **wrong})  # pyright: ignore[reportArgumentType]
+    assert len(live) == 1 and len(live.points) == before
+    live.add(**good)  # pyright: ignore[reportArgumentType]
+    assert len(live) == 2
+
+
+@given(
+    rgb=some.arrays(
+        st.sampled_from([np.uint8, np.float32, np.int64]), some.array_shapes(min_dims=1, max_dims=4, max_side=4)
+    ),
+    depth=some.arrays(st.sampled_from([np.float32, np.uint16]), some.array_shapes(min_dims=1, max_dims=3, max_side=4)),
+    pose=some.arrays(np.float64, st.sampled_from([(4, 4), (3, 4), (4,)])),
+    stamp=st.one_of(st.floats(), st.text(max_size=2), st.none()),
+)
+@settings(max_examples=60)
+def test_any_arrays_make_a_frame_or_a_sentence(rgb, depth, pose, stamp) -> None:
+    live = avlmaps.VoxelMap(0.1, avlmaps.Encoders())
+    try:
+        live.add(rgb, depth, avlmaps.Pinhole(2.0, 2.0, 2.0, 2.0, 4, 4), pose, stamp)
+    except AvlmapsError as fault:
+        assert str(fault).endswith(".") and "\n" not in str(fault)
+    assert len(live) in (0, 1)
+
+
+def test_what_is_no_map_size_up_or_profile_is_refused() -> None:
+    for size in (0.0, -1.0, "5 cm", 50.0):
+        with pytest.raises(MapError, match="voxel"):
+            avlmaps.VoxelMap(size)  # pyright: ignore[reportArgumentType]
+    for up in ((0, 0, 0), "z", (0, 1), (np.nan, 0, 1)):
+        with pytest.raises(MapError, match="up_in_world must be a direction"):
+            avlmaps.VoxelMap(up_in_world=up)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(BackendError, match="no profile called 'embeded'"):
+        avlmaps.VoxelMap(encoders="embeded")
+    with pytest.raises(MapError, match="has no frame yet"):
+        avlmaps.VoxelMap(encoders="colours").ask("the chair")
+
+
+# Examples
+
+WORDS = {
+    "01": ["home.avlmap", "where can I sit?"], "02": ["rec", "new.avlmap"], "03": ["rec"], "04": ["rec", "live.avlmap"],
+    "05": ["rec", "mine.avlmap"], "06": ["rec"], "07": ["home.avlmap"], "08": ["home.avlmap"],
+    "09": ["home.avlmap", "photo.png"], "10": ["home.avlmap", "heat.png"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
+def test_the_examples_run(
+    script: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(sys, "argv", [str(script), *WORDS[script.name[:2]]])
+    runpy.run_path(str(script), run_name="__main__")
+    assert capsys.readouterr().out.strip()
+
+
+def test_there_are_ten_short_examples() -> None:
+    assert [path.name[:2] for path in EXAMPLES] == sorted(WORDS)
+    assert all(len(path.read_text().splitlines()) <= 40 for path in EXAMPLES)
+    for number in ("04", "05", "06"):  # a stranger's loop, encoder and features
+        (path,) = [one for one in EXAMPLES if one.name.startswith(number)]
+        code = [
+            line for line in path.read_text().splitlines() if line.strip() and not line.startswith(('"""', "import"))
+        ]
+        assert len(code) <= 20, path
