@@ -82,6 +82,10 @@ ENTRIES = (
         "The first six of the twelve: the same walls and furniture, with people, clothes, papers and mirrors that "
         "reflect. The rendered worlds that the weights learnt from had none of these.",
     ),
+    Entry(
+        "rooms", "Rooms of twelve held-out homes", "avlmaps bench rooms --out OUT", 1.0,
+        "[What a room is](concepts/rooms.md).",
+    ),
     Entry("indexing", "The paper's Tables III to V", "avlmaps bench indexing --out OUT", 1.5, _INDEXING),
     Entry(
         "indexing-clips", "The same with recorded sounds", "avlmaps bench indexing --sounds SOUNDS --out OUT", 2.5,

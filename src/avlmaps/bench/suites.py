@@ -30,7 +30,7 @@ class SuiteInputs:
         profile: the models that are measured.
         models: other backends than the profile's, ``module=backend[@model]``.
         seed: of what is drawn at random.
-        indexing: what the suites ``indexing``, ``found`` and ``objects`` are run on; its own defaults if None.
+        indexing: what the suites on scenes other than ``navigation`` are run on; its own defaults if None.
         navigation: what the suite ``navigation`` is run on; its own defaults if None.
     """
 
@@ -50,7 +50,7 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
 
     Args:
         suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``recordings``,
-            ``objects``, ``indexing``, ``found`` or ``navigation``.
+            ``objects``, ``indexing``, ``found``, ``rooms`` or ``navigation``.
         inputs: what it measures on.
         out: folder to write into.
 
@@ -65,6 +65,10 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
         from avlmaps.bench.found.suite import run_found
 
         return run_found(inputs.indexing, out)
+    if suite == "rooms":
+        from avlmaps.bench.rooms.suite import run_rooms
+
+        return run_rooms(inputs.indexing, out)
     if suite == "navigation":
         from avlmaps.bench.navigation.suite import run_navigation
 

@@ -24,6 +24,7 @@ Suite = Literal[
     "objects",
     "indexing",
     "found",
+    "rooms",
     "navigation",
 ]
 Series = Literal["sounds-1", "sounds-2", "sounds-3", "images", "pairs", "commands", "spatial"]
@@ -86,6 +87,7 @@ class Bench(ModelVerb):
     objects: positions of objects, in the scenes of indexing, whose maps it shares.
     indexing: the paper's Tables III to V, in twelve held-out homes, in --scenes, or in a recording with objects.json.
     found: is what is reported as found there? Brier scores and a reliability diagram, in the scenes of indexing.
+    rooms: the rooms of a map against the true ones (overlap, names, count, area), in the scenes of indexing.
     navigation: the paper's Tables I, II and VI and its commands, in twelve held-out homes or in --scenes.
     """
 
@@ -118,7 +120,7 @@ class Bench(ModelVerb):
         """Measure, write the tables, print them."""
         from avlmaps.bench.suites import SuiteInputs, run_suite
 
-        indexing = self.indexing_settings() if self.suite in ("indexing", "found", "objects") else None
+        indexing = self.indexing_settings() if self.suite in ("indexing", "found", "rooms", "objects") else None
         navigation = self.navigation_settings() if self.suite == "navigation" else None
         scenes = () if indexing or navigation else tuple(map(Path, self.scenes))
         models = self.models_chosen

@@ -104,8 +104,18 @@ def room_lines(rooms: "list[RoomAnswer]", frame: str = FrameName.RECORDING) -> l
     """Lay out rooms as a table, those with most views first."""
     if not rooms:
         return ["no rooms"]
-    rows = [(r["name"], f"{r['confidence']:.2f}", place(r["position"]), str(r["views"])) for r in rooms]
-    head = ("room", "confidence", f"position ({frame} frame)", "views")
+    rows = [
+        (
+            r["name"],
+            f"{r['probability']:.2f}",
+            "" if r["area_m2"] is None else f"{r['area_m2']:.1f} m²",
+            place(r["position"]),
+            str(r["views"]),
+            ", ".join(f"{other['name']} {other['probability']:.2f}" for other in r["names"][1:]),
+        )
+        for r in rooms
+    ]
+    head = ("room", "probability", "area", f"position ({frame} frame)", "views", "or")
     return _with_storeys(head, rows, [r.get("storey") for r in rooms])
 
 

@@ -32,6 +32,7 @@ from avlmaps.query.modalities.sound import (
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.pieces import Pieces, object_pieces
 from avlmaps.query.queryable import Attachment, Photo
+from avlmaps.query.room_regions import RoomRegions
 from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, voting_rows
 from avlmaps.query.things_in_rooms import ThingsInRooms
 from avlmaps.query.voxel_space import Space
@@ -218,7 +219,9 @@ class AVLMap:
         """Return the rooms of the map, those with most views first; see ``contents.find_rooms``."""
         from avlmaps.query.contents import find_rooms
 
-        return find_rooms(self.stored, self.space, self.settings.areas, least_confidence, self.room_field)
+        field, regions = self.room_field, self.room_regions
+        by_floor = None if field is None or regions is None else (field, regions)
+        return find_rooms(self.stored, self.space, self.settings.areas, least_confidence, by_floor)
 
     @property
     def points(self) -> Float[np.ndarray, "n 3"]:
@@ -349,6 +352,16 @@ class AVLMap:
         places = area_anchors(stored.keyframes, settings)
         plan = FloorPlan.of(self.space, storeys(known, cameras), places)
         return None if plan is None else Rooms(plan, places, self._voting_voxels, settings.rooms)
+
+    @cached_property
+    def room_regions(self) -> RoomRegions | None:
+        """The rooms that walls and doorways bound; None where there is no floor plan."""
+        votes = self.room_votes
+        if votes is None:
+            return None
+        camera = self.stored.rig.depth
+        width_rad = 2.0 * float(np.arctan2(camera.width, 2.0 * camera.fx))
+        return RoomRegions.of(votes.plan, np.asarray(self.stored.keyframes.world_from_camera), width_rad)
 
     @cached_property
     def room_field(self) -> RoomField | None:

@@ -26,6 +26,7 @@ from avlmaps.query.voxel_space import Space
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
     from avlmaps.maps.storeys import Storeys
+    from avlmaps.query.room_regions import RoomRegions
     from avlmaps.query.rooms import RoomField
     from avlmaps.query.schema import ContentsAnswer, RoomAnswer, SoundAnswer, ThingAnswer
 
@@ -38,6 +39,10 @@ STRUCTURE = ("wall", "floor", "ceiling", "column", "stairs", "railing")
 _SAME_SHARE = 0.5
 # A room is listed where at least this many keyframes show it.
 _FEWEST_VIEWS = 2
+# Of a room as many names are listed as are at least so likely.
+_MOST_ROOM_NAMES, _LEAST_ROOM_NAME = 3, 0.1
+LEAST_PART = 0.25
+"""Probability from which a second name of a room is taken for a part of an open plan."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,14 +115,18 @@ class SoundEvent:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
-    """One room: a region of the floor that has one likeliest name, and the keyframes that looked into it.
+    """One room: a region of the floor that walls and doorways bound, and the keyframes that looked into it.
 
     Attributes:
         name: kind of room.
-        confidence: mean posterior of the name over its views' places, in [0, 1].
+        confidence: probability of the name, in [0, 1].
         position: its view's place nearest to their middle, metres, recording frame.
         views: number of keyframes.
         places: middle of what each of its keyframes saw, metres, recording frame.
+        names: kinds that it may be and how likely it is each, best first; several of an open plan.
+        region: its number in ``AVLMap.room_regions``; −1 for a room that is a group of views.
+        area_m2: of its floor; None for a group of views.
+        outline: corners on its floor, metres, recording frame; none for a group of views.
     """
 
     name: str
@@ -125,6 +134,10 @@ class Room:
     position: tuple[float, float, float]
     views: int
     places: Float[np.ndarray, "k 3"] = field(repr=False)
+    names: tuple[tuple[str, float], ...] = ()
+    region: int = -1
+    area_m2: float | None = None
+    outline: Float[np.ndarray, "c 3"] = field(repr=False, default_factory=lambda: np.zeros((0, 3)))
 
     def to_json(self) -> "RoomAnswer":
         """Return the room as ``avlmaps things --json`` prints it."""
@@ -133,7 +146,15 @@ class Room:
             "confidence": self.confidence,
             "position": list(self.position),
             "views": self.views,
+            "probability": self.confidence,
+            "names": [{"name": name, "probability": likely} for name, likely in self.names],
+            "area_m2": self.area_m2,
+            "outline": [[round(value, 3) for value in corner] for corner in self.outline.tolist()],
         }
+
+    def may_be(self, kind: Callable[[str], bool]) -> bool:
+        """Return whether the room is of a kind, or a part of it may be: an open plan has several names."""
+        return kind(self.name) or any(kind(name) and likely >= LEAST_PART for name, likely in self.names)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -280,20 +301,19 @@ def find_rooms(
     space: Space,
     settings: AreaSettings,
     least_confidence: float = 0.0,
-    field: "RoomField | None" = None,
+    by_floor: "tuple[RoomField, RoomRegions] | None" = None,
 ) -> list[Room]:
     """Return the rooms of a map, those with most views first.
 
-    A room is a region of the floor with one likeliest name that walls and other rooms bound, and the keyframes that
-    looked into it. Without a field it is a group of keyframes with one likeliest name whose views' places lie close to
-    one another.
+    A room is a region of the floor that walls and doorways bound and that keyframes looked into. Without a plan it
+    is a group of keyframes with one likeliest name whose views' places lie close to one another.
 
     Args:
         stored: the map.
         space: its voxels' places.
         settings: how views are scored and grouped.
         least_confidence: rooms below it are left out, in [0, 1].
-        field: how likely each place is each kind of room; without it only the views vote.
+        by_floor: how likely each place is each kind of room, and the regions; None without a floor plan.
 
     Raises:
         BackendError: the map's profile has no view encoder.
@@ -304,22 +324,51 @@ def find_rooms(
     stored.require_model(Kind.VIEWS)
     names = area_names(encoder)
     places = np.asarray(stored.keyframes.centre, np.float64).reshape(-1, 3)
-    if field is None:
+    if by_floor is None:
         share = pooled_name_shares(np.asarray(stored.keyframes.view), encoder, settings, places)
         group = _groups_of_views(space.level(places)[:, :2], share, settings.link_m)
+        rooms = [*_rooms_of_views(names, share, places, group)]
     else:
-        cells = field.plan.cells_of(places)
-        share, group = field.share[cells], field.regions()[cells]
+        field, regions = by_floor
+        own, share = regions.at(places), field.at(places)
+        rooms = [*_rooms_by_floor(field, regions, places, own)]
+        beyond = np.flatnonzero(own < 0)  # where no floor is mapped, views alone speak
+        group = _groups_of_views(space.level(places[beyond])[:, :2], share[beyond], settings.link_m)
+        rooms += _rooms_of_views(names, share[beyond], places[beyond], group)
+    listed = [room for room in rooms if room.views >= _FEWEST_VIEWS and room.confidence >= least_confidence]
+    return sorted(listed, key=lambda room: (-room.views, room.name))
+
+
+def _rooms_by_floor(
+    field: "RoomField", regions: "RoomRegions", places: Float[np.ndarray, "k 3"], own: Int[np.ndarray, " k"]
+) -> Iterator[Room]:
+    """Yield the regions into which views looked, by the region that each view's place lies in."""
+    share = field.of_rooms(regions)
+    for number in np.unique(own[own >= 0]).tolist():
+        seen = places[own == number]
+        best = np.argsort(-share[number], kind="stable")[:_MOST_ROOM_NAMES]
+        likely = [(field.kinds[k], round(float(share[number, k]), 3)) for k in best]
+        yield Room(
+            *likely[0], _middle(seen), len(seen), seen,
+            tuple(one for one in likely if one[1] >= _LEAST_ROOM_NAME) or (likely[0],),
+            number, round(float(regions.areas_m2[number]), 2), regions.outline(number),
+        )  # fmt: skip
+
+
+def _rooms_of_views(
+    names: Sequence[str],
+    share: Float[np.ndarray, "k n"],
+    places: Float[np.ndarray, "k 3"],
+    group: Int[np.ndarray, " k"],
+) -> Iterator[Room]:
+    """Yield groups of views of one likeliest name."""
     likeliest = share.argmax(axis=1)
-    rooms: list[Room] = []
     for number in np.unique(group):
         members = np.flatnonzero(group == number)
         kind = int(likeliest[members[0]])
-        mean = float(share[members, kind].mean())
-        if len(members) >= _FEWEST_VIEWS and mean >= least_confidence:
-            seen_from = places[members]
-            rooms.append(Room(names[kind], round(mean, 3), _middle(seen_from), len(members), seen_from))
-    return sorted(rooms, key=lambda room: (-room.views, room.name))
+        likely = round(float(share[members, kind].mean()), 3)
+        seen = places[members]
+        yield Room(names[kind], likely, _middle(seen), len(members), seen, ((names[kind], likely),))
 
 
 def _groups_of_views(

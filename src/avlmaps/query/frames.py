@@ -18,7 +18,7 @@ def answer_in(answer: Mapping[str, Any], frame: FrameName, level_from_recording:
     """Return an answer of the command line with all its positions, poses and texts about them in a frame.
 
     Args:
-        answer: in the recording's frame: with ``position`` and ``world_from_camera`` at any depth.
+        answer: in the recording's frame: with ``position``, ``outline`` and ``world_from_camera`` at any depth.
         frame: that is wanted.
         level_from_recording: 4x4, metres.
     """
@@ -43,6 +43,8 @@ def _moved(key: str, value: Any, level_from_recording: Float[np.ndarray, "4 4"],
         point = apply(level_from_recording, np.array([value], np.float64))[0]
         spoken[_words(value)] = _words(point)
         return [float(number) for number in point]
+    if key == "outline" and value:
+        return apply(level_from_recording, np.array(value, np.float64)).round(3).tolist()
     if key == "world_from_camera" and value is not None:
         return (level_from_recording @ np.array(value, np.float64)).tolist()
     return _turned(value, level_from_recording, spoken)

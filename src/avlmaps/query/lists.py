@@ -138,9 +138,9 @@ def _room_of(avlmap: "Queryable", subject: Answer) -> tuple[list[Goal], str]:
 
 def _contents(avlmap: "Queryable", name: str) -> tuple[list[Goal], str]:
     where, things = Whereabouts.of(avlmap), _things(avlmap)
-    rooms = [k for k, room in enumerate(where.rooms) if _same_room(room.name, name)]
+    rooms = [room for room in where.rooms if room.may_be(lambda kind: _same_room(kind, name))]
     places = np.array([thing.position for thing in things]).reshape(-1, 3)
-    inside = np.isin(where.rooms_of(places), rooms) if rooms else np.zeros(len(things), bool)
+    inside = where.parts_of(lambda kind: _same_room(kind, name), places)
     goals = [_thing_goal(thing) for thing, is_in in zip(things, inside, strict=True) if is_in]
     if not rooms:
         return goals, f"The map shows no room that is a {name} as a whole."

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
     from avlmaps.maps.storeys import Storeys
     from avlmaps.query.contents import Room, SoundEvent, Thing
+    from avlmaps.query.room_regions import RoomRegions
     from avlmaps.query.rooms import RoomField, Rooms
 
 
@@ -78,6 +79,11 @@ class Queryable(Protocol):
     @cached_property
     def room_field(self) -> "RoomField | None":
         """How likely each place is each kind of room."""
+        ...
+
+    @cached_property
+    def room_regions(self) -> "RoomRegions | None":
+        """The rooms that walls and doorways bound."""
         ...
 
     def heat(

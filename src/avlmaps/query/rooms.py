@@ -2,21 +2,25 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
+from avlmaps.core.lexicon import Entry, Kind, lexicon
 from avlmaps.perception.room_contents import RoomContents
 from avlmaps.query.factors import NearAnchors
 from avlmaps.query.floor_plan import CELL_M, FloorPlan
 from avlmaps.query.room_contents import votes
+from avlmaps.query.room_regions import NONE, RoomRegions
 
 # Voxels whose names vote: one of q, so that their features' products with the names cost some tens of milliseconds.
 _MOST_PRODUCTS = 200_000_000
 # Far from all views a place is any kind of room: each kind has this number of views everywhere, divided among them.
 _PRIOR_VIEWS = 0.01
-_SEEN_VIEWS = 0.1  # a cell with fewer views near belongs to no room that is listed
+_PASSAGES = ("hallway", "corridor", "entrance hall", "staircase")
+# How much less likely a passage is for a room that has none, one, two or more rooms beside it.
+_PASSAGE_ODDS = (0.2, 0.2, 0.4, 1.0)
 _LEAST_SHARE = 0.003  # no view rules a kind of room out by more than this
 
 
@@ -84,10 +88,26 @@ class RoomField:
         """
         return np.clip(self.share @ weights, 0.0, 1.0).astype(np.float32)[self.plan.voxel_cells]
 
-    def regions(self) -> Int[np.ndarray, " c"]:
-        """Return the number of the room of each cell: a region that views saw, with one likeliest kind, up to walls."""
-        seen = self.views >= _SEEN_VIEWS
-        return self.plan.regions(np.where(seen, self.share.argmax(axis=1), -1))
+    def of_rooms(self, regions: RoomRegions) -> Float[np.ndarray, "r n"]:
+        """Return how likely each room is each kind: the mean over its floor; rows add up to 1.
+
+        A room that leads to few others is seldom a passage, whatever is seen through its door.
+        """
+        room = np.where(self.plan.open.reshape(-1), regions.of_plan_cells, NONE)
+        own = np.flatnonzero(room != NONE)
+        total = np.zeros((len(regions), len(self.kinds)))
+        np.add.at(total, room[own], self.share[own].astype(np.float64))
+        total += 1e-6
+        passage = np.array([lexicon().find(kind, Kind.ROOM) in _passages() for kind in self.kinds])
+        fewest = np.minimum(regions.neighbours, len(_PASSAGE_ODDS) - 1)
+        total *= np.where(passage, np.array(_PASSAGE_ODDS)[fewest][:, None], 1.0)
+        return total / total.sum(axis=1, keepdims=True)
+
+
+@cache
+def _passages() -> frozenset[Entry | None]:
+    known = (lexicon().find(name, Kind.ROOM) for name in _PASSAGES)
+    return frozenset(entry for entry in known if entry is not None)
 
 
 class Rooms:

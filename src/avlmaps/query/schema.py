@@ -108,14 +108,25 @@ class SoundAnswer(TypedDict):
     storey: NotRequired[Storey]
 
 
+class RoomName(TypedDict):
+    """A kind of room that a room may be."""
+
+    name: str
+    probability: Unit
+
+
 class RoomAnswer(TypedDict):
-    """One room of a map."""
+    """One room of a map: what walls and doorways bound."""
 
     name: str
     confidence: Unit
     position: Position
     views: Annotated[int, Meta(description="number of keyframes that show it")]
     storey: NotRequired[Storey]
+    probability: Annotated[float, Meta(ge=0.0, le=1.0, description="of the name")]
+    names: Annotated[list[RoomName], Meta(description="kinds that it may be, best first; several of an open plan")]
+    area_m2: Annotated[float | None, Meta(description="of its floor; null where no walls are known")]
+    outline: Annotated[list[Position], Meta(description="corners on its floor, counter-clockwise from above")]
 
 
 class ContentsAnswer(TypedDict):

@@ -1,20 +1,20 @@
 """The floors and rooms of a map as names, and which of them a point lies in: building, floor, room, things."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, Int
+from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import QueryError
-from avlmaps.query.floor_plan import CELL_M
 
 if TYPE_CHECKING:
     from avlmaps.query.contents import Room
     from avlmaps.query.floor_plan import FloorPlan
     from avlmaps.query.queryable import Queryable
+    from avlmaps.query.room_regions import RoomRegions
     from avlmaps.query.rooms import RoomField
 
 NOWHERE = -1
@@ -32,6 +32,7 @@ class Whereabouts:
         avlmap: the map.
         plan: its storeys; None for a map without a floor plan.
         field: the kinds of room of each place; None for a map whose rooms are groups of views.
+        regions: the floor of each room; None likewise.
     """
 
     rooms: "tuple[Room, ...]"
@@ -39,6 +40,7 @@ class Whereabouts:
     avlmap: "Queryable"
     plan: "FloorPlan | None"
     field: "RoomField | None"
+    regions: "RoomRegions | None" = None
 
     @classmethod
     def of(cls, avlmap: "Queryable") -> "Whereabouts":
@@ -52,7 +54,7 @@ class Whereabouts:
             return cls((), (), avlmap, None if votes is None else votes.plan, None)
         rooms, field = tuple(avlmap.rooms()), avlmap.room_field
         names = numbered([room.name for room in rooms])
-        return cls(rooms, names, avlmap, None if field is None else field.plan, field)
+        return cls(rooms, names, avlmap, None if field is None else field.plan, field, avlmap.room_regions)
 
     @property
     def floor_count(self) -> int:
@@ -82,25 +84,42 @@ class Whereabouts:
         places = np.concatenate([room.places for room in self.rooms])
         number = np.repeat(np.arange(len(self.rooms)), [len(room.places) for room in self.rooms])
         nearest = KDTree(self._by_storey(level(places), places)).query(self._by_storey(level(points), points))[1]
-        out = number[nearest]
-        if self.field is None:
-            return out
-        region = self.field.regions()
-        of_region = dict(zip(region[self.field.plan.cells_of(places)].tolist(), number.tolist(), strict=True))
-        of_points = region[self.field.plan.cells_of(points)].tolist()
-        return np.array([of_region.get(one, other) for one, other in zip(of_points, out.tolist(), strict=True)])
+        if self.regions is None:
+            return number[nearest]
+        of_region = np.full(len(self.regions) + 1, NOWHERE, np.int64)
+        for own_number, room in enumerate(self.rooms):
+            of_region[room.region] = own_number
+        of_region[-1] = NOWHERE  # rooms that are groups of views have no region
+        own = of_region[self.regions.at(points)]
+        return np.where(own == NOWHERE, number[nearest], own)
 
     def _by_storey(self, level: Float[np.ndarray, "m 3"], points: Float[np.ndarray, "m 3"]) -> np.ndarray:
         """Return level x and y, and a third number that puts other storeys farther away than any place of the same."""
         return np.c_[level[:, :2], 1e4 * self.floors_of(points)]
 
     def areas_m2(self) -> Float[np.ndarray, " r"]:
-        """Return the area of each room's region; none for a map without a floor plan."""
-        if self.field is None:
+        """Return the floor area of each room; none for a map without a floor plan."""
+        if self.regions is None:
             return np.zeros(0)
-        region, plan = self.field.regions(), self.field.plan
-        own = [np.unique(region[plan.cells_of(room.places)]) for room in self.rooms]
-        return np.array([np.isin(region, one[one >= 0]).sum() * CELL_M**2 for one in own], np.float64)
+        return np.array([room.area_m2 or 0.0 for room in self.rooms], np.float64)
+
+    def parts_of(self, kind: Callable[[str], bool], points: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
+        """Return which points lie in a room of a kind: in one of that name, or in the part of an open plan that is.
+
+        Args:
+            kind: whether a name of a room is meant.
+            points: metres, recording frame.
+        """
+        points = np.asarray(points, np.float64).reshape(-1, 3)
+        own = self.rooms_of(points)
+        whole = np.array([kind(room.name) for room in self.rooms] + [False])[own]
+        part = np.array([room.may_be(kind) for room in self.rooms] + [False])[own] & ~whole
+        if self.field is None or not part.any():
+            return whole
+        likeliest = self.field.at(points[part]).argmax(axis=1)
+        meant = np.array([kind(name) for name in self.field.kinds])
+        whole[part] = meant[likeliest]
+        return whole
 
     def numbers_of(self, asked: str) -> list[int]:
         """Return the numbers of the rooms that a word names: one by its own name, or all of a kind.

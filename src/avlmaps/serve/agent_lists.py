@@ -129,6 +129,7 @@ def list_rooms(task: Task, query: ListRoomsQuery) -> dict[str, Any]:
             "room": where.names[k],
             "name": where.rooms[k].name,
             "confidence": where.rooms[k].confidence,
+            "area_m2": where.rooms[k].area_m2,
             "position": list(where.rooms[k].position),
             "things": count[k],
             **({"floor": int(floors[k])} if where.floor_count > 1 else {}),

@@ -50,6 +50,12 @@ class TrueVoxels:
             label[missing] = self._at(index[missing] + offset)
         return label
 
+    @property
+    def index(self) -> Int[np.ndarray, "m 3"]:
+        """The voxels, as the grid counts them."""
+        axes = (self.key >> 42, (self.key >> 21) & (2 * _OFFSET - 1), self.key & (2 * _OFFSET - 1))
+        return np.stack(axes, axis=1) - _OFFSET
+
     def _at(self, index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
         if not len(self.key):
             return np.full(len(index), NOTHING)

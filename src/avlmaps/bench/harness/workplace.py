@@ -207,6 +207,13 @@ class Workplace:
         with np.load(path, allow_pickle=False) as kept:
             return TrueVoxels(kept["key"], kept["instance"])
 
+    @property
+    def wall_points(self) -> Float[np.ndarray, "w 3"]:
+        """Middles of the voxels that the walls of a simulated scene pass through, metres."""
+        true = self._true_voxels
+        walls = np.array([thing.category in ("wall", "column") for thing in self.truth.objects])
+        return self.avlmap.stored.grid.centre_of(true.index[walls[true.instance]])
+
     @cached_property
     def label(self) -> Int[np.ndarray, " n"]:
         """The true thing of each voxel of the map, -1 for none."""

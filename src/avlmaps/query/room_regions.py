@@ -1,0 +1,331 @@
+"""The rooms of a map as regions of its floors: what walls and closed doorways bound is one room.
+
+On each storey doorways are closed (``doorways``), and the free floor is parted where it narrows to no more than a door
+(watershed of the distance to walls). Nooks join the room that they open into. Parts of an open plan, with an opening
+wider than ``doorways.WIDEST_M`` between them, are one region.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from avlmaps.core.arrays import Bool, Float, Float32, Int
+from avlmaps.query.doorways import closed_doorways, without_leaves, without_posts
+from avlmaps.query.floor_plan import CELL_M as PLAN_CELL_M
+from avlmaps.query.floor_plan import FloorPlan
+from avlmaps.query.storey_grid import Sights, StoreyGrid
+
+NONE = -1
+"""The region of a place in no room."""
+_NARROW_M, _WIDER_M = 0.65, 0.15  # half the width of a door at most, and by how much rooms are wider on both sides
+_LEAST_M2, _LEAST_HALF_M = 1.5, 0.45  # a smaller or narrower region is a nook
+_LEAST_UNENTERED_M2 = 4.0  # so is one of this size that no camera entered: behind a shelf, under a bunk bed
+_GAP_M = 0.3  # unseen floor up to twice this width, and doorways, belong to a region beside them
+_TO_WALL_M = 0.1  # a region reaches onto the faces of its walls
+_REACH_M = 0.6  # a place up to this far from a region belongs to it: a picture on the wall
+_LEAST_CONTACT_M = 0.2  # along which two rooms lie side by side in a doorway
+_STRAIGHT_M = 0.12  # an outline leaves out what is smaller
+_MOST_CORNERS = 60
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StoreyRooms:
+    """The rooms of one storey.
+
+    Attributes:
+        label: number of the room of each cell, from 0; ``NONE`` outside.
+        neighbours: of each room, the number of rooms that one can see into through its doorways.
+    """
+
+    label: Int[np.ndarray, "nx ny"]
+    neighbours: Int[np.ndarray, " r"]
+
+
+def rooms_of_storey(grid: StoreyGrid) -> StoreyRooms:
+    """Part one storey into rooms."""
+    cell_m = grid.cell_m
+    wall = without_leaves(grid.wall, grid.free, cell_m)
+    free = _whole(grid.free & ~wall, wall, cell_m)
+    doorway = closed_doorways(wall, free, cell_m)
+    wall = without_posts(wall, doorway, cell_m)
+    free = _whole(free & ~wall, wall, cell_m)
+    inside = free & ~doorway
+    half_m = np.where(inside, _distance(~(wall | doorway)) * cell_m, 0.0).astype(np.float32)
+    label = _parted(inside, half_m, cell_m)
+    label = _grown(label, free | doorway, _GAP_M / cell_m)
+    label = _without_nooks(label, half_m, grid.stood, cell_m)
+    label = np.unique(np.append(label.reshape(-1), 0), return_inverse=True)[1][:-1].reshape(label.shape)
+    neighbours = np.zeros(int(label.max(initial=0)), np.int64)
+    for pair, cells in _contacts(label).items():
+        neighbours[np.array(pair) - 1] += cells * cell_m >= _LEAST_CONTACT_M - 1e-6
+    return StoreyRooms(_grown(label, np.ones_like(free), _TO_WALL_M / cell_m) - 1, neighbours)
+
+
+def _distance(cells: Bool[np.ndarray, "nx ny"]) -> Float32[np.ndarray, "nx ny"]:
+    """Return how far each cell is from the nearest one that is not held, in cells."""
+    import cv2
+
+    padded = np.pad(cells, 1).astype(np.uint8)
+    return np.asarray(cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1], np.float32)
+
+
+def _whole(
+    free: Bool[np.ndarray, "nx ny"], wall: Bool[np.ndarray, "nx ny"], cell_m: float
+) -> Bool[np.ndarray, "nx ny"]:
+    """Return the free floor without gaps: narrow ones, and those that floor and walls enclose."""
+    import cv2
+
+    reach = _GAP_M / cell_m
+    edge = int(np.ceil(reach)) + 1
+    wide = _distance(np.pad(~free, edge, constant_values=True)) <= reach
+    wide[[0, -1]], wide[:, [0, -1]] = False, False  # beyond the grid lies no floor
+    closed = (_distance(wide) > reach)[edge:-edge, edge:-edge]
+    filled = (free | closed) & ~wall
+    hole = cv2.connectedComponents((~(filled | wall)).astype(np.uint8), connectivity=4)[1]
+    outer = np.unique(np.concatenate([hole[0], hole[-1], hole[:, 0], hole[:, -1]]))
+    return filled | ((hole > 0) & ~np.isin(hole, outer))
+
+
+class _Joined:
+    """Numbers of which some are one."""
+
+    def __init__(self) -> None:
+        self.parent = [0]
+        self.peak = [0.0]
+
+    def add(self, count: int, peak: float) -> None:
+        self.parent += range(len(self.parent), len(self.parent) + count)
+        self.peak += [peak] * count
+
+    def root(self, number: int) -> int:
+        while self.parent[number] != number:
+            number = self.parent[number]
+        return number
+
+    def roots(self) -> Int[np.ndarray, " k"]:
+        return np.array([self.root(number) for number in range(len(self.parent))])
+
+
+def _parted(
+    inside: Bool[np.ndarray, "nx ny"], half_m: Float32[np.ndarray, "nx ny"], cell_m: float
+) -> Int[np.ndarray, "nx ny"]:
+    """Part the floor where it narrows to a door's width between wider parts; numbers from 1, 0 outside.
+
+    Cells are taken in by their distance to walls, the farthest first. Two parts that meet where the distance is no more
+    than half a door stay two if both have places that are farther from walls.
+    """
+    import cv2
+
+    label, known = np.zeros(inside.shape, np.int32), _Joined()
+    apart: set[tuple[int, int]] = set()
+    for step in range(int(np.ceil((_NARROW_M + _WIDER_M) / cell_m)), -1, -1):
+        from_m = step * cell_m
+        taken = half_m > from_m + 1e-6 if step else inside
+        count, part = cv2.connectedComponents(taken.astype(np.uint8), connectivity=4)
+        fresh = np.ones(count, bool)
+        fresh[0] = False
+        fresh[part[label > 0]] = False
+        number = np.zeros(count, np.int32)
+        number[fresh] = len(known.parent) + np.arange(int(fresh.sum()))
+        known.add(int(fresh.sum()), from_m + cell_m)
+        label = _flooded(np.where(number[part] > 0, number[part], label), taken)
+        before = list(known.parent)
+        for one, other in _contacts(label):
+            a, b = known.root(one), known.root(other)
+            low, high = sorted((a, b), key=lambda each: known.peak[each])
+            pair = (min(a, b), max(a, b))
+            if a == b or pair in apart:
+                continue
+            if from_m <= _NARROW_M + 1e-6 and known.peak[low] >= from_m + _WIDER_M - 1e-6:
+                apart.add(pair)
+                continue
+            known.parent[low] = high
+            rooted = ((known.root(x), known.root(y)) for x, y in apart)
+            apart = {(min(x, y), max(x, y)) for x, y in rooted if x != y}
+        if before != known.parent:
+            label = known.roots().astype(np.int32)[label]
+    return label
+
+
+def _flooded(label: Int[np.ndarray, "nx ny"], taken: Bool[np.ndarray, "nx ny"]) -> Int[np.ndarray, "nx ny"]:
+    """Return labels grown cell by cell over the cells that are taken."""
+    import cv2
+
+    cross = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
+    label = label.astype(np.int32)
+    missing = taken & (label == 0)
+    while missing.any():
+        grown = cv2.dilate(label.astype(np.float32), cross).astype(np.int32)
+        added = missing & (grown > 0)
+        if not added.any():
+            break
+        label[added] = grown[added]
+        missing &= ~added
+    return label
+
+
+def _contacts(label: Int[np.ndarray, "nx ny"]) -> dict[tuple[int, int], int]:
+    """Return the pairs of numbers that lie side by side, the lower first, and along how many cells."""
+    sides = [(label[1:], label[:-1]), (label[:, 1:], label[:, :-1])]
+    pairs = [np.stack([np.minimum(a, b), np.maximum(a, b)], axis=-1)[(a != b) & (a > 0) & (b > 0)] for a, b in sides]
+    found, count = np.unique(np.concatenate(pairs), axis=0, return_counts=True)
+    return {(int(a), int(b)): int(n) for (a, b), n in zip(found, count, strict=True)}
+
+
+def _grown(label: Int[np.ndarray, "nx ny"], over: Bool[np.ndarray, "nx ny"], reach: float) -> Int[np.ndarray, "nx ny"]:
+    """Return labels that take in cells up to ``reach`` cells away, each that of the nearest."""
+    nearest, away = _nearest_label(label)
+    return np.where((label == 0) & over & (away <= reach + 1e-3), nearest, label)
+
+
+def _nearest_label(
+    label: Int[np.ndarray, "nx ny"],
+) -> tuple[Int[np.ndarray, "nx ny"], Float32[np.ndarray, "nx ny"]]:
+    """Return the label nearest to each cell and how far away it is, in cells; 0 and infinity where there is none."""
+    import cv2
+
+    if not (label > 0).any():
+        return np.zeros_like(label), np.full(label.shape, np.inf, np.float32)
+    away, found = cv2.distanceTransformWithLabels(
+        (label == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    number = np.zeros(int(found.max()) + 1, label.dtype)
+    number[found[label > 0]] = label[label > 0]
+    return number[found], np.asarray(away, np.float32)
+
+
+def _without_nooks(
+    label: Int[np.ndarray, "nx ny"],
+    half_m: Float32[np.ndarray, "nx ny"],
+    stood: Bool[np.ndarray, "nx ny"],
+    cell_m: float,
+) -> Int[np.ndarray, "nx ny"]:
+    """Return labels in which nooks belong to the room beside them, by the longest side; those beside none are gone."""
+    while True:
+        count = int(label.max()) + 1
+        cells = np.bincount(label.reshape(-1), minlength=count)
+        area_m2 = cells * cell_m**2
+        widest = np.zeros(count, np.float32)
+        np.maximum.at(widest, label.reshape(-1), half_m.reshape(-1))
+        entered = np.bincount(label.reshape(-1), stood.reshape(-1), count) > 0
+        nook = ((area_m2 < np.where(entered, _LEAST_M2, _LEAST_UNENTERED_M2)) | (widest < _LEAST_HALF_M)) & (cells > 0)
+        nook[0] = False
+        beside: dict[int, tuple[int, int]] = {}
+        for (a, b), length in _contacts(label).items():
+            for own, other in ((a, b), (b, a)):
+                if nook[own] and (length, other) > beside.get(own, (0, 0)):
+                    beside[own] = (length, other)
+        if not beside:
+            return np.where(nook[label], 0, label)
+        known = _Joined()
+        known.add(count - 1, 0.0)
+        for own in sorted(beside, key=lambda each: (cells[each], each)):
+            a, b = known.root(own), known.root(beside[own][1])
+            known.parent[a] = b
+        label = known.roots()[label]
+
+
+@dataclass(frozen=True, eq=False)
+class RoomRegions:
+    """The rooms of all storeys, numbered from 0 over the whole map.
+
+    Attributes:
+        plan: storeys of the map.
+        grids: of each storey.
+        labels: of each storey, the number of the room of each cell; ``NONE`` outside.
+        neighbours: of each room, the number of rooms that one can see into through its doorways.
+    """
+
+    plan: FloorPlan
+    grids: tuple[StoreyGrid, ...]
+    labels: tuple[Int[np.ndarray, "nx ny"], ...]
+    neighbours: Int[np.ndarray, " r"]
+
+    @classmethod
+    def of(cls, plan: FloorPlan, world_from_camera: Float[np.ndarray, "k 4 4"], width_rad: float) -> "RoomRegions":
+        """Find the rooms of a map.
+
+        Args:
+            plan: its storeys and voxels.
+            world_from_camera: of its keyframes.
+            width_rad: angle of view of their camera, from side to side.
+        """
+        space, storeys = plan.space, range(len(plan.floors_m))
+        level, poses = space.level(space.centres), np.asarray(world_from_camera, np.float64).reshape(-1, 4, 4)
+        own, cameras = plan.storeys_of(space.centres), plan.storeys_of(poses[:, :3, 3])
+        level_from_camera = space.level_from_recording @ poses
+        grids: list[StoreyGrid] = []
+        labels: list[Int[np.ndarray, "nx ny"]] = []
+        neighbours = [np.zeros(0, np.int64)]
+        for storey in storeys:
+            rows = own == storey
+            at = level[rows] if rows.any() else np.r_[plan.origin_m, plan.floors_m[storey]][None]
+            sights = Sights.of(level_from_camera[cameras == storey], width_rad)
+            grids.append(StoreyGrid.of(at, float(plan.floors_m[storey]), sights, space.grid.voxel_size_m))
+            found = rooms_of_storey(grids[-1])
+            before = sum(len(each) for each in neighbours)
+            labels.append(np.where(found.label >= 0, found.label + before, NONE))
+            neighbours.append(found.neighbours)
+        return cls(plan, tuple(grids), tuple(labels), np.concatenate(neighbours))
+
+    @cached_property
+    def areas_m2(self) -> Float[np.ndarray, " r"]:
+        """Floor area of each room."""
+        cells = [
+            np.bincount(label[label >= 0], minlength=len(self)) * grid.cell_m**2
+            for grid, label in zip(self.grids, self.labels, strict=True)
+        ]
+        return np.sum(cells, axis=0).astype(np.float64)
+
+    def __len__(self) -> int:
+        """Return the number of rooms."""
+        return len(self.neighbours)
+
+    def at(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
+        """Return the number of the room of each point on its storey, up to 0.6 m away; ``NONE`` beyond."""
+        points = np.asarray(points_world, np.float64).reshape(-1, 3)
+        level, storey = self.plan.space.level(points), self.plan.storeys_of(points)
+        return self._of(level[:, :2], storey)
+
+    @cached_property
+    def of_plan_cells(self) -> Int[np.ndarray, " c"]:
+        """The room of each cell of the floor plan; ``NONE`` for cells in none."""
+        storey, i, j = np.indices(self.plan.wall.shape).reshape(3, -1)
+        return self._of(self.plan.origin_m + (np.stack([i, j], axis=1) + 0.5) * PLAN_CELL_M, storey)
+
+    def _of(self, level_xy: Float[np.ndarray, "m 2"], storey: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+        out = np.full(len(level_xy), NONE, np.int64)
+        for number, (grid, label) in enumerate(zip(self.grids, self._reaching, strict=True)):
+            rows = np.flatnonzero(storey == number)
+            cell, within = grid.cells_of(level_xy[rows])
+            out[rows] = np.where(within, label[cell[:, 0], cell[:, 1]], NONE)
+        return out
+
+    @cached_property
+    def _reaching(self) -> tuple[Int[np.ndarray, "nx ny"], ...]:
+        return tuple(
+            _grown(label + 1, np.ones(label.shape, bool), _REACH_M / grid.cell_m) - 1
+            for grid, label in zip(self.grids, self.labels, strict=True)
+        )
+
+    def outline(self, number: int) -> Float[np.ndarray, "k 3"]:
+        """Return the corners of a room on its floor, counter-clockwise as seen from above, recording frame, metres."""
+        import cv2
+
+        storey = next(s for s, label in enumerate(self.labels) if (label == number).any())
+        grid = self.grids[storey]
+        mask = np.pad(self.labels[storey] == number, 1).astype(np.uint8)
+        fine = np.kron(mask, np.ones((3, 3), np.uint8)).T  # contours run through middles of cells: thirds lie closer
+        contours = cv2.findContours(np.ascontiguousarray(fine), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
+        contour = max(contours, key=cv2.contourArea)
+        loose = _STRAIGHT_M
+        corners = cv2.approxPolyDP(contour, 3.0 * loose / grid.cell_m, closed=True)[:, 0]
+        while len(corners) > _MOST_CORNERS:
+            loose *= 1.5
+            corners = cv2.approxPolyDP(contour, 3.0 * loose / grid.cell_m, closed=True)[:, 0]
+        xy = grid.level_of((corners + 0.5) / 3.0 - 1.0)
+        ahead = np.roll(xy, -1, axis=0)
+        if np.sum(xy[:, 0] * ahead[:, 1] - ahead[:, 0] * xy[:, 1]) < 0.0:
+            xy = xy[::-1]
+        return self.plan.space.world(np.c_[xy, np.full(len(xy), self.plan.floors_m[storey])])

@@ -1,0 +1,210 @@
+"""One storey top-down, in fine cells along its walls: where walls stand, and where nothing does.
+
+A cell is free where a low voxel lies, such as the floor or a bed, or where a camera looked over it at a wall: between
+the camera and the first wall nothing is as high as one. So rooms are whole though half of their floor was never seen.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from avlmaps.core.arrays import Bool, Float, Int
+
+CELL_M = 0.05
+WALL_M = (1.0, 2.0)  # heights between which a wall is seen; see floor_plan
+_CORE_SHARE, _FAINT_SHARE = 0.5, 0.25  # of these heights: a wall, and a wall where it touches one
+_LOW_M = 1.0  # what is lower hides no wall
+_SIGHT_M, _RAY_RAD = 8.0, np.deg2rad(0.75)  # how far cameras look, and how finely
+_LEAST_LEVEL = 0.35  # of a line of sight's horizontal part; a camera that looks down sees no walls
+_STEP, _CHUNK = 0.9, 64  # cells from one look to the next along a line; cameras at once
+_WALL, _EDGE = 1, 2
+_SAME_PLACE_M, _SAME_HEADING_RAD = 0.25, np.deg2rad(10.0)  # cameras that look at the same
+_MOST_CAMERAS = 1500
+_MOST_CELLS = 16_000_000
+_MARGIN_M = 1.0
+_MOST_COLUMNS = 40_000  # of walls whose direction is sought
+_CLEARLY = 1.03
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sights:
+    """Cameras that looked over a storey.
+
+    Attributes:
+        places: level x and y, metres.
+        headings_rad: of the line of sight, level.
+        width_rad: angle of view from side to side.
+    """
+
+    places: Float[np.ndarray, "k 2"]
+    headings_rad: Float[np.ndarray, " k"]
+    width_rad: float
+
+    @classmethod
+    def of(cls, level_from_camera: Float[np.ndarray, "k 4 4"], width_rad: float) -> "Sights":
+        """Take those that look along the floor rather than down, one for each place and heading."""
+        poses = np.asarray(level_from_camera, np.float64).reshape(-1, 4, 4)
+        poses = poses[np.linalg.norm(poses[:, :2, 2], axis=1) >= _LEAST_LEVEL]
+        heading = np.arctan2(poses[:, 1, 2], poses[:, 0, 2])
+        key = np.floor(np.c_[poses[:, :2, 3] / _SAME_PLACE_M, heading / _SAME_HEADING_RAD]).astype(np.int64)
+        first = np.sort(np.unique(key, axis=0, return_index=True)[1])
+        first = first[:: max(1, -(-len(first) // _MOST_CAMERAS))]
+        return cls(poses[first, :2, 3], heading[first], float(width_rad))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StoreyGrid:
+    """Cell (i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · cell_m`` of the level frame turned by the heading.
+
+    Attributes:
+        heading_rad: of the walls, counter-clockwise from level +x, within a right angle.
+        origin_m: of the corner of cell (0, 0), turned x and y.
+        cell_m: side of a cell.
+        wall: cells that hold a wall, or what is as high as one.
+        free: cells that do not, and were seen.
+        stood: cells in which a camera was.
+    """
+
+    heading_rad: float
+    origin_m: Float[np.ndarray, "2"]
+    cell_m: float
+    wall: Bool[np.ndarray, "nx ny"]
+    free: Bool[np.ndarray, "nx ny"]
+    stood: Bool[np.ndarray, "nx ny"]
+
+    @classmethod
+    def of(
+        cls,
+        level: Float[np.ndarray, "n 3"],
+        floor_m: float,
+        sights: Sights,
+        voxel_size_m: float,
+        heading_rad: float | None = None,
+    ) -> "StoreyGrid":
+        """Sort the voxels of a storey into cells.
+
+        Args:
+            level: middles of its voxels, level frame, metres; at least one.
+            floor_m: level z of its floor.
+            sights: cameras over it.
+            voxel_size_m: side of a voxel.
+            heading_rad: of its walls; found if None.
+        """
+        height = level[:, 2] - floor_m
+        tall = (height >= WALL_M[0]) & (height < WALL_M[1])
+        heading = wall_heading(level[tall, :2], voxel_size_m) if heading_rad is None else heading_rad
+        places = turned(level[:, :2], -heading)
+        over = turned(sights.places, -heading)
+        everywhere = np.concatenate([places, over])
+        ends = np.array([everywhere.min(axis=0), everywhere.max(axis=0)])
+        cell_m = max(CELL_M, voxel_size_m)
+        while np.prod(np.ptp(ends, axis=0) / cell_m + 1.0) > _MOST_CELLS:
+            cell_m *= 2.0
+        low = np.floor((ends[0] - _MARGIN_M) / cell_m)
+        shape = tuple((np.ceil((ends[1] + _MARGIN_M) / cell_m) - low).astype(np.int64).tolist())
+        cell = np.floor(places / cell_m + 1e-6).astype(np.int64) - low.astype(np.int64)
+        own = cell[:, 0] * shape[1] + cell[:, 1]
+        wall = _walls(own[tall], height[tall] - WALL_M[0], voxel_size_m, shape)
+        below = _marked(own[height < _LOW_M], shape)
+        over = over / cell_m - low
+        seen = _carved(wall, over, sights.headings_rad - heading, sights.width_rad, _SIGHT_M / cell_m)
+        stood = np.zeros(shape, bool)
+        at = np.floor(over).astype(np.int64)
+        stood[tuple(at[((at >= 0) & (at < shape)).all(axis=1)].T)] = True
+        return cls(float(heading), low * cell_m, float(cell_m), wall, (seen | below) & ~wall, stood)
+
+    def cells_of(self, level_xy: Float[np.ndarray, "m 2"]) -> tuple[Int[np.ndarray, "m 2"], Bool[np.ndarray, " m"]]:
+        """Return the cell nearest to each place, and which places lie within the grid."""
+        cell = np.floor((turned(level_xy, -self.heading_rad) - self.origin_m) / self.cell_m)
+        most = np.array(self.wall.shape) - 1
+        return np.clip(cell, 0, most).astype(np.int64), ((cell >= 0) & (cell <= most)).all(axis=1)
+
+    def level_of(self, corners: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, "m 2"]:
+        """Return level x and y of places that are given in cells from the corner of cell (0, 0)."""
+        return turned(self.origin_m + np.asarray(corners, np.float64) * self.cell_m, self.heading_rad)
+
+
+def turned(xy: Float[np.ndarray, "m 2"], angle_rad: float) -> Float[np.ndarray, "m 2"]:
+    """Return places turned counter-clockwise about the origin."""
+    cos, sin = np.cos(angle_rad), np.sin(angle_rad)
+    return np.asarray(xy, np.float64) @ np.array([[cos, sin], [-sin, cos]])
+
+
+def wall_heading(xy: Float[np.ndarray, "m 2"], cell_m: float) -> float:
+    """Return the heading along which most walls run, in [0, π/2) by degrees; 0 where it is as good as any.
+
+    Along it, walls fall into few rows and columns of cells.
+    """
+    column = np.unique(np.floor(np.asarray(xy) / cell_m + 1e-6).astype(np.int64), axis=0)
+    if len(column) < 2:
+        return 0.0
+    some = (column[:: max(1, len(column) // _MOST_COLUMNS)] + 0.5) * cell_m
+    angles = np.deg2rad(np.arange(90.0))
+    packed = [_packed(turned(some - some.mean(axis=0), -angle), cell_m) for angle in angles]
+    best = int(np.argmax(packed))
+    return 0.0 if packed[best] < _CLEARLY * packed[0] else float(angles[best])
+
+
+def _packed(xy: Float[np.ndarray, "m 2"], cell_m: float) -> float:
+    """Return the sum of squares of the numbers of places in rows and in columns of two cells."""
+    rows = np.floor(xy / (2.0 * cell_m) + 0.5).astype(np.int64)
+    counts = [np.bincount(axis - axis.min()).astype(np.float64) for axis in rows.T]
+    return float(sum(np.square(count).sum() for count in counts))
+
+
+def _marked(own: Int[np.ndarray, " m"], shape: tuple[int, ...]) -> Bool[np.ndarray, "nx ny"]:
+    out = np.zeros(shape, bool)
+    out.reshape(-1)[own] = True
+    return out
+
+
+def _walls(
+    own: Int[np.ndarray, " m"], over_m: Float[np.ndarray, " m"], voxel_size_m: float, shape: tuple[int, ...]
+) -> Bool[np.ndarray, "nx ny"]:
+    """Return the cells where voxels fill half of the heights of walls, and fainter ones that touch these."""
+    import cv2
+
+    layers = max(1, int(np.ceil((WALL_M[1] - WALL_M[0]) / voxel_size_m)))
+    held = np.zeros((int(np.prod(shape)), layers), bool)
+    held[own, np.minimum((over_m / voxel_size_m).astype(np.int64), layers - 1)] = True
+    share = held.mean(axis=1).reshape(shape)
+    label = cv2.connectedComponents((share >= _FAINT_SHARE).astype(np.uint8), connectivity=8)[1]
+    kept = np.zeros(int(label.max()) + 1, bool)
+    kept[label[share >= _CORE_SHARE]] = True
+    kept[0] = False
+    return kept[label]
+
+
+def _carved(
+    wall: Bool[np.ndarray, "nx ny"],
+    places: Float[np.ndarray, "k 2"],
+    headings_rad: Float[np.ndarray, " k"],
+    width_rad: float,
+    reach: float,
+) -> Bool[np.ndarray, "nx ny"]:
+    """Return the cells between cameras and the first wall along each line of sight; a line without a wall clears none.
+
+    Args:
+        wall: cells with walls.
+        places: of the cameras, in cells.
+        headings_rad: of their lines of sight.
+        width_rad: angle of view.
+        reach: cells.
+    """
+    out = np.zeros(np.array(wall.shape) + 2, bool)
+    ends = np.pad(np.where(wall, _WALL, 0), 1, constant_values=_EDGE).astype(np.uint8)
+    angles = np.arange(-width_rad / 2.0, width_rad / 2.0, _RAY_RAD)
+    steps = np.arange(0.0, reach, _STEP, dtype=np.float32)
+    last = np.array(out.shape, np.float32) - 1.0
+    for start in range(0, len(places), _CHUNK):
+        chunk = slice(start, start + _CHUNK)
+        along = (headings_rad[chunk, None] + angles).reshape(-1, 1).astype(np.float32)
+        x, y = np.repeat(places[chunk] + 1.0, len(angles), axis=0).astype(np.float32).T
+        i = np.clip(x[:, None] + np.cos(along) * steps, 0.0, last[0]).astype(np.int32)
+        j = np.clip(y[:, None] + np.sin(along) * steps, 0.0, last[1]).astype(np.int32)
+        end = ends[i, j]
+        first = (end > 0).argmax(axis=1)
+        first[end[np.arange(len(end)), first] != _WALL] = 0
+        before = np.arange(len(steps)) < first[:, None]
+        out[i[before], j[before]] = True
+    return out[1:-1, 1:-1]
