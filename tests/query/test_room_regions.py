@@ -11,13 +11,13 @@ from walled_rooms import two_rooms_index
 
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.floor_plan import FloorPlan
+from avlmaps.query.raster import dilated
 from avlmaps.query.room_regions import NONE, RoomRegions, rooms_of_storey
 from avlmaps.query.rooms import RoomField
 from avlmaps.query.storey_grid import Sights, StoreyGrid, turned, wall_heading
 from avlmaps.query.voxel_space import Space
 
 CELL = 0.05
-NOBODY = Sights(np.zeros((0, 2)), np.zeros(0), 1.0)
 
 
 def cells(value_m: float) -> int:
@@ -41,9 +41,7 @@ class Drawn:
 
     def grid(self) -> StoreyGrid:
         free = ~self.solid
-        near = np.pad(free, 1)
-        beside = sum(np.roll(near, (i, j), (0, 1)) for i in (-1, 0, 1) for j in (-1, 0, 1))[1:-1, 1:-1] > 0
-        return StoreyGrid(0.0, np.zeros(2), CELL, beside & self.solid, free, free)
+        return StoreyGrid(0.0, np.zeros(2), CELL, dilated(free, 3, 3) & self.solid, free, free)
 
     def at(self, label: np.ndarray, x: float, y: float) -> int:
         return int(label[cells(x + 1.0), cells(y + 1.0)])

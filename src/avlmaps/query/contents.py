@@ -346,7 +346,7 @@ def _rooms_by_floor(
     share = field.of_rooms(regions)
     for number in np.unique(own[own >= 0]).tolist():
         seen = places[own == number]
-        best = np.argsort(-share[number], kind="stable")[:_MOST_ROOM_NAMES]
+        best: list[int] = np.argsort(-share[number], kind="stable")[:_MOST_ROOM_NAMES].tolist()
         likely = [(field.kinds[k], round(float(share[number, k]), 3)) for k in best]
         yield Room(
             *likely[0], _middle(seen), len(seen), seen,

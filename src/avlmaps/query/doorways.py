@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Int
+from avlmaps.query.raster import bridged, dilated, distance, extents, of_pieces, opened, pieces
 
 WIDEST_M = 2.2
 """A wider opening joins two parts of one room: an open plan."""
@@ -31,60 +32,41 @@ def without_leaves(
     wall: Bool[np.ndarray, "nx ny"], free: Bool[np.ndarray, "nx ny"], cell_m: float
 ) -> Bool[np.ndarray, "nx ny"]:
     """Return walls without leaves of doors and other pieces that are thin, short and seen from both sides."""
-    import cv2
-
-    solid = np.pad(~(free | _shadows(~(free | wall), cell_m)), 3, constant_values=True).astype(np.uint8)
-    core = cv2.distanceTransform(solid, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * cell_m > _LEAF_THICKNESS_M - 0.01
-    away = cv2.distanceTransform((~core).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    thick = away[3:-3, 3:-3] * cell_m <= _LEAF_THICKNESS_M + 0.02
-    out = wall & ~_short(wall & ~thick, _LEAF_M / cell_m, np.hypot)
-    return out & ~(_short(out, _SCREEN_M / cell_m, np.hypot) & ~_touching(out, thick))
+    solid = ~(free | _shadows(~(free | wall), cell_m))
+    core = distance(solid, beyond=True) * cell_m > _LEAF_THICKNESS_M - 0.01
+    thick = distance(~core, beyond=True) * cell_m <= _LEAF_THICKNESS_M + 0.02
+    out = wall & ~_short(wall & ~thick, _LEAF_M / cell_m)
+    piece = pieces(out, diagonally=True)
+    rows, columns, _ = extents(piece).T
+    return out & ~((np.hypot(rows, columns) <= _SCREEN_M / cell_m) & ~of_pieces(piece, thick))[piece]
 
 
 def _shadows(unseen: Bool[np.ndarray, "nx ny"], cell_m: float) -> Bool[np.ndarray, "nx ny"]:
     """Return small unseen places behind what stands about; the insides of walls are narrower."""
-    import cv2
-
-    padded = np.pad(unseen, 1).astype(np.uint8)
-    deep = cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * cell_m >= _SHADOW_M / 2.0
-    _, label, stats, _ = cv2.connectedComponentsWithStats(padded, connectivity=4)
-    small = stats[:, cv2.CC_STAT_AREA] * cell_m**2 <= _SHADOW_M2
-    held = np.zeros(len(stats), bool)
-    held[label[deep]] = True
-    held[0] = False
-    return (small & held)[label][1:-1, 1:-1]
+    piece = pieces(unseen)
+    small = extents(piece)[:, 2] * cell_m**2 <= _SHADOW_M2
+    return (small & of_pieces(piece, distance(unseen) * cell_m >= _SHADOW_M / 2.0))[piece]
 
 
-def _touching(cells: Bool[np.ndarray, "nx ny"], some: Bool[np.ndarray, "nx ny"]) -> Bool[np.ndarray, "nx ny"]:
-    """Return the pieces of cells that hold some others."""
-    import cv2
-
-    label = cv2.connectedComponents(cells.astype(np.uint8), connectivity=8)[1]
-    held = np.zeros(int(label.max()) + 1, bool)
-    held[label[some]] = True
-    held[0] = False
-    return held[label]
+def posts(wall: Bool[np.ndarray, "nx ny"], cell_m: float) -> Bool[np.ndarray, "nx ny"]:
+    """Return the walls that stand alone and are small: a lamp, a plant, a person, a pillar."""
+    rows, columns, _ = extents(piece := pieces(wall, diagonally=True)).T
+    return (np.maximum(rows, columns) <= _POST_M / cell_m)[piece] & wall
 
 
 def without_posts(
     wall: Bool[np.ndarray, "nx ny"], doorway: Bool[np.ndarray, "nx ny"], cell_m: float
 ) -> Bool[np.ndarray, "nx ny"]:
-    """Return walls without what stands alone, such as a lamp, a plant or a person; pillars between doorways stay."""
-    import cv2
-
-    post = _short(wall, _POST_M / cell_m, np.maximum)
-    beside = cv2.dilate(doorway.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    return wall & (~post | _touching(post, beside))
+    """Return walls without what stands alone; pillars between doorways stay."""
+    post = posts(wall, cell_m)
+    piece = pieces(post, diagonally=True)
+    return wall & (~post | of_pieces(piece, dilated(doorway, 3, 3))[piece])
 
 
-def _short(cells: Bool[np.ndarray, "nx ny"], most: float, length: np.ufunc) -> Bool[np.ndarray, "nx ny"]:
+def _short(cells: Bool[np.ndarray, "nx ny"], most: float) -> Bool[np.ndarray, "nx ny"]:
     """Return the pieces of cells that are no longer than ``most`` cells."""
-    import cv2
-
-    _, label, stats, _ = cv2.connectedComponentsWithStats(cells.astype(np.uint8), connectivity=8)
-    short = length(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) <= most
-    short[0] = False
-    return short[label]
+    rows, columns, _ = extents(piece := pieces(cells, diagonally=True)).T
+    return (np.hypot(rows, columns) <= most)[piece] & cells
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,7 +97,7 @@ def closed_doorways(
         free: cells without, that were seen.
         cell_m: side of a cell.
     """
-    post = _short(wall, _POST_M / cell_m, np.maximum)
+    post = posts(wall, cell_m)
     gaps = [_gaps(wall, post, free, cell_m), _gaps(wall.T, post.T, free.T, cell_m)]
     out = np.zeros(wall.shape, bool)
     narrower = 0.0
@@ -139,16 +121,12 @@ def _gaps(
 
     What stands alone is the end of a gap only where it lies between two walls.
     """
-    import cv2
-
-    row, start, end = _runs(_bridged(wall))
-    alone = _sums(_bridged(post))
+    row, start, end = _runs(_as_rows(wall))
+    alone = _sums(_as_rows(post))
     long = ((end - start) * cell_m >= _LEAST_WALL_M - 1e-6) & (alone[row, end] == alone[row, start])
-    beam = np.ones((max(3, 2 * (round(_LEAST_WALL_M / cell_m) // 2) - 1), 1), np.uint8)
-    across = cv2.dilate(
-        cv2.morphologyEx((wall & ~post).astype(np.uint8), cv2.MORPH_OPEN, beam), np.ones((3, 1), np.uint8)
-    )
-    ends_at = _sums(across > 0)
+    beam = max(3, 2 * (round(_LEAST_WALL_M / cell_m) // 2) - 1)
+    across = dilated(opened(wall & ~post, beam, 1), 3, 1)
+    ends_at = _sums(across)
     held = long | (ends_at[row, end] > ends_at[row, start])
     held |= _pillars(row, start, end, held, _DOOR_M / cell_m)
     row, start, end, long = row[held], start[held], end[held], long[held]
@@ -203,12 +181,9 @@ def _leads_somewhere(
     return (wide_a & wide_b) | (gaps.between & free_a & free_b & (wide_a | wide_b))
 
 
-def _bridged(wall: Bool[np.ndarray, "r c"]) -> Bool[np.ndarray, "r c"]:
+def _as_rows(wall: Bool[np.ndarray, "r c"]) -> Bool[np.ndarray, "r c"]:
     """Return walls a cell thicker to both sides, with holes of up to four cells along the rows closed."""
-    import cv2
-
-    thick = np.pad(cv2.dilate(wall.astype(np.uint8), np.ones((3, 1), np.uint8)), 3)
-    return cv2.morphologyEx(thick, cv2.MORPH_CLOSE, np.ones((1, 5), np.uint8))[3:-3, 3:-3] > 0
+    return bridged(dilated(wall, 3, 1), 5)
 
 
 def _runs(
@@ -227,7 +202,7 @@ def _sums(cells: Bool[np.ndarray, "r c"]) -> Int[np.ndarray, "r c1"]:
 
 def _nearest(cells: Bool[np.ndarray, "r c"]) -> tuple[Int[np.ndarray, "r c"], Int[np.ndarray, "r c"]]:
     """Return the column of the nearest of some cells at or before each one and at or after it; −1 and c for none."""
-    count = cells.shape[1]
+    count = int(cells.shape[1])
     column = np.arange(count)
     before = np.maximum.accumulate(np.where(cells, column, -1), axis=1)
     after = np.minimum.accumulate(np.where(cells, column, count)[:, ::-1], axis=1)[:, ::-1]

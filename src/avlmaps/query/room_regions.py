@@ -14,6 +14,7 @@ from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.query.doorways import closed_doorways, without_leaves, without_posts
 from avlmaps.query.floor_plan import CELL_M as PLAN_CELL_M
 from avlmaps.query.floor_plan import FloorPlan
+from avlmaps.query.raster import contacts, distance, flooded, nearest_label, outline, pieces
 from avlmaps.query.storey_grid import Sights, StoreyGrid
 
 NONE = -1
@@ -51,38 +52,27 @@ def rooms_of_storey(grid: StoreyGrid) -> StoreyRooms:
     wall = without_posts(wall, doorway, cell_m)
     free = _whole(free & ~wall, wall, cell_m)
     inside = free & ~doorway
-    half_m = np.where(inside, _distance(~(wall | doorway)) * cell_m, 0.0).astype(np.float32)
+    half_m = np.where(inside, distance(~(wall | doorway)) * cell_m, 0.0).astype(np.float32)
     label = _parted(inside, half_m, cell_m)
     label = _grown(label, free | doorway, _GAP_M / cell_m)
     label = _without_nooks(label, half_m, grid.stood, cell_m)
     label = np.unique(np.append(label.reshape(-1), 0), return_inverse=True)[1][:-1].reshape(label.shape)
     neighbours = np.zeros(int(label.max(initial=0)), np.int64)
-    for pair, cells in _contacts(label).items():
+    for pair, cells in contacts(label).items():
         neighbours[np.array(pair) - 1] += cells * cell_m >= _LEAST_CONTACT_M - 1e-6
     return StoreyRooms(_grown(label, np.ones_like(free), _TO_WALL_M / cell_m) - 1, neighbours)
-
-
-def _distance(cells: Bool[np.ndarray, "nx ny"]) -> Float32[np.ndarray, "nx ny"]:
-    """Return how far each cell is from the nearest one that is not held, in cells."""
-    import cv2
-
-    padded = np.pad(cells, 1).astype(np.uint8)
-    return np.asarray(cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1], np.float32)
 
 
 def _whole(
     free: Bool[np.ndarray, "nx ny"], wall: Bool[np.ndarray, "nx ny"], cell_m: float
 ) -> Bool[np.ndarray, "nx ny"]:
     """Return the free floor without gaps: narrow ones, and those that floor and walls enclose."""
-    import cv2
-
     reach = _GAP_M / cell_m
     edge = int(np.ceil(reach)) + 1
-    wide = _distance(np.pad(~free, edge, constant_values=True)) <= reach
-    wide[[0, -1]], wide[:, [0, -1]] = False, False  # beyond the grid lies no floor
-    closed = (_distance(wide) > reach)[edge:-edge, edge:-edge]
+    wide = distance(np.pad(~free, edge, constant_values=True), beyond=True) <= reach
+    closed = (distance(wide) > reach)[edge:-edge, edge:-edge]
     filled = (free | closed) & ~wall
-    hole = cv2.connectedComponents((~(filled | wall)).astype(np.uint8), connectivity=4)[1]
+    hole = pieces(~(filled | wall))
     outer = np.unique(np.concatenate([hole[0], hole[-1], hole[:, 0], hole[:, -1]]))
     return filled | ((hole > 0) & ~np.isin(hole, outer))
 
@@ -115,23 +105,21 @@ def _parted(
     Cells are taken in by their distance to walls, the farthest first. Two parts that meet where the distance is no more
     than half a door stay two if both have places that are farther from walls.
     """
-    import cv2
-
     label, known = np.zeros(inside.shape, np.int32), _Joined()
     apart: set[tuple[int, int]] = set()
     for step in range(int(np.ceil((_NARROW_M + _WIDER_M) / cell_m)), -1, -1):
         from_m = step * cell_m
         taken = half_m > from_m + 1e-6 if step else inside
-        count, part = cv2.connectedComponents(taken.astype(np.uint8), connectivity=4)
-        fresh = np.ones(count, bool)
+        part = pieces(taken)
+        fresh = np.ones(int(part.max(initial=0)) + 1, bool)
         fresh[0] = False
         fresh[part[label > 0]] = False
-        number = np.zeros(count, np.int32)
+        number = np.zeros(len(fresh), np.int32)
         number[fresh] = len(known.parent) + np.arange(int(fresh.sum()))
         known.add(int(fresh.sum()), from_m + cell_m)
-        label = _flooded(np.where(number[part] > 0, number[part], label), taken)
+        label = flooded(np.where(number[part] > 0, number[part], label), taken)
         before = list(known.parent)
-        for one, other in _contacts(label):
+        for one, other in contacts(label):
             a, b = known.root(one), known.root(other)
             low, high = sorted((a, b), key=lambda each: known.peak[each])
             pair = (min(a, b), max(a, b))
@@ -148,51 +136,10 @@ def _parted(
     return label
 
 
-def _flooded(label: Int[np.ndarray, "nx ny"], taken: Bool[np.ndarray, "nx ny"]) -> Int[np.ndarray, "nx ny"]:
-    """Return labels grown cell by cell over the cells that are taken."""
-    import cv2
-
-    cross = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
-    label = label.astype(np.int32)
-    missing = taken & (label == 0)
-    while missing.any():
-        grown = cv2.dilate(label.astype(np.float32), cross).astype(np.int32)
-        added = missing & (grown > 0)
-        if not added.any():
-            break
-        label[added] = grown[added]
-        missing &= ~added
-    return label
-
-
-def _contacts(label: Int[np.ndarray, "nx ny"]) -> dict[tuple[int, int], int]:
-    """Return the pairs of numbers that lie side by side, the lower first, and along how many cells."""
-    sides = [(label[1:], label[:-1]), (label[:, 1:], label[:, :-1])]
-    pairs = [np.stack([np.minimum(a, b), np.maximum(a, b)], axis=-1)[(a != b) & (a > 0) & (b > 0)] for a, b in sides]
-    found, count = np.unique(np.concatenate(pairs), axis=0, return_counts=True)
-    return {(int(a), int(b)): int(n) for (a, b), n in zip(found, count, strict=True)}
-
-
 def _grown(label: Int[np.ndarray, "nx ny"], over: Bool[np.ndarray, "nx ny"], reach: float) -> Int[np.ndarray, "nx ny"]:
     """Return labels that take in cells up to ``reach`` cells away, each that of the nearest."""
-    nearest, away = _nearest_label(label)
+    nearest, away = nearest_label(label)
     return np.where((label == 0) & over & (away <= reach + 1e-3), nearest, label)
-
-
-def _nearest_label(
-    label: Int[np.ndarray, "nx ny"],
-) -> tuple[Int[np.ndarray, "nx ny"], Float32[np.ndarray, "nx ny"]]:
-    """Return the label nearest to each cell and how far away it is, in cells; 0 and infinity where there is none."""
-    import cv2
-
-    if not (label > 0).any():
-        return np.zeros_like(label), np.full(label.shape, np.inf, np.float32)
-    away, found = cv2.distanceTransformWithLabels(
-        (label == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    number = np.zeros(int(found.max()) + 1, label.dtype)
-    number[found[label > 0]] = label[label > 0]
-    return number[found], np.asarray(away, np.float32)
 
 
 def _without_nooks(
@@ -212,7 +159,7 @@ def _without_nooks(
         nook = ((area_m2 < np.where(entered, _LEAST_M2, _LEAST_UNENTERED_M2)) | (widest < _LEAST_HALF_M)) & (cells > 0)
         nook[0] = False
         beside: dict[int, tuple[int, int]] = {}
-        for (a, b), length in _contacts(label).items():
+        for (a, b), length in contacts(label).items():
             for own, other in ((a, b), (b, a)):
                 if nook[own] and (length, other) > beside.get(own, (0, 0)):
                     beside[own] = (length, other)
@@ -311,21 +258,13 @@ class RoomRegions:
 
     def outline(self, number: int) -> Float[np.ndarray, "k 3"]:
         """Return the corners of a room on its floor, counter-clockwise as seen from above, recording frame, metres."""
-        import cv2
-
         storey = next(s for s, label in enumerate(self.labels) if (label == number).any())
-        grid = self.grids[storey]
-        mask = np.pad(self.labels[storey] == number, 1).astype(np.uint8)
-        fine = np.kron(mask, np.ones((3, 3), np.uint8)).T  # contours run through middles of cells: thirds lie closer
-        contours = cv2.findContours(np.ascontiguousarray(fine), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
-        contour = max(contours, key=cv2.contourArea)
-        loose = _STRAIGHT_M
-        corners = cv2.approxPolyDP(contour, 3.0 * loose / grid.cell_m, closed=True)[:, 0]
-        while len(corners) > _MOST_CORNERS:
-            loose *= 1.5
-            corners = cv2.approxPolyDP(contour, 3.0 * loose / grid.cell_m, closed=True)[:, 0]
-        xy = grid.level_of((corners + 0.5) / 3.0 - 1.0)
+        grid, own = self.grids[storey], self.labels[storey] == number
+        low = np.array([np.flatnonzero(own.any(axis=1))[0], np.flatnonzero(own.any(axis=0))[0]])
+        high = np.array([np.flatnonzero(own.any(axis=1))[-1], np.flatnonzero(own.any(axis=0))[-1]]) + 1
+        part = own[low[0] : high[0], low[1] : high[1]]
+        xy = grid.level_of(low + outline(part, _STRAIGHT_M / grid.cell_m, _MOST_CORNERS))
         ahead = np.roll(xy, -1, axis=0)
-        if np.sum(xy[:, 0] * ahead[:, 1] - ahead[:, 0] * xy[:, 1]) < 0.0:
+        if float(np.sum(xy[:, 0] * ahead[:, 1] - ahead[:, 0] * xy[:, 1])) < 0.0:
             xy = xy[::-1]
         return self.plan.space.world(np.c_[xy, np.full(len(xy), self.plan.floors_m[storey])])

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
+from avlmaps.query.raster import of_pieces, pieces
 
 CELL_M = 0.05
 WALL_M = (1.0, 2.0)  # heights between which a wall is seen; see floor_plan
@@ -117,7 +118,8 @@ class StoreyGrid:
         """Return the cell nearest to each place, and which places lie within the grid."""
         cell = np.floor((turned(level_xy, -self.heading_rad) - self.origin_m) / self.cell_m)
         most = np.array(self.wall.shape) - 1
-        return np.clip(cell, 0, most).astype(np.int64), ((cell >= 0) & (cell <= most)).all(axis=1)
+        within: Bool[np.ndarray, " m"] = np.all((cell >= 0) & (cell <= most), axis=1)
+        return np.clip(cell, 0, most).astype(np.int64), within
 
     def level_of(self, corners: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, "m 2"]:
         """Return level x and y of places that are given in cells from the corner of cell (0, 0)."""
@@ -162,17 +164,12 @@ def _walls(
     own: Int[np.ndarray, " m"], over_m: Float[np.ndarray, " m"], voxel_size_m: float, shape: tuple[int, ...]
 ) -> Bool[np.ndarray, "nx ny"]:
     """Return the cells where voxels fill half of the heights of walls, and fainter ones that touch these."""
-    import cv2
-
     layers = max(1, int(np.ceil((WALL_M[1] - WALL_M[0]) / voxel_size_m)))
     held = np.zeros((int(np.prod(shape)), layers), bool)
     held[own, np.minimum((over_m / voxel_size_m).astype(np.int64), layers - 1)] = True
     share = held.mean(axis=1).reshape(shape)
-    label = cv2.connectedComponents((share >= _FAINT_SHARE).astype(np.uint8), connectivity=8)[1]
-    kept = np.zeros(int(label.max()) + 1, bool)
-    kept[label[share >= _CORE_SHARE]] = True
-    kept[0] = False
-    return kept[label]
+    piece = pieces(share >= _FAINT_SHARE, diagonally=True)
+    return of_pieces(piece, share >= _CORE_SHARE)[piece]
 
 
 def _carved(

@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from avlmaps.query.doorways import WIDEST_M
 from avlmaps.query.loops import connected
+from avlmaps.query.raster import dilated
 from avlmaps.sim.scene import Area
 
 CELL_M = 0.1
@@ -38,7 +39,7 @@ class Floor:
     @property
     def middles(self) -> Float[np.ndarray, "nx ny 2"]:
         """Middles of the cells."""
-        return self.origin_m + (np.stack(np.indices(self.label.shape), axis=-1) + 0.5) * CELL_M
+        return self.origin_m + (np.moveaxis(np.indices(self.label.shape), 0, -1) + 0.5) * CELL_M
 
     def mask(self, outline: Float[np.ndarray, "k 3"]) -> Bool[np.ndarray, "nx ny"]:
         """Return the cells within an outline; none where it lies on another storey."""
@@ -92,11 +93,12 @@ def _floor(
         pairs = _wide_openings(label, _cells(walls[between], origin, shape))
         joined = connected(len(areas), pairs[:, 0], pairs[:, 1])
     kinds = tuple(
-        tuple(sorted({areas[k].kind for k in np.flatnonzero(joined == number)})) for number in range(joined.max() + 1)
+        tuple(sorted({area.kind for area, own in zip(areas, joined.tolist(), strict=True) if own == number}))
+        for number in range(int(joined.max()) + 1)
     )
     low = (seen[:, 2] - floor_m > -0.3) & (seen[:, 2] - floor_m < 2.0)
     shown = _cells(seen[low], origin, shape)
-    label = np.where(label >= 0, joined[label], -1)
+    label = np.asarray(np.where(label >= 0, joined[label], -1))
     some = [float(shown[label == number].mean()) >= _SEEN for number in range(len(kinds))]
     return Floor(floor_m, origin, label, kinds, np.array(some))
 
@@ -113,9 +115,7 @@ def _cells(
 
 def _wide_openings(label: Int[np.ndarray, "nx ny"], wall: Bool[np.ndarray, "nx ny"]) -> Int[np.ndarray, "p 2"]:
     """Return the pairs of areas between which more than a door's width of their common side has no wall."""
-    from scipy.ndimage import binary_dilation
-
-    near = binary_dilation(wall, np.ones((3, 3), bool), iterations=_BESIDE_CELLS)
+    near = dilated(wall, 1 + 2 * _BESIDE_CELLS, 1 + 2 * _BESIDE_CELLS)
     open_m: dict[tuple[int, int], float] = {}
     for a, b, closed in (
         (label[1:], label[:-1], near[1:] | near[:-1]),
