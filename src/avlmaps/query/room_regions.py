@@ -257,7 +257,7 @@ class RoomRegions:
         )
 
     def outline(self, number: int) -> Float[np.ndarray, "k 3"]:
-        """Return the corners of a room on its floor, counter-clockwise as seen from above, recording frame, metres."""
+        """Return the corners of a room on its floor, counter-clockwise top-down, recording frame, metres."""
         storey = next(s for s, label in enumerate(self.labels) if (label == number).any())
         grid, own = self.grids[storey], self.labels[storey] == number
         low = np.array([np.flatnonzero(own.any(axis=1))[0], np.flatnonzero(own.any(axis=0))[0]])

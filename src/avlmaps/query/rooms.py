@@ -91,7 +91,7 @@ class RoomField:
     def of_rooms(self, regions: RoomRegions) -> Float[np.ndarray, "r n"]:
         """Return how likely each room is each kind: the mean over its floor; rows add up to 1.
 
-        A room that leads to few others is seldom a passage, whatever is seen through its door.
+        A room that leads to few others is seldom a passage, though one sees a hallway through its door.
         """
         room = np.where(self.plan.open.reshape(-1), regions.of_plan_cells, NONE)
         own = np.flatnonzero(room != NONE)
