@@ -14,9 +14,12 @@ from hypothesis.extra import numpy as some
 import avlmaps
 from avlmaps.core.errors import AvlmapsError, BackendError, MapError, QueryError, RecordingError
 from avlmaps.recordings.memory import MemoryRecording
-from helpers.walked_room import CAMERA, write_walk
+from helpers.raycast import render
+from helpers.room import Room
+from helpers.walked_room import RATE_HZ, beeps
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
+CAMERA = avlmaps.Pinhole(107.0, 107.0, 80.0, 60.0, 160, 120)
 COARSE = avlmaps.BuildSettings(voxel_size_m=0.1)
 
 
@@ -24,13 +27,15 @@ COARSE = avlmaps.BuildSettings(voxel_size_m=0.1)
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recording of six frames with a sound, and its map."""
     folder = tmp_path_factory.mktemp("face")
-    whole = avlmaps.open_recording(write_walk(folder / "whole"))
-    with avlmaps.RecordingWriter(folder / "rec", whole.rig, up_in_world=whole.up_in_world) as writer:
-        for frame in whole.frames(step=4):
-            writer.add(frame)
-        writer.set_audio(whole.audio.read())
+    room, rig = Room(), avlmaps.Rig(CAMERA, CAMERA)
+    silence = 0.0005 * np.random.default_rng(0).standard_normal(2 * RATE_HZ).astype(np.float32)
+    with avlmaps.RecordingWriter(folder / "rec", rig, up_in_world=np.array([0.0, 0.0, 1.0])) as writer:
+        for index, pose in enumerate(room.walk()[100:190:15]):
+            view = render(room.scene, CAMERA, pose)
+            writer.add(avlmaps.Frame(index, f"{index:06d}", float(index), view.rgb, view.depth_m, pose, rig))
+        writer.set_audio(avlmaps.Sound(np.concatenate([silence, beeps(), silence]), RATE_HZ))
     avlmaps.build_map(folder / "rec", folder / "home.avlmap", settings=COARSE, progress=False)
-    cv2.imwrite(str(folder / "photo.png"), np.ascontiguousarray(whole.frame(8).rgb[:, :, ::-1]))
+    cv2.imwrite(str(folder / "photo.png"), np.ascontiguousarray(view.rgb[:, :, ::-1]))
     return folder
 
 
@@ -109,7 +114,7 @@ def test_frames_of_a_recording_come_one_by_one(folder: Path) -> None:
     frames = list(recording)
     assert len(frames) == len(recording) == 6
     for frame in frames:
-        assert frame.rgb.shape == (180, 240, 3) and frame.depth_m.shape == (180, 240)
+        assert frame.rgb.shape == (120, 160, 3) and frame.depth_m.shape == (120, 160)
         assert frame.world_from_camera.shape == (4, 4) and isinstance(frame.camera, avlmaps.Pinhole)
 
 
@@ -206,18 +211,18 @@ def frame(folder: Path) -> avlmaps.Frame:
 
 
 BAD_FRAMES = {
-    "rgb of floats": (dict(rgb=np.zeros((180, 240, 3))), r"rgb .* must be uint8 of shape \(h, w, 3\), not float64"),
-    "rgb without channels": (dict(rgb=np.zeros((180, 240), np.uint8)), r"not uint8 of \(180, 240\)"),
-    "rgba": (dict(rgb=np.zeros((180, 240, 4), np.uint8)), "leave the fourth channel out"),
-    "millimetres": (dict(depth_m=np.full((180, 240), 1200.0)), r"must be in metres; its median is 1,200"),
-    "whole numbers": (dict(depth_m=np.full((180, 240), 1200, np.uint16)), r"not uint16 up to 1200; millimetres"),
-    "kilometres": (dict(depth_m=np.full((180, 240), 0.002)), r"must be in metres; .* largest 0.002"),
-    "negative depth": (dict(depth_m=np.full((180, 240), -1.0)), "negative depths, down to -1 m"),
-    "depth of three axes": (dict(depth_m=np.zeros((180, 240, 3))), r"shape \(h, w\), not \(180, 240, 3\)"),
-    "depth on its side": (dict(depth_m=np.ones((240, 180))), "180x240 pixels, rgb 240x180: not one view"),
+    "rgb of floats": (dict(rgb=np.zeros((120, 160, 3))), r"rgb .* must be uint8 of shape \(h, w, 3\), not float64"),
+    "rgb without channels": (dict(rgb=np.zeros((120, 160), np.uint8)), r"not uint8 of \(120, 160\)"),
+    "rgba": (dict(rgb=np.zeros((120, 160, 4), np.uint8)), "leave the fourth channel out"),
+    "millimetres": (dict(depth_m=np.full((120, 160), 1200.0)), r"must be in metres; its median is 1,200"),
+    "whole numbers": (dict(depth_m=np.full((120, 160), 1200, np.uint16)), r"not uint16 up to 1200; millimetres"),
+    "kilometres": (dict(depth_m=np.full((120, 160), 0.002)), r"must be in metres; .* largest 0.002"),
+    "negative depth": (dict(depth_m=np.full((120, 160), -1.0)), "negative depths, down to -1 m"),
+    "depth of three axes": (dict(depth_m=np.zeros((120, 160, 3))), r"shape \(h, w\), not \(120, 160, 3\)"),
+    "depth on its side": (dict(depth_m=np.ones((160, 120))), "120x160 pixels, rgb 160x120: not one view"),
     "words for depth": (dict(depth_m="far"), "depth_m .* must be an array of numbers, not str"),
     "a matrix for a camera": (dict(camera=np.eye(3)), r"must be an avlmaps.Pinhole.* not ndarray"),
-    "a camera of another size": (dict(camera=CAMERA.resized(320, 240)), "rgb .* 240x180 pixels, its camera 320x240"),
+    "a camera of another size": (dict(camera=CAMERA.resized(320, 240)), "rgb .* 160x120 pixels, its camera 320x240"),
     "a pose that mirrors": (dict(world_from_camera=np.diag([1.0, 1, -1, 1])), "not a rigid transform"),
     "a pose that stretches": (dict(world_from_camera=np.diag([2.0, 2, 2, 1])), "not a rigid transform"),
     "a pose of three rows": (dict(world_from_camera=np.eye(4)[:3]), r"has shape \(3, 4\); it must be 4x4"),
