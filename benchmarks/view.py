@@ -37,7 +37,7 @@ def enlarged(path: Path, count: int) -> AVLMap:
         *(np.concatenate(copies * [np.asarray(getattr(voxels, name))])[:count]
           for name in ("feature", "weight", "rgb", "last_seen_s", "hits")),
     )  # fmt: skip
-    return AVLMap(replace(stored, voxels=many))
+    return AVLMap(replace(stored, arrays=replace(stored.arrays, voxels=many)))
 
 
 def resident_mb() -> float:

@@ -36,7 +36,7 @@ from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import BadFrame, GroundInfo, MapInfo, ModelInfo, SensorInfo, Timings, UpInfo
 from avlmaps.maps.store.manifest_file import MANIFEST
-from avlmaps.maps.store.reader import GIVEN_FEATURES, StoredMap, open_stored
+from avlmaps.maps.store.reader import GIVEN_FEATURES, MapArrays, StoredMap, open_stored
 from avlmaps.maps.store.writer import MapContent, is_map_or_free, write_map
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import GroundReader
@@ -146,8 +146,8 @@ class GrowingMap:
             up, ground = self._upright()
             content, info = self._content(plan, up, ground, final)
         rig, grid = self._walk.rig, GridSpec(self.settings.voxel_size_m)
-        parts = content.voxels, content.keyframes, content.place_state, content.sounds
-        return StoredMap(_HERE, info, grid, up.vector(), *parts, self.used, rig, Guard(_HERE, {}))
+        arrays = MapArrays(content.voxels, content.keyframes, content.place_state, content.sounds)
+        return StoredMap(_HERE, info, grid, up.vector(), arrays, self.used, rig, Guard(_HERE, {}))
 
     def save(self, path: Path, *, overwrite: bool = False) -> StoredMap:
         """Write the map and open it.

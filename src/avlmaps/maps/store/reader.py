@@ -34,7 +34,23 @@ PARTS = "parts"
 GIVEN_FEATURES = "given:features"  # backend of features that came without an encoder
 STATE = "keyframes/state/"
 CLIPS = "sounds/clips/"
-_GUARDED = frozenset({"voxels", "keyframes", "sounds", "place_state"})
+
+
+@dataclass(frozen=True, slots=True)
+class MapArrays:
+    """The arrays of a map.
+
+    Attributes:
+        voxels: occupied voxels.
+        keyframes: stored pictures.
+        place_state: what the place encoder learned from the keyframes.
+        sounds: what was heard.
+    """
+
+    voxels: Voxels
+    keyframes: Keyframes
+    place_state: dict[str, np.ndarray]
+    sounds: HeardSounds
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -46,32 +62,45 @@ class StoredMap:
         info: all that ``map.json`` says.
         grid: turns metres into voxels.
         up_in_world: unit vector; the recording's world need not be level.
-        voxels: occupied voxels.
-        keyframes: stored pictures.
-        place_state: what the place encoder learned from the keyframes.
-        sounds: what was heard; ``clip_path`` finds a clip.
+        arrays: of the files as they are; ``voxels`` and the like are those that are known to be whole.
         encoders: which models perceived.
         rig: the recording's cameras.
-        guard: watches over the large files; reading voxels or keyframes waits until they are known to be whole.
+        guard: watches over the large files.
     """
 
     path: Path
     info: MapInfo
     grid: GridSpec
     up_in_world: Float[np.ndarray, "3"]
-    voxels: Voxels
-    keyframes: Keyframes
-    place_state: dict[str, np.ndarray]
-    sounds: HeardSounds
+    arrays: MapArrays
     encoders: Encoders
     rig: Rig
     guard: Guard
 
-    def __getattribute__(self, name: str) -> Any:
-        value = object.__getattribute__(self, name)
-        if name in _GUARDED:
-            object.__getattribute__(self, "guard").require_whole()
-        return value
+    @property
+    def voxels(self) -> Voxels:
+        """Occupied voxels; waits until the files are known to be whole, and raises ``MapError`` where they are not."""
+        return self._whole.voxels
+
+    @property
+    def keyframes(self) -> Keyframes:
+        """Stored pictures; waits likewise."""
+        return self._whole.keyframes
+
+    @property
+    def place_state(self) -> dict[str, np.ndarray]:
+        """What the place encoder learned from the keyframes; waits likewise."""
+        return self._whole.place_state
+
+    @property
+    def sounds(self) -> HeardSounds:
+        """What was heard; ``clip_path`` finds a clip. Waits likewise."""
+        return self._whole.sounds
+
+    @property
+    def _whole(self) -> MapArrays:
+        self.guard.require_whole()
+        return self.arrays
 
     def __repr__(self) -> str:
         return f"StoredMap({self.path.name!r}: {self.info.counts.voxels:,} voxels)"
@@ -209,9 +238,8 @@ def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
         guard.require_whole()
         check_order(voxels, f"{path}/voxels")
     state = {name.removeprefix(STATE): array for name, array in arrays.items() if name.startswith(STATE)}
-    return StoredMap(
-        path, info, grid, info.up.vector(), voxels, keyframes, state, sounds, encoders_of_map(info), rig, guard
-    )
+    whole = MapArrays(voxels, keyframes, state, sounds)
+    return StoredMap(path, info, grid, info.up.vector(), whole, encoders_of_map(info), rig, guard)
 
 
 def _of(arrays: Mapping[str, np.ndarray], kind: type, prefix: str) -> dict[str, Any]:
