@@ -82,7 +82,7 @@ class KnownThings:
 
 def robot_among(pose: GroundPose, settings: RobotSettings | None = None, **polygons: np.ndarray) -> Robot:
     """Return a robot at a pose that knows polygons, on a floor at height 0."""
-    empty: Any = SimpleNamespace(space=Space(GridSpec(0.05), np.zeros((0, 3), np.int64), UP))
+    empty: Any = SimpleNamespace(space=Space(GridSpec(0.05), np.zeros((0, 3), np.int64), UP), storeys=None)
     robot = Robot(empty, KinematicDriver(pose), settings)
     robot.seeker = KnownThings(**polygons)  # pyright: ignore[reportAttributeAccessIssue]
     return robot

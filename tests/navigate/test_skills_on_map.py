@@ -272,5 +272,6 @@ def test_the_floor_is_sought_among_the_voxels_that_count() -> None:
     asked: Any = SimpleNamespace(
         space=Space(GridSpec(0.05), index, np.array([0.0, 0.0, 1.0])),
         stored=SimpleNamespace(voxels=SimpleNamespace(hits=hits)),
+        storeys=None,
     )
     assert Robot(asked, KinematicDriver(GroundPose(0.0, 0.0))).floor_m == pytest.approx(robot.floor_m)

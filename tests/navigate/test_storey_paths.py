@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from avlmaps.core.errors import MapError
+from avlmaps.core.errors import MapError, NavigationError
 from avlmaps.core.motion import GroundPose
+from avlmaps.language.program.vocabulary import Place
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.obstacles import CellState
 from avlmaps.maps.storeys import find_storeys
@@ -15,7 +16,10 @@ from avlmaps.maps.types import Voxels
 from avlmaps.navigate.bodies import BASE, WALKER
 from avlmaps.navigate.costmap import obstacles_for, storey_of_walk
 from avlmaps.navigate.driver import MapDriver
+from avlmaps.navigate.footprint import Outline
+from avlmaps.navigate.instances import Thing
 from avlmaps.navigate.paths import PathFinder
+from avlmaps.navigate.skills import Robot
 from avlmaps.query.voxel_space import Space
 from avlmaps.view.route import MapBody
 from helpers.two_floors import SIZE_M, UPPER_M, VOXEL_M, WELL, two_floors
@@ -116,3 +120,23 @@ def test_a_driver_on_the_ground_floor_goes_nowhere_for_a_place_upstairs() -> Non
     assert not refused.reached and "does not climb stairs" in refused.note and driver.pose == GroundPose(3.0, 3.0, 0.0)
     assert driver.go_to(np.array([5.0, 3.0, 0.7])).reached
     assert SIZE_M[0] > driver.pose.x_m > 4.5
+
+
+def test_a_skill_beside_a_thing_upstairs_is_refused_and_not_driven_on_the_floor_below() -> None:
+    driver = MapDriver(obstacles_for(HOME, BASE, 0), MapBody(GroundPose(3.0, 3.0, 0.0)))
+    robot = Robot(HOME, driver)
+    with pytest.raises(NavigationError, match="does not climb stairs"):
+        robot.move_north(Place(5.0, 2.0, UPPER_M + 0.5))
+    assert driver.pose == GroundPose(3.0, 3.0, 0.0)
+    assert robot.floor_m == pytest.approx(HOME.storeys[0].floor_m)
+
+
+def test_of_things_on_two_storeys_those_of_the_robots_own_count_where_one_is_found() -> None:
+    robot = Robot(HOME, MapDriver(obstacles_for(HOME, BASE, 0), MapBody(GroundPose(3.0, 3.0, 0.0))))
+    up, down, unlikely = (
+        Thing("bed", Outline.at(np.array([x, 2.0])), np.array([x, 2.0, z]), likely)
+        for x, z, likely in ((3.0, UPPER_M + 0.5, 0.9), (5.0, 0.5, 0.8), (5.0, 0.5, 0.3))
+    )
+    assert robot.seeker._near_first([up, down], 0.5) == [down]
+    assert robot.seeker._near_first([up, unlikely], 0.5) == [up, unlikely]
+    assert robot.seeker.notes == ["1 of 2 places for bed are on other storeys; those of the ground floor count"]

@@ -1,8 +1,11 @@
 """What the page reads of a map is the map: places, colours, labels and heat, in one order."""
 
+from copy import copy
+
 import numpy as np
 import pytest
 
+from avlmaps.maps.storeys import Storey, Storeys
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.naming import VoxelNamer, keyframes_that_saw
 from avlmaps.view.labels import Labels, palettes
@@ -46,6 +49,17 @@ def test_the_description_places_the_cameras_in_the_map(layout: Layout) -> None:
         np.testing.assert_allclose(np.cross(frame["right"], frame["down"]), frame["ahead"], atol=1e-3)
     assert told["floor_m"] == pytest.approx(0.0, abs=0.15)
     assert told["floor_m"] < told["ceiling_m"]
+
+
+def test_the_description_of_a_map_of_several_storeys_cuts_each_out(layout: Layout, room: AVLMap) -> None:
+    assert "storeys" not in layout.describe()
+    two = copy(room)
+    two.storeys = Storeys((Storey(0, 0.0, 2.5, -np.inf, 2.6, 9.0), Storey(1, 2.8, None, 2.6, np.inf, 9.0)))
+    ground, first = layout.with_map(two).describe()["storeys"]
+    assert (ground["name"], first["name"]) == ("ground floor", "first floor")
+    assert ground["cut"][0] < ground["floor_m"] < ground["cut"][1] == pytest.approx(2.4)
+    assert first["cut"][0] == first["low_m"] == 2.6
+    assert all(np.isfinite(one["cut"]).all() for one in (ground, first))
 
 
 def test_thumbnails_are_jpegs_and_others_are_none(layout: Layout) -> None:

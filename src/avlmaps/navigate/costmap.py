@@ -159,10 +159,10 @@ def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE, storey: int | None 
 
 def storey_of_walk(avlmap: "AVLMap") -> int:
     """Return the number of the storey on which the walk of a map began; 0 for a map of one."""
-    cameras = np.asarray(avlmap.stored.keyframes.world_from_camera, np.float64)[:1, :3, 3]
-    if avlmap.storeys is None or not len(cameras):
+    if avlmap.storeys is None:
         return 0
-    return int(avlmap.storeys.of(avlmap.space.level(cameras)[:, 2])[0])
+    cameras = np.asarray(avlmap.stored.keyframes.world_from_camera, np.float64)[:1, :3, 3]
+    return int(avlmap.storeys.of_places(cameras)[0]) if len(cameras) else 0
 
 
 def _voxels_called(avlmap: "AVLMap", word: str) -> Bool[np.ndarray, " n"]:

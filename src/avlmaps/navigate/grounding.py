@@ -27,8 +27,11 @@ class Seeker:
         notes: what a person should know: words half understood, guesses.
     """
 
-    def __init__(self, avlmap: AVLMap, guess: bool, readable: Readable, tell: Callable[[str], None]) -> None:
-        """Take a map, and a function that is called with each note on things as they are found."""
+    def __init__(
+        self, avlmap: AVLMap, guess: bool, readable: Readable, tell: Callable[[str], None], storey: int = 0
+    ) -> None:
+        """Take a map, a function that is called with each note, and the storey that the robot is on."""
+        self._storey = storey
         self.avlmap = avlmap
         self.guess = guess
         self.readable = readable
@@ -129,10 +132,25 @@ class Seeker:
         things = things_in(heat, self.guess)
         if isinstance(target, str):
             self._note(heat)
+        things = self._near_first(things, heat.found_at)
         if not heat.found:
             likely_by = f"{things[0].probability:.2f}, below {heat.found_at:.2f}"
             self.note(f"the probability of {things[0].name} is {likely_by}; this is the best guess")
         return things, tells_one(heat)
+
+    def _near_first(self, things: list[Thing], found_at: float) -> list[Thing]:
+        """Return the things on the robot's own storey where one of them is found, else all of them."""
+        storeys = self.avlmap.storeys
+        if storeys is None:
+            return things
+        on = storeys.of(np.array([thing.place[2] for thing in things]))
+        own = [thing for thing, number in zip(things, on.tolist(), strict=True) if number == self._storey]
+        if not own or len(own) == len(things) or own[0].probability < found_at:
+            return things
+        name = storeys[self._storey].name
+        others = len(things) - len(own)
+        self.note(f"{others} of {len(things)} places for {own[0].name} are on other storeys; those of the {name} count")
+        return own
 
     def place_of(self, target: Target) -> Place:
         """Return the place of the best thing that a target may mean; a later skill finds the thing again at that place.

@@ -19,6 +19,7 @@ from avlmaps.core.errors import NavigationError, ProgramError
 from avlmaps.core.motion import Action, wrap_angle
 from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place, Target
 from avlmaps.navigate.arguments import kind_of, number_of, text_of
+from avlmaps.navigate.costmap import storey_of_walk
 from avlmaps.navigate.driver import Arrival, Driver
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline, bearing_rad, middle_between, to_the_left
@@ -86,7 +87,7 @@ class Robot:
         self.driver = driver
         self._pause = pause
         self.settings = settings or RobotSettings()
-        self.seeker = Seeker(asked, self.settings.guess, readable or Readable(), tell)
+        self.seeker = Seeker(asked, self.settings.guess, readable or Readable(), tell, storey_of_walk(asked))
         self.moves: list[Move] = []
 
     def load_image(self, path: str) -> Picture:
@@ -143,7 +144,8 @@ class Robot:
 
     def get_contour(self, target: Target) -> list[Place]:
         """Return the outline on the ground of the best instance of an object, counter-clockwise."""
-        return [self._place(self._on_floor(corner)) for corner in self.seeker.best(target).outline.corners]
+        thing = self.seeker.best(target)
+        return [self._place(self._on_floor(corner, thing)) for corner in thing.outline.corners]
 
     def current_pos(self) -> Place:
         """Return the place where the robot stands now; keep it to come back later."""
@@ -167,7 +169,7 @@ class Robot:
         both = Thing(
             f"between {first.name or 'a place'} and {second.name or 'a place'}",
             Outline.at(middle),
-            self._on_floor(middle),
+            self._on_floor(middle, first, second),
         )
         self._go("move_in_between", both, both.place)
 
@@ -251,10 +253,12 @@ class Robot:
 
     @cached_property
     def floor_m(self) -> float:
-        """Level height of the map's floor."""
+        """Level height of the floor that the robot is on."""
         from avlmaps.maps.obstacles import Body, floor_height
 
         space = self.asked.space
+        if self.asked.storeys is not None:
+            return self.asked.storeys[storey_of_walk(self.asked)].floor_m
         if not len(space):
             return 0.0
         height_m = space.level(space.centres)[:, 2]
@@ -266,8 +270,13 @@ class Robot:
         pose = self.driver.pose
         return np.array([pose.x_m, pose.y_m])
 
-    def _on_floor(self, xy: Float[np.ndarray, "2"]) -> Float[np.ndarray, "3"]:
-        return np.append(xy, self.floor_m)
+    def _on_floor(self, xy: Float[np.ndarray, "2"], *things: Thing) -> Float[np.ndarray, "3"]:
+        """Return a place on the floor: that of things, where they are on another storey than the robot."""
+        storeys, floors = self.asked.storeys, [self.floor_m]
+        if storeys is not None and things:
+            numbers = storeys.of(np.array([thing.place[2] for thing in things]))
+            floors = [storeys[number].floor_m for number in numbers.tolist()]
+        return np.append(xy, max(floors, key=lambda floor_m: abs(floor_m - self.floor_m)))
 
     def _place(self, level: Float[np.ndarray, "3"]) -> Place:
         return Place(*_triple(self.asked.space.world(level)))
@@ -282,7 +291,7 @@ class Robot:
         distance_m = number_of(distance_m, skill, _MOST_M, "metres")
         if distance_m < 0.0:
             raise ProgramError(f"{skill} takes a distance of 0 m or more, not {distance_m:g}; go to the other side.")
-        self._go(skill, thing, self._on_floor(thing.outline.beside(direction, distance_m)))
+        self._go(skill, thing, self._on_floor(thing.outline.beside(direction, distance_m), thing))
 
     def _go(
         self, skill: str, thing: Thing, goal: Float[np.ndarray, "3"], face: Float[np.ndarray, "3"] | None = None

@@ -17,12 +17,14 @@ from avlmaps.query.topdown import camera_path
 from avlmaps.view.detail import detail_order
 
 if TYPE_CHECKING:
+    from avlmaps.maps.storeys import Storeys
     from avlmaps.query.avlmap import AVLMap
 
 RECORD = np.dtype([("cell", "<u2", (3,)), ("seen", "<u2"), ("rgb", "u1", (3,)), ("spare", "u1")])
 """One voxel as the page reads it: where, when it was last seen (65535 is the end of the recording), its colour."""
 _MOST_CELLS = 65535
 _NEAR_SHARE = 0.25  # of the map's extent: voxels up to this far out of the bulk of it count as the whole map
+_UNDER_CEILING_M = 0.1  # a storey is shown from below its floor to this far under its ceiling
 _HEADROOM_M = 0.3  # the page opens with what is higher over the highest camera cut away
 
 
@@ -104,6 +106,7 @@ class Layout:
         cameras = camera_path(space)
         ceiling = float(cameras[:, 2].max()) + _HEADROOM_M if len(cameras) else float(level[:, 2].max())
         camera = stored.rig.rgb
+        storeys = {} if self.avlmap.storeys is None else {"storeys": _storeys(self.avlmap.storeys, low[2], high[2])}
         return {
             "name": stored.path.name,
             "summary": repr(self.avlmap).partition(": ")[2].removesuffix(")"),
@@ -124,6 +127,7 @@ class Layout:
             "profile": stored.info.profile,
             "field_of_view": [camera.width / camera.fx, camera.height / camera.fy],
             "keyframes": self._keyframes(),
+            **storeys,
         }
 
     def _keyframes(self) -> list[dict[str, Any]]:
@@ -148,6 +152,16 @@ class Layout:
             return None
         start, stop = (int(value) for value in keyframes.thumbnail_offsets[number : number + 2])
         return np.asarray(keyframes.thumbnails[start:stop]).tobytes() or None
+
+
+def _storeys(storeys: "Storeys", low_m: float, high_m: float) -> list[dict[str, Any]]:
+    """Return the storeys, lowest first, each with the heights between which it is shown without its ceiling."""
+    told: list[dict[str, Any]] = []
+    for storey in storeys.all:
+        top_m = (storey.ceiling_m or min(storey.high_m, high_m)) - _UNDER_CEILING_M
+        bottom_m = max(storey.low_m, low_m - _UNDER_CEILING_M)
+        told.append({"name": storey.name, "floor_m": storey.floor_m, "low_m": bottom_m, "cut": [bottom_m, top_m]})
+    return told
 
 
 def _floor_m(level: Float[np.ndarray, "n 3"], cameras: Float[np.ndarray, "k 3"]) -> float:

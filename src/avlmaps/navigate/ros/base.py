@@ -44,6 +44,7 @@ class RosDriver:
         frames: the robot's frames, and how they lie to the map.
         settings: names, patience, tolerances.
         guard: a second process that cancels when this one dies; None where nobody started one.
+        elsewhere: returns why a place of another storey is not driven to, ``""`` for others; None for a map of one.
     """
 
     def __init__(
@@ -54,7 +55,6 @@ class RosDriver:
         standing: Standing | None = None,
         level_from_world: Float[np.ndarray, "3 3"] | None = None,
         clock: Callable[[], float] = monotonic,
-        elsewhere: Callable[[Float[np.ndarray, "3"]], str] | None = None,
     ) -> None:
         """Connect, and wait until the robot reports its pose.
 
@@ -64,7 +64,6 @@ class RosDriver:
             standing: moves a goal to where a body can stand; goals are sent as they are without it.
             level_from_world: the map's rotation into its level frame; the identity by default.
             clock: seconds, by which poses age and the loop's own stalls are measured; replaced in tests.
-            elsewhere: says why a place of another storey is not driven to; "" for a place of the robot's own.
 
         Raises:
             NavigationError: nobody answers there, or the robot does not report its pose.
@@ -72,7 +71,6 @@ class RosDriver:
         """
         self.frames, self.settings, self._tasks = tasks.frames, tasks.settings, tasks
         self._standing = standing
-        self._elsewhere = elsewhere
         self._level_from_world = np.eye(3) if level_from_world is None else np.asarray(level_from_world, np.float64)
         self._busy, self._halted, self._closing = threading.Lock(), threading.Event(), threading.Event()
         self._goal: Goal | None = None
@@ -81,6 +79,7 @@ class RosDriver:
         self._halt = _IDLE
         self._clock = clock
         self.guard: Guard | None = None
+        self.elsewhere: Callable[[Float[np.ndarray, 3]], str] | None = None
         self._absent: set[str] = set()
         self._mute: set[str] = set()
         self._contact = Contact(opener, self.frames, self.settings, clock)
@@ -94,7 +93,7 @@ class RosDriver:
 
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
         """Drive to a place, or as near to it as the robot can stand and see it; see `Driver`."""
-        refused = "" if self._elsewhere is None else self._elsewhere(place)
+        refused = "" if self.elsewhere is None else self.elsewhere(place)
         if refused:
             return self._move(lambda _: refused)
         wanted = self._level(place)

@@ -108,10 +108,9 @@ def open_ros_driver(
         own = on_own_map(obstacles, grid, frames or Frames())
         standing = standable_goal(own, 0.0 if grid.is_costmap else settings.radius_m, "the robot's own map")
     driver = {"nav2": Nav2Driver, "move_base": MoveBaseDriver}[kind]
-    elsewhere = None if obstacles is None else obstacles.elsewhere
-    opened = driver(
-        url, frames, settings, standing=standing, level_from_world=level_from_world, token=token, elsewhere=elsewhere
-    )
+    opened = driver(url, frames, settings, standing=standing, level_from_world=level_from_world, token=token)
+    if obstacles is not None:
+        opened.elsewhere = obstacles.elsewhere
     if guarded:
         silence_s = settings.stall_s + settings.heartbeat_s
         opened.guard = Guard(Orders(kind, url, token, settings, silence_s, settings.goal_timeout_s))

@@ -336,6 +336,7 @@ class Panel {
     }
     this.uncut = [Number($("low").value), Number($("high").value)];
     this.cut();
+    this.bindStoreys();
     $("colour").addEventListener("change", () => this.colourBy($("colour").value));
     for (const kind of ["things", "boxes", "sounds", "rooms", "path"]) {
       $(`show-${kind}`).addEventListener("change", () => {
@@ -354,6 +355,26 @@ class Panel {
       $("seam").style.left = `${100 * this.viewer.divide}%`;
       this.viewer.changed();
     });
+  }
+
+  /** One storey is shown by cutting away the others, and its own ceiling. */
+  bindStoreys() {
+    const storeys = this.maps.find((map) => map.storeys)?.storeys ?? [];
+    $("storey-field").hidden = !storeys.length;
+    for (const [k, { name, floor_m }] of [...storeys.entries()].reverse()) {
+      $("storey").append(made("option", { value: `${k}`, textContent: `${name}, ${metres(floor_m)}` }));
+    }
+    $("storey").addEventListener("change", () => {
+      const chosen = storeys[$("storey").value]?.cut ?? this.uncut;
+      [$("low").value, $("high").value] = chosen;
+      this.cut();
+    });
+  }
+
+  /** Height of the floor under a place of a map. */
+  floorUnder(map, z) {
+    const below = (map.storeys ?? []).filter((storey) => storey.low_m <= z);
+    return (below.at(-1) ?? map).floor_m;
   }
 
   cut() {
@@ -423,7 +444,7 @@ class Panel {
       })) : []);
       marks.set("room", 3, shown("rooms") ? apart(contents.rooms).map((room) => {
         const place = this.toLevel(k, room.position);
-        const onFloor = [place[0], place[1], map.floor_m + 0.02];
+        const onFloor = [place[0], place[1], this.floorUnder(map, place[2]) + 0.02];
         return { place: onFloor, text: room.name, title: `go to the ${room.name}`,
           onClick: () => this.viewer.flyTo(onFloor, 6) };
       }) : []);
@@ -441,7 +462,8 @@ class Panel {
       })) : null);
       this.viewer.setLines(k, "goals", answer ? answer.goals.map((goal) => {
         const place = this.toLevel(k, goal.position);
-        return { kind: "line", tint: INK_TINT, places: new Float32Array([...place, place[0], place[1], map.floor_m]) };
+        const foot = [place[0], place[1], this.floorUnder(map, place[2])];
+        return { kind: "line", tint: INK_TINT, places: new Float32Array([...place, ...foot]) };
       }) : null);
     });
     this.viewer.changed();
@@ -620,8 +642,9 @@ class Panel {
 
   drawPath() {
     this.maps.forEach((map, k) => {
-      const heights = map.keyframes.map(({ position }) => position[2]).sort((a, b) => a - b);
-      const carried = heights.length ? heights[heights.length >> 1] - map.floor_m - 0.04 : 0;
+      const carriedAt = ({ position: [, , z] }) => z - this.floorUnder(map, map.storeys ? z - 0.3 : z);
+      const heights = map.keyframes.map(carriedAt).sort((a, b) => a - b);
+      const carried = heights.length ? heights[heights.length >> 1] - 0.04 : 0;
       const places = map.keyframes.map(({ position: [x, y, z] }) => [x, y, z - carried]);
       this.viewer.setLines(k, "path", $("show-path").checked && places.length > 1 ?
         [{ kind: "band", places: band(places, 0.045), tint: PATH_TINT }] : null);
