@@ -17,6 +17,7 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.image import read_picture
+from avlmaps.query.queryable import Photo
 from avlmaps.sim.truth import Truth
 
 Sense = Literal["ours", "weak", "true", "none"]
@@ -93,12 +94,12 @@ class Perceived(AVLMap):
 
     def image(
         self,
-        picture: str | Path | UInt8[np.ndarray, "h w 3"],
+        picture: str | Path | Photo | UInt8[np.ndarray, "h w 3"],
         intrinsics: Pinhole | None = None,
         primary: bool = False,
     ) -> Heatmap:
         """Return the heat of where a photo was taken."""
-        if isinstance(picture, np.ndarray):
+        if isinstance(picture, np.ndarray | Photo):
             raise ValueError("missions name photos by their files")
         name, sense = Path(picture).name, self._senses.images
         makers: dict[str, Callable[[], Heatmap]] = {
