@@ -11,14 +11,16 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
+from avlmaps.query import known_rivals
 from avlmaps.query.colour_filter import tint_of
 from avlmaps.query.factors import HeatSettings, NearAnchors
 from avlmaps.query.heatmap import Heatmap
+from avlmaps.query.known_rivals import KnownRivals
 from avlmaps.query.loops import plain_loops
 from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import EncodedWord, Rivals, Vocabulary, least_score_to_count
+from avlmaps.query.words import EncodedWord, Rivals, Vocabulary, least_score_to_count, object_margins
 
 NAMES = ("chair", "dining table", "coffee table", "floor", "other")
 MEANT = {
@@ -226,13 +228,58 @@ def test_voxels_with_little_of_the_word_need_no_comparison(
     none = dict.fromkeys(("least_confidence", "least_in_company", "guess_below"), 0.0) if rules_of_the_paper else {}
     chosen, part = ObjectSettings(score_in_company=share, **none), Part(Modality.OBJECT, word, Role.PRIMARY)
     with plain_loops():
-        rivals = [Rivals.of(feature, ENCODER, NAMES), Vocabulary.encoded(ENCODER, NAMES)]
-        full, short = (object_factor(SPACE, feature, ENCODER, each, part, chosen, HeatSettings()) for each in rivals)
-        for one, other in ((full, short), (full.include_uncertain(), short.include_uncertain())):
-            np.testing.assert_array_equal(one.mask, other.mask)
-            np.testing.assert_array_equal(one.instance, other.instance)
-            np.testing.assert_allclose(one.confidence, other.confidence, atol=1e-6)
-            assert (one.found, one.note, one.understood) == (other.found, other.note, other.understood)
+        vocabulary = Vocabulary.encoded(ENCODER, NAMES)
+        none_known, all_known = (KnownRivals.of(vocabulary, len(INDEX)) for _ in range(2))
+        all_known.whole(feature)
+        full, *short = (
+            object_factor(SPACE, feature, ENCODER, each, part, chosen, HeatSettings())
+            for each in (Rivals.of(feature, ENCODER, NAMES), vocabulary, none_known, all_known)
+        )
+        for lazy in short:
+            for one, other in ((full, lazy), (full.include_uncertain(), lazy.include_uncertain())):
+                np.testing.assert_array_equal(one.mask, other.mask)
+                np.testing.assert_array_equal(one.instance, other.instance)
+                np.testing.assert_allclose(one.confidence, other.confidence, atol=1e-6)
+                assert (one.found, one.note, one.understood) == (other.found, other.note, other.understood)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.one_of(st.sampled_from(sorted(MEANT)), st.sampled_from(NAMES)),
+    st.booleans(),
+    st.sampled_from([0.02, 0.1, 0.5, 5.0]),
+    st.floats(0.05, 1.0),
+    st.integers(0, 2**32 - 1),
+)
+def test_no_voxel_wins_that_its_closest_words_rule_out(
+    word: str, alone: bool, evenness: float, share: float, seed: int
+) -> None:
+    probability = np.random.default_rng(seed).dirichlet(np.full(len(NAMES), evenness), 200)
+    feature = features_of(probability, ENCODER.codes).astype(np.float16)
+    feature[::11] = 0.0
+    known = KnownRivals.of(Vocabulary.encoded(ENCODER, NAMES), len(feature))
+    encoded = EncodedWord.of_name(ENCODER, word) if alone and word in NAMES else EncodedWord.of(ENCODER, word)
+    chosen = ObjectSettings()
+    with plain_loops(), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(known_rivals, "_MOST_PICKED", 1.0)
+        everything = known.whole(feature)
+        silent = known.silent_for(ENCODER, encoded, chosen.same_word_cosine)
+        rows = known.contenders(ENCODER, encoded, silent, share)
+        margin, score = object_margins(feature, everything, encoded.rows, silent, chosen.least_score)
+        assert rows is not None
+        assert (np.diff(rows) > 0).all()
+        wins = np.flatnonzero((score > share * (score - margin)) | (margin > 0.0))
+        assert np.isin(wins, rows).all()
+
+
+def test_few_voxels_are_left_for_a_name_that_others_win() -> None:
+    known = KnownRivals.of(Vocabulary.encoded(ENCODER, NAMES), len(FEATURE))
+    with plain_loops():
+        known.whole(FEATURE)
+    encoded = EncodedWord.of_name(ENCODER, NAMES[3])
+    rows = known.contenders(ENCODER, encoded, known.silent_for(ENCODER, encoded, 0.95), 1.0)
+    assert rows is not None
+    assert not len(rows)
 
 
 def test_weak_voxels_round_a_chair_leave_it_as_it_is_in_company() -> None:

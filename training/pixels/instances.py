@@ -111,7 +111,7 @@ def pieces_of(options: Options, number: int) -> Iterator[Pieces]:
             if thing.category == name:
                 low, high = np.array(thing.low) - GROWN_M, np.array(thing.high) + GROWN_M
                 held |= ((space.centres >= low) & (space.centres <= high)).all(axis=1)
-        share = np.bincount(pieces.instance, weights=held[pieces.mask], minlength=len(count)) / np.maximum(count, 1)
+        share = np.bincount(pieces.instance, weights=held[pieces.rows], minlength=len(count)) / np.maximum(count, 1)
         large = count >= FEWEST_VOXELS // 3
         area = count * space.grid.voxel_size_m**2
         yield Pieces(name, pieces.mean_probability[large], area[large], share[large] >= 0.5)

@@ -15,10 +15,10 @@ from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder
 from avlmaps.perception.room_contents import read_room_contents
-from avlmaps.query import loops
 from avlmaps.query.factors import FOUND_AT, HeatSettings
 from avlmaps.query.floor_plan import FloorPlan, storeys
 from avlmaps.query.heatmap import Heatmap
+from avlmaps.query.known_rivals import KnownRivals
 from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor, area_names, name_shares
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
 from avlmaps.query.modalities.object import object_factor
@@ -120,12 +120,9 @@ class AVLMap:
         """
         part = Part(Modality.OBJECT, word, _role(primary))
         encoder = self.stored.encoders.pixels
-        if vocabulary is None and self._rivals is None and loops.is_plain() and isinstance(encoder, NamedPixelEncoder):
-            # One question: most voxels have too little of the word to be compared with all others.
-            self.stored.require_model(Kind.PIXELS)
-            rivals = Vocabulary.encoded(encoder, encoder.vocabulary)
-        else:
-            rivals = self._rivals_of(encoder, vocabulary)
+        # Of names, most voxels have too little of the word to be compared with all others.
+        is_own = vocabulary is None and isinstance(encoder, NamedPixelEncoder)
+        rivals = self._known_rivals if is_own else self._rivals_of(encoder, vocabulary)
         settings, voxels = self.settings, self.stored.voxels
         return Heatmap.of(
             object_factor(
@@ -151,7 +148,9 @@ class AVLMap:
                 armchair is no piece of "chair".
         """
         encoder = self.stored.encoders.pixels
-        rivals = self._rivals_of(encoder, None)
+        rivals: Vocabulary = self._rivals_of(encoder, None)
+        if isinstance(encoder, NamedPixelEncoder):
+            rivals = self._known_rivals  # all are known now
         if alone and isinstance(encoder, NamedPixelEncoder) and word in encoder.names:
             encoded = EncodedWord.of_name(encoder, word)
         else:
@@ -167,10 +166,19 @@ class AVLMap:
 
     def _rivals_of(self, encoder: PixelEncoder, vocabulary: Sequence[str] | None) -> Rivals:
         self.stored.require_model(Kind.PIXELS)
+        if vocabulary is None and isinstance(encoder, NamedPixelEncoder):
+            return self._known_rivals.whole(self.stored.voxels.feature)
         names = tuple(encoder.vocabulary if vocabulary is None else vocabulary)
         if self._rivals is None or self._rivals[0] != names:
             self._rivals = names, Rivals.of(self.stored.voxels.feature, encoder, names)
         return self._rivals[1]
+
+    @cached_property
+    def _known_rivals(self) -> KnownRivals:
+        """The names of an encoder that has a list of them, and those closest to the voxels that were asked about."""
+        self.stored.require_model(Kind.PIXELS)
+        encoder = self.stored.encoders.pixels
+        return KnownRivals.of(Vocabulary.encoded(encoder, encoder.vocabulary), len(self.stored.voxels))
 
     def things(
         self,

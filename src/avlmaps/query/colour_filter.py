@@ -55,11 +55,11 @@ def is_tinted(rgb: UInt8[np.ndarray, "n 3"], tint: Tint) -> Bool[np.ndarray, " n
 
 
 def tinted_share(
-    rgb: UInt8[np.ndarray, "n 3"], mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"], tint: Tint
+    rgb: UInt8[np.ndarray, "n 3"], rows: Int[np.ndarray, " a"], instance: Int[np.ndarray, " a"], tint: Tint
 ) -> Float32[np.ndarray, " i"]:
     """Return for each instance the share of its voxels in the queried colour: 1 from four in ten on."""
     if not len(instance):
         return np.zeros(0, np.float32)
-    hits = is_tinted(np.asarray(rgb)[mask], tint)
+    hits = is_tinted(np.asarray(rgb)[rows], tint)
     share = np.bincount(instance, weights=hits) / np.maximum(np.bincount(instance), 1)
     return np.minimum(share / FULL_SHARE, 1.0).astype(np.float32)

@@ -246,7 +246,7 @@ def _is_wide(name: str, encoder: PixelEncoder) -> bool:
 
 def _confident(pieces: Pieces, least: float) -> Iterator[tuple[float, Int[np.ndarray, " m"]]]:
     """Yield the confidence and the voxels of each instance of at least some confidence."""
-    rows = np.flatnonzero(pieces.mask)
+    rows = pieces.rows
     order = np.argsort(pieces.instance, kind="stable")
     bounds = np.searchsorted(pieces.instance[order], np.arange(len(pieces.confidence) + 1))
     for number in np.flatnonzero(pieces.confidence >= least):
@@ -254,7 +254,7 @@ def _confident(pieces: Pieces, least: float) -> Iterator[tuple[float, Int[np.nda
 
 
 def _thing(stored: "StoredMap", space: Space, name: str, confidence: float, rows: Int[np.ndarray, " m"]) -> Thing:
-    points = space.centres[rows]
+    points = space.centres_of(rows)
     extent = np.ptp(space.level(points), axis=0) + space.grid.voxel_size_m
     colors: UInt8[np.ndarray, "m 3"] = np.asarray(stored.voxels.rgb)[rows]
     r, g, b = (int(value) for value in colors.mean(axis=0).round())

@@ -163,7 +163,7 @@ class NearThings(Factor):
     @cached_property
     def anchors(self) -> Float[np.ndarray, "a 3"]:  # pyright: ignore[reportIncompatibleVariableOverride]
         """The middles of the object's voxels."""
-        return self.space.centres[self.mask]
+        return self.space.centres_of(self.mask)
 
     def heat_and_anchors(
         self, among: Bool[np.ndarray, " n"] | None = None

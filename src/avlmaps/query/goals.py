@@ -91,7 +91,7 @@ class Shares:
         """Return where some of them are, metres, world."""
         voxels = which < len(self.rows)
         places = np.empty((len(which), 3))
-        places[voxels] = self.lead.space.centres[self.rows[which[voxels]]]
+        places[voxels] = self.lead.space.centres_of(self.rows[which[voxels]])
         places[~voxels] = self.lead.anchors[which[~voxels] - len(self.rows)]
         return places
 

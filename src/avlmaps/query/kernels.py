@@ -128,26 +128,29 @@ def widen(bits: UInt16[np.ndarray, "n d"], out: Float32[np.ndarray, "n d"]):
 
 @njit(cache=True, nogil=True)
 def best_two(
-    scores: Float32[np.ndarray, "n words"],
+    scores: Float32[np.ndarray, "words m"],
     best: Float32[np.ndarray, " rows"],
     best_word: Int[np.ndarray, " rows"],
     second: Float32[np.ndarray, " rows"],
     second_word: Int[np.ndarray, " rows"],
     offset: Whole,
 ):
-    """Write the two highest scores of each row and whose they are, to rows from ``offset``."""
-    for i in range(scores.shape[0]):
-        a, b = np.float32(-np.inf), np.float32(-np.inf)
-        at_a, at_b = -1, -1
-        for k in range(scores.shape[1]):
-            s = scores[i, k]
-            if s > a:
-                b, at_b = a, at_a
-                a, at_a = s, k
-            elif s > b:
-                b, at_b = s, k
-        best[offset + i], best_word[offset + i] = a, at_a
-        second[offset + i], second_word[offset + i] = b, at_b
+    """Write the two highest scores of each column and whose they are, from row ``offset`` on; of equals the first."""
+    count = scores.shape[1]
+    a, b = np.full(count, np.float32(-np.inf)), np.full(count, np.float32(-np.inf))
+    at_a, at_b = np.full(count, -1, np.int32), np.full(count, -1, np.int32)
+    for k in range(scores.shape[0]):
+        number = np.int32(k)
+        for i in range(count):  # without branches, so that it is vectorised
+            s = scores[k, i]
+            first, next_ = s > a[i], s > b[i]
+            at_b[i] = at_a[i] if first else (number if next_ else at_b[i])
+            b[i] = a[i] if first else (s if next_ else b[i])
+            at_a[i] = number if first else at_a[i]
+            a[i] = s if first else a[i]
+    for i in range(count):
+        best[offset + i], best_word[offset + i] = a[i], at_a[i]
+        second[offset + i], second_word[offset + i] = b[i], at_b[i]
 
 
 @njit(cache=True, nogil=True)

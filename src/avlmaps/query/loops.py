@@ -14,6 +14,8 @@ import numpy as np
 from avlmaps.core.arrays import Bool, Float16, Float32, Int, Int64
 
 _CHUNK = 16_384
+# Rows that are compared with all words at once: their scores stay in the processor's cache.
+_SCORED = 2_048
 # Rows that are widened at once in plain NumPy: they stay in the processor's cache.
 _WIDENED = 4_096
 # A float16's bits, moved to where a float32 has them, are the number times 2⁻¹¹²: the exponents' biases differ by that.
@@ -71,19 +73,27 @@ Closest = tuple[
 ]  # the best score of each voxel and whose it is, and the second best
 
 
+def word_type(words: int) -> type[np.signedinteger]:
+    """Return the type of the number of a word: small, as there is one for each voxel."""
+    return np.int16 if words < 1 << 15 else np.int32
+
+
 def two_closest(feature: Float16[np.ndarray, "n d"], words: Float32[np.ndarray, "v d"]) -> Closest:
     """Return the two words closest to each feature; −inf and −1 where there are none."""
     n = len(feature)
     best, second = np.full(n, -np.inf, np.float32), np.full(n, -np.inf, np.float32)
-    best_word, second_word = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
+    kind = word_type(len(words))
+    best_word, second_word = np.full(n, -1, kind), np.full(n, -1, kind)
     columns = np.ascontiguousarray(words.T)
 
     def compiled(start: int, stop: int) -> None:
-        wide = np.empty((min(_CHUNK, max(stop - start, 1)), feature.shape[1]), np.float32)
-        for a in range(start, stop, _CHUNK):
-            rows = np.ascontiguousarray(feature[a : min(a + _CHUNK, stop)], np.float16)
+        wide = np.empty((min(_SCORED, max(stop - start, 1)), feature.shape[1]), np.float32)
+        scores = np.empty((len(words), len(wide)), np.float32)
+        for a in range(start, stop, _SCORED):
+            rows = np.ascontiguousarray(feature[a : min(a + _SCORED, stop)], np.float16)
             widen(rows.view(np.uint16), wide)
-            best_two(wide[: len(rows)] @ columns, best, best_word, second, second_word, a)
+            np.matmul(words, wide.T, out=scores)
+            best_two(scores[:, : len(rows)], best, best_word, second, second_word, a)
 
     def plain() -> None:
         scaled = columns * _BIAS

@@ -14,7 +14,7 @@ from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.synonyms import is_open
 from avlmaps.query.things_in_rooms import ThingsInRooms, with_rooms
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import EncodedWord, Rivals, object_scores
+from avlmaps.query.words import EncodedWord, Scored, Vocabulary, scored_once
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class Pieces:
     """The voxels that a queried word won, and the things that they make up.
 
     Attributes:
-        mask: which voxels they are.
+        rows: numbers of these voxels in the map, ascending.
         instance: which thing each of them belongs to.
         mean_probability: of each thing: the mean of its voxels' squared scores (for an encoder of names: p).
         confidence: the probability that each matches the query.
@@ -30,7 +30,7 @@ class Pieces:
         best: highest confidence before that.
     """
 
-    mask: Bool[np.ndarray, " n"]
+    rows: Int[np.ndarray, " a"]
     instance: Int[np.ndarray, " a"]
     mean_probability: Float32[np.ndarray, " i"]
     confidence: Float32[np.ndarray, " i"]
@@ -39,26 +39,26 @@ class Pieces:
 
     def beside(self, others: "Pieces") -> "Pieces":
         """Return these things and others, which have none of their voxels."""
-        instance = np.full(len(self.mask), -1, np.int64)
-        instance[others.mask] = others.instance
-        instance[self.mask] = self.instance + len(others.confidence)
-        mask = instance >= 0
+        rows = np.concatenate([self.rows, others.rows])
+        instance = np.concatenate([self.instance + len(others.confidence), others.instance])
+        order = np.argsort(rows)
         mean = np.concatenate([others.mean_probability, self.mean_probability])
         confidence = np.concatenate([others.confidence, self.confidence])
-        return Pieces(mask, instance[mask], mean, confidence, max(self.won, others.won), max(self.best, others.best))
+        won, best = max(self.won, others.won), max(self.best, others.best)
+        return Pieces(rows[order], instance[order], mean, confidence, won, best)
 
 
 def object_pieces(
     space: Space,
     feature: Float16[np.ndarray, "n d"],
     encoder: PixelEncoder,
-    rivals: Rivals,
+    rivals: Vocabulary,
     encoded: EncodedWord,
     settings: ObjectSettings,
     rooms: Callable[[], ThingsInRooms | None] = lambda: None,
 ) -> Pieces:
     """Return the things that a word names: connected voxels that it wins, specks left out, thin parts joined."""
-    scored = object_scores(feature, encoder, rivals, encoded, settings)
+    scored = scored_once(feature, encoder, rivals, encoded, settings)(1.0)
     return pieces_of(space, encoder, encoded, scored, settings, rooms)
 
 
@@ -66,7 +66,7 @@ def pieces_of(
     space: Space,
     encoder: PixelEncoder,
     encoded: EncodedWord,
-    scored: tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]],
+    scored: Scored,
     settings: ObjectSettings,
     rooms: Callable[[], ThingsInRooms | None] = lambda: None,
     beside: Pieces | None = None,
@@ -76,23 +76,26 @@ def pieces_of(
     With ``beside``, those stay as they are, and uncertain ones of the other voxels come after them: weak voxels round a
     confident thing make it neither larger nor less likely.
     """
-    margin, score = scored
+    rows, margin, score = scored.rows, scored.margin, scored.score
+    index = np.asarray(space.index)[rows]  # all below is of these voxels alone, however large the map
     least = settings.least_confidence if beside is None else settings.least_in_company
     longest = _longest_m(encoder, encoded, settings)
 
-    def lengths_of(mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"]) -> Float[np.ndarray, " i"]:
-        points = space.level(space.centres[mask])
-        return oversize.lengths_m(points, instance, int(instance.max(initial=-1)) + 1)
+    def points_of(mask: Bool[np.ndarray, " m"]) -> Float[np.ndarray, "a 3"]:
+        return space.level(space.grid.centre_of(index[mask]))
+
+    def lengths_of(mask: Bool[np.ndarray, " m"], instance: Int[np.ndarray, " a"]) -> Float[np.ndarray, " i"]:
+        return oversize.lengths_m(points_of(mask), instance, int(instance.max(initial=-1)) + 1)
 
     def confidence_of(
-        mask: Bool[np.ndarray, " n"], instance: Int[np.ndarray, " a"], length_m: Float[np.ndarray, " i"] | None = None
+        mask: Bool[np.ndarray, " m"], instance: Int[np.ndarray, " a"], length_m: Float[np.ndarray, " i"] | None = None
     ) -> Float32[np.ndarray, " i"]:
         if isinstance(encoder, NamedPixelEncoder):
             by_looks = named_confidence(encoder, encoded, score[mask], instance, space.grid.voxel_size_m)
             if math.isfinite(longest):
                 length_m = lengths_of(mask, instance) if length_m is None else length_m
                 by_looks = oversize.less_likely(by_looks, length_m, longest)
-            return _in_rooms(by_looks, rooms, encoded.meant(encoder), settings, mask, instance)
+            return _in_rooms(by_looks, rooms, encoded.meant(encoder), settings, rows[mask], instance)
         return instance_confidence(margin[mask], instance, space.grid.voxel_size_m, fitting(settings, encoder))
 
     mask = margin > 0.0
@@ -100,18 +103,18 @@ def pieces_of(
     if beside is not None:
         if isinstance(encoder, NamedPixelEncoder):
             mask |= score > np.maximum(settings.score_in_company * (score - margin), settings.least_score_in_company)
-        mask &= ~beside.mask
-    instance = instances_of(space, mask, settings.link_m)
+        mask &= ~np.isin(rows, beside.rows, assume_unique=True)
+    instance = instances_of(space, rows[mask], settings.link_m)
     confidence = confidence_of(mask, instance)
     best = float(confidence.max(initial=0.0))
     mask, instance, confidence = without_specks(mask, instance, confidence, least)
-    joined = merge_instances(space.level(space.centres[mask]), instance, settings.link_m, settings.join_m)
+    joined = merge_instances(points_of(mask), instance, settings.link_m, settings.join_m)
     if len(confidence) > joined.max(initial=-1) + 1:
         instance = joined[instance]
         confidence = confidence_of(mask, instance)
     if math.isfinite(longest) and len(instance):
-        points, reach = space.level(space.centres[mask]), _reach(space, settings.link_m)
-        pieces, piece_of = oversize.cut(np.asarray(space.index[mask]), points, score[mask], instance, longest, reach)
+        points, reach = points_of(mask), _reach(space, settings.link_m)
+        pieces, piece_of = oversize.cut(index[mask], points, score[mask], instance, longest, reach)
         if not np.array_equal(pieces, instance):
             length_m, mask = lengths_of(mask, instance)[piece_of], mask.copy()
             mask[np.flatnonzero(mask)[pieces < 0]] = False
@@ -121,13 +124,15 @@ def pieces_of(
     mean = np.bincount(instance, weights=np.square(score[mask]), minlength=len(confidence)).astype(np.float64)
     mean /= np.maximum(np.bincount(instance, minlength=len(confidence)), 1)
     best = max(best, float(confidence.max(initial=0.0)))
-    pieces = Pieces(mask, instance, mean.astype(np.float32), confidence, won, best)
+    pieces = Pieces(rows[mask], instance, mean.astype(np.float32), confidence, won, best)
     return pieces if beside is None else pieces.beside(beside)
 
 
-def instances_of(space: Space, mask: Bool[np.ndarray, " n"], link_m: float) -> Int[np.ndarray, " a"]:
-    """Return for each voxel of the mask the number of the instance that it belongs to."""
-    return loops.linked(np.asarray(space.index[mask]), _reach(space, link_m))
+def instances_of(
+    space: Space, voxels: Bool[np.ndarray, " n"] | Int[np.ndarray, " a"], link_m: float
+) -> Int[np.ndarray, " a"]:
+    """Return for each of some voxels, a mask or ascending numbers, the number of the instance that it belongs to."""
+    return loops.linked(np.asarray(space.index)[voxels], _reach(space, link_m))
 
 
 def _reach(space: Space, link_m: float) -> int:
@@ -188,12 +193,12 @@ def _in_rooms(
     rooms: Callable[[], ThingsInRooms | None],
     names: tuple[str, ...],
     settings: ObjectSettings,
-    mask: Bool[np.ndarray, " n"],
+    rows: Int[np.ndarray, " a"],
     instance: Int[np.ndarray, " a"],
 ) -> Float32[np.ndarray, " i"]:
     """Return the confidence of each instance after what its room says about things of these names."""
     evidence = rooms() if settings.room_weight > 0.0 and len(confidence) else None
-    nats = None if evidence is None else evidence.nats(names, np.flatnonzero(mask), instance, len(confidence))
+    nats = None if evidence is None else evidence.nats(names, rows, instance, len(confidence))
     if nats is None:
         return confidence
     return with_rooms(confidence, settings.room_weight * nats, settings.room_cost).astype(np.float32)

@@ -107,6 +107,10 @@ class Space:
         """The middles of the voxels, metres, world."""
         return self.grid.centre_of(np.asarray(self.index))
 
+    def centres_of(self, voxels: Bool[np.ndarray, " n"] | Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 3"]:
+        """Return the middles of some voxels, a mask or their numbers, metres, world; those of all are not computed."""
+        return self.grid.centre_of(np.asarray(self.index)[voxels])
+
     @cached_property
     def blocks(self) -> Blocks:
         """The voxels in blocks."""

@@ -101,6 +101,17 @@ class Vocabulary:
         return silent
 
 
+    def rivals_at(self, feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"]) -> "Rivals":
+        """Return the two words closest to some voxels of a map."""
+        return Rivals.among(np.ascontiguousarray(feature[rows]), self)
+
+    def contenders(
+        self, encoder: PixelEncoder, encoded: "EncodedWord", silent: Bool[np.ndarray, " v"], share: float
+    ) -> Int[np.ndarray, " m"] | None:
+        """Return the voxels where a word may score a share of its best rival, as far as is known; None: any voxel."""
+        return None
+
+
 @dataclass(frozen=True, slots=True)
 class Rivals(Vocabulary):
     """A vocabulary, and its two words closest to each voxel, computed once a map and vocabulary.
@@ -130,6 +141,26 @@ class Rivals(Vocabulary):
         closest = loops.two_closest(feature, rivals.word_feature)
         return cls(rivals.words, rivals.word_feature, rivals.understood, rivals.has_other, *closest)
 
+    def taken(self, rows: Int[np.ndarray, " m"]) -> "Rivals":
+        """Return the same for some of the voxels."""
+        closest = self.best[rows], self.best_word[rows], self.second[rows], self.second_word[rows]
+        return Rivals(self.words, self.word_feature, self.understood, self.has_other, *closest)
+
+
+@dataclass(frozen=True, slots=True)
+class Scored:
+    """The voxels that may be a queried thing: no other voxel of the map can be.
+
+    Attributes:
+        rows: their numbers in the map, ascending.
+        margin: by how much the word beats its best rival there.
+        score: of the word.
+    """
+
+    rows: Int[np.ndarray, " m"]
+    margin: Float32[np.ndarray, " m"]
+    score: Float32[np.ndarray, " m"]
+
 
 def object_margins(
     feature: Float16[np.ndarray, "n d"],
@@ -150,29 +181,38 @@ def object_margins(
         least_score: what the word must beat besides where ``other`` has no feature.
     """
     score = loops.feature_scores(feature, word_rows)
+    return _beaten(score, feature, np.arange(len(score)), rivals, silent, least_score), score
+
+
+def _beaten(
+    score: Float32[np.ndarray, " m"],
+    feature: Float16[np.ndarray, "n d"],
+    rows: Int[np.ndarray, " m"],
+    rivals: Rivals,
+    silent: Bool[np.ndarray, " v"],
+    least_score: float,
+) -> Float32[np.ndarray, " m"]:
+    """Return by how much scores of some voxels beat the best rival there; features are read where a third word may be.
+
+    Args:
+        score: of the word at these voxels.
+        feature: of the map.
+        rows: of the voxels in it.
+        rivals: at these voxels.
+        silent: which words do not compete.
+        least_score: see ``object_margins``.
+    """
     floor = float(np.float32(-np.inf if rivals.has_other else least_score))
     closest = rivals.best, rivals.best_word, rivals.second, rivals.second_word
     out, unsure = loops.margins(score, closest, silent, floor)
-    rows = np.flatnonzero(unsure)
-    if len(rows) and not silent.all():
+    thirds = np.flatnonzero(unsure)
+    if len(thirds) and not silent.all():
         others = rivals.word_feature[~silent].T
-        for a in range(0, len(rows), _CHUNK):
-            some = rows[a : a + _CHUNK]
-            best = (np.asarray(feature[some], np.float32) @ others).max(axis=1)
+        for a in range(0, len(thirds), _CHUNK):
+            some = thirds[a : a + _CHUNK]
+            best = (np.asarray(feature[rows[some]], np.float32) @ others).max(axis=1)
             out[some] = score[some] - np.maximum(best, floor)
-    return out, score
-
-
-def object_scores(
-    feature: Float16[np.ndarray, "n d"],
-    encoder: PixelEncoder,
-    rivals: Rivals,
-    encoded: EncodedWord,
-    settings: ObjectSettings,
-) -> tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
-    """Return ``object_margins`` of a word."""
-    silent = rivals.silent_for(encoder, encoded, settings.same_word_cosine)
-    return object_margins(feature, rivals, encoded.rows, silent, settings.least_score)
+    return out
 
 
 def scored_once(
@@ -181,25 +221,35 @@ def scored_once(
     rivals: Vocabulary,
     encoded: EncodedWord,
     settings: ObjectSettings,
-) -> Callable[[float], tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]]]:
-    """Return what gives ``object_margins`` of a word for voxels that score at least a share of their best rival."""
-    if isinstance(rivals, Rivals):
-        scored = object_scores(feature, encoder, rivals, encoded, settings)
-        return lambda share: scored
-    score = loops.feature_scores(feature, encoded.rows)
+) -> Callable[[float], Scored]:
+    """Return what gives the voxels where a word scores at least a share of its best rival, and maybe others.
+
+    With all ``Rivals`` known they are all voxels. Else the encoder is one of names: voxels with little of the word are
+    not compared with its rivals, and where the closest words are known before (``KnownRivals``), they say of most
+    voxels that the word cannot win.
+    """
     silent = rivals.silent_for(encoder, encoded, settings.same_word_cosine)
+    if isinstance(rivals, Rivals):
+        every = np.arange(len(feature))
+        everywhere = Scored(every, *object_margins(feature, rivals, encoded.rows, silent, settings.least_score))
+        return lambda share: everywhere
 
     @cache
-    def margins(share: float) -> tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
-        margin = np.full(len(score), np.finfo(np.float32).min)
-        rows = np.flatnonzero(score > least_score_to_count(len(rivals.words), share))
-        some = np.ascontiguousarray(feature[rows])
-        margin[rows], _ = object_margins(
-            some, Rivals.among(some, rivals), encoded.rows, silent, settings.least_score
-        )  # fmt: skip
-        return margin, score
+    def scores() -> Float32[np.ndarray, " n"]:
+        return loops.feature_scores(feature, encoded.rows)
 
-    return margins
+    @cache
+    def at_least(share: float) -> Scored:
+        rows = rivals.contenders(encoder, encoded, silent, share)
+        if rows is None:
+            rows = np.flatnonzero(scores() > least_score_to_count(len(rivals.words), share))
+            score = scores()[rows]
+        else:
+            score = loops.feature_scores(np.ascontiguousarray(feature[rows]), encoded.rows)
+        near = rivals.rivals_at(feature, rows)
+        return Scored(rows, _beaten(score, feature, rows, near, silent, settings.least_score), score)
+
+    return at_least
 
 
 def least_score_to_count(names: int, share: float) -> float:

@@ -79,18 +79,20 @@ def object_factor(
             among = scored(chosen.share_in_company)
             pieces = pieces_of(space, encoder, encoded, among, chosen, rooms, beside=confident)
         if tint is not None and rgb is not None:
-            share = tinted_share(rgb, pieces.mask, pieces.instance, tint)
+            share = tinted_share(rgb, pieces.rows, pieces.instance, tint)
             pieces = replace(pieces, confidence=pieces.confidence * share)
         best = float(pieces.confidence.max(initial=0.0)) if tint else pieces.best
-        note = "" if best >= FOUND_AT else _absence(part.query, len(pieces.mask), pieces.won, best)
+        note = "" if best >= FOUND_AT else _absence(part.query, len(space), pieces.won, best)
         if encoded.understood and not _is_whole(encoded.understood, tint.thing if tint else part.query):
             half = f"understood only {understood!r} of {part.query!r}"
             half += "" if is_named else ", and a colour alone is no thing: what has it is a guess"
             note = half + ("; " + note if note else "")
         falloff, alone = heat.falloff_per_m(part.role), None if with_uncertain else lambda: things(True)
         found = best >= FOUND_AT and is_named
+        mask = np.zeros(len(space), np.bool_)
+        mask[pieces.rows] = True
         return NearThings(
-            space, part, falloff, pieces.mask, pieces.instance, pieces.confidence, found, understood, note, alone,
+            space, part, falloff, mask, pieces.instance, pieces.confidence, found, understood, note, alone,
             is_named,
         )  # fmt: skip
 
