@@ -95,6 +95,12 @@ def _written(verb: View, out: Path) -> dict[str, Any]:
 
 def _lines(answer: dict[str, Any]) -> list[str]:
     lines = [f"query: {one['question']}: {'found' if one['found'] else 'not found'}" for one in answer["questions"]]
+    counts = zip(answer["voxels"], answer["voxels_of_maps"], strict=True)
+    lines += [
+        f"note: the file shows {drawn:,} of {all_of_map:,} voxels, one of each small block; answers come from all"
+        for drawn, all_of_map in counts
+        if drawn < all_of_map
+    ]
     return [*lines, f"wrote {answer['page']} ({size_of(answer['bytes'])})"]
 
 

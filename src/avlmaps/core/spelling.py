@@ -1,6 +1,7 @@
 """Words alike in spelling: which known word a misspelt one was meant to be."""
 
 from collections.abc import Iterable
+from functools import lru_cache
 
 _JOINTS = str.maketrans("", "", " \t\n\r\v\f\u00a0-_'’.")
 # Of the letters of the longer word; beyond, two words are not alike.
@@ -8,6 +9,7 @@ _MOST_CHANGED = 0.28
 _DOUBLED = 0.5
 
 
+@lru_cache(maxsize=1 << 13)
 def squeezed(phrase: str) -> str:
     """Return a phrase in small letters without blanks, hyphens, dots and apostrophes: "Arm-chair" is "armchair"."""
     return phrase.casefold().translate(_JOINTS)

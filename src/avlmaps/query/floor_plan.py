@@ -26,6 +26,7 @@ _CAMERA_M = 1.3
 # Share of a cell's mass that one step of the walk moves to each neighbour; it adds 2 x 0.24 cells² of variance an axis.
 _TO_NEIGHBOUR = 0.24
 _MOST_CELLS = 4_000_000
+_CHUNK = 1 << 17  # voxels, or shares of cells, that are worked on at once: they stay in the processor's cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,29 +63,31 @@ class FloorPlan:
         if not len(space):
             return None
         floors = np.sort(np.asarray(floors_m, np.float64))
-        level = space.level(space.centres)
-        cell = np.floor(level[:, :2] / CELL_M).astype(np.int64)
-        ends = cell if places is None else np.r_[cell, np.floor(space.level(places)[:, :2] / CELL_M).astype(np.int64)]
-        low = ends.min(axis=0) - 1
-        size = ends.max(axis=0) - low + 2
+        low, high = _ends(space, places)
+        low, size = low - 1, high - low + 3
         if len(floors) * int(size[0]) * int(size[1]) > _MOST_CELLS:
             return None
-        storey = _storey_of(level[:, 2], floors)
-        height_m = level[:, 2] - floors[storey]
-        thickness = space.grid.voxel_size_m
         shape = (len(floors), int(size[0]), int(size[1]))
-        own = ((storey * size[0] + cell[:, 0] - low[0]) * size[1] + cell[:, 1] - low[1]).astype(np.int64)
-        layers = max(1, int(np.ceil((WALL_M[1] - WALL_M[0]) / thickness)))
-        at = np.flatnonzero((height_m >= WALL_M[0]) & (height_m < WALL_M[1]))
-        layer = np.minimum(((height_m[at] - WALL_M[0]) / thickness).astype(np.int64), layers - 1)
+        layers = max(1, int(np.ceil((WALL_M[1] - WALL_M[0]) / space.grid.voxel_size_m)))
         held = np.zeros((int(np.prod(shape)), layers), bool)
-        held[own[at], layer] = True
-        wall = (held.sum(axis=1) >= _WALL_SHARE * layers).reshape(shape)
         seen = np.zeros(shape, bool)
-        seen.reshape(-1)[own] = True
+        own = np.empty(len(space), np.int64)
+        for a in range(0, len(space), _CHUNK):
+            level = space.level(space.centres_of(slice(a, a + _CHUNK)))
+            storey = _storey_of(level[:, 2], floors)
+            cell = np.floor(level[:, :2] / CELL_M).astype(np.int64) - low
+            mine = own[a : a + _CHUNK]
+            mine[:] = (storey * size[0] + cell[:, 0]) * size[1] + cell[:, 1]
+            height_m = level[:, 2] - floors[storey]
+            at = np.flatnonzero((height_m >= WALL_M[0]) & (height_m < WALL_M[1]))
+            layer = ((height_m[at] - WALL_M[0]) / space.grid.voxel_size_m).astype(np.int64)
+            held[mine[at], np.minimum(layer, layers - 1)] = True
+            seen.reshape(-1)[mine] = True
+        wall = (held.sum(axis=1) >= _WALL_SHARE * layers).reshape(shape)
         if places is not None:
             beyond = space.level(places)
-            seen[_storey_of(beyond[:, 2], floors), *(ends[len(cell) :] - low).T] = True
+            cell = np.floor(beyond[:, :2] / CELL_M).astype(np.int64) - low
+            seen[_storey_of(beyond[:, 2], floors), *cell.T] = True
         return cls(space, floors, low * CELL_M, wall, _without_gaps(seen) & ~wall, own)
 
     def __len__(self) -> int:
@@ -172,13 +175,17 @@ class FloorPlan:
             mass: in each cell, any number of kinds.
             sigma_m: standard deviation along each axis, metres.
         """
-        spread = np.array(mass, np.float32).reshape(*self.wall.shape, -1)
-        for _ in range(round((sigma_m / CELL_M) ** 2 / (2.0 * _TO_NEIGHBOUR))):
-            flow = [across * (spread[one] - spread[other]) for one, other, across in self._doors]
-            for (one, other, _), moved in zip(self._doors, flow, strict=True):
-                spread[one] -= moved
-                spread[other] += moved
-        return spread.reshape(len(self), -1)
+        whole = np.array(mass, np.float32).reshape(*self.wall.shape, -1)
+        some = max(1, _CHUNK // max(len(self), 1))
+        for a in range(0, whole.shape[-1], some):  # kinds do not mix
+            spread = np.ascontiguousarray(whole[..., a : a + some])
+            for _ in range(round((sigma_m / CELL_M) ** 2 / (2.0 * _TO_NEIGHBOUR))):
+                flow = [across * (spread[one] - spread[other]) for one, other, across in self._doors]
+                for (one, other, _), moved in zip(self._doors, flow, strict=True):
+                    spread[one] -= moved
+                    spread[other] += moved
+            whole[..., a : a + some] = spread
+        return whole.reshape(len(self), -1)
 
     @cached_property
     def _doors(self) -> "list[tuple[tuple[slice, ...], tuple[slice, ...], Float32[np.ndarray, 's nx ny 1']]]":
@@ -188,6 +195,20 @@ class FloorPlan:
             (one, other, (_TO_NEIGHBOUR * (self.open[one] & self.open[other])[..., None]).astype(np.float32))
             for one, other in sides
         ]
+
+
+def _ends(
+    space: Space, places: Float[np.ndarray, "k 3"] | None
+) -> tuple[Int[np.ndarray, "2"], Int[np.ndarray, "2"]]:
+    """Return the lowest and the highest cell, of the level frame, in which a voxel of the map or a place lies."""
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for a in range(0, len(space), _CHUNK):
+        level = space.level(space.centres_of(slice(a, a + _CHUNK)))[:, :2]
+        low, high = np.minimum(low, level.min(axis=0)), np.maximum(high, level.max(axis=0))
+    if places is not None and len(places):
+        level = space.level(places)[:, :2]
+        low, high = np.minimum(low, level.min(axis=0)), np.maximum(high, level.max(axis=0))
+    return np.floor(low / CELL_M).astype(np.int64), np.floor(high / CELL_M).astype(np.int64)
 
 
 def _without_gaps(seen: Bool[np.ndarray, "s nx ny"]) -> Bool[np.ndarray, "s nx ny"]:

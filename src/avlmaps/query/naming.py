@@ -71,14 +71,19 @@ class VoxelNamer:
         best = np.argsort(-confidence, kind="stable")[:most]
         return [(self.names[k], float(confidence[k])) for k in best if confidence[k] > 0.0]
 
-    def best(self) -> tuple[Int[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
-        """Return for every voxel the number of its likeliest name (-1 for none) and its confidence."""
-        n = len(self._voxels)
-        number, confidence = np.full(n, -1, np.int64), np.zeros(n, np.float32)
-        for start in range(0, n if self.names else 0, _CHUNK):
-            rows = np.arange(start, min(start + _CHUNK, n))
-            share = self.confidences(rows)
-            number[rows], confidence[rows] = share.argmax(axis=1), share.max(axis=1)
+    def best(self, rows: Int[np.ndarray, " m"] | None = None) -> tuple[Int[np.ndarray, " m"], Float32[np.ndarray, " m"]]:
+        """Return for each of some voxels the number of its likeliest name (-1 for none) and its confidence.
+
+        Args:
+            rows: numbers of the voxels in the map; by default all.
+        """
+        rows = np.arange(len(self._voxels)) if rows is None else rows
+        number, confidence = np.full(len(rows), -1, np.int64), np.zeros(len(rows), np.float32)
+        for start in range(0, len(rows) if self.names else 0, _CHUNK):
+            some = slice(start, start + _CHUNK)
+            share = self.confidences(rows[some])
+            number[some] = share.argmax(axis=1)
+            confidence[some] = np.take_along_axis(share, number[some, None], axis=1)[:, 0]
         number[confidence <= 0.0] = -1
         return number, confidence
 

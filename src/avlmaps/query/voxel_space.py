@@ -107,8 +107,8 @@ class Space:
         """The middles of the voxels, metres, world."""
         return self.grid.centre_of(np.asarray(self.index))
 
-    def centres_of(self, voxels: Bool[np.ndarray, " n"] | Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 3"]:
-        """Return the middles of some voxels, a mask or their numbers, metres, world; those of all are not computed."""
+    def centres_of(self, voxels: Bool[np.ndarray, " n"] | Int[np.ndarray, " m"] | slice) -> Float[np.ndarray, "m 3"]:
+        """Return the middles of some voxels, metres, world: of a mask, numbers or a slice; all are never computed."""
         return self.grid.centre_of(np.asarray(self.index)[voxels])
 
     @cached_property
@@ -140,6 +140,11 @@ class Space:
         """The middles of the voxels in the order of ``blocks``, horizontal coordinates of the level frame, metres."""
         return np.ascontiguousarray(self.level(self.centres[self.blocks.order])[:, :2])
 
+    @cached_property
+    def is_level(self) -> bool:
+        """Whether the world is the level frame itself."""
+        return np.array_equal(self.level_from_world, np.eye(3))
+
     @property
     def level_from_recording(self) -> Float[np.ndarray, "4 4"]:
         """The pose of the recording's world in the level frame: the rotation, about the same origin."""
@@ -149,6 +154,8 @@ class Space:
 
     def level(self, points_world: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
         """Turn points from the world into the level frame."""
+        if self.is_level:
+            return np.array(points_world, np.float64)
         return np.asarray(points_world, np.float64) @ self.level_from_world.T
 
     def world(self, points_level: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:

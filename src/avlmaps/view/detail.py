@@ -8,6 +8,8 @@ from jaxtyping import Int
 # Edges of the blocks, in voxels, of which one voxel each is drawn first.
 _EDGES = (16, 8, 4, 2)
 _SEED = 11
+# Blocks in the box round a map, for each of its voxels, up to which a table of them is made.
+_MOST_BLOCKS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,40 +25,55 @@ class Level:
     edge: int
 
 
-def detail_order(index: Int[np.ndarray, "n 3"]) -> tuple[Int[np.ndarray, " n"], tuple[Level, ...]]:
+def detail_order(
+    index: Int[np.ndarray, "n 3"], most: int | None = None
+) -> tuple[Int[np.ndarray, " m"], tuple[Level, ...]]:
     """Return the order in which voxels are drawn, and how many of them make up each level.
 
     A level holds one voxel of every block that holds any, and the last level holds all voxels. Within a level the
     order is drawn at random (always the same), so that any part of a level is spread over the whole map.
 
     Args:
-        index: which voxels; each once.
+        index: which voxels; each once, sorted.
+        most: voxels that are drawn at most. Where there are more, the last level is one of blocks of which some are
+            left out, and ``count`` of that level is what all of them would be.
     """
     index = np.asarray(index, np.int64)
     n = len(index)
     rng = np.random.default_rng(_SEED)
     chosen = np.zeros(n, bool)
+    drawn = 0
     parts: list[np.ndarray] = []
     levels: list[Level] = []
     for edge in _EDGES:
-        fresh = _one_of_each(index // edge, chosen)
-        if n and len(fresh) + int(chosen.sum()) < n:
+        fresh = _one_of_each(index, edge, chosen)
+        if n and len(fresh) + drawn < n:
             chosen[fresh] = True
+            drawn += len(fresh)
             parts.append(rng.permutation(fresh))
-            levels.append(Level(int(chosen.sum()), edge))
+            levels.append(Level(drawn, edge))
+            if most is not None and drawn >= most:
+                return np.concatenate(parts)[:most], tuple(levels)
     parts.append(rng.permutation(np.flatnonzero(~chosen)))
     levels.append(Level(n, 1))
-    return np.concatenate(parts), tuple(levels)
+    return np.concatenate(parts)[:most], tuple(levels)
 
 
-def _one_of_each(block: Int[np.ndarray, "n 3"], chosen: np.ndarray) -> Int[np.ndarray, " m"]:
+def _one_of_each(index: Int[np.ndarray, "n 3"], edge: int, chosen: np.ndarray) -> Int[np.ndarray, " m"]:
     """Return one row of each block of which none is chosen yet: the first of them."""
-    if not len(block):
+    if not len(index):
         return np.zeros(0, np.int64)
-    shifted = block - block.min(axis=0)
-    span = shifted.max(axis=0) + 1
-    key = (shifted[:, 0] * span[1] + shifted[:, 1]) * span[2] + shifted[:, 2]
-    _, first, number = np.unique(key, return_index=True, return_inverse=True)
-    taken = np.zeros(len(first), bool)
-    taken[number[chosen]] = True
-    return first[~taken]
+    low, high = index.min(axis=0) // edge, index.max(axis=0) // edge
+    span = high - low + 1
+    key = np.zeros(len(index), np.int64)
+    for axis in range(3):
+        key *= span[axis]
+        key += index[:, axis] // edge - low[axis]
+    blocks = int(span[0]) * int(span[1]) * int(span[2])
+    if blocks > _MOST_BLOCKS * len(index):  # a few far voxels: a table of all blocks would be larger than the map
+        _, key = np.unique(key, return_inverse=True)
+        blocks = int(key.max()) + 1
+    first = np.full(blocks, -1, np.int64)
+    first[key[::-1]] = np.arange(len(index) - 1, -1, -1)  # the last one written stays
+    first[key[chosen]] = -1
+    return first[first >= 0]

@@ -34,7 +34,7 @@ class Labels:
         names: of things, in the order of their colours; a voxel's first label counts into it from 1.
         room_names: likewise, for the second label.
         voxel_names: likewise, for the third label.
-        voxels: (n, 4) the labels of each voxel in the order of drawing: thing, room, name, confidence of the name.
+        voxels: (m, 4) the labels of each voxel that is drawn, in that order: thing, room, name, confidence of the name.
         notes: one sentence each on what could not be computed.
     """
 
@@ -54,10 +54,10 @@ class Labels:
         things = _or_note(avlmap.things, notes)
         sounds = _or_note(avlmap.sounds, notes)
         rooms = _or_note(avlmap.rooms, notes)
-        names, thing = _thing_labels(len(layout), things)
-        room_names, room = _room_labels(avlmap, rooms)
-        voxel_names, best, confidence = _name_labels(avlmap, notes)
-        voxels = np.stack([thing, room, best, confidence], axis=1)[layout.order]
+        names, thing = _thing_labels(len(avlmap.space), things)
+        room_names, room = _room_labels(avlmap, rooms, layout.order)
+        voxel_names, best, confidence = _name_labels(avlmap, notes, layout.order)
+        voxels = np.stack([thing[layout.order], room, best, confidence], axis=1)
         return cls(
             tuple(things), tuple(sounds), tuple(rooms), names, room_names, voxel_names, voxels,
             tuple(dict.fromkeys(notes)),
@@ -132,20 +132,26 @@ def _thing_labels(count: int, things: "Sequence[Thing]") -> tuple[tuple[str, ...
     return names, label
 
 
-def _room_labels(avlmap: "AVLMap", rooms: "Sequence[Room]") -> tuple[tuple[str, ...], UInt8[np.ndarray, " n"]]:
-    """Give every voxel the room whose views lie nearest to it on the ground."""
+def _room_labels(
+    avlmap: "AVLMap", rooms: "Sequence[Room]", rows: Int[np.ndarray, " m"]
+) -> tuple[tuple[str, ...], UInt8[np.ndarray, " m"]]:
+    """Give each of some voxels the room whose views lie nearest to it on the ground."""
     from scipy.spatial import KDTree
 
     names = tuple(sorted({room.name for room in rooms}))[:_MOST]
-    if not names or not len(avlmap.space):
-        return names, np.zeros(len(avlmap.space), np.uint8)
-    level = avlmap.space.level
-    places = np.concatenate([level(room.places)[:, :2] for room in rooms])
+    if not names or not len(rows):
+        return names, np.zeros(len(rows), np.uint8)
+    space = avlmap.space
+    places = np.concatenate([space.level(room.places)[:, :2] for room in rooms])
     label = np.concatenate([np.full(room.views, 1 + names.index(room.name), np.uint8) for room in rooms])
-    column, member = np.unique(np.asarray(avlmap.space.index)[:, :2], axis=0, return_inverse=True)
     if not _is_level(avlmap):
-        return names, label[KDTree(places).query(level(avlmap.space.centres)[:, :2])[1]]
-    middles = (column + 0.5) * avlmap.space.grid.voxel_size_m
+        return names, label[KDTree(places).query(space.level(space.centres_of(rows))[:, :2])[1]]
+    ground = np.asarray(space.index)[rows, :2].astype(np.int64)
+    ground -= ground.min(axis=0)
+    width = int(ground[:, 1].max()) + 1
+    column, member = np.unique(ground[:, 0] * width + ground[:, 1], return_inverse=True)
+    low = np.asarray(space.index)[rows, :2].min(axis=0)
+    middles = (np.stack(np.divmod(column, width), axis=1) + low + 0.5) * space.grid.voxel_size_m
     return names, label[KDTree(places).query(middles)[1]][member.ravel()]
 
 
@@ -154,13 +160,13 @@ def _is_level(avlmap: "AVLMap") -> bool:
 
 
 def _name_labels(
-    avlmap: "AVLMap", notes: list[str]
-) -> tuple[tuple[str, ...], UInt8[np.ndarray, " n"], UInt8[np.ndarray, " n"]]:
-    """Give every voxel its likeliest name; where there are more than 255, the rarest are left out."""
-    n = len(avlmap.space)
+    avlmap: "AVLMap", notes: list[str], rows: Int[np.ndarray, " m"]
+) -> tuple[tuple[str, ...], UInt8[np.ndarray, " m"], UInt8[np.ndarray, " m"]]:
+    """Give each of some voxels its likeliest name; where there are more than 255, the rarest are left out."""
+    n = len(rows)
     try:
         namer = VoxelNamer(avlmap.stored)
-        number, confidence = namer.best()
+        number, confidence = namer.best(rows)
     except AvlmapsError as fault:
         notes.append(str(fault))
         return (), np.zeros(n, np.uint8), np.zeros(n, np.uint8)

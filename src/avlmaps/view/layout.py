@@ -25,6 +25,7 @@ RECORD = np.dtype([("cell", "<u2", (3,)), ("seen", "<u2"), ("rgb", "u1", (3,)), 
 _MOST_CELLS = 65535
 _NEAR_SHARE = 0.25  # of the map's extent: voxels up to this far out of the bulk of it count as the whole map
 _UNDER_CEILING_M = 0.1  # a storey is shown from below its floor to this far under its ceiling
+_MEASURED = 2_000_000  # voxels from which the page's first view is computed
 _HEADROOM_M = 0.3  # the page opens with what is higher over the highest camera cut away
 
 
@@ -33,23 +34,28 @@ class Layout:
 
     Attributes:
         avlmap: the map.
-        order: (n,) the map's row of each voxel that is drawn, in the order of drawing.
+        order: (m,) the map's row of each voxel that is drawn, in the order of drawing.
         levels: of detail.
         low: (3,) index of the map's lowest corner.
     """
 
-    def __init__(self, avlmap: "AVLMap") -> None:
+    def __init__(self, avlmap: "AVLMap", most: int | None = None) -> None:
         """Lay out a map.
+
+        Args:
+            avlmap: the map.
+            most: voxels that are drawn at most; of a larger map one voxel of each small block, see ``detail_order``.
 
         Raises:
             MapError: it is too wide to be drawn.
         """
         self.avlmap = avlmap
-        index = np.asarray(avlmap.space.index, np.int64)
-        self.order, self.levels = detail_order(index)
-        self.low = index.min(axis=0) if len(index) else np.zeros(3, np.int64)
-        if len(index) and int((index.max(axis=0) - self.low).max()) > _MOST_CELLS:
-            span_m = float((index.max(axis=0) - self.low).max() * avlmap.space.grid.voxel_size_m)
+        index = np.asarray(avlmap.space.index)
+        self.order, self.levels = detail_order(index, most)
+        ends = (index.min(axis=0), index.max(axis=0)) if len(index) else (np.zeros(3, np.int64),) * 2
+        self.low, self._high = (end.astype(np.int64) for end in ends)
+        if int((self._high - self.low).max()) > _MOST_CELLS:
+            span_m = float((self._high - self.low).max() * avlmap.space.grid.voxel_size_m)
             raise MapError(
                 f"{avlmap.stored.path} is {span_m:.0f} m wide, more than {_MOST_CELLS} voxels; build it with larger "
                 "voxels to view it."
@@ -75,9 +81,9 @@ class Layout:
 
     @cached_property
     def records(self) -> bytes:
-        """All voxels as `RECORD`, in the order of drawing."""
+        """The voxels that are drawn as `RECORD`, in the order of drawing."""
         voxels, records = self.avlmap.stored.voxels, np.zeros(len(self), RECORD)
-        records["cell"] = (np.asarray(self.avlmap.space.index, np.int64) - self.low)[self.order]
+        records["cell"] = np.asarray(self.avlmap.space.index)[self.order] - self.low
         records["rgb"] = np.asarray(voxels.rgb)[self.order]
         share = np.asarray(voxels.last_seen_s, np.float64)[self.order] / self.duration_s
         records["seen"] = np.clip(np.round(share * 65535), 0, 65535)
@@ -91,14 +97,15 @@ class Layout:
         latest = float(np.asarray(stored.voxels.last_seen_s).max(initial=0.0))
         return max(1e-3, latest, *map(float, ends)) if ends else max(1e-3, latest)
 
-    def in_order(self, values: Float32[np.ndarray, " n"]) -> UInt8[np.ndarray, " n"]:
+    def in_order(self, values: Float32[np.ndarray, " n"]) -> UInt8[np.ndarray, " m"]:
         """Return heat in [0, 1] as whole bytes in the order of drawing; any heat at all is at least 1."""
-        return np.ceil(np.clip(values, 0.0, 1.0) * 255).astype(np.uint8)[self.order]
+        return np.ceil(np.clip(values[self.order], 0.0, 1.0) * 255).astype(np.uint8)
 
     def describe(self) -> dict[str, Any]:
         """Return all that the page needs before it draws the first voxel."""
         stored, space = self.avlmap.stored, self.avlmap.space
-        level = space.level(space.centres) if len(space) else np.zeros((1, 3))
+        # Of a very large map an even picture of it is measured.
+        level = space.level(space.centres_of(self.order[:_MEASURED])) if len(space) else np.zeros((1, 3))
         low, high = np.percentile(level, [0.1, 99.9], axis=0)
         # What lies far from all else, seen through a window, does not make the rest small.
         reach = _NEAR_SHARE * (high - low) + space.grid.voxel_size_m
@@ -111,6 +118,7 @@ class Layout:
             "name": stored.path.name,
             "summary": repr(self.avlmap).partition(": ")[2].removesuffix(")"),
             "voxels": len(self),
+            "voxels_of_map": len(space),
             "voxel_size_m": space.grid.voxel_size_m,
             "record_bytes": RECORD.itemsize,
             "levels": [[level.count, level.edge] for level in self.levels],

@@ -30,6 +30,9 @@ SCRIPTS = ("matrix.js", "source.js", "shaders.js", "renderer.js", "camera.js", "
 _MARK = re.compile(r"\{\{(\w+)\}\}")
 _MOST_PICTURES = 60
 _MOST_QUESTIONS = 8
+# Voxels of a map in a file. Of a larger one a file shows one voxel of each small block, so that it stays within some
+# 30 MB and opens in a browser; answers and heat are computed on all voxels.
+MOST_VOXELS = 1_500_000
 _POLICY = (
     "default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; img-src 'self' data: blob:; "
     "media-src 'self' data: blob:; connect-src {connect}; base-uri 'none'; form-action 'none'"
@@ -58,7 +61,7 @@ def write_page(
     Raises:
         QueryError: a question is not understood, or the file cannot be written.
     """
-    session = ViewSession(maps)
+    session = ViewSession(maps, most=MOST_VOXELS)
     sentences = list(questions) or default_questions(session.maps[0].labels)
     data: dict[str, Any] = {
         **session.describe(),
@@ -83,6 +86,8 @@ def write_page(
     return {
         "page": str(out),
         "bytes": len(content),
+        "voxels": [len(one.layout) for one in session.maps],
+        "voxels_of_maps": [len(one.avlmap.space) for one in session.maps],
         "questions": [{"question": one["question"], "found": one["answers"][0]["found"]} for one in data["questions"]],
     }
 

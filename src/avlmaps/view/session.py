@@ -38,9 +38,10 @@ class MapOnPage:
         layout: how it is drawn.
     """
 
-    def __init__(self, avlmap: AVLMap) -> None:
+    def __init__(self, avlmap: AVLMap, most: int | None = None) -> None:
         self.avlmap = avlmap
-        self.layout = Layout(avlmap)
+        self.layout = Layout(avlmap, most)
+        self._is_file = most is not None
         self._labels: Labels | None = None
         self._namer: VoxelNamer | None = None
         self._lock = threading.Lock()
@@ -50,8 +51,9 @@ class MapOnPage:
         """Its contents; the first call computes them, others wait for it."""
         with self._lock:
             if self._labels is None:
-                # A map object of its own, so that questions need not wait for it.
-                self._labels = Labels.of(self.layout.with_map(AVLMap(self.avlmap.stored, self.avlmap.settings)))
+                # A map object of its own, so that questions need not wait for it; for a file they come later.
+                own = self.avlmap if self._is_file else AVLMap(self.avlmap.stored, self.avlmap.settings)
+                self._labels = Labels.of(self.layout.with_map(own))
             return self._labels
 
     def describe_contents(self) -> dict[str, Any]:
@@ -101,8 +103,9 @@ class ViewSession:
         guide: plans commands on the first map.
     """
 
-    def __init__(self, maps: Sequence[AVLMap], robot: MakeRobot | None = None) -> None:
-        self.maps = [MapOnPage(avlmap) for avlmap in maps]
+    def __init__(self, maps: Sequence[AVLMap], robot: MakeRobot | None = None, most: int | None = None) -> None:
+        """Lay out the maps, for a file each with at most so many voxels, and make what plans commands."""
+        self.maps = [MapOnPage(avlmap, most) for avlmap in maps]
         self.guide = Guide(maps[0], robot)
         self._asking = threading.Lock()
         self._uploads: OrderedDict[str, Upload] = OrderedDict()

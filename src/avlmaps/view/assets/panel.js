@@ -40,7 +40,9 @@ class Panel {
   async start() {
     const names = this.maps.map((map) => map.name.replace(/\.avlmap$/, ""));
     $("name").textContent = names.join(" and ");
-    $("summary").textContent = this.maps.map((map) => map.summary).join("; ");
+    const shown = (map) => map.voxels < map.voxels_of_map
+      ? `${map.summary}; this file shows ${map.voxels.toLocaleString("en")} of them` : map.summary;
+    $("summary").textContent = this.maps.map(shown).join("; ");
     document.title = `${names.join(" and ")} · avlmaps`;
     this.bindAsking();
     this.bindLook();

@@ -102,14 +102,16 @@ class Layer {
     const words = new Uint16Array(this.records.buffer);
     const stride = this.map.record_bytes / 2;
     const m = this.levelFromCells;
+    const { block } = this.edgeFor(this.loaded);
     let best = Infinity;
     let found = -1;
     for (let i = 0; i < this.loaded; i++) {
       let enter = 0;
       let leave = best;
       for (let axis = 0; axis < 3 && enter < leave; axis++) {
-        const low = (words[i * stride + axis] - start[axis]) * slope[axis];
-        const high = low + slope[axis];
+        const word = words[i * stride + axis];
+        const low = (word - (word % block) - start[axis]) * slope[axis];
+        const high = low + block * slope[axis];
         enter = Math.max(enter, Math.min(low, high));
         leave = Math.min(leave, Math.max(low, high));
       }
@@ -215,8 +217,7 @@ class Renderer {
     const part = Math.max(LEAST_BUDGET, Math.round((RESTING * this.budget) / views.length));
     for (const view of views) {
       const count = Math.min(part, view.layer.loaded - this.rest.at);
-      const whole = view.layer.loaded >= view.layer.count;
-      const { block, edge } = whole ? { block: 1, edge: 1 } : view.layer.edgeFor(view.layer.loaded);
+      const { block, edge } = view.layer.edgeFor(view.layer.loaded);
       if (count > 0) this.voxels(this.blocks, view, look, this.rest.at, count, { block, edge }, 1.75);
     }
     this.rest.at += part;
