@@ -67,7 +67,9 @@ def rows_of(path: Path, photo: Path, chosen: argparse.Namespace, work: Path) -> 
             continue
         row: dict[str, object] = {"command": name}
         told = {"MAP": str(path), "PHOTO": str(photo), "OUT": str(work)}
-        command = re.sub("MAP|PHOTO|OUT", lambda word: shlex.quote(told[word[0]]), form)
+        command = form
+        for word, value in told.items():
+            command = command.replace(word, shlex.quote(value))
         for label, source in (("", None), (" before", chosen.against)):
             if label and source is None:
                 continue

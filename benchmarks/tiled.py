@@ -88,7 +88,7 @@ def _moved(keyframes: Keyframes, world: np.ndarray, number: int) -> Keyframes:
 
 
 def _rows(offsets: np.ndarray, which: np.ndarray) -> np.ndarray:
-    return np.concatenate([np.arange(offsets[k], offsets[k + 1]) for k in which])
+    return np.concatenate([np.arange(int(offsets[k]), int(offsets[k + 1])) for k in which])
 
 
 def _joined(frames: list[Keyframes]) -> Keyframes:

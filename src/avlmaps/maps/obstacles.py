@@ -200,8 +200,13 @@ def find_obstacles(
 
 def _cells(
     level: Float[np.ndarray, "n 3"], level_from_world: Float[np.ndarray, "3 3"], voxel_size_m: float, cell_size_m: float
-) -> Int[np.ndarray, "8 n 2"]:
-    """Return the cells of eight points in each voxel: one that is turned reaches beyond the cell of its middle."""
+) -> Int[np.ndarray, "p n 2"]:
+    """Return the cells of eight points in each voxel: one that is turned reaches beyond the cell of its middle.
+
+    Where voxels are cells and none is turned, all eight lie in one cell, which is given once.
+    """
+    if cell_size_m == voxel_size_m and np.array_equal(level_from_world, np.eye(3)):
+        return np.floor(level[None, :, :2] / cell_size_m).astype(np.int64)
     offsets = (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5) * (0.5 * voxel_size_m) @ level_from_world.T
     return np.floor((level[None, :, :2] + offsets[:, None, :2]) / cell_size_m).astype(np.int64)
 
@@ -211,7 +216,7 @@ def _strides(
     level_from_world: Float[np.ndarray, "3 3"],
     floor_m: float,
     cell_size_m: float,
-    seen: Int[np.ndarray, "8 n 2"],
+    seen: Int[np.ndarray, "p n 2"],
     flat_only: bool = False,
 ) -> Float[np.ndarray, "m 2"]:
     """Return places along a walk on a floor, closer to each other than a cell, in units of cells.
@@ -243,7 +248,7 @@ def _under(steps: Float[np.ndarray, "m 2"], reach: float, shape: tuple[int, ...]
 
 
 def _states(
-    cell: Int[np.ndarray, "8 n 2"],
+    cell: Int[np.ndarray, "p n 2"],
     size: Int[np.ndarray, "2"],
     height_m: Float[np.ndarray, " n"],
     body: Body,

@@ -181,7 +181,7 @@ class NearThings(Factor):
         """Return the heat at any points."""
         if not len(self.anchors):
             return np.zeros(len(points_world))
-        if len(points_world) * len(self.anchors) <= _FEW_PAIRS:
+        if len(points_world) == 1 or len(points_world) * len(self.anchors) <= _FEW_PAIRS:
             apart = points_world[:, None, :] - self.anchors
             distance = np.sqrt(np.einsum("mak,mak->ma", apart, apart)).min(axis=1)
         else:
@@ -247,10 +247,13 @@ def product_of(factors: Sequence[Factor]) -> Float32[np.ndarray, " n"]:
     The lead comes first, as it falls fastest: other factors are computed where it leaves heat.
     """
     lead = lead_of(factors)
-    heat = lead.values
+    return times(lead.values, [factor for factor in factors if factor is not lead])
+
+
+def times(heat: Float32[np.ndarray, " n"], factors: Sequence[Factor]) -> Float32[np.ndarray, " n"]:
+    """Return heat times that of more factors, which are computed where some is left."""
     for factor in factors:
-        if factor is not lead:
-            heat = heat * factor.among(heat > 0.0)
+        heat = heat * factor.among(heat > 0.0)
     return heat
 
 
@@ -298,22 +301,24 @@ def object_heat(
     voxel_size_m = space.grid.voxel_size_m
     blocks = space.blocks if among is None else space.blocks.chosen(among)
     things = space.blocks.chosen(mask)
-    reach = min(1.0 / (falloff_per_m * voxel_size_m), 40_000.0)
-    limit = np.int32(int(np.ceil(reach)) ** 2)
+    reach = int(np.ceil(min(1.0 / (falloff_per_m * voxel_size_m), 40_000.0)))
+    limit = np.int32(reach**2)
     squared, nearest = np.full(len(blocks.order), limit, np.int32), np.full(len(blocks.order), -1, np.int32)
+    near = blocks.near(things, reach)
     if len(things):
         share(
             lambda a, b: nearest_squared(
                 blocks.index, blocks.starts, blocks.low, blocks.high,
-                things.index, things.starts, things.low, things.high, limit, squared, nearest, a, b,
+                things.index, things.starts, things.low, things.high, limit, squared, nearest, near, a, b,
             ),
-            len(blocks),
+            len(near),
             least=64,
         )  # fmt: skip
-    near = 1.0 - falloff_per_m * voxel_size_m * np.sqrt(squared, dtype=np.float32)
     heat, anchor = np.zeros(len(space), np.float32), np.full(len(space), -1, np.int32)
-    heat[blocks.order] = np.where(squared < limit, np.maximum(near, 0.0), 0.0)
-    anchor[blocks.order] = np.append(np.searchsorted(np.flatnonzero(mask), things.order), -1)[nearest]
+    hot = np.flatnonzero(squared < limit)
+    rows = blocks.order[hot]
+    heat[rows] = np.maximum(1.0 - falloff_per_m * voxel_size_m * np.sqrt(squared[hot], dtype=np.float32), 0.0)
+    anchor[rows] = np.searchsorted(np.flatnonzero(mask), things.order)[nearest[hot]]
     return heat, anchor
 
 
@@ -342,10 +347,8 @@ def anchor_heat(
     sorted_scores = np.asarray(scores, np.float64)[order]
     keep = undominated(ground, sorted_scores, float(falloff_per_m))
     ground, sorted_scores = ground[keep], sorted_scores[keep]
-    blocks, horizontal = space.blocks, space.horizontal
-    if among is not None:
-        horizontal = horizontal[among[blocks.order]]
-        blocks = blocks.chosen(among)
+    blocks = space.blocks if among is None else space.blocks.chosen(among)
+    horizontal = space.horizontal if among is None else space.horizontal_of(blocks)
     heat, winner = np.zeros(len(horizontal), np.float64), np.full(len(horizontal), -1, np.int64)
     if len(ground):
         share(
@@ -356,6 +359,8 @@ def anchor_heat(
             least=64,
         )
     values, anchor = np.zeros(len(space), np.float32), np.full(len(space), -1, np.int64)
-    values[blocks.order] = heat
-    anchor[blocks.order] = np.where(winner >= 0, np.append(order[keep], -1)[winner], -1)
+    hot = np.flatnonzero(winner >= 0)
+    rows = blocks.order[hot]
+    values[rows] = heat[hot]
+    anchor[rows] = order[keep][winner[hot]]
     return values, anchor

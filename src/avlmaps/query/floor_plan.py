@@ -197,9 +197,7 @@ class FloorPlan:
         ]
 
 
-def _ends(
-    space: Space, places: Float[np.ndarray, "k 3"] | None
-) -> tuple[Int[np.ndarray, "2"], Int[np.ndarray, "2"]]:
+def _ends(space: Space, places: Float[np.ndarray, "k 3"] | None) -> tuple[Int[np.ndarray, "2"], Int[np.ndarray, "2"]]:
     """Return the lowest and the highest cell, of the level frame, in which a voxel of the map or a place lies."""
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     for a in range(0, len(space), _CHUNK):

@@ -18,7 +18,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.poses import plain_point
 from avlmaps.query.evidence import Evidence, evidence_of
-from avlmaps.query.factors import Factor, NearThings, lead_of, product_of
+from avlmaps.query.factors import Factor, NearThings, lead_of
 from avlmaps.query.probability import probability_of
 
 if TYPE_CHECKING:
@@ -96,12 +96,17 @@ class Shares:
         return places
 
 
-def share_voxels(factors: Sequence[Factor], values: Callable[[], Float32[np.ndarray, " n"]]) -> Shares:
+def share_voxels(
+    factors: Sequence[Factor],
+    values: Callable[[], Float32[np.ndarray, " n"]],
+    of_things: Callable[[], Float32[np.ndarray, " n"]],
+) -> Shares:
     """Divide the heated voxels among the instances of the lead.
 
     Args:
         factors: one or more, of one map.
         values: returns their product at every voxel; not called for one object alone, whose heat is 1 on it.
+        of_things: returns the product without regions.
     """
     lead = lead_of(factors)
     if isinstance(lead, NearThings) and len(factors) == 1:
@@ -118,14 +123,15 @@ def share_voxels(factors: Sequence[Factor], values: Callable[[], Float32[np.ndar
         heat, instance = np.append(heat, at_anchors), np.append(instance, lead.instance)
     regions = [factor for factor in factors if factor.regional]
     if regions and isinstance(lead, NearThings):
-        return Shares(lead, rows, heat, instance, _peak_in_regions(lead, factors, regions))
+        return Shares(lead, rows, heat, instance, _peak_in_regions(lead, of_things(), regions))
     return Shares(lead, rows, heat, instance, _highest(instance, heat, len(lead.confidence)))
 
 
-def _peak_in_regions(lead: NearThings, factors: Sequence[Factor], regions: Sequence[Factor]) -> Float[np.ndarray, " i"]:
+def _peak_in_regions(
+    lead: NearThings, others: Float32[np.ndarray, " n"], regions: Sequence[Factor]
+) -> Float[np.ndarray, " i"]:
     """Return the highest heat that each instance has without the regions', times the mean of theirs over its voxels."""
     count = len(lead.confidence)
-    others = product_of([factor for factor in factors if not factor.regional])
     near = np.flatnonzero(others > 0.0)
     peak = _highest(lead.instance[lead.anchor_of(near)], others[near].astype(np.float64), count)
     own = np.bincount(lead.instance, minlength=count)

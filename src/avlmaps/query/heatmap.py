@@ -10,7 +10,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Float32
 from avlmaps.query.evidence import Evidence
-from avlmaps.query.factors import FOUND_AT, Factor, lead_of, product_of
+from avlmaps.query.factors import FOUND_AT, Factor, lead_of, product_of, times
 from avlmaps.query.goals import Goal, Shares, share_voxels, weigh_goals
 from avlmaps.query.heat import Heat
 from avlmaps.query.voxel_space import Space
@@ -43,7 +43,12 @@ class Heatmap(Heat):
     @cached_property
     def values(self) -> Float32[np.ndarray, " n"]:  # pyright: ignore[reportIncompatibleMethodOverride, reportIncompatibleVariableOverride]
         """The product of the factors' heat, computed when it is first used."""
-        return product_of(self.factors)
+        return times(self._of_things, [factor for factor in self.factors if _is_region(factor, self.lead)])
+
+    @cached_property
+    def _of_things(self) -> Float32[np.ndarray, " n"]:
+        """The product without what only says in which region a place lies."""
+        return product_of([factor for factor in self.factors if not _is_region(factor, self.lead)])
 
     @overload
     def __mul__(self, other: "Heatmap") -> "Heatmap": ...
@@ -96,7 +101,7 @@ class Heatmap(Heat):
 
     @cached_property
     def _shares(self) -> Shares:
-        return share_voxels(self.factors, lambda: self.values)
+        return share_voxels(self.factors, lambda: self.values, lambda: self._of_things)
 
     @cached_property
     def probability(self) -> float:
@@ -134,6 +139,10 @@ class Heatmap(Heat):
 
         figure = draw_heat(self.factors, self.shown, self.found, self.goals(top))
         return figure if path is None else save(figure, Path(path))
+
+
+def _is_region(factor: Factor, lead: Factor) -> bool:
+    return factor.regional and factor is not lead
 
 
 def product(heatmaps: Sequence[Heatmap]) -> Heatmap:

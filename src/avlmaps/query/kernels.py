@@ -118,6 +118,26 @@ def half_length(
         out[i] = math.sqrt(squared)
 
 
+@njit(cache=True, nogil=True, fastmath=True)
+def half_length_at(
+    bits: UInt16[np.ndarray, "n d"],
+    rows: Int64[np.ndarray, " m"],
+    words: Float32[np.ndarray, "k d"],
+    out: Float32[np.ndarray, " m"],
+    start: Whole,
+    stop: Whole,
+):
+    """Write the product of some float16 rows with one word, or the length of their products with several."""
+    for i in range(start, stop):
+        if len(words) == 1:
+            out[i] = _dot(bits[rows[i]], words[0])
+        else:
+            squared = 0.0
+            for m in range(len(words)):
+                squared += _dot(bits[rows[i]], words[m]) ** 2
+            out[i] = math.sqrt(squared)
+
+
 @njit(cache=True, nogil=True)
 def widen(bits: UInt16[np.ndarray, "n d"], out: Float32[np.ndarray, "n d"]):
     """Copy float16 rows (given as uint16 bits) to float32."""
@@ -295,6 +315,21 @@ def cone_heat(
 
 
 @njit(cache=True, nogil=True)
+def sorted_by_number(number: Int64[np.ndarray, " n"], count: Whole):
+    """Return the order that sorts numbers from 0 to ``count``, each group in the order in which it comes."""
+    start = np.zeros(count + 1, np.int64)
+    for value in number:
+        start[value + 1] += 1
+    for k in range(count):
+        start[k + 1] += start[k]
+    order = np.empty(len(number), np.int64)
+    for i in range(len(number)):
+        order[start[number[i]]] = i
+        start[number[i]] += 1
+    return order
+
+
+@njit(cache=True, nogil=True)
 def _box_gap(
     low_a: Int64[np.ndarray, "3"],
     high_a: Int64[np.ndarray, "3"],
@@ -407,6 +442,7 @@ def nearest_squared(
     limit: Whole,
     out: Int[np.ndarray, " n"],
     nearest: Int[np.ndarray, " n"],
+    which: Int64[np.ndarray, " k"],
     first: Whole,
     last: Whole,
 ):
@@ -415,7 +451,7 @@ def nearest_squared(
     Where that is ``limit`` or farther, ``limit`` and -1 are written.
 
     Voxels and things come in blocks: places ``starts[b]:starts[b + 1]`` of (3, n) int32 indices (one row an axis,
-    so that the inner loop is vectorised), in boxes from ``low`` to ``high`` (b, 3) int64. ``first`` and ``last``
+    so that the inner loop is vectorised), in boxes from ``low`` to ``high`` (b, 3) int64. ``which[first:last]``
     are the blocks of voxels to do.
     """
     near = np.empty(len(thing_low), np.int64)
@@ -424,7 +460,8 @@ def nearest_squared(
     for t in range(1, len(high_before)):
         high_before[t] = max(high_before[t], high_before[t - 1])
         low_after[-t - 1] = min(low_after[-t - 1], low_after[-t])
-    for b in range(first, last):
+    for c in range(first, last):
+        b = which[c]
         count = _things_near(low[b], high[b], thing_low, thing_high, high_before, low_after, limit, near, gaps)
         for i in range(starts[b], starts[b + 1]):
             x, y, z = voxels[0, i], voxels[1, i], voxels[2, i]
@@ -435,14 +472,14 @@ def nearest_squared(
                 gap_y = max(thing_low[t, 1] - y, y - thing_high[t, 1], 0)
                 gap_z = max(thing_low[t, 2] - z, z - thing_high[t, 2], 0)
                 if gap_x * gap_x + gap_y * gap_y + gap_z * gap_z < best:
-                    a, c = thing_starts[t], thing_starts[t + 1]
-                    nearer = _nearest_in(x, y, z, things[0, a:c], things[1, a:c], things[2, a:c], best)
+                    a, e = thing_starts[t], thing_starts[t + 1]
+                    nearer = _nearest_in(x, y, z, things[0, a:e], things[1, a:e], things[2, a:e], best)
                     if nearer < best:
                         best, block = nearer, t
             out[i], nearest[i] = best, -1
             if block >= 0:  # looked for only now: a search for the smallest alone is vectorised
-                a, c = thing_starts[block], thing_starts[block + 1]
-                nearest[i] = a + _first_at(x, y, z, things[0, a:c], things[1, a:c], things[2, a:c], best)
+                a, e = thing_starts[block], thing_starts[block + 1]
+                nearest[i] = a + _first_at(x, y, z, things[0, a:e], things[1, a:e], things[2, a:e], best)
 
 
 @njit(cache=True)
@@ -497,19 +534,25 @@ def linked(index: Int64[np.ndarray, "n 3"], reach: Whole):
 
 
 def feature_scores(
-    feature: Float32[np.ndarray, "n d"] | UInt16[np.ndarray, "n d"], words: Float32[np.ndarray, "m d"]
-) -> Float32[np.ndarray, " n"]:
+    feature: Float32[np.ndarray, "n d"] | UInt16[np.ndarray, "n d"],
+    words: Float32[np.ndarray, "k d"],
+    rows: Int[np.ndarray, " m"] | None = None,
+) -> Float32[np.ndarray, " m"]:
     """Return the product of every feature with one word; of several words, the length of the products with them.
 
     Args:
         feature: float16, memory-mapped or not, rows contiguous.
         words: float32, one or more.
+        rows: which features; None for all.
     """
-    out = np.empty(len(feature), np.float32)
+    out = np.empty(len(feature) if rows is None else len(rows), np.float32)
     bits = np.asarray(feature, np.float16).view(np.uint16)
-    rows = np.ascontiguousarray(words, np.float32)
-    if len(rows) == 1:
-        share(lambda a, b: half_dot(bits, rows[0], out, a, b), len(out), least=20_000)
+    word = np.ascontiguousarray(words, np.float32)
+    if rows is not None:
+        which = np.ascontiguousarray(rows, np.int64)
+        share(lambda a, b: half_length_at(bits, which, word, out, a, b), len(out), least=20_000)
+    elif len(word) == 1:
+        share(lambda a, b: half_dot(bits, word[0], out, a, b), len(out), least=20_000)
     else:
-        share(lambda a, b: half_length(bits, rows, out, a, b), len(out), least=20_000)
+        share(lambda a, b: half_length(bits, word, out, a, b), len(out), least=20_000)
     return out

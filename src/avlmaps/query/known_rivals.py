@@ -14,10 +14,12 @@ from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query import loops
 from avlmaps.query.words import EncodedWord, Rivals, Vocabulary
 
-# Features are rounded to float16, and sums of floats in another order differ: bounds are loosened by this much.
-_ROUNDING = 0.01
+# Features are rounded to float16, so that their squares add up to 1 within this.
+_HALF = 0.01
+# Sums of floats in another order differ by less than this.
+_ROUNDING = 1e-5
 # If more of the voxels than this may win, reading all features in turn is quicker than picking theirs.
-_MOST_PICKED = 0.125
+_MOST_PICKED = 0.5
 
 
 @dataclass(frozen=True)
@@ -41,10 +43,12 @@ class KnownRivals(Vocabulary):
     @classmethod
     def of(cls, vocabulary: Vocabulary, count: int) -> Self:
         """Return a vocabulary of which nothing is known yet, for a map of ``count`` voxels."""
-        score, word = np.float32, loops.word_type(len(vocabulary.words))
-        arrays = (np.empty(count, kind) for kind in (score, word, score, word))
-        told = vocabulary.words, vocabulary.word_feature, vocabulary.understood, vocabulary.has_other
-        return cls(*told, *arrays, np.zeros(count, np.bool_))
+        word = loops.word_type(len(vocabulary.words))
+        return cls(
+            vocabulary.words, vocabulary.word_feature, vocabulary.understood, vocabulary.has_other,
+            np.empty(count, np.float32), np.empty(count, word), np.empty(count, np.float32), np.empty(count, word),
+            np.zeros(count, np.bool_),
+        )  # fmt: skip
 
     def rivals_at(self, feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"]) -> Rivals:
         """Return the two words closest to some voxels, computing those that are not known."""
@@ -64,6 +68,20 @@ class KnownRivals(Vocabulary):
             self.known[:] = True
         return Rivals(*self._told, *self._closest)
 
+    def scores_at(
+        self, feature: Float16[np.ndarray, "n d"], encoded: EncodedWord, rows: Int[np.ndarray, " m"]
+    ) -> Float32[np.ndarray, " m"]:
+        """Return the score of a word at some voxels; that of a name which is one of the two closest is known."""
+        own: Int[np.ndarray, " o"] = np.flatnonzero((self.word_feature @ encoded.rows.T > 1.0 - 1e-6).any(axis=1))
+        if len(encoded.rows) != 1 or len(own) != 1:
+            return loops.feature_scores(feature, encoded.rows, rows)
+        first: Bool[np.ndarray, " m"] = self.best_word[rows] == own[0]
+        second: Bool[np.ndarray, " m"] = self.second_word[rows] == own[0]
+        score = np.where(first, self.best[rows], self.second[rows])
+        others = np.flatnonzero(~(first | second) | ~self.known[rows])
+        score[others] = loops.feature_scores(feature, encoded.rows, rows[others])
+        return score
+
     def contenders(
         self, encoder: PixelEncoder, encoded: EncodedWord, silent: Bool[np.ndarray, " v"], share: float
     ) -> Int[np.ndarray, " m"] | None:
@@ -77,7 +95,7 @@ class KnownRivals(Vocabulary):
         if not isinstance(encoder, NamedPixelEncoder) or not self.known.all():
             return None
         meant = encoded.name_weights > 0.0
-        same = self.word_feature @ encoder.codes[meant].T > 1.0 - _ROUNDING
+        same = self.word_feature @ encoder.codes[meant].T > 1.0 - _HALF
         if not same.any(axis=0).all():
             return None  # a name that is not in the vocabulary may score anything
         first = same.any(axis=1) | silent
@@ -87,7 +105,7 @@ class KnownRivals(Vocabulary):
         told = [order[starts[word] : starts[word + 1]] for word in np.flatnonzero(first)]
         others = self._closer_than(least / max(float(weights.sum()), 1e-9))
         square = np.square(self.best[others])
-        possible = ((1.0 + _ROUNDING - square) * weights.max(initial=0.0) >= least * square) & ~first[
+        possible = ((1.0 + _HALF - square) * weights.max(initial=0.0) >= least * square) & ~first[
             self.best_word[others]
         ]
         rows = np.concatenate([*told, others[possible]])
@@ -122,4 +140,4 @@ class KnownRivals(Vocabulary):
 
     @cached_property
     def _ties(self) -> Int[np.ndarray, " m"]:
-        return np.flatnonzero(self._closeness >= 1.0 - 2.0 * _ROUNDING)
+        return np.flatnonzero(self._closeness >= 1.0 - _ROUNDING)

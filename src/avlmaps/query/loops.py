@@ -39,12 +39,21 @@ def is_plain() -> bool:
     return _PLAIN.get()
 
 
-def feature_scores(feature: Float16[np.ndarray, "n d"], words: Float32[np.ndarray, "m d"]) -> Float32[np.ndarray, " n"]:
-    """Return the product of every feature with one word; of several words, the length of the products with them."""
+def feature_scores(
+    feature: Float16[np.ndarray, "n d"], words: Float32[np.ndarray, "k d"], rows: Int[np.ndarray, " m"] | None = None
+) -> Float32[np.ndarray, " m"]:
+    """Return the product of features with one word; of several words, the length of the products with them.
+
+    Args:
+        feature: of a map.
+        words: one or more.
+        rows: which features; None for all.
+    """
     if not _PLAIN.get():
         from avlmaps.query.kernels import feature_scores as compiled
 
-        return compiled(feature, words)
+        return compiled(feature, words, rows)
+    feature = feature if rows is None else np.ascontiguousarray(feature[rows])
     out = np.empty(len(feature), np.float32)
     columns = np.asarray(words, np.float32).T * _BIAS
     for a, rows in _widened(feature):

@@ -71,7 +71,9 @@ class VoxelNamer:
         best = np.argsort(-confidence, kind="stable")[:most]
         return [(self.names[k], float(confidence[k])) for k in best if confidence[k] > 0.0]
 
-    def best(self, rows: Int[np.ndarray, " m"] | None = None) -> tuple[Int[np.ndarray, " m"], Float32[np.ndarray, " m"]]:
+    def best(
+        self, rows: Int[np.ndarray, " m"] | None = None
+    ) -> tuple[Int[np.ndarray, " m"], Float32[np.ndarray, " m"]]:
         """Return for each of some voxels the number of its likeliest name (-1 for none) and its confidence.
 
         Args:

@@ -81,11 +81,8 @@ def pieces_of(
     least = settings.least_confidence if beside is None else settings.least_in_company
     longest = _longest_m(encoder, encoded, settings)
 
-    def points_of(mask: Bool[np.ndarray, " m"]) -> Float[np.ndarray, "a 3"]:
-        return space.level(space.grid.centre_of(index[mask]))
-
     def lengths_of(mask: Bool[np.ndarray, " m"], instance: Int[np.ndarray, " a"]) -> Float[np.ndarray, " i"]:
-        return oversize.lengths_m(points_of(mask), instance, int(instance.max(initial=-1)) + 1)
+        return oversize.lengths_m(_points(space, index[mask]), instance, int(instance.max(initial=-1)) + 1)
 
     def confidence_of(
         mask: Bool[np.ndarray, " m"], instance: Int[np.ndarray, " a"], length_m: Float[np.ndarray, " i"] | None = None
@@ -108,12 +105,12 @@ def pieces_of(
     confidence = confidence_of(mask, instance)
     best = float(confidence.max(initial=0.0))
     mask, instance, confidence = without_specks(mask, instance, confidence, least)
-    joined = merge_instances(points_of(mask), instance, settings.link_m, settings.join_m)
+    joined = merge_instances(_points(space, index[mask]), instance, settings.link_m, settings.join_m)
     if len(confidence) > joined.max(initial=-1) + 1:
         instance = joined[instance]
         confidence = confidence_of(mask, instance)
     if math.isfinite(longest) and len(instance):
-        points, reach = points_of(mask), _reach(space, settings.link_m)
+        points, reach = _points(space, index[mask]), _reach(space, settings.link_m)
         pieces, piece_of = oversize.cut(index[mask], points, score[mask], instance, longest, reach)
         if not np.array_equal(pieces, instance):
             length_m, mask = lengths_of(mask, instance)[piece_of], mask.copy()
@@ -126,6 +123,11 @@ def pieces_of(
     best = max(best, float(confidence.max(initial=0.0)))
     pieces = Pieces(rows[mask], instance, mean.astype(np.float32), confidence, won, best)
     return pieces if beside is None else pieces.beside(beside)
+
+
+def _points(space: Space, index: Int[np.ndarray, "a 3"]) -> Float[np.ndarray, "a 3"]:
+    """Return the middles of some voxels, metres, level frame."""
+    return space.level(space.grid.centre_of(index))
 
 
 def instances_of(

@@ -80,13 +80,17 @@ class RoomField:
         """Return how likely each point is in each kind of room."""
         return self.share[self.plan.cells_of(points_world)]
 
-    def of_voxels(self, weights: Float[np.ndarray, " n"]) -> Float32[np.ndarray, " v"]:
-        """Return for every voxel of the map how likely it is in a room of some kinds, in [0, 1].
+    def of_cells(self, weights: Float[np.ndarray, " n"]) -> Float32[np.ndarray, " c"]:
+        """Return for every cell how likely it is in a room of some kinds, in [0, 1].
 
         Args:
             weights: how much each kind is meant, in [0, 1].
         """
-        return np.clip(self.share @ weights, 0.0, 1.0).astype(np.float32)[self.plan.voxel_cells]
+        return np.clip(self.share @ weights, 0.0, 1.0).astype(np.float32)
+
+    def of_voxels(self, weights: Float[np.ndarray, " n"]) -> Float32[np.ndarray, " v"]:
+        """Return the same for every voxel of the map."""
+        return self.of_cells(weights)[self.plan.voxel_cells]
 
     def of_rooms(self, regions: RoomRegions) -> Float[np.ndarray, "r n"]:
         """Return how likely each room is each kind: the mean over its floor; rows add up to 1.
@@ -212,12 +216,20 @@ class InRooms(NearAnchors):
         self, among: Bool[np.ndarray, " n"] | None = None
     ) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
         """Return the heat, and the anchor nearest to each voxel on its storey."""
-        heat = self.kinds.of_voxels(self.weights)
-        if among is not None:
-            heat = np.where(among, heat, np.float32(0.0))
-        plan = self.kinds.plan
-        nearest = plan.nearest(self.anchors)[plan.voxel_cells]
-        return heat, np.where(heat > 0.0, nearest, -1)
+        plan, nearest = self.kinds.plan, self._nearest
+        if among is None:
+            heat = self.kinds.of_voxels(self.weights)
+            return heat, np.where(heat > 0.0, nearest[plan.voxel_cells], -1)
+        heat, anchor = np.zeros(len(among), np.float32), np.full(len(among), -1, np.int64)
+        rows = np.flatnonzero(among)
+        cells = plan.voxel_cells[rows]
+        heat[rows] = self.kinds.of_cells(self.weights)[cells]
+        anchor[rows] = np.where(heat[rows] > 0.0, nearest[cells], -1)
+        return heat, anchor
+
+    @cached_property
+    def _nearest(self) -> Int[np.ndarray, " c"]:
+        return self.kinds.plan.nearest(self.anchors)
 
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat at any points."""

@@ -19,7 +19,20 @@ if TYPE_CHECKING:
 
 # Voxels are worked on in cubes of this many a side: small enough that few objects or anchors are nearest to
 # some voxel of a cube, large enough that asking for them costs little.
-_BLOCK = 8
+_SHIFT = 3
+_BLOCK = 1 << _SHIFT
+_CHUNK = 1 << 17  # voxels whose places are computed at once: they stay in the processor's cache
+# Blocks in the box round a map, for each of its own, up to which a table of them is made.
+_MOST_BLOCKS = 64
+
+
+def _grouped(number: Int[np.ndarray, " n"], count: int) -> Int[np.ndarray, " n"]:
+    """Return the order that sorts numbers below ``count``; of equals, the first comes first."""
+    if count > _MOST_BLOCKS * len(number):
+        return np.argsort(number, kind="stable")
+    from avlmaps.query.kernels import sorted_by_number
+
+    return sorted_by_number(number, count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,18 +59,41 @@ class Blocks:
     @classmethod
     def of(cls, index: Int[np.ndarray, "n 3"]) -> "Blocks":
         """Sort voxels into blocks."""
-        cube = np.floor_divide(index, _BLOCK)
-        order = np.lexsort((cube[:, 2], cube[:, 1], cube[:, 0]))
-        return cls._split(order, cube[order], index[order])
+        n = len(index)
+        if not n:
+            empty = np.zeros((0, 3), np.int64)
+            return cls(np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros((3, 0), np.int32), empty, empty)
+        least, most = (end.astype(np.int64) // _BLOCK for end in (index.min(axis=0), index.max(axis=0)))
+        span: Int[np.ndarray, "3"] = most - least + 1
+        number = np.zeros(n, np.int64)
+        for axis in range(3):
+            number *= span[axis]
+            number += (index[:, axis] >> _SHIFT) - least[axis]
+        order = _grouped(number, int(span[0]) * int(span[1]) * int(span[2]))
+        number = number[order]
+        first = np.flatnonzero(np.append(True, number[1:] != number[:-1]))
+        sorted_index = np.ascontiguousarray(index[order].T, np.int32)
+        low = np.minimum.reduceat(sorted_index, first, axis=1).T.astype(np.int64)
+        high = np.maximum.reduceat(sorted_index, first, axis=1).T.astype(np.int64)
+        starts = np.append(first, n).astype(np.int64)
+        return cls(order, starts, sorted_index, np.ascontiguousarray(low), np.ascontiguousarray(high))
 
-    @classmethod
-    def _split(cls, order: Int[np.ndarray, " n"], cube: Int[np.ndarray, "n 3"], index: Int[np.ndarray, "n 3"]):
-        n = len(order)
-        first = np.flatnonzero(np.r_[True, (cube[1:] != cube[:-1]).any(axis=1)]) if n else np.zeros(0, np.int64)
-        empty = np.zeros((0, 3), np.int64)
-        low = np.minimum.reduceat(index, first).astype(np.int64) if n else empty
-        high = np.maximum.reduceat(index, first).astype(np.int64) if n else empty
-        return cls(order, np.append(first, n).astype(np.int64), np.ascontiguousarray(index.T, np.int32), low, high)
+    def near(self, things: "Blocks", reach: int) -> Int[np.ndarray, " k"]:
+        """Return the numbers of the blocks that come within some voxels of a block of things along every axis."""
+        every = np.arange(len(self), dtype=np.int64)
+        if not len(things) or not len(self):
+            return every[:0]
+        cube, thing, around = self.low // _BLOCK, things.low // _BLOCK, -(-reach // _BLOCK)
+        least = np.minimum(cube.min(axis=0), thing.min(axis=0)) - around
+        span = np.maximum(cube.max(axis=0), thing.max(axis=0)) + around + 1 - least
+        if float(np.prod(span.astype(np.float64))) > _MOST_BLOCKS * max(len(self), 1) + 4096:
+            return every  # a few far voxels: a table of all blocks would be larger than the map
+        held = np.zeros(tuple(span), bool)
+        held[tuple((thing - least).T)] = True
+        for axis in range(3):  # each axis in turn: a cube about each block of things
+            steps = [np.roll(held, step, axis) for step in range(-around, around + 1)]
+            held = np.logical_or.reduce(steps)
+        return every[held[tuple((cube - least).T)]]
 
     def chosen(self, mask: Bool[np.ndarray, " n"]) -> "Blocks":
         """Return the blocks of some of the voxels only, without sorting again; blocks that have none are left out.
@@ -138,7 +174,14 @@ class Space:
     @cached_property
     def horizontal(self) -> Float[np.ndarray, "n 2"]:
         """The middles of the voxels in the order of ``blocks``, horizontal coordinates of the level frame, metres."""
-        return np.ascontiguousarray(self.level(self.centres[self.blocks.order])[:, :2])
+        return self.horizontal_of(self.blocks)
+
+    def horizontal_of(self, blocks: Blocks) -> Float[np.ndarray, "m 2"]:
+        """Return the middles of the voxels of some blocks, likewise."""
+        out = np.empty((blocks.index.shape[1], 2))
+        for a in range(0, len(out), _CHUNK):
+            out[a : a + _CHUNK] = self.level(self.grid.centre_of(blocks.index[:, a : a + _CHUNK].T))[:, :2]
+        return out
 
     @cached_property
     def is_level(self) -> bool:

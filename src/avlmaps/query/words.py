@@ -100,10 +100,15 @@ class Vocabulary:
             silent[-1] = same[-1]
         return silent
 
-
     def rivals_at(self, feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"]) -> "Rivals":
         """Return the two words closest to some voxels of a map."""
         return Rivals.among(np.ascontiguousarray(feature[rows]), self)
+
+    def scores_at(
+        self, feature: Float16[np.ndarray, "n d"], encoded: "EncodedWord", rows: Int[np.ndarray, " m"]
+    ) -> Float32[np.ndarray, " m"]:
+        """Return the score of a word at some voxels of a map."""
+        return loops.feature_scores(feature, encoded.rows, rows)
 
     def contenders(
         self, encoder: PixelEncoder, encoded: "EncodedWord", silent: Bool[np.ndarray, " v"], share: float
@@ -245,7 +250,7 @@ def scored_once(
             rows = np.flatnonzero(scores() > least_score_to_count(len(rivals.words), share))
             score = scores()[rows]
         else:
-            score = loops.feature_scores(np.ascontiguousarray(feature[rows]), encoded.rows)
+            score = rivals.scores_at(feature, encoded, rows)
         near = rivals.rivals_at(feature, rows)
         return Scored(rows, _beaten(score, feature, rows, near, silent, settings.least_score), score)
 

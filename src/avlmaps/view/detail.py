@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int
 
-# Edges of the blocks, in voxels, of which one voxel each is drawn first.
-_EDGES = (16, 8, 4, 2)
+# Edges of the blocks, in voxels and powers of two, of which one voxel each is drawn first.
+_SHIFTS = (4, 3, 2, 1)
 _SEED = 11
 # Blocks in the box round a map, for each of its voxels, up to which a table of them is made.
 _MOST_BLOCKS = 4
@@ -34,24 +34,23 @@ def detail_order(
     order is drawn at random (always the same), so that any part of a level is spread over the whole map.
 
     Args:
-        index: which voxels; each once, sorted.
+        index: which voxels; each once.
         most: voxels that are drawn at most. Where there are more, the last level is one of blocks of which some are
             left out, and ``count`` of that level is what all of them would be.
     """
-    index = np.asarray(index, np.int64)
     n = len(index)
     rng = np.random.default_rng(_SEED)
     chosen = np.zeros(n, bool)
     drawn = 0
     parts: list[np.ndarray] = []
     levels: list[Level] = []
-    for edge in _EDGES:
-        fresh = _one_of_each(index, edge, chosen)
+    for shift in _SHIFTS:
+        fresh = _one_of_each(index, shift, chosen)
         if n and len(fresh) + drawn < n:
             chosen[fresh] = True
             drawn += len(fresh)
             parts.append(rng.permutation(fresh))
-            levels.append(Level(drawn, edge))
+            levels.append(Level(drawn, 1 << shift))
             if most is not None and drawn >= most:
                 return np.concatenate(parts)[:most], tuple(levels)
     parts.append(rng.permutation(np.flatnonzero(~chosen)))
@@ -59,16 +58,16 @@ def detail_order(
     return np.concatenate(parts)[:most], tuple(levels)
 
 
-def _one_of_each(index: Int[np.ndarray, "n 3"], edge: int, chosen: np.ndarray) -> Int[np.ndarray, " m"]:
+def _one_of_each(index: Int[np.ndarray, "n 3"], shift: int, chosen: np.ndarray) -> Int[np.ndarray, " m"]:
     """Return one row of each block of which none is chosen yet: the first of them."""
     if not len(index):
         return np.zeros(0, np.int64)
-    low, high = index.min(axis=0) // edge, index.max(axis=0) // edge
+    low, high = (end.astype(np.int64) >> shift for end in (index.min(axis=0), index.max(axis=0)))
     span = high - low + 1
     key = np.zeros(len(index), np.int64)
     for axis in range(3):
         key *= span[axis]
-        key += index[:, axis] // edge - low[axis]
+        key += (index[:, axis] >> shift) - low[axis]
     blocks = int(span[0]) * int(span[1]) * int(span[2])
     if blocks > _MOST_BLOCKS * len(index):  # a few far voxels: a table of all blocks would be larger than the map
         _, key = np.unique(key, return_inverse=True)
