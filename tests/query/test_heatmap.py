@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,7 +10,7 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.factors import HeatSettings, NearAnchors, anchor_heat, object_heat, stretch_scores
 from avlmaps.query.heatmap import Heatmap, product
-from avlmaps.query.voxel_space import Space
+from avlmaps.query.voxel_space import Blocks, Space
 
 SIZE_M = 0.05
 FALLOFFS = st.sampled_from([0.2, 0.7, 2.0, 9.0])
@@ -50,6 +52,28 @@ def brute_force_anchors(
     away = space.centres[:, None] - anchors[None]
     flat = away - (away @ up)[..., None] * up
     return np.maximum((scores - falloff * np.linalg.norm(flat, axis=-1)).max(axis=1, initial=0.0), 0.0)
+
+
+@given(voxel_sets(), st.sampled_from([0, 10**6]))
+def test_blocks_are_the_cubes_in_order_and_each_keeps_the_maps(index, far) -> None:
+    index = np.append(index, [[far + 100] * 3], axis=0).astype(np.int32)
+    blocks, cube = Blocks.of(index), index // 8
+    np.testing.assert_array_equal(blocks.order, np.lexsort((cube[:, 2], cube[:, 1], cube[:, 0])))
+    for k, (a, b) in enumerate(itertools.pairwise(blocks.starts)):
+        here = index[blocks.order[a:b]]
+        assert len(np.unique(here // 8, axis=0)) == 1
+        np.testing.assert_array_equal(blocks.index[:, a:b].T, here)
+        np.testing.assert_array_equal([blocks.low[k], blocks.high[k]], [here.min(axis=0), here.max(axis=0)])
+
+
+@given(voxel_sets(least=1), st.integers(0, 2**32 - 1), st.floats(0, 1), st.integers(1, 100), st.booleans())
+def test_no_block_in_reach_is_skipped(index, seed, share, reach, far) -> None:
+    index = np.append(index, [[10**6 if far else 50] * 3], axis=0).astype(np.int32)
+    rng, whole = np.random.default_rng(seed), Blocks.of(index)
+    things, some = (whole.chosen(rng.uniform(0, 1, len(index)) < share) for _ in range(2))
+    near = set(some.near(things, reach).tolist())
+    gap = np.maximum(some.low[:, None] - things.high[None], things.low[None] - some.high[:, None]).max(axis=2)
+    assert set(np.flatnonzero((gap <= reach).any(axis=1)).tolist()) <= near
 
 
 @given(voxel_sets(), st.integers(0, 2**32 - 1), st.floats(0, 1), FALLOFFS)

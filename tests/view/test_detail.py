@@ -45,3 +45,19 @@ def test_any_part_of_a_level_is_spread_over_the_map() -> None:
     for count in (levels[-2].count // 2, len(index) // 2):
         quarter = np.bincount((index[order[:count], :2] // 32) @ [2, 1], minlength=4)
         assert quarter.min() > 0.1 * count
+
+
+@given(voxels(), st.integers(0, 60))
+def test_a_smaller_number_of_voxels_is_the_beginning_of_all(index: np.ndarray, most: int) -> None:
+    order, levels = detail_order(index)
+    some, fewer = detail_order(index, most)
+    np.testing.assert_array_equal(some, order[:most])
+    assert fewer == levels[: len(fewer)]
+    assert fewer[-1].count >= len(some)
+
+
+def test_far_voxels_need_no_table_of_all_blocks() -> None:
+    index = np.concatenate([np.argwhere(np.ones((4, 4, 4))), [[10**6, -(10**6), 10**6]]])
+    order, levels = detail_order(index)
+    assert sorted(order) == list(range(len(index)))
+    assert levels[0].count == 2

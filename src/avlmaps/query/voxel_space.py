@@ -64,7 +64,7 @@ class Blocks:
             empty = np.zeros((0, 3), np.int64)
             return cls(np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros((3, 0), np.int32), empty, empty)
         least, most = (end.astype(np.int64) // _BLOCK for end in (index.min(axis=0), index.max(axis=0)))
-        span: Int[np.ndarray, "3"] = most - least + 1
+        span: Int[np.ndarray, " xyz"] = most - least + 1
         number = np.zeros(n, np.int64)
         for axis in range(3):
             number *= span[axis]
@@ -85,8 +85,8 @@ class Blocks:
             return every[:0]
         cube, thing, around = self.low // _BLOCK, things.low // _BLOCK, -(-reach // _BLOCK)
         least = np.minimum(cube.min(axis=0), thing.min(axis=0)) - around
-        span = np.maximum(cube.max(axis=0), thing.max(axis=0)) + around + 1 - least
-        if float(np.prod(span.astype(np.float64))) > _MOST_BLOCKS * max(len(self), 1) + 4096:
+        span: Int[np.ndarray, " xyz"] = np.maximum(cube.max(axis=0), thing.max(axis=0)) + around + 1 - least
+        if int(span[0]) * int(span[1]) * int(span[2]) > _MOST_BLOCKS * len(self) + 4096:
             return every  # a few far voxels: a table of all blocks would be larger than the map
         held = np.zeros(tuple(span), bool)
         held[tuple((thing - least).T)] = True
