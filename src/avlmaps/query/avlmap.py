@@ -121,8 +121,8 @@ class AVLMap:
         part = Part(Modality.OBJECT, word, _role(primary))
         encoder = self.stored.encoders.pixels
         # Of names, most voxels have too little of the word to be compared with all others.
-        is_own = vocabulary is None and isinstance(encoder, NamedPixelEncoder)
-        rivals = self._known_rivals if is_own else self._rivals_of(encoder, vocabulary)
+        known = self._known_rivals if vocabulary is None else None
+        rivals = self._rivals_of(encoder, vocabulary) if known is None else known
         settings, voxels = self.settings, self.stored.voxels
         return Heatmap.of(
             object_factor(
@@ -148,9 +148,8 @@ class AVLMap:
                 armchair is no piece of "chair".
         """
         encoder = self.stored.encoders.pixels
-        rivals: Vocabulary = self._rivals_of(encoder, None)
-        if isinstance(encoder, NamedPixelEncoder):
-            rivals = self._known_rivals  # all are known now
+        everywhere = self._rivals_of(encoder, None)
+        rivals = everywhere if self._known_rivals is None else self._known_rivals  # which knows all of them now
         if alone and isinstance(encoder, NamedPixelEncoder) and word in encoder.names:
             encoded = EncodedWord.of_name(encoder, word)
         else:
@@ -166,7 +165,7 @@ class AVLMap:
 
     def _rivals_of(self, encoder: PixelEncoder, vocabulary: Sequence[str] | None) -> Rivals:
         self.stored.require_model(Kind.PIXELS)
-        if vocabulary is None and isinstance(encoder, NamedPixelEncoder):
+        if vocabulary is None and self._known_rivals is not None:
             return self._known_rivals.whole(self.stored.voxels.feature)
         names = tuple(encoder.vocabulary if vocabulary is None else vocabulary)
         if self._rivals is None or self._rivals[0] != names:
@@ -174,10 +173,15 @@ class AVLMap:
         return self._rivals[1]
 
     @cached_property
-    def _known_rivals(self) -> KnownRivals:
-        """The names of an encoder that has a list of them, and those closest to the voxels that were asked about."""
-        self.stored.require_model(Kind.PIXELS)
+    def _known_rivals(self) -> KnownRivals | None:
+        """The names of an encoder that has a list of them, and those closest to the voxels that were asked about.
+
+        None for an encoder of any words, and where names of an encoder do not compete.
+        """
         encoder = self.stored.encoders.pixels
+        if not isinstance(encoder, NamedPixelEncoder) or not {*encoder.names} <= {*encoder.vocabulary, "other"}:
+            return None
+        self.stored.require_model(Kind.PIXELS)
         return KnownRivals.of(Vocabulary.encoded(encoder, encoder.vocabulary), len(self.stored.voxels))
 
     def things(
