@@ -1,4 +1,4 @@
-"""The two words closest to each voxel, worked out where queries need them and kept for later ones.
+"""The two words closest to each voxel, computed where queries need them and stored for later ones.
 
 For an encoder of names they also say, without its feature, of most voxels that a word cannot win there.
 """
@@ -85,7 +85,7 @@ class KnownRivals(Vocabulary):
     def contenders(
         self, encoder: PixelEncoder, encoded: EncodedWord, silent: Bool[np.ndarray, " v"], share: float
     ) -> Int[np.ndarray, " m"] | None:
-        """Return the voxels where a word may score a share of its best rival; None where they are not told, or many.
+        """Return the voxels where a word may score a share of its best rival; None where they are unknown, or many.
 
         The word means names W with weights w, and scores √(Σ w·s²) over their scores s. Where the closest word is
         neither in W nor silent, it is the best rival, with score b. No name of W scores more than the second closest

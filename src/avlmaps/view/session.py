@@ -104,7 +104,7 @@ class ViewSession:
     """
 
     def __init__(self, maps: Sequence[AVLMap], robot: MakeRobot | None = None, most: int | None = None) -> None:
-        """Lay out the maps, for a file each with at most so many voxels, and make what plans commands."""
+        """Lay out the maps, for a file each with up to ``most`` voxels, and make what plans commands."""
         self.maps = [MapOnPage(avlmap, most) for avlmap in maps]
         self.guide = Guide(maps[0], robot)
         self._asking = threading.Lock()
