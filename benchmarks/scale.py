@@ -90,7 +90,7 @@ def main() -> None:
     arguments.add_argument("--voxels", type=int, nargs="+", default=[1_000_000])
     arguments.add_argument("--against", type=Path, help="source folder of another version")
     arguments.add_argument("--only", nargs="+", choices=list(COMMANDS))
-    arguments.add_argument("--folder", type=Path, help="where the large maps are put, and kept")
+    arguments.add_argument("--folder", type=Path, help="where the large maps are stored")
     chosen = arguments.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         folder = chosen.folder or Path(temporary)

@@ -21,7 +21,7 @@ from avlmaps.maps.types import Keyframes, Voxels
 GAP = 4  # empty voxels between two copies
 HOLES = 12  # boxes of voxels that a copy lacks
 HOLE = 8  # voxels a side of the largest
-EVERY = 4  # keyframes that are copied, one of so many
+EVERY = 4  # keyframes that are copied, every fourth
 
 
 def tiled(source: StoredMap, count: int, seed: int = 0) -> tuple[Voxels, Keyframes]:

@@ -174,7 +174,7 @@ class AVLMap:
 
     @cached_property
     def _known_rivals(self) -> KnownRivals | None:
-        """The names of an encoder that has a list of them, and those closest to the voxels that were asked about.
+        """The names of an encoder that has a list of them, and those closest to the voxels that queries needed.
 
         None for an encoder of any words, and where names of an encoder do not compete.
         """
