@@ -27,6 +27,7 @@ class Entry:
         command: words; SOUNDS, RECORDING, NYUV2 and HOUSE stand for folders of data, OUT for the folder of all results.
         hours: on two quiet cores without a GPU, estimated; 0 for minutes.
         about: a sentence below the title.
+        picture: the picture of the suite that is shown, ``found.png``; ``""`` for none.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Entry:
     command: str
     hours: float = 0.0
     about: str = ""
+    picture: str = ""
 
     @property
     def is_suite(self) -> bool:
@@ -95,6 +97,12 @@ ENTRIES = (
     Entry(
         "indexing-paper", "The same by the paper's rules", "avlmaps bench indexing --rules paper --out OUT", 1.5,
         "The paper's pipeline whole, with our encoders ([the rules](paper-models.md#the-papers-rules)).",
+    ),
+    Entry(
+        "found", "Is found true?",
+        f"avlmaps bench found --scenes {' '.join(f'house:{1_000_000 + n}:held-out' for n in (0, 1, 6, 10))} --out OUT",
+        0.5, "Four of the twelve homes of the tables above; no weight of the probability was fitted on them "
+        "([how](experiments.md#found-as-a-probability)).", "found.png",
     ),
     Entry("navigation", "The paper's Tables I, II and VI", "avlmaps bench navigation --out OUT", 5.0, _NAVIGATION),
     Entry(
@@ -209,6 +217,7 @@ def _section(entry: Entry, found: Mapping[str, Any] | None, shipped: Mapping[str
     lines += [measured_on + " " + in_words(answer), "", *_warning(answer, shipped)]
     lines += [answer["note"], ""] if answer.get("note") else []
     lines += [f"Paper: {answer['paper']}", ""] if answer.get("paper") else []
+    lines += [f"![{entry.title}](pictures/{entry.picture})", ""] if entry.picture else []
     for name, table in answer["tables"].items():
         lines += [f"### {name}", "", table_markdown(table)]
     return "\n".join(lines)

@@ -15,6 +15,7 @@ import json
 import os
 import platform
 import shlex
+import shutil
 import subprocess
 import sys
 from datetime import date
@@ -125,6 +126,8 @@ def main() -> None:
             continue
         print(f"running {entry.name}: {entry.command}", file=sys.stderr)
         found[entry.name] = measured(entry, words)
+        if entry.picture:
+            shutil.copyfile(asked.out / entry.picture, PAGE.parent / "pictures" / entry.picture)
         write({one.name: found[one.name] for one in ENTRIES if one.name in found})
     write({one.name: found[one.name] for one in ENTRIES if one.name in found})
 

@@ -1,10 +1,11 @@
 """How likely a goal is right, all parts of the query together: a product of what makes it so, each with its own odds.
 
-    p = s(thing) * s(near and marks) * s(room),   s the logistic function of a weighted sum
+    p = s(thing) * s(near) * s(marks) * s(room),   s the logistic function of a weight times a number, and a bias
 
-so that a goal is likely only where the thing, what it is near and the room all are. The weights (``found.json``) are
-fitted by ``training/found`` on homes that no table uses, half of the queries being for what is not there. A thing, a
-sound, an area or a photo alone is as likely as the models that made it out say: those are calibrated by themselves.
+so that a goal is likely only where the thing, how near it is, what it is near and the room all are: beside a photo
+whose place is certain, a thing 4 m away is no nearer. The weights (``found.json``) are fitted by ``training/found``
+on homes that no table uses, half of the queries being for what is not there. A thing, a sound, an area or a photo
+alone is as likely as the models that made it out say: those are calibrated by themselves.
 """
 
 import json
@@ -18,7 +19,7 @@ from avlmaps.query.evidence import Evidence
 
 NUMBERS = ("thing", "near", "room", "marks")
 """The numbers of the evidence that have a weight."""
-FACTORS = {"thing": ("thing",), "near": ("near", "marks"), "room": ("room",)}
+FACTORS = {"thing": ("thing",), "near": ("near",), "marks": ("marks",), "room": ("room",)}
 """The factors of the product, and the numbers that each weighs; the weights have a bias for each as well."""
 Weights = Mapping[str, float]
 
@@ -35,8 +36,8 @@ def probability_of(evidence: Evidence, given: Weights | None = None) -> float:
 
 
 def factors_of(evidence: Evidence) -> tuple[str, ...]:
-    """Return the factors that a query has: ``room`` where it names an area, ``near`` where anything else."""
-    near = ("near",) if any(kind is not Modality.AREA for kind in evidence.context) else ()
+    """Return the factors that a query has: ``room`` where it names an area, ``near`` and ``marks`` where others."""
+    near = ("near", "marks") if any(kind is not Modality.AREA for kind in evidence.context) else ()
     return ("thing", *near, *(("room",) if Modality.AREA in evidence.context else ()))
 
 

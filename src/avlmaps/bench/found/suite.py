@@ -15,6 +15,8 @@ from avlmaps.bench.harness.intervals import in_percent, wilson
 from avlmaps.bench.harness.provenance import in_words, provenance
 from avlmaps.bench.harness.workers import side_by_side
 from avlmaps.bench.indexing.runs import IndexingSettings
+from avlmaps.bench.indexing.tables import TITLE
+from avlmaps.bench.indexing.tasks import TaskKind
 from avlmaps.bench.output import Table, markdown, write_answer
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.query.factors import FOUND_AT
@@ -66,11 +68,17 @@ def _scene(todo: _Todo) -> list[Judged]:
 def kinds_table(answers: Sequence[Judged]) -> Table:
     """Return for each kind of query its Brier score and what is reported as found, by what it truly is."""
     rows: list[list[object]] = []
+    tables = {str(kind): TITLE[kind] for kind in TaskKind}
     for kind in [*sorted({one.kind for one in answers}), "all"]:
         own = [one for one in answers if kind in (one.kind, "all")]
         p, right, weight = _numbers(own)
         base = np.average(right, weights=weight)
-        cells: list[object] = [kind, len(own), round(brier(p, right, weight), 3), round(float(base * (1 - base)), 3)]
+        cells: list[object] = [
+            tables.get(kind, kind),
+            len(own),
+            round(brier(p, right, weight), 3),
+            round(float(base * (1 - base)), 3),
+        ]
         groups = (
             [one for one in own if one.right],
             [one for one in own if one.answerable and not one.right],
