@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 # For a count, up to this many instances are taken; those that are found count.
 _MOST_COUNTED = 200
+# Each way to name a storey has one of these: floor, storey, story, stories, level, upstairs.
+_STOREY_STEMS = ("floor", "stor", "level", "stair")
 _EXAMPLE = "the red cabinet near the sound of a dog barking"
 
 
@@ -142,23 +144,27 @@ def ask(avlmap: "Queryable", asked: Asked, files: Files | None = None) -> Answer
         AskError: the sentence does not speak of a file that was given, or intrinsics come without a photo.
         QueryError: the sentence is not understood, or a part of it cannot be used.
     """
-    from avlmaps.language.storey_words import asks_how_many_storeys, said_storeys
-
     begin, files = time.perf_counter(), files or Files()
-    said = said_storeys(asked.sentence)
-    if asks_how_many_storeys(asked.sentence):
-        from avlmaps.query.on_storeys import how_many
-
-        answer = how_many(avlmap)
-    elif said:
-        from avlmaps.query.on_storeys import answer_on_storey
-
-        answer = answer_on_storey(
-            avlmap, said, asked.top, lambda rest, top: _ask(avlmap, replace(asked, sentence=rest, top=top), files)
-        )
-    else:
-        answer = _ask(avlmap, asked, files)
+    sentence = asked.sentence.lower()
+    # A query of one word loads nothing of the language.
+    speaks_of_storeys = any(stem in sentence for stem in _STOREY_STEMS)
+    answer = (_ask_of_storeys if speaks_of_storeys else _ask)(avlmap, asked, files)
     return on_storey(replace(answer, elapsed_ms=1e3 * (time.perf_counter() - begin)), avlmap.storeys)
+
+
+def _ask_of_storeys(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
+    """Answer what may name a storey, or be a question about storeys."""
+    from avlmaps.language.storey_words import asks_how_many_storeys, said_storeys
+    from avlmaps.query.on_storeys import answer_on_storey, how_many
+
+    if asks_how_many_storeys(asked.sentence):
+        return how_many(avlmap)
+    said = said_storeys(asked.sentence)
+    if not said:
+        return _ask(avlmap, asked, files)
+    return answer_on_storey(
+        avlmap, said, asked.top, lambda rest, top: _ask(avlmap, replace(asked, sentence=rest, top=top), files)
+    )
 
 
 def on_storey(answer: Answer, storeys: "Storeys | None") -> Answer:

@@ -337,12 +337,13 @@ class AVLMap:
     @cached_property
     def storeys(self) -> "Storeys | None":
         """The storeys of the map and the stairs between them; None for a map of one storey."""
-        from avlmaps.maps.obstacles import Body
         from avlmaps.maps.storeys import find_storeys, stayed_on_one
 
         cameras = self.space.level(np.asarray(self.stored.keyframes.world_from_camera, np.float64)[:, :3, 3])
         if stayed_on_one(cameras[:, 2]):
             return None
+        from avlmaps.maps.obstacles import Body  # slow to load, and most maps have one storey
+
         certain = np.asarray(self.stored.voxels.hits) >= Body().min_hits
         level = self.space.level(self.space.centres[certain])
         found = find_storeys(level, self.space.grid.voxel_size_m, cameras)
