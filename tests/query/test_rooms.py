@@ -17,6 +17,9 @@ from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.modalities.area import AreaSettings
 from avlmaps.query.rooms import InRooms, NamedVoxels, RoomField, Rooms, RoomSettings, voting_rows
 from avlmaps.query.rules import query_settings
+from avlmaps.query.whereabouts import Whereabouts
+from avlmaps.view.labels import Labels
+from avlmaps.view.layout import Layout
 
 KINDS = ("kitchen", "bedroom", "bathroom")
 LEFT, RIGHT = np.array([[1.0, 1.5, 1.2]]), np.array([[5.0, 1.5, 1.2]])
@@ -182,7 +185,9 @@ def home(settings: QuerySettings | None = None, door_m: float = 0.8, things: boo
     view /= np.linalg.norm(view, axis=1, keepdims=True)
     voxels = voxels_of(np.concatenate([index, bed]), encoder.encode_words(words))
     encoders = fake_encoders(encoder, FakeSounds(), OpenViews())
-    return AVLMap(fake_map(voxels, keyframes=keyframes_at(places, view), encoders=encoders), settings)
+    stored = fake_map(voxels, keyframes=keyframes_at(places, view), encoders=encoders)
+    stored.info.models = ("views", "pixels")
+    return AVLMap(stored, settings)
 
 
 def test_a_bed_makes_the_bedroom() -> None:
@@ -219,6 +224,29 @@ def test_the_rooms_of_the_map_are_listed_by_walls() -> None:
     rooms = home(door_m=0.0).rooms()
     assert sorted(room.name for room in rooms) == ["bedroom", "kitchen"]
     assert {room.name: room.views for room in rooms} == {"kitchen": 4, "bedroom": 4}
+    for room in rooms:
+        told = room.to_json()
+        assert told["probability"] == told["confidence"] == told["names"][0]["probability"]
+        assert told["area_m2"] == pytest.approx(8.6, abs=1.0) and len(told["outline"]) >= 4
+
+
+def test_each_voxel_has_the_colour_of_its_room_and_a_question_its_things() -> None:
+    m = home(door_m=0.0)
+    layout = Layout(m)
+    labels, x = Labels.of(layout), m.points[layout.order, 0]
+    left, right = labels.voxels[x < 2.8, 1], labels.voxels[x > 3.2, 1]
+    assert np.median(left) != np.median(right) and {*np.unique(left)} == {np.median(left)}
+    where = Whereabouts.of(m)
+    assert where.areas_m2() == pytest.approx([8.6, 8.6], abs=1.0)
+    np.testing.assert_array_equal(where.parts_of(lambda kind: kind == "kitchen", np.r_[LEFT, RIGHT]), [True, False])
+
+
+def test_an_open_plan_is_one_room_of_two_names_and_each_part_answers_to_its_own() -> None:
+    m = home(door_m=2.8, things=False)
+    (room,) = m.rooms()
+    assert {name for name, _ in room.names} >= {"kitchen", "office"} and (room.area_m2 or 0.0) > 16.0
+    inside = Whereabouts.of(m).parts_of(lambda kind: kind == "kitchen", np.array([[0.6, 1.5, 1.0], [4.6, 1.5, 1.0]]))
+    assert inside.tolist() == [True, False]
 
 
 def test_the_papers_rules_know_no_walls_and_no_things() -> None:

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 MAP_MANIFEST = "map.json"
 # `info` opens this many pictures of a recording, spread evenly; `info --verify` opens them all.
 DECODED_BY_INFO = 100
-# Rooms with a lower confidence are not named in the picture.
-LEAST_ROOM = 0.5
 # Further names of a sound are shown from this score on.
 _LIKELY = 0.1
 _MOST_NAMED = 6  # sounds, without --verbose
@@ -167,7 +165,7 @@ def plot_named(stored: "StoredMap", plot: Path) -> Path:
     things, rooms = [], []
     try:
         things = opened.things() if "pixels" in models else []
-        rooms = opened.rooms(LEAST_ROOM) if "views" in models else []
+        rooms = opened.rooms() if "views" in models else []
     except AvlmapsError as error:  # a map can be looked at without the models that made it
         say(f"note: the picture has no names: {error}")
     return plot_map(stored, plot, things, rooms)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Things(ModelVerb):
-    """List the things, sounds and rooms of a map, each with its confidence.
+    """List the things, sounds and rooms of a map, each with its confidence; of rooms the area as well.
 
     Example: avlmaps things home.avlmap --least 0.7 --csv things.csv
     """

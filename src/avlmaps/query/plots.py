@@ -15,6 +15,7 @@ from avlmaps.core.frames import FrameName
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import plot_text
 from avlmaps.core.question import Modality
+from avlmaps.query.export import palette
 from avlmaps.query.factors import FOUND_AT, Factor, NearAnchors
 from avlmaps.query.goals import Goal
 from avlmaps.query.topdown import TopDown, camera_path
@@ -116,7 +117,7 @@ def draw_map(
 
 
 def _draw_names(ax: "Axes", space: Space, things: "Sequence[Thing]", rooms: "Sequence[Room]") -> None:
-    """Write names where things and rooms are."""
+    """Write names where things and rooms are, and draw the outlines of rooms."""
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=2.5, foreground="white", alpha=0.85)]
@@ -124,9 +125,14 @@ def _draw_names(ax: "Axes", space: Space, things: "Sequence[Thing]", rooms: "Seq
     for thing in sorted(things, key=lambda one: -one.size[0] * one.size[1])[:MOST_NAMES]:
         x, y, _ = space.level(np.array(thing.position))
         ax.text(x, y, plot_text(thing.name), fontsize=6.5, color=INK, zorder=8, **style)
-    for room in rooms:
+    for room, colour in zip(rooms, palette(len(rooms)) / 255.0, strict=True):
+        corners = space.level(room.outline)[:, :2]
+        if len(corners):
+            ax.fill(*corners.T, facecolor=(*colour, 0.12), edgecolor=(*colour, 0.9), linewidth=1.6, zorder=6)
         x, y, _ = space.level(np.array(room.position))
-        ax.text(x, y, plot_text(room.name).upper(), fontsize=9, color=_PATH, fontweight="bold", zorder=9, **style)
+        area = "" if room.area_m2 is None else f"\n{room.area_m2:.1f} m²"
+        text = plot_text(room.name).upper() + area
+        ax.text(x, y, text, fontsize=9, color=_PATH, fontweight="bold", zorder=9, **style)
 
 
 def panels(view: TopDown, count: int) -> "tuple[Figure, list[Axes]]":

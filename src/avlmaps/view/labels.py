@@ -135,13 +135,19 @@ def _thing_labels(count: int, things: "Sequence[Thing]") -> tuple[tuple[str, ...
 def _room_labels(
     avlmap: "AVLMap", rooms: "Sequence[Room]", rows: Int[np.ndarray, " m"]
 ) -> tuple[tuple[str, ...], UInt8[np.ndarray, " m"]]:
-    """Give each of some voxels the room whose views lie nearest to it on the ground."""
+    """Give each of some voxels the room that it lies in; without regions that whose views lie nearest on the ground."""
     from scipy.spatial import KDTree
 
     names = tuple(sorted({room.name for room in rooms}))[:_MOST]
     if not names or not len(rows):
         return names, np.zeros(len(rows), np.uint8)
-    space = avlmap.space
+    space, regions = avlmap.space, avlmap.room_regions
+    if regions is not None and len(regions):
+        of_region = np.full(len(regions) + 1, NONE, np.uint8)  # the last is that of no region
+        for room in rooms:
+            of_region[room.region] = 1 + names.index(room.name) if room.name in names else NONE
+        of_region[-1] = NONE
+        return names, of_region[regions.at(space.centres_of(rows))]
     places = np.concatenate([space.level(room.places)[:, :2] for room in rooms])
     label = np.concatenate([np.full(room.views, 1 + names.index(room.name), np.uint8) for room in rooms])
     if not _is_level(avlmap):

@@ -5,21 +5,13 @@ const metres = (value) => `${value.toFixed(2)} m`;
 const placeText = (place) => `(${place.map((value) => value.toFixed(2)).join(", ")}) m`;
 const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 const percent = (share) => `${Math.round(100 * share)} %`;
+const areaText = (room) => (room.area_m2 === null ? "" : ` · ${room.area_m2.toFixed(1)} m²`);
 
 function made(tag, properties = {}, ...children) {
   const element = document.createElement(tag);
   Object.assign(element, properties);
   element.append(...children);
   return element;
-}
-
-/** Rooms without those of the same name close to a larger one: one name is enough there. */
-function apart(rooms) {
-  const kept = [];
-  for (const room of rooms) {
-    if (!kept.some((one) => one.name === room.name && length(sub(one.position, room.position)) < 4)) kept.push(room);
-  }
-  return kept;
 }
 
 class Panel {
@@ -444,12 +436,19 @@ class Panel {
         place: this.toLevel(k, sound.position), text: `♪ ${sound.names[0] ?? `sound ${i + 1}`}`,
         title: `play what was heard at ${clock(sound.onset_s)}`, onClick: (event) => this.play(k, i, event.target),
       })) : []);
-      marks.set("room", 3, shown("rooms") ? apart(contents.rooms).map((room) => {
+      marks.set("room", 3, shown("rooms") ? contents.rooms.map((room) => {
         const place = this.toLevel(k, room.position);
-        const onFloor = [place[0], place[1], this.floorUnder(map, place[2]) + 0.02];
-        return { place: onFloor, text: room.name, title: `go to the ${room.name}`,
+        const floor = room.outline.length ? this.toLevel(k, room.outline[0])[2] : this.floorUnder(map, place[2]);
+        const onFloor = [place[0], place[1], floor + 0.02];
+        return { place: onFloor, text: room.name, title: `go to the ${room.name}${areaText(room)}`,
           onClick: () => this.viewer.flyTo(onFloor, 6) };
       }) : []);
+      const outlined = shown("rooms") ? contents.rooms.filter((room) => room.outline.length) : [];
+      this.viewer.setLines(k, "rooms", outlined.map((room) => {
+        const corners = [...room.outline, room.outline[0]].map((corner) => add(this.toLevel(k, corner), [0, 0, 0.03]));
+        const tint = contents.palettes.room.slice(3 * room.label, 3 * room.label + 3).map((value) => value / 255);
+        return { kind: "band", places: band(corners, 0.08), tint };
+      }));
       marks.set("thing", 4, shown("things") ? contents.things.map((thing) => {
         const [r, g, b] = contents.palettes.thing.slice(3 * thing.label, 3 * thing.label + 3);
         return {
@@ -494,7 +493,8 @@ class Panel {
       return item;
     }));
     $("rooms").replaceChildren(...rooms.map((room) =>
-      row(room.name, `${percent(room.confidence)} · ${room.views} views`, room.position, 7, ["room", room.label])));
+      row(room.name, `${percent(room.probability)}${areaText(room)} · ${room.views} views`, room.position, 7,
+        ["room", room.label])));
     for (const [id, list] of [["things", things], ["sounds", sounds], ["rooms", rooms]]) {
       $(`${id}-count`).textContent = `(${list.length})`;
     }
