@@ -141,9 +141,9 @@ def test_frames_that_see_nothing_in_common_are_not_called_fine(tmp_path: Path) -
 
 
 SPOTS = {
-    "stands and turns evenly": (RoomWalk("turn", seed=57, frames=30, round_rad_s=0.0, even=True), {"scale", "clock"}),
+    "stands and turns evenly": (RoomWalk("turn", seed=57, frames=30, round_rad_s=0.0, even=True), {"scale of", "clock of"}),
     "hardly moves": (RoomWalk("still", seed=58, frames=30, round_rad_s=0.02, turn_rad_s=0.02, noise=0.0019, even=True),
-                     {"scale", "clock", "focal"}),
+                     {"scale of", "clock of", "focal"}),
     "walks": (RoomWalk("walk", seed=51, frames=30), set[str]()),
 }  # fmt: skip
 
@@ -154,7 +154,7 @@ def test_what_would_not_show_is_said(name: str, tmp_path: Path) -> None:
     found = verdict(walk.draft(CAMERA), tmp_path)
     assert found.grade is Grade.FINE and not found.sentences()
     said = " ".join(found.unchecked)
-    assert {spot for spot in ("scale", "clock", "focal", "axis") if spot in said} == spots
+    assert {spot for spot in ("scale of", "clock of", "focal", "the ray") if spot in said} == spots
 
 
 @pytest.fixture(scope="module")

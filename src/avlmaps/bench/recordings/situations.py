@@ -52,7 +52,7 @@ _Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
 def _of_poses() -> Iterator[Situation]:
-    group, geometry = "poses", r"do not agree|jump|exchanged|m/s|Hardly any"
+    group, geometry = "poses", r"do not agree|jump|exchanged|m/s|Hardly any|mount"
     yield Situation("camera_from_world", group, _on_poses(poses.inverse), "camera_from_world|camera-from-world")
     yield Situation("quaternion written w first", group, lambda d, o, g: replace(d, quaternion_roll=1), "wxyz")
     yield Situation("OpenGL camera", group, _on_poses(lambda p: p @ _GL), "opengl|RUB")
@@ -71,8 +71,13 @@ def _of_poses() -> Iterator[Situation]:
         "noise of 5 cm and 3 degrees", group, lambda d, o, g: replace(d, poses=_noisy(d.poses, g)), geometry
     )
     yield Situation("pictures of 10 frames exchanged", group, _exchanged, geometry)
+    yield Situation("camera rolled by 8 degrees in its mount", group, _on_poses(lambda p: p @ _ROLLED), geometry)
     yield Situation("two neighbours exchanged", group, _neighbours(1, 0), "exchanged")
     yield Situation("three neighbours exchanged", group, _neighbours(1, 2, 0), "exchanged")
+
+
+_ROLLED = np.eye(4)
+_ROLLED[:2, :2] = [[np.cos(0.14), -np.sin(0.14)], [np.sin(0.14), np.cos(0.14)]]
 
 
 def _transposed(written: np.ndarray) -> np.ndarray:
@@ -242,6 +247,10 @@ def _of_colour() -> Iterator[Situation]:
         "colour shifted by a sixteenth", group, _on_colour(lambda c: np.roll(c, c.shape[1] // 16, axis=1)), "colour"
     )
     yield Situation("colour of two neighbours exchanged", group, _neighbours(1, 0, depth=False), "exchanged|colour")
+    yield Situation(
+        "colour froze", group,
+        lambda d, o, g: _reordered(d, np.minimum(np.arange(len(d)), len(d) // 2), colour=True, depth=False), colour,
+    )  # fmt: skip
     yield Situation(
         "colour 3 frames late", group,
         lambda d, o, g: _reordered(d, np.minimum(np.arange(len(d)) + 3, len(d) - 1), colour=True, depth=False), colour,

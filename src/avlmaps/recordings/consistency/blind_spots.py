@@ -15,6 +15,7 @@ from avlmaps.recordings.types import Recording
 
 # Mistakes that are made to see whether they would show: twice, half, a moment.
 _FACTOR, _FOCAL, _DELAY_S = 2.0, 1.25, 0.3
+_BESIDE, _ROLLED_DEG = 0.08, 6.0
 # A step that turns the camera by more than this share of its view leaves nothing that both frames see.
 _NO_OVERLAP = 0.9
 
@@ -68,6 +69,13 @@ def _spots(recording: Recording, trials: Trials, edges: Edges) -> Iterator[str]:
         yield (
             "The focal length cannot be checked here, because the camera hardly turns between frames that see the same "
             f"place: one {_FOCAL:g} times as long would not show."
+        )
+    beside = (Suspect(off_centre=(_BESIDE, 0.0)), Suspect(off_centre=(0.0, _BESIDE)), Suspect(rolled_deg=_ROLLED_DEG))
+    if not shows(*beside):
+        yield (
+            "How the camera sits in its mount and its principal point cannot be checked here, because the camera turns "
+            f"about one axis or hardly: a principal point that is off by {_BESIDE:.0%} of the picture, or a roll of "
+            f"{_ROLLED_DEG:g} degrees, would not show."
         )
     if not shows(Suspect(along_ray=True)):
         yield (

@@ -56,7 +56,9 @@ def _looks(suspect: Suspect, rig: Rig, median_m: float) -> list[str]:
     if any(suspect.off_centre):
         parts = zip(suspect.off_centre, (rig.rgb.width, rig.rgb.height), "xy", strict=True)
         by = " and ".join(f"{share * size:+.0f} pixels in {axis}" for share, size, axis in parts if share)
-        said.append(f"the principal point looks {by} off")
+        said.append(f"the principal point looks {by} off, or the camera turned by so much in its mount")
+    if suspect.rolled_deg:
+        said.append(f"the camera looks turned by {suspect.rolled_deg:+.0f} degrees about its own axis in its mount")
     if suspect.along_ray:
         said.append("the depth looks like the distance along the ray, not along the camera's axis")
     return said + _turned(suspect.turn_colour, suspect.turn_depth)
@@ -136,6 +138,8 @@ def _by_hand(suspect: Suspect, median_m: float) -> str:
         todo.append("turn the colour pictures as the depth is")
     elif suspect.turn_depth is not None:
         todo.append("turn the depth pictures as the colour is")
+    if suspect.rolled_deg:
+        todo.append("correct the transform from what the poses are of to the camera")
     if suspect.along_ray:
         todo.append("write the depth along the camera's axis (z)")
     return ", ".join(todo)

@@ -26,6 +26,8 @@ from avlmaps.recordings.types import Recording
 MOST_JUMPS = 3
 # A step of the poses this many times the usual one, and beyond this, is a jump if fewer points agree across it.
 LEAST_ACROSS_STEP = 0.9
+# Without such a step fewer points must agree across it, and their depths differ this many times as much as beside.
+_MISFIT, _MISFIT_RATIO = 0.7, 3.0
 ODD_STEP, ODD_STEP_M, ODD_STEP_RAD = 4.0, 0.15, np.radians(8.0)
 # Pairs of frames that are exchanged agree less than this, and all of them agree in another order.
 _EXCHANGED, _PUT_RIGHT, _COLOUR_RIGHT = 0.85, 0.15, 0.3
@@ -38,7 +40,7 @@ def find_jump(recording: Recording, sample: Sample, after: Agreement) -> Finding
     pairs = sample.index[sample.only(sample.follows).pairs]
     odd = _odd_steps(recording)
     share = np.where(after.points >= 2 * FEWEST_POINTS, after.same / np.maximum(after.points, 1), 1.0)
-    most = np.where([odd[a:b].any() for a, b in pairs], LEAST_ACROSS_STEP, BAD_PAIR)
+    most = np.where([odd[a:b].any() for a, b in pairs], LEAST_ACROSS_STEP, _MISFIT)
     rows = np.flatnonzero(share < most)
     for row in rows[np.argsort(share[rows] - most[rows], kind="stable")][:MOST_JUMPS].tolist():
         a, b = (int(number) for number in pairs[row])
@@ -54,7 +56,10 @@ def find_jump(recording: Recording, sample: Sample, after: Agreement) -> Finding
         )
         few = over.pairs >= FEWEST_PAIRS and over.same_share < HARDLY_ANY
         seen = (can_be_judged(over) or few) and can_be_judged(beside)
-        if seen and over.same_share < most[row] and beside.same_share > max(LEAST_AGREEING, over.same_share + 0.1):
+        far_off = over.same_share < BAD_PAIR or np.nanmedian(over.off) > _MISFIT_RATIO * np.nanmedian(beside.off)
+        step = far_off or most[row] == LEAST_ACROSS_STEP
+        better = beside.same_share > max(LEAST_AGREEING, over.same_share + 0.1)
+        if seen and step and better and over.same_share < most[row]:
             sentence = (
                 f"Frames {recording.name(a)} and {recording.name(b)} do not agree ({over.same_share:.0%} of the points "
                 f"on one surface), although the frames before and after do ({beside.same_share:.0%})."

@@ -117,14 +117,23 @@ def _flat_depth(sample: Sample, there: np.ndarray) -> Iterator[Finding]:
     if len(spread) >= 3 and float(np.median(spread)) < 0.01:
         sentence = "The depth pictures are flat: every pixel has the same depth."
         yield Finding(Reason.DEPTH, Grade.IMPOSSIBLE, sentence, "Check how they were written.")
+    yield from _frozen(sample, np.where(there, sample.depth_m, np.nan), Reason.DEPTH)
+
+
+def _frozen(sample: Sample, pictures: np.ndarray, reason: Reason) -> Iterator[Finding]:
+    """Find pictures that stay the same although the camera moves; those of one value are none."""
     moved = np.array([steps_between_all(sample.world_from_camera[pair])[0] for pair in sample.pairs])
-    same = np.array([np.array_equal(sample.depth_m[a], sample.depth_m[b]) and there[a].any() for a, b in sample.pairs])
-    if len(moved) and (moved > 0.3).sum() >= 3:
-        share = float(same[moved > 0.3].mean())
-        if share > MOST_FROZEN:
-            sentence = f"In {share:.0%} of the pairs of frames the depth picture is the same although the camera moved."
-            remedy = "The camera or its driver may have hung; record again, or leave these frames out."
-            yield Finding(Reason.DEPTH, Grade.SUSPICIOUS, sentence, remedy)
+    if (moved > 0.3).sum() < 3:
+        return
+    shown = np.array([np.nanmax(one, initial=-np.inf) > np.nanmin(one, initial=np.inf) for one in pictures])
+    same = np.array(
+        [shown[a] and np.array_equal(pictures[a], pictures[b], equal_nan=True) for a, b in sample.pairs[moved > 0.3]]
+    )
+    share = float(same.mean())
+    if share > MOST_FROZEN:
+        sentence = f"In {share:.0%} of the pairs of frames the {reason} picture is the same although the camera moved."
+        remedy = "The camera or its driver may have hung; record again, or leave these frames out."
+        yield Finding(reason, Grade.SUSPICIOUS, sentence, remedy)
 
 
 def of_colour(sample: Sample, surfaces: Surfaces) -> Iterator[Finding]:
@@ -140,6 +149,8 @@ def of_colour(sample: Sample, surfaces: Surfaces) -> Iterator[Finding]:
         sentence = f"The colour pictures are dark: the middle brightness is {level:.0f} of 255."
         remedy = "Little is recognised in the dark; record with more light or a longer exposure."
         yield Finding(Reason.COLOUR, Grade.SUSPICIOUS, sentence, remedy)
+    else:
+        yield from _frozen(sample, sample.grey, Reason.COLOUR)
     rig = sample.rig
     if rig.registered or not surfaces.there.any():
         return

@@ -20,6 +20,7 @@ _FLOOR_SHARE, _APART_FLOOR_SHARE = SAME_M / 2.5, APART_SAME_M / 2.5
 UNITS = (0.5, 2.0, 0.25, 4.0, 0.2, 5.0, 0.1, 10.0, 0.01, 100.0, 0.001, 1000.0)
 _SCALES = (0.8, 1.25, 0.63, 1.6, 0.4, 2.5, *UNITS)
 _TWICE_SCALES = UNITS[:8]
+_ROLLED_DEG = (-8.0, -4.0, 4.0, 8.0)
 _OFF_CENTRE, _BESIDE_CENTRE = (-0.12, -0.06, 0.06, 0.12), (-0.03, 0.0, 0.03)
 _FOCAL = (0.5, 0.67, 0.8, 0.9, 1.12, 1.25, 1.5, 2.0)
 _DELAYS_S = tuple(sign * step / 20.0 for step in range(1, 21) for sign in (1.0, -1.0))
@@ -84,6 +85,7 @@ class Suspect:
         scale: what the depth is multiplied by, beside.
         focal: what the focal lengths are multiplied by; None: nothing.
         off_centre: by how much the principal point lies to the right and below, as shares of the picture.
+        rolled_deg: by how much the camera is turned about its own axis in its mount.
         centred: whether the principal point is put into the middle, with the focal length in proportion.
         swapped: whether the numbers of columns and rows are exchanged.
         turn_colour: how colour pictures are turned.
@@ -95,6 +97,7 @@ class Suspect:
     scale: float = 1.0
     focal: float | None = None
     off_centre: tuple[float, float] = (0.0, 0.0)
+    rolled_deg: float = 0.0
     centred: bool = False
     swapped: bool = False
     turn_colour: Turn | None = None
@@ -158,7 +161,11 @@ class Trials:
         if rig is None or pose is None:
             return Trial(suspect, NOTHING, NOTHING, 0.0)
         sample = replace(sample, depth_m=depth_m, grey=grey)
-        median_m, scale, pose = self._median_m * suspect.scale, suspect.scale, reread_poses(pose, given)
+        median_m, scale, pose = (
+            self._median_m * suspect.scale,
+            suspect.scale,
+            reread_poses(pose, given) @ _rolled(suspect.rolled_deg),
+        )
         after = compare(sample.only(sample.follows), surfaces, pose, rig, scale, _FLOOR_SHARE * median_m)
         apart = compare(sample.only(~sample.follows), surfaces, pose, rig, scale, _APART_FLOOR_SHARE * median_m)
         return Trial(suspect, after, apart, self._score(after, apart))
@@ -187,6 +194,12 @@ class Trials:
         if np.isfinite(found.likeness) and found.textured > 0.05 * self._points:
             score *= 0.5 + 0.5 * max(found.likeness, 0.0)
         return score
+
+
+def _rolled(degrees: float) -> Float[np.ndarray, "4 4"]:
+    turn, cos, sin = np.eye(4), np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn[:2, :2] = [[cos, -sin], [sin, cos]]
+    return turn
 
 
 def _some(rows: np.ndarray) -> np.ndarray:
@@ -224,7 +237,7 @@ def find_closer(trials: Trials) -> Trial | None:
     as_it_is = trials.run(Suspect())
     if not _LEAST_OFF < as_it_is.off < float("inf"):
         return None
-    tried = map(trials.run, (*_scales(), *_delays(), *_focal(), *_centres()))
+    tried = map(trials.run, (*_scales(), *_delays(), *_focal(), *_mounts()))
     closer = [trial for trial in tried if _is_less_off(trial, as_it_is)]
     if not closer:
         return None
@@ -330,8 +343,9 @@ def _focal() -> Iterator[Suspect]:
     yield from (Suspect(focal=factor) for factor in _FOCAL)
 
 
-def _centres() -> Iterator[Suspect]:
-    """Yield principal points beside the given one."""
+def _mounts() -> Iterator[Suspect]:
+    """Yield rolls, and principal points beside the given one, which a camera that is turned has as well."""
+    yield from (Suspect(rolled_deg=degrees) for degrees in _ROLLED_DEG)
     for by in _OFF_CENTRE:
         yield from (Suspect(off_centre=(by, 0.0)), Suspect(off_centre=(0.0, by)))
 
@@ -342,6 +356,7 @@ def _with(a: Suspect, b: Suspect) -> Suspect:
         given=b.given.over(a.given),
         scale=a.scale if b.scale == 1.0 else b.scale,
         focal=b.focal or a.focal,
+        rolled_deg=b.rolled_deg or a.rolled_deg,
         off_centre=b.off_centre if any(b.off_centre) else a.off_centre,
         centred=a.centred or b.centred,
         swapped=a.swapped or b.swapped,
@@ -362,6 +377,10 @@ def _refined(trials: Trials, best: Trial) -> Trial:
         tried = [replace(suspect, scale=float(scale)) for scale in (*_SCALES, *fine.tolist())]
     elif suspect.focal is not None:
         tried = [replace(suspect, focal=float(suspect.focal * factor)) for factor in np.geomspace(0.88, 1.14, 9)]
+    elif suspect.rolled_deg:
+        tried = [
+            replace(suspect, rolled_deg=suspect.rolled_deg + degrees) for degrees in (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
+        ]
     elif any(suspect.off_centre):
         at_x, at_y = suspect.off_centre
         tried = [replace(suspect, off_centre=(at_x + x, at_y + y)) for x, y in product(_BESIDE_CENTRE, repeat=2)]
