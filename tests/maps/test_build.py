@@ -395,7 +395,7 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None
     path = tmp_path / "file" / "a.avlmap"
     with pytest.raises(MapError) as fault:
         build(Walk(4), path)
-    assert str(fault.value).startswith(f"Cannot write {path}: Not a directory; make room or choose another folder")
+    assert str(fault.value).startswith(f"Cannot write {path}: Not a directory; choose another folder")
 
 
 def test_a_subset_is_a_recording() -> None:

@@ -544,3 +544,9 @@ def test_a_repair_gives_back_what_was_built(copied: Path) -> None:
     if not done.rebuilt:
         assert all(file.read_bytes() == content for file, content in before.items())
     assert repair_map(copied, None).files == ()
+
+
+def test_a_link_that_leads_nowhere_is_called_one(tmp_path: Path) -> None:
+    (tmp_path / "map").symlink_to("nowhere")
+    with pytest.raises(MapError, match=r"map: it is a symbolic link that leads nowhere; choose another folder"):
+        lock_folder(tmp_path / "map").__enter__()

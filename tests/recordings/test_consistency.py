@@ -141,7 +141,8 @@ def test_frames_that_see_nothing_in_common_are_not_called_fine(tmp_path: Path) -
 
 
 SPOTS = {
-    "stands and turns evenly": (RoomWalk("turn", seed=57, frames=30, round_rad_s=0.0, even=True), {"scale of", "clock of"}),
+    "stands and turns evenly": (RoomWalk("turn", seed=57, frames=30, round_rad_s=0.0, even=True),
+                                {"scale of", "clock of"}),
     "hardly moves": (RoomWalk("still", seed=58, frames=30, round_rad_s=0.02, turn_rad_s=0.02, noise=0.0019, even=True),
                      {"scale of", "clock of", "focal"}),
     "walks": (RoomWalk("walk", seed=51, frames=30), set[str]()),

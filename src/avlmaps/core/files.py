@@ -151,6 +151,10 @@ def replace_atomically(path: Path) -> Generator[BinaryIO]:
             os.fsync(stream.fileno())
         partial.replace(path)
         sync_folder(path.parent)
+    except OSError as fault:
+        if fault.filename is None:  # of a full disk
+            fault.filename = str(path)
+        raise
     finally:
         partial.unlink(missing_ok=True)
 

@@ -4,6 +4,7 @@ A file is written under a temporary name, synced and renamed to ``<name>-<sha256
 for two contents, an old manifest's files are never touched by a new build, and the same build gives the same names.
 """
 
+import errno
 import hashlib
 import io
 import itertools
@@ -51,9 +52,14 @@ def explain_write_errors(folder: Path) -> Generator[None]:
     try:
         yield
     except OSError as fault:
+        place = Path(fault.filename or folder)
+        why = fault.strerror or fault
+        if fault.errno == errno.EEXIST and place.is_symlink():
+            why = "it is a symbolic link that leads nowhere"
+        make_room = "make room or " if fault.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) else ""
         raise MapError(
-            f"Cannot write {fault.filename or folder}: {fault.strerror or fault}; make room or choose another folder, "
-            "then run the same build again: the finished stages are stored."
+            f"Cannot write {place}: {why}; {make_room}choose another folder, then run the same build again: the "
+            "finished stages are stored."
         ) from fault
 
 

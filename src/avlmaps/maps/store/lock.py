@@ -58,8 +58,9 @@ def lock_folder(folder: Path) -> Generator[None]:
                 f"{folder} is being built by another process{f' ({holder})' if holder else ''} at this moment; wait "
                 "for it, or build into another folder."
             ) from fault
-        os.ftruncate(descriptor, 0)
-        os.write(descriptor, f"{os.getpid()}\n".encode())
+        with explain_write_errors(folder):
+            os.ftruncate(descriptor, 0)
+            os.write(descriptor, f"{os.getpid()}\n".encode())
         yield
     finally:
         os.close(descriptor)
