@@ -56,7 +56,7 @@ def _looks(suspect: Suspect, rig: Rig, median_m: float) -> list[str]:
     if any(suspect.off_centre):
         parts = zip(suspect.off_centre, (rig.rgb.width, rig.rgb.height), "xy", strict=True)
         by = " and ".join(f"{share * size:+.0f} pixels in {axis}" for share, size, axis in parts if share)
-        said.append(f"the principal point looks {by} off, or the camera turned by so much in its mount")
+        said.append(f"the principal point looks {by} off, or the camera turned by as many in its mount")
     if suspect.rolled_deg:
         said.append(f"the camera looks turned by {suspect.rolled_deg:+.0f} degrees about its own axis in its mount")
     if suspect.along_ray:
